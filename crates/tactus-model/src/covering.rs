@@ -1,0 +1,29 @@
+//! The elastic covering and how it spreads what presses on it.
+
+/// The layer on the sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Covering {
+    /// Thickness in mm, positive.
+    pub thickness_mm: f64,
+}
+
+/// Width of the Gaussian point spread function against covering thickness (Eq. 4).
+///
+/// `sigma_mm = sigma_intercept_mm + sigma_per_mm * thickness_mm`
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Psf {
+    /// Spread without any covering: the sensor's own.
+    pub sigma_intercept_mm: f64,
+    /// Spread gained with each mm of covering.
+    pub sigma_per_mm: f64,
+}
+
+impl Psf {
+    /// The paper's fit, `sigma = 1.11 + 0.497 t` in pitches of 2.0 mm (Eq. 4), in mm.
+    pub const PAPER: Self = Self { sigma_intercept_mm: 2.22, sigma_per_mm: 0.497 };
+
+    /// Standard deviation of the spread under a covering, in mm.
+    pub fn sigma_mm(&self, covering: Covering) -> f64 {
+        self.sigma_intercept_mm + self.sigma_per_mm * covering.thickness_mm
+    }
+}

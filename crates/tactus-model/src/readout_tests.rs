@@ -1,0 +1,28 @@
+use super::*;
+
+fn twelve_bit() -> Readout {
+    Readout::of(&Array::digitacts())
+}
+
+#[test]
+fn readings_are_whole_steps_within_the_range() {
+    let readout = twelve_bit();
+    for (counts, noise, want) in [
+        (100.4, 0.0, 100.0),
+        (100.4, 0.2, 101.0),
+        (5000.0, 0.0, 4095.0),
+        (-3.0, 1.0, 0.0),
+        // Noise comes before saturation: a reading past full scale can come back into range.
+        (4100.0, -10.0, 4090.0),
+    ] {
+        assert_eq!(readout.read(counts, noise).to_bits(), f64::to_bits(want), "{counts} {noise}");
+    }
+}
+
+#[test]
+fn the_last_step_does_not_pass_full_scale() {
+    let array = Array::new("coarse", [1.0, 1.0], vec![0.0], vec![0.0], 30.0, 100.0, 8.0).unwrap();
+    let readout = Readout::of(&array);
+    assert_eq!(readout.read(1e9, 0.0).to_bits(), 96.0_f64.to_bits());
+    assert_eq!(readout.read(43.0, 0.0).to_bits(), 40.0_f64.to_bits());
+}

@@ -1,0 +1,84 @@
+//! One reading of all elements, as it travels through the service.
+
+use std::sync::Arc;
+
+use crate::{DeviceTick, MonoTime, Stamp, WallTime, pb};
+
+/// One reading of all elements; cheap to clone, so that it can fan out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Counts every frame the sensor took, lost ones included; see [`pb::Frame::seq`].
+    pub seq: u64,
+    /// Rises by one with every (re)connection.
+    pub epoch: u32,
+    /// The device's clock at the sampling, where it has one.
+    pub device_tick: Option<DeviceTick>,
+    /// When the last byte of the frame reached the host.
+    pub received: Stamp,
+    /// Raw counts, row-major, one per element.
+    pub counts: Arc<[f32]>,
+    /// What is known of this frame.
+    pub flags: FrameFlags,
+    /// Frames known to be lost just before this one.
+    pub lost_before: u32,
+    /// True if no physical sensor was read.
+    pub simulated: bool,
+}
+
+/// Bits of [`pb::FrameFlag`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FrameFlags(pub u32);
+
+impl FrameFlags {
+    /// At least one frame before this one is missing.
+    pub const GAP_BEFORE: Self = Self(pb::FrameFlag::GapBefore as u32);
+    /// The first frame after a (re)connection.
+    pub const NEW_EPOCH: Self = Self(pb::FrameFlag::NewEpoch as u32);
+    /// At least one element stands at the end of its range.
+    pub const SATURATED: Self = Self(pb::FrameFlag::Saturated as u32);
+
+    /// True if every bit of `other` is set.
+    pub fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Both sets of bits.
+    #[must_use]
+    pub fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl From<&Frame> for pb::Frame {
+    fn from(frame: &Frame) -> Self {
+        Self {
+            seq: frame.seq,
+            epoch: frame.epoch,
+            device_tick: frame.device_tick.map(|tick| tick.0),
+            t_mono_ns: frame.received.mono.ns(),
+            t_wall_ns: frame.received.wall.ns(),
+            counts: frame.counts.to_vec(),
+            flags: frame.flags.0,
+            lost_before: frame.lost_before,
+            simulated: frame.simulated,
+        }
+    }
+}
+
+impl From<pb::Frame> for Frame {
+    fn from(message: pb::Frame) -> Self {
+        Self {
+            seq: message.seq,
+            epoch: message.epoch,
+            device_tick: message.device_tick.map(DeviceTick),
+            received: Stamp {
+                mono: MonoTime::from_ns(message.t_mono_ns),
+                wall: WallTime::from_ns(message.t_wall_ns),
+            },
+            counts: message.counts.into(),
+            flags: FrameFlags(message.flags),
+            lost_before: message.lost_before,
+            simulated: message.simulated,
+        }
+    }
+}

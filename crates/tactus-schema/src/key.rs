@@ -1,0 +1,114 @@
+//! Key expressions on the bus: `tactus/<rig>/...`.
+
+/// The keys of one rig.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Keys {
+    rig: String,
+}
+
+/// A topic that the service publishes; its message is named beside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Topic {
+    /// [`crate::pb::Frame`], at the sensor's rate.
+    SensorFrame,
+    /// [`crate::pb::SensorInfo`], at each connection.
+    SensorInfo,
+    /// [`crate::pb::StageState`], at each report of the stage.
+    StageState,
+    /// [`crate::pb::RunEvent`], as they happen.
+    RunEvent,
+    /// [`crate::pb::RunState`], at each change.
+    RunState,
+    /// [`crate::pb::Health`], once a second.
+    Health,
+    /// [`crate::pb::SafetyEvent`], at each change.
+    SafetyState,
+}
+
+/// A question that the service answers; asked with [`crate::pb::RunRequest`] or
+/// [`crate::pb::CommandRequest`], answered with [`crate::pb::CommandReply`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Command {
+    /// What the service is doing.
+    Status,
+    /// Start an experiment.
+    Run,
+    /// Hold after the step in hand.
+    Pause,
+    /// Go on after a pause.
+    Resume,
+    /// Stop motion now, retract, end the run. Never queued behind anything.
+    Stop,
+    /// Clear the stage's alarm and home it. Refused during a run.
+    Reset,
+}
+
+impl Topic {
+    /// Every topic.
+    pub const ALL: [Self; 7] = [
+        Self::SensorFrame,
+        Self::SensorInfo,
+        Self::StageState,
+        Self::RunEvent,
+        Self::RunState,
+        Self::Health,
+        Self::SafetyState,
+    ];
+
+    /// The key below `tactus/<rig>/`.
+    pub const fn suffix(self) -> &'static str {
+        match self {
+            Self::SensorFrame => "sensor/frame",
+            Self::SensorInfo => "sensor/info",
+            Self::StageState => "stage/state",
+            Self::RunEvent => "run/event",
+            Self::RunState => "run/state",
+            Self::Health => "health",
+            Self::SafetyState => "safety/state",
+        }
+    }
+}
+
+impl Command {
+    /// Every command.
+    pub const ALL: [Self; 6] = [Self::Status, Self::Run, Self::Pause, Self::Resume, Self::Stop, Self::Reset];
+
+    /// The key below `tactus/<rig>/`.
+    pub const fn suffix(self) -> &'static str {
+        match self {
+            Self::Status => "cmd/status",
+            Self::Run => "cmd/run",
+            Self::Pause => "cmd/pause",
+            Self::Resume => "cmd/resume",
+            Self::Stop => "cmd/stop",
+            Self::Reset => "cmd/reset",
+        }
+    }
+}
+
+impl Keys {
+    /// The keys of the rig of that name; see [`crate::Rig`] for what a name may be.
+    pub fn new(rig: impl Into<String>) -> Self {
+        Self { rig: rig.into() }
+    }
+
+    /// The rig's name.
+    pub fn rig(&self) -> &str {
+        &self.rig
+    }
+
+    /// Key of a topic, such as `tactus/sim/sensor/frame`.
+    pub fn topic(&self, topic: Topic) -> String {
+        format!("tactus/{}/{}", self.rig, topic.suffix())
+    }
+
+    /// Key of a command, such as `tactus/sim/cmd/stop`.
+    pub fn command(&self, command: Command) -> String {
+        format!("tactus/{}/{}", self.rig, command.suffix())
+    }
+
+    /// Key of the liveliness token, held while the service is ready.
+    pub fn alive(&self) -> String {
+        format!("tactus/{}/alive", self.rig)
+    }
+}

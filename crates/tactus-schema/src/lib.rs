@@ -1,0 +1,20 @@
+//! The contracts of Tactus: messages, bus keys, frames and times, the rig file, the measurement table.
+//!
+//! A change here is a new version, never a silent edit. No I/O: everything is parsed from and
+//! written to text or bytes that the caller reads and stores.
+
+pub mod key;
+pub mod rig;
+pub mod table;
+
+mod frame;
+mod message;
+mod time;
+
+pub use frame::{Frame, FrameFlags};
+pub use message::{Message, pb};
+pub use rig::{Rig, RigError};
+pub use time::{DeviceTick, MonoTime, Stamp, WallTime};
+
+/// The compiled descriptor set of `tactus.v1`, as stock protobuf and MCAP tools read it.
+pub const DESCRIPTOR_SET: &[u8] = include_bytes!("../proto/tactus.binpb");

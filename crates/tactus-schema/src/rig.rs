@@ -1,0 +1,268 @@
+//! The rig file: one tactile array, one stage, one covering, one indenter; TOML or JSON, `tactus.rig/1`.
+//!
+//! [`Rig::from_toml`] and [`Rig::from_json`] check everything that can be checked without hardware;
+//! unknown keys are refused. The TOML form holds the description that goes with data (the JSON form)
+//! and, for the service, links, envelope, motion, policy and simulation.
+
+mod file;
+mod one_or_each;
+
+use std::collections::BTreeMap;
+
+use tactus_model::{Array, ArrayError, Covering, Indenter, Psf, Registration};
+
+pub use file::SCHEMA;
+
+/// A checked rig description.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rig {
+    /// Name, one chunk of a bus key: letters, digits, `-`, `_`.
+    pub name: String,
+    /// True if no physical device stands behind it.
+    pub simulated: bool,
+    /// The elements.
+    pub array: Array,
+    /// Where the sensor lies in the robot's frame.
+    pub registration: Registration,
+    /// Spread against covering thickness.
+    pub psf: Psf,
+    /// Counts per mm of indentation of the reference indenter at the element's own centre, one per element.
+    pub sensitivity_counts_per_mm: Vec<f64>,
+    /// What the sensitivity was stated for.
+    pub sensitivity_reference: SensitivityReference,
+    /// Reading at rest, one per element.
+    pub baseline_counts: Vec<f64>,
+    /// The tools, by id.
+    pub indenters: BTreeMap<String, Indenter>,
+    /// Id of the tool on the stage.
+    pub indenter: String,
+    /// The covering in place.
+    pub covering: Covering,
+    /// What may be done to it; `None` in descriptions that came with data.
+    pub service: Option<Service>,
+    /// What the virtual devices hide from the service; simulated rigs only.
+    pub simulation: Option<Simulation>,
+}
+
+/// The press for which sensitivity is stated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensitivityReference {
+    /// Id of an indenter of the rig.
+    pub indenter: String,
+    /// The covering then in place.
+    pub covering: Covering,
+}
+
+/// What the lab service needs beyond the description.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Service {
+    /// Bounds that no script, client or fault may cross.
+    pub envelope: Envelope,
+    /// How the stage moves within them.
+    pub motion: Motion,
+    /// What to do when something is lost.
+    pub policy: Policy,
+    /// The sensor's protocol and transport.
+    pub sensor: SensorLink,
+    /// The stage's protocol and transport.
+    pub stage: StageLink,
+}
+
+/// Bounds of motion and load; positions in the robot frame, z = 0 at the covering's nominal surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Envelope {
+    /// Least and greatest x.
+    pub x_mm: [f64; 2],
+    /// Least and greatest y.
+    pub y_mm: [f64; 2],
+    /// Greatest z; the least is given by the depth limit.
+    pub z_max_mm: f64,
+    /// Greatest depth as a share of the covering's thickness, in (0, 1).
+    pub depth_share_max: f64,
+    /// Greatest speed anywhere.
+    pub speed_max_mm_per_s: f64,
+    /// Greatest speed downwards below the approach height.
+    pub load_speed_max_mm_per_s: f64,
+    /// Greatest rise of any element above its tare.
+    pub element_max_counts: f64,
+    /// Greatest sum of the rises of all elements above their tares.
+    pub sum_max_counts: f64,
+}
+
+/// How the stage moves; speeds within the envelope's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// Height at which the tip travels and to which it retracts.
+    pub safe_height_mm: f64,
+    /// Height down to which it travels fast before a press.
+    pub approach_height_mm: f64,
+    /// Speed of travel and retraction.
+    pub travel_speed_mm_per_s: f64,
+    /// Speed of loading and unloading, unless the script says otherwise.
+    pub load_speed_mm_per_s: f64,
+    /// Rest between the end of a motion and the readings of a dwell.
+    pub settle_s: f64,
+    /// A move is done when the controller is idle and the position within this of the target.
+    pub tolerance_mm: f64,
+}
+
+/// What to do when something is lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Policy {
+    /// When frames are lost during a run.
+    pub on_gap: OnGap,
+    /// How long a lost device is waited for before the run fails, in milliseconds.
+    pub reconnect_ms: u32,
+}
+
+/// What a run does when frames are lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnGap {
+    /// Retract, wait for the sensor, begin the press again; the run ends as degraded.
+    Repeat,
+    /// Retract and fail.
+    Fail,
+}
+
+/// The sensor's link.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SensorLink {
+    /// How it speaks.
+    pub protocol: SensorProtocol,
+    /// Over what.
+    pub transport: Transport,
+}
+
+/// Protocols of sensors (devices.md).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SensorProtocol {
+    /// `weiss-dsa`: the `DSACON32m` and relatives, push mode.
+    WeissDsa,
+}
+
+/// The stage's link.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StageLink {
+    /// How it speaks.
+    pub protocol: StageProtocol,
+    /// Over what.
+    pub transport: Transport,
+}
+
+/// Protocols of stages (devices.md).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StageProtocol {
+    /// Grbl 1.1 and grblHAL.
+    Grbl,
+}
+
+/// What carries a device's bytes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Transport {
+    /// The rig's own virtual device, in the service's process.
+    Embedded,
+    /// A serial port or pseudo-terminal.
+    Serial {
+        /// Device path; stable names such as those under by-id are best.
+        path: String,
+        /// Bits per second.
+        baud: u32,
+    },
+    /// A serial server.
+    Tcp {
+        /// `host:port`.
+        address: String,
+    },
+}
+
+/// The truth of a simulated rig, which the service does not see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulation {
+    /// Seed of everything random in it.
+    pub seed: u64,
+    /// Standard deviation of an element's noise.
+    pub noise_rms_counts: f64,
+    /// Relative standard deviation of the gains.
+    pub gain_spread: f64,
+    /// `k` of the response `R(u) = u + k u^2`, in 1/mm; `u` is the equivalent indentation of the forward model.
+    pub quadratic_per_mm: f64,
+    /// True registration minus the declared one.
+    pub registration_error: RegistrationError,
+    /// True height of the covering's surface where the service believes 0.
+    pub surface_mm: f64,
+    /// Cross-wired elements: `element` answers for `answers_for`.
+    pub miswired: Vec<Miswired>,
+    /// The stage's true kinematics.
+    pub stage: SimulatedStage,
+}
+
+/// By how much the true registration differs from the declared one.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RegistrationError {
+    /// Of the origin, robot frame.
+    pub origin_mm: [f64; 2],
+    /// Of the rotation.
+    pub rotation_deg: f64,
+}
+
+/// An element that answers for another (the paper's two faulty elements).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Miswired {
+    /// Index of the faulty element.
+    pub element: usize,
+    /// Index of the element whose signal it gives.
+    pub answers_for: usize,
+}
+
+/// The virtual platen-forcer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimulatedStage {
+    /// Step of x and y (paper: 3 um).
+    pub lateral_step_mm: f64,
+    /// Step of z (paper: 1 um).
+    pub vertical_step_mm: f64,
+    /// Acceleration along a move.
+    pub acceleration_mm_per_s2: f64,
+    /// Greatest speed it can do.
+    pub speed_max_mm_per_s: f64,
+    /// Travel of x, y and z: least and greatest, robot frame.
+    pub travel_mm: [[f64; 2]; 3],
+}
+
+/// Why a file is not a rig.
+#[derive(Debug, thiserror::Error)]
+pub enum RigError {
+    /// Not TOML of the right form; the text names line and key.
+    #[error("{0}")]
+    Toml(#[from] toml::de::Error),
+    /// Not JSON of the right form.
+    #[error("{0}")]
+    Json(#[from] serde_json::Error),
+    /// The array's description is contradictory.
+    #[error("array: {0}")]
+    Array(#[from] ArrayError),
+    /// One field is wrong.
+    #[error("{field}: {problem}")]
+    Field {
+        /// Path of the field, such as `envelope.x_mm`.
+        field: String,
+        /// What is wrong with it, and what would be right.
+        problem: String,
+    },
+}
+
+impl Rig {
+    /// Greatest depth that the envelope allows under the covering in place, in mm; `None` without a service part.
+    pub fn depth_max_mm(&self) -> Option<f64> {
+        self.service.as_ref().map(|service| service.envelope.depth_share_max * self.covering.thickness_mm)
+    }
+
+    /// The tool on the stage.
+    pub fn mounted(&self) -> Option<Indenter> {
+        self.indenters.get(&self.indenter).copied()
+    }
+}
+
+#[cfg(test)]
+#[path = "rig_tests.rs"]
+mod tests;

@@ -1,0 +1,68 @@
+use super::*;
+
+const SIM: &str = include_str!("../../../config/rigs/sim.toml");
+
+fn refused(from: &str, to: &str) -> String {
+    assert!(SIM.contains(from), "the shipped rig has no {from:?}");
+    Rig::from_toml(&SIM.replace(from, to)).unwrap_err().to_string()
+}
+
+#[test]
+fn the_shipped_rig_is_the_papers() {
+    let rig = Rig::from_toml(SIM).unwrap();
+    assert_eq!(rig.array, Array::digitacts());
+    assert!(
+        (rig.psf.sigma_mm(rig.covering) / tactus_model::DIGITACTS_PITCH_MM - 1.36).abs() < 0.005,
+        "Sec. 4 says 1.36"
+    );
+    assert!((rig.depth_max_mm().unwrap() - 0.7112).abs() < 1e-12);
+    assert_eq!(rig.mounted(), Some(Indenter::Cylinder { diameter_mm: 1.0 }));
+}
+
+#[test]
+fn a_misspelt_key_is_refused_with_its_line() {
+    let error = refused("depth_share_max", "depth_share_maximum");
+    assert!(error.contains("depth_share_maximum") && error.contains("line"), "{error}");
+}
+
+#[test]
+fn contradictions_are_refused_with_their_field() {
+    for (from, to, field) in [
+        ("rows = 6", "rows = 7", "array.rows"),
+        ("simulated = true\nindenter = \"cyl1\"", "simulated = true\nindenter = \"cyl9\"", "indenter"),
+        ("depth_share_max = 0.70", "depth_share_max = 1.4", "envelope.depth_share_max"),
+        ("travel_speed_mm_per_s = 20.0", "travel_speed_mm_per_s = 90.0", "motion.travel_speed_mm_per_s"),
+        ("thickness_mm = 1.016", "thickness_mm = -1.0", "covering.thickness_mm"),
+        ("baseline_counts = 100.0", "baseline_counts = [1.0, 2.0]", "baseline_counts"),
+        ("name = \"sim\"", "name = \"a/b\"", "name"),
+        ("{ element = 18,", "{ element = 48,", "simulation.miswired"),
+        ("gain_spread = 0.08", "gain_spread = 1e300", "simulation.gain_spread"),
+        ("sigma_per_mm = 0.497", "sigma_per_mm = 1e11", "sensitivity_reference"),
+    ] {
+        let error = refused(from, to);
+        assert!(error.starts_with(field), "{field}: {error}");
+    }
+}
+
+#[test]
+fn the_json_that_goes_with_data_reads_back_without_links_limits_and_secrets() {
+    let rig = Rig::from_toml(SIM).unwrap();
+    let back = Rig::from_json(&rig.to_json()).unwrap();
+    assert_eq!(back, Rig { service: None, simulation: None, ..rig });
+}
+
+#[test]
+fn a_shape_takes_its_own_size_only() {
+    let error = refused("diameter_mm = 1.0", "size_mm = [1.0, 2.0]");
+    assert!(error.starts_with("indenters.cyl1.shape"), "{error}");
+}
+
+#[test]
+fn numbers_of_any_spelling_are_read_from_json() {
+    let json = Rig::from_toml(SIM).unwrap().to_json();
+    let spelt = json.replace("\"baseline_counts\":100.0", "\"baseline_counts\":1e2");
+    assert_ne!(json, spelt);
+    assert_eq!(Rig::from_json(&spelt).unwrap().baseline_counts, vec![100.0; 48]);
+    let listed = json.replace("\"baseline_counts\":100.0", &format!("\"baseline_counts\":{:?}", vec![7; 48]));
+    assert_eq!(Rig::from_json(&listed).unwrap().baseline_counts, vec![7.0; 48]);
+}

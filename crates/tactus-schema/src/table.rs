@@ -1,0 +1,125 @@
+//! The measurement table: the columns that analysis reads, as Parquet.
+//!
+//! | column | type | meaning |
+//! |---|---|---|
+//! | run | string | run id; rows of one run are contiguous and in time order |
+//! | press | int32 | press index in the run; -1 outside a press |
+//! | phase | string | idle, approach, load, hold, unload, retract |
+//! | t_ns | int64 | time of the frame's sampling, monotonic within a run |
+//! | x_mm, y_mm, z_mm | float64 | stage position at t_ns, robot frame |
+//! | covering_mm | float64 | covering thickness |
+//! | indenter | string | id of an indenter in the rig description |
+//! | temperature_c | float64, null allowed | |
+//! | counts | `list<float32>` | raw counts, row-major, one per element |
+
+use crate::pb;
+
+/// Key of the file metadata that holds the rig as JSON (`tactus.rig/1`).
+pub const RIG_METADATA_KEY: &str = "tactus.rig";
+
+/// Names of the columns, in order.
+pub const COLUMNS: [&str; 11] = [
+    "run",
+    "press",
+    "phase",
+    "t_ns",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "covering_mm",
+    "indenter",
+    "temperature_c",
+    "counts",
+];
+
+/// One row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Run id.
+    pub run: String,
+    /// Press index in the run; -1 outside a press.
+    pub press: i32,
+    /// What the stage was doing.
+    pub phase: Phase,
+    /// Time of the frame's sampling.
+    pub t_ns: i64,
+    /// Stage position at `t_ns`, robot frame.
+    pub position_mm: [f64; 3],
+    /// Covering thickness.
+    pub covering_mm: f64,
+    /// Id of an indenter in the rig description.
+    pub indenter: String,
+    /// Temperature, if it was measured.
+    pub temperature_c: Option<f64>,
+    /// Raw counts, row-major, one per element.
+    pub counts: Vec<f32>,
+}
+
+/// What the stage is doing when a frame is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Phase {
+    /// Outside a press.
+    Idle,
+    /// Coming down to the surface.
+    Approach,
+    /// Moving deeper.
+    Load,
+    /// Holding a depth.
+    Hold,
+    /// Moving up, still in the press.
+    Unload,
+    /// Going back to the safe height.
+    Retract,
+}
+
+impl Phase {
+    /// Every phase.
+    pub const ALL: [Self; 6] =
+        [Self::Idle, Self::Approach, Self::Load, Self::Hold, Self::Unload, Self::Retract];
+
+    /// The word in the table.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Idle => "idle",
+            Self::Approach => "approach",
+            Self::Load => "load",
+            Self::Hold => "hold",
+            Self::Unload => "unload",
+            Self::Retract => "retract",
+        }
+    }
+
+    /// The phase of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|phase| phase.name() == name)
+    }
+}
+
+impl From<Phase> for pb::Phase {
+    fn from(phase: Phase) -> Self {
+        match phase {
+            Phase::Idle => Self::Idle,
+            Phase::Approach => Self::Approach,
+            Phase::Load => Self::Load,
+            Phase::Hold => Self::Hold,
+            Phase::Unload => Self::Unload,
+            Phase::Retract => Self::Retract,
+        }
+    }
+}
+
+impl TryFrom<pb::Phase> for Phase {
+    type Error = ();
+
+    fn try_from(phase: pb::Phase) -> Result<Self, ()> {
+        match phase {
+            pb::Phase::Unspecified => Err(()),
+            pb::Phase::Idle => Ok(Self::Idle),
+            pb::Phase::Approach => Ok(Self::Approach),
+            pb::Phase::Load => Ok(Self::Load),
+            pb::Phase::Hold => Ok(Self::Hold),
+            pb::Phase::Unload => Ok(Self::Unload),
+            pb::Phase::Retract => Ok(Self::Retract),
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! Chores of the repository: `cargo xtask proto` compiles the messages.
+
+mod messages;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+
+fn main() -> Result<()> {
+    let task = std::env::args().nth(1);
+    match task.as_deref() {
+        Some("proto") => messages::compile(&repository(), &repository()),
+        other => bail!("unknown task {other:?}; there is: proto"),
+    }
+}
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}

@@ -1,0 +1,89 @@
+//! The direction of dependencies: a crate may depend only on crates in rows above its own.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use std::collections::BTreeSet;
+
+use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
+
+/// The rows of ARCHITECTURE.md, top to bottom.
+const ROWS: [&str; 14] = [
+    "tactus-model",
+    "tactus-schema",
+    "tactus-wire",
+    "tactus-plan",
+    "tactus-device",
+    "tactus-engine",
+    "tactus-record",
+    "tactus-report",
+    "tactus-bus",
+    "tactus-mock",
+    "tactus-daemon",
+    "tactus",
+    "tactus-e2e",
+    "xtask",
+];
+
+/// What each layer must not reach for, not even through its dependencies' features.
+const NEVER: [(&str, &[&str]); 3] = [
+    ("tactus-model", &["tokio", "rand", "serde"]),
+    ("tactus-wire", &["tokio", "rand"]),
+    ("tactus-plan", &["tokio"]),
+];
+
+/// Only the apps embed virtual devices.
+const MAY_USE_MOCK: [&str; 2] = ["tactus-daemon", "tactus-e2e"];
+
+fn metadata() -> Metadata {
+    MetadataCommand::new()
+        .manifest_path(concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml"))
+        .exec()
+        .unwrap()
+}
+
+/// Pairs of a workspace crate and what it is built from, tests aside.
+fn edges(metadata: &Metadata) -> BTreeSet<(String, String)> {
+    metadata
+        .workspace_packages()
+        .into_iter()
+        .flat_map(|package| {
+            let built_from =
+                package.dependencies.iter().filter(|dep| dep.kind != DependencyKind::Development);
+            built_from.map(|dep| (package.name.to_string(), dep.name.clone())).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+#[test]
+fn every_crate_has_its_row() {
+    let named: BTreeSet<String> = ROWS.iter().map(ToString::to_string).collect();
+    let there: BTreeSet<String> =
+        metadata().workspace_packages().iter().map(|package| package.name.to_string()).collect();
+    assert_eq!(named, there);
+}
+
+#[test]
+fn dependencies_point_upwards() {
+    let row = |name: &str| ROWS.iter().position(|row| *row == name);
+    for (user, used) in edges(&metadata()) {
+        if let (Some(user_row), Some(used_row)) = (row(&user), row(&used)) {
+            assert!(used_row < user_row, "{user} stands above {used} and must not depend on it");
+        }
+    }
+}
+
+#[test]
+fn production_crates_do_not_know_the_virtual_devices() {
+    for (user, used) in edges(&metadata()) {
+        assert!(used != "tactus-mock" || MAY_USE_MOCK.contains(&user.as_str()), "{user} depends on {used}");
+    }
+}
+
+#[test]
+fn pure_crates_have_no_io_no_async_and_no_global_random_numbers() {
+    let edges = edges(&metadata());
+    for (user, forbidden) in NEVER {
+        for used in forbidden {
+            assert!(!edges.contains(&(user.to_owned(), (*used).to_owned())), "{user} depends on {used}");
+        }
+    }
+}
