@@ -1,0 +1,52 @@
+//! The host's clocks, real or virtual.
+
+use std::time::{Duration, SystemTime};
+
+use tactus_schema::{MonoTime, Stamp, WallTime};
+use tokio::time::Instant;
+
+/// The host's monotonic and wall clock, read together.
+///
+/// Monotonic time is tokio's: in a runtime started with paused time it jumps to the next timer
+/// whenever every task waits, so that nobody waits for real.
+#[derive(Debug, Clone, Copy)]
+pub struct Clock {
+    start: Instant,
+    wall_start: WallTime,
+    is_virtual: bool,
+}
+
+impl Clock {
+    /// A clock that starts now and follows real time.
+    pub fn real() -> Self {
+        Self { start: Instant::now(), wall_start: wall_now(), is_virtual: false }
+    }
+
+    /// A clock for a runtime with paused time: the wall stands at the present and moves with the virtual time.
+    pub fn paused() -> Self {
+        Self { is_virtual: true, ..Self::real() }
+    }
+
+    /// True if time is simulated.
+    pub fn is_virtual(&self) -> bool {
+        self.is_virtual
+    }
+
+    /// The present instant. On a real clock the wall time is read anew each time, so that a step of the
+    /// system clock shows in it and not in the monotonic time.
+    pub fn now(&self) -> Stamp {
+        let mono = MonoTime::default().after(self.start.elapsed());
+        let wall = if self.is_virtual { self.wall_start.after(self.start.elapsed()) } else { wall_now() };
+        Stamp { mono, wall }
+    }
+
+    /// The tokio instant of a monotonic time.
+    pub fn instant(&self, mono: MonoTime) -> Instant {
+        self.start + mono.since(MonoTime::default())
+    }
+}
+
+fn wall_now() -> WallTime {
+    let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO);
+    WallTime::default().after(since_1970)
+}

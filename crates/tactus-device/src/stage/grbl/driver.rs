@@ -1,0 +1,322 @@
+//! The task that owns the stage.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use tactus_schema::{Stamp, pb};
+use tactus_wire::grbl::{Action, Config, Failure, Report, Session, SessionError, Status, alarm_meaning};
+use tokio::sync::mpsc::error::TrySendError;
+use tokio::sync::{mpsc, oneshot, watch};
+use tokio::time::sleep;
+
+use super::GrblOptions;
+use super::stop::StopSwitch;
+use crate::backoff::Backoff;
+use crate::link::{Link, LinkEvent, since_start};
+use crate::transport::Connect;
+use crate::{Clock, DeviceError, ErrorKind, StageError, Target};
+
+/// Where the result of a command goes.
+type Reply = oneshot::Sender<Result<[f64; 3], StageError>>;
+
+/// A command, and where its result goes.
+#[derive(Debug)]
+pub(super) struct Request {
+    pub(super) command: Command,
+    /// How often stop had been pressed when the command was given.
+    pub(super) stops_before: u64,
+    pub(super) reply: Reply,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Command {
+    Home,
+    MoveTo(Target),
+    ClearAlarm,
+}
+
+/// Owns the stage: what it says goes to `reports` and `latest`, what it is to do comes by `requests` and `stop`.
+pub(super) struct Driver {
+    pub(super) connect: Arc<dyn Connect>,
+    pub(super) options: GrblOptions,
+    pub(super) clock: Clock,
+    pub(super) requests: mpsc::Receiver<Request>,
+    pub(super) stop: Arc<StopSwitch>,
+    pub(super) reports: mpsc::Sender<pb::StageState>,
+    pub(super) latest: watch::Sender<pb::StageState>,
+    pub(super) progress: Progress,
+}
+
+/// What the driver is about.
+#[derive(Default)]
+pub(super) struct Progress {
+    /// The stage has answered and not been lost since.
+    connected: bool,
+    in_hand: Option<Reply>,
+    /// Reports that found no room yet. The device is not read meanwhile, so that these stay few.
+    waiting: VecDeque<pb::StageState>,
+    /// The kind of loss that was logged and has not been made good.
+    logged: Option<ErrorKind>,
+}
+
+/// Nobody holds the stage any more: the task is to end.
+struct Unused;
+
+impl Driver {
+    pub(super) async fn run(mut self) {
+        let mut backoff = Backoff::new();
+        loop {
+            let connect = Arc::clone(&self.connect);
+            let ended = match self.meanwhile(connect.connect()).await {
+                Ok(Ok(stream)) => {
+                    let link = Link::new(stream, self.clock, self.device());
+                    self.converse(link, &mut backoff).await
+                }
+                Ok(Err(error)) => Ok(error),
+                Err(Unused) => return,
+            };
+            let Ok(error) = ended else { return };
+            self.lost(error);
+            if self.meanwhile(sleep(backoff.pause())).await.is_err() {
+                return;
+            }
+        }
+    }
+
+    /// Waits for something while there is no stage: commands fail, and a stop has nothing to stop.
+    async fn meanwhile<T>(&mut self, awaited: impl Future<Output = T>) -> Result<T, Unused> {
+        tokio::pin!(awaited);
+        loop {
+            tokio::select! {
+                biased;
+                () = self.stop.pressed() => {}
+                () = room(&self.reports), if !self.progress.waiting.is_empty() => self.hand_over(),
+                request = self.requests.recv() => match request {
+                    Some(request) => answer(request.reply, Err(self.not_connected())),
+                    None => return Err(Unused),
+                },
+                result = &mut awaited => return Ok(result),
+            }
+        }
+    }
+
+    /// Talks over an open link until it fails; gives why.
+    async fn converse(&mut self, mut link: Link, backoff: &mut Backoff) -> Result<DeviceError, Unused> {
+        let mut session = Session::new(Config { tolerance_mm: self.options.tolerance_mm });
+        let mut now = self.clock.now();
+        let mut actions = session.start(since_start(now));
+        loop {
+            if let Err(error) = self.carry_out(now, actions, &mut link, backoff).await {
+                return Ok(error);
+            }
+            let Progress { connected, ref in_hand, ref waiting, .. } = self.progress;
+            // While a stop is under way commands wait; otherwise they are begun or refused.
+            let refuses_requests = !connected || (in_hand.is_some() && !session.is_stopping());
+            let looks_at_requests = refuses_requests || session.is_ready();
+            let has_room = waiting.is_empty();
+            actions = tokio::select! {
+                biased;
+                () = self.stop.pressed() => {
+                    now = self.clock.now();
+                    session.stop(since_start(now))
+                }
+                () = room(&self.reports), if !has_room => {
+                    self.hand_over();
+                    Vec::new()
+                }
+                request = self.requests.recv(), if has_room && looks_at_requests => {
+                    let Some(request) = request else { return Err(Unused) };
+                    now = self.clock.now();
+                    self.begin(now, request, &mut session)
+                }
+                event = link.next(session.deadline()), if has_room => match event {
+                    Ok((stamp, LinkEvent::Received(bytes))) => {
+                        now = stamp;
+                        session.receive(since_start(now), bytes)
+                    }
+                    Ok((stamp, LinkEvent::Deadline)) => {
+                        now = stamp;
+                        session.timer(since_start(now))
+                    }
+                    Err(error) => return Ok(error),
+                },
+            };
+        }
+    }
+
+    /// Begins a command, or answers why not.
+    fn begin(&mut self, now: Stamp, request: Request, session: &mut Session) -> Vec<Action> {
+        let Request { command, stops_before, reply } = request;
+        let refusal = if !self.progress.connected {
+            self.not_connected()
+        } else if self.progress.in_hand.is_some() {
+            let reason = "another command is in hand".to_owned();
+            StageError::Refused { command: format!("{command:?}"), reason }
+        } else if stops_before != self.stop.count() {
+            StageError::Stopped { position_mm: self.position_mm() }
+        } else {
+            self.progress.in_hand = Some(reply);
+            let now = since_start(now);
+            return match command {
+                Command::Home => session.home(now),
+                Command::MoveTo(target) => session.move_to(now, target.position_mm, target.speed_mm_per_s),
+                Command::ClearAlarm => session.clear_alarm(now),
+            };
+        };
+        answer(reply, Err(refusal));
+        Vec::new()
+    }
+
+    async fn carry_out(
+        &mut self,
+        now: Stamp,
+        actions: Vec<Action>,
+        link: &mut Link,
+        backoff: &mut Backoff,
+    ) -> Result<(), DeviceError> {
+        for action in actions {
+            match action {
+                Action::Send(bytes) => link.send(&bytes).await?,
+                Action::Connected { banner } => {
+                    tracing::info!(device = self.device(), banner, "stage connected");
+                    backoff.reset();
+                    self.progress.logged = None;
+                    self.progress.connected = true;
+                }
+                Action::Report(report) => self.report(now, report),
+                Action::Reset { banner } => {
+                    tracing::warn!(
+                        device = self.device(),
+                        banner,
+                        "the stage was reset: its position is suspect"
+                    );
+                }
+                Action::Done(result) => {
+                    if let Some(reply) = self.progress.in_hand.take() {
+                        answer(reply, result.map_err(stage_error));
+                    }
+                }
+                Action::Failed(error) => return Err(self.describe(error)),
+            }
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, now: Stamp, report: Report) {
+        let status = match report.status {
+            Status::Unhomed => pb::StageStatus::Unhomed,
+            Status::Idle => pb::StageStatus::Idle,
+            Status::Moving => pb::StageStatus::Moving,
+            Status::Hold => pb::StageStatus::Hold,
+            Status::Homing => pb::StageStatus::Homing,
+            Status::Alarm => pb::StageStatus::Alarm,
+        };
+        self.publish(now, report.position_mm, status, report.alarm.map(u32::from));
+    }
+
+    fn publish(
+        &mut self,
+        now: Stamp,
+        [x_mm, y_mm, z_mm]: [f64; 3],
+        status: pb::StageStatus,
+        alarm: Option<u32>,
+    ) {
+        let before = *self.latest.borrow();
+        if before.status() != status {
+            let is_routine = |status| matches!(status, pb::StageStatus::Idle | pb::StageStatus::Moving);
+            if is_routine(before.status()) && is_routine(status) {
+                tracing::debug!(device = self.device(), to = ?status, "stage");
+            } else {
+                tracing::info!(device = self.device(), from = ?before.status(), to = ?status, alarm, "stage");
+            }
+        }
+        let state = pb::StageState {
+            seq: before.seq + 1,
+            t_mono_ns: now.mono.ns(),
+            t_wall_ns: now.wall.ns(),
+            x_mm,
+            y_mm,
+            z_mm,
+            status: status.into(),
+            alarm,
+            simulated: self.options.simulated,
+        };
+        self.latest.send_replace(state);
+        self.progress.waiting.push_back(state);
+        // Now, if it can be, so that a report is there before the result that rests on it.
+        self.hand_over();
+    }
+
+    /// Hands over the reports for which there is room; all of them are of no use if nobody takes them.
+    fn hand_over(&mut self) {
+        while let Some(report) = self.progress.waiting.pop_front() {
+            if let Err(TrySendError::Full(report)) = self.reports.try_send(report) {
+                self.progress.waiting.push_front(report);
+                return;
+            }
+        }
+    }
+
+    /// The link has failed: so does the command in hand.
+    fn lost(&mut self, error: DeviceError) {
+        if self.progress.logged != Some(error.kind) {
+            tracing::warn!(%error, kind = ?error.kind, "stage lost");
+            self.progress.logged = Some(error.kind);
+        }
+        self.progress.connected = false;
+        if let Some(reply) = self.progress.in_hand.take() {
+            answer(reply, Err(error.into()));
+        }
+        if self.latest.borrow().status() != pb::StageStatus::Disconnected {
+            self.publish(self.clock.now(), self.position_mm(), pb::StageStatus::Disconnected, None);
+        }
+    }
+
+    fn position_mm(&self) -> [f64; 3] {
+        let state = self.latest.borrow();
+        [state.x_mm, state.y_mm, state.z_mm]
+    }
+
+    fn device(&self) -> String {
+        format!("stage on {}", self.connect)
+    }
+
+    fn not_connected(&self) -> StageError {
+        DeviceError::new(
+            self.device(),
+            ErrorKind::Disconnected,
+            "it is not connected; it is being looked for",
+        )
+        .into()
+    }
+
+    fn describe(&self, error: SessionError) -> DeviceError {
+        DeviceError::new(self.device(), ErrorKind::Timeout, error.to_string())
+    }
+}
+
+fn stage_error(failure: Failure) -> StageError {
+    match failure {
+        Failure::Stopped { position_mm } => StageError::Stopped { position_mm },
+        Failure::Refused { command, reason } => StageError::Refused { command, reason },
+        Failure::Alarm { code } => {
+            StageError::Alarm { code: code.into(), meaning: alarm_meaning(code).to_owned() }
+        }
+        Failure::Unhomed => StageError::Unhomed,
+        Failure::NotThere { target_mm, position_mm } => StageError::NotThere { target_mm, position_mm },
+        Failure::Overdue { target_mm, position_mm, waited } => {
+            StageError::Overdue { target_mm, position_mm, waited_s: waited.as_secs_f64() }
+        }
+    }
+}
+
+fn answer(reply: Reply, result: Result<[f64; 3], StageError>) {
+    if let Err(result) = reply.send(result) {
+        tracing::debug!(?result, "nobody waits for the result of a command any more");
+    }
+}
+
+/// Waits until there is room for a report, or nobody to take it.
+async fn room(reports: &mpsc::Sender<pb::StageState>) {
+    drop(reports.reserve().await);
+}

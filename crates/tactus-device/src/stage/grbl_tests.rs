@@ -1,0 +1,255 @@
+#![expect(clippy::float_cmp, reason = "the controller prints positions with three decimals")]
+
+#[path = "grbl_tests/fake.rs"]
+mod fake;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use fake::{Fault, Shared};
+use tactus_schema::pb::{StageState, StageStatus};
+use tokio::sync::mpsc;
+use tokio::time::{Instant, sleep};
+
+use super::{GrblOptions, GrblStage, REPORTS_MAX};
+use crate::transport::memory::{MemoryPort, pair};
+use crate::{Clock, ErrorKind, Stage, StageError, Target};
+
+const OPTIONS: GrblOptions = GrblOptions { tolerance_mm: 0.005, simulated: true };
+
+fn to(x_mm: f64, speed_mm_per_s: f64) -> Target {
+    Target { position_mm: [x_mm, 1.0, 5.0], speed_mm_per_s }
+}
+
+fn start() -> (Arc<dyn Stage>, mpsc::Receiver<StageState>, MemoryPort) {
+    let (connector, port) = pair("stage");
+    let (stage, reports) = GrblStage::start(Box::new(connector), OPTIONS, Clock::paused());
+    (stage, reports, port)
+}
+
+/// A stage that stands homed at (1, 1, 5), its controller, and a task that takes every report.
+async fn homed() -> (Arc<dyn Stage>, Shared) {
+    let (stage, reports, port) = start();
+    let shared = Shared::new();
+    tokio::spawn(fake::run(port, shared.clone()));
+    tokio::spawn(drain(reports));
+    until(&stage, StageStatus::Unhomed).await;
+    stage.home().await.unwrap();
+    assert_eq!(stage.state().borrow().status(), StageStatus::Idle);
+    (stage, shared)
+}
+
+async fn drain(mut reports: mpsc::Receiver<StageState>) {
+    let mut last = 0;
+    while let Some(report) = reports.recv().await {
+        assert_eq!(report.seq, last + 1, "a report was lost");
+        last = report.seq;
+    }
+}
+
+async fn until(stage: &Arc<dyn Stage>, status: StageStatus) {
+    stage.state().wait_for(|state| state.status() == status).await.unwrap();
+}
+
+/// Begins a move, and lets it get under way for a time.
+async fn begin(
+    stage: &Arc<dyn Stage>,
+    target: Target,
+    under_way: Duration,
+) -> tokio::task::JoinHandle<Result<[f64; 3], StageError>> {
+    let stage = Arc::clone(stage);
+    let moving = tokio::spawn(async move { stage.move_to(target).await });
+    sleep(under_way).await;
+    moving
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_move_is_done_soon_after_the_stage_arrives() {
+    let (stage, shared) = homed().await;
+    let began = Instant::now();
+    let reached = stage.move_to(to(11.0, 10.0)).await.unwrap();
+    assert_eq!(reached, [11.0, 1.0, 5.0]);
+    assert_eq!(shared.count("G90 G21 G1 X11.000 Y1.000 Z5.000 F600.000"), 1);
+    // The way takes a second; the stage is asked every 50 ms.
+    let took = began.elapsed();
+    assert!((Duration::from_secs(1)..=Duration::from_millis(1050)).contains(&took), "{took:?}");
+    let state = *stage.state().borrow();
+    assert_eq!((state.status(), state.x_mm, state.simulated), (StageStatus::Idle, 11.0, true));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_move_to_the_present_place_takes_no_time() {
+    let (stage, shared) = homed().await;
+    let began = Instant::now();
+    assert_eq!(stage.move_to(to(1.0, 10.0)).await.unwrap(), [1.0, 1.0, 5.0]);
+    assert_eq!(began.elapsed(), Duration::ZERO);
+    assert_eq!(shared.count("G"), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn stop_is_sent_in_the_same_instant_and_keeps_the_position() {
+    let (stage, shared) = homed().await;
+    let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(537)).await;
+    let pressed = Instant::now();
+    stage.stop();
+    let result = moving.await.unwrap();
+    assert_eq!(shared.first_heard("!"), Some(pressed));
+    let Err(StageError::Stopped { position_mm }) = result else { panic!("{result:?}") };
+    assert!((position_mm[0] - 6.37).abs() < 0.001, "{position_mm:?}");
+    assert!((position_mm[0] - shared.position_mm()[0]).abs() < 0.0006);
+    // Still homed: it goes on from where it stands.
+    assert_eq!(stage.move_to(to(6.0, 10.0)).await.unwrap(), [6.0, 1.0, 5.0]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_given_before_the_stop_is_not_begun_after_it() {
+    let (stage, shared) = homed().await;
+    let given = stage.move_to(to(11.0, 10.0));
+    stage.stop();
+    assert!(matches!(given.await, Err(StageError::Stopped { .. })));
+    assert_eq!(shared.count("G"), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_command_given_while_the_stage_comes_to_a_stand_waits_for_it() {
+    let (stage, shared) = homed().await;
+    let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(500)).await;
+    stage.stop();
+    assert_eq!(stage.move_to(to(2.0, 10.0)).await.unwrap(), [2.0, 1.0, 5.0]);
+    assert!(matches!(moving.await.unwrap(), Err(StageError::Stopped { .. })));
+    assert_eq!(shared.count("\x18"), 2, "one at the greeting, one after the hold");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_second_move_is_refused_while_one_is_in_hand() {
+    let (stage, _shared) = homed().await;
+    let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(500)).await;
+    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Refused { .. })));
+    assert_eq!(moving.await.unwrap().unwrap(), [11.0, 1.0, 5.0]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stage_that_lies_is_not_there() {
+    let (stage, shared) = homed().await;
+    shared.set(Fault::StopsShort);
+    let result = stage.move_to(to(11.0, 10.0)).await;
+    let Err(StageError::NotThere { target_mm, position_mm }) = result else { panic!("{result:?}") };
+    assert_eq!((target_mm[0], position_mm[0]), (11.0, 10.0));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_move_that_does_not_end_is_stopped_and_overdue() {
+    let (stage, shared) = homed().await;
+    shared.set(Fault::NeverIdle);
+    let result = stage.move_to(to(11.0, 10.0)).await;
+    let Err(StageError::Overdue { position_mm, waited_s, .. }) = result else { panic!("{result:?}") };
+    assert_eq!((position_mm[0], waited_s), (11.0, 4.0));
+    assert!(shared.first_heard("!").is_some());
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_alarm_is_told_and_cleared() {
+    let (stage, shared) = homed().await;
+    shared.set(Fault::HardLimit);
+    let result = stage.move_to(to(11.0, 10.0)).await;
+    let Err(StageError::Alarm { code: 1, meaning }) = result else { panic!("{result:?}") };
+    assert_eq!(meaning, "a hard limit switch was hit");
+    let state = *stage.state().borrow();
+    assert_eq!((state.status(), state.alarm), (StageStatus::Alarm, Some(1)));
+    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Alarm { code: 1, .. })));
+    stage.clear_alarm().await.unwrap();
+    assert_eq!(stage.state().borrow().status(), StageStatus::Unhomed);
+    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Unhomed)));
+    stage.home().await.unwrap();
+    stage.move_to(to(2.0, 10.0)).await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_reset_leaves_the_stage_unhomed() {
+    let (stage, shared) = homed().await;
+    shared.set(Fault::Resets);
+    assert!(matches!(stage.move_to(to(11.0, 10.0)).await, Err(StageError::Unhomed)));
+    assert_eq!(stage.state().borrow().status(), StageStatus::Unhomed);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stage_that_falls_silent_is_held_and_found_again() {
+    let (stage, shared) = homed().await;
+    shared.set(Fault::FallsSilent);
+    let result = stage.move_to(to(31.0, 10.0)).await;
+    let Err(StageError::Device(error)) = result else { panic!("{result:?}") };
+    assert_eq!(error.kind, ErrorKind::Timeout);
+    assert!(shared.first_heard("!").is_some());
+    assert_eq!(stage.state().borrow().status(), StageStatus::Disconnected);
+    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Device(_))));
+    until(&stage, StageStatus::Unhomed).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_unplugged_stage_fails_the_move_and_is_unhomed_when_it_is_back() {
+    let (stage, reports, mut port) = start();
+    tokio::spawn(drain(reports));
+    let shared = Shared::new();
+    let plugged = tokio::spawn({
+        let shared = shared.clone();
+        async move {
+            let stream = port.accept().await;
+            // Half a second into the move.
+            tokio::select! {
+                () = fake::serve(stream, &shared) => {}
+                () = sleep(Duration::from_millis(1500)) => {}
+            }
+            port
+        }
+    });
+    assert!(matches!(stage.home().await, Err(StageError::Device(_))), "it cannot have answered yet");
+    until(&stage, StageStatus::Unhomed).await;
+    stage.home().await.unwrap();
+    let result = stage.move_to(to(31.0, 10.0)).await;
+    let Err(StageError::Device(error)) = result else { panic!("{result:?}") };
+    assert_eq!(error.kind, ErrorKind::Disconnected);
+    until(&stage, StageStatus::Disconnected).await;
+    sleep(Duration::from_secs(5)).await;
+    tokio::spawn(fake::run(plugged.await.unwrap(), shared));
+    until(&stage, StageStatus::Unhomed).await;
+    stage.home().await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn reports_that_nobody_takes_hold_up_the_stage_but_not_a_stop() {
+    let (stage, mut reports, port) = start();
+    let shared = Shared::new();
+    tokio::spawn(fake::run(port, shared.clone()));
+    until(&stage, StageStatus::Unhomed).await;
+    // Ten reports a second: full after half a minute, and then no more is asked.
+    sleep(Duration::from_mins(5)).await;
+    let asked = shared.count("?");
+    assert!((REPORTS_MAX..REPORTS_MAX + 5).contains(&asked), "{asked}");
+    let pressed = Instant::now();
+    stage.stop();
+    sleep(Duration::from_millis(1)).await;
+    assert_eq!(shared.first_heard("!"), Some(pressed));
+    for seq in 1..=REPORTS_MAX as u64 {
+        assert_eq!(reports.recv().await.unwrap().seq, seq);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn two_runs_are_alike() {
+    let mut runs = Vec::new();
+    for _ in 0..2 {
+        let (stage, mut reports, port) = start();
+        tokio::spawn(fake::run(port, Shared::new()));
+        until(&stage, StageStatus::Unhomed).await;
+        stage.home().await.unwrap();
+        stage.move_to(to(3.0, 1.0)).await.unwrap();
+        drop(stage);
+        let mut run = Vec::new();
+        while let Some(report) = reports.recv().await {
+            run.push(StageState { t_wall_ns: 0, ..report });
+        }
+        runs.push(run);
+    }
+    assert!(runs[0].len() > 30);
+    assert_eq!(runs[0], runs[1]);
+}

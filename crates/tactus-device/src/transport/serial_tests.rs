@@ -1,0 +1,60 @@
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio_serial::{SerialPort, SerialStream};
+
+use super::SerialConnector;
+use crate::transport::Connect;
+use crate::{DeviceError, ErrorKind};
+
+async fn error(path: &str) -> DeviceError {
+    SerialConnector::new(path, 115_200).connect().await.err().expect("it opened")
+}
+
+#[tokio::test]
+async fn an_absent_port_is_absent_and_the_text_says_what_to_do() {
+    let error = error("/dev/serial/by-id/usb-tactus-none").await;
+    assert_eq!(error.kind, ErrorKind::Absent);
+    let text = error.to_string();
+    assert!(text.starts_with("/dev/serial/by-id/usb-tactus-none: there is no such port"), "{text}");
+    assert!(text.contains("plugged in"), "{text}");
+}
+
+#[tokio::test]
+async fn a_file_is_no_serial_port() {
+    assert_eq!(error("/dev/null").await.kind, ErrorKind::Protocol);
+    assert_eq!(error("/etc").await.kind, ErrorKind::Protocol);
+}
+
+/// The path of the far end of a new pseudo-terminal, whose near end is given too.
+fn terminal() -> (SerialStream, String) {
+    let (near, mut far) = SerialStream::pair().unwrap();
+    far.set_exclusive(false).unwrap();
+    let path = far.name().unwrap();
+    (near, path)
+}
+
+#[tokio::test]
+async fn bytes_go_through_a_pseudo_terminal_unchanged() {
+    let (mut device, path) = terminal();
+    let mut host = SerialConnector::new(path, 115_200).connect().await.unwrap();
+    // Among them everything that a terminal in its usual mode would change or swallow.
+    let all: Vec<u8> = (0..=u8::MAX).collect();
+    let mut read = vec![0; all.len()];
+    host.write_all(&all).await.unwrap();
+    device.read_exact(&mut read).await.unwrap();
+    assert_eq!(read, all);
+    device.write_all(&all).await.unwrap();
+    host.read_exact(&mut read).await.unwrap();
+    assert_eq!(read, all);
+}
+
+#[tokio::test]
+async fn a_port_that_somebody_holds_is_busy() {
+    let (_device, path) = terminal();
+    let connector = SerialConnector::new(&path, 115_200);
+    let held = connector.connect().await.unwrap();
+    let error = connector.connect().await.err().expect("it opened twice");
+    assert_eq!(error.kind, ErrorKind::Busy);
+    assert!(error.to_string().contains("another program holds the port"), "{error}");
+    drop(held);
+    connector.connect().await.unwrap();
+}

@@ -1,0 +1,251 @@
+//! The host's side of the conversation.
+
+mod action;
+mod hear;
+mod phase;
+mod step;
+
+use core::time::Duration;
+
+use phase::{Phase, Purpose};
+
+use super::poll::Poll;
+use super::travel::{Travel, distance_mm};
+use super::{FEED_HOLD, Lines, MachineState, Response};
+
+pub use action::{Action, Config, Failure, Report, SessionError, Status};
+
+/// How long a banner is waited for that comes by itself when the port is opened.
+const LISTEN: Duration = Duration::from_millis(500);
+
+/// How long homing may take; the controller itself gives up after some 24 s.
+const HOMING_TIMEOUT: Duration = Duration::from_mins(1);
+
+/// Lowest speed that the three decimals of a feed in mm/min can tell.
+const SPEED_MIN_MM_PER_S: f64 = 0.001 / 60.0;
+
+/// Half of the reporting step: places nearer than this are the same.
+const SAME_PLACE_MM: f64 = 0.0005;
+
+/// A conversation over one connection. Positions are in the work frame, which is the machine's unless an
+/// offset is set in the controller.
+///
+/// Call [`start`](Self::start) once, [`receive`](Self::receive) with what arrives and [`timer`](Self::timer)
+/// when [`deadline`](Self::deadline) has come; do what the actions say, in their order. Times never go
+/// back. Commands ([`home`](Self::home), [`move_to`](Self::move_to), [`clear_alarm`](Self::clear_alarm)) are
+/// given one at a time, while [`is_ready`](Self::is_ready); each ends with one [`Action::Done`].
+/// [`stop`](Self::stop) may be called at any time. After [`Action::Failed`] it does nothing more: open the
+/// link anew. The command in hand then ends without [`Action::Done`].
+///
+/// The position counts as known only from a successful homing on, until an alarm, a reset that was not
+/// ours, or a stop that had to reset the controller in motion.
+#[derive(Debug)]
+pub struct Session {
+    config: Config,
+    lines: Lines,
+    poll: Poll,
+    phase: Phase,
+    homed: bool,
+    /// In alarm, with its number; 0 if it was not told.
+    alarm: Option<u8>,
+    banner: String,
+    /// As last reported since the last reset.
+    state: Option<MachineState>,
+    position_mm: [f64; 3],
+    work_offset_mm: Option<[f64; 3]>,
+    unknown_lines: u64,
+    actions: Vec<Action>,
+}
+
+impl Session {
+    /// A session that has not started.
+    pub fn new(config: Config) -> Self {
+        Self {
+            config,
+            lines: Lines::default(),
+            poll: Poll::default(),
+            phase: Phase::Over,
+            homed: false,
+            alarm: None,
+            banner: String::new(),
+            state: None,
+            position_mm: [0.0; 3],
+            work_offset_mm: None,
+            unknown_lines: 0,
+            actions: Vec::new(),
+        }
+    }
+
+    /// True if a command would be taken: none is in hand, and no stop or reset is under way.
+    pub fn is_ready(&self) -> bool {
+        matches!(self.phase, Phase::Ready)
+    }
+
+    /// True while a stop, or the stop of an overdue move, has not come to its end.
+    pub fn is_stopping(&self) -> bool {
+        match &self.phase {
+            Phase::Holding { .. } => true,
+            Phase::Resetting { purpose, .. } | Phase::Looking { purpose, .. } => {
+                matches!(purpose, Purpose::Stop { .. })
+            }
+            Phase::Ready
+            | Phase::Moving(_)
+            | Phase::Homing { .. }
+            | Phase::Unlocking { .. }
+            | Phase::Over => false,
+        }
+    }
+
+    /// When [`timer`](Self::timer) is due; `None` once the session is over.
+    pub fn deadline(&self) -> Option<Duration> {
+        let poll = self.poll_interval().map(|interval| self.poll.next(interval));
+        [self.phase.deadline(), poll].into_iter().flatten().min()
+    }
+
+    /// Lines that could not be read, since the start.
+    pub fn unknown_lines(&self) -> u64 {
+        self.unknown_lines + self.lines.dropped()
+    }
+
+    /// Begins the conversation.
+    pub fn start(&mut self, now: Duration) -> Vec<Action> {
+        self.phase = Phase::Resetting { purpose: Purpose::Greet, resets: 0, deadline: now + LISTEN };
+        self.finish(now)
+    }
+
+    /// Finds the reference position.
+    pub fn home(&mut self, now: Duration) -> Vec<Action> {
+        if self.is_over() {
+            return Vec::new();
+        }
+        if let Err(failure) = self.check_ready("$H").and_then(|()| self.check_alarm()) {
+            self.done(Err(failure));
+            return self.finish(now);
+        }
+        self.homed = false;
+        // While homing `?` is not answered.
+        self.poll.reset();
+        self.phase = Phase::Homing { deadline: now + HOMING_TIMEOUT, accepted: None };
+        self.send_line("$H");
+        self.report();
+        self.finish(now)
+    }
+
+    /// Goes to a place in a straight line. A target equal to the present position is done at once.
+    pub fn move_to(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) -> Vec<Action> {
+        if self.is_over() {
+            return Vec::new();
+        }
+        let travel = Travel::new(now, self.position_mm, target_mm, speed_mm_per_s);
+        let checked = self
+            .check_ready(travel.line())
+            .and_then(|()| check_numbers(travel.line(), target_mm, speed_mm_per_s))
+            .and_then(|()| self.check_alarm())
+            .and_then(|()| self.check_homed());
+        if let Err(failure) = checked {
+            self.done(Err(failure));
+        } else if self.state == Some(MachineState::Idle)
+            && distance_mm(self.position_mm, travel.target_mm()) < SAME_PLACE_MM
+        {
+            self.done(Ok(self.position_mm));
+        } else {
+            self.send_line(travel.line());
+            self.phase = Phase::Moving(travel);
+        }
+        self.finish(now)
+    }
+
+    /// Clears an alarm: resets and unlocks the controller. The position is suspect after it. Without an alarm
+    /// nothing is done.
+    pub fn clear_alarm(&mut self, now: Duration) -> Vec<Action> {
+        if self.is_over() {
+            return Vec::new();
+        }
+        if let Err(failure) = self.check_ready("$X") {
+            self.done(Err(failure));
+        } else if self.alarm.is_none() && self.state != Some(MachineState::Alarm) {
+            self.done(Ok(self.position_mm));
+        } else {
+            self.reset(now, Purpose::Clear, 1);
+        }
+        self.finish(now)
+    }
+
+    /// Stops motion now: the first action is the byte to send. The stage decelerates and keeps its
+    /// position; what the controller still holds is then flushed by a reset, made at a stand. Homing can only
+    /// be ended by a reset.
+    pub fn stop(&mut self, now: Duration) -> Vec<Action> {
+        let stopped = Some(Failure::Stopped { position_mm: self.position_mm });
+        match self.phase.clone() {
+            // It stands, and would not answer.
+            Phase::Ready if self.alarm.is_some() => self.send(FEED_HOLD),
+            Phase::Ready | Phase::Looking { purpose: Purpose::Recover, .. } => self.hold(now, None),
+            Phase::Moving(_) | Phase::Unlocking { .. } | Phase::Looking { purpose: Purpose::Clear, .. } => {
+                self.hold(now, stopped);
+            }
+            Phase::Looking { purpose: Purpose::Stop { failure, .. }, .. } => self.hold(now, failure),
+            Phase::Holding { .. } => self.send(FEED_HOLD),
+            Phase::Homing { .. } => self.reset(now, Purpose::Stop { failure: stopped, held_mm: None }, 1),
+            Phase::Looking { purpose: Purpose::Greet, .. } => self.reset(now, Purpose::Greet, 1),
+            Phase::Resetting { purpose, resets: 0, .. } => self.reset(now, purpose, 1),
+            // Reset already: nothing moves.
+            Phase::Resetting { .. } | Phase::Over => {}
+        }
+        self.finish(now)
+    }
+
+    /// Takes what arrived.
+    pub fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
+        let mut lines = core::mem::take(&mut self.lines);
+        lines.push(bytes, |line| self.hear(now, Response::parse(line)));
+        self.lines = lines;
+        self.finish(now)
+    }
+
+    /// Does what is due at [`deadline`](Self::deadline).
+    pub fn timer(&mut self, now: Duration) -> Vec<Action> {
+        if self.phase.deadline().is_some_and(|deadline| now >= deadline) {
+            self.overdue(now);
+        }
+        // In an alarm the controller may keep silent until it is reset.
+        let excused = self.alarm.is_some() && self.is_ready();
+        if self.poll_interval().is_some() && self.poll.is_silent(now) && !excused {
+            self.fail(SessionError::Silent { question: "for its status" });
+        }
+        self.finish(now)
+    }
+
+    fn is_over(&self) -> bool {
+        matches!(self.phase, Phase::Over)
+    }
+
+    fn check_ready(&self, command: &str) -> Result<(), Failure> {
+        if self.is_ready() { Ok(()) } else { Err(refused(command, "another command is in hand")) }
+    }
+
+    fn check_alarm(&self) -> Result<(), Failure> {
+        self.alarm.map_or(Ok(()), |code| Err(Failure::Alarm { code }))
+    }
+
+    fn check_homed(&self) -> Result<(), Failure> {
+        if self.homed { Ok(()) } else { Err(Failure::Unhomed) }
+    }
+}
+
+fn check_numbers(command: &str, target_mm: [f64; 3], speed_mm_per_s: f64) -> Result<(), Failure> {
+    if !target_mm.iter().all(|mm| mm.is_finite()) {
+        return Err(refused(command, "the target is not a place"));
+    }
+    if !(speed_mm_per_s.is_finite() && speed_mm_per_s >= SPEED_MIN_MM_PER_S) {
+        return Err(refused(command, "the speed is not one that can be sent"));
+    }
+    Ok(())
+}
+
+fn refused(command: &str, reason: &str) -> Failure {
+    Failure::Refused { command: command.to_owned(), reason: reason.to_owned() }
+}
+
+#[cfg(test)]
+#[path = "session_tests.rs"]
+mod tests;

@@ -1,0 +1,247 @@
+//! What a session does about what the controller says.
+
+use core::time::Duration;
+
+use super::phase::{Phase, Purpose};
+use super::{Action, Failure, SAME_PLACE_MM, Session};
+use crate::grbl::travel::{Judgement, Travel, distance_mm};
+use crate::grbl::{FEED_HOLD, MachineState, Position, Response, StatusReport, error_meaning};
+
+/// How long `$X` may take.
+const UNLOCK_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// What boot may emit before its banner; it answers no line.
+const ERROR_AT_BOOT: u8 = 7;
+
+impl Session {
+    /// Does what one line calls for.
+    pub(super) fn hear(&mut self, now: Duration, response: Response) {
+        if self.phase == Phase::Over {
+            return;
+        }
+        match response {
+            Response::Ok => self.hear_ok(now),
+            Response::Error(code) => self.hear_error(code),
+            Response::Alarm(code) => self.hear_alarm(code),
+            Response::Banner(banner) => self.hear_banner(now, banner),
+            Response::Status(report) => self.hear_report(now, &report),
+            Response::Unknown(_) => self.unknown_lines += 1,
+            Response::Message(_)
+            | Response::Probe { .. }
+            | Response::Setting { .. }
+            | Response::Feedback(_) => {}
+        }
+    }
+
+    /// Anything but an answer to the line in hand is passed over: noise on the line is answered too.
+    fn hear_ok(&mut self, now: Duration) {
+        if let Phase::Moving(travel) = &mut self.phase
+            && travel.awaits_ok()
+        {
+            travel.accept(now);
+            self.poll.at_once();
+        } else if let Phase::Homing { accepted: accepted @ None, .. } = &mut self.phase {
+            *accepted = Some(now);
+            self.poll.at_once();
+        } else if let Phase::Unlocking { .. } = self.phase {
+            self.look(now, Purpose::Clear);
+        }
+    }
+
+    fn hear_error(&mut self, code: u8) {
+        if code == ERROR_AT_BOOT {
+            return;
+        }
+        let command = if let Phase::Moving(travel) = &self.phase
+            && travel.awaits_ok()
+        {
+            travel.line().to_owned()
+        } else if let Phase::Homing { accepted: None, .. } = self.phase {
+            "$H".to_owned()
+        } else if let Phase::Unlocking { .. } = self.phase {
+            "$X".to_owned()
+        } else {
+            return;
+        };
+        self.phase = Phase::Ready;
+        let reason = format!("error {code}: {}", error_meaning(code));
+        self.report();
+        self.done(Err(Failure::Refused { command, reason }));
+    }
+
+    /// An alarm, told by a line, or (0) only by a report.
+    fn hear_alarm(&mut self, code: u8) {
+        self.alarm = Some(code);
+        self.state = Some(MachineState::Alarm);
+        self.homed = false;
+        let ended = match &self.phase {
+            Phase::Moving(_)
+            | Phase::Homing { .. }
+            | Phase::Unlocking { .. }
+            | Phase::Looking { purpose: Purpose::Clear, .. } => true,
+            Phase::Holding { failure, .. } => failure.is_some(),
+            // A reset may raise an alarm; its banner follows.
+            Phase::Resetting { .. } | Phase::Looking { .. } | Phase::Over => return self.report(),
+            Phase::Ready => false,
+        };
+        self.phase = Phase::Ready;
+        self.report();
+        if ended {
+            self.done(Err(Failure::Alarm { code }));
+        }
+    }
+
+    fn hear_banner(&mut self, now: Duration, banner: String) {
+        self.poll.reset();
+        self.state = None;
+        self.banner.clone_from(&banner);
+        let failure = match core::mem::replace(&mut self.phase, Phase::Ready) {
+            Phase::Resetting { purpose: Purpose::Clear, .. } => {
+                self.send_line("$X");
+                self.phase = Phase::Unlocking { deadline: now + UNLOCK_TIMEOUT };
+                return;
+            }
+            Phase::Resetting { purpose, .. } => return self.look(now, purpose),
+            // The one that comes by itself and the one that was asked for.
+            Phase::Looking { purpose: Purpose::Greet, .. } => return self.look(now, Purpose::Greet),
+            Phase::Looking { purpose: Purpose::Stop { failure, .. }, .. }
+            | Phase::Holding { failure, .. } => failure,
+            Phase::Moving(_)
+            | Phase::Homing { .. }
+            | Phase::Unlocking { .. }
+            | Phase::Looking { purpose: Purpose::Clear, .. } => Some(Failure::Unhomed),
+            Phase::Looking { purpose: Purpose::Recover, .. } | Phase::Ready | Phase::Over => None,
+        };
+        self.homed = false;
+        self.actions.push(Action::Reset { banner });
+        self.report();
+        if let Some(failure) = failure {
+            self.done(Err(failure));
+        }
+        self.look(now, Purpose::Recover);
+    }
+
+    fn hear_report(&mut self, now: Duration, report: &StatusReport) {
+        let asked = self.poll.answered();
+        self.state = Some(report.state);
+        let offset_moved = self.take_position(report);
+        if report.state != MachineState::Alarm {
+            self.alarm = None;
+        } else if self.alarm.is_none() && (self.homed || matches!(self.phase, Phase::Moving(_))) {
+            // Its line was lost on the way.
+            return self.hear_alarm(0);
+        }
+        if offset_moved {
+            self.homed = false;
+        }
+        let asked_since = |since: Duration| asked.is_some_and(|asked| asked >= since);
+        match self.phase.clone() {
+            Phase::Moving(_) if offset_moved => {
+                self.report();
+                self.hold(now, Some(Failure::Unhomed));
+            }
+            Phase::Moving(travel) => self.judge(now, asked, travel),
+            Phase::Homing { accepted: Some(accepted), .. } if asked_since(accepted) => self.conclude_homing(),
+            Phase::Holding { failure, since } if asked_since(since) => self.conclude_hold(now, failure),
+            Phase::Looking { purpose, since } if asked_since(since) => self.conclude_look(purpose),
+            Phase::Homing { .. }
+            | Phase::Holding { .. }
+            | Phase::Looking { .. }
+            | Phase::Resetting { .. }
+            | Phase::Unlocking { .. }
+            | Phase::Ready
+            | Phase::Over => self.report(),
+        }
+    }
+
+    /// Takes over the position; true if the work frame has been moved since an earlier report.
+    fn take_position(&mut self, report: &StatusReport) -> bool {
+        let before = self.work_offset_mm;
+        self.work_offset_mm = report.work_offset_mm.or(before);
+        let offset_mm = self.work_offset_mm.unwrap_or_default();
+        self.position_mm = match report.position {
+            Position::Work(mm) => mm,
+            Position::Machine([x, y, z]) => {
+                let [offset_x, offset_y, offset_z] = offset_mm;
+                [x - offset_x, y - offset_y, z - offset_z]
+            }
+        };
+        before.is_some_and(|before| distance_mm(before, offset_mm) > SAME_PLACE_MM)
+    }
+
+    fn judge(&mut self, now: Duration, asked: Option<Duration>, mut travel: Travel) {
+        let (position_mm, stands) = (self.position_mm, self.state == Some(MachineState::Idle));
+        let target_mm = travel.target_mm();
+        let result = match travel.judge(now, asked, stands, position_mm, self.config.tolerance_mm) {
+            Judgement::Underway => {
+                self.phase = Phase::Moving(travel);
+                return self.report();
+            }
+            Judgement::Done => Ok(position_mm),
+            Judgement::NotThere => Err(Failure::NotThere { target_mm, position_mm }),
+        };
+        self.phase = Phase::Ready;
+        self.report();
+        self.done(result);
+    }
+
+    fn conclude_homing(&mut self) {
+        match self.state {
+            Some(MachineState::Idle) => {
+                self.homed = true;
+                self.phase = Phase::Ready;
+                self.report();
+                self.done(Ok(self.position_mm));
+            }
+            Some(MachineState::Alarm) => self.hear_alarm(0),
+            _ => self.report(),
+        }
+    }
+
+    fn conclude_hold(&mut self, now: Duration, failure: Option<Failure>) {
+        self.report();
+        if self.state == Some(MachineState::Alarm) {
+            self.phase = Phase::Ready;
+            if let Some(failure) = failure {
+                self.done(Err(failure.at(self.position_mm)));
+            }
+        } else if !self.moves() {
+            let held_mm = Some(self.position_mm);
+            self.reset(now, Purpose::Stop { failure, held_mm }, 1);
+        } else if self.state != Some(MachineState::Holding) {
+            self.send(FEED_HOLD);
+        }
+    }
+
+    fn conclude_look(&mut self, purpose: Purpose) {
+        let position_mm = self.position_mm;
+        match purpose {
+            Purpose::Greet => {
+                self.phase = Phase::Ready;
+                self.actions.push(Action::Connected { banner: self.banner.clone() });
+                self.report();
+            }
+            Purpose::Recover => {
+                self.phase = Phase::Ready;
+                self.report();
+            }
+            Purpose::Clear => {
+                self.phase = Phase::Ready;
+                self.homed = false;
+                self.report();
+                self.done(self.check_alarm().map(|()| position_mm));
+            }
+            Purpose::Stop { failure, held_mm } => {
+                let kept =
+                    held_mm.is_some_and(|held| distance_mm(held, position_mm) <= self.config.tolerance_mm);
+                // A stage that says after a reset that it moves can neither be believed nor waited for.
+                self.homed &= kept && !self.moves();
+                self.phase = Phase::Ready;
+                self.report();
+                if let Some(failure) = failure {
+                    self.done(Err(failure.at(position_mm)));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The steps that a session takes by itself.
+
+use core::time::Duration;
+
+use super::phase::{Phase, Purpose};
+use super::{Action, Failure, Report, Session, SessionError, Status};
+use crate::grbl::{FEED_HOLD, MachineState, SOFT_RESET, STATUS_QUERY};
+
+/// Between status reports while standing.
+const POLL_IDLE: Duration = Duration::from_millis(100);
+
+/// Between status reports while moving, or waiting to know.
+const POLL_MOVING: Duration = Duration::from_millis(50);
+
+/// How long the banner may take after a reset; some boards pass through a boot loader.
+const BANNER_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// How often a reset is tried.
+const RESETS_MAX: u32 = 4;
+
+impl Session {
+    /// Tells where the stage is and what it does.
+    pub(super) fn report(&mut self) {
+        let report = Report {
+            position_mm: self.position_mm,
+            status: self.status(),
+            alarm: self.alarm.filter(|code| *code != 0),
+        };
+        self.actions.push(Action::Report(report));
+    }
+
+    /// Ends the command in hand.
+    pub(super) fn done(&mut self, result: Result<[f64; 3], Failure>) {
+        self.actions.push(Action::Done(result));
+    }
+
+    /// Ends the session; what moves is told to stop.
+    pub(super) fn fail(&mut self, error: SessionError) {
+        match self.phase {
+            Phase::Homing { .. } => self.send(SOFT_RESET),
+            Phase::Ready | Phase::Moving(_) | Phase::Holding { .. } => self.send(FEED_HOLD),
+            Phase::Resetting { .. } | Phase::Looking { .. } | Phase::Unlocking { .. } | Phase::Over => {}
+        }
+        self.phase = Phase::Over;
+        self.actions.push(Action::Failed(error));
+    }
+
+    /// Decelerates to a stand, whereupon the command in hand ends with `failure`.
+    pub(super) fn hold(&mut self, now: Duration, failure: Option<Failure>) {
+        self.send(FEED_HOLD);
+        self.phase = Phase::Holding { failure, since: now };
+        self.poll.at_once();
+    }
+
+    /// Resets the controller, for the `resets`th time.
+    pub(super) fn reset(&mut self, now: Duration, purpose: Purpose, resets: u32) {
+        self.send(SOFT_RESET);
+        self.phase = Phase::Resetting { purpose, resets, deadline: now + BANNER_TIMEOUT };
+    }
+
+    /// Looks where the stage is after a reset.
+    pub(super) fn look(&mut self, now: Duration, purpose: Purpose) {
+        self.phase = Phase::Looking { purpose, since: now };
+        self.poll.at_once();
+    }
+
+    /// Does what follows when a phase has taken too long.
+    pub(super) fn overdue(&mut self, now: Duration) {
+        match self.phase.clone() {
+            Phase::Resetting { resets, .. } if resets >= RESETS_MAX => {
+                self.fail(SessionError::NoBanner { resets });
+            }
+            Phase::Resetting { purpose, resets, .. } => self.reset(now, purpose, resets + 1),
+            Phase::Moving(travel) => {
+                let (target_mm, waited) = (travel.target_mm(), travel.waited(now));
+                let failure = Failure::Overdue { target_mm, position_mm: self.position_mm, waited };
+                self.hold(now, Some(failure));
+            }
+            Phase::Homing { .. } => self.fail(SessionError::Silent { question: "that it is homed" }),
+            Phase::Unlocking { .. } => self.fail(SessionError::Silent { question: "to $X" }),
+            Phase::Holding { failure, .. } => self.reset(now, Purpose::Stop { failure, held_mm: None }, 1),
+            Phase::Looking { .. } | Phase::Ready | Phase::Over => {}
+        }
+    }
+
+    /// Asks for a report if it is time, and hands out what is to be done.
+    pub(super) fn finish(&mut self, now: Duration) -> Vec<Action> {
+        if self.poll_interval().is_some_and(|interval| now >= self.poll.next(interval)) {
+            self.poll.sent(now);
+            if self.poll.is_repeated() && matches!(self.phase, Phase::Holding { .. }) {
+                self.send(FEED_HOLD);
+            }
+            self.send(STATUS_QUERY);
+        }
+        core::mem::take(&mut self.actions)
+    }
+
+    /// How often to ask for a report; `None` if it would not be answered.
+    pub(super) fn poll_interval(&self) -> Option<Duration> {
+        match self.phase {
+            Phase::Resetting { .. } | Phase::Unlocking { .. } | Phase::Over => None,
+            Phase::Homing { accepted, .. } => accepted.map(|_| POLL_MOVING),
+            // A question asked now would only delay the one that follows the `ok`.
+            Phase::Moving(ref travel) if travel.awaits_ok() => Some(POLL_IDLE),
+            Phase::Ready if !self.moves() => Some(POLL_IDLE),
+            Phase::Ready | Phase::Moving(_) | Phase::Holding { .. } | Phase::Looking { .. } => {
+                Some(POLL_MOVING)
+            }
+        }
+    }
+
+    /// True if the last report says that the stage moves.
+    pub(super) fn moves(&self) -> bool {
+        use MachineState::{Holding, Home, Jog, Run};
+        self.state.is_some_and(|state| matches!(state, Run | Jog | Holding | Home))
+    }
+
+    pub(super) fn send(&mut self, byte: u8) {
+        self.actions.push(Action::Send(vec![byte]));
+    }
+
+    pub(super) fn send_line(&mut self, line: &str) {
+        self.actions.push(Action::Send(format!("{line}\n").into_bytes()));
+    }
+
+    fn status(&self) -> Status {
+        use MachineState::{Alarm, Check, Door, Hold, Holding, Home, Idle, Jog, Run, Sleep, Tool};
+        if matches!(self.phase, Phase::Homing { .. }) {
+            return Status::Homing;
+        }
+        if self.alarm.is_some() {
+            return Status::Alarm;
+        }
+        match self.state {
+            Some(Run | Jog) => Status::Moving,
+            Some(Holding | Hold | Door | Tool) => Status::Hold,
+            Some(Home) => Status::Homing,
+            // An alarm that was not told: locked since the start, which homing unlocks.
+            Some(Idle | Check | Sleep | Alarm) | None if !self.homed => Status::Unhomed,
+            Some(Idle | Check | Sleep | Alarm) | None => Status::Idle,
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Stopping.
+
+use super::{homed, moving};
+
+#[test]
+fn stop_holds_then_flushes_at_a_stand_and_keeps_the_position() {
+    moving(
+        "1008 * stop
+        1008 > !
+        1015 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
+        1015 = Moving 1.400 1.000 5.000
+        1015 > ?
+        1030 < <Hold:1|MPos:1.500,1.000,5.000|FS:300,0>
+        1030 = Hold 1.500 1.000 5.000
+        1065 > ?
+        1075 < <Hold:0|MPos:1.520,1.000,5.000|FS:0,0>
+        1075 = Hold 1.520 1.000 5.000
+        1075 > ^X
+        1090 < Grbl 1.1h ['$' for help]
+        1090 > ?
+        1100 < <Idle|MPos:1.520,1.000,5.000|FS:0,0|WCO:0.000,0.000,0.000>
+        1100 = Idle 1.520 1.000 5.000
+        1100 = stopped 1.520 1.000 5.000
+        1110 * move 1.52 1 6 at 10
+        1110 > G90 G21 G1 X1.520 Y1.000 Z6.000 F600.000",
+    );
+}
+
+#[test]
+fn a_second_stop_changes_nothing() {
+    moving(
+        "1008 * stop
+        1008 > !
+        1009 * stop
+        1009 > !
+        1015 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
+        1015 = Moving 1.400 1.000 5.000
+        1015 > ?
+        1030 < <Hold:0|MPos:1.500,1.000,5.000|FS:0,0>
+        1030 = Hold 1.500 1.000 5.000
+        1030 > ^X
+        1031 * stop
+        1090 < Grbl 1.1h ['$' for help]
+        1090 > ?
+        1100 < <Idle|MPos:1.500,1.000,5.000|FS:0,0>
+        1100 = Idle 1.500 1.000 5.000
+        1100 = stopped 1.500 1.000 5.000",
+    );
+}
+
+#[test]
+fn a_stage_that_stands_elsewhere_after_the_reset_must_be_homed() {
+    moving(
+        "1006 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
+        1006 = Moving 1.400 1.000 5.000
+        1008 * stop
+        1008 > !
+        1008 > ?
+        1030 < <Hold:0|MPos:1.500,1.000,5.000|FS:0,0>
+        1030 = Hold 1.500 1.000 5.000
+        1030 > ^X
+        1090 < Grbl 1.1h ['$' for help]
+        1090 > ?
+        1100 < <Idle|MPos:0.000,0.000,0.000|FS:0,0>
+        1100 = Unhomed 0.000 0.000 0.000
+        1100 = stopped 0.000 0.000 0.000
+        1110 * move 1 1 6 at 10
+        1110 = unhomed",
+    );
+}
+
+#[test]
+fn a_reset_that_raises_an_alarm_leaves_the_position_suspect() {
+    moving(
+        "1006 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
+        1006 = Moving 1.400 1.000 5.000
+        1008 * stop
+        1008 > !
+        1008 > ?
+        1030 < <Hold:0|MPos:1.500,1.000,5.000|FS:0,0>
+        1030 = Hold 1.500 1.000 5.000
+        1030 > ^X
+        1035 < ALARM:3
+        1035 = Alarm 3 1.500 1.000 5.000
+        1040 < Grbl 1.1h ['$' for help]
+        1040 > ?
+        1050 < <Alarm|MPos:1.500,1.000,5.000|FS:0,0>
+        1050 = Alarm 3 1.500 1.000 5.000
+        1050 = stopped 1.500 1.000 5.000
+        1060 * move 1.5 1 6 at 10
+        1060 = alarm 3",
+    );
+}
+
+#[test]
+fn a_line_that_waits_in_the_controller_is_flushed_by_a_stop() {
+    homed(
+        "950 * move 2 1 5 at 10
+        950 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
+        951 * stop
+        951 > !
+        951 > ?
+        960 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        960 = Idle 1.000 1.000 5.000
+        960 > ^X
+        970 < Grbl 1.1h ['$' for help]
+        970 > ?
+        980 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        980 = Idle 1.000 1.000 5.000
+        980 = stopped 1.000 1.000 5.000",
+    );
+}
+
+#[test]
+fn a_stage_that_moves_on_is_told_again_to_hold() {
+    moving(
+        "1006 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
+        1006 = Moving 1.400 1.000 5.000
+        1008 * stop
+        1008 > !
+        1008 > ?
+        1010 < <Run|MPos:1.500,1.000,5.000|FS:600,0>
+        1010 = Moving 1.500 1.000 5.000
+        1010 > !
+        1058 > ?
+        1308 > !
+        1308 > ?",
+    );
+}
+
+#[test]
+fn a_hold_that_never_completes_ends_in_a_reset_and_an_unknown_position() {
+    moving(
+        "1006 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
+        1006 = Moving 1.400 1.000 5.000
+        1008 * stop
+        1008 > !
+        1008 > ?
+        ...
+        2900 < <Hold:1|MPos:1.500,1.000,5.000|FS:600,0>
+        2900 = Hold 1.500 1.000 5.000
+        2900 > ?
+        ...
+        4008 > ^X
+        4020 < Grbl 1.1h ['$' for help]
+        4020 > ?
+        4030 < <Idle|MPos:1.500,1.000,5.000|FS:0,0>
+        4030 = Unhomed 1.500 1.000 5.000
+        4030 = stopped 1.500 1.000 5.000",
+    );
+}
+
+#[test]
+fn stop_while_standing_leaves_the_stage_ready() {
+    homed(
+        "950 * stop
+        950 > !
+        950 > ?
+        960 < <Hold:0|MPos:1.000,1.000,5.000|FS:0,0>
+        960 = Hold 1.000 1.000 5.000
+        960 > ^X
+        970 < Grbl 1.1h ['$' for help]
+        970 > ?
+        980 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        980 = Idle 1.000 1.000 5.000
+        990 * move 1 1 5 at 10
+        990 = done 1.000 1.000 5.000",
+    );
+}
+
+#[test]
+fn homing_is_stopped_by_a_reset() {
+    homed(
+        "950 * home
+        950 > $H
+        950 = Homing 1.000 1.000 5.000
+        1000 * stop
+        1000 > ^X
+        1005 < ALARM:6
+        1005 = Alarm 6 1.000 1.000 5.000
+        1010 < Grbl 1.1h ['$' for help]
+        1010 > ?
+        1020 < <Alarm|MPos:1.000,1.000,5.000|FS:0,0>
+        1020 = Alarm 6 1.000 1.000 5.000
+        1020 = stopped 1.000 1.000 5.000",
+    );
+}
+
+#[test]
+fn a_stage_that_says_even_after_the_reset_that_it_moves_is_not_waited_for() {
+    moving(
+        "1006 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
+        1006 = Moving 1.400 1.000 5.000
+        1008 * stop
+        1008 > !
+        1008 > ?
+        ...
+        2900 < <Run|MPos:1.500,1.000,5.000|FS:600,0>
+        2900 = Moving 1.500 1.000 5.000
+        2900 > !
+        2900 > ?
+        ...
+        4008 > ^X
+        4020 < Grbl 1.1h ['$' for help]
+        4020 > ?
+        4030 < <Run|MPos:1.500,1.000,5.000|FS:0,0>
+        4030 = Moving 1.500 1.000 5.000
+        4030 = stopped 1.500 1.000 5.000
+        4040 * move 1 1 6 at 10
+        4040 = unhomed",
+    );
+}

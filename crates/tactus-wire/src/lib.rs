@@ -1,0 +1,8 @@
+//! Sans-IO codecs and protocol state machines of sensors and stages, one module a device family.
+//!
+//! Bytes and times come in, actions go out: no sockets, no clock, no tokio. A time is a
+//! [`Duration`](core::time::Duration) since an instant of the caller's choice, the same for all calls.
+#![warn(clippy::indexing_slicing)]
+
+pub mod grbl;
+pub mod weiss;

@@ -1,0 +1,105 @@
+//! What the host asks, and the plain acknowledgement.
+
+use super::{ErrorCode, Packet, encode_packet, id};
+
+/// Flag of the acquire command: push frames.
+const RUN: u8 = 0x80;
+/// Flag of the acquire command: run-length encode them.
+const RUN_LENGTH: u8 = 0x01;
+
+/// Configures the acquisition: whether to push frames, how they are encoded, how many a second.
+/// Answered by [`acknowledge`] with [`id::ACQUIRE`].
+pub fn acquire(run: bool, run_length: bool, fps: u16) -> Vec<u8> {
+    let flags = if run { RUN } else { 0 } | if run_length { RUN_LENGTH } else { 0 };
+    let [fps_low, fps_high] = fps.to_le_bytes();
+    encode_packet(id::ACQUIRE, &[flags, fps_low, fps_high])
+}
+
+/// Asks for [`ControllerInfo`](super::ControllerInfo).
+pub fn query_controller() -> Vec<u8> {
+    encode_packet(id::CONTROLLER, &[])
+}
+
+/// Asks for [`SensorInfo`](super::SensorInfo).
+pub fn query_sensor() -> Vec<u8> {
+    encode_packet(id::SENSOR, &[])
+}
+
+/// Asks for the [`MatrixInfo`](super::MatrixInfo) of one matrix, counted from 0.
+pub fn query_matrix(matrix: u8) -> Vec<u8> {
+    encode_packet(id::MATRIX, &[matrix])
+}
+
+/// The device's answer to a command that has no other: its error code.
+pub fn acknowledge(id: u8, code: ErrorCode) -> Vec<u8> {
+    encode_packet(id, &code.0.to_le_bytes())
+}
+
+/// A command as the device reads it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Command {
+    /// [`query_controller`].
+    QueryController,
+    /// [`query_sensor`].
+    QuerySensor,
+    /// [`query_matrix`].
+    QueryMatrix {
+        /// Which, counted from 0.
+        matrix: u8,
+    },
+    /// [`acquire`].
+    Acquire {
+        /// Push frames.
+        run: bool,
+        /// Run-length encode them.
+        run_length: bool,
+        /// Frames per second.
+        fps: u16,
+    },
+}
+
+/// Why a packet is not a command that is known here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum CommandError {
+    /// No such command.
+    #[error("there is no command {id:#04x}")]
+    Unknown {
+        /// The packet's id.
+        id: u8,
+    },
+    /// Its payload has another length.
+    #[error("command {id:#04x} with {bytes} bytes of payload")]
+    Length {
+        /// The packet's id.
+        id: u8,
+        /// Length of the payload.
+        bytes: usize,
+    },
+}
+
+impl Command {
+    /// Reads a command.
+    ///
+    /// # Errors
+    /// A command that is not known, or a payload of another length.
+    pub fn parse(packet: &Packet<'_>) -> Result<Self, CommandError> {
+        match (packet.id, packet.payload) {
+            (id::CONTROLLER, []) => Ok(Self::QueryController),
+            (id::SENSOR, []) => Ok(Self::QuerySensor),
+            (id::MATRIX, [matrix]) => Ok(Self::QueryMatrix { matrix: *matrix }),
+            (id::ACQUIRE, [flags, fps_low, fps_high]) => Ok(Self::Acquire {
+                run: flags & RUN != 0,
+                run_length: flags & RUN_LENGTH != 0,
+                fps: u16::from_le_bytes([*fps_low, *fps_high]),
+            }),
+            (id::CONTROLLER | id::SENSOR | id::MATRIX | id::ACQUIRE, payload) => {
+                Err(CommandError::Length { id: packet.id, bytes: payload.len() })
+            }
+            (id, _) => Err(CommandError::Unknown { id }),
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "command_tests.rs"]
+mod tests;

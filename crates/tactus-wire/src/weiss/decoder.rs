@@ -1,0 +1,243 @@
+//! Packets out of a stream of bytes, whatever else is in it.
+
+use std::ops::Range;
+
+use super::packet::{HEADER_BYTES, SYNC};
+use super::{BOOT_MESSAGE, Packet, crc};
+
+/// Longest payload that [`Decoder::new`] believes in.
+const DEFAULT_MAX_PAYLOAD_BYTES: usize = 4096;
+
+/// Bytes after the payload.
+const CHECKSUM_BYTES: usize = 2;
+
+/// Finds packets in a stream that may be cut anywhere and hold garbage.
+///
+/// Feed it with [`push`](Self::push), then call [`next_packet`](Self::next_packet) until it gives
+/// `None`; what comes out does not depend on how the stream was cut. It holds at most one unfinished
+/// packet and what was pushed since.
+///
+/// Sync bytes may occur within a payload or in garbage. Of packets that overlap, the one that ends
+/// first and whose checksum holds is believed. So a broken length never hides the frames behind it,
+/// and the first whole packet after garbage is found when its last byte arrives.
+#[derive(Debug, Clone)]
+pub struct Decoder {
+    bytes: Vec<u8>,
+    /// Bytes before this are done with.
+    start: usize,
+    max_payload_bytes: usize,
+    /// How much of [`BOOT_MESSAGE`] the skipped bytes end with.
+    boot_matched: usize,
+    stats: DecoderStats,
+}
+
+/// What a [`Decoder`] met beside good packets, since it was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DecoderStats {
+    /// Bytes that were part of no packet.
+    pub skipped_bytes: u64,
+    /// Packets whose checksum did not hold.
+    pub bad_checksums: u64,
+    /// Boot messages among the skipped bytes.
+    pub boot_messages: u64,
+}
+
+/// A packet's checksum does not hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("packet {id:#04x} of {bytes} bytes has the checksum {found:#06x}, not {expected:#06x}")]
+pub struct ChecksumError {
+    /// The packet's id, if it can be believed.
+    pub id: u8,
+    /// Length of its payload, if it can be believed.
+    pub bytes: usize,
+    /// Computed.
+    pub expected: u16,
+    /// Received.
+    pub found: u16,
+}
+
+/// What stands at sync bytes.
+enum Candidate {
+    /// No packet: the id or the length is impossible.
+    Impossible,
+    /// It has not all arrived.
+    Unfinished,
+    /// It has arrived.
+    Whole { end: usize, verdict: Result<(), ChecksumError> },
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Decoder {
+    /// A decoder for payloads of up to 4096 bytes.
+    pub fn new() -> Self {
+        Self::with_max_payload(DEFAULT_MAX_PAYLOAD_BYTES)
+    }
+
+    /// A decoder for payloads of up to `bytes`; longer ones are taken for garbage.
+    pub fn with_max_payload(bytes: usize) -> Self {
+        Self {
+            bytes: Vec::new(),
+            start: 0,
+            max_payload_bytes: bytes,
+            boot_matched: 0,
+            stats: DecoderStats::default(),
+        }
+    }
+
+    /// Takes what arrived.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.bytes.drain(..self.start);
+        self.start = 0;
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// The next packet, a packet whose checksum does not hold, or `None` until more is pushed.
+    pub fn next_packet(&mut self) -> Option<Result<Packet<'_>, ChecksumError>> {
+        loop {
+            self.skip_to_sync();
+            let outer_at = self.start;
+            let (limit, verdict) = match self.inspect(outer_at) {
+                Candidate::Impossible => {
+                    self.skip(1);
+                    continue;
+                }
+                Candidate::Unfinished => (self.bytes.len() + 1, None),
+                Candidate::Whole { end, verdict } => (end, Some(verdict)),
+            };
+            if let Some(inner) = self.first_to_end_within(outer_at + 1, limit) {
+                self.skip(inner.start - outer_at);
+                return self.accept(inner.end).map(Ok);
+            }
+            return match verdict? {
+                Ok(()) => self.accept(limit).map(Ok),
+                Err(error) => {
+                    self.stats.bad_checksums += 1;
+                    self.skip(1);
+                    Some(Err(error))
+                }
+            };
+        }
+    }
+
+    /// What it met beside good packets.
+    pub fn stats(&self) -> DecoderStats {
+        self.stats
+    }
+
+    /// Skips to the next sync bytes, or to the end but for what may become sync bytes.
+    fn skip_to_sync(&mut self) {
+        let rest = self.bytes.get(self.start..).unwrap_or_default();
+        let skipped = find_sync(rest).unwrap_or_else(|| {
+            let begun = rest.iter().rev().take(SYNC.len() - 1).take_while(|byte| **byte == SYNC[0]).count();
+            rest.len() - begun
+        });
+        self.skip(skipped);
+    }
+
+    fn inspect(&self, at: usize) -> Candidate {
+        let Some(rest) = self.bytes.get(at + SYNC.len()..) else { return Candidate::Unfinished };
+        let Some(&[id, length_low, length_high]) = rest.first_chunk() else {
+            // A run of sync bytes ends where the header begins: no id is one.
+            return if rest.first() == Some(&SYNC[0]) {
+                Candidate::Impossible
+            } else {
+                Candidate::Unfinished
+            };
+        };
+        let length = usize::from(u16::from_le_bytes([length_low, length_high]));
+        if id == SYNC[0] || length > self.max_payload_bytes {
+            return Candidate::Impossible;
+        }
+        if length == 0 {
+            return Candidate::Whole { end: at + HEADER_BYTES, verdict: Ok(()) };
+        }
+        let covered = HEADER_BYTES - SYNC.len() + length;
+        let Some((covered, tail)) = rest.split_at_checked(covered) else { return Candidate::Unfinished };
+        let Some(found) = tail.first_chunk::<CHECKSUM_BYTES>() else { return Candidate::Unfinished };
+        let (expected, found) = (crc(covered), u16::from_le_bytes(*found));
+        let verdict = if expected == found {
+            Ok(())
+        } else {
+            Err(ChecksumError { id, bytes: length, expected, found })
+        };
+        Candidate::Whole { end: at + HEADER_BYTES + length + CHECKSUM_BYTES, verdict }
+    }
+
+    /// Of the checksummed packets that lie within `from..limit` and end before `limit`, the one that ends first.
+    fn first_to_end_within(&self, mut from: usize, mut limit: usize) -> Option<Range<usize>> {
+        let mut first = None;
+        while let Some(offset) = find_sync(self.bytes.get(from..limit.min(self.bytes.len()))?) {
+            let at = from + offset;
+            if let Candidate::Whole { end, verdict: Ok(()) } = self.inspect(at)
+                && end < limit
+                && end > at + HEADER_BYTES
+            {
+                first = Some(at..end);
+                limit = end;
+            }
+            from = at + 1;
+        }
+        first
+    }
+
+    /// The packet from `start` to `end`, which is then done with.
+    fn accept(&mut self, end: usize) -> Option<Packet<'_>> {
+        let packet = self.bytes.get(self.start..end)?;
+        let id = *packet.get(SYNC.len())?;
+        let payload =
+            packet.get(HEADER_BYTES..packet.len().saturating_sub(CHECKSUM_BYTES)).unwrap_or_default();
+        self.start = end;
+        self.boot_matched = 0;
+        Some(Packet { id, payload })
+    }
+
+    fn skip(&mut self, count: usize) {
+        let skipped = self.bytes.get(self.start..self.start + count).unwrap_or_default();
+        for byte in skipped {
+            // ESC stands only at the message's beginning, so that a mismatch can fall back no further.
+            let expected = BOOT_MESSAGE.get(self.boot_matched);
+            self.boot_matched = match expected {
+                Some(expected) if expected == byte => self.boot_matched + 1,
+                _ => usize::from(*byte == BOOT_MESSAGE[0]),
+            };
+            if self.boot_matched == BOOT_MESSAGE.len() {
+                self.stats.boot_messages += 1;
+                self.boot_matched = 0;
+            }
+        }
+        self.stats.skipped_bytes += skipped.len() as u64;
+        self.start += skipped.len();
+    }
+}
+
+/// Offset of the first three sync bytes in a row.
+fn find_sync(bytes: &[u8]) -> Option<usize> {
+    let mut at = 0;
+    loop {
+        at += find_sync_byte(bytes.get(at..)?)?;
+        at += match bytes.get(at..)?.first_chunk()? {
+            &SYNC => return Some(at),
+            [_, _, 0xAA] => 2,
+            [_, _, _] => 3,
+        };
+    }
+}
+
+/// Offset of the first sync byte; looks at blocks, which the compiler compares in one go.
+fn find_sync_byte(bytes: &[u8]) -> Option<usize> {
+    let (blocks, _) = bytes.as_chunks::<32>();
+    let has_none =
+        |block: &&[u8; 32]| block.iter().fold(0, |any, byte| any | u8::from(*byte == SYNC[0])) == 0;
+    let without = 32 * blocks.iter().take_while(has_none).count();
+    let rest = bytes.get(without..)?;
+    rest.iter().position(|byte| *byte == SYNC[0]).map(|offset| without + offset)
+}
+
+#[cfg(test)]
+#[path = "decoder_tests.rs"]
+mod tests;

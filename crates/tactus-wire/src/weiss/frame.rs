@@ -1,0 +1,104 @@
+//! The full frame: one reading of all elements.
+
+use super::{Packet, encode_packet, id};
+
+/// Bit of the flags byte: counts are run-length encoded.
+const RUN_LENGTH: u8 = 0x01;
+
+/// Greatest count that a run-length word can hold.
+const MAX_RUN_COUNTS: u16 = 0x0FFF;
+
+/// One reading of all elements.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// The controller's clock in ms; wraps after 49.7 days.
+    pub timestamp_ms: u32,
+    /// True if the counts came run-length encoded.
+    pub run_length: bool,
+    /// Raw counts in the order of the wire: row-major.
+    pub counts: Vec<u16>,
+}
+
+/// Why a packet is not the frame that was expected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// The packet is something else.
+    #[error("packet {id:#04x} is not a frame")]
+    NotAFrame {
+        /// The packet's id.
+        id: u8,
+    },
+    /// The payload ends before the counts begin, or within one.
+    #[error("a frame of {bytes} bytes has no whole number of counts")]
+    Length {
+        /// Length of the payload.
+        bytes: usize,
+    },
+    /// Another array than expected.
+    #[error("the frame has {found} elements, the rig's array has {expected}")]
+    Elements {
+        /// As the rig says.
+        expected: usize,
+        /// As received.
+        found: usize,
+    },
+}
+
+impl Frame {
+    /// Reads a frame of exactly `elements` counts.
+    ///
+    /// # Errors
+    /// Any other packet, a broken payload, or another number of elements.
+    pub fn parse(packet: &Packet<'_>, elements: usize) -> Result<Self, FrameError> {
+        if packet.id != id::FRAME {
+            return Err(FrameError::NotAFrame { id: packet.id });
+        }
+        let length = FrameError::Length { bytes: packet.payload.len() };
+        let (timestamp, rest) = packet.payload.split_first_chunk::<4>().ok_or(length)?;
+        let (flags, texels) = rest.split_first().ok_or(length)?;
+        let (words, []) = texels.as_chunks::<2>() else { return Err(length) };
+        let words = words.iter().map(|word| u16::from_le_bytes(*word));
+        let run_length = flags & RUN_LENGTH != 0;
+        let mut counts = Vec::with_capacity(elements);
+        if run_length {
+            for word in words {
+                let repeats = usize::from(word >> 12);
+                counts.resize(counts.len() + repeats, word & MAX_RUN_COUNTS);
+            }
+        } else {
+            counts.extend(words);
+        }
+        if counts.len() != elements {
+            return Err(FrameError::Elements { expected: elements, found: counts.len() });
+        }
+        Ok(Self { timestamp_ms: u32::from_le_bytes(*timestamp), run_length, counts })
+    }
+}
+
+/// A frame as a whole packet.
+///
+/// Run-length words hold twelve bits: counts above 4095 read 4095 in that form.
+///
+/// # Panics
+/// If the counts do not fit into one packet: more than 32 765 of them.
+pub fn encode_frame(timestamp_ms: u32, counts: &[u16], run_length: bool) -> Vec<u8> {
+    let mut payload = Vec::with_capacity(5 + 2 * counts.len());
+    payload.extend(timestamp_ms.to_le_bytes());
+    payload.push(if run_length { RUN_LENGTH } else { 0 });
+    if run_length {
+        let clamped: Vec<u16> = counts.iter().map(|count| (*count).min(MAX_RUN_COUNTS)).collect();
+        for run in clamped.chunk_by(|a, b| a == b).flat_map(|run| run.chunks(15)) {
+            let count = run.first().copied().unwrap_or(0);
+            #[expect(clippy::cast_possible_truncation, reason = "at most 15")]
+            let repeats = run.len() as u16;
+            payload.extend((repeats << 12 | count).to_le_bytes());
+        }
+    } else {
+        payload.extend(counts.iter().flat_map(|count| count.to_le_bytes()));
+    }
+    encode_packet(id::FRAME, &payload)
+}
+
+#[cfg(test)]
+#[path = "frame_tests.rs"]
+mod tests;

@@ -1,0 +1,74 @@
+//! The controller's clock: unwrapped, and watched for jumps.
+
+use core::time::Duration;
+
+/// A tick this far back or less is a frame that came late; farther back the clock was set back.
+const LATE_MS: u32 = 1000;
+
+/// How much more the controller's clock may advance than the host's between two frames: what a frame may be
+/// delayed on the way. More, and the clock was set forward.
+const DELAY_MS: u128 = 1000;
+
+/// Turns the wrapping 32-bit ticks of successive frames into 64-bit ones.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ticks {
+    last: Option<Last>,
+    /// A frame that seemed late. If the next goes on from it, the clock was set back.
+    late: Option<u32>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    raw_ms: u32,
+    tick_ms: u64,
+    received: Duration,
+}
+
+/// What a frame's tick says of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Placed {
+    /// Later than the frame before, on the same clock.
+    Next { tick_ms: u64 },
+    /// The first on a new clock: the first at all, or the controller's clock has jumped.
+    NewClock { tick_ms: u64 },
+    /// The frame before again, or one from before that: nothing new.
+    Stale,
+}
+
+impl Ticks {
+    /// Places a frame that was received at `now`.
+    pub(super) fn place(&mut self, now: Duration, raw_ms: u32) -> Placed {
+        let Some(last) = self.last else { return self.new_clock(now, raw_ms) };
+        let (ahead_ms, behind_ms) = (raw_ms.wrapping_sub(last.raw_ms), last.raw_ms.wrapping_sub(raw_ms));
+        if ahead_ms == 0 {
+            return Placed::Stale;
+        }
+        if ahead_ms < behind_ms {
+            let elapsed_ms = now.saturating_sub(last.received).as_millis();
+            if u128::from(ahead_ms) > elapsed_ms + DELAY_MS {
+                return self.new_clock(now, raw_ms);
+            }
+            let tick_ms = last.tick_ms + u64::from(ahead_ms);
+            self.last = Some(Last { raw_ms, tick_ms, received: now });
+            self.late = None;
+            return Placed::Next { tick_ms };
+        }
+        let goes_on = self.late.is_some_and(|late| (1..LATE_MS).contains(&raw_ms.wrapping_sub(late)));
+        if behind_ms > LATE_MS || goes_on {
+            return self.new_clock(now, raw_ms);
+        }
+        self.late = Some(raw_ms);
+        Placed::Stale
+    }
+
+    fn new_clock(&mut self, now: Duration, raw_ms: u32) -> Placed {
+        let tick_ms = u64::from(raw_ms);
+        self.last = Some(Last { raw_ms, tick_ms, received: now });
+        self.late = None;
+        Placed::NewClock { tick_ms }
+    }
+}
+
+#[cfg(test)]
+#[path = "ticks_tests.rs"]
+mod tests;
