@@ -1,0 +1,88 @@
+//! What can be wrong with a script.
+
+use crate::{Exceeded, Location, Refusal};
+
+/// Why a script is not one, or ended early. The text begins with the script's line where there is one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ScriptError {
+    /// Not Starlark, or something that experiment scripts may not use.
+    #[error("{at}: {problem}")]
+    Syntax {
+        /// The line.
+        at: Location,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A line failed: a wrong operand, a wrong argument, the script's own `fail`.
+    #[error("{at}: {problem}")]
+    Evaluation {
+        /// The innermost line of the script.
+        at: Location,
+        /// What is wrong.
+        problem: String,
+        /// How the script got there, with the lines' text.
+        call_stack: String,
+    },
+    /// A step was not done.
+    #[error("{at}: {refusal}")]
+    Refused {
+        /// The line that asked for the step.
+        at: Location,
+        /// Why it was not done.
+        refusal: Refusal,
+        /// How the script got there, with the lines' text.
+        call_stack: String,
+    },
+    /// The script used up what it may use.
+    #[error("{at}: {exceeded}")]
+    Limit {
+        /// The line that was under way.
+        at: Location,
+        /// The bound that it ran into.
+        exceeded: Exceeded,
+        /// How the script got there, with the lines' text; empty if it had to be left behind.
+        call_stack: String,
+    },
+    /// A parameter was given a value that it cannot have, or does not exist.
+    #[error("{script}: {problem}")]
+    Argument {
+        /// The script's name, without the suffix.
+        script: String,
+        /// What is wrong, and what would be right.
+        problem: String,
+    },
+    /// The arguments cannot be read at all.
+    #[error("{0}")]
+    Malformed(String),
+    /// The evaluator itself broke.
+    #[error("{script}: the evaluator broke: {problem}")]
+    Evaluator {
+        /// The script's name, without the suffix.
+        script: String,
+        /// What is known about it.
+        problem: String,
+    },
+}
+
+impl ScriptError {
+    /// The line at fault, where there is one.
+    pub fn at(&self) -> Option<&Location> {
+        match self {
+            Self::Syntax { at, .. }
+            | Self::Evaluation { at, .. }
+            | Self::Refused { at, .. }
+            | Self::Limit { at, .. } => Some(at),
+            Self::Argument { .. } | Self::Malformed(_) | Self::Evaluator { .. } => None,
+        }
+    }
+
+    /// How the script got to that line, outermost call first; empty where there is nothing to tell.
+    pub fn call_stack(&self) -> &str {
+        match self {
+            Self::Evaluation { call_stack, .. }
+            | Self::Refused { call_stack, .. }
+            | Self::Limit { call_stack, .. } => call_stack,
+            Self::Syntax { .. } | Self::Argument { .. } | Self::Malformed(_) | Self::Evaluator { .. } => "",
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The script's side of an evaluation, on a thread of its own.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender};
+
+use serde_json::Value as Json;
+use starlark::codemap::FileSpanRef;
+use starlark::environment::Module;
+use starlark::eval::{BeforeStmtFunc, BeforeStmtFuncDyn, Evaluator};
+use starlark::{Error, ErrorKind};
+
+use crate::builtins::{rig_value, to_json};
+use crate::session::{self, Halt, Message, Part, Session, Watch};
+use crate::{
+    Arguments, Exceeded, Limits, Location, Parameter, Refusal, Reply, RigView, Script, ScriptError, sandbox,
+};
+
+/// What an evaluation is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// The parameters only.
+    Declare,
+    /// The whole script.
+    Run {
+        /// Seed of its random numbers.
+        seed: u64,
+    },
+}
+
+/// All that the script's thread needs.
+#[derive(Debug)]
+pub(crate) struct Job {
+    pub(crate) script: Script,
+    pub(crate) arguments: Arguments,
+    pub(crate) rig: RigView,
+    pub(crate) limits: Limits,
+    pub(crate) purpose: Purpose,
+    pub(crate) watch: Arc<Watch>,
+    pub(crate) calls: SyncSender<Message>,
+    pub(crate) replies: Receiver<Result<Reply, Refusal>>,
+}
+
+/// What an evaluation gives.
+#[derive(Debug)]
+pub(crate) struct Evaluated {
+    pub(crate) parameters: Vec<Parameter>,
+    pub(crate) values: Arguments,
+    pub(crate) result: Json,
+    pub(crate) steps: u64,
+    pub(crate) ticks: u64,
+    pub(crate) heap_bytes: usize,
+}
+
+/// Evaluates a script and sends what came of it.
+pub(crate) fn evaluate(job: Job) {
+    let session = Session::new(job).begin();
+    let ended = Module::with_temp_heap(|module| evaluate_in(&module, &session));
+    // If nobody listens any more, nobody wants to know.
+    drop(session.job.calls.send(Message::Ended(Box::new(ended))));
+}
+
+fn evaluate_in(module: &Module<'_>, session: &Session) -> Result<Evaluated, ScriptError> {
+    let Job { script, limits, purpose, watch, .. } = &session.job;
+    let rig = rig_value(&session.job.rig, module.heap());
+    module.set("rig", rig);
+    let mut eval = Evaluator::new(module);
+    // Collection runs between top-level statements only, where scripts do nothing, and follows values
+    // however deep: without it memory is bounded just as well.
+    eval.disable_gc();
+    let bounded = eval
+        .set_max_callstack_size(limits.call_depth.max(1))
+        .and_then(|()| eval.set_max_tick_count(limits.ticks.max(1)))
+        .and_then(|()| eval.set_max_heap_size(limits.heap_bytes.max(1)));
+    bounded.map_err(|error| ScriptError::Evaluator {
+        script: script.name().to_owned(),
+        problem: error.to_string(),
+    })?;
+    eval.set_check_cancelled(Box::new(|| watch.stopped().is_some()));
+    // Hidden from the crate's documentation, but public: its debugger is built on it.
+    eval.before_stmt_for_dap(BeforeStmtFunc::from_dyn(Box::new(BeforeStatement)));
+
+    let mut evaluated = eval.eval_module(script.ast().clone(), &sandbox::GLOBALS).map(|_| Json::Null);
+    evaluated = evaluated.and_then(|none| Ok(session.check_arguments().map(|()| none)?));
+    if let (Ok(_), Purpose::Run { .. }) = (&evaluated, purpose) {
+        session.part.set(Part::Run);
+        watch.at_line(script.run_line());
+        evaluated = match module.get("run") {
+            Some(run) => eval.eval_function(run, &[rig], &[]).map(to_json),
+            None => Err(Halt::Failed("`run` is not defined at the end of the top level".into()).into()),
+        };
+    }
+    match evaluated {
+        Ok(result) => Ok(Evaluated {
+            parameters: session.parameters.take(),
+            values: session.values.take().into_iter().collect(),
+            result,
+            steps: session.steps.get(),
+            ticks: eval.get_total_tick_count(),
+            heap_bytes: module.heap().allocated_bytes(),
+        }),
+        Err(error) => Err(script_error(&error, &eval, session)),
+    }
+}
+
+/// Looks after the bounds before each statement.
+struct BeforeStatement;
+
+impl<'e> BeforeStmtFuncDyn<'e> for BeforeStatement {
+    fn call<'v>(
+        &mut self,
+        span: FileSpanRef<'_>,
+        _continued: bool,
+        eval: &mut Evaluator<'v, '_, 'e>,
+    ) -> starlark::Result<()> {
+        let session = session::current()?;
+        session.job.watch.at_line(sandbox::line(&span.to_file_span()));
+        Ok(session.check(eval)?)
+    }
+}
+
+/// The evaluator's error in our terms.
+fn script_error(error: &Error, eval: &Evaluator<'_, '_, '_>, session: &Session) -> ScriptError {
+    let script = session.job.script.name().to_owned();
+    let line = error.span().map_or_else(|| session.job.watch.line().max(1), sandbox::line);
+    let at = Location { script: script.clone(), line };
+    let call_stack = shortened(error.to_string());
+    match halt(error, eval, session) {
+        Halt::Failed(problem) => ScriptError::Evaluation { at, problem: shortened(problem), call_stack },
+        Halt::Argument(problem) => ScriptError::Argument { script, problem: shortened(problem) },
+        Halt::Refused(refusal) => ScriptError::Refused { at, refusal, call_stack },
+        Halt::Exceeded(exceeded) => ScriptError::Limit { at, exceeded, call_stack },
+    }
+}
+
+fn halt(error: &Error, eval: &Evaluator<'_, '_, '_>, session: &Session) -> Halt {
+    let Job { limits, watch, .. } = &session.job;
+    if let ErrorKind::Native(native) = error.kind()
+        && let Some(halt) = native.downcast_ref::<Halt>()
+    {
+        return halt.clone();
+    }
+    if let ErrorKind::StackOverflow(_) = error.kind() {
+        return Exceeded::CallDepth(limits.call_depth).into();
+    }
+    // The evaluator's own checks, once in a thousand ticks, have no kind of their own.
+    if let ErrorKind::Other(_) = error.kind() {
+        if let Some(stop) = watch.stopped() {
+            return session.halt(stop);
+        }
+        if eval.get_total_tick_count() > limits.ticks {
+            return Exceeded::Ticks(limits.ticks).into();
+        }
+        if eval.heap().allocated_bytes() > limits.heap_bytes {
+            return Exceeded::Heap(limits.heap_bytes).into();
+        }
+    }
+    Halt::Failed(error.without_diagnostic().to_string().trim().to_owned())
+}
+
+/// Texts that may quote a script's values end up in messages: they stay short.
+fn shortened(mut text: String) -> String {
+    const BYTES_MAX: usize = 8 << 10;
+    if text.len() > BYTES_MAX {
+        text.truncate(text.floor_char_boundary(BYTES_MAX));
+        text.push_str(" ...");
+    }
+    text
+}

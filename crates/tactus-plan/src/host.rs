@@ -1,0 +1,88 @@
+//! Between a script and whoever performs its steps.
+
+use std::fmt;
+
+use crate::Step;
+
+/// Performs the steps of a script: the run engine on a rig, or a test.
+pub trait Host {
+    /// Performs one step and gives back what came of it. The script waits for as long as this takes.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the step was not done; it ends the script at the line of the call.
+    fn perform(&mut self, call: &Call) -> Result<Reply, Refusal>;
+
+    /// True once the run is to end. Asked again and again while the script computes.
+    fn cancelled(&self) -> bool;
+}
+
+/// A step that a script asks for, and the line that asks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Call {
+    /// What to do.
+    pub step: Step,
+    /// The innermost line of the script.
+    pub at: Location,
+}
+
+/// A line of a script, displayed as `corners.star:12`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Location {
+    /// The script's name, without the suffix.
+    pub script: String,
+    /// Line, from 1.
+    pub line: u32,
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.star:{}", self.script, self.line)
+    }
+}
+
+/// What came of a step.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reply {
+    /// It is done and there is nothing to tell.
+    Done,
+    /// A press: one reading for each of its depths, in their order.
+    Pressed(Vec<Reading>),
+    /// A dwell, a read or a tare.
+    Reading(Reading),
+    /// A move: where the tip is now, in the sensor frame.
+    Position {
+        /// Along a row of elements.
+        x_mm: f64,
+        /// Along a column of elements.
+        y_mm: f64,
+        /// Above the covering's nominal surface.
+        height_mm: f64,
+    },
+}
+
+/// The mean over some frames; one number per element, row-major.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Reading {
+    /// Raw counts, averaged.
+    pub mean_counts: Vec<f64>,
+    /// `mean_counts` above the last tare; before any tare, above the run's own reading at rest.
+    pub signal: Vec<f64>,
+    /// Standard deviation of the counts over the averaged frames.
+    pub rms: Vec<f64>,
+    /// Number of frames averaged.
+    pub frames: u32,
+}
+
+/// Why a step was not done. The text is for a person and follows the script's line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// The step leaves the rig's envelope; nothing moved.
+    #[error("{0}")]
+    Outside(String),
+    /// The run was stopped.
+    #[error("{0}")]
+    Stopped(String),
+    /// The rig could not do it.
+    #[error("{0}")]
+    Failed(String),
+}

@@ -1,0 +1,64 @@
+//! How much a script may use up.
+
+use std::time::Duration;
+
+/// Bounds of one evaluation of a script. `Default` is ample for any experiment.
+///
+/// What each of them can and cannot hold is told in the crate's documentation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Limits {
+    /// Turns of loops and comprehensions, plus calls of functions and operators. Looked at once in a thousand.
+    pub ticks: u64,
+    /// Memory of the script's values.
+    pub heap_bytes: usize,
+    /// Functions that may be under way at a time.
+    pub call_depth: usize,
+    /// Steps asked of the host, `log` included.
+    pub steps: u64,
+    /// Time that the script may compute between two steps. The steps themselves may take as long as they need.
+    pub think: Duration,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            ticks: 5_000_000,
+            heap_bytes: 256 << 20,
+            call_depth: 64,
+            steps: 100_000,
+            think: Duration::from_secs(10),
+        }
+    }
+}
+
+/// Which bound a script ran into.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Exceeded {
+    /// [`Limits::ticks`].
+    #[error("the script's {0} loop turns and calls are used up: is there a loop without an end?")]
+    Ticks(u64),
+    /// [`Limits::heap_bytes`].
+    #[error("the script's values take more than {} MiB", .0 >> 20)]
+    Heap(usize),
+    /// [`Limits::call_depth`].
+    #[error("more than {0} functions are under way: does one call itself without an end?")]
+    CallDepth(usize),
+    /// [`Limits::steps`].
+    #[error("the script asked for more than {0} steps")]
+    Steps(u64),
+    /// [`Limits::think`].
+    #[error("the script computed for more than {:.1} s without asking for a step", .0.as_secs_f64())]
+    Think(Duration),
+    /// One value would be too large.
+    #[error("{what} of {size} {unit}, the limit is {limit}")]
+    Size {
+        /// Kind of value, with its article.
+        what: &'static str,
+        /// How large it would be; a lower bound if measuring was broken off.
+        size: u64,
+        /// Of what.
+        unit: &'static str,
+        /// How large it may be.
+        limit: u64,
+    },
+}

@@ -1,0 +1,62 @@
+//! What experiment scripts may use, and the bounds that the evaluator does not know itself.
+//!
+//! The evaluator counts loop turns and calls and looks at memory and time every thousand of them. That is
+//! too late for a single operation that makes a huge value, so such operations are closed off here:
+//! the source is bounded in size ([`SOURCE_MAX_BYTES`]) and nesting before it is parsed, operators that
+//! can make a value much larger than their operands are replaced by functions that measure first
+//! (`operators`), and what cannot be replaced is refused with its line (`language`).
+
+mod globals;
+mod language;
+mod nesting;
+mod operators;
+mod text;
+
+use starlark::codemap::FileSpan;
+use starlark::syntax::{AstModule, Dialect};
+
+use crate::{Location, ScriptError};
+
+pub(crate) use globals::GLOBALS;
+pub(crate) use text::{Numbers, SEQUENCE_MAX, write_text};
+
+/// Longest source that is read.
+pub(crate) const SOURCE_MAX_BYTES: usize = 256 << 10;
+
+/// Parses and checks a script, and puts the measuring functions in the place of its operators.
+pub(crate) fn parse(name: &str, source: &str) -> Result<AstModule, ScriptError> {
+    let syntax =
+        |line, problem| ScriptError::Syntax { at: Location { script: name.to_owned(), line }, problem };
+    if source.len() > SOURCE_MAX_BYTES {
+        let problem = format!("a script of {} bytes, the limit is {SOURCE_MAX_BYTES}", source.len());
+        return Err(syntax(1, problem));
+    }
+    nesting::check(source).map_err(|(line, problem)| syntax(line, problem))?;
+    let mut ast =
+        AstModule::parse(&format!("{name}.star"), source.to_owned(), &dialect()).map_err(|error| {
+            let problem = error.without_diagnostic().to_string();
+            syntax(error.span().map_or(1, line), problem.trim_start_matches("Parse error: ").to_owned())
+        })?;
+    language::check(&ast).map_err(|(line, problem)| syntax(line, problem))?;
+    ast.replace_binary_operators(&operators::replacements());
+    Ok(ast)
+}
+
+/// First line of a span, from 1.
+pub(crate) fn line(span: &FileSpan) -> u32 {
+    u32::try_from(span.resolve_span().begin.line).unwrap_or(u32::MAX).saturating_add(1)
+}
+
+fn dialect() -> Dialect {
+    Dialect {
+        enable_load: false,
+        enable_keyword_only_arguments: true,
+        enable_top_level_stmt: true,
+        enable_f_strings: false,
+        ..Dialect::Standard
+    }
+}
+
+#[cfg(test)]
+#[path = "sandbox_tests.rs"]
+mod tests;

@@ -1,0 +1,159 @@
+//! An experiment script: parsed and checked, not yet run.
+
+use std::fmt;
+use std::slice;
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+use starlark::syntax::AstModule;
+use starlark::syntax::ast::{AstLiteral, AstStmt, Expr, Stmt};
+
+use crate::evaluate::{Evaluated, Purpose};
+use crate::execute::converse;
+use crate::{
+    Arguments, Call, Host, Limits, Location, Parameter, Refusal, Reply, RigView, ScriptError, sandbox,
+};
+
+/// An experiment script. Cloning is cheap enough to hand it to another thread.
+#[derive(Clone)]
+pub struct Script {
+    name: String,
+    source: Arc<str>,
+    sha256: String,
+    doc: String,
+    run_line: u32,
+    ast: AstModule,
+}
+
+/// Longest name of a script.
+const NAME_MAX_BYTES: usize = 64;
+
+impl Script {
+    /// Reads a script. `name` is what locations and files are called after; a suffix `.star` is dropped.
+    ///
+    /// # Errors
+    /// [`ScriptError::Syntax`] with the line: not Starlark, nested too deeply, something that experiment
+    /// scripts may not use, or no `def run(rig):`.
+    pub fn parse(name: &str, source: &str) -> Result<Self, ScriptError> {
+        let name = name.strip_suffix(".star").unwrap_or(name).to_owned();
+        // It becomes part of run ids, and so of paths.
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if name.is_empty() || name.len() > NAME_MAX_BYTES || !name.chars().all(is_plain) {
+            return Err(ScriptError::Malformed(format!(
+                "{name:?} is no name for an experiment: letters, digits, '-' and '_', at most {NAME_MAX_BYTES}"
+            )));
+        }
+        let ast = sandbox::parse(&name, source)?;
+        let Some(run_line) = definition_line(&ast, "run") else {
+            let at = Location { script: name, line: 1 };
+            return Err(ScriptError::Syntax { at, problem: "there is no `def run(rig):`".into() });
+        };
+        Ok(Self {
+            name,
+            source: source.into(),
+            sha256: hexadecimal(&Sha256::digest(source)),
+            doc: docstring(ast.statement()).unwrap_or_default(),
+            run_line,
+            ast,
+        })
+    }
+
+    /// The script's name, without the suffix.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The script's text.
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// SHA-256 of the text, in hexadecimal.
+    pub fn sha256(&self) -> &str {
+        &self.sha256
+    }
+
+    /// What the script says of itself: its first statement, if that is a text. The first line sums it up.
+    pub fn doc(&self) -> &str {
+        &self.doc
+    }
+
+    /// The first line of [`doc`](Self::doc).
+    pub fn summary(&self) -> &str {
+        self.doc.lines().next().unwrap_or_default()
+    }
+
+    /// The parameters in the order of their declarations. Evaluates the script's top level only.
+    ///
+    /// # Errors
+    /// [`ScriptError`] if the top level fails.
+    pub fn parameters(&self, rig: &RigView) -> Result<Vec<Parameter>, ScriptError> {
+        Ok(self.declare(rig, &Arguments::default())?.parameters)
+    }
+
+    pub(crate) fn resolve(&self, rig: &RigView, arguments: &Arguments) -> Result<Arguments, ScriptError> {
+        Ok(self.declare(rig, arguments)?.values)
+    }
+
+    fn declare(&self, rig: &RigView, arguments: &Arguments) -> Result<Evaluated, ScriptError> {
+        converse(self, arguments, rig, &Limits::default(), Purpose::Declare, &mut Nobody)
+    }
+
+    pub(crate) fn ast(&self) -> &AstModule {
+        &self.ast
+    }
+
+    /// Where `def run` stands.
+    pub(crate) fn run_line(&self) -> u32 {
+        self.run_line
+    }
+}
+
+impl fmt::Debug for Script {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Script")
+            .field("name", &self.name)
+            .field("sha256", &self.sha256)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The host of an evaluation that performs nothing.
+struct Nobody;
+
+impl Host for Nobody {
+    fn perform(&mut self, _call: &Call) -> Result<Reply, Refusal> {
+        Err(Refusal::Failed("nothing is performed while parameters are declared".into()))
+    }
+
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+fn definition_line(ast: &AstModule, name: &str) -> Option<u32> {
+    let is_definition =
+        |statement: &&AstStmt| matches!(&statement.node, Stmt::Def(def) if def.name.node.ident == name);
+    let definition = statements(ast.statement()).iter().find(is_definition)?;
+    Some(sandbox::line(&ast.file_span(definition.span)))
+}
+
+fn docstring(statement: &AstStmt) -> Option<String> {
+    let Stmt::Expression(expression) = &statements(statement).first()?.node else { return None };
+    let Expr::Literal(AstLiteral::String(text)) = &expression.node else { return None };
+    let lines: Vec<_> = text.node.trim().lines().map(str::trim_end).collect();
+    Some(lines.join("\n"))
+}
+
+/// The statements of a block; one statement alone is its own block.
+fn statements(block: &AstStmt) -> &[AstStmt] {
+    if let Stmt::Statements(statements) = &block.node { statements } else { slice::from_ref(block) }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+}
+
+#[cfg(test)]
+#[path = "script_tests.rs"]
+mod tests;

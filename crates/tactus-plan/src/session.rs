@@ -1,0 +1,200 @@
+//! What the functions of a script share during one evaluation.
+//!
+//! An evaluation has a thread to itself, and the evaluator hands functions no context of ours, so the session
+//! is that thread's own.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+
+use serde_json::Value;
+use starlark::eval::Evaluator;
+
+use crate::chance::Chance;
+use crate::evaluate::{Evaluated, Job, Purpose};
+use crate::{Call, Exceeded, Location, Parameter, Refusal, Reply, ScriptError, Step, sandbox};
+
+/// What the script's thread says to the caller's.
+#[derive(Debug)]
+pub(crate) enum Message {
+    /// A step; the script waits for the answer.
+    Call(Call),
+    /// The script is over.
+    Ended(Box<Result<Evaluated, ScriptError>>),
+}
+
+/// Seen by both threads while the script computes.
+#[derive(Debug, Default)]
+pub(crate) struct Watch {
+    stop: AtomicU8,
+    line: AtomicU32,
+}
+
+/// Why the caller's thread wants the script to end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Stop {
+    /// The host cancelled.
+    Cancelled = 1,
+    /// [`Limits::think`](crate::Limits::think) is over.
+    Think = 2,
+}
+
+impl Watch {
+    pub(crate) fn stop(&self, stop: Stop) {
+        self.stop.store(stop as u8, Ordering::Relaxed);
+    }
+
+    pub(crate) fn stopped(&self) -> Option<Stop> {
+        match self.stop.load(Ordering::Relaxed) {
+            1 => Some(Stop::Cancelled),
+            2 => Some(Stop::Think),
+            _ => None,
+        }
+    }
+
+    /// The line under way, from 1; 0 before the first.
+    pub(crate) fn line(&self) -> u32 {
+        self.line.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn at_line(&self, line: u32) {
+        self.line.store(line, Ordering::Relaxed);
+    }
+}
+
+/// Why a function ends the script.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(crate) enum Halt {
+    #[error("{0}")]
+    Failed(String),
+    #[error("{0}")]
+    Argument(String),
+    #[error(transparent)]
+    Refused(#[from] Refusal),
+    #[error(transparent)]
+    Exceeded(#[from] Exceeded),
+}
+
+impl From<Halt> for starlark::Error {
+    fn from(halt: Halt) -> Self {
+        Self::new_native(halt)
+    }
+}
+
+/// Which part of the script is under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// The top level: parameters may be declared, nothing may be done.
+    TopLevel,
+    /// `run`: the other way round.
+    Run,
+}
+
+/// One evaluation.
+#[derive(Debug)]
+pub(crate) struct Session {
+    pub(crate) job: Job,
+    pub(crate) part: Cell<Part>,
+    pub(crate) parameters: RefCell<Vec<Parameter>>,
+    pub(crate) values: RefCell<Vec<(String, Value)>>,
+    pub(crate) chance: RefCell<Chance>,
+    pub(crate) steps: Cell<u64>,
+}
+
+thread_local! {
+    static SESSION: RefCell<Option<Rc<Session>>> = const { RefCell::new(None) };
+}
+
+/// The session of this thread's evaluation.
+pub(crate) fn current() -> Result<Rc<Session>, Halt> {
+    let session = SESSION.with_borrow(Clone::clone);
+    session.ok_or_else(|| Halt::Failed("no script is being evaluated on this thread".into()))
+}
+
+/// An error once the script's values take more memory than they may, or the script is to end.
+pub(crate) fn check_heap(eval: &Evaluator<'_, '_, '_>) -> Result<(), Halt> {
+    current()?.check(eval)
+}
+
+impl Session {
+    pub(crate) fn new(job: Job) -> Self {
+        let seed = match job.purpose {
+            Purpose::Declare => 0,
+            Purpose::Run { seed } => seed,
+        };
+        Self {
+            job,
+            part: Cell::new(Part::TopLevel),
+            parameters: RefCell::default(),
+            values: RefCell::default(),
+            chance: RefCell::new(Chance::seeded(seed)),
+            steps: Cell::new(0),
+        }
+    }
+
+    /// Makes this the session of the present thread.
+    pub(crate) fn begin(self) -> Rc<Self> {
+        let session = Rc::new(self);
+        SESSION.set(Some(Rc::clone(&session)));
+        session
+    }
+
+    /// An error once the script's values take more memory than they may, or the script is to end.
+    pub(crate) fn check(&self, eval: &Evaluator<'_, '_, '_>) -> Result<(), Halt> {
+        let heap_bytes = eval.heap().allocated_bytes() + eval.frozen_heap().allocated_bytes();
+        if heap_bytes > self.job.limits.heap_bytes {
+            return Err(Exceeded::Heap(self.job.limits.heap_bytes).into());
+        }
+        self.job.watch.stopped().map_or(Ok(()), |stop| Err(self.halt(stop)))
+    }
+
+    /// Why the script ends when the caller's thread says so.
+    pub(crate) fn halt(&self, stop: Stop) -> Halt {
+        match stop {
+            Stop::Cancelled => Refusal::Stopped("the run was stopped".into()).into(),
+            Stop::Think => Exceeded::Think(self.job.limits.think).into(),
+        }
+    }
+
+    /// Declares a parameter; gives its value.
+    pub(crate) fn declare(&self, parameter: Parameter) -> Result<Value, Halt> {
+        if self.part.get() != Part::TopLevel {
+            return Err(Halt::Failed("parameters are declared at the top level, not inside run".into()));
+        }
+        let parameter = parameter.declare().map_err(Halt::Failed)?;
+        let mut parameters = self.parameters.borrow_mut();
+        if parameters.iter().any(|earlier| earlier.name == parameter.name) {
+            return Err(Halt::Failed(format!("the parameter {:?} is declared twice", parameter.name)));
+        }
+        let value = self.job.arguments.value_for(&parameter).map_err(Halt::Argument)?;
+        self.values.borrow_mut().push((parameter.name.clone(), value.clone()));
+        parameters.push(parameter);
+        Ok(value)
+    }
+
+    /// An error if there is an argument for a parameter that was not declared.
+    pub(crate) fn check_arguments(&self) -> Result<(), Halt> {
+        self.job.arguments.check_names(&self.parameters.borrow()).map_err(Halt::Argument)
+    }
+
+    /// Has the host perform a step.
+    pub(crate) fn perform(&self, step: Step, eval: &Evaluator<'_, '_, '_>) -> Result<Reply, Halt> {
+        if self.part.get() != Part::Run {
+            return Err(Halt::Failed(
+                "only run(rig) may do something: the top level declares parameters".into(),
+            ));
+        }
+        self.check(eval)?;
+        if self.steps.get() >= self.job.limits.steps {
+            return Err(Exceeded::Steps(self.job.limits.steps).into());
+        }
+        self.steps.set(self.steps.get() + 1);
+        let line =
+            eval.call_stack_top_location().map_or_else(|| self.job.watch.line(), |span| sandbox::line(&span));
+        let call = Call { step, at: Location { script: self.job.script.name().to_owned(), line } };
+        let gone = |()| Halt::from(Refusal::Stopped("nobody waits for the script any more".into()));
+        self.job.calls.send(Message::Call(call)).map_err(|_| gone(()))?;
+        Ok(self.job.replies.recv().map_err(|_| gone(()))??)
+    }
+}
