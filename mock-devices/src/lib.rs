@@ -1,0 +1,31 @@
+//! Virtual sensor and stage that speak real device bytes, driven by the forward model.
+//!
+//! [`VirtualRig`] runs both in this process, for the production drivers to connect to, in real or virtual
+//! time; the program `tactus-mock` serves the same devices at pseudo-terminals. Behind both stands one
+//! world: where the tip truly is, what it presses, what the elements feel. The devices see no more of it
+//! than real ones would. [`RigControl`] sees all of it, and makes things go wrong ([`faults`]).
+//!
+//! Everything random follows from one seed, so that two runs in virtual time are identical to the byte.
+
+pub mod cli;
+pub mod faults;
+
+#[cfg(test)]
+mod bench;
+mod cable;
+mod control;
+mod kinematics;
+mod motion;
+mod outbox;
+mod rig;
+mod sensor;
+mod stage;
+mod terminal;
+mod truth;
+mod twin;
+mod world;
+
+pub use control::RigControl;
+pub use rig::VirtualRig;
+pub use truth::Truth;
+pub use twin::twin_of;

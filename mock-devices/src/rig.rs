@@ -1,0 +1,95 @@
+//! A whole virtual rig: both devices, the world between them, and a handle to the truth.
+
+use std::fmt;
+use std::sync::Arc;
+
+use futures_util::future::BoxFuture;
+use tactus_device::DeviceError;
+use tactus_device::transport::memory::{self, MemoryConnector};
+use tactus_device::transport::{ByteStream, Connect};
+use tactus_schema::Rig;
+use tokio::time::Instant;
+
+use crate::cable::{self, Port};
+use crate::control::{RigControl, Taps};
+use crate::sensor::VirtualSensor;
+use crate::stage::VirtualStage;
+use crate::truth::Truth;
+use crate::world::{Shared, World};
+
+/// Both devices of a simulated rig, in this process.
+///
+/// They run from [`start`](Self::start) until the runtime ends, whether or not anybody is connected.
+#[derive(Debug)]
+pub struct VirtualRig {
+    sensor: Arc<MemoryConnector>,
+    stage: Arc<MemoryConnector>,
+    control: RigControl,
+}
+
+impl VirtualRig {
+    /// Switches the rig on, within a tokio runtime. The seed takes the place of the rig's own: one seed,
+    /// one behaviour, to the byte.
+    ///
+    /// A rig without a simulation behaves as its description says, without noise; see [`twin_of`](crate::twin_of).
+    ///
+    /// # Panics
+    /// Outside of a tokio runtime.
+    pub fn start(rig: &Rig, seed: u64) -> Self {
+        let (sensor, sensor_port) = memory::pair("sensor");
+        let (stage, stage_port) = memory::pair("stage");
+        let started = start_devices(rig, seed, Instant::now());
+        // In memory a device never fails.
+        tokio::spawn(cable::run(started.sensor, Port::Memory(sensor_port), started.taps.sensor));
+        tokio::spawn(cable::run(started.stage, Port::Memory(stage_port), started.taps.stage));
+        Self { sensor: Arc::new(sensor), stage: Arc::new(stage), control: started.control }
+    }
+
+    /// The way to the sensor, for its driver.
+    pub fn sensor_connector(&mut self) -> Box<dyn Connect> {
+        Box::new(Outlet(Arc::clone(&self.sensor)))
+    }
+
+    /// The way to the stage, for its driver.
+    pub fn stage_connector(&mut self) -> Box<dyn Connect> {
+        Box::new(Outlet(Arc::clone(&self.stage)))
+    }
+
+    /// A handle to what is true, and to what goes wrong.
+    pub fn control(&self) -> RigControl {
+        self.control.clone()
+    }
+}
+
+/// Devices that are switched on and not yet connected to anything.
+pub(crate) struct Started {
+    pub(crate) sensor: VirtualSensor,
+    pub(crate) stage: VirtualStage,
+    pub(crate) taps: Taps,
+    pub(crate) control: RigControl,
+}
+
+pub(crate) fn start_devices(rig: &Rig, seed: u64, now: Instant) -> Started {
+    let simulation = crate::twin::simulation_of(rig);
+    let truth = Arc::new(Truth::of(rig, &simulation, seed));
+    let world = Shared::new(World::new(truth, rig.covering, simulation.surface_mm));
+    let (control, taps) = RigControl::new(world.clone(), now);
+    let sensor = VirtualSensor::new(world.clone(), now);
+    let stage = VirtualStage::new(world, now);
+    Started { sensor, stage, taps, control }
+}
+
+/// A connector that can be handed out more than once.
+struct Outlet(Arc<MemoryConnector>);
+
+impl Connect for Outlet {
+    fn connect(&self) -> BoxFuture<'_, Result<Box<dyn ByteStream>, DeviceError>> {
+        self.0.connect()
+    }
+}
+
+impl fmt::Display for Outlet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}

@@ -1,0 +1,151 @@
+//! Faults of the sensor's link: what happens to frames between the controller and the host.
+
+use rand::{Rng, RngExt};
+use rand_chacha::ChaCha8Rng;
+use tactus_wire::weiss::encode_frame;
+use tokio::time::Instant;
+
+use crate::faults::LinkFault;
+use crate::truth::Draw;
+
+/// Armed faults; each strikes the next frame or frames and is gone.
+#[derive(Debug)]
+pub(super) struct Tamper {
+    rng: ChaCha8Rng,
+    armed: Armed,
+}
+
+#[derive(Debug, Default)]
+struct Armed {
+    stalled_until: Option<Instant>,
+    dripping_until: Option<Instant>,
+    drop_bytes: usize,
+    garbage_bytes: usize,
+    flip_bits: usize,
+    wrong_count: Option<usize>,
+    // How many frames are still to be struck.
+    drop_frames: usize,
+    duplicate_frames: usize,
+    reorder_frames: usize,
+    wrong_checksum_frames: usize,
+    truncate_frames: usize,
+    burst_frames: usize,
+    /// A frame that waits for the one after it.
+    overtaken: Vec<u8>,
+    /// Frames that wait for the last of a burst.
+    burst: Vec<u8>,
+}
+
+impl Tamper {
+    pub(super) fn new(seed: u64) -> Self {
+        Self { rng: Draw::SensorLink.rng(seed), armed: Armed::default() }
+    }
+
+    /// Has a fault strike from now on.
+    pub(super) fn arm(&mut self, fault: LinkFault, now: Instant) {
+        let armed = &mut self.armed;
+        match fault {
+            LinkFault::Stall(duration) => armed.stalled_until = Some(now + duration),
+            LinkFault::Drip(duration) => armed.dripping_until = Some(now + duration),
+            LinkFault::Drop(bytes) => armed.drop_bytes += bytes,
+            LinkFault::DropFrames(frames) => armed.drop_frames += frames,
+            LinkFault::FlipBits(bits) => armed.flip_bits += bits,
+            LinkFault::Garbage(bytes) => armed.garbage_bytes += bytes,
+            LinkFault::Duplicate => armed.duplicate_frames += 1,
+            LinkFault::Reorder => armed.reorder_frames += 1,
+            LinkFault::WrongChecksum => armed.wrong_checksum_frames += 1,
+            LinkFault::Truncate => armed.truncate_frames += 1,
+            LinkFault::Burst(frames) => armed.burst_frames += frames,
+            LinkFault::WrongCount(elements) => armed.wrong_count = Some(elements),
+        }
+    }
+
+    /// Disarms everything.
+    pub(super) fn clear(&mut self) {
+        self.armed = Armed::default();
+    }
+
+    /// True while nothing leaves the controller.
+    pub(super) fn is_stalled(&self, at: Instant) -> bool {
+        self.armed.stalled_until.is_some_and(|until| at < until)
+    }
+
+    /// True while bytes come one at a time.
+    pub(super) fn is_dripping(&self, at: Instant) -> bool {
+        self.armed.dripping_until.is_some_and(|until| at < until)
+    }
+
+    /// The bytes that leave the controller for a frame sampled at `at`: none, one packet, or what became of it.
+    pub(super) fn frame(
+        &mut self,
+        timestamp_ms: u32,
+        counts: &[u16],
+        run_length: bool,
+        at: Instant,
+    ) -> Vec<u8> {
+        if self.is_stalled(at) {
+            return Vec::new();
+        }
+        let Self { rng, armed } = self;
+        if strikes(&mut armed.drop_frames) {
+            return Vec::new();
+        }
+        let mut bytes = match armed.wrong_count.take() {
+            Some(elements) => encode_frame(timestamp_ms, &with_length(counts, elements), run_length),
+            None => encode_frame(timestamp_ms, counts, run_length),
+        };
+        if strikes(&mut armed.wrong_checksum_frames)
+            && let Some(last) = bytes.last_mut()
+        {
+            *last ^= 0xFF;
+        }
+        for _ in 0..std::mem::take(&mut armed.flip_bits) {
+            let bit = rng.random_range(0..8 * bytes.len());
+            if let Some(byte) = bytes.get_mut(bit / 8) {
+                *byte ^= 1 << (bit % 8);
+            }
+        }
+        if strikes(&mut armed.truncate_frames) {
+            bytes.truncate(bytes.len() / 2);
+        }
+        if strikes(&mut armed.duplicate_frames) {
+            bytes.extend_from_within(..);
+        }
+        if armed.garbage_bytes > 0 {
+            let mut garbage = vec![0; std::mem::take(&mut armed.garbage_bytes)];
+            rng.fill_bytes(&mut garbage);
+            bytes.splice(..0, garbage);
+        }
+        if strikes(&mut armed.reorder_frames) {
+            armed.overtaken.extend(bytes);
+            return Vec::new();
+        }
+        bytes.append(&mut armed.overtaken);
+        if strikes(&mut armed.burst_frames) {
+            armed.burst.extend(bytes);
+            return if armed.burst_frames == 0 { std::mem::take(&mut armed.burst) } else { Vec::new() };
+        }
+        bytes
+    }
+
+    /// What arrives of what leaves.
+    pub(super) fn pass(&mut self, mut bytes: Vec<u8>) -> Vec<u8> {
+        let dropped = self.armed.drop_bytes.min(bytes.len());
+        self.armed.drop_bytes -= dropped;
+        bytes.drain(..dropped);
+        bytes
+    }
+}
+
+/// True if one more frame is to be struck, which is then counted.
+fn strikes(frames: &mut usize) -> bool {
+    let is_armed = *frames > 0;
+    *frames = frames.saturating_sub(1);
+    is_armed
+}
+
+/// The counts cut off or, with the last repeated, drawn out to another length.
+fn with_length(counts: &[u16], elements: usize) -> Vec<u16> {
+    let last = counts.last().copied().unwrap_or(0);
+    counts.iter().copied().chain(std::iter::repeat(last)).take(elements).collect()
+}

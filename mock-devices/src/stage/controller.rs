@@ -1,0 +1,345 @@
+//! The controller's states, what time does to them, and its real-time commands.
+
+mod lines;
+
+use std::time::Duration;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use tokio::time::Instant;
+
+use super::gcode::{GrblError, MotionMode};
+use super::input::{Input, RealTime};
+use super::report::{self, Status};
+use super::settings::Settings;
+use crate::faults::ControllerFault;
+use crate::motion::Point;
+use crate::outbox::Outbox;
+use crate::truth::Draw;
+use crate::world::Shared;
+
+/// A status report leaves this long after it was asked for.
+const REPORT_LATENCY_MS: std::ops::RangeInclusive<u64> = 2..=5;
+
+/// From a reset to the banner.
+const RESTART: Duration = Duration::from_millis(5);
+
+/// Alarms after which the controller takes nothing but a reset.
+const CRITICAL_ALARMS: std::ops::RangeInclusive<u8> = 1..=2;
+
+const ALARM_HARD_LIMIT: u8 = 1;
+const ALARM_SOFT_LIMIT: u8 = 2;
+const ALARM_RESET_IN_MOTION: u8 = 3;
+const ALARM_HOMING_RESET: u8 = 6;
+const ALARM_HOMING_FAILED: u8 = 9;
+
+/// The controller.
+#[derive(Debug)]
+pub(super) struct Controller {
+    world: Shared,
+    settings: Settings,
+    mode: Mode,
+    modal: Modal,
+    input: Input,
+    outbox: Outbox,
+    report_due: Option<Instant>,
+    reports: u32,
+    /// A command takes time: nothing else is taken until then, when it is answered by `ok`.
+    busy_until: Option<Instant>,
+    /// When the tip runs into a limit switch.
+    limit_at: Option<Instant>,
+    rng: ChaCha8Rng,
+    defects: Defects,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    /// Idle, or running what was planned.
+    Ready,
+    Jog,
+    /// Braking or standing; what was not done is held.
+    Hold,
+    /// Braking at the end of a jog that was cancelled.
+    JogCancel,
+    /// Braking for a target beyond the travel.
+    SoftLimit,
+    Homing {
+        gives_up_at: Option<Instant>,
+    },
+    Alarm {
+        is_critical: bool,
+    },
+}
+
+/// What lines leave behind for those after them.
+#[derive(Debug, Default)]
+struct Modal {
+    motion: MotionMode,
+    relative: bool,
+    feed_mm_per_min: Option<f64>,
+}
+
+/// What is wrong with it.
+#[derive(Debug, Default)]
+struct Defects {
+    lie_z_mm: f64,
+    is_never_idle: bool,
+    ignores_moves: bool,
+    refuses_next: Option<u8>,
+    homing_fails: bool,
+}
+
+impl Controller {
+    pub(super) fn new(world: Shared, now: Instant) -> Self {
+        let truth = world.lock().truth().clone();
+        let mut controller = Self {
+            world,
+            settings: Settings::of(&truth.stage),
+            mode: Mode::Ready,
+            modal: Modal::default(),
+            input: Input::default(),
+            outbox: Outbox::default(),
+            report_due: None,
+            reports: 0,
+            busy_until: None,
+            limit_at: None,
+            rng: Draw::StageController.rng(truth.seed),
+            defects: Defects::default(),
+        };
+        controller.power_up(now);
+        controller
+    }
+
+    /// Takes bytes from the host.
+    pub(super) fn receive(&mut self, bytes: &[u8], now: Instant) {
+        self.wake(now);
+        for byte in bytes {
+            if let Some(command) = self.input.push(*byte) {
+                self.obey(command, now);
+            }
+            self.take_lines(now);
+        }
+    }
+
+    /// Does what is due.
+    pub(super) fn wake(&mut self, now: Instant) {
+        self.only_move(now);
+        if self.report_due.is_some_and(|due| due <= now) {
+            self.report_due = None;
+            self.report(now);
+        }
+        if self.busy_until.is_some_and(|until| until <= now) {
+            self.busy_until = None;
+            self.say(report::OK, now);
+        }
+        self.take_lines(now);
+    }
+
+    /// Lets motion go on to `now`, and what follows from it.
+    pub(super) fn only_move(&mut self, now: Instant) {
+        if let Some(at) = self.limit_at.filter(|at| *at <= now) {
+            self.alarm(ALARM_HARD_LIMIT, at);
+        }
+        self.world.lock().settle(now);
+        if self.is_moving() {
+            return;
+        }
+        self.limit_at = None;
+        match self.mode {
+            Mode::Jog => self.mode = Mode::Ready,
+            Mode::JogCancel => {
+                self.world.lock().motion.forget_held();
+                self.mode = Mode::Ready;
+            }
+            Mode::SoftLimit => self.alarm(ALARM_SOFT_LIMIT, now),
+            Mode::Homing { gives_up_at: None } => {
+                let home_mm = self.home_mm();
+                self.world.lock().motion.believe(home_mm);
+                self.mode = Mode::Ready;
+                self.say(report::OK, now);
+            }
+            Mode::Homing { gives_up_at: Some(at) } if at <= now => self.alarm(ALARM_HOMING_FAILED, now),
+            Mode::Homing { .. } | Mode::Ready | Mode::Hold | Mode::Alarm { .. } => {}
+        }
+    }
+
+    pub(super) fn next_wake(&self) -> Option<Instant> {
+        let gives_up_at = if let Mode::Homing { gives_up_at } = self.mode { gives_up_at } else { None };
+        let move_ends = self.world.lock().motion.next_end();
+        [self.outbox.next_due(), self.report_due, self.busy_until, self.limit_at, gives_up_at, move_ends]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    pub(super) fn limit_at(&self) -> Option<Instant> {
+        self.limit_at
+    }
+
+    pub(super) fn output(&mut self, now: Instant) -> Vec<u8> {
+        self.outbox.take_due(now)
+    }
+
+    /// Takes on a defect.
+    pub(super) fn fault(&mut self, fault: ControllerFault, now: Instant) {
+        self.only_move(now);
+        match fault {
+            ControllerFault::Alarm(code) => self.alarm(code, now),
+            ControllerFault::Lie { z_mm } => self.defects.lie_z_mm = z_mm,
+            ControllerFault::NeverIdle => self.defects.is_never_idle = true,
+            ControllerFault::Refuse(code) => self.defects.refuses_next = Some(code),
+            ControllerFault::IgnoreMoves => self.defects.ignores_moves = true,
+            ControllerFault::LostSteps { lost_mm } => self.world.lock().motion.lose_steps(lost_mm),
+            ControllerFault::HomingFails => self.defects.homing_fails = true,
+            ControllerFault::Reset => {
+                self.world.lock().motion.freeze(now);
+                self.power_up(now);
+            }
+        }
+    }
+
+    /// Loses its defects.
+    pub(super) fn mend(&mut self) {
+        self.defects = Defects::default();
+    }
+
+    /// As after a power failure: the controller believes to be at 0.
+    fn power_up(&mut self, now: Instant) {
+        self.world.lock().motion.believe([0.0; 3]);
+        self.mode = if self.settings.has_homing() { Mode::Alarm { is_critical: false } } else { Mode::Ready };
+        if self.rng.random() {
+            // As seen on the real firmware, now and then: the stored settings could not be read.
+            self.outbox.push(now + RESTART, report::error(GrblError(7)));
+        }
+        self.restart(now);
+    }
+
+    /// Forgets everything but the position and an alarm.
+    fn restart(&mut self, now: Instant) {
+        self.modal = Modal::default();
+        self.input.clear();
+        self.report_due = None;
+        self.reports = 0;
+        self.busy_until = None;
+        self.limit_at = None;
+        self.outbox.push(now + RESTART, report::BANNER);
+        if matches!(self.mode, Mode::Alarm { .. }) {
+            self.outbox.push(now + RESTART, report::UNLOCK);
+        }
+    }
+
+    fn obey(&mut self, command: RealTime, now: Instant) {
+        match (command, self.mode) {
+            (RealTime::Report, Mode::Homing { .. }) => {}
+            (RealTime::Report, _) => self.ask_for_report(now),
+            (RealTime::Reset, _) => self.reset(now),
+            (RealTime::Hold, Mode::Ready) => self.brake(Mode::Hold, now),
+            (RealTime::Hold | RealTime::CancelJog, Mode::Jog) => self.brake(Mode::JogCancel, now),
+            (RealTime::Resume, Mode::Hold) if !self.is_moving() => {
+                self.mode = Mode::Ready;
+                self.world.lock().motion.resume(now);
+                self.watch_limits();
+            }
+            (RealTime::Hold | RealTime::Resume | RealTime::CancelJog, _) => {}
+        }
+    }
+
+    fn brake(&mut self, mode: Mode, now: Instant) {
+        self.mode = mode;
+        self.world.lock().motion.hold(now);
+        self.watch_limits();
+        self.only_move(now);
+    }
+
+    /// Restarts the controller; motion is cut off where it is.
+    fn reset(&mut self, now: Instant) {
+        let is_moving = self.is_moving();
+        self.world.lock().motion.freeze(now);
+        match self.mode {
+            Mode::Homing { .. } => self.alarm(ALARM_HOMING_RESET, now),
+            // The real firmware notices, or not.
+            _ if is_moving && self.rng.random() => self.alarm(ALARM_RESET_IN_MOTION, now),
+            Mode::Alarm { .. } => {}
+            Mode::Ready | Mode::Jog | Mode::Hold | Mode::JogCancel | Mode::SoftLimit => {
+                self.mode = Mode::Ready;
+            }
+        }
+        if let Mode::Alarm { is_critical } = &mut self.mode {
+            *is_critical = false;
+        }
+        self.restart(now);
+    }
+
+    /// Stops dead.
+    fn alarm(&mut self, code: u8, now: Instant) {
+        {
+            let mut world = self.world.lock();
+            world.settle(now);
+            world.motion.freeze(now);
+        }
+        self.limit_at = None;
+        let is_critical = CRITICAL_ALARMS.contains(&code);
+        self.mode = Mode::Alarm { is_critical };
+        self.outbox.push(now, report::alarm(code));
+        if is_critical {
+            self.outbox.push(now, report::RESET_TO_CONTINUE);
+        }
+    }
+
+    /// Where homing ends: off the switches.
+    fn home_mm(&self) -> Point {
+        let pull_off_mm = self.settings.pull_off_mm();
+        let [[x, _], [y, _], [_, z]] = self.world.lock().truth().stage.travel_mm;
+        [x + pull_off_mm, y + pull_off_mm, z - pull_off_mm]
+    }
+
+    fn watch_limits(&mut self) {
+        let world = self.world.lock();
+        let travel_mm = world.truth().stage.travel_mm;
+        self.limit_at = if self.settings.has_hard_limits() { world.motion.leaves(travel_mm) } else { None };
+    }
+
+    fn is_moving(&self) -> bool {
+        self.world.lock().motion.is_moving()
+    }
+
+    fn say(&mut self, text: &str, now: Instant) {
+        self.outbox.push(now, text);
+    }
+
+    /// A report that is asked for while one is due is the same report.
+    fn ask_for_report(&mut self, now: Instant) {
+        if self.report_due.is_none() {
+            self.report_due = Some(now + Duration::from_millis(self.rng.random_range(REPORT_LATENCY_MS)));
+        }
+    }
+
+    fn report(&mut self, now: Instant) {
+        let world = self.world.lock();
+        let is_moving = world.motion.is_moving();
+        let [x, y, z] = world.believed_mm(now);
+        let status = Status {
+            state: match self.mode {
+                _ if self.defects.is_never_idle => "Run",
+                Mode::Ready if is_moving => "Run",
+                Mode::Ready => "Idle",
+                Mode::Jog | Mode::JogCancel => "Jog",
+                Mode::Hold | Mode::SoftLimit if is_moving => "Hold:1",
+                Mode::Hold | Mode::SoftLimit => "Hold:0",
+                Mode::Homing { .. } => "Home",
+                Mode::Alarm { .. } => "Alarm",
+            },
+            position_mm: [x, y, z + self.defects.lie_z_mm],
+            is_machine_position: self.settings.reports_machine_position(),
+            buffers: self
+                .settings
+                .reports_buffers()
+                .then(|| (world.motion.pending(), self.input.free_bytes())),
+            speed_mm_per_s: world.motion.speed_mm_per_s(now),
+            number: self.reports,
+        };
+        drop(world);
+        self.reports += 1;
+        self.outbox.push(now, status.line());
+    }
+}

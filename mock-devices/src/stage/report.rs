@@ -1,0 +1,66 @@
+//! What the controller says in words of its own.
+
+use super::gcode::GrblError;
+use super::input::BUFFER_BYTES;
+
+pub(super) const OK: &str = "ok\r\n";
+pub(super) const BANNER: &str = "\r\nGrbl 1.1h ['$' for help]\r\n[MSG:Simulated stage]\r\n";
+pub(super) const UNLOCK: &str = "[MSG:'$H'|'$X' to unlock]\r\n";
+pub(super) const UNLOCKED: &str = "[MSG:Caution: Unlocked]\r\n";
+pub(super) const RESET_TO_CONTINUE: &str = "[MSG:Reset to continue]\r\n";
+pub(super) const HELP: &str = "[HLP:$$ $# $G $I $x=val $J=line $X $H ~ ! ? ctrl-x]\r\n";
+/// Build and options: variable speeds, planner blocks, receive buffer.
+pub(super) const BUILD: &str = "[VER:1.1h.20190830:simulated by Tactus]\r\n[OPT:V,15,128]\r\n";
+pub(super) const OFFSETS: &str = "[G54:0.000,0.000,0.000]\r\n[G92:0.000,0.000,0.000]\r\n[TLO:0.000]\r\n";
+
+/// Moves that the planner holds.
+pub(super) const PLANNER_BLOCKS: usize = 15;
+
+/// `error:n`.
+pub(super) fn error(error: GrblError) -> String {
+    format!("error:{}\r\n", error.0)
+}
+
+/// `ALARM:n`.
+pub(super) fn alarm(code: u8) -> String {
+    format!("ALARM:{code}\r\n")
+}
+
+/// What a status report tells.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Status {
+    pub(super) state: &'static str,
+    pub(super) position_mm: [f64; 3],
+    pub(super) is_machine_position: bool,
+    /// Moves pending and receive bytes free, if asked for.
+    pub(super) buffers: Option<(usize, usize)>,
+    pub(super) speed_mm_per_s: f64,
+    /// Which report since the reset, from 0 on: some fields come now and then.
+    pub(super) number: u32,
+}
+
+impl Status {
+    /// The report's line.
+    pub(super) fn line(&self) -> String {
+        // Negative zero would print a sign.
+        let [x, y, z] = self.position_mm.map(|mm| (mm * 1000.0).round() / 1000.0 + 0.0);
+        let frame = if self.is_machine_position { "MPos" } else { "WPos" };
+        let buffers = self.buffers.map_or(String::new(), |(moves, free_bytes)| {
+            format!("|Bf:{},{}", PLANNER_BLOCKS.saturating_sub(moves), free_bytes.min(BUFFER_BYTES))
+        });
+        let feed_mm_per_min = self.speed_mm_per_s * 60.0;
+        let now_and_then = match self.number % 10 {
+            0 => "|WCO:0.000,0.000,0.000",
+            1 => "|Ov:100,100,100",
+            _ => "",
+        };
+        format!(
+            "<{}|{frame}:{x:.3},{y:.3},{z:.3}{buffers}|FS:{feed_mm_per_min:.0},0{now_and_then}>\r\n",
+            self.state
+        )
+    }
+}
+
+#[cfg(test)]
+#[path = "report_tests.rs"]
+mod tests;

@@ -1,0 +1,103 @@
+//! What a simulated rig hides from the service: the truth that calibration is to find.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use tactus_model::{ForwardModel, Indenter, Readout, Registration, Response};
+use tactus_schema::Rig;
+use tactus_schema::rig::{Miswired, SimulatedStage, Simulation};
+
+/// The true sensor, stage and tool behind a rig description; all of it follows from the description and a seed.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    /// The seed of everything random.
+    pub seed: u64,
+    /// The base model with each element's true sensitivity.
+    pub model: ForwardModel,
+    /// The converter.
+    pub readout: Readout,
+    /// For each element, row-major, the element whose signal it gives: itself unless it is miswired.
+    pub wiring: Vec<usize>,
+    /// Standard deviation of an element's noise.
+    pub noise_rms_counts: f64,
+    /// Where the sensor really lies in the robot's frame.
+    pub registration: Registration,
+    /// The tool on the stage.
+    pub indenter: Indenter,
+    /// The stage.
+    pub stage: SimulatedStage,
+}
+
+/// What draws random numbers: each has a stream of its own, so that one does not disturb the others.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Draw {
+    Gains,
+    Noise,
+    SensorLink,
+    StageLink,
+    StageController,
+}
+
+impl Draw {
+    /// The stream's generator for a seed.
+    pub(crate) fn rng(self, seed: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(self as u64);
+        rng
+    }
+}
+
+impl Truth {
+    /// The truth of a rig whose simulation is `simulation`.
+    ///
+    /// # Panics
+    /// If the rig was not made by its own constructors, which check what is needed here.
+    #[expect(clippy::expect_used, reason = "a checked rig lists its tools, and makes a model")]
+    pub fn of(rig: &Rig, simulation: &Simulation, seed: u64) -> Self {
+        let tool = |id: &str| rig.indenters.get(id).copied().expect("a rig's tools are listed");
+        let response = Response {
+            sensitivity_counts_per_mm: spread(
+                &rig.sensitivity_counts_per_mm,
+                simulation.gain_spread,
+                simulation.seed,
+            ),
+            baseline_counts: rig.baseline_counts.clone(),
+            quadratic_per_mm: simulation.quadratic_per_mm,
+            reference_indenter: tool(&rig.sensitivity_reference.indenter),
+            reference_covering: rig.sensitivity_reference.covering,
+        };
+        let model = ForwardModel::new(rig.array.clone(), rig.psf, response).expect("a rig makes a model");
+        let error = simulation.registration_error;
+        Self {
+            seed,
+            model,
+            readout: Readout::of(&rig.array),
+            wiring: wiring(rig.array.elements(), &simulation.miswired),
+            noise_rms_counts: simulation.noise_rms_counts,
+            registration: Registration {
+                origin_mm: std::array::from_fn(|axis| {
+                    rig.registration.origin_mm[axis] + error.origin_mm[axis]
+                }),
+                rotation_deg: rig.registration.rotation_deg + error.rotation_deg,
+            },
+            indenter: tool(&rig.indenter),
+            stage: simulation.stage,
+        }
+    }
+}
+
+/// Each declared sensitivity times one plus a normal deviate of standard deviation `spread`.
+fn spread(declared: &[f64], spread: f64, seed: u64) -> Vec<f64> {
+    let mut rng = Draw::Gains.rng(seed);
+    let deviates = StandardNormal.sample_iter(&mut rng);
+    declared
+        .iter()
+        .zip(deviates)
+        .map(|(declared, deviate): (_, f64)| declared * (1.0 + spread * deviate))
+        .collect()
+}
+
+fn wiring(elements: usize, miswired: &[Miswired]) -> Vec<usize> {
+    let answers_for = |element| miswired.iter().find(|one| one.element == element).map(|one| one.answers_for);
+    (0..elements).map(|element| answers_for(element).unwrap_or(element)).collect()
+}

@@ -1,0 +1,192 @@
+//! The one true state that both virtual devices share: where the tip is, what it presses, what the elements feel.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use tactus_model::{Contact, Covering};
+use tactus_schema::rig::SimulatedStage;
+use tokio::time::Instant;
+
+use crate::motion::{Motion, Point};
+use crate::truth::{Draw, Truth};
+
+/// The world, shared by the devices and their controls. Held for one look or one change at a time.
+#[derive(Debug, Clone)]
+pub(crate) struct Shared(Arc<Mutex<World>>);
+
+/// The truth, and what changes in it.
+#[derive(Debug)]
+pub(crate) struct World {
+    truth: Arc<Truth>,
+    /// The stage's tip and what its controller believes.
+    pub(crate) motion: Motion,
+    covering: Covering,
+    surface_mm: f64,
+    stiffness: f64,
+    deepest_mm: f64,
+    noise: ChaCha8Rng,
+    /// The noiseless image in counts and the true position that it was made for.
+    image: Vec<f64>,
+    image_at_mm: Option<Point>,
+}
+
+impl Shared {
+    pub(crate) fn new(world: World) -> Self {
+        Self(Arc::new(Mutex::new(world)))
+    }
+
+    pub(crate) fn lock(&self) -> MutexGuard<'_, World> {
+        // A panic elsewhere left a whole world behind: every change is one assignment.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl World {
+    /// A rig that was just switched on: the tip stands near the top of its travel, and the controller
+    /// believes that this is 0.
+    pub(crate) fn new(truth: Arc<Truth>, covering: Covering, surface_mm: f64) -> Self {
+        let [x_mm, y_mm, z_mm] = truth.stage.travel_mm;
+        let tip_mm = [middle(x_mm), middle(y_mm), z_mm[1] - 0.1 * (z_mm[1] - z_mm[0])];
+        Self {
+            motion: Motion::at_rest([0.0; 3], tip_mm, truth.stage.acceleration_mm_per_s2),
+            covering,
+            surface_mm,
+            stiffness: 1.0,
+            deepest_mm: surface_mm - tip_mm[2],
+            noise: Draw::Noise.rng(truth.seed),
+            image: truth.model.response().baseline_counts.clone(),
+            image_at_mm: None,
+            truth,
+        }
+    }
+
+    /// What the rig hides.
+    pub(crate) fn truth(&self) -> &Arc<Truth> {
+        &self.truth
+    }
+
+    /// One reading of all elements at `at`, into `counts`: noise, saturation, quantisation upon the image there.
+    pub(crate) fn sample(&mut self, at: Instant, counts: &mut Vec<u16>) {
+        self.refresh_image(at);
+        let Self { truth, noise, image, .. } = self;
+        counts.clear();
+        counts.extend(image.iter().map(|clean| {
+            let deviation: f64 = StandardNormal.sample(noise);
+            let read = truth.readout.read(*clean, truth.noise_rms_counts * deviation);
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "whole and not negative"
+            )]
+            let count = read.min(f64::from(u16::MAX)) as u16;
+            count
+        }));
+    }
+
+    /// The image without noise, in counts, row-major.
+    pub(crate) fn image(&mut self, at: Instant) -> &[f64] {
+        self.refresh_image(at);
+        &self.image
+    }
+
+    /// Where the tip truly is, in the stage's steps.
+    pub(crate) fn tip_mm(&self, at: Instant) -> Point {
+        self.in_steps(self.motion.true_mm(at))
+    }
+
+    /// Where the controller believes the tip to be, in the stage's steps.
+    pub(crate) fn believed_mm(&self, at: Instant) -> Point {
+        self.in_steps(self.motion.believed_mm(at))
+    }
+
+    /// How far the tip stands below the covering's true surface; negative above it.
+    pub(crate) fn depth_mm(&self, at: Instant) -> f64 {
+        self.surface_mm - self.tip_mm(at)[2]
+    }
+
+    /// Greatest depth ever until `now`.
+    pub(crate) fn deepest_mm(&mut self, now: Instant) -> f64 {
+        self.settle(now);
+        self.deepest_mm
+    }
+
+    /// Brings the record of depths up to `now` and takes finished moves off the chain. To be called before
+    /// any change of the motion.
+    pub(crate) fn settle(&mut self, now: Instant) {
+        // Along a straight line depth is greatest at an end: of a finished move, or where the tip is.
+        let ends = self.motion.true_ends_mm().filter(|(end, _)| *end <= now).map(|(_, tip_mm)| tip_mm);
+        let lowest_mm =
+            ends.chain([self.motion.true_mm(now)]).map(|[_, _, z]| z).fold(f64::INFINITY, f64::min);
+        let vertical_step_mm = self.truth.stage.vertical_step_mm;
+        self.deepest_mm = self.deepest_mm.max(self.surface_mm - round_to(lowest_mm, vertical_step_mm));
+        self.motion.settle(now);
+    }
+
+    /// Thickness of the covering in place.
+    pub(crate) fn covering_mm(&self) -> f64 {
+        self.covering.thickness_mm
+    }
+
+    /// Puts another covering in place, its surface where the former one's was.
+    pub(crate) fn set_covering_mm(&mut self, thickness_mm: f64) {
+        self.covering = Covering { thickness_mm: thickness_mm.max(0.0) };
+        self.image_at_mm = None;
+    }
+
+    /// Moves the true surface, where the service believes 0.
+    pub(crate) fn set_surface_mm(&mut self, surface_mm: f64, now: Instant) {
+        self.settle(now);
+        self.surface_mm = surface_mm;
+        self.image_at_mm = None;
+        self.settle(now);
+    }
+
+    /// Makes the covering answer `stiffness` times as strongly as the model says.
+    pub(crate) fn set_stiffness(&mut self, stiffness: f64) {
+        self.stiffness = stiffness;
+        self.image_at_mm = None;
+    }
+
+    fn refresh_image(&mut self, at: Instant) {
+        let tip_mm = self.tip_mm(at);
+        let depth_mm = self.surface_mm - tip_mm[2];
+        // Above the surface every place gives the same image.
+        let key = if depth_mm > 0.0 { tip_mm } else { [f64::INFINITY; 3] };
+        if self.image_at_mm == Some(key) {
+            return;
+        }
+        self.image_at_mm = Some(key);
+        let Truth { model, registration, indenter, wiring, .. } = &*self.truth;
+        let contact = Contact {
+            indenter: *indenter,
+            position_mm: registration.to_sensor([tip_mm[0], tip_mm[1]]),
+            // The tool's sides run along the robot's axes.
+            rotation_deg: -registration.rotation_deg,
+            depth_mm,
+        };
+        let mut felt_mm = vec![0.0; wiring.len()];
+        model.indentation(&contact, self.covering, &mut felt_mm);
+        for (element, source) in self.image.iter_mut().zip(wiring) {
+            *element = self.stiffness * felt_mm.get(*source).copied().unwrap_or(0.0);
+        }
+        model.respond(&mut self.image);
+    }
+
+    fn in_steps(&self, [x, y, z]: Point) -> Point {
+        let SimulatedStage { lateral_step_mm, vertical_step_mm, .. } = self.truth.stage;
+        [round_to(x, lateral_step_mm), round_to(y, lateral_step_mm), round_to(z, vertical_step_mm)]
+    }
+}
+
+fn round_to(value: f64, step: f64) -> f64 {
+    (value / step).round() * step
+}
+
+fn middle([least, greatest]: [f64; 2]) -> f64 {
+    f64::midpoint(least, greatest)
+}
+
+#[cfg(test)]
+#[path = "world_tests.rs"]
+mod tests;
