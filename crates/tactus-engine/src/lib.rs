@@ -1,0 +1,24 @@
+//! The run engine and the safety supervisor.
+//!
+//! An [`Engine`] owns a rig's devices for the life of the service. One task acquires: each frame
+//! goes first to the safety supervisor, then to the recording, then to the run's averages, then to
+//! whoever watches. A run executes one experiment script: every step is checked against the rig's
+//! envelope before anything moves, and whatever ends a run, the tip is retracted first.
+
+mod acquisition;
+mod average;
+mod engine;
+mod envelope;
+mod motion;
+mod outlet;
+mod run;
+mod script;
+mod supervisor;
+
+pub use engine::{
+    Busy, ChangeCovering, Claim, Devices, Engine, EngineError, Pulse, ResetError, StopOrder, Stopped,
+};
+pub use envelope::{Bounds, Outside};
+pub use outlet::{Publish, Record, RecordFailure, Unpublished};
+pub use run::{Planned, RunOrder, RunOutcome};
+pub use supervisor::{Supervisor, Violation};

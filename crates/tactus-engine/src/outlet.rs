@@ -1,0 +1,73 @@
+//! Where everything that happens goes: the recording, which must not lose anything, and the viewers.
+
+use std::error::Error;
+
+use tactus_schema::{Frame, Stamp, pb};
+
+/// A recording in the making. A failure fails the run.
+pub trait Record: Send {
+    /// What the sensor says of itself.
+    ///
+    /// # Errors
+    /// If it could not be taken in; the recording is then incomplete.
+    fn sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordFailure>;
+    /// One frame.
+    ///
+    /// # Errors
+    /// As [`Record::sensor_info`].
+    fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure>;
+    /// One report of the stage.
+    ///
+    /// # Errors
+    /// As [`Record::sensor_info`].
+    fn stage(&mut self, state: &pb::StageState) -> Result<(), RecordFailure>;
+    /// One event of the run.
+    ///
+    /// # Errors
+    /// As [`Record::sensor_info`].
+    fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure>;
+    /// One act of the safety supervisor.
+    ///
+    /// # Errors
+    /// As [`Record::sensor_info`].
+    fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure>;
+    /// Closes the recording; returns once everything is on disk.
+    ///
+    /// # Errors
+    /// If what was taken in before could not be stored.
+    fn finish(self: Box<Self>) -> Result<(), RecordFailure>;
+}
+
+/// The recording could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("the recording failed: {0}")]
+pub struct RecordFailure(#[from] pub Box<dyn Error + Send + Sync>);
+
+/// Those who watch. Must return at once: what they cannot take, they drop and count themselves.
+pub trait Publish: Send + Sync {
+    /// What the sensor says of itself.
+    fn sensor_info(&self, info: &pb::SensorInfo);
+    /// One frame.
+    fn frame(&self, frame: &Frame);
+    /// One report of the stage.
+    fn stage(&self, state: &pb::StageState);
+    /// One event of the run.
+    fn event(&self, event: &pb::RunEvent);
+    /// Where the run stands.
+    fn state(&self, state: &pb::RunState);
+    /// One act of the safety supervisor.
+    fn safety(&self, event: &pb::SafetyEvent);
+}
+
+/// Nobody watches.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unpublished;
+
+impl Publish for Unpublished {
+    fn sensor_info(&self, _: &pb::SensorInfo) {}
+    fn frame(&self, _: &Frame) {}
+    fn stage(&self, _: &pb::StageState) {}
+    fn event(&self, _: &pb::RunEvent) {}
+    fn state(&self, _: &pb::RunState) {}
+    fn safety(&self, _: &pb::SafetyEvent) {}
+}

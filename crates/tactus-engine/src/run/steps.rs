@@ -1,0 +1,338 @@
+//! What each step of a script does.
+
+use std::time::Duration;
+
+use tactus_model::Covering;
+use tactus_plan::{Call, Place, Press, Reading, Reply, Step};
+use tactus_schema::pb::{self, run_event::Event};
+use tactus_schema::rig::OnGap;
+use tactus_schema::table::Phase;
+use tokio::time::{sleep, timeout};
+use tracing::{info, warn};
+
+use super::{Broken, Ending, Run};
+use crate::average::Average;
+use crate::supervisor::Violation;
+
+/// How often one press is begun again before the run fails.
+const REPEATS_MAX: u32 = 3;
+
+/// Sample periods that an average is waited for beyond its end.
+const LATE_PERIODS_MAX: u32 = 5;
+
+impl Run<'_> {
+    /// Checks a step and does it.
+    pub(super) async fn perform(&mut self, call: &Call) -> Result<Reply, Broken> {
+        self.hold_while_paused().await?;
+        self.bounds.check(&call.step)?;
+        let step = self.steps;
+        self.steps += 1;
+        self.shared.emit(Event::StepStarted(pb::StepStarted {
+            step,
+            what: describe(&call.step),
+            at: call.at.to_string(),
+        }));
+        let reply = self.act(&call.step).await?;
+        self.shared.emit(Event::StepDone(pb::StepDone { step }));
+        Ok(reply)
+    }
+
+    async fn act(&mut self, step: &Step) -> Result<Reply, Broken> {
+        match step {
+            Step::Move { to, height_mm, speed_mm_per_s } => {
+                self.go_to(*to, *height_mm, *speed_mm_per_s).await
+            }
+            Step::Press(press) => self.press(press).await.map(Reply::Pressed),
+            Step::Dwell { duration_s } => {
+                self.wait(self.shared.service.motion.settle_s).await?;
+                self.read(*duration_s).await
+            }
+            Step::Read { duration_s } => self.read(*duration_s).await,
+            Step::Tare { duration_s } => self.tare(*duration_s).await,
+            Step::Wait { duration_s } => self.wait(*duration_s).await.map(|()| Reply::Done),
+            Step::Log { message } => {
+                info!(script = self.order.script.name(), "{message}");
+                self.shared.emit(Event::Log(pb::Log { message: message.clone() }));
+                Ok(Reply::Done)
+            }
+            Step::Covering { thickness_mm } => self.change_covering(*thickness_mm).await,
+        }
+    }
+
+    /// A press ends at the safe height, so a run that is held between two steps presses nothing.
+    async fn hold_while_paused(&mut self) -> Result<(), Broken> {
+        if !self.shared.control.borrow().paused {
+            return self.shared.check_ended();
+        }
+        self.set_state(pb::RunPhase::Paused, "paused: `tactus resume` goes on, `tactus stop` ends the run");
+        self.shared.emit(Event::Paused(pb::Paused {}));
+        self.resumed().await?;
+        self.shared.emit(Event::Resumed(pb::Resumed {}));
+        self.set_state(pb::RunPhase::Running, "");
+        Ok(())
+    }
+
+    async fn resumed(&self) -> Result<(), Broken> {
+        let mut control = self.shared.control.subscribe();
+        let going_on = async { control.wait_for(|control| !control.paused).await.is_ok() };
+        self.shared.unless_ended(going_on).await?;
+        self.shared.check_ended()
+    }
+
+    async fn go_to(
+        &mut self,
+        to: Place,
+        height_mm: Option<f64>,
+        speed_mm_per_s: Option<f64>,
+    ) -> Result<Reply, Broken> {
+        let motion = &self.shared.service.motion;
+        let to_mm = self.shared.rig.registration.to_robot([to.x_mm, to.y_mm]);
+        let z_mm = height_mm.unwrap_or(motion.safe_height_mm);
+        self.note_travel(to_mm, z_mm);
+        self.shared.travel(to_mm, z_mm, speed_mm_per_s.unwrap_or(motion.travel_speed_mm_per_s)).await?;
+        Ok(Reply::Position { x_mm: to.x_mm, y_mm: to.y_mm, height_mm: self.shared.position_mm()[2] })
+    }
+
+    /// Presses, and begins again if frames were lost and the rig's policy says so.
+    async fn press(&mut self, press: &Press) -> Result<Vec<Reading>, Broken> {
+        let mut repeats = 0;
+        loop {
+            let index = self.next_press;
+            self.next_press += 1;
+            let broken = match self.press_once(press, index).await {
+                Ok(readings) => {
+                    self.presses += 1;
+                    self.dwells += u32::try_from(readings.len()).unwrap_or(u32::MAX);
+                    self.set_state(pb::RunPhase::Running, "");
+                    return Ok(readings);
+                }
+                Err(broken) => broken,
+            };
+            if repeats == REPEATS_MAX || !self.may_repeat(&broken) {
+                return Err(broken);
+            }
+            repeats += 1;
+            warn!(press = index, %broken, "press broken off; it will be repeated");
+            self.shared
+                .emit(Event::PressRepeated(pb::PressRepeated { press: index, reason: broken.to_string() }));
+            self.recover().await?;
+        }
+    }
+
+    async fn press_once(&mut self, press: &Press, index: i32) -> Result<Vec<Reading>, Broken> {
+        let motion = self.shared.service.motion.clone();
+        let at_mm = self.shared.rig.registration.to_robot([press.at.x_mm, press.at.y_mm]);
+        let speed_mm_per_s = press.speed_mm_per_s.unwrap_or(motion.load_speed_mm_per_s);
+        self.note_travel(at_mm, motion.safe_height_mm);
+        self.set_phase(Phase::Approach, index);
+        match press.approach_from_mm {
+            Some([dx_mm, dy_mm]) => {
+                let aside = [press.at.x_mm + dx_mm, press.at.y_mm + dy_mm];
+                let aside_mm = self.shared.rig.registration.to_robot(aside);
+                self.note_travel(aside_mm, motion.approach_height_mm);
+                self.shared.travel(aside_mm, motion.approach_height_mm, motion.travel_speed_mm_per_s).await?;
+                self.shared.slide(at_mm, motion.travel_speed_mm_per_s).await?;
+            }
+            None => {
+                self.shared.travel(at_mm, motion.approach_height_mm, motion.travel_speed_mm_per_s).await?;
+            }
+        }
+        self.shared.descend(at_mm, 0.0, speed_mm_per_s).await?;
+        let mut readings = Vec::with_capacity(press.depths_mm.len());
+        let mut depth_before_mm = 0.0;
+        for (dwell, &depth_mm) in (0_u32..).zip(&press.depths_mm) {
+            let deeper = depth_mm >= depth_before_mm;
+            self.set_phase(if deeper { Phase::Load } else { Phase::Unload }, index);
+            self.note_travel(at_mm, -depth_mm);
+            self.shared.descend(at_mm, -depth_mm, speed_mm_per_s).await?;
+            self.set_phase(Phase::Hold, index);
+            readings.push(self.hold(press, index, dwell, depth_mm).await?);
+            depth_before_mm = depth_mm;
+        }
+        if depth_before_mm > 0.0 {
+            self.set_phase(Phase::Unload, index);
+            self.shared.descend(at_mm, 0.0, speed_mm_per_s).await?;
+        }
+        self.set_phase(Phase::Retract, index);
+        self.shared.descend(at_mm, motion.safe_height_mm, motion.travel_speed_mm_per_s).await?;
+        self.set_phase(Phase::Idle, -1);
+        Ok(readings)
+    }
+
+    /// One dwell: settle, then average.
+    async fn hold(&self, press: &Press, index: i32, dwell: u32, depth_mm: f64) -> Result<Reading, Broken> {
+        self.wait(self.shared.service.motion.settle_s).await?;
+        let average = self.average(Duration::from_secs_f64(press.dwell_s)).await?;
+        if average.lost > 0 {
+            return Err(Broken::FramesLost(average.lost));
+        }
+        self.shared.emit(Event::DwellDone(pb::DwellDone {
+            press: index,
+            dwell,
+            x_mm: press.at.x_mm,
+            y_mm: press.at.y_mm,
+            depth_mm,
+            frames: average.frames,
+            mean_counts: as_f32(&average.mean_counts),
+            from_mono_ns: average.span[0].ns(),
+            to_mono_ns: average.span[1].ns(),
+        }));
+        Ok(self.reading(average))
+    }
+
+    fn may_repeat(&self, broken: &Broken) -> bool {
+        let lost = matches!(
+            broken,
+            Broken::FramesLost(_)
+                | Broken::SensorSilent(_)
+                | Broken::Ended(Ending::Safety(Violation::Silence { .. }))
+        );
+        lost && self.shared.service.policy.on_gap == OnGap::Repeat
+    }
+
+    /// After frames were lost: up, wait for the sensor, watch again.
+    async fn recover(&mut self) -> Result<(), Broken> {
+        self.set_phase(Phase::Retract, -1);
+        self.shared.retract().await?;
+        self.set_phase(Phase::Idle, -1);
+        self.shared.forgive_silence();
+        self.wait_for_sensor().await?;
+        self.shared.live().supervisor.rearm(self.shared.clock.now().mono);
+        Ok(())
+    }
+
+    async fn read(&mut self, duration_s: f64) -> Result<Reply, Broken> {
+        let average = self.whole_average(Duration::from_secs_f64(duration_s)).await?;
+        self.shared.emit(Event::ReadDone(pb::ReadDone {
+            frames: average.frames,
+            mean_counts: as_f32(&average.mean_counts),
+        }));
+        Ok(Reply::Reading(self.reading(average)))
+    }
+
+    async fn tare(&mut self, duration_s: f64) -> Result<Reply, Broken> {
+        let average = self.whole_average(Duration::from_secs_f64(duration_s)).await?;
+        self.shared.emit(Event::TareDone(pb::TareDone {
+            frames: average.frames,
+            baseline_counts: as_f32(&average.mean_counts),
+        }));
+        self.zero_counts.clone_from(&average.mean_counts);
+        self.shared.live().supervisor.set_tare(average.mean_counts.clone());
+        Ok(Reply::Reading(self.reading(average)))
+    }
+
+    async fn wait(&self, duration_s: f64) -> Result<(), Broken> {
+        self.shared.unless_ended(sleep(Duration::from_secs_f64(duration_s))).await
+    }
+
+    async fn change_covering(&mut self, thickness_mm: f64) -> Result<Reply, Broken> {
+        let covering = Covering { thickness_mm };
+        if covering == self.covering {
+            return Ok(Reply::Done);
+        }
+        self.shared.retract().await?;
+        if let Some(change) = &self.shared.change_covering {
+            change(thickness_mm);
+        } else {
+            let ask = format!(
+                "put the {thickness_mm} mm covering in place, set its surface to z = 0, then `tactus resume`"
+            );
+            self.shared.control.send_modify(|control| control.paused = true);
+            self.set_state(pb::RunPhase::Paused, &ask);
+            self.shared.emit(Event::Paused(pb::Paused {}));
+            self.resumed().await?;
+            self.shared.emit(Event::Resumed(pb::Resumed {}));
+            self.set_state(pb::RunPhase::Running, "");
+        }
+        self.covering = covering;
+        self.shared.live().covering = covering;
+        self.bounds = self.bounds.clone().under(covering);
+        self.shared.live().supervisor.set_depth_max_mm(self.bounds.depth_max_mm());
+        self.shared.emit(Event::CoveringChanged(pb::CoveringChanged { covering_mm: thickness_mm }));
+        Ok(Reply::Done)
+    }
+
+    /// An average outside a press, begun again if frames were lost in it and the rig's policy says so.
+    pub(super) async fn whole_average(&mut self, duration: Duration) -> Result<Average, Broken> {
+        let mut repeats = 0;
+        loop {
+            let broken = match self.average(duration).await {
+                Ok(average) if average.lost == 0 => return Ok(average),
+                Ok(average) => Broken::FramesLost(average.lost),
+                Err(broken) => broken,
+            };
+            if repeats == REPEATS_MAX || !self.may_repeat(&broken) {
+                return Err(broken);
+            }
+            repeats += 1;
+            warn!(%broken, "average broken off; it will be repeated");
+            self.shared.forgive_silence();
+            self.wait_for_sensor().await?;
+            self.shared.live().supervisor.rearm(self.shared.clock.now().mono);
+        }
+    }
+
+    /// The mean over the frames that arrive within the next `duration`.
+    pub(super) async fn average(&self, duration: Duration) -> Result<Average, Broken> {
+        let now = self.shared.clock.now().mono;
+        let average = self.shared.live().average(now, now.after(duration));
+        let patience = duration + self.shared.sample_period() * LATE_PERIODS_MAX;
+        match self.shared.unless_ended(timeout(patience, average)).await? {
+            Ok(Ok(average)) => Ok(average),
+            Ok(Err(_)) | Err(_) => Err(Broken::SensorSilent(patience.as_secs_f64())),
+        }
+    }
+
+    fn reading(&self, average: Average) -> Reading {
+        let signal =
+            average.mean_counts.iter().zip(&self.zero_counts).map(|(count, zero)| count - zero).collect();
+        Reading { mean_counts: average.mean_counts, signal, rms: average.rms_counts, frames: average.frames }
+    }
+
+    fn note_travel(&mut self, [x_mm, y_mm]: [f64; 2], z_mm: f64) {
+        for (range, value) in self.travel_mm.iter_mut().zip([x_mm, y_mm, z_mm]) {
+            *range = [range[0].min(value), range[1].max(value)];
+        }
+    }
+}
+
+impl crate::engine::Shared {
+    /// Takes a silence back as the reason to end: the run goes on once the sensor is back.
+    fn forgive_silence(&self) {
+        self.control.send_modify(|control| {
+            control.ending.take_if(|ending| ending.is_silence());
+        });
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "messages carry single precision, far finer than a count"
+)]
+fn as_f32(values: &[f64]) -> Vec<f32> {
+    values.iter().map(|value| *value as f32).collect()
+}
+
+fn describe(step: &Step) -> String {
+    match step {
+        Step::Move { to, height_mm, .. } => match height_mm {
+            Some(height_mm) => format!("move to ({:.3}, {:.3}) mm at {height_mm:.3} mm", to.x_mm, to.y_mm),
+            None => format!("move to ({:.3}, {:.3}) mm", to.x_mm, to.y_mm),
+        },
+        Step::Press(press) => {
+            let depths: Vec<_> = press.depths_mm.iter().map(|depth| format!("{depth:.3}")).collect();
+            format!(
+                "press at ({:.3}, {:.3}) mm, depths {} mm",
+                press.at.x_mm,
+                press.at.y_mm,
+                depths.join(", ")
+            )
+        }
+        Step::Dwell { duration_s } => format!("dwell {duration_s} s"),
+        Step::Read { duration_s } => format!("read {duration_s} s"),
+        Step::Tare { duration_s } => format!("tare over {duration_s} s"),
+        Step::Wait { duration_s } => format!("wait {duration_s} s"),
+        Step::Log { .. } => "log".to_owned(),
+        Step::Covering { thickness_mm } => format!("covering of {thickness_mm} mm"),
+    }
+}

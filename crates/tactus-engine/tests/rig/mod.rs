@@ -1,0 +1,280 @@
+//! A sensor and a stage that exist only here, in virtual time, and a recording that remembers.
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use futures_util::FutureExt;
+use futures_util::future::BoxFuture;
+use tactus_device::{Clock, Sensor, SensorEvent, Stage, StageError, Target};
+use tactus_engine::{Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
+use tactus_plan::{Arguments, Limits, RigView, Script};
+use tactus_schema::{Frame, FrameFlags, Rig, Stamp, pb};
+use tokio::sync::{mpsc, watch};
+use tokio::time::{MissedTickBehavior, interval, sleep};
+
+/// What can go wrong with the sensor, set by a test while it runs.
+#[derive(Debug, Default)]
+pub(crate) struct Trouble {
+    /// Frames that will be lost before the next one.
+    pub(crate) lose: u32,
+    /// No frame comes.
+    pub(crate) silent: bool,
+    /// Counts on top of all elements.
+    pub(crate) push_counts: f32,
+}
+
+pub(crate) struct Bench {
+    pub(crate) engine: Engine,
+    pub(crate) trouble: Arc<Mutex<Trouble>>,
+    pub(crate) deepest_mm: Arc<Mutex<f64>>,
+    pub(crate) stage: watch::Receiver<pb::StageState>,
+}
+
+struct FakeSensor {
+    trouble: Arc<Mutex<Trouble>>,
+    stage: watch::Receiver<pb::StageState>,
+    clock: Clock,
+    tick: tokio::time::Interval,
+    seq: u64,
+    told: bool,
+    pending: Option<Frame>,
+}
+
+impl Sensor for FakeSensor {
+    fn next(&mut self) -> BoxFuture<'_, SensorEvent> {
+        async {
+            if !std::mem::replace(&mut self.told, true) {
+                return SensorEvent::Connected(pb::SensorInfo { rows: 6, cols: 8, ..Default::default() });
+            }
+            if let Some(frame) = self.pending.take() {
+                return SensorEvent::Frame(frame);
+            }
+            loop {
+                self.tick.tick().await;
+                let mut trouble = self.trouble.lock().unwrap();
+                self.seq += 1;
+                if trouble.silent {
+                    trouble.lose += 1;
+                    continue;
+                }
+                let lost = std::mem::take(&mut trouble.lose);
+                let depth_mm = -self.stage.borrow().z_mm.min(0.0);
+                #[expect(clippy::cast_possible_truncation, reason = "a fake reading")]
+                let counts = vec![100.0 + 1000.0 * depth_mm as f32 + trouble.push_counts; 48];
+                let frame = Frame {
+                    seq: self.seq,
+                    epoch: 0,
+                    device_tick: None,
+                    received: self.clock.now(),
+                    counts: counts.into(),
+                    flags: FrameFlags::default(),
+                    lost_before: lost,
+                    simulated: true,
+                };
+                if lost == 0 {
+                    return SensorEvent::Frame(frame);
+                }
+                let gap = pb::Gap {
+                    frames_lost: lost.into(),
+                    after_seq: self.seq - 1 - u64::from(lost),
+                    next_seq: self.seq,
+                    reason: "test".into(),
+                };
+                self.pending = Some(frame);
+                return SensorEvent::Gap(gap);
+            }
+        }
+        .boxed()
+    }
+}
+
+struct FakeStage {
+    state: watch::Sender<pb::StageState>,
+    reports: mpsc::Sender<pb::StageState>,
+    stops: watch::Sender<u64>,
+    deepest_mm: Arc<Mutex<f64>>,
+    clock: Clock,
+}
+
+impl FakeStage {
+    async fn report(&self, [x_mm, y_mm, z_mm]: [f64; 3], status: pb::StageStatus) {
+        let now = self.clock.now();
+        {
+            let mut deepest_mm = self.deepest_mm.lock().unwrap();
+            *deepest_mm = deepest_mm.max(-z_mm);
+        }
+        let state = pb::StageState {
+            t_mono_ns: now.mono.ns(),
+            t_wall_ns: now.wall.ns(),
+            x_mm,
+            y_mm,
+            z_mm,
+            status: status.into(),
+            simulated: true,
+            ..Default::default()
+        };
+        self.state.send_replace(state);
+        self.reports.send(state).await.unwrap();
+    }
+
+    fn position_mm(&self) -> [f64; 3] {
+        let state = self.state.borrow();
+        [state.x_mm, state.y_mm, state.z_mm]
+    }
+}
+
+impl Stage for FakeStage {
+    fn state(&self) -> watch::Receiver<pb::StageState> {
+        self.state.subscribe()
+    }
+
+    fn home(&self) -> BoxFuture<'_, Result<(), StageError>> {
+        async {
+            self.report([25.0, 20.0, 10.0], pb::StageStatus::Idle).await;
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn move_to(&self, target: Target) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
+        async move {
+            let from = self.position_mm();
+            let way: Vec<_> = from.iter().zip(target.position_mm).map(|(from, to)| to - from).collect();
+            let distance_mm = way.iter().map(|d| d * d).sum::<f64>().sqrt();
+            let mut stops = self.stops.subscribe();
+            let lasts = Duration::from_secs_f64(distance_mm / target.speed_mm_per_s);
+            let start = self.clock.now().mono;
+            self.report(from, pb::StageStatus::Moving).await;
+            let stopped = tokio::select! {
+                biased;
+                _ = stops.changed() => true,
+                () = sleep(lasts) => false,
+            };
+            let share = if lasts.is_zero() {
+                1.0
+            } else {
+                self.clock.now().mono.since(start).as_secs_f64() / lasts.as_secs_f64()
+            };
+            let share = if stopped { share.min(1.0) } else { 1.0 };
+            let at: Vec<_> = from.iter().zip(&way).map(|(from, way)| from + way * share).collect();
+            let at = if stopped { [at[0], at[1], at[2]] } else { target.position_mm };
+            self.report(at, pb::StageStatus::Idle).await;
+            if stopped { Err(StageError::Stopped { position_mm: at }) } else { Ok(at) }
+        }
+        .boxed()
+    }
+
+    fn stop(&self) {
+        self.stops.send_modify(|stops| *stops += 1);
+    }
+
+    fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>> {
+        async { Ok(()) }.boxed()
+    }
+}
+
+impl Bench {
+    pub(crate) fn start(change: impl Fn(String) -> String) -> Self {
+        let rig = change(include_str!("../../../../config/rigs/sim.toml").to_owned());
+        let rig = Rig::from_toml(&rig).unwrap();
+        let clock = Clock::paused();
+        let unhomed =
+            pb::StageState { z_mm: 10.0, status: pb::StageStatus::Unhomed.into(), ..Default::default() };
+        let (reports, stage_reports) = mpsc::channel(256);
+        let deepest_mm = Arc::new(Mutex::new(f64::NEG_INFINITY));
+        let stage = Arc::new(FakeStage {
+            state: watch::Sender::new(unhomed),
+            reports,
+            stops: watch::Sender::default(),
+            deepest_mm: Arc::clone(&deepest_mm),
+            clock,
+        });
+        let mut tick = interval(Duration::from_secs_f64(1.0 / 30.0));
+        tick.set_missed_tick_behavior(MissedTickBehavior::Burst);
+        let trouble = Arc::new(Mutex::new(Trouble::default()));
+        let sensor = FakeSensor {
+            trouble: Arc::clone(&trouble),
+            stage: stage.state(),
+            clock,
+            tick,
+            seq: 0,
+            told: false,
+            pending: None,
+        };
+        let state = stage.state();
+        let devices = Devices { sensor: Box::new(sensor), stage, stage_reports, change_covering: None };
+        let engine = Engine::start(rig, devices, clock, Arc::new(Unpublished)).unwrap();
+        Self { engine, trouble, deepest_mm, stage: state }
+    }
+
+    pub(crate) fn order(&self, source: &str) -> RunOrder {
+        let script = Script::parse("test", source).unwrap();
+        let arguments = Arguments::default().resolve(&script, &RigView::of(&self.engine.rig())).unwrap();
+        RunOrder {
+            run_id: "run".into(),
+            script,
+            arguments,
+            seed: 1,
+            who: "test".into(),
+            limits: Limits::default(),
+            planned: None,
+            versions: std::collections::BTreeMap::new(),
+            recording: String::new(),
+        }
+    }
+}
+
+/// Everything that was recorded, in order.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Memory {
+    pub(crate) frames: Arc<Mutex<Vec<Frame>>>,
+    pub(crate) events: Arc<Mutex<Vec<pb::RunEvent>>>,
+    pub(crate) safety: Arc<Mutex<Vec<pb::SafetyEvent>>>,
+    pub(crate) finished: Arc<Mutex<bool>>,
+    /// The disk is full after this many frames.
+    pub(crate) fails_after: Option<usize>,
+}
+
+impl Memory {
+    pub(crate) fn sink(&self) -> Box<dyn Record> {
+        Box::new(self.clone())
+    }
+
+    pub(crate) fn kinds(&self) -> Vec<pb::run_event::Event> {
+        self.events.lock().unwrap().iter().filter_map(|event| event.event.clone()).collect()
+    }
+}
+
+impl Record for Memory {
+    fn sensor_info(&mut self, _: &pb::SensorInfo, _: Stamp) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure> {
+        let mut frames = self.frames.lock().unwrap();
+        frames.push(frame.clone());
+        if self.fails_after.is_some_and(|limit| frames.len() > limit) {
+            return Err(RecordFailure("no space left on device".into()));
+        }
+        Ok(())
+    }
+
+    fn stage(&mut self, _: &pb::StageState) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure> {
+        self.events.lock().unwrap().push(event.clone());
+        Ok(())
+    }
+
+    fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure> {
+        self.safety.lock().unwrap().push(event.clone());
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
+        *self.finished.lock().unwrap() = true;
+        Ok(())
+    }
+}

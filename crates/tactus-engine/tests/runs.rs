@@ -1,0 +1,370 @@
+//! A run from start to end, and everything that can end it, in virtual time.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
+mod rig;
+
+use pb::ExitStatus;
+use pb::Phase::{Approach, Hold, Idle, Load, Retract, Unload};
+use pb::run_event::Event;
+use rig::{Bench, Memory};
+use tactus_engine::StopOrder;
+use tactus_schema::pb::{self, RunPhase};
+
+const PRESS: &str = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2, 0.4])\n";
+const PRESSES: &str =
+    "def run(rig):\n    for i in range(3):\n        press(5.0, 5.0, depths_mm = [0.2, 0.4])\n";
+const HOLD: &str = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 60.0)\n";
+
+fn order(abort: bool) -> StopOrder {
+    StopOrder { by: "test".into(), reason: "enough".into(), abort }
+}
+
+/// Starts a run beside the test.
+fn start(bench: &Bench, source: &str, memory: &Memory) -> tokio::task::JoinHandle<tactus_engine::RunOutcome> {
+    let (engine, order, sink) = (bench.engine.clone(), bench.order(source), memory.sink());
+    tokio::spawn(async move { engine.run(order, sink).await.unwrap() })
+}
+
+/// Waits until the tip is that deep.
+async fn until_deep(bench: &mut Bench, depth_mm: f64) {
+    bench.stage.wait_for(|stage| -stage.z_mm >= depth_mm - 1e-6).await.unwrap();
+}
+
+async fn until_phase(bench: &Bench, phase: RunPhase) {
+    bench.engine.state().wait_for(|state| state.phase() == phase).await.unwrap();
+}
+
+fn height_mm(bench: &Bench) -> f64 {
+    bench.stage.borrow().z_mm
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_press_is_approached_loaded_held_unloaded_and_retracted() {
+    let bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let outcome = bench.engine.run(bench.order(PRESS), memory.sink()).await.unwrap();
+    assert_eq!(
+        (outcome.exit_status, outcome.presses, outcome.dwells),
+        (ExitStatus::Done, 1, 2),
+        "{outcome:?}"
+    );
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+    assert!(*memory.finished.lock().unwrap());
+    assert_eq!(outcome.frames, memory.frames.lock().unwrap().len() as u64);
+
+    let kinds = memory.kinds();
+    let phases: Vec<_> = kinds
+        .iter()
+        .filter_map(|kind| if let Event::PhaseChanged(c) = kind { Some((c.phase(), c.press)) } else { None })
+        .collect();
+    let expected = [
+        (Idle, -1),
+        (Approach, 0),
+        (Load, 0),
+        (Hold, 0),
+        (Load, 0),
+        (Hold, 0),
+        (Unload, 0),
+        (Retract, 0),
+        (Idle, -1),
+        (Retract, -1),
+        (Idle, -1),
+    ];
+    assert_eq!(phases, expected);
+    let means: Vec<_> = kinds
+        .iter()
+        .filter_map(|kind| if let Event::DwellDone(d) = kind { Some(d.mean_counts[0]) } else { None })
+        .collect();
+    assert_eq!(means, [300.0, 500.0], "what the sensor reads at 0.2 and 0.4 mm");
+    let seqs: Vec<_> = memory.events.lock().unwrap().iter().map(|event| event.seq).collect();
+    assert_eq!(seqs, (0..seqs.len() as u64).collect::<Vec<_>>());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_step_outside_the_envelope_ends_the_run_with_its_line_and_is_not_begun() {
+    let bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let script = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2])\n    press(5.0, 5.0, depths_mm = [0.3, 0.8])\n";
+    let outcome = bench.engine.run(bench.order(script), memory.sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Refused);
+    assert!(
+        outcome.message.contains("test.star:3") && outcome.message.contains("too deep"),
+        "{}",
+        outcome.message
+    );
+    assert!(*bench.deepest_mm.lock().unwrap() < 0.2 + 1e-9);
+    assert_eq!(memory.safety.lock().unwrap()[0].verdict(), pb::SafetyVerdict::Refused);
+}
+
+#[tokio::test(start_paused = true)]
+async fn stop_in_a_hold_retracts_at_once_and_keeps_the_recording() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let run = start(&bench, HOLD, &memory);
+    until_deep(&mut bench, 0.3).await;
+    assert!(bench.engine.stop(order(false)));
+    let outcome = run.await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Stopped);
+    assert!(outcome.duration_s < 10.0, "the hold of 60 s was not waited for: {outcome:?}");
+    assert!(outcome.message.contains("stopped by test: enough"), "{}", outcome.message);
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+    assert!(*memory.finished.lock().unwrap());
+}
+
+#[tokio::test(start_paused = true)]
+async fn stop_works_while_preparing_moving_paused_and_retracting() {
+    // Preparing: the run waits for frames.
+    let bench = Bench::start(|rig| rig);
+    bench.trouble.lock().unwrap().silent = true;
+    let run = start(&bench, PRESS, &Memory::default());
+    until_phase(&bench, RunPhase::Preparing).await;
+    bench.engine.stop(order(false));
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
+
+    // Moving down.
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    bench
+        .stage
+        .wait_for(|stage| stage.z_mm < 0.25 && stage.status() == pb::StageStatus::Moving)
+        .await
+        .unwrap();
+    bench.engine.stop(order(true));
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Aborted);
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+
+    // Paused.
+    let bench = Bench::start(|rig| rig);
+    let run = start(&bench, PRESSES, &Memory::default());
+    until_phase(&bench, RunPhase::Running).await;
+    assert!(bench.engine.pause());
+    until_phase(&bench, RunPhase::Paused).await;
+    bench.engine.stop(order(false));
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
+
+    // Retracting already: a second stop halts the tip, which then goes on up.
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    bench.engine.stop(order(false));
+    until_phase(&bench, RunPhase::Stopping).await;
+    bench.engine.stop(order(false));
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+
+    // Idle: nothing to stop, and nothing wrong with asking.
+    assert!(!bench.engine.stop(order(false)));
+    let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done, "an old stop does not end a new run");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_pause_comes_between_steps_with_the_tip_up_and_resuming_does_every_press_once() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    assert!(!bench.engine.pause(), "nothing runs yet");
+    let run = start(&bench, PRESSES, &memory);
+    until_deep(&mut bench, 0.2).await;
+    assert!(bench.engine.pause());
+    until_phase(&bench, RunPhase::Paused).await;
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+    assert!(bench.engine.resume());
+    assert!(!bench.engine.resume(), "it goes on already");
+    let outcome = run.await.unwrap();
+    assert_eq!((outcome.exit_status, outcome.presses, outcome.dwells), (ExitStatus::Done, 3, 6));
+    let kinds = memory.kinds();
+    assert_eq!(kinds.iter().filter(|kind| matches!(kind, Event::Paused(_))).count(), 1);
+    assert_eq!(kinds.iter().filter(|kind| matches!(kind, Event::Resumed(_))).count(), 1);
+}
+
+#[tokio::test(start_paused = true)]
+async fn one_run_at_a_time() {
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    let busy = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap_err();
+    assert_eq!(busy.run_id, "run");
+    bench.engine.stop(order(false));
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped, "the refused run did not disturb it");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_press_in_which_frames_were_lost_is_repeated_under_a_new_index() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let run = start(&bench, HOLD, &memory);
+    until_deep(&mut bench, 0.3).await;
+    tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+    bench.trouble.lock().unwrap().lose = 2;
+    let outcome = run.await.unwrap();
+    assert_eq!(
+        (outcome.exit_status, outcome.presses, outcome.dwells, outcome.frames_lost),
+        (ExitStatus::Degraded, 1, 1, 2)
+    );
+    let kinds = memory.kinds();
+    assert!(kinds.iter().any(|kind| matches!(kind, Event::Gap(gap) if gap.frames_lost == 2)));
+    assert!(kinds.iter().any(|kind| matches!(kind, Event::PressRepeated(repeated) if repeated.press == 0)));
+    assert!(kinds.iter().any(|kind| matches!(kind, Event::DwellDone(dwell) if dwell.press == 1)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_sensor_that_falls_silent_in_contact_gets_the_tip_up_and_the_press_is_repeated() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let run = start(&bench, HOLD, &memory);
+    until_deep(&mut bench, 0.3).await;
+    bench.trouble.lock().unwrap().silent = true;
+    bench.stage.wait_for(|stage| stage.z_mm > 1.9).await.unwrap();
+    let silent_frames = bench.trouble.lock().unwrap().lose;
+    // Three periods, and the way up.
+    assert!((3..10).contains(&silent_frames), "{silent_frames}");
+    bench.trouble.lock().unwrap().silent = false;
+    let outcome = run.await.unwrap();
+    assert_eq!((outcome.exit_status, outcome.presses), (ExitStatus::Degraded, 1), "{outcome:?}");
+    assert_eq!(memory.safety.lock().unwrap()[0].rule, "silence");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_sensor_that_does_not_come_back_fails_the_run() {
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    bench.trouble.lock().unwrap().silent = true;
+    let outcome = run.await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Failed);
+    assert!(outcome.message.contains("no frame from the sensor for 10.0 s"), "{}", outcome.message);
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+}
+
+#[tokio::test(start_paused = true)]
+async fn where_the_policy_says_fail_lost_frames_fail_the_run() {
+    let mut bench = Bench::start(|rig| rig.replace("on_gap = \"repeat\"", "on_gap = \"fail\""));
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    bench.trouble.lock().unwrap().lose = 1;
+    let outcome = run.await.unwrap();
+    assert_eq!((outcome.exit_status, outcome.frames_lost), (ExitStatus::Failed, 1), "{outcome:?}");
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+}
+
+#[tokio::test(start_paused = true)]
+async fn too_much_force_stops_retracts_and_refuses() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let run = start(&bench, HOLD, &memory);
+    until_deep(&mut bench, 0.3).await;
+    bench.trouble.lock().unwrap().push_counts = 2500.0;
+    let outcome = run.await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Refused, "{outcome:?}");
+    assert_eq!(memory.safety.lock().unwrap()[0].rule, "element-force");
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_recording_that_fails_fails_the_run_loudly_with_the_tip_up() {
+    let bench = Bench::start(|rig| rig);
+    let memory = Memory { fails_after: Some(60), ..Memory::default() };
+    let outcome = bench.engine.run(bench.order(HOLD), memory.sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Failed);
+    assert!(outcome.message.contains("no space left"), "{}", outcome.message);
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+}
+
+#[tokio::test(start_paused = true)]
+async fn near_the_covering_no_step_down_exceeds_a_tenth_of_a_millimetre() {
+    let bench = Bench::start(|rig| rig);
+    let mut stage = bench.stage.clone();
+    let watching = tokio::spawn(async move {
+        let (mut from_mm, mut longest_mm) = (stage.borrow().z_mm, 0.0_f64);
+        while stage.changed().await.is_ok() {
+            let z_mm = stage.borrow_and_update().z_mm;
+            if from_mm < 0.3 + 1e-9 {
+                longest_mm = longest_mm.max(from_mm - z_mm);
+            }
+            from_mm = z_mm;
+        }
+        longest_mm
+    });
+    let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done);
+    drop(bench);
+    let longest_mm = watching.await.unwrap();
+    assert!(longest_mm > 0.09 && longest_mm < 0.1 + 1e-9, "{longest_mm}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_change_of_covering_is_asked_for_waited_for_and_moves_the_depth_limit() {
+    let bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let script = "def run(rig):\n    covering(2.54)\n    press(5.0, 5.0, depths_mm = [0.75])\n";
+    let run = start(&bench, script, &memory);
+    until_phase(&bench, RunPhase::Paused).await;
+    assert!(bench.engine.state().borrow().message.contains("2.54 mm covering"));
+    bench.engine.resume();
+    let outcome = run.await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
+    assert!(memory.kinds().iter().any(|kind| matches!(kind, Event::CoveringChanged(_))));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_script_decides_from_what_it_read() {
+    let bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let script = "def run(rig):\n    tare()\n    for i in range(1, 7):\n        reading = press(5.0, 5.0, depths_mm = [0.1 * i])[0]\n        if reading.signal[0] > 250:\n            log(\"answers at %d\" % i)\n            return\n";
+    let outcome = bench.engine.run(bench.order(script), memory.sink()).await.unwrap();
+    assert_eq!((outcome.exit_status, outcome.presses), (ExitStatus::Done, 3), "{outcome:?}");
+    assert!(
+        memory.kinds().iter().any(|kind| matches!(kind, Event::Log(log) if log.message == "answers at 3"))
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_while_a_silent_press_is_retracted_is_not_forgiven_with_the_silence() {
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    bench.trouble.lock().unwrap().silent = true;
+    // On its way up, before the sensor is back.
+    bench.stage.wait_for(|stage| stage.z_mm > 1.9).await.unwrap();
+    bench.engine.stop(order(false));
+    bench.trouble.lock().unwrap().silent = false;
+    let outcome = run.await.unwrap();
+    assert_eq!((outcome.exit_status, outcome.presses), (ExitStatus::Stopped, 0), "{outcome:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn however_often_stop_is_pressed_the_tip_ends_up() {
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    for _ in 0..10 {
+        bench.engine.stop(order(false));
+        tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+    }
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_before_the_run_has_begun_ends_it_before_anything_moves() {
+    let bench = Bench::start(|rig| rig);
+    let claim = bench.engine.claim().unwrap();
+    assert!(bench.engine.stop(order(false)));
+    assert!(claim.check().unwrap_err().reason.contains("stopped by test"));
+    let outcome = claim.run(bench.order(PRESS), Memory::default().sink()).await;
+    assert_eq!((outcome.exit_status, outcome.presses), (ExitStatus::Stopped, 0), "{outcome:?}");
+    assert!(*bench.deepest_mm.lock().unwrap() < 0.0, "the tip was never pressed in");
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_covering_in_place_stays_from_run_to_run() {
+    let bench = Bench::start(|rig| rig);
+    let thinner = "def run(rig):\n    covering(0.5)\n";
+    let run = start(&bench, thinner, &Memory::default());
+    until_phase(&bench, RunPhase::Paused).await;
+    bench.engine.resume();
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Done);
+    assert!((bench.engine.rig().covering.thickness_mm - 0.5).abs() < 1e-12);
+    let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Refused, "0.4 mm is too deep under 0.5 mm: {outcome:?}");
+}
