@@ -1,0 +1,185 @@
+//! The device's clock against the host's.
+//!
+//! A frame is sampled at device time `tick * tick_ns` and reaches the host at `t_mono = sampling + delay`. The delay
+//! is never negative and varies; its least value is met again and again. So the line under all points
+//! `(tick * tick_ns, t_mono - tick * tick_ns)` is the host's time of sampling, late by the least delay, which no
+//! observer at the host can know. Without drift that line is level: `offset = min(t_mono - tick * tick_ns)`. A
+//! device clock that runs fast or slow tilts it: then it is the edge of the points' lower convex hull below their
+//! mean, which is the line with the least mean distance to them (Moon, Skelly and Towsley, 1999).
+
+use serde::Serialize;
+use tactus_schema::{DeviceTick, MonoTime};
+
+/// A residual beyond this is a jump of the device's clock, not a delay.
+const JUMP_NS: f64 = 1e9;
+
+/// No quartz runs further off; what looks like more is a jump.
+const DRIFT_MAX: f64 = 500e-6;
+
+/// Over a shorter time a drift cannot be told from the delays.
+const DRIFT_SPAN_NS: f64 = 60e9;
+
+/// The estimated clock of one connection of the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EpochClock {
+    /// The connection.
+    pub epoch: u32,
+    /// Frames it was estimated from.
+    pub frames: u64,
+    /// Length of a device tick.
+    pub tick_ns: u64,
+    /// Host monotonic time at device time zero of a device clock without drift; with drift, at `reference_tick`
+    /// less that tick's device time.
+    pub offset_ns: i64,
+    /// Where the drift starts to count.
+    pub reference_tick: u64,
+    /// By how much the host's clock runs faster than the device's, in millionths; 0 unless it moves the sampling
+    /// times by more than their uncertainty.
+    pub drift_ppm: f64,
+    /// One tick, and the residual that 5 % of the frames stay below: how sharp the lower edge is. The least delay
+    /// itself is not in it.
+    pub uncertainty_ns: i64,
+    /// Delay beyond the least one that half the frames stay below.
+    pub delay_p50_ns: i64,
+    /// Delay beyond the least one that 99 % of the frames stay below.
+    pub delay_p99_ns: i64,
+}
+
+/// Why a connection's ticks say nothing of sampling times; frames are then dated by their arrival.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoClock {
+    /// The device has no clock, or its tick length is unknown.
+    #[error("the device gave no clock")]
+    Absent,
+    /// Ticks ran backwards, or away from the host's clock by more than a second.
+    #[error("the device's clock jumped")]
+    Jumped,
+}
+
+impl EpochClock {
+    /// Estimates the clock from the frames of one connection, in the order in which they arrived.
+    ///
+    /// # Errors
+    /// If there are no frames, the tick length is zero, or the clock jumped.
+    pub fn estimate(epoch: u32, tick_ns: u64, frames: &[(DeviceTick, MonoTime)]) -> Result<Self, NoClock> {
+        let &[(reference, _), ..] = frames else { return Err(NoClock::Absent) };
+        if tick_ns == 0 {
+            return Err(NoClock::Absent);
+        }
+        if frames.windows(2).any(|pair| matches!(pair, [(a, _), (b, _)] if b < a)) {
+            return Err(NoClock::Jumped);
+        }
+        let base_ns = behind_ns(tick_ns, frames[0]);
+        let points: Vec<(f64, f64)> = frames
+            .iter()
+            .map(|&frame| {
+                let device_ns = (frame.0.0 - reference.0) as f64 * tick_ns as f64;
+                (device_ns, (behind_ns(tick_ns, frame) - base_ns) as f64)
+            })
+            .collect();
+        let level =
+            Line { slope: 0.0, at_zero: points.iter().map(|point| point.1).fold(f64::INFINITY, f64::min) };
+        let tilted = lower_line(&points);
+        let tilted_residuals = residuals(&points, tilted);
+        let uncertainty = tick_ns as f64 + share_below(&tilted_residuals, 0.05);
+        let span_ns = points.last().map_or(0.0, |point| point.0);
+        let drifts = span_ns >= DRIFT_SPAN_NS
+            && tilted.slope.abs() <= DRIFT_MAX
+            && (tilted.slope * span_ns).abs() > uncertainty;
+        let (line, residuals) =
+            if drifts { (tilted, tilted_residuals) } else { (level, residuals(&points, level)) };
+        if residuals.last().is_some_and(|largest| *largest > JUMP_NS) {
+            return Err(NoClock::Jumped);
+        }
+        Ok(Self {
+            epoch,
+            frames: frames.len() as u64,
+            tick_ns,
+            offset_ns: clamped(base_ns + i128::from(whole(line.at_zero))),
+            reference_tick: reference.0,
+            drift_ppm: line.slope * 1e6,
+            uncertainty_ns: whole(tick_ns as f64 + share_below(&residuals, 0.05)),
+            delay_p50_ns: whole(share_below(&residuals, 0.50)),
+            delay_p99_ns: whole(share_below(&residuals, 0.99)),
+        })
+    }
+
+    /// When a frame was sampled, on the host's monotonic clock.
+    pub fn sampled(&self, tick: DeviceTick) -> MonoTime {
+        let device_ns = device_ns(tick, self.tick_ns);
+        let since_reference = i128::from(tick.0) - i128::from(self.reference_tick);
+        let drift_ns = since_reference as f64 * self.tick_ns as f64 * self.drift_ppm * 1e-6;
+        MonoTime::from_ns(clamped(device_ns + i128::from(self.offset_ns) + i128::from(whole(drift_ns))))
+    }
+}
+
+/// By how much the host's clock is ahead of the device's at one frame.
+fn behind_ns(tick_ns: u64, (tick, received): (DeviceTick, MonoTime)) -> i128 {
+    i128::from(received.ns()) - device_ns(tick, tick_ns)
+}
+
+/// The device's time; bounded, so that sums with it cannot overflow.
+fn device_ns(tick: DeviceTick, tick_ns: u64) -> i128 {
+    i128::from(tick.0).saturating_mul(i128::from(tick_ns)).min(i128::MAX / 4)
+}
+
+#[derive(Clone, Copy)]
+struct Line {
+    slope: f64,
+    at_zero: f64,
+}
+
+/// The line under all points with the least mean distance to them; points in order of x.
+fn lower_line(points: &[(f64, f64)]) -> Line {
+    let mut hull: Vec<(f64, f64)> = Vec::new();
+    for &point in points {
+        while let [.., a, b] = hull[..] {
+            let turns_up = (b.0 - a.0) * (point.1 - a.1) - (b.1 - a.1) * (point.0 - a.0) > 0.0;
+            if turns_up {
+                break;
+            }
+            hull.pop();
+        }
+        // Of points at one device time, the lowest counts.
+        match hull.last_mut() {
+            Some(last) if last.0 >= point.0 => last.1 = last.1.min(point.1),
+            _ => hull.push(point),
+        }
+    }
+    let mean = points.iter().map(|point| point.0).sum::<f64>() / points.len() as f64;
+    let edge = hull.windows(2).find(|edge| matches!(edge, [_, b] if b.0 >= mean));
+    match (edge, hull.first()) {
+        (Some([a, b]), _) => {
+            let slope = (b.1 - a.1) / (b.0 - a.0);
+            Line { slope, at_zero: a.1 - slope * a.0 }
+        }
+        (_, first) => Line { slope: 0.0, at_zero: first.map_or(0.0, |point| point.1) },
+    }
+}
+
+/// Distances of the points above the line, sorted.
+fn residuals(points: &[(f64, f64)], line: Line) -> Vec<f64> {
+    let mut above: Vec<f64> = points.iter().map(|(x, y)| y - line.at_zero - line.slope * x).collect();
+    above.sort_by(f64::total_cmp);
+    above
+}
+
+/// The value that a share of the sorted values stays below.
+fn share_below(sorted: &[f64], share: f64) -> f64 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index into the values")]
+    let index = (sorted.len().saturating_sub(1) as f64 * share).round() as usize;
+    sorted.get(index).copied().unwrap_or(0.0)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+fn whole(ns: f64) -> i64 {
+    ns.round() as i64
+}
+
+fn clamped(ns: i128) -> i64 {
+    i64::try_from(ns).unwrap_or(if ns < 0 { i64::MIN } else { i64::MAX })
+}
+
+#[cfg(test)]
+#[path = "clock_tests.rs"]
+mod tests;

@@ -1,0 +1,110 @@
+//! What can go wrong with a recording.
+
+use std::{io, path::PathBuf};
+
+use tactus_schema::RigError;
+
+use crate::table::TableError;
+
+/// Why a recording could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried, such as `create`.
+        action: &'static str,
+        /// On which file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A message could not be stored: what was taken in before may be incomplete.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The recording.
+        path: PathBuf,
+        /// What the MCAP writer said.
+        source: mcap::McapError,
+    },
+    /// The file does not begin as an MCAP file does.
+    #[error("{} is not an MCAP file", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is MCAP, but not a recording of a run, or it was cut off before it said which run it is.
+    #[error("{}: no metadata record {:?}, so this is no recording of a run, or its first bytes are lost", path.display(), crate::header::METADATA_NAME)]
+    NoRun {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Something that stands at the start of every recording is missing or wrong.
+    #[error("{}: {what}: {problem}", path.display())]
+    Header {
+        /// The file.
+        path: PathBuf,
+        /// Name of the attachment or metadata field.
+        what: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The rig in the recording is not a rig.
+    #[error("{}: rig.json: {source}", path.display())]
+    Rig {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: RigError,
+    },
+    /// Recovery was asked for a recording that lacks nothing.
+    #[error("{} is whole and its run is closed: there is nothing to recover", path.display())]
+    NothingToRecover {
+        /// The file.
+        path: PathBuf,
+    },
+    /// What recovery wrote does not read back as what was meant; the output was removed.
+    #[error("{}: the recovered file does not read back: {problem}", path.display())]
+    Unverified {
+        /// The output.
+        path: PathBuf,
+        /// What differs.
+        problem: String,
+    },
+}
+
+/// Why recordings could not be made into a measurement table.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// No recording was named.
+    #[error("no recording to export")]
+    Nothing,
+    /// A recording could not be read.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The table could not be written.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// One table describes one rig.
+    #[error("{} was made with another rig than {}: export them apart", path.display(), first.display())]
+    RigsDiffer {
+        /// The first recording.
+        first: PathBuf,
+        /// The one that differs.
+        path: PathBuf,
+    },
+    /// One run may stand in a table once.
+    #[error("{} holds run {run:?}, which is in the table already", path.display())]
+    RunTwice {
+        /// The recording.
+        path: PathBuf,
+        /// Its run.
+        run: String,
+    },
+    /// The stage never said where it was.
+    #[error("{}: no position of the stage was recorded", path.display())]
+    NoStage {
+        /// The recording.
+        path: PathBuf,
+    },
+}

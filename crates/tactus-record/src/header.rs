@@ -1,0 +1,146 @@
+//! What stands at the start of a recording.
+
+use std::collections::BTreeMap;
+
+use tactus_schema::{Rig, WallTime};
+
+/// Name of the metadata record that tells a run's recording from any other MCAP file.
+pub(crate) const METADATA_NAME: &str = "tactus.run";
+
+/// Attachment: the rig as JSON, [`tactus_schema::rig::SCHEMA`].
+pub(crate) const RIG_JSON: &str = "rig.json";
+/// Attachment: the rig file as it was read.
+pub(crate) const RIG_TOML: &str = "rig.toml";
+/// Attachment: name to version, as a JSON object.
+pub(crate) const VERSIONS_JSON: &str = "versions.json";
+/// Attachment: the parameters as the script saw them, as a JSON object.
+pub(crate) const PARAMETERS_JSON: &str = "parameters.json";
+
+/// Everything known when a run begins.
+#[derive(Debug, Clone, Copy)]
+pub struct Header<'a> {
+    /// Id of the run.
+    pub run_id: &'a str,
+    /// Name of the experiment.
+    pub experiment: &'a str,
+    /// Who asked for it.
+    pub who: &'a str,
+    /// The rig it runs on; its name goes into the topics.
+    pub rig: &'a Rig,
+    /// The rig file as it was read.
+    pub rig_toml: &'a str,
+    /// The experiment's script.
+    pub script: Script<'a>,
+    /// Name to version of everything that had a part in it.
+    pub versions: &'a BTreeMap<String, String>,
+    /// The parameters as the script sees them, as a JSON object.
+    pub parameters_json: &'a str,
+    /// When it began.
+    pub started: WallTime,
+    /// True if no physical sensor is read.
+    pub simulated: bool,
+}
+
+/// An experiment's script.
+#[derive(Debug, Clone, Copy)]
+pub struct Script<'a> {
+    /// File name, such as `element-centres.star`; becomes the attachment's name.
+    pub name: &'a str,
+    /// The text.
+    pub source: &'a str,
+}
+
+/// The metadata record `tactus.run`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunMetadata {
+    /// Id of the run.
+    pub run_id: String,
+    /// Name of the experiment.
+    pub experiment: String,
+    /// Who asked for it.
+    pub who: String,
+    /// Name of the rig.
+    pub rig: String,
+    /// Name of the attachment that holds the script.
+    pub script: String,
+    /// True if no physical sensor was read.
+    pub simulated: bool,
+    /// When it began.
+    pub started: WallTime,
+}
+
+/// A file within the recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Attachment {
+    /// File name.
+    pub name: String,
+    /// Media type, such as `application/json`.
+    pub media_type: String,
+    /// When it was written.
+    pub written: WallTime,
+    /// Its bytes.
+    pub data: Vec<u8>,
+}
+
+impl Header<'_> {
+    pub(crate) fn metadata(&self) -> RunMetadata {
+        RunMetadata {
+            run_id: self.run_id.into(),
+            experiment: self.experiment.into(),
+            who: self.who.into(),
+            rig: self.rig.name.clone(),
+            script: self.script.name.into(),
+            simulated: self.simulated,
+            started: self.started,
+        }
+    }
+
+    pub(crate) fn attachments(&self) -> [Attachment; 5] {
+        let attach = |name: &str, media_type: &str, text: String| Attachment {
+            name: name.into(),
+            media_type: media_type.into(),
+            written: self.started,
+            data: text.into_bytes(),
+        };
+        let versions = serde_json::Value::from_iter(self.versions.clone());
+        [
+            attach(RIG_JSON, "application/json", self.rig.to_json()),
+            attach(RIG_TOML, "application/toml", self.rig_toml.into()),
+            attach(self.script.name, "text/x-starlark", self.script.source.into()),
+            attach(VERSIONS_JSON, "application/json", versions.to_string()),
+            attach(PARAMETERS_JSON, "application/json", self.parameters_json.into()),
+        ]
+    }
+}
+
+impl RunMetadata {
+    pub(crate) fn to_record(&self) -> mcap::records::Metadata {
+        let field = |name: &str, value: String| (name.to_owned(), value);
+        mcap::records::Metadata {
+            name: METADATA_NAME.into(),
+            metadata: BTreeMap::from([
+                field("run_id", self.run_id.clone()),
+                field("experiment", self.experiment.clone()),
+                field("who", self.who.clone()),
+                field("rig", self.rig.clone()),
+                field("script", self.script.clone()),
+                field("simulated", self.simulated.to_string()),
+                field("started_wall_ns", self.started.ns().to_string()),
+            ]),
+        }
+    }
+
+    /// Reads the metadata record; the error is the name of the field that is missing or wrong.
+    pub(crate) fn from_record(record: &mcap::records::Metadata) -> Result<Self, &'static str> {
+        let field = |name: &'static str| record.metadata.get(name).cloned().ok_or(name);
+        Ok(Self {
+            run_id: field("run_id")?,
+            experiment: field("experiment")?,
+            who: field("who")?,
+            rig: field("rig")?,
+            script: field("script")?,
+            simulated: field("simulated")?.parse().map_err(|_| "simulated")?,
+            started: WallTime::from_ns(field("started_wall_ns")?.parse().map_err(|_| "started_wall_ns")?),
+        })
+    }
+}

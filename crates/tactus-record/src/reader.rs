@@ -1,0 +1,171 @@
+//! Reads a recording as a stream.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{self, BufReader, Read},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use tactus_schema::{Frame, Message as _, WallTime, pb};
+
+use crate::{
+    Completeness, RecordError,
+    header::{Attachment, METADATA_NAME, RunMetadata},
+    scan::{Item, RawMessage, Scan},
+};
+
+/// One thing in a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    /// Which run it is; first of all.
+    Run(RunMetadata),
+    /// A file that was put into it; before all messages.
+    Attachment(Attachment),
+    /// A message, in the order in which it was recorded.
+    Message {
+        /// The channel's topic.
+        topic: Arc<str>,
+        /// The host's wall clock.
+        at: WallTime,
+        /// What it says.
+        message: Message,
+    },
+}
+
+/// A recorded message.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Message {
+    /// One reading of all elements.
+    Frame(Frame),
+    /// A report of the stage.
+    Stage(pb::StageState),
+    /// An event of the run.
+    Event(Box<pb::RunEvent>),
+    /// An act of the safety supervisor.
+    Safety(pb::SafetyEvent),
+    /// What the sensor says of itself.
+    SensorInfo(pb::SensorInfo),
+    /// A message that this version does not know; its schema's name.
+    Unknown(String),
+}
+
+/// Gives a recording's entries in order, up to its end or to where it is damaged. It never holds more than one
+/// chunk in memory.
+///
+/// As an iterator it gives an error only if the file system does; damage ends it, and then
+/// [`Reader::completeness`] says where and why.
+pub struct Reader<R = BufReader<File>> {
+    scan: Scan<R>,
+    topics: BTreeMap<u16, Arc<str>>,
+}
+
+/// Opens a recording.
+///
+/// # Errors
+/// If the file cannot be read or does not begin as an MCAP file.
+pub fn read(path: impl AsRef<Path>) -> Result<Reader, RecordError> {
+    let path = path.as_ref();
+    let failed = |action, source| RecordError::Io { action, path: path.to_owned(), source };
+    let mut start = Vec::new();
+    let file = File::open(path).map_err(|error| failed("open", error))?;
+    file.take(mcap::MAGIC.len() as u64).read_to_end(&mut start).map_err(|error| failed("read", error))?;
+    if start != mcap::MAGIC {
+        return Err(RecordError::NotMcap { path: path.to_owned() });
+    }
+    let file = File::open(path).map_err(|error| failed("open", error))?;
+    Ok(Reader::new(BufReader::with_capacity(64 * 1024, file)))
+}
+
+/// Opens a recording and reads up to the record that says which run it is.
+pub(crate) fn read_run(path: &Path) -> Result<(RunMetadata, Reader), RecordError> {
+    let mut reader = read(path)?;
+    for entry in reader.by_ref() {
+        match entry.map_err(|source| io_error(path, source))? {
+            Entry::Run(run) => return Ok((run, reader)),
+            Entry::Attachment(_) => {}
+            Entry::Message { .. } => break,
+        }
+    }
+    Err(RecordError::NoRun { path: path.to_owned() })
+}
+
+pub(crate) fn io_error(path: &Path, source: io::Error) -> RecordError {
+    RecordError::Io { action: "read", path: PathBuf::from(path), source }
+}
+
+impl<R: Read> Reader<R> {
+    /// Reads a recording from any source of its bytes.
+    pub fn new(source: R) -> Self {
+        Self { scan: Scan::new(source), topics: BTreeMap::new() }
+    }
+
+    /// How much could be read; `None` until the last entry was given.
+    pub fn completeness(&self) -> Option<&Completeness> {
+        self.scan.completeness()
+    }
+
+    fn next_entry(&mut self) -> io::Result<Option<Entry>> {
+        while let Some(item) = self.scan.next_item()? {
+            let entry = match item {
+                Item::Metadata(record) if record.name == METADATA_NAME => RunMetadata::from_record(&record)
+                    .map(Entry::Run)
+                    .map_err(|field| format!("metadata {METADATA_NAME}: {field} is missing or wrong")),
+                Item::Metadata(_) => continue,
+                Item::Attachment(attachment) => Ok(Entry::Attachment(attachment)),
+                Item::Message(raw) => decode(&raw)
+                    .map(|message| Entry::Message {
+                        topic: self.topic(&raw),
+                        at: WallTime::from_ns(i64::try_from(raw.header.log_time).unwrap_or(i64::MAX)),
+                        message,
+                    })
+                    .map_err(|error| {
+                        format!("message {} on {}: {error}", raw.header.sequence, raw.channel.topic)
+                    }),
+            };
+            match entry {
+                Ok(entry) => return Ok(Some(entry)),
+                Err(reason) => self.scan.give_up(reason),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Messages on one channel share the text of its topic.
+    fn topic(&mut self, raw: &RawMessage) -> Arc<str> {
+        let shared = self.topics.entry(raw.header.channel_id);
+        Arc::clone(shared.or_insert_with(|| Arc::from(raw.channel.topic.as_str())))
+    }
+}
+
+impl<R: Read> Iterator for Reader<R> {
+    type Item = io::Result<Entry>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_entry().transpose()
+    }
+}
+
+impl<R> std::fmt::Debug for Reader<R> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Reader").finish_non_exhaustive()
+    }
+}
+
+pub(crate) fn decode(raw: &RawMessage) -> Result<Message, prost::DecodeError> {
+    let data = raw.data.as_slice();
+    let schema = raw.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
+    Ok(match schema {
+        pb::Frame::NAME => Message::Frame(decoded::<pb::Frame>(data)?.into()),
+        pb::StageState::NAME => Message::Stage(decoded(data)?),
+        pb::RunEvent::NAME => Message::Event(Box::new(decoded(data)?)),
+        pb::SafetyEvent::NAME => Message::Safety(decoded(data)?),
+        pb::SensorInfo::NAME => Message::SensorInfo(decoded(data)?),
+        other => Message::Unknown(other.to_owned()),
+    })
+}
+
+fn decoded<M: tactus_schema::Message>(data: &[u8]) -> Result<M, prost::DecodeError> {
+    M::decode(data)
+}

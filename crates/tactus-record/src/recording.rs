@@ -1,0 +1,181 @@
+//! A recording in the making.
+
+use std::{
+    fmt,
+    fs::{File, OpenOptions},
+    path::{Path, PathBuf},
+};
+
+use tactus_schema::{Frame, MonoTime, Stamp, WallTime, pb};
+
+use crate::{RecordError, Tally, channel::ChannelWriter, header::Header};
+
+/// One run being written to an MCAP file.
+///
+/// Each call returns once the message is in the chunk in hand; a chunk reaches the system when it spans half a
+/// second of message time, so a killed process loses at most that. After an error nothing more is taken in: the
+/// caller fails the run. Dropped unfinished, the file is whole, but its run stays open.
+pub struct Recording {
+    path: PathBuf,
+    writer: ChannelWriter<File>,
+    tally: Tally,
+    sensor_infos: u64,
+}
+
+/// What a recording came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// The file.
+    pub path: PathBuf,
+    /// Size of the file.
+    pub bytes: u64,
+    /// Frames recorded: all that were received.
+    pub frames: u64,
+    /// Frames that the sensor took and that never arrived.
+    pub frames_lost: u64,
+    /// Places at which frames are missing.
+    pub gaps: u64,
+    /// Presses of which at least one dwell is done.
+    pub presses: u32,
+    /// Dwells done.
+    pub dwells: u32,
+    /// From the first message to the last.
+    pub duration_s: f64,
+    /// How the run ended, as its last event says; `None` if there was none.
+    pub exit_status: Option<pb::ExitStatus>,
+}
+
+impl Recording {
+    /// Creates the file and writes everything of `header` into it. An existing file is never overwritten.
+    ///
+    /// # Errors
+    /// If the file exists or cannot be written.
+    pub fn create(path: impl Into<PathBuf>, header: &Header<'_>) -> Result<Self, RecordError> {
+        let path = path.into();
+        let file = match OpenOptions::new().write(true).create_new(true).open(&path) {
+            Ok(file) => file,
+            Err(source) => return Err(RecordError::Io { action: "create", path, source }),
+        };
+        match ChannelWriter::new(file, header) {
+            Ok(writer) => Ok(Self { path, writer, tally: Tally::default(), sensor_infos: 0 }),
+            Err(source) => Err(RecordError::Write { path, source }),
+        }
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What was recorded so far.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// Records one frame.
+    ///
+    /// # Errors
+    /// If the chunk before it could not be written; so with all that follow.
+    pub fn write_frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
+        self.tally.frame(frame);
+        let written = self.writer.frame(&frame.into(), frame.received);
+        self.checked(written)
+    }
+
+    /// Records one report of the stage.
+    ///
+    /// # Errors
+    /// As [`Recording::write_frame`].
+    pub fn write_stage(&mut self, state: &pb::StageState) -> Result<(), RecordError> {
+        let at = stamp(state.t_mono_ns, state.t_wall_ns);
+        self.tally.time(at.mono);
+        let written = self.writer.stage(state, at);
+        self.checked(written)
+    }
+
+    /// Records one event of the run.
+    ///
+    /// # Errors
+    /// As [`Recording::write_frame`].
+    pub fn write_event(&mut self, event: &pb::RunEvent) -> Result<(), RecordError> {
+        self.tally.event(event);
+        let written = self.writer.event(event, stamp(event.t_mono_ns, event.t_wall_ns));
+        self.checked(written)
+    }
+
+    /// Records one act of the safety supervisor.
+    ///
+    /// # Errors
+    /// As [`Recording::write_frame`].
+    pub fn write_safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordError> {
+        let at = stamp(event.t_mono_ns, event.t_wall_ns);
+        self.tally.time(at.mono);
+        let written = self.writer.safety(event, at);
+        self.checked(written)
+    }
+
+    /// Records what the sensor says of itself.
+    ///
+    /// # Errors
+    /// As [`Recording::write_frame`].
+    pub fn write_sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordError> {
+        self.tally.time(at.mono);
+        let nth = self.sensor_infos;
+        self.sensor_infos += 1;
+        let written = self.writer.sensor_info(info, nth, at);
+        self.checked(written)
+    }
+
+    /// Gives everything taken in so far to the system. For quiet times: while messages come, they do it.
+    ///
+    /// # Errors
+    /// As [`Recording::write_frame`].
+    pub fn flush(&mut self) -> Result<(), RecordError> {
+        let flushed = self.writer.flush();
+        self.checked(flushed)
+    }
+
+    /// Closes the file; returns once it is on the disk.
+    ///
+    /// # Errors
+    /// If what was taken in before could not be stored.
+    pub fn finish(self) -> Result<Summary, RecordError> {
+        let Self { path, writer, tally, .. } = self;
+        let file = match writer.finish() {
+            Ok(file) => file,
+            Err(source) => return Err(RecordError::Write { path, source }),
+        };
+        let bytes = match file.sync_all().and_then(|()| file.metadata()) {
+            Ok(metadata) => metadata.len(),
+            Err(source) => return Err(RecordError::Io { action: "sync", path, source }),
+        };
+        Ok(Summary {
+            path,
+            bytes,
+            frames: tally.frames(),
+            frames_lost: tally.frames_lost(),
+            gaps: tally.gaps(),
+            presses: tally.presses(),
+            dwells: tally.dwells(),
+            duration_s: tally.duration().as_secs_f64(),
+            exit_status: tally.exit_status(),
+        })
+    }
+
+    fn checked(&self, written: Result<(), mcap::McapError>) -> Result<(), RecordError> {
+        written.map_err(|source| RecordError::Write { path: self.path.clone(), source })
+    }
+}
+
+impl fmt::Debug for Recording {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Recording")
+            .field("path", &self.path)
+            .field("tally", &self.tally)
+            .finish_non_exhaustive()
+    }
+}
+
+fn stamp(mono_ns: i64, wall_ns: i64) -> Stamp {
+    Stamp { mono: MonoTime::from_ns(mono_ns), wall: WallTime::from_ns(wall_ns) }
+}

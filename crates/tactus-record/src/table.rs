@@ -1,0 +1,223 @@
+//! The measurement table as a file: written, read and checked, whoever wrote it.
+//!
+//! The contract stands in [`tactus_schema::table`]. Types are exact: a column of another type is refused with its
+//! name. Physical layout is free: nullable or not, plain or dictionary, any of the ways in which Parquet writes
+//! lists, snappy, zstd or no compression, columns in any order, further columns beside them (which are not read).
+
+mod check;
+mod column;
+mod error;
+mod layout;
+mod read;
+mod write;
+
+use std::{collections::BTreeMap, ops::Range, path::Path, sync::Arc};
+
+use tactus_schema::{
+    Rig,
+    table::{Phase, Row},
+};
+
+pub use error::TableError;
+pub use write::TableWriter;
+
+/// A checked measurement table in memory, by columns.
+#[derive(Debug, Clone)]
+pub struct Table {
+    head: Head,
+    runs: Vec<RunRows>,
+    press: Vec<i32>,
+    phase: Vec<Phase>,
+    t_ns: Vec<i64>,
+    position_mm: Vec<[f64; 3]>,
+    covering_mm: Vec<f64>,
+    indenter: Vec<Arc<str>>,
+    temperature_c: Vec<Option<f64>>,
+    counts: Vec<f32>,
+}
+
+/// What a table says of all its rows.
+#[derive(Debug, Clone)]
+pub struct Head {
+    /// The rig that was measured.
+    pub rig: Rig,
+    /// The file's metadata, the rig's text among it.
+    pub metadata: BTreeMap<String, String>,
+}
+
+/// The rows of one run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunRows {
+    /// Run id.
+    pub run: Arc<str>,
+    /// Its rows, contiguous and in order of time.
+    pub rows: Range<usize>,
+}
+
+/// One row, borrowed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowView<'a> {
+    /// Run id.
+    pub run: &'a str,
+    /// Press index in the run; -1 outside a press.
+    pub press: i32,
+    /// What the stage was doing.
+    pub phase: Phase,
+    /// Time of the frame's sampling.
+    pub t_ns: i64,
+    /// Stage position at `t_ns`, robot frame.
+    pub position_mm: [f64; 3],
+    /// Covering thickness.
+    pub covering_mm: f64,
+    /// Id of an indenter of the rig.
+    pub indenter: &'a str,
+    /// Temperature, if it was measured.
+    pub temperature_c: Option<f64>,
+    /// Raw counts, row-major, one per element.
+    pub counts: &'a [f32],
+}
+
+/// What a valid table holds.
+#[derive(Debug, Clone)]
+pub struct Validated {
+    /// What it says of all its rows.
+    pub head: Head,
+    /// Number of rows.
+    pub rows: u64,
+    /// Number of runs.
+    pub runs: u64,
+}
+
+/// Reads a table into memory, checked.
+///
+/// # Errors
+/// [`TableError`] names the column, and the row where there is one.
+pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
+    let mut rows = Rows::default();
+    let head = read::visit(path.as_ref(), |row| rows.push(row))?;
+    Ok(rows.into_table(head))
+}
+
+/// Checks a table without keeping it.
+///
+/// # Errors
+/// As [`read()`].
+pub fn validate(path: impl AsRef<Path>) -> Result<Validated, TableError> {
+    let (mut rows, mut runs, mut last) = (0, 0, String::new());
+    let head = read::visit(path.as_ref(), |row| {
+        rows += 1;
+        if rows == 1 || last != row.run {
+            runs += 1;
+            row.run.clone_into(&mut last);
+        }
+    })?;
+    Ok(Validated { head, rows, runs })
+}
+
+impl Table {
+    /// What it says of all its rows.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.t_ns.len()
+    }
+
+    /// True if it has no rows.
+    pub fn is_empty(&self) -> bool {
+        self.t_ns.is_empty()
+    }
+
+    /// The runs, in the order in which they stand in the table.
+    pub fn runs(&self) -> &[RunRows] {
+        &self.runs
+    }
+
+    /// All rows, in order.
+    pub fn rows(&self) -> impl Iterator<Item = RowView<'_>> {
+        let elements = self.head.rig.array.elements();
+        self.runs.iter().flat_map(move |run| {
+            run.rows.clone().map(move |row| RowView {
+                run: &run.run,
+                press: self.press[row],
+                phase: self.phase[row],
+                t_ns: self.t_ns[row],
+                position_mm: self.position_mm[row],
+                covering_mm: self.covering_mm[row],
+                indenter: &self.indenter[row],
+                temperature_c: self.temperature_c[row],
+                counts: &self.counts[row * elements..(row + 1) * elements],
+            })
+        })
+    }
+
+    /// Sampling times, one a row.
+    pub fn t_ns(&self) -> &[i64] {
+        &self.t_ns
+    }
+
+    /// Raw counts of all rows, one after the other; as many a row as the array has elements.
+    pub fn counts(&self) -> &[f32] {
+        &self.counts
+    }
+}
+
+impl<'a> From<&'a Row> for RowView<'a> {
+    fn from(row: &'a Row) -> Self {
+        Self {
+            run: &row.run,
+            press: row.press,
+            phase: row.phase,
+            t_ns: row.t_ns,
+            position_mm: row.position_mm,
+            covering_mm: row.covering_mm,
+            indenter: &row.indenter,
+            temperature_c: row.temperature_c,
+            counts: &row.counts,
+        }
+    }
+}
+
+/// A table in the making.
+#[derive(Default)]
+struct Rows {
+    runs: Vec<RunRows>,
+    press: Vec<i32>,
+    phase: Vec<Phase>,
+    t_ns: Vec<i64>,
+    position_mm: Vec<[f64; 3]>,
+    covering_mm: Vec<f64>,
+    indenter: Vec<Arc<str>>,
+    temperature_c: Vec<Option<f64>>,
+    counts: Vec<f32>,
+}
+
+impl Rows {
+    fn push(&mut self, row: RowView<'_>) {
+        let index = self.t_ns.len();
+        match self.runs.last_mut() {
+            Some(last) if *last.run == *row.run => last.rows.end = index + 1,
+            _ => self.runs.push(RunRows { run: row.run.into(), rows: index..index + 1 }),
+        }
+        let indenter = match self.indenter.last() {
+            Some(last) if **last == *row.indenter => Arc::clone(last),
+            _ => row.indenter.into(),
+        };
+        self.indenter.push(indenter);
+        self.press.push(row.press);
+        self.phase.push(row.phase);
+        self.t_ns.push(row.t_ns);
+        self.position_mm.push(row.position_mm);
+        self.covering_mm.push(row.covering_mm);
+        self.temperature_c.push(row.temperature_c);
+        self.counts.extend_from_slice(row.counts);
+    }
+
+    fn into_table(self, head: Head) -> Table {
+        let Self { runs, press, phase, t_ns, position_mm, covering_mm, indenter, temperature_c, counts } =
+            self;
+        Table { head, runs, press, phase, t_ns, position_mm, covering_mm, indenter, temperature_c, counts }
+    }
+}

@@ -1,0 +1,185 @@
+//! Reads one column of one row group.
+
+use std::path::Path;
+
+use parquet::{
+    column::reader::{ColumnReaderImpl, get_typed_column_reader},
+    data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type},
+    errors::ParquetError,
+    file::reader::RowGroupReader,
+    schema::types::ColumnDescriptor,
+};
+
+use super::TableError;
+
+/// Rows asked for at once: bounds what a wrong count of rows in a damaged file costs.
+const BATCH_ROWS: usize = 8192;
+
+/// Values of a column, row by row.
+pub(super) struct Column<T> {
+    /// As many as there are values that are not null.
+    values: Vec<T>,
+    /// Where each row's values begin; one more than there are rows.
+    starts: Vec<usize>,
+    /// Rows that are null, or lists that hold a null or are null, in order.
+    null_rows: Vec<usize>,
+}
+
+/// A file in which a column is read, and what errors say of it.
+pub(super) struct Source<'a> {
+    pub(super) path: &'a Path,
+    pub(super) group: &'a dyn RowGroupReader,
+    pub(super) first_row: u64,
+}
+
+impl<T> Column<T> {
+    pub(super) fn rows(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The values of one row: one, or, of a list, any number; none of a null.
+    pub(super) fn row(&self, row: usize) -> &[T] {
+        &self.values[self.starts[row]..self.starts[row + 1]]
+    }
+}
+
+impl Source<'_> {
+    /// A column of texts, none of them null.
+    pub(super) fn texts(&self, leaf: usize, name: &'static str) -> Result<Vec<String>, TableError> {
+        let column = self.column::<ByteArrayType>(leaf, name)?;
+        self.no_nulls(&column, name)?;
+        let text = |(row, bytes): (usize, &ByteArray)| match bytes.as_utf8() {
+            Ok(text) => Ok(text.to_owned()),
+            Err(_) => Err(self.fault(row, name, "not UTF-8".into())),
+        };
+        column.values.iter().enumerate().map(text).collect()
+    }
+
+    /// A column of 32-bit integers, none of them null.
+    pub(super) fn int32s(&self, leaf: usize, name: &'static str) -> Result<Vec<i32>, TableError> {
+        let column = self.column::<Int32Type>(leaf, name)?;
+        self.no_nulls(&column, name)?;
+        Ok(column.values)
+    }
+
+    /// A column of 64-bit integers, none of them null.
+    pub(super) fn int64s(&self, leaf: usize, name: &'static str) -> Result<Vec<i64>, TableError> {
+        let column = self.column::<Int64Type>(leaf, name)?;
+        self.no_nulls(&column, name)?;
+        Ok(column.values)
+    }
+
+    /// A column of numbers, none of them null.
+    pub(super) fn float64s(&self, leaf: usize, name: &'static str) -> Result<Vec<f64>, TableError> {
+        let column = self.column::<DoubleType>(leaf, name)?;
+        self.no_nulls(&column, name)?;
+        Ok(column.values)
+    }
+
+    /// A column of numbers or nulls; a column of Parquet's null type, in whatever it is kept, holds nulls only.
+    pub(super) fn optional_float64s(
+        &self,
+        leaf: usize,
+        name: &'static str,
+        rows: usize,
+    ) -> Result<Vec<Option<f64>>, TableError> {
+        if self.group.metadata().column(leaf).column_type() != DoubleType::get_physical_type() {
+            return Ok(vec![None; rows]);
+        }
+        let column = self.column::<DoubleType>(leaf, name)?;
+        Ok((0..column.rows()).map(|row| column.row(row).first().copied()).collect())
+    }
+
+    /// A column of lists of numbers, neither null nor with nulls in them.
+    pub(super) fn lists(&self, leaf: usize, name: &'static str) -> Result<Column<f32>, TableError> {
+        let column = self.column::<FloatType>(leaf, name)?;
+        self.no_nulls(&column, name)?;
+        Ok(column)
+    }
+
+    pub(super) fn fault(&self, row: usize, column: &'static str, problem: String) -> TableError {
+        TableError::Value { path: self.path.to_owned(), row: self.first_row + row as u64, column, problem }
+    }
+
+    fn no_nulls<T>(&self, column: &Column<T>, name: &'static str) -> Result<(), TableError> {
+        match column.null_rows.first() {
+            Some(&row) => Err(self.fault(row, name, "null".into())),
+            None => Ok(()),
+        }
+    }
+
+    fn column<T: DataType>(&self, leaf: usize, name: &'static str) -> Result<Column<T::T>, TableError> {
+        let descriptor = self.group.metadata().column(leaf).column_descr_ptr();
+        let failed = |source: ParquetError| TableError::Parquet { path: self.path.to_owned(), source };
+        let reader = get_typed_column_reader::<T>(self.group.get_column_reader(leaf).map_err(failed)?);
+        let levels = Levels::read(reader).map_err(failed)?;
+        let column = levels.into_column(Form::of(&descriptor));
+        let expected = usize::try_from(self.group.metadata().num_rows()).unwrap_or(0);
+        if column.rows() == expected {
+            return Ok(column);
+        }
+        let group = usize::try_from(self.group.metadata().ordinal().unwrap_or(0)).unwrap_or(0);
+        let (path, found) = (self.path.to_owned(), column.rows());
+        Err(TableError::ColumnLength { path, column: name, group, found, expected })
+    }
+}
+
+/// Values and levels as Parquet keeps them: a repetition level above 0 goes on in the row before, a definition level
+/// below the greatest stands for no value.
+struct Levels<T> {
+    values: Vec<T>,
+    definition: Vec<i16>,
+    repetition: Vec<i16>,
+}
+
+/// What the definition levels of a column mean.
+#[derive(Clone, Copy)]
+struct Form {
+    /// The level of a value; 0 if there can be no nulls.
+    defined: i16,
+    /// The level of a list without elements; its length says what is wrong with it.
+    empty_list: Option<i16>,
+}
+
+impl Form {
+    fn of(column: &ColumnDescriptor) -> Self {
+        let defined = column.max_def_level();
+        let entry = defined - i16::from(column.self_type().is_optional());
+        Self { defined, empty_list: (column.max_rep_level() > 0).then_some(entry - 1) }
+    }
+}
+
+impl<T> Levels<T> {
+    fn read<D: DataType<T = T>>(mut reader: ColumnReaderImpl<D>) -> Result<Self, ParquetError> {
+        let mut levels = Self { values: Vec::new(), definition: Vec::new(), repetition: Vec::new() };
+        loop {
+            let Self { values, definition, repetition } = &mut levels;
+            let (records, _, _) =
+                reader.read_records(BATCH_ROWS, Some(definition), Some(repetition), values)?;
+            if records == 0 {
+                return Ok(levels);
+            }
+        }
+    }
+
+    fn into_column(self, form: Form) -> Column<T> {
+        let Self { values, definition, repetition } = self;
+        if form.defined == 0 {
+            return Column { starts: (0..=values.len()).collect(), values, null_rows: Vec::new() };
+        }
+        let (mut starts, mut null_rows, mut taken) = (Vec::new(), Vec::new(), 0);
+        for (index, &level) in definition.iter().enumerate() {
+            if repetition.get(index).is_none_or(|repeated| *repeated == 0) {
+                starts.push(taken);
+            }
+            let row = starts.len().saturating_sub(1);
+            if level == form.defined {
+                taken += 1;
+            } else if form.empty_list != Some(level) && null_rows.last() != Some(&row) {
+                null_rows.push(row);
+            }
+        }
+        starts.push(taken);
+        Column { values, starts, null_rows }
+    }
+}

@@ -1,0 +1,119 @@
+//! What a run came to: frames received and lost, presses, dwells, how it ended.
+
+use std::{collections::BTreeSet, time::Duration};
+
+use tactus_schema::{
+    Frame, MonoTime,
+    pb::{self, run_event::Event},
+};
+
+use crate::Message;
+
+/// Counts over the messages of one run, taken in the order in which they were recorded.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    frames: u64,
+    frames_lost: u64,
+    gaps: u64,
+    last_seq: Option<u64>,
+    dwells: BTreeSet<(i32, u32)>,
+    dwells_outside: u32,
+    span: Option<(MonoTime, MonoTime)>,
+    finished: Option<pb::RunFinished>,
+}
+
+impl Tally {
+    /// Takes in any message as it was read back.
+    pub fn take(&mut self, message: &Message) {
+        match message {
+            Message::Frame(frame) => {
+                self.frame(frame);
+            }
+            Message::Event(event) => self.event(event),
+            Message::Stage(state) => self.time(MonoTime::from_ns(state.t_mono_ns)),
+            Message::Safety(event) => self.time(MonoTime::from_ns(event.t_mono_ns)),
+            Message::SensorInfo(_) | Message::Unknown(_) => {}
+        }
+    }
+
+    /// Takes in a frame; returns how many are missing between it and the one before.
+    ///
+    /// What was lost before the first frame was lost before the recording began, and is not counted.
+    pub fn frame(&mut self, frame: &Frame) -> u64 {
+        self.time(frame.received.mono);
+        self.frames += 1;
+        let lost = self.last_seq.map_or(0, |last| {
+            let step = frame.seq.saturating_sub(last);
+            u64::from(frame.lost_before).max(step.saturating_sub(1))
+        });
+        self.last_seq = Some(frame.seq);
+        self.frames_lost += lost;
+        self.gaps += u64::from(lost > 0);
+        lost
+    }
+
+    /// Takes in an event of the run.
+    pub fn event(&mut self, event: &pb::RunEvent) {
+        self.time(MonoTime::from_ns(event.t_mono_ns));
+        match &event.event {
+            // A press that was begun again repeats its dwells: each counts once.
+            Some(Event::DwellDone(dwell)) if dwell.press >= 0 => {
+                self.dwells.insert((dwell.press, dwell.dwell));
+            }
+            Some(Event::DwellDone(_)) => self.dwells_outside += 1,
+            Some(Event::Finished(finished)) => self.finished = Some(finished.clone()),
+            _ => {}
+        }
+    }
+
+    /// Takes in the time of any other message.
+    pub fn time(&mut self, at: MonoTime) {
+        let (first, last) = self.span.unwrap_or((at, at));
+        self.span = Some((first.min(at), last.max(at)));
+    }
+
+    /// Frames received.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Frames that the sensor took and that never arrived.
+    pub fn frames_lost(&self) -> u64 {
+        self.frames_lost
+    }
+
+    /// Places at which frames are missing.
+    pub fn gaps(&self) -> u64 {
+        self.gaps
+    }
+
+    /// Presses of which at least one dwell is done.
+    pub fn presses(&self) -> u32 {
+        let presses: BTreeSet<i32> = self.dwells.iter().map(|(press, _)| *press).collect();
+        u32::try_from(presses.len()).unwrap_or(u32::MAX)
+    }
+
+    /// Dwells done.
+    pub fn dwells(&self) -> u32 {
+        u32::try_from(self.dwells.len()).unwrap_or(u32::MAX).saturating_add(self.dwells_outside)
+    }
+
+    /// From the first message to the last.
+    pub fn duration(&self) -> Duration {
+        self.span.map_or(Duration::ZERO, |(first, last)| last.since(first))
+    }
+
+    /// How the run ended; `None` if it never said.
+    pub fn finished(&self) -> Option<&pb::RunFinished> {
+        self.finished.as_ref()
+    }
+
+    /// How the run ended; `None` if it never said.
+    pub fn exit_status(&self) -> Option<pb::ExitStatus> {
+        self.finished.as_ref().map(pb::RunFinished::exit_status)
+    }
+}
+
+#[cfg(test)]
+#[path = "tally_tests.rs"]
+mod tests;

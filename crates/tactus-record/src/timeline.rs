@@ -1,0 +1,188 @@
+//! Where the stage was, and what it did, at any time of a run.
+
+mod gather;
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use gather::Gathered;
+use tactus_schema::{
+    Frame, MonoTime, Rig,
+    pb::{self, run_event::Event},
+    table::Phase,
+};
+
+use crate::{
+    Completeness, EpochClock, NoClock, RecordError, RunMetadata, Tally,
+    reader::{io_error, read_run},
+};
+
+/// All of a recording but the counts of its frames, put into order of time.
+///
+/// It holds a few dozen bytes a frame, so that a second pass over the recording can treat the frames one by one.
+#[derive(Debug, Clone)]
+pub struct Timeline {
+    path: PathBuf,
+    run: RunMetadata,
+    rig: Rig,
+    rig_json: String,
+    attachments: BTreeMap<String, Vec<u8>>,
+    clocks: BTreeMap<u32, Result<EpochClock, NoClock>>,
+    stage: Vec<StageReport>,
+    phases: Vec<(MonoTime, Phase, i32)>,
+    coverings: Vec<(MonoTime, f64)>,
+    events: Vec<pb::RunEvent>,
+    tally: Tally,
+    completeness: Completeness,
+}
+
+/// A place of the stage at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StageReport {
+    /// When it was there.
+    pub at: MonoTime,
+    /// Where; robot frame.
+    pub position_mm: [f64; 3],
+}
+
+/// When a frame was sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sampling {
+    /// By the device's clock.
+    Device(MonoTime),
+    /// Taken to be when it arrived, because the device's clock says nothing.
+    Arrival(MonoTime),
+}
+
+impl Sampling {
+    /// The time, whatever it rests on.
+    pub fn time(self) -> MonoTime {
+        match self {
+            Self::Device(at) | Self::Arrival(at) => at,
+        }
+    }
+}
+
+impl Timeline {
+    /// Reads a recording, whole or damaged.
+    ///
+    /// # Errors
+    /// If it cannot be read, does not say which run it is, or holds no valid rig.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+        let path = path.as_ref();
+        let (run, mut reader) = read_run(path)?;
+        let mut gathered = Gathered::default();
+        for entry in reader.by_ref() {
+            gathered.take(entry.map_err(|source| io_error(path, source))?);
+        }
+        let completeness = reader.completeness().cloned().unwrap_or(Completeness::Complete);
+        gathered.into_timeline(path, run, completeness)
+    }
+
+    /// The recording.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Which run it is.
+    pub fn run(&self) -> &RunMetadata {
+        &self.run
+    }
+
+    /// The rig it ran on.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// The rig as it stands in the recording.
+    pub fn rig_json(&self) -> &str {
+        &self.rig_json
+    }
+
+    /// A file within the recording.
+    pub fn attachment(&self, name: &str) -> Option<&[u8]> {
+        self.attachments.get(name).map(Vec::as_slice)
+    }
+
+    /// The run's events, in order.
+    pub fn events(&self) -> &[pb::RunEvent] {
+        &self.events
+    }
+
+    /// Counts over the whole recording.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// How much of the file could be read.
+    pub fn completeness(&self) -> &Completeness {
+        &self.completeness
+    }
+
+    /// The device's clock against the host's, by connection.
+    pub fn clocks(&self) -> &BTreeMap<u32, Result<EpochClock, NoClock>> {
+        &self.clocks
+    }
+
+    /// The stage's reports, in order of time.
+    pub fn stage(&self) -> &[StageReport] {
+        &self.stage
+    }
+
+    /// When a frame of this recording was sampled.
+    pub fn sampling(&self, frame: &Frame) -> Sampling {
+        match (self.clocks.get(&frame.epoch), frame.device_tick) {
+            (Some(Ok(clock)), Some(tick)) => Sampling::Device(clock.sampled(tick)),
+            _ => Sampling::Arrival(frame.received.mono),
+        }
+    }
+
+    /// Where the stage was, in the robot's frame: between two reports on the straight line, before the first and
+    /// after the last where they say. `None` if it never said.
+    pub fn position_mm(&self, at: MonoTime) -> Option<[f64; 3]> {
+        let next = self.stage.partition_point(|report| report.at <= at);
+        let before = next.checked_sub(1).and_then(|index| self.stage.get(index));
+        match (before, self.stage.get(next)) {
+            (Some(a), Some(b)) => {
+                let share = (at.ns() - a.at.ns()) as f64 / (b.at.ns() - a.at.ns()) as f64;
+                let between =
+                    |axis: usize| a.position_mm[axis] + share * (b.position_mm[axis] - a.position_mm[axis]);
+                Some([between(0), between(1), between(2)])
+            }
+            (Some(nearest), None) | (None, Some(nearest)) => Some(nearest.position_mm),
+            (None, None) => None,
+        }
+    }
+
+    /// What the stage did, and the index of the press, -1 outside one; idle before the run began.
+    pub fn phase(&self, at: MonoTime) -> (Phase, i32) {
+        let next = self.phases.partition_point(|(from, _, _)| *from <= at);
+        let now = next.checked_sub(1).and_then(|index| self.phases.get(index));
+        now.map_or((Phase::Idle, -1), |(_, phase, press)| (*phase, *press))
+    }
+
+    /// Thickness of the covering in place.
+    pub fn covering_mm(&self, at: MonoTime) -> f64 {
+        let next = self.coverings.partition_point(|(from, _)| *from <= at);
+        let now = next.checked_sub(1).or(Some(0)).and_then(|index| self.coverings.get(index));
+        now.map_or(self.rig.covering.thickness_mm, |(_, thickness_mm)| *thickness_mm)
+    }
+
+    /// Id of the tool on the stage.
+    pub fn indenter(&self) -> &str {
+        self.started()
+            .map(|started| started.indenter.as_str())
+            .filter(|id| !id.is_empty())
+            .unwrap_or(&self.rig.indenter)
+    }
+
+    /// The run's first event.
+    pub fn started(&self) -> Option<&pb::RunStarted> {
+        self.events.iter().find_map(|event| match &event.event {
+            Some(Event::Started(started)) => Some(started),
+            _ => None,
+        })
+    }
+}

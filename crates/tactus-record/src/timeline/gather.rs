@@ -1,0 +1,134 @@
+//! Gathers a timeline from a recording's entries.
+
+use std::{collections::BTreeMap, path::Path};
+
+use tactus_schema::{
+    DeviceTick, Frame, MonoTime, Rig,
+    pb::{self, run_event::Event},
+    table::Phase,
+};
+
+use super::{StageReport, Timeline};
+use crate::{
+    Completeness, Entry, EpochClock, Message, NoClock, RecordError, RunMetadata, Tally, header::RIG_JSON,
+};
+
+#[derive(Default)]
+pub(super) struct Gathered {
+    attachments: BTreeMap<String, Vec<u8>>,
+    /// Frames by connection; `None` in place of a tick ends the hope for that connection's clock.
+    ticks: BTreeMap<u32, Option<Vec<(DeviceTick, MonoTime)>>>,
+    /// Tick length as it was last stated, by connection.
+    tick_ns: BTreeMap<u32, u64>,
+    stated_tick_ns: u64,
+    stage: Vec<StageReport>,
+    phases: Vec<(MonoTime, Phase, i32)>,
+    coverings: Vec<(MonoTime, f64)>,
+    events: Vec<pb::RunEvent>,
+    tally: Tally,
+}
+
+impl Gathered {
+    pub(super) fn take(&mut self, entry: Entry) {
+        let message = match entry {
+            Entry::Run(_) => return,
+            Entry::Attachment(file) => {
+                self.attachments.insert(file.name, file.data);
+                return;
+            }
+            Entry::Message { message, .. } => message,
+        };
+        self.tally.take(&message);
+        match message {
+            Message::Frame(frame) => self.frame(&frame),
+            Message::SensorInfo(info) => self.stated_tick_ns = info.tick_ns,
+            Message::Stage(state) => self.stage(&state),
+            Message::Event(event) => self.event(*event),
+            Message::Safety(_) | Message::Unknown(_) => {}
+        }
+    }
+
+    fn frame(&mut self, frame: &Frame) {
+        if self.stated_tick_ns > 0 {
+            self.tick_ns.entry(frame.epoch).or_insert(self.stated_tick_ns);
+        }
+        let ticks = self.ticks.entry(frame.epoch).or_insert_with(|| Some(Vec::new()));
+        match (ticks.as_mut(), frame.device_tick) {
+            (Some(known), Some(tick)) => known.push((tick, frame.received.mono)),
+            _ => *ticks = None,
+        }
+    }
+
+    fn stage(&mut self, state: &pb::StageState) {
+        // What a stage that is not there reports is no position.
+        let position_mm = [state.x_mm, state.y_mm, state.z_mm];
+        if state.status() != pb::StageStatus::Disconnected && position_mm.iter().all(|mm| mm.is_finite()) {
+            self.stage.push(StageReport { at: MonoTime::from_ns(state.t_mono_ns), position_mm });
+        }
+    }
+
+    fn event(&mut self, event: pb::RunEvent) {
+        let at = MonoTime::from_ns(event.t_mono_ns);
+        match &event.event {
+            Some(Event::PhaseChanged(changed)) => {
+                if let Ok(phase) = Phase::try_from(changed.phase()) {
+                    self.phases.push((at, phase, changed.press.max(-1)));
+                }
+            }
+            Some(Event::Started(started)) if started.covering_mm > 0.0 => {
+                self.coverings.push((at, started.covering_mm));
+            }
+            Some(Event::CoveringChanged(changed)) => self.coverings.push((at, changed.covering_mm)),
+            _ => {}
+        }
+        self.events.push(event);
+    }
+
+    pub(super) fn into_timeline(
+        mut self,
+        path: &Path,
+        run: RunMetadata,
+        completeness: Completeness,
+    ) -> Result<Timeline, RecordError> {
+        let Some(Ok(rig_json)) = self.attachments.get(RIG_JSON).cloned().map(String::from_utf8) else {
+            let problem = "missing: the recording was cut off before it, or is not ours".to_owned();
+            return Err(RecordError::Header { path: path.to_owned(), what: RIG_JSON.into(), problem });
+        };
+        let rig =
+            Rig::from_json(&rig_json).map_err(|source| RecordError::Rig { path: path.to_owned(), source })?;
+        // Times are the messages' own; a stable sort keeps the order of those that share one.
+        self.stage.sort_by_key(|report| report.at);
+        self.stage.dedup_by(|later, kept| {
+            let same = later.at == kept.at;
+            if same {
+                *kept = *later;
+            }
+            same
+        });
+        self.phases.sort_by_key(|(from, _, _)| *from);
+        self.coverings.sort_by_key(|(from, _)| *from);
+        let clocks = self
+            .ticks
+            .iter()
+            .map(|(&epoch, ticks)| {
+                let tick_ns = self.tick_ns.get(&epoch).copied().unwrap_or(self.stated_tick_ns);
+                let ticks = ticks.as_deref().ok_or(NoClock::Absent);
+                (epoch, ticks.and_then(|ticks| EpochClock::estimate(epoch, tick_ns, ticks)))
+            })
+            .collect();
+        Ok(Timeline {
+            path: path.to_owned(),
+            run,
+            rig,
+            rig_json,
+            attachments: self.attachments,
+            clocks,
+            stage: self.stage,
+            phases: self.phases,
+            coverings: self.coverings,
+            events: self.events,
+            tally: self.tally,
+            completeness,
+        })
+    }
+}

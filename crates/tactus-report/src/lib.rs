@@ -1,0 +1,21 @@
+//! Self-contained HTML reports with figures in SVG.
+//!
+//! A report is made in two steps: [`run_report`] reads one run's recording and computes everything that is to be
+//! said, as data; [`render_html`] makes one HTML page of it, with its style and figures inline, that loads nothing
+//! from anywhere. The same recording always gives the same page.
+//!
+//! - [`fit`] fits polynomials by least squares, with standard errors.
+//! - [`plot`] draws figures and heat images as SVG; it knows nothing of runs.
+
+pub mod fit;
+pub mod plot;
+
+mod markup;
+mod page;
+mod run;
+
+pub use page::render_html;
+pub use run::{
+    Baseline, Dwell, ElementCurve, Intervals, LoggedEvent, Loss, Press, ReportError, Response, RunReport,
+    Silent, Summary, Timing, Trace, run_report,
+};

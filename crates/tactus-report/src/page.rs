@@ -1,0 +1,100 @@
+//! The report as one HTML page that loads nothing.
+
+mod images;
+mod response;
+mod summary;
+mod time;
+
+use std::fmt;
+
+use crate::{markup::Text, plot, run::RunReport};
+
+/// Width of the page's content.
+const WIDTH_PX: f64 = 1080.0;
+
+/// More lines of the event log than this are not shown.
+const EVENTS_MAX: usize = 1500;
+
+/// Makes the report's page: HTML with its style and figures inline.
+///
+/// Everything that comes from the recording is escaped; there is no script and no reference to anything outside.
+pub fn render_html(report: &RunReport) -> String {
+    Page(report).to_string()
+}
+
+struct Page<'a>(&'a RunReport);
+
+impl fmt::Display for Page<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let report = self.0;
+        writeln!(f, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">")?;
+        writeln!(f, "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">")?;
+        writeln!(
+            f,
+            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
+        )?;
+        writeln!(
+            f,
+            "<title>{} &#183; {}</title>",
+            Text(&report.summary.experiment),
+            Text(&report.summary.run_id)
+        )?;
+        writeln!(
+            f,
+            "<style>\n{}{}</style>\n</head>\n<body>\n<main>",
+            plot::STYLE,
+            include_str!("page/page.css")
+        )?;
+        summary::header(f, &report.summary)?;
+        notes(f, &report.notes)?;
+        summary::facts(f, report)?;
+        if let Some(response) = &report.response {
+            response::section(f, response)?;
+        }
+        images::section(f, report)?;
+        time::signal(f, report)?;
+        time::losses(f, report)?;
+        time::timing(f, &report.timing)?;
+        events(f, report)?;
+        writeln!(f, "</main>\n</body>\n</html>")
+    }
+}
+
+fn notes(f: &mut fmt::Formatter<'_>, notes: &[String]) -> fmt::Result {
+    if notes.is_empty() {
+        return Ok(());
+    }
+    writeln!(f, "<ul class=\"notes\">")?;
+    for note in notes {
+        writeln!(f, "<li>{}</li>", Text(note))?;
+    }
+    writeln!(f, "</ul>")
+}
+
+fn events(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
+    let all = report.events.len();
+    let routine = all <= EVENTS_MAX;
+    let shown: Vec<_> =
+        report.events.iter().filter(|event| routine || !event.routine).take(EVENTS_MAX).collect();
+    writeln!(f, "<section>\n<details>\n<summary><h2>Event log</h2> {all} events</summary>")?;
+    if shown.len() < all {
+        let left_out = if routine { "" } else { "; steps, phases, dwells and reads are left out" };
+        writeln!(f, "<p>{} of {all} events are shown{left_out}.</p>", shown.len())?;
+    }
+    writeln!(f, "<table class=\"log\">\n<tr><th class=\"n\">time / s</th><th>event</th><th></th></tr>")?;
+    for event in shown {
+        let time = plot::number(event.at_s, 3);
+        let class = if event.routine { "" } else { " class=\"notable\"" };
+        writeln!(
+            f,
+            "<tr{class}><td class=\"n\">{time}</td><td>{}</td><td>{}</td></tr>",
+            Text(event.kind),
+            Text(event.detail.trim_end())
+        )?;
+    }
+    writeln!(f, "</table>\n</details>\n</section>")
+}
+
+#[cfg(test)]
+#[path = "page_tests.rs"]
+mod tests;

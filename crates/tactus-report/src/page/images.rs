@@ -1,0 +1,141 @@
+//! The mean image of each dwell, as small multiples with one colour scale.
+
+use std::{collections::BTreeMap, fmt};
+
+use super::WIDTH_PX;
+use crate::{
+    plot::{ColourBar, Heat, Mosaic, Scale, Tile},
+    run::{Dwell, Press, RunReport},
+};
+
+/// More cells than this make the page heavy.
+const CELLS_MAX: usize = 40_000;
+/// More images than this are not looked at.
+const IMAGES_MAX: usize = 300;
+/// Room for a caption above an image.
+const CAPTION_PX: f64 = 13.0;
+
+pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
+    let dwells: usize = report.presses.iter().map(|press| press.dwells.len()).sum();
+    if dwells == 0 {
+        return Ok(());
+    }
+    let values = report.presses.iter().flat_map(|press| &press.dwells).flat_map(|dwell| &dwell.rise_counts);
+    let scale = Scale::of(values.map(|rise| f64::from(*rise)));
+    let (mosaic, lead) =
+        laid_out_like_the_array(report, scale).unwrap_or_else(|| in_order(report, scale, dwells));
+    writeln!(
+        f,
+        "<section>\n<h2>Mean image of each dwell</h2>\n<p class=\"lead\">{lead} Row 0 is at the bottom and column 0 at the left of each image; one colour scale for all.</p>"
+    )?;
+    writeln!(f, "{}", ColourBar { scale, title: "counts above baseline".into() })?;
+    writeln!(f, "<div class=\"scroll\">{mosaic}</div>\n</section>")
+}
+
+/// Each element's press where the element is; `None` unless at least half of the elements were pressed once each.
+fn laid_out_like_the_array(report: &RunReport, scale: Scale) -> Option<(Mosaic<'_>, String)> {
+    const GAP_PX: [f64; 2] = [12.0, 12.0];
+    const BETWEEN_PX: f64 = 2.0;
+    let array = &report.array;
+    let mut pressed: BTreeMap<usize, &Press> = BTreeMap::new();
+    for press in &report.presses {
+        if pressed.insert(press.element?, press).is_some() {
+            return None;
+        }
+    }
+    let dwells: usize = pressed.values().map(|press| press.dwells.len()).sum();
+    if 2 * pressed.len() < array.elements() || dwells > IMAGES_MAX || dwells * array.elements() > CELLS_MAX {
+        return None;
+    }
+    let (rows, cols) = (array.rows(), array.cols());
+    let most = pressed.values().map(|press| press.dwells.len()).max()?;
+    // The images of a press make a block, a little wider than high.
+    let across = (1..=most).find(|n| n * n >= most)?;
+    let block_px = (WIDTH_PX - (cols - 1) as f64 * GAP_PX[0]) / cols as f64;
+    let cell_px =
+        ((block_px - (across - 1) as f64 * BETWEEN_PX) / (across * cols) as f64).floor().clamp(1.0, 10.0);
+    let image_px = [cell_px * cols as f64 + BETWEEN_PX, cell_px * rows as f64 + BETWEEN_PX];
+    let step_px = [
+        across as f64 * image_px[0] - BETWEEN_PX + GAP_PX[0],
+        CAPTION_PX + most.div_ceil(across) as f64 * image_px[1] - BETWEEN_PX + GAP_PX[1],
+    ];
+    let (mut tiles, mut captions) = (Vec::new(), Vec::new());
+    for (element, press) in pressed {
+        let (row, col) = (element / cols, element % cols);
+        let corner = [col as f64 * step_px[0], (rows - 1 - row) as f64 * step_px[1]];
+        captions.push(([corner[0], corner[1] + CAPTION_PX - 4.0], format!("({row}, {col})")));
+        for (nth, dwell) in press.dwells.iter().enumerate() {
+            let at_px = [
+                corner[0] + (nth % across) as f64 * image_px[0],
+                corner[1] + CAPTION_PX + (nth / across) as f64 * image_px[1],
+            ];
+            tiles.push(tile(at_px, press, dwell, nth, [rows, cols]));
+        }
+    }
+    let lead = format!(
+        "{dwells} dwells. The presses are laid out like the array, each under the (row, column) of the element at whose \
+         centre it was: its {most} images, row by row from the first dwell to the last."
+    );
+    let size_px = [cols as f64 * step_px[0] - GAP_PX[0], rows as f64 * step_px[1]];
+    Some((Mosaic { name: "Mean image of each dwell".into(), size_px, cell_px, scale, tiles, captions }, lead))
+}
+
+/// Images one after the other, as they were taken; of many, an even choice.
+fn in_order(report: &RunReport, scale: Scale, dwells: usize) -> (Mosaic<'_>, String) {
+    const IMAGE_PX: f64 = 52.0;
+    const GAP_PX: [f64; 2] = [8.0, 7.0];
+    let (rows, cols) = (report.array.rows(), report.array.cols());
+    let shown = (CELLS_MAX / (rows * cols)).clamp(1, IMAGES_MAX).min(dwells);
+    let cell_px = (IMAGE_PX / cols as f64).floor().clamp(1.0, 10.0);
+    let image_px = [cell_px * cols as f64, cell_px * rows as f64];
+    let step_px = [image_px[0] + GAP_PX[0], CAPTION_PX + image_px[1] + GAP_PX[1]];
+    let across = (1..=shown).take_while(|n| *n as f64 * step_px[0] <= WIDTH_PX + GAP_PX[0]).count().max(1);
+    let all: Vec<(&Press, usize, &Dwell)> = report
+        .presses
+        .iter()
+        .flat_map(|press| press.dwells.iter().enumerate().map(move |(nth, dwell)| (press, nth, dwell)))
+        .collect();
+    let (mut tiles, mut captions) = (Vec::new(), Vec::new());
+    for n in 0..shown {
+        // Evenly, but for a wandering offset: experiments repeat depths at fixed strides.
+        let wander = (n as f64 * 0.618_034).fract();
+        let Some(&(press, nth, dwell)) = all.get(chosen(n as f64 + wander, dwells, shown)) else { continue };
+        let corner = [(n % across) as f64 * step_px[0], (n / across) as f64 * step_px[1]];
+        captions.push(([corner[0], corner[1] + CAPTION_PX - 3.0], format!("{:.3} mm", dwell.depth_mm)));
+        tiles.push(tile([corner[0], corner[1] + CAPTION_PX], press, dwell, nth, [rows, cols]));
+    }
+    let lead = if shown < dwells {
+        format!(
+            "{shown} of {dwells} dwells, evenly chosen, in the order in which they were taken; above each its depth."
+        )
+    } else {
+        format!("All {dwells} dwells, in the order in which they were taken; above each its depth.")
+    };
+    let size_px = [across.min(shown) as f64 * step_px[0], shown.div_ceil(across) as f64 * step_px[1]];
+    (Mosaic { name: "Mean image of each dwell".into(), size_px, cell_px, scale, tiles, captions }, lead)
+}
+
+/// Where a place among `shown` stands among `dwells`; the same if all are shown.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index into the dwells")]
+fn chosen(place: f64, dwells: usize, shown: usize) -> usize {
+    if shown == dwells { place.floor() as usize } else { (place * dwells as f64 / shown as f64) as usize }
+}
+
+fn tile<'a>(
+    at_px: [f64; 2],
+    press: &Press,
+    dwell: &'a Dwell,
+    nth: usize,
+    [rows, cols]: [usize; 2],
+) -> Tile<'a> {
+    let title = format!(
+        "press {}, dwell {nth}: ({:.3}, {:.3}) mm, depth {:.3} mm, {} frames, {:.0} counts in all",
+        press.index,
+        press.at_mm[0],
+        press.at_mm[1],
+        dwell.depth_mm,
+        dwell.frames,
+        dwell.total_counts()
+    );
+    Tile { at_px, heat: Heat { values: &dwell.rise_counts, rows, cols }, title }
+}

@@ -1,0 +1,152 @@
+//! The response curves and the polynomials over their mean: Fig. 2a of the paper.
+
+use std::fmt;
+
+use super::summary::plural;
+use crate::{
+    fit::{Estimate, Polynomial},
+    markup::Text,
+    plot::{Axis, Figure, Ink, Series, number},
+    run::Response,
+};
+
+/// Points along a fitted curve; more are not seen.
+const CURVE_POINTS: u32 = 60;
+
+pub(super) fn section(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
+    writeln!(f, "<section>\n<h2>Response of the elements</h2>")?;
+    writeln!(
+        f,
+        "<p class=\"lead\">Each element's own reading above the baseline, in presses at its own centre; a point is the mean of one dwell. The fits are over the mean of the curves.</p>"
+    )?;
+    writeln!(f, "<div class=\"beside\">\n<div>{}</div>\n<div>", figure(response))?;
+    if let (Some(first), Some(last)) = (response.mean.first(), response.mean.last()) {
+        writeln!(
+            f,
+            "<p>{} of {}; the mean rises from {} to {} counts between {:.3} and {:.3} mm.</p>",
+            plural(response.curves.len() as u64, "curve"),
+            plural(elements(response) as u64, "element"),
+            number(first[1], 1),
+            number(last[1], 1),
+            first[0],
+            last[0],
+        )?;
+    }
+    silent(f, response)?;
+    spread(f, response)?;
+    writeln!(f, "</div>\n</div>")?;
+    table(f, response)?;
+    writeln!(f, "</section>")
+}
+
+fn figure(response: &Response) -> Figure {
+    let x = Axis::new("indentation", "mm").from_zero();
+    let y = Axis::new("response above baseline", "counts").from_zero();
+    let mut figure =
+        Figure::new("Response of every element against indentation, with fits", x, y).size_px([680.0, 440.0]);
+    for (nth, curve) in response.curves.iter().enumerate() {
+        let series = Series::line(curve.points.clone()).dotted().width_px(1.0).opacity(0.75);
+        figure = figure.with(if nth == 0 { series.label("single elements") } else { series });
+    }
+    if let Some(line) = &response.linear {
+        figure =
+            figure.with(Series::line(along(line, response)).ink(Ink::Red).width_px(2.2).label("linear fit"));
+    }
+    if let Some(parabola) = &response.quadratic {
+        let series = Series::line(along(parabola, response)).ink(Ink::Blue).dashed().width_px(2.2);
+        figure = figure.with(series.label("quadratic fit"));
+    }
+    figure.with(Series::dots(response.mean.clone()).width_px(6.0).label("mean"))
+}
+
+/// A fit over the depths that were held.
+fn along(fit: &Polynomial, response: &Response) -> Vec<[f64; 2]> {
+    let (Some([from, _]), Some([to, _])) = (response.mean.first(), response.mean.last()) else {
+        return Vec::new();
+    };
+    let at = |step: u32| from + (to - from) * f64::from(step) / f64::from(CURVE_POINTS);
+    (0..=CURVE_POINTS).map(|step| [at(step), fit.at(at(step))]).collect()
+}
+
+fn elements(response: &Response) -> usize {
+    let distinct: std::collections::BTreeSet<usize> =
+        response.curves.iter().map(|curve| curve.element).collect();
+    distinct.len()
+}
+
+fn silent(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
+    if elements(response) < 2 && response.silent.is_empty() {
+        return Ok(());
+    }
+    if response.silent.is_empty() {
+        return writeln!(f, "<p>Every pressed element answers to its own press.</p>");
+    }
+    writeln!(
+        f,
+        "<p class=\"warn\">Left out, because they do not answer to their own press:</p>\n<table class=\"numbers\">"
+    )?;
+    writeln!(f, "<thead><tr><th>element</th><th>(row, col)</th><th>answers to</th></tr></thead>")?;
+    for silent in &response.silent {
+        let [row, col] = silent.curve.place;
+        let other =
+            silent.answers_to.map_or_else(|| "nothing".into(), |[row, col]| format!("({row}, {col})"));
+        writeln!(f, "<tr><td>{}</td><td>({row}, {col})</td><td>{other}</td></tr>", silent.curve.element)?;
+    }
+    writeln!(f, "</table>")
+}
+
+fn spread(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
+    if elements(response) < 2 {
+        return Ok(());
+    }
+    let Some([mean, deviation]) = response.slope_spread() else { return Ok(()) };
+    let slope = |curve: &&crate::run::ElementCurve| curve.slope_counts_per_mm().unwrap_or(f64::NAN);
+    let least = response.curves.iter().min_by(|a, b| slope(a).total_cmp(&slope(b)));
+    let most = response.curves.iter().max_by(|a, b| slope(a).total_cmp(&slope(b)));
+    let (Some(least), Some(most)) = (least, most) else { return Ok(()) };
+    writeln!(
+        f,
+        "<p>Slopes of the single elements: mean {} counts/mm, standard deviation {} counts/mm ({} %), from {} at ({}, {}) to {} at ({}, {}).</p>",
+        number(mean, 0),
+        number(deviation, 0),
+        number(100.0 * deviation / mean.abs(), 1),
+        number(slope(&least), 0),
+        least.place[0],
+        least.place[1],
+        number(slope(&most), 0),
+        most.place[0],
+        most.place[1],
+    )
+}
+
+fn table(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
+    if response.linear.is_none() {
+        return writeln!(f, "<p>Too few depths for a fit.</p>");
+    }
+    writeln!(
+        f,
+        "<div class=\"scroll\"><table class=\"numbers\">\n<thead><tr><th>response = a + b x + c x&#178;, x in mm</th><th class=\"n\">a / counts</th><th class=\"n\">b / (counts/mm)</th><th class=\"n\">c / (counts/mm&#178;)</th><th class=\"n\">residual / counts</th><th class=\"n\">degrees of freedom</th></tr></thead>"
+    )?;
+    for (name, fit) in [("linear", &response.linear), ("quadratic", &response.quadratic)] {
+        let Some(fit) = fit else { continue };
+        write!(f, "<tr><td>{name}</td>")?;
+        for k in 0..3 {
+            let text = fit.coefficients.get(k).map(estimate).unwrap_or_default();
+            write!(f, "<td class=\"n\">{}</td>", Text(text))?;
+        }
+        let residual = fit.residual.map_or_else(|| "\u{2013}".into(), |residual| number(residual, 2));
+        writeln!(f, "<td class=\"n\">{residual}</td><td class=\"n\">{}</td></tr>", fit.degrees_of_freedom)?;
+    }
+    writeln!(
+        f,
+        "</table></div>\n<p class=\"lead\">After &#177;: standard error, from the scatter of the mean about the fit.</p>"
+    )
+}
+
+/// A value and its standard error, to two digits of the error.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 6")]
+fn estimate(estimate: &Estimate) -> String {
+    let Some(error) = estimate.standard_error else { return number(estimate.value, 2) };
+    let decimals = if error > 0.0 { (1.0 - error.log10().floor()).clamp(0.0, 6.0) as usize } else { 6 };
+    format!("{} \u{b1} {}", number(estimate.value, decimals), number(error, decimals))
+}

@@ -1,0 +1,32 @@
+//! Figures as SVG text: axes with rounded ticks and units, lines, points, stems and heat images.
+//!
+//! Everything here is a value that displays itself as one `<svg>` element. Colours are those of [`STYLE`], which the
+//! page holds once, so that one figure reads well on light and dark ground and on paper.
+//!
+//! ```
+//! use tactus_report::plot::{Axis, Figure, Ink, Series};
+//!
+//! let svg = Figure::new("A line", Axis::new("indentation", "mm").from_zero(), Axis::new("response", "counts"))
+//!     .with(Series::line(vec![[0.2, 180.0], [0.6, 590.0]]).ink(Ink::Red).label("fit"))
+//!     .to_string();
+//! assert!(svg.starts_with("<svg") && svg.contains("indentation / mm"));
+//! ```
+
+mod axis;
+mod colour;
+mod decimate;
+mod figure;
+mod heat;
+mod series;
+
+pub use axis::Axis;
+pub use colour::{ColourBar, Scale};
+pub use decimate::{extremes, steps};
+pub use figure::Figure;
+pub use heat::{Heat, Mosaic, Tile};
+pub use series::{Ink, Series};
+
+pub(crate) use axis::{number, round_step};
+
+/// The figures' part of a page's style sheet.
+pub const STYLE: &str = include_str!("plot/figure.css");

@@ -1,0 +1,166 @@
+//! One axis: what it shows, from where to where, and its ticks.
+
+/// What an axis shows, and its range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    quantity: String,
+    unit: String,
+    range: Option<[f64; 2]>,
+    from_zero: bool,
+    tight: bool,
+}
+
+impl Axis {
+    /// An axis of a quantity in a unit (empty for a pure number), as wide as the data.
+    pub fn new(quantity: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { quantity: quantity.into(), unit: unit.into(), range: None, from_zero: false, tight: false }
+    }
+
+    /// Over exactly this range, whatever the data.
+    #[must_use]
+    pub fn spanning(mut self, range: [f64; 2]) -> Self {
+        self.range = Some(range);
+        self
+    }
+
+    /// With zero in its range.
+    #[must_use]
+    pub fn from_zero(mut self) -> Self {
+        self.from_zero = true;
+        self
+    }
+
+    /// Ending at the data, not at the next tick.
+    #[must_use]
+    pub fn tight(mut self) -> Self {
+        self.tight = true;
+        self
+    }
+
+    /// `quantity / unit`.
+    pub(super) fn title(&self) -> String {
+        if self.unit.is_empty() {
+            self.quantity.clone()
+        } else {
+            format!("{} / {}", self.quantity, self.unit)
+        }
+    }
+
+    /// The scale over these data, with about `ticks` ticks.
+    pub(super) fn scale(&self, data: impl Iterator<Item = f64>, ticks: f64) -> AxisScale {
+        let seed = if self.from_zero { Some([0.0, 0.0]) } else { None };
+        let found = data.filter(|value| value.is_finite()).fold(seed, |range, value| {
+            let [lo, hi] = range.unwrap_or([value, value]);
+            Some([lo.min(value), hi.max(value)])
+        });
+        match self.range {
+            Some(range) => AxisScale::within(range, ticks),
+            None if self.tight => AxisScale::within(found.unwrap_or([0.0, 1.0]), ticks),
+            None => AxisScale::around(found.unwrap_or([0.0, 1.0]), ticks),
+        }
+    }
+}
+
+/// A range and the ticks in it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct AxisScale {
+    pub(super) range: [f64; 2],
+    pub(super) ticks: Vec<f64>,
+    decimals: usize,
+}
+
+impl AxisScale {
+    /// Ticks inside a fixed range.
+    fn within(range: [f64; 2], ticks: f64) -> Self {
+        let [lo, hi] = wide(range);
+        let step = round_step((hi - lo) / ticks);
+        let slack = 1e-9 * (hi - lo);
+        let (first, last) = (((lo - slack) / step).ceil(), ((hi + slack) / step).floor());
+        Self { range: [lo, hi], ticks: multiples(first, last, step), decimals: decimals(step) }
+    }
+
+    /// A range that begins and ends at a tick.
+    fn around(range: [f64; 2], ticks: f64) -> Self {
+        let [lo, hi] = wide(range);
+        let step = round_step((hi - lo) / ticks);
+        let slack = 1e-9 * (hi - lo);
+        let (first, last) = (((lo + slack) / step).floor(), ((hi - slack) / step).ceil());
+        Self {
+            range: [first * step, last * step],
+            ticks: multiples(first, last, step),
+            decimals: decimals(step),
+        }
+    }
+
+    /// Where a value stands: 0 at the range's start, 1 at its end.
+    pub(super) fn share(&self, value: f64) -> f64 {
+        let [lo, hi] = self.range;
+        (value - lo) / (hi - lo)
+    }
+
+    /// A tick's text, with as many decimals as the ticks differ in.
+    pub(super) fn label(&self, tick: f64) -> String {
+        number(tick, self.decimals)
+    }
+}
+
+/// A number for people: a true minus sign, thousands apart, no negative zero.
+pub(crate) fn number(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return "\u{2013}".into();
+    }
+    let digits = format!("{:.decimals$}", value.abs());
+    let (whole, fraction) = digits.split_once('.').map_or((digits.as_str(), None), |(a, b)| (a, Some(b)));
+    let zero = digits.bytes().all(|byte| matches!(byte, b'0' | b'.'));
+    let mut text = String::from(if value < 0.0 && !zero { "\u{2212}" } else { "" });
+    for (index, digit) in whole.chars().enumerate() {
+        let left = whole.len() - index;
+        if index > 0 && left.is_multiple_of(3) && whole.len() > 4 {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    if let Some(fraction) = fraction {
+        text.push('.');
+        text.push_str(fraction);
+    }
+    text
+}
+
+/// 1, 2 or 5 times a power of ten, nearest above the rough step.
+pub(crate) fn round_step(rough: f64) -> f64 {
+    let power = 10_f64.powf(rough.log10().floor());
+    let share = rough / power;
+    let digit = [1.0, 2.0, 5.0].into_iter().find(|digit| share <= digit * (1.0 + 1e-9)).unwrap_or(10.0);
+    digit * power
+}
+
+/// A range of a width that can be divided.
+fn wide([lo, hi]: [f64; 2]) -> [f64; 2] {
+    let least = 1e-9 * lo.abs().max(hi.abs()).max(1e-9);
+    if hi - lo > least {
+        return [lo, hi];
+    }
+    let half = if lo == 0.0 { 0.5 } else { 0.5 * lo.abs() };
+    [lo - half, lo + half]
+}
+
+fn multiples(first: f64, last: f64, step: f64) -> Vec<f64> {
+    // Never more than a few; the bound only guards against a range that no step divides.
+    let mut ticks: Vec<f64> = Vec::new();
+    let mut index = first;
+    while index <= last && ticks.len() < 100 {
+        ticks.push(index * step);
+        index += 1.0;
+    }
+    ticks
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 12")]
+fn decimals(step: f64) -> usize {
+    (-(step * (1.0 + 1e-9)).log10().floor()).clamp(0.0, 12.0) as usize
+}
+
+#[cfg(test)]
+#[path = "axis_tests.rs"]
+mod tests;

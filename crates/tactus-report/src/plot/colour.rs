@@ -1,0 +1,113 @@
+//! Values as colours.
+
+use std::fmt;
+
+use super::Axis;
+use super::axis::{AxisScale, number};
+use crate::markup::Text;
+
+/// Number of colours that a scale has; more are hardly told apart in small cells.
+const LEVELS: u8 = 48;
+
+/// Viridis at nine equally spaced places: equal steps look equally large, also in grey and to the colour-blind.
+///
+/// # Source
+/// van der Walt and Smith's colour map of that name, released under CC0.
+const VIRIDIS: [[f64; 3]; 9] = [
+    [68.0, 1.0, 84.0],
+    [71.0, 44.0, 122.0],
+    [59.0, 81.0, 139.0],
+    [44.0, 113.0, 142.0],
+    [33.0, 144.0, 141.0],
+    [39.0, 173.0, 129.0],
+    [92.0, 200.0, 99.0],
+    [170.0, 220.0, 50.0],
+    [253.0, 231.0, 37.0],
+];
+
+/// A range of values and the colours over it; values beyond its ends have the colours of the ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    lo: f64,
+    hi: f64,
+}
+
+impl Scale {
+    /// Over a range; one without width is widened upwards by one.
+    pub fn new(lo: f64, hi: f64) -> Self {
+        if hi > lo { Self { lo, hi } } else { Self { lo, hi: lo + 1.0 } }
+    }
+
+    /// From zero (or the least value, if that lies clearly below) to the greatest; 0 to 1 without values.
+    pub fn of(values: impl Iterator<Item = f64>) -> Self {
+        let (lo, hi) = values
+            .filter(|value| value.is_finite())
+            .fold((0.0_f64, 0.0_f64), |(lo, hi), value| (lo.min(value), hi.max(value)));
+        // Noise below zero is not worth a part of the scale.
+        let lo = if -lo < 0.05 * hi { 0.0 } else { lo };
+        Self::new(lo, hi)
+    }
+
+    /// Which of its colours a value has; `None` if it is not a number.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and LEVELS - 1")]
+    pub(super) fn level(self, value: f64) -> Option<u8> {
+        let share = (value - self.lo) / (self.hi - self.lo);
+        (!share.is_nan()).then(|| (share * f64::from(LEVELS)).clamp(0.0, f64::from(LEVELS - 1)) as u8)
+    }
+}
+
+/// The colour of a level as `#rrggbb`.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]
+pub(super) fn colour(level: u8) -> String {
+    let place = f64::from(level.min(LEVELS - 1)) / f64::from(LEVELS - 1) * (VIRIDIS.len() - 1) as f64;
+    let below = (place as usize).min(VIRIDIS.len() - 2);
+    let share = place - below as f64;
+    let [r, g, b] = std::array::from_fn(|channel| {
+        (VIRIDIS[below][channel] * (1.0 - share) + VIRIDIS[below + 1][channel] * share).round() as u8
+    });
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// A legend of a colour scale; displays itself as SVG.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColourBar {
+    /// The scale.
+    pub scale: Scale,
+    /// What its values are, with their unit.
+    pub title: String,
+}
+
+impl fmt::Display for ColourBar {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const LEFT_PX: f64 = 12.0;
+        const STEP_PX: f64 = 6.0;
+        let width_px = STEP_PX * f64::from(LEVELS);
+        let all_px = width_px + 2.0 * LEFT_PX + 260.0;
+        write!(
+            f,
+            r#"<svg class="figure" viewBox="0 0 {all_px} 34" width="{all_px}" height="34" role="img"><title>colour scale</title><g class="cells">"#
+        )?;
+        for level in 0..LEVELS {
+            let x = LEFT_PX + STEP_PX * f64::from(level);
+            write!(f, r#"<path fill="{}" d="M{x} 2h{STEP_PX}v12h-{STEP_PX}z"/>"#, colour(level))?;
+        }
+        f.write_str("</g>")?;
+        let Scale { lo, hi } = self.scale;
+        let ticks: AxisScale = Axis::new("", "").spanning([lo, hi]).scale(std::iter::empty(), 5.0);
+        for tick in &ticks.ticks {
+            let x = LEFT_PX + ticks.share(*tick) * width_px;
+            write!(
+                f,
+                r#"<path class="axis" d="M{x:.1} 14v4"/><text class="x" x="{x:.1}" y="30">{}</text>"#,
+                ticks.label(*tick)
+            )?;
+        }
+        let beside = width_px + LEFT_PX + 14.0;
+        write!(f, r#"<text class="name" x="{beside}" y="12">{}</text>"#, Text(&self.title))?;
+        write!(f, r#"<text x="{beside}" y="30">{} to {}</text></svg>"#, number(lo, 0), number(hi, 0))
+    }
+}
+
+#[cfg(test)]
+#[path = "colour_tests.rs"]
+mod tests;

@@ -1,0 +1,96 @@
+//! Images of the array: one value an element.
+
+use std::{collections::BTreeMap, fmt};
+
+use super::{Scale, colour::colour};
+use crate::markup::Text;
+
+/// One value for each of `rows x cols` elements, row-major; row 0 is drawn at the bottom, as y points up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heat<'a> {
+    /// The values; what is missing or not finite is not drawn.
+    pub values: &'a [f32],
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub cols: usize,
+}
+
+/// A heat image and where it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tile<'a> {
+    /// Upper left corner.
+    pub at_px: [f64; 2],
+    /// The image.
+    pub heat: Heat<'a>,
+    /// What it shows, as a tooltip.
+    pub title: String,
+}
+
+/// Many heat images with one colour scale, and captions; displays itself as SVG.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mosaic<'a> {
+    /// What it shows, for those who cannot see it.
+    pub name: String,
+    /// Width and height in all.
+    pub size_px: [f64; 2],
+    /// Side of an element's square.
+    pub cell_px: f64,
+    /// The colours.
+    pub scale: Scale,
+    /// The images.
+    pub tiles: Vec<Tile<'a>>,
+    /// Texts, by the lower left corner of each.
+    pub captions: Vec<([f64; 2], String)>,
+}
+
+impl fmt::Display for Mosaic<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [width, height] = self.size_px;
+        write!(
+            f,
+            r#"<svg class="figure" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img"><title>{}</title>"#,
+            Text(&self.name)
+        )?;
+        for ([x, y], text) in &self.captions {
+            write!(f, r#"<text x="{x}" y="{y}" font-size="10">{}</text>"#, Text(text))?;
+        }
+        f.write_str(r#"<g class="cells">"#)?;
+        for tile in &self.tiles {
+            let [x, y] = tile.at_px;
+            write!(
+                f,
+                r#"<g transform="translate({x} {y}) scale({})"><title>{}</title>"#,
+                self.cell_px,
+                Text(&tile.title)
+            )?;
+            tile.heat.write(f, self.scale)?;
+            f.write_str("</g>")?;
+        }
+        f.write_str("</g></svg>")
+    }
+}
+
+impl Heat<'_> {
+    /// One path a colour, one unit a cell.
+    fn write(&self, f: &mut fmt::Formatter<'_>, scale: Scale) -> fmt::Result {
+        let mut cells: BTreeMap<u8, Vec<[usize; 2]>> = BTreeMap::new();
+        for (index, value) in self.values.iter().enumerate().take(self.rows * self.cols) {
+            if let Some(level) = scale.level(f64::from(*value)) {
+                cells.entry(level).or_default().push([index % self.cols, self.rows - 1 - index / self.cols]);
+            }
+        }
+        for (level, cells) in cells {
+            write!(f, r#"<path fill="{}" d=""#, colour(level))?;
+            for [x, y] in cells {
+                write!(f, "M{x} {y}h1v1h-1z")?;
+            }
+            f.write_str(r#""/>"#)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+#[path = "heat_tests.rs"]
+mod tests;

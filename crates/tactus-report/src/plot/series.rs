@@ -1,0 +1,115 @@
+//! What is drawn over a figure's axes.
+
+/// Points and how they are drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    pub(super) points: Vec<[f64; 2]>,
+    pub(super) mark: Mark,
+    pub(super) ink: Ink,
+    pub(super) label: Option<String>,
+    pub(super) dashes: &'static str,
+    pub(super) width_px: f64,
+    pub(super) opacity: f64,
+}
+
+/// Colours that read well on light and dark ground.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Ink {
+    /// The colour of text.
+    #[default]
+    Text,
+    /// Less than text.
+    Muted,
+    /// Red.
+    Red,
+    /// Blue.
+    Blue,
+    /// Green.
+    Green,
+    /// Amber.
+    Amber,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mark {
+    Line,
+    Dots,
+    Stems,
+}
+
+impl Series {
+    /// A line through points `[x, y]`, broken where one is not finite.
+    pub fn line(points: Vec<[f64; 2]>) -> Self {
+        Self::new(points, Mark::Line, 1.5)
+    }
+
+    /// A round dot at each point.
+    pub fn dots(points: Vec<[f64; 2]>) -> Self {
+        Self::new(points, Mark::Dots, 4.0)
+    }
+
+    /// A vertical line from the bottom of the figure to each point.
+    pub fn stems(points: Vec<[f64; 2]>) -> Self {
+        Self::new(points, Mark::Stems, 1.5)
+    }
+
+    /// In a colour.
+    #[must_use]
+    pub fn ink(mut self, ink: Ink) -> Self {
+        self.ink = ink;
+        self
+    }
+
+    /// Named in the legend.
+    #[must_use]
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = Some(label.into());
+        self
+    }
+
+    /// Of this width (a dot: diameter).
+    #[must_use]
+    pub fn width_px(mut self, width_px: f64) -> Self {
+        self.width_px = width_px;
+        self
+    }
+
+    /// Let through what lies below: 0 invisible, 1 solid.
+    #[must_use]
+    pub fn opacity(mut self, opacity: f64) -> Self {
+        self.opacity = opacity;
+        self
+    }
+
+    /// Dashed.
+    #[must_use]
+    pub fn dashed(mut self) -> Self {
+        self.dashes = "7 4";
+        self
+    }
+
+    /// Dotted.
+    #[must_use]
+    pub fn dotted(mut self) -> Self {
+        self.dashes = "1.5 2.5";
+        self
+    }
+
+    fn new(points: Vec<[f64; 2]>, mark: Mark, width_px: f64) -> Self {
+        Self { points, mark, ink: Ink::Text, label: None, dashes: "", width_px, opacity: 1.0 }
+    }
+}
+
+impl Ink {
+    /// Its class in the style sheet.
+    pub(super) fn class(self) -> &'static str {
+        match self {
+            Self::Text => "ink",
+            Self::Muted => "muted",
+            Self::Red => "red",
+            Self::Blue => "blue",
+            Self::Green => "green",
+            Self::Amber => "amber",
+        }
+    }
+}

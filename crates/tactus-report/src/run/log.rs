@@ -1,0 +1,91 @@
+//! The events of a run as lines of text.
+
+use tactus_record::{Timeline, exit_status_name};
+use tactus_schema::{
+    MonoTime,
+    pb::{self, run_event::Event},
+    table::Phase,
+};
+
+use super::frames::{Frames, seconds};
+
+/// One line of the event log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoggedEvent {
+    /// When, from the start of the run.
+    pub at_s: f64,
+    /// What kind of event.
+    pub kind: &'static str,
+    /// What it says.
+    pub detail: String,
+    /// True of what happens over and over in any run: steps, phases and dwells.
+    pub routine: bool,
+}
+
+/// All events, and the acts of the safety supervisor among them, in order of time.
+pub(super) fn events(timeline: &Timeline, frames: &Frames) -> Vec<LoggedEvent> {
+    let logged = |event: &pb::RunEvent| {
+        let at_s = seconds(timeline, MonoTime::from_ns(event.t_mono_ns));
+        let (kind, detail) = event.event.as_ref().map_or(("unknown", String::new()), describe);
+        let routine = matches!(kind, "step" | "step done" | "phase" | "dwell" | "read");
+        LoggedEvent { at_s, kind, detail, routine }
+    };
+    let supervised = frames.safety.iter().map(|event| LoggedEvent {
+        at_s: seconds(timeline, MonoTime::from_ns(event.t_mono_ns)),
+        kind: "safety",
+        detail: format!("{}: {} {}", verdict(event.verdict()), event.rule, event.detail),
+        routine: false,
+    });
+    let mut events: Vec<LoggedEvent> = timeline.events().iter().map(logged).chain(supervised).collect();
+    events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    events
+}
+
+fn describe(event: &Event) -> (&'static str, String) {
+    match event {
+        Event::Started(e) => {
+            ("started", format!("{} on {} by {}, seed {}", e.experiment, e.rig, e.who, e.seed))
+        }
+        Event::StepStarted(e) => ("step", format!("{}: {} ({})", e.step, e.what, e.at)),
+        Event::StepDone(e) => ("step done", e.step.to_string()),
+        Event::PhaseChanged(e) => {
+            let phase = Phase::try_from(e.phase()).map_or("unknown", Phase::name);
+            ("phase", if e.press < 0 { phase.into() } else { format!("{phase}, press {}", e.press) })
+        }
+        Event::DwellDone(e) => (
+            "dwell",
+            format!(
+                "press {}, dwell {}: ({:.3}, {:.3}) mm, depth {:.3} mm, {} frames",
+                e.press, e.dwell, e.x_mm, e.y_mm, e.depth_mm, e.frames
+            ),
+        ),
+        Event::ReadDone(e) => ("read", format!("{} frames", e.frames)),
+        Event::TareDone(e) => ("tare", format!("{} frames", e.frames)),
+        Event::Log(e) => ("log", e.message.clone()),
+        Event::Gap(e) => (
+            "gap",
+            format!("{} frames lost between {} and {}: {}", e.frames_lost, e.after_seq, e.next_seq, e.reason),
+        ),
+        Event::Paused(_) => ("paused", String::new()),
+        Event::Resumed(_) => ("resumed", String::new()),
+        Event::StopRequested(e) => {
+            (if e.abort { "abort" } else { "stop" }, format!("by {}: {}", e.by, e.reason))
+        }
+        Event::PressRepeated(e) => ("press void", format!("press {}: {}", e.press, e.reason)),
+        Event::CoveringChanged(e) => ("covering", format!("{} mm", e.covering_mm)),
+        Event::Cleanup(e) => {
+            let retracted = if e.retracted { "retracted" } else { "NOT retracted" };
+            ("clean-up", format!("{retracted}, z = {:.3} mm {}", e.z_mm, e.detail))
+        }
+        Event::Finished(e) => ("finished", format!("{} {}", exit_status_name(e.exit_status()), e.message)),
+    }
+}
+
+fn verdict(verdict: pb::SafetyVerdict) -> &'static str {
+    match verdict {
+        pb::SafetyVerdict::Unspecified => "unspecified",
+        pb::SafetyVerdict::Clear => "clear",
+        pb::SafetyVerdict::Refused => "refused",
+        pb::SafetyVerdict::Stopped => "stopped",
+    }
+}

@@ -1,0 +1,191 @@
+//! The presses that count, and what each dwell read above its baseline.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tactus_model::Array;
+use tactus_record::Timeline;
+use tactus_schema::{
+    MonoTime,
+    pb::{self, run_event::Event},
+};
+
+use super::frames::Frames;
+
+/// A press this near an element's centre, in pitches, is a press on that element.
+const CENTRE_PITCHES: f64 = 0.3;
+
+/// One press that was not broken off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Press {
+    /// Its index in the run.
+    pub index: i32,
+    /// Where the tip was told to be, sensor frame.
+    pub at_mm: [f64; 2],
+    /// The element at whose centre that is, within 0.3 pitch.
+    pub element: Option<usize>,
+    /// Its dwells, in order.
+    pub dwells: Vec<Dwell>,
+}
+
+/// The mean reading at one depth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dwell {
+    /// Depth below the covering's nominal surface.
+    pub depth_mm: f64,
+    /// The covering then in place.
+    pub covering_mm: f64,
+    /// Frames averaged.
+    pub frames: u32,
+    /// Mean counts above the baseline, row-major.
+    pub rise_counts: Vec<f32>,
+}
+
+/// What rises are against; of several, what the first dwell without a tare has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Baseline {
+    /// The tare last taken before.
+    Tare,
+    /// The mean of this many frames before the first press.
+    FirstFrames(u64),
+    /// The baseline in the rig file.
+    RigFile,
+}
+
+impl Dwell {
+    /// Sum of the rises of all elements.
+    pub fn total_counts(&self) -> f64 {
+        self.rise_counts.iter().map(|rise| f64::from(*rise)).sum()
+    }
+}
+
+/// The presses of a run.
+pub(super) struct Presses {
+    pub(super) done: Vec<Press>,
+    pub(super) baseline: Baseline,
+    /// Presses that were broken off and begun again.
+    pub(super) void: BTreeSet<i32>,
+    /// Dwells whose counts are not one finite number per element.
+    pub(super) misfits: u32,
+    zeros: Zeros,
+}
+
+impl Presses {
+    pub(super) fn of(timeline: &Timeline, frames: &Frames) -> Self {
+        let array = &timeline.rig().array;
+        let void: BTreeSet<i32> = timeline
+            .events()
+            .iter()
+            .filter_map(|event| match &event.event {
+                Some(Event::PressRepeated(repeated)) => Some(repeated.press),
+                _ => None,
+            })
+            .collect();
+        let zeros = Zeros::of(timeline, frames);
+        let (mut baseline, mut misfits) = (Baseline::Tare, 0);
+        let mut presses: BTreeMap<i32, Press> = BTreeMap::new();
+        for event in timeline.events() {
+            let Some(Event::DwellDone(done)) = &event.event else { continue };
+            if done.press < 0 || void.contains(&done.press) {
+                continue;
+            }
+            let at = MonoTime::from_ns(done.from_mono_ns);
+            let (zero_counts, tared) = zeros.at(at);
+            if !fits(done, array) {
+                misfits += 1;
+                continue;
+            }
+            if !tared {
+                baseline = zeros.fallback;
+            }
+            let rise = |(counts, zero): (&f32, &f32)| counts - zero;
+            let press = presses.entry(done.press).or_insert_with(|| Press {
+                index: done.press,
+                at_mm: [done.x_mm, done.y_mm],
+                element: element_at(array, [done.x_mm, done.y_mm]),
+                dwells: Vec::new(),
+            });
+            press.dwells.push(Dwell {
+                depth_mm: done.depth_mm,
+                covering_mm: timeline.covering_mm(at),
+                frames: done.frames,
+                rise_counts: done.mean_counts.iter().zip(zero_counts).map(rise).collect(),
+            });
+        }
+        Self { done: presses.into_values().collect(), baseline, void, misfits, zeros }
+    }
+
+    /// Sum over all elements of the baseline in force.
+    pub(super) fn zero_total_counts(&self, at: MonoTime) -> f64 {
+        self.zeros.at(at).0.iter().map(|counts| f64::from(*counts)).sum()
+    }
+}
+
+/// The baselines of a run.
+struct Zeros {
+    tares: Vec<(MonoTime, Vec<f32>)>,
+    before: Vec<f32>,
+    fallback: Baseline,
+}
+
+impl Zeros {
+    fn of(timeline: &Timeline, frames: &Frames) -> Self {
+        let elements = timeline.rig().array.elements();
+        let mut tares: Vec<(MonoTime, Vec<f32>)> = timeline
+            .events()
+            .iter()
+            .filter_map(|event| match &event.event {
+                Some(Event::TareDone(tare)) if tare.baseline_counts.len() == elements => {
+                    Some((MonoTime::from_ns(event.t_mono_ns), tare.baseline_counts.clone()))
+                }
+                _ => None,
+            })
+            .collect();
+        tares.sort_by_key(|(at, _)| *at);
+        let (before, fallback) = match frames.first_mean_counts() {
+            Some((mean_counts, frames)) => (mean_counts, Baseline::FirstFrames(frames)),
+            None => (as_f32(&timeline.rig().baseline_counts), Baseline::RigFile),
+        };
+        Self { tares, before, fallback }
+    }
+
+    /// The baseline in force, and whether it is a tare.
+    fn at(&self, at: MonoTime) -> (&[f32], bool) {
+        let next = self.tares.partition_point(|(from, _)| *from <= at);
+        match next.checked_sub(1).and_then(|index| self.tares.get(index)) {
+            Some((_, baseline)) => (baseline, true),
+            None => (&self.before, false),
+        }
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "counts are far within f32")]
+fn as_f32(values: &[f64]) -> Vec<f32> {
+    values.iter().map(|value| *value as f32).collect()
+}
+
+fn fits(done: &pb::DwellDone, array: &Array) -> bool {
+    done.mean_counts.len() == array.elements()
+        && done.mean_counts.iter().all(|counts| counts.is_finite())
+        && [done.x_mm, done.y_mm, done.depth_mm].iter().all(|mm| mm.is_finite())
+}
+
+/// The element at whose centre a place is.
+pub(super) fn element_at(array: &Array, [x_mm, y_mm]: [f64; 2]) -> Option<usize> {
+    let nearest = |centres: &[f64], at: f64| {
+        let distance =
+            |(_, a): &(usize, &f64), (_, b): &(usize, &f64)| (*a - at).abs().total_cmp(&(*b - at).abs());
+        centres.iter().enumerate().min_by(distance).map(|(index, centre)| (index, centre - at))
+    };
+    let (col, dx_mm) = nearest(array.col_centres_mm(), x_mm)?;
+    let (row, dy_mm) = nearest(array.row_centres_mm(), y_mm)?;
+    (dx_mm.hypot(dy_mm) <= CENTRE_PITCHES * pitch_mm(array)).then_some(row * array.cols() + col)
+}
+
+/// The least distance of two centres along an axis; of a single element, its size.
+fn pitch_mm(array: &Array) -> f64 {
+    let apart = |centres: &[f64]| {
+        centres.windows(2).filter_map(|pair| Some(pair.last()? - pair.first()?)).fold(f64::INFINITY, f64::min)
+    };
+    let least = apart(array.col_centres_mm()).min(apart(array.row_centres_mm()));
+    if least.is_finite() { least } else { array.element_mm()[0] }
+}

@@ -1,0 +1,89 @@
+use tactus_model::Array;
+use tactus_schema::Rig;
+
+use super::Response;
+use crate::run::{Dwell, Press};
+
+const DEPTHS_MM: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];
+
+fn rig() -> Rig {
+    Rig::from_toml(include_str!("../../../../config/rigs/sim.toml")).unwrap()
+}
+
+/// Presses at all centres; an element reads `rise(depth)` times its share of the press.
+fn presses(rise: impl Fn(f64) -> f64, share: impl Fn(usize, usize) -> f64) -> Vec<Press> {
+    let array = rig().array;
+    #[expect(clippy::cast_possible_truncation, reason = "readings are f32")]
+    let dwell = |pressed: usize, depth_mm: f64| Dwell {
+        depth_mm,
+        covering_mm: 1.016,
+        frames: 8,
+        rise_counts: (0..48).map(|element| (rise(depth_mm) * share(element, pressed)) as f32).collect(),
+    };
+    (0..48)
+        .map(|pressed| Press {
+            index: i32::try_from(pressed).unwrap(),
+            at_mm: array.centre_mm(pressed).unwrap(),
+            element: Some(pressed),
+            dwells: DEPTHS_MM.map(|depth_mm| dwell(pressed, depth_mm)).to_vec(),
+        })
+        .collect()
+}
+
+/// A Gaussian of the distance, as under the paper's thinnest covering.
+fn spread(element: usize, pressed: usize) -> f64 {
+    let array = Array::digitacts();
+    let ([ax, ay], [bx, by]) = (array.centre_mm(element).unwrap(), array.centre_mm(pressed).unwrap());
+    (-((ax - bx).powi(2) + (ay - by).powi(2)) / (2.0 * 2.72_f64.powi(2))).exp()
+}
+
+#[test]
+fn exact_responses_give_their_polynomial() {
+    let response = Response::of(&rig(), &presses(|x| 10.0 + 600.0 * x + 400.0 * x * x, spread)).unwrap();
+    assert_eq!((response.curves.len(), response.silent.len(), response.mean.len()), (48, 0, 5));
+    let fitted: Vec<f64> = response.quadratic.unwrap().coefficients.iter().map(|c| c.value).collect();
+    for (got, expected) in fitted.iter().zip([10.0, 600.0, 400.0]) {
+        // Readings are f32.
+        assert!((got - expected).abs() < 0.05, "{fitted:?}");
+    }
+    // The line through a parabola at five even places: slope b + 2 c (their middle).
+    let slope = response.linear.unwrap().coefficients[1].value;
+    assert!((slope - (600.0 + 2.0 * 400.0 * 0.4)).abs() < 0.01, "{slope}");
+}
+
+#[test]
+fn cross_wired_and_dead_elements_are_found_and_left_out() {
+    let share = |element, pressed| match element {
+        18 => spread(19, pressed),
+        22 => spread(23, pressed),
+        40 => 0.0,
+        element => spread(element, pressed),
+    };
+    for sign in [1.0, -1.0] {
+        let response = Response::of(&rig(), &presses(|x| sign * 1000.0 * x, share)).unwrap();
+        let found: Vec<_> =
+            response.silent.iter().map(|s| (s.curve.element, s.curve.place, s.answers_to)).collect();
+        assert_eq!(
+            found,
+            [(18, [2, 2], Some([2, 3])), (22, [2, 6], Some([2, 7])), (40, [5, 0], None)],
+            "sign {sign}"
+        );
+        assert_eq!(response.curves.len(), 45);
+        let slope = response.linear.unwrap().coefficients[1].value;
+        assert!((slope - sign * 1000.0).abs() < 0.01, "{slope}");
+    }
+}
+
+#[test]
+fn presses_off_centre_or_at_one_depth_give_no_curves() {
+    let mut elsewhere = presses(|x| x, spread);
+    for press in &mut elsewhere {
+        press.element = None;
+    }
+    assert_eq!(Response::of(&rig(), &elsewhere), None);
+    let mut single = presses(|x| x, spread);
+    for press in &mut single {
+        press.dwells.truncate(1);
+    }
+    assert_eq!(Response::of(&rig(), &single), None);
+}
