@@ -1,0 +1,31 @@
+"""Client of Tactus, the lab service for a tactile array and the robot that presses it.
+
+    import tactus_client
+
+    with tactus_client.connect() as client:
+        for frame in client.frames():
+            print(frame.seq, frame.image)
+
+Messages are those of ``tactus.v1``, with their own names: see ``tactus_client.messages``.
+"""
+
+from tactus_client import messages
+from tactus_client.client import Client, connect
+from tactus_client.errors import NoAnswer, NoRig, NoService, Refused, TactusError
+from tactus_client.frames import Frame, FrameStream, Missing
+from tactus_client.stream import Stream
+
+__all__ = [
+    "Client",
+    "Frame",
+    "FrameStream",
+    "Missing",
+    "NoAnswer",
+    "NoRig",
+    "NoService",
+    "Refused",
+    "Stream",
+    "TactusError",
+    "connect",
+    "messages",
+]

@@ -1,0 +1,129 @@
+"""Frames as objects, and what is missing between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from tactus_client import messages
+from tactus_client.stream import Stream
+
+try:
+    import numpy
+except ImportError:
+    numpy = None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One reading of all elements; the fields of ``tactus.v1.Frame`` under the same names."""
+
+    #: Counts every frame that the sensor took, those that were lost included.
+    seq: int
+    #: Rises by one with every (re)connection of the device.
+    epoch: int
+    #: The device's own clock, in its ticks; None if it has none.
+    device_tick: int | None
+    #: When the frame reached the service: its monotonic clock, and UTC since 1970.
+    t_mono_ns: int
+    t_wall_ns: int
+    #: Raw counts, row-major, row 0 column 0 at the origin corner.
+    counts: tuple
+    #: Bits of ``FrameFlag``.
+    flags: int
+    #: Frames lost at the device or on its link just before this one.
+    lost_before: int
+    #: True if no physical sensor was read.
+    simulated: bool
+    #: How the elements lie; None if the service has not said.
+    shape: tuple | None
+
+    @property
+    def image(self):
+        """The counts as rows x columns: a numpy array of float32 where numpy is installed, else a list of lists."""
+        if self.shape is None:
+            raise ValueError("the service has not told how the elements lie; take .counts, which are row-major")
+        rows, cols = self.shape
+        if rows * cols != len(self.counts):
+            raise ValueError(f"{len(self.counts)} counts do not make {rows} x {cols} elements")
+        if numpy is not None:
+            return numpy.array(self.counts, dtype=numpy.float32).reshape(rows, cols)
+        return [list(self.counts[row * cols : (row + 1) * cols]) for row in range(rows)]
+
+    @classmethod
+    def of(cls, message, shape: tuple | None) -> Frame:
+        """A ``tactus.v1.Frame`` as an object."""
+        return cls(
+            seq=message.seq,
+            epoch=message.epoch,
+            device_tick=message.device_tick if message.HasField("device_tick") else None,
+            t_mono_ns=message.t_mono_ns,
+            t_wall_ns=message.t_wall_ns,
+            counts=tuple(message.counts),
+            flags=message.flags,
+            lost_before=message.lost_before,
+            simulated=message.simulated,
+            shape=shape,
+        )
+
+
+class Missing(NamedTuple):
+    """Frames that did not arrive between the first and the last that did."""
+
+    #: Lost at the device or on its link; the service never had them.
+    device: int
+    #: Lost between service and this program, by a slow network or a slow reader.
+    bus: int
+
+
+class Tally:
+    """Counts frames, and those that are missing between them."""
+
+    def __init__(self):
+        self.received = 0
+        self.device_lost = 0
+        self.bus_missing = 0
+        #: How often the numbers began again: the service was restarted.
+        self.restarts = 0
+        self.first_seq: int | None = None
+        self.last_seq: int | None = None
+
+    def count(self, seq: int, lost_before: int) -> None:
+        """Counts one frame."""
+        if self.last_seq is None:
+            self.first_seq = seq
+        elif seq <= self.last_seq:
+            self.restarts += 1
+        else:
+            absent = seq - self.last_seq - 1
+            at_device = min(lost_before, absent)
+            self.device_lost += at_device
+            # A frame that fell out on the bus took its own `lost_before` along: that, too, counts here.
+            self.bus_missing += absent - at_device
+        self.received += 1
+        self.last_seq = seq
+
+
+class FrameStream(Stream):
+    """Iterates over frames as objects and counts them: see ``tally`` and ``missing``."""
+
+    #: Frames that may wait to be read: 5 minutes at 30 Hz.
+    CAPACITY = 9_000
+
+    def __init__(self, session, key: str, history: int | None, shape: tuple | None):
+        self._shape = shape
+        self.tally = Tally()
+        super().__init__(session, key, messages.Frame, history, self.CAPACITY)
+
+    def receive(self, timeout_s: float | None = None) -> Frame | None:
+        """The next frame; None once the stream is closed, or after ``timeout_s`` seconds without one."""
+        message = super().receive(timeout_s)
+        if message is None:
+            return None
+        self.tally.count(message.seq, message.lost_before)
+        return Frame.of(message, self._shape)
+
+    @property
+    def missing(self) -> Missing:
+        """What is missing so far."""
+        return Missing(device=self.tally.device_lost, bus=self.tally.bus_missing)

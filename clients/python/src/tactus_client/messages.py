@@ -1,0 +1,50 @@
+"""The messages of ``tactus.v1``.
+
+The classes are made at import from the descriptors that come with this package (``tactus.binpb``, compiled
+from ``tactus.proto``), so that no generated code has to fit the protobuf runtime. A class is named as its
+message: ``Frame``, ``RunEvent``, ``CommandReply`` ...
+"""
+
+from __future__ import annotations
+
+from importlib import resources
+
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from google.protobuf.message import DecodeError
+
+PACKAGE = "tactus.v1"
+
+
+def _load():
+    # A pool of its own: other packages may bring other versions of the same messages.
+    pool = descriptor_pool.DescriptorPool()
+    files = descriptor_pb2.FileDescriptorSet.FromString(
+        resources.files(__package__).joinpath("tactus.binpb").read_bytes()
+    )
+    classes = {}
+    for file in files.file:
+        pool.AddSerializedFile(file.SerializeToString())
+        for message in file.message_type:
+            descriptor = pool.FindMessageTypeByName(f"{file.package}.{message.name}")
+            classes[message.name] = message_factory.GetMessageClass(descriptor)
+    return pool, classes
+
+
+POOL, _CLASSES = _load()
+globals().update(_CLASSES)
+__all__ = [*_CLASSES, "DecodeError", "encoding", "name_of"]  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def encoding(message_class) -> str:
+    """The encoding that names a message on the bus, such as ``application/protobuf;tactus.v1.Frame``."""
+    return f"application/protobuf;{message_class.DESCRIPTOR.full_name}"
+
+
+def name_of(message, field: str) -> str:
+    """The name of an enumeration's value: ``name_of(state, "phase")`` is such as ``RUN_PHASE_RUNNING``.
+
+    A value that this version does not know is given as its number.
+    """
+    number = getattr(message, field)
+    value = message.DESCRIPTOR.fields_by_name[field].enum_type.values_by_number.get(number)
+    return value.name if value else str(number)

@@ -1,0 +1,128 @@
+"""Messages of one topic, in order."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+
+import zenoh
+import zenoh.ext
+
+from tactus_client import messages
+from tactus_client.merge import Merge, Numbered
+
+#: How long the past is waited for; what has come by then is what there is.
+PAST_TIMEOUT_S = 10.0
+
+
+class Stream:
+    """Iterates over the messages of one topic, waiting for each.
+
+    Lost messages are fetched again as long as the service keeps them. At most ``capacity`` messages wait to be
+    read; then the oldest is dropped and counted in ``overrun``.
+    """
+
+    def __init__(self, session, key: str, message_class, history: int | None, capacity: int):
+        """``history``: how many past messages to begin with; None for all that the service keeps."""
+        self._message_class = message_class
+        self._encoding = messages.encoding(message_class)
+        self._capacity = capacity
+        self._arrived: deque = deque()
+        self._changed = threading.Condition()
+        self._closed = False
+        self._merge = Merge(self._keep)
+        #: Messages dropped because they were read too slowly.
+        self.overrun = 0
+        #: Messages that were not what belongs on the topic.
+        self.unreadable = 0
+        self._subscriber = zenoh.ext.declare_advanced_subscriber(
+            session,
+            key,
+            zenoh.handlers.Callback(self._hear, self._end),
+            recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
+        )
+        # Asked for after the present is listened to, so that no message falls between the two.
+        past = [_numbered(sample) for sample in past_samples(session, key, history)]
+        with self._changed:
+            self._merge.join(past)
+
+    def receive(self, timeout_s: float | None = None):
+        """The next message; None once the stream is closed, or after ``timeout_s`` seconds without one."""
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            with self._changed:
+                while not self._arrived:
+                    left_s = None if deadline is None else deadline - time.monotonic()
+                    if self._closed or (left_s is not None and left_s <= 0):
+                        return None
+                    self._changed.wait(left_s)
+                sample = self._arrived.popleft()
+            message = self._decode(sample)
+            if message is not None:
+                return message
+
+    def close(self) -> None:
+        """Stops listening; what has arrived can still be read."""
+        self._end()
+        self._subscriber.undeclare()
+
+    def __iter__(self):
+        return self
+
+    def __next__(self):
+        message = self.receive()
+        if message is None:
+            raise StopIteration
+        return message
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def _decode(self, sample):
+        try:
+            if str(sample.encoding) == self._encoding:
+                return self._message_class.FromString(sample.payload.to_bytes())
+        except messages.DecodeError:
+            pass
+        self.unreadable += 1
+        return None
+
+    def _hear(self, sample) -> None:
+        with self._changed:
+            self._merge.present(_numbered(sample))
+
+    def _keep(self, sample) -> None:
+        if len(self._arrived) == self._capacity:
+            self._arrived.popleft()
+            self.overrun += 1
+        self._arrived.append(sample)
+        self._changed.notify()
+
+    def _end(self) -> None:
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+
+def past_samples(session, key: str, history: int | None):
+    """What the topic's publishers still keep of it: each answers on a key of zenoh's below the topic."""
+    limit = "" if history is None else f"?_max={history}"
+    replies = session.get(
+        f"{key}/@adv/pub/**{limit}",
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        accept_replies=zenoh.ReplyKeyExpr.ANY,
+        timeout=PAST_TIMEOUT_S,
+    )
+    return [reply.ok for reply in replies if reply.ok is not None]
+
+
+def _numbered(sample) -> Numbered:
+    source = sample.source_info
+    if source is None:
+        return Numbered(None, None, sample)
+    return Numbered((str(source.source_id.zid), source.source_id.eid), source.source_sn, sample)

@@ -1,0 +1,106 @@
+"""Against a running publisher of synthetic frames: see ``pulse`` in ``conftest.py``."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tactus_client
+from tactus_client import messages
+
+COUNT_FRAMES = Path(__file__).parents[1] / "examples" / "count_frames.py"
+
+
+@pytest.fixture
+def client(pulse):
+    with tactus_client.connect(pulse) as client:
+        yield client
+
+
+def test_frames_arrive_whole_and_the_losses_are_the_devices(client):
+    assert client.rig == "pulse"
+    frames = client.frames()
+    seen = [next(frames) for _ in range(500)]
+    seqs = [frame.seq for frame in seen]
+    # The publisher leaves out each tenth.
+    assert seqs == [seq for seq in range(seqs[0], seqs[-1] + 1) if seq % 10 != 9]
+    assert frames.missing == (seqs[-1] - seqs[0] + 1 - 500, 0)
+    assert (frames.overrun, frames.unreadable) == (0, 0)
+    for frame in seen:
+        assert frame.simulated
+        assert frame.shape == (6, 8)
+        assert len(frame.image) == 6 and len(frame.image[0]) == 8
+        assert all(100 <= counts <= 1000 for counts in frame.counts)
+
+
+def test_a_late_joiner_gets_the_past_and_the_present(client):
+    with client.frames() as early:
+        while next(early).seq < 100:
+            pass
+        with client.frames() as late:
+            # 10 s of frames are kept, and fewer have been since the start.
+            assert next(late).seq == 0
+            while next(late).seq <= early.tally.last_seq:
+                pass
+            assert late.missing.bus == 0
+        with client.frames(history=1) as viewer:
+            assert next(viewer).seq >= 100
+
+
+def test_a_run_is_followed_by_its_events(client):
+    reply = client.run("corners", depth_mm=0.3, seed=7)
+    assert reply.state.experiment == "corners"
+    client.pause("to look")
+    client.resume()
+    # Late, and yet from the beginning.
+    with client.events() as events:
+        client.stop("enough")
+        seen = [next(events) for _ in range(4)]
+    assert [event.seq for event in seen] == [0, 1, 2, 3]
+    assert [event.WhichOneof("event") for event in seen] == ["started", "paused", "resumed", "finished"]
+    started = seen[0].started
+    assert (started.experiment, started.seed, started.who) == ("corners", 7, seen[0].started.who)
+    assert started.who.startswith("python")
+    assert json.loads(started.parameters_json) == {"depth_mm": 0.3}
+    with client.states() as states:
+        assert messages.name_of(next(states), "phase") == "RUN_PHASE_FINISHED"
+    assert client.status().rig == "pulse"
+
+
+def test_a_refusal_is_an_error_that_says_why(client):
+    with pytest.raises(tactus_client.Refused, match="no run is going on") as refused:
+        client.pause()
+    assert refused.value.exit_code == 1
+
+
+def test_a_rig_that_is_not_there_does_not_answer(pulse):
+    no_answer = pytest.raises(tactus_client.NoAnswer, match="tactus/elsewhere/cmd/status")
+    with tactus_client.connect(pulse, "elsewhere") as stranger, no_answer:
+        stranger.status(timeout_s=3_600)
+
+
+def test_a_closed_stream_ends(client):
+    frames = client.frames()
+    frames.close()
+    assert len(list(frames)) == frames.tally.received
+
+
+def test_streams_end_with_the_client(client):
+    events = client.events()
+    client.close()
+    assert list(events) == []
+
+
+def test_the_example_counts(pulse):
+    counted = subprocess.run(
+        [sys.executable, COUNT_FRAMES, "--endpoint", pulse, "--frames", "200"],
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    tally = json.loads(counted.stdout)
+    assert (tally["frames"], tally["bus_missing"]) == (200, 0)
+    span = tally["last_seq"] - tally["first_seq"] + 1
+    assert tally["device_lost"] == span - 200 > 0

@@ -1,0 +1,47 @@
+use std::collections::VecDeque;
+
+use super::{Kept, wanted};
+
+/// The numbers found after so many messages, of which the last `capacity` are kept.
+fn check(published: u32, capacity: usize, numbers: Option<&str>, limit: Option<&str>) -> Vec<u32> {
+    let mut kept = Kept { capacity, next: 0, messages: VecDeque::new() };
+    for number in 0..published {
+        kept.push(number.to_le_bytes().into());
+    }
+    let (numbers, limit) = wanted(numbers, limit);
+    let found = kept.find(&numbers, limit);
+    for (number, payload) in &found {
+        assert_eq!(*payload.to_bytes(), number.to_le_bytes(), "the number belongs to the message");
+    }
+    found.into_iter().map(|(number, _)| number).collect()
+}
+
+#[test]
+fn the_last_messages_are_kept() {
+    assert_eq!(check(0, 3, None, None), [0; 0]);
+    assert_eq!(check(2, 3, None, None), [0, 1]);
+    assert_eq!(check(10, 3, None, None), [7, 8, 9]);
+}
+
+#[test]
+fn a_question_may_name_the_numbers_it_wants() {
+    assert_eq!(check(10, 10, Some("3..5"), None), [3, 4, 5]);
+    assert_eq!(check(10, 10, Some("8.."), None), [8, 9]);
+    assert_eq!(check(10, 10, Some("..1"), None), [0, 1]);
+    assert_eq!(check(10, 10, Some("4"), None), [4]);
+    assert_eq!(check(10, 3, Some("..7"), None), [7]);
+    assert_eq!(check(10, 10, Some("5..3"), None), [0; 0]);
+}
+
+#[test]
+fn a_question_may_limit_itself_to_the_last() {
+    assert_eq!(check(10, 10, None, Some("1")), [9]);
+    assert_eq!(check(10, 10, Some("..6"), Some("2")), [5, 6]);
+    assert_eq!(check(2, 10, None, Some("5")), [0, 1]);
+}
+
+#[test]
+fn what_cannot_be_read_is_taken_as_not_said() {
+    assert_eq!(check(3, 10, Some("..many"), Some("-1")), [0, 1, 2]);
+    assert_eq!(check(3, 10, Some(""), Some("")), [0, 1, 2]);
+}

@@ -1,0 +1,155 @@
+//! What the bus's tests stand on: a service on a free port, raw zenoh clients, and a link that can stand still.
+#![allow(dead_code, reason = "each test takes what it needs")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{net::TcpListener as StdListener, time::Duration};
+
+use tactus_bus::{Bus, BusConfig, BusError, Calls, Client, Endpoint};
+use tactus_schema::{
+    Frame, FrameFlags, MonoTime, Stamp, WallTime,
+    key::{Command, Keys},
+    pb,
+};
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::{TcpListener, TcpStream},
+    sync::watch,
+    task::JoinHandle,
+};
+
+/// A service for a rig named `bench`, and where it listens.
+pub(crate) struct Service {
+    pub(crate) bus: Bus,
+    pub(crate) calls: Calls,
+    pub(crate) endpoint: Endpoint,
+}
+
+/// An endpoint on which nothing listens.
+pub(crate) fn free_endpoint() -> Endpoint {
+    let port = StdListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    format!("tcp/127.0.0.1:{port}").parse().unwrap()
+}
+
+/// Opens a service; `connect` is whom it joins.
+pub(crate) async fn open(rig: &str, connect: &[Endpoint]) -> Service {
+    loop {
+        let endpoint = free_endpoint();
+        let config = BusConfig { listen: vec![endpoint.clone()], connect: connect.to_vec() };
+        match Bus::open(&config, Keys::new(rig)).await {
+            Ok((bus, calls)) => return Service { bus, calls, endpoint },
+            // Somebody else took the port meanwhile.
+            Err(BusError::Open { .. }) => {}
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+/// A zenoh session that knows nothing of `tactus-bus`.
+pub(crate) async fn raw_session(endpoint: &Endpoint) -> zenoh::Session {
+    let mut config = zenoh::Config::default();
+    config.insert_json5("mode", "\"client\"").unwrap();
+    config.insert_json5("scouting/multicast/enabled", "false").unwrap();
+    config.insert_json5("connect/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
+    zenoh::open(config).await.unwrap()
+}
+
+/// Returns once the service has taken in all that the client declared before: declarations and
+/// commands of one session keep their order.
+pub(crate) async fn settled(client: &Client, calls: &mut Calls) {
+    let request = pb::CommandRequest::default();
+    let asked = client.command(Command::Status, &request, Duration::from_hours(1));
+    let (answer, ()) = tokio::join!(asked, async { drop(calls.commands.recv().await) });
+    assert!(matches!(answer, Err(BusError::NoAnswer { .. })), "{answer:?}");
+}
+
+/// A frame of 48 elements with that number.
+pub(crate) fn frame(seq: u64) -> Frame {
+    let ns = i64::try_from(seq).unwrap() * 33_333_333;
+    Frame {
+        seq,
+        epoch: 1,
+        device_tick: None,
+        received: Stamp { mono: MonoTime::from_ns(ns), wall: WallTime::from_ns(ns) },
+        counts: vec![seq as f32; 48].into(),
+        flags: FrameFlags::default(),
+        lost_before: 0,
+        simulated: true,
+    }
+}
+
+/// A run event with that number.
+pub(crate) fn event(seq: u64) -> pb::RunEvent {
+    pb::RunEvent { seq, run_id: "run-1".to_owned(), ..Default::default() }
+}
+
+/// A link between client and service that can stand still or break.
+pub(crate) struct Link {
+    pub(crate) endpoint: Endpoint,
+    state: watch::Sender<LinkState>,
+    task: JoinHandle<()>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum LinkState {
+    Flowing,
+    Still,
+    Broken,
+}
+
+impl Link {
+    pub(crate) async fn to(service: &Endpoint) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let endpoint = format!("tcp/{}", listener.local_addr().unwrap()).parse().unwrap();
+        let (state, watched) = watch::channel(LinkState::Flowing);
+        let address = service.address().to_owned();
+        let task = tokio::spawn(async move {
+            while let Ok((client, _)) = listener.accept().await {
+                let Ok(service) = TcpStream::connect(&address).await else { continue };
+                tokio::spawn(carry(client, service, watched.clone()));
+            }
+        });
+        Self { endpoint, state, task }
+    }
+
+    /// From here on nothing of what the service sends goes through.
+    pub(crate) fn stand_still(&self) {
+        self.state.send_replace(LinkState::Still);
+    }
+
+    /// Everything goes through again.
+    pub(crate) fn flow(&self) {
+        self.state.send_replace(LinkState::Flowing);
+    }
+
+    /// Breaks all connections, as a dying service does, and takes no new ones.
+    pub(crate) fn break_off(&self) {
+        self.state.send_replace(LinkState::Broken);
+        self.task.abort();
+    }
+}
+
+async fn carry(client: TcpStream, service: TcpStream, mut state: watch::Receiver<LinkState>) {
+    let (mut from_client, mut to_client) = client.into_split();
+    let (mut from_service, mut to_service) = service.into_split();
+    let mut broken = state.clone();
+    tokio::select! {
+        _ = broken.wait_for(|state| *state == LinkState::Broken) => {}
+        _ = tokio::io::copy(&mut from_client, &mut to_service) => {}
+        () = async {
+            let mut bytes = vec![0; 65_536];
+            loop {
+                if state.wait_for(|state| *state == LinkState::Flowing).await.is_err() {
+                    return;
+                }
+                match from_service.read(&mut bytes).await {
+                    Ok(count) if count > 0 => {
+                        if to_client.write_all(&bytes[..count]).await.is_err() {
+                            return;
+                        }
+                    }
+                    _ => return,
+                }
+            }
+        } => {}
+    }
+}
