@@ -1,0 +1,25 @@
+//! The lab service: composition root of `tactusd`, and the same composition embedded in the CLI.
+//!
+//! | module | what it composes |
+//! |---|---|
+//! | [`config`] | the configuration and rig files |
+//! | [`experiments`] | names to scripts |
+//! | [`order`] | a request to a checked order, its run id and its recording |
+//! | [`devices`] | transports, drivers and virtual devices of a rig |
+//! | [`recorder`] | the recording behind the engine |
+//! | [`twin`] | the dry run on a simulated twin |
+//! | [`embedded`] | one run in this process, without a service |
+//! | [`service`] | the service: bus, commands, health, systemd |
+
+pub mod config;
+pub mod devices;
+pub mod embedded;
+pub mod experiments;
+pub mod logging;
+pub mod order;
+pub mod recorder;
+pub mod service;
+pub mod twin;
+
+mod notify;
+mod virtual_time;

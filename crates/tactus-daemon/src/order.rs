@@ -1,0 +1,102 @@
+//! From what somebody asked for to an order the engine can take.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use jiff::Timestamp;
+use tactus_engine::RunOrder;
+use tactus_plan::{Arguments, Limits, RigView, Script, ScriptError};
+use tactus_record::{Header, RecordError, Recording};
+use tactus_schema::{Rig, WallTime};
+
+/// What somebody asks for.
+#[derive(Debug, Clone)]
+pub struct Ask {
+    /// The experiment.
+    pub script: Script,
+    /// The parameters that differ from their defaults.
+    pub arguments: Arguments,
+    /// The seed; a new one each time if `None`.
+    pub seed: Option<u64>,
+    /// Who asks.
+    pub who: String,
+}
+
+/// Makes the order, with a new run id. Everything about the parameters is checked here.
+///
+/// # Errors
+/// [`ScriptError`] names the parameter or the script's line.
+pub fn order(ask: Ask, rig: &Rig, at: WallTime) -> Result<RunOrder, ScriptError> {
+    let Ask { script, arguments, seed, who } = ask;
+    let arguments = arguments.resolve(&script, &RigView::of(rig))?;
+    let seed = seed.unwrap_or_else(|| mix(at.ns().unsigned_abs()));
+    let run_id =
+        format!("{}-{}-{:04x}", timestamp(at), script.name(), mix(at.ns().unsigned_abs() ^ seed) & 0xffff);
+    let versions = BTreeMap::from([
+        ("tactus".into(), env!("CARGO_PKG_VERSION").into()),
+        ("schema".into(), "tactus.v1".into()),
+    ]);
+    Ok(RunOrder {
+        run_id,
+        script,
+        arguments,
+        seed,
+        who,
+        limits: Limits::default(),
+        planned: None,
+        versions,
+        recording: String::new(),
+    })
+}
+
+/// Opens the recording of an order: `recording.mcap` in a folder of the run's own, made below `folder`.
+///
+/// # Errors
+/// [`RecordError`] names the path.
+pub fn recording(
+    order: &RunOrder,
+    rig: &Rig,
+    rig_toml: &str,
+    folder: &Path,
+    started: WallTime,
+) -> Result<(Recording, PathBuf), RecordError> {
+    let folder = folder.join(&order.run_id);
+    std::fs::create_dir_all(&folder).map_err(|source| RecordError::Io {
+        action: "create",
+        path: folder.clone(),
+        source,
+    })?;
+    let path = folder.join("recording.mcap");
+    let recording = Recording::create(
+        &path,
+        &Header {
+            run_id: &order.run_id,
+            experiment: order.script.name(),
+            who: &order.who,
+            rig,
+            rig_toml,
+            script: tactus_record::Script {
+                name: &format!("{}.star", order.script.name()),
+                source: order.script.source(),
+            },
+            versions: &order.versions,
+            parameters_json: &order.arguments.to_json(),
+            started,
+            simulated: rig.simulated,
+        },
+    )?;
+    Ok((recording, path))
+}
+
+/// `20260131-142530`, UTC.
+fn timestamp(at: WallTime) -> String {
+    Timestamp::from_nanosecond(at.ns().into())
+        .map_or_else(|_| "undated".into(), |time| time.strftime("%Y%m%d-%H%M%S").to_string())
+}
+
+/// Spreads the bits of a number (the finaliser of `SplitMix64`, Steele et al. 2014).
+fn mix(mut bits: u64) -> u64 {
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ (bits >> 31)
+}

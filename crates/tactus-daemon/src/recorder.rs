@@ -1,0 +1,139 @@
+//! The recording behind the engine: written in place in virtual time, on a thread of its own in real time.
+
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use tactus_engine::{Record, RecordFailure};
+use tactus_record::{RecordError, Recording};
+use tactus_schema::{Frame, Stamp, pb};
+
+/// What may wait for the disk: a minute of frames, reports and events. If it is full the run fails, loudly.
+const QUEUE: usize = 4096;
+
+/// Writes in place: in virtual time nothing waits for the disk.
+#[derive(Debug)]
+pub struct InPlace(pub Recording);
+
+/// Hands everything to a thread, so that a slow disk never holds up acquisition.
+#[derive(Debug)]
+pub struct OnThread {
+    entries: SyncSender<Entry>,
+    writer: JoinHandle<Result<(), RecordError>>,
+}
+
+/// The disk could not keep up, or writing failed earlier.
+#[derive(Debug, thiserror::Error)]
+enum QueueError {
+    #[error("the disk cannot keep up: {QUEUE} entries are waiting to be written")]
+    Full,
+    #[error("the recording's thread ended early; its error follows when the recording is closed")]
+    Gone,
+    #[error("the recording's thread panicked; this is a defect of Tactus")]
+    Panicked,
+}
+
+#[derive(Debug)]
+enum Entry {
+    SensorInfo(pb::SensorInfo, Stamp),
+    Frame(Frame),
+    Stage(pb::StageState),
+    Event(pb::RunEvent),
+    Safety(pb::SafetyEvent),
+}
+
+impl Record for InPlace {
+    fn sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordFailure> {
+        self.0.write_sensor_info(info, at).map_err(failure)
+    }
+
+    fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure> {
+        self.0.write_frame(frame).map_err(failure)
+    }
+
+    fn stage(&mut self, state: &pb::StageState) -> Result<(), RecordFailure> {
+        self.0.write_stage(state).map_err(failure)
+    }
+
+    fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure> {
+        self.0.write_event(event).map_err(failure)
+    }
+
+    fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure> {
+        self.0.write_safety(event).map_err(failure)
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
+        self.0.finish().map(drop).map_err(failure)
+    }
+}
+
+impl OnThread {
+    /// Starts the thread.
+    ///
+    /// # Errors
+    /// If the system gives no thread.
+    pub fn start(recording: Recording) -> std::io::Result<Self> {
+        // Overflow policy: never dropped; a full queue is an error that fails the run.
+        let (entries, queue) = sync_channel(QUEUE);
+        let writer =
+            thread::Builder::new().name("recorder".into()).spawn(move || write_all(recording, &queue))?;
+        Ok(Self { entries, writer })
+    }
+
+    fn hand(&self, entry: Entry) -> Result<(), RecordFailure> {
+        self.entries.try_send(entry).map_err(|refused| {
+            RecordFailure(Box::new(match refused {
+                TrySendError::Full(_) => QueueError::Full,
+                TrySendError::Disconnected(_) => QueueError::Gone,
+            }))
+        })
+    }
+}
+
+impl Record for OnThread {
+    fn sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordFailure> {
+        self.hand(Entry::SensorInfo(info.clone(), at))
+    }
+
+    fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure> {
+        self.hand(Entry::Frame(frame.clone()))
+    }
+
+    fn stage(&mut self, state: &pb::StageState) -> Result<(), RecordFailure> {
+        self.hand(Entry::Stage(*state))
+    }
+
+    fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure> {
+        self.hand(Entry::Event(event.clone()))
+    }
+
+    fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure> {
+        self.hand(Entry::Safety(event.clone()))
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
+        // The thread ends when the queue does; then everything is on disk.
+        drop(self.entries);
+        match self.writer.join() {
+            Ok(written) => written.map_err(failure),
+            Err(_) => Err(RecordFailure(Box::new(QueueError::Panicked))),
+        }
+    }
+}
+
+fn write_all(mut recording: Recording, queue: &Receiver<Entry>) -> Result<(), RecordError> {
+    for entry in queue {
+        match &entry {
+            Entry::SensorInfo(info, at) => recording.write_sensor_info(info, *at),
+            Entry::Frame(frame) => recording.write_frame(frame),
+            Entry::Stage(state) => recording.write_stage(state),
+            Entry::Event(event) => recording.write_event(event),
+            Entry::Safety(event) => recording.write_safety(event),
+        }?;
+    }
+    recording.finish().map(drop)
+}
+
+fn failure(error: RecordError) -> RecordFailure {
+    RecordFailure(Box::new(error))
+}

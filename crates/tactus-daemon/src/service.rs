@@ -1,0 +1,173 @@
+//! The service: acquires from start to end, answers commands, runs experiments.
+//!
+//! | task | waits for |
+//! |---|---|
+//! | acquisition (in the engine) | frames, reports of the stage, the supervisor's clock |
+//! | stops | `cmd/stop`; nothing else, so that no other command can delay it |
+//! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status` |
+//! | run | the order of one run, until its recording is closed |
+//! | health | once a second |
+//! | watchdog | half of systemd's limit |
+//! | main | SIGTERM or SIGINT |
+
+mod answer;
+mod health;
+mod watch;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::Parser;
+use tactus_bus::{Bus, BusConfig, BusError, Calls};
+use tactus_device::Clock;
+use tactus_engine::{Engine, EngineError, StopOrder};
+use tactus_schema::key::Keys;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::time::timeout;
+use tracing::{error, info, warn};
+
+use crate::config::{Config, ConfigError, LogFormat};
+use crate::{devices, logging, notify};
+use answer::Desk;
+use watch::OnBus;
+
+/// How long a run may take to retract and close its recording at shutdown.
+const FAREWELL: Duration = Duration::from_secs(30);
+
+/// The lab service of Tactus.
+#[derive(Debug, Parser)]
+#[command(name = "tactusd", version, about)]
+struct Options {
+    /// The configuration file.
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Overrides the configuration's log format.
+    #[arg(long, value_enum)]
+    log: Option<LogFormat>,
+    /// Where recordings go; overrides the configuration.
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
+}
+
+/// Why the service ended.
+#[derive(Debug, thiserror::Error)]
+enum ServiceError {
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    #[error("the system gives no {what}: {source}")]
+    System { what: &'static str, source: std::io::Error },
+    #[error("the run did not close within {FAREWELL:?}: its recording may lack its end")]
+    Hung,
+}
+
+/// Runs `tactusd` with the process's arguments.
+pub fn main() -> ExitCode {
+    let options = Options::parse();
+    let config = match Config::load(&options.config) {
+        Ok(config) => config,
+        Err(error) => {
+            logging::start(options.log.unwrap_or_default(), "info");
+            error!("{error}");
+            return ExitCode::from(2);
+        }
+    };
+    logging::start(options.log.unwrap_or(config.log.format), &config.log.filter);
+    let config = Config { recordings: options.recordings.unwrap_or(config.recordings), ..config };
+    match start(config) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            error!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn start(config: Config) -> Result<(), ServiceError> {
+    let system = |what| move |source| ServiceError::System { what, source };
+    let runtime =
+        tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(system("runtime"))?;
+    let served = runtime.block_on(serve(config));
+    // What still computes, such as a dry run, does not hold the process.
+    runtime.shutdown_background();
+    served
+}
+
+async fn serve(config: Config) -> Result<(), ServiceError> {
+    let system = |what| move |source| ServiceError::System { what, source };
+    let mut terminate = signal(SignalKind::terminate()).map_err(system("SIGTERM"))?;
+    let mut interrupt = signal(SignalKind::interrupt()).map_err(system("SIGINT"))?;
+
+    let clock = Clock::real();
+    let rig = config.rig.clone();
+    let Some(rig_service) = rig.service.clone() else {
+        return Err(EngineError::NoService { rig: rig.name }.into());
+    };
+    let keys = Keys::new(rig.name.clone());
+    info!(rig = rig.name, simulated = rig.simulated, recordings = %config.recordings.display(), "tactusd starts");
+    let endpoints = BusConfig {
+        listen: config.bus.listen.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
+        connect: config.bus.connect.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
+    };
+    if !endpoints.is_loopback() {
+        warn!("the bus listens or connects beyond this machine, without access control");
+    }
+    let (bus, calls) = Bus::open(&endpoints, keys).await?;
+    let opened = devices::open(&rig, &rig_service, clock.now().wall.ns().unsigned_abs(), clock);
+    let engine = Engine::start(rig, opened.devices, clock, Arc::new(OnBus(bus.publisher())))?;
+
+    let Calls { stops, commands } = calls;
+    let desk = Arc::new(Desk::new(engine.clone(), config, bus.publisher()));
+    let tasks = [
+        tokio::spawn(Arc::clone(&desk).answer_stops(stops)),
+        tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
+        tokio::spawn(health::publish(engine.clone(), bus.publisher())),
+        tokio::spawn(notify::feed_watchdog(engine.clone())),
+    ];
+
+    let mut alive = None;
+    let signalled = tokio::select! {
+        biased;
+        _ = terminate.recv() => "SIGTERM",
+        _ = interrupt.recv() => "SIGINT",
+        never = async {
+            frames_flow(&engine).await;
+            alive = Some(bus.declare_alive().await);
+            notify::ready(&engine.rig().name);
+            info!("ready: frames flow");
+            std::future::pending::<&str>().await
+        } => never,
+    };
+    info!("{signalled}: closing down");
+    notify::stopping();
+    let closed = farewell(&engine, signalled).await;
+    drop(alive);
+    for task in tasks {
+        task.abort();
+    }
+    bus.close().await?;
+    info!("closed");
+    closed
+}
+
+async fn frames_flow(engine: &Engine) {
+    let mut pulse = engine.pulse();
+    if pulse.wait_for(|pulse| pulse.sensor_connected && pulse.frames > 1).await.is_err() {
+        std::future::pending::<()>().await;
+    }
+}
+
+/// Ends the run in progress: stop, retract, close the recording.
+async fn farewell(engine: &Engine, signalled: &str) -> Result<(), ServiceError> {
+    engine.stop(StopOrder {
+        by: "signal".into(),
+        reason: format!("{signalled}: the service closes down"),
+        abort: false,
+    });
+    timeout(FAREWELL, engine.released()).await.map_err(|_| ServiceError::Hung)
+}

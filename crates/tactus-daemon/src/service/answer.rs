@@ -1,0 +1,178 @@
+//! The desk where commands are answered.
+
+use std::fmt;
+use std::sync::Arc;
+
+use tactus_bus::{CommandCall, Publisher, Request};
+use tactus_engine::{Engine, ResetError, StopOrder};
+use tactus_plan::{Arguments, Script};
+use tactus_schema::key::Command;
+use tactus_schema::{MonoTime, pb};
+use tokio::sync::mpsc;
+use tracing::{info, warn};
+
+use super::health::health;
+use crate::config::Config;
+use crate::order::{self, Ask};
+use crate::recorder::OnThread;
+use crate::{experiments, twin};
+
+/// The CLI's exit codes for what can go wrong with a command.
+mod exit {
+    pub(super) const FAILED: u32 = 1;
+    pub(super) const USAGE: u32 = 2;
+    pub(super) const REFUSED: u32 = 4;
+    pub(super) const NOT_NOW: u32 = 5;
+}
+
+/// Answers commands for one engine.
+pub(super) struct Desk {
+    engine: Engine,
+    config: Config,
+    publisher: Publisher,
+}
+
+/// Why a command was not done.
+struct No {
+    exit_code: u32,
+    error: String,
+}
+
+impl Desk {
+    pub(super) fn new(engine: Engine, config: Config, publisher: Publisher) -> Self {
+        Self { engine, config, publisher }
+    }
+
+    pub(super) async fn answer_stops(self: Arc<Self>, mut stops: mpsc::Receiver<CommandCall>) {
+        while let Some(call) = stops.recv().await {
+            let order = match call.request {
+                Request::Control(request) => {
+                    StopOrder { by: request.who, reason: request.reason, abort: request.abort }
+                }
+                Request::Run(_) => StopOrder { by: "unknown".into(), reason: String::new(), abort: false },
+            };
+            let was_running = self.engine.stop(order.clone());
+            warn!(by = order.by, reason = order.reason, was_running, "stop");
+            call.reply.reply(self.reply(Ok(())));
+        }
+    }
+
+    pub(super) async fn answer_commands(self: Arc<Self>, mut commands: mpsc::Receiver<CommandCall>) {
+        while let Some(call) = commands.recv().await {
+            match (call.command, call.request) {
+                (Command::Run, Request::Run(request)) => {
+                    // A dry run computes for a while: others are answered meanwhile.
+                    let desk = Arc::clone(&self);
+                    tokio::spawn(async move {
+                        let done = desk.run(request).await;
+                        call.reply.reply(desk.reply(done));
+                    });
+                }
+                (Command::Reset, _) => {
+                    // Homing takes its time.
+                    let desk = Arc::clone(&self);
+                    tokio::spawn(async move {
+                        let done = desk.reset().await;
+                        call.reply.reply(desk.reply(done));
+                    });
+                }
+                (Command::Pause, _) => call.reply.reply(self.reply(self.pause())),
+                (Command::Resume, _) => call.reply.reply(self.reply(self.resume())),
+                (Command::Status | Command::Stop | Command::Run, _) => call.reply.reply(self.reply(Ok(()))),
+            }
+        }
+    }
+
+    fn pause(&self) -> Result<(), No> {
+        if self.engine.pause() { Ok(()) } else { Err(No::failed("no run is in progress")) }
+    }
+
+    fn resume(&self) -> Result<(), No> {
+        if self.engine.resume() { Ok(()) } else { Err(No::failed("no run is paused")) }
+    }
+
+    async fn reset(&self) -> Result<(), No> {
+        info!("reset: clearing the stage's alarm and homing");
+        self.engine.reset().await.map_err(|error| match error {
+            ResetError::Busy(busy) => No::not_now(busy),
+            ResetError::Stopped(_) | ResetError::Stage(_) => No::failed(error),
+        })
+    }
+
+    /// Checks everything that can be checked, dry-runs, and starts the run.
+    async fn run(&self, request: pb::RunRequest) -> Result<(), No> {
+        // From here on a stop ends this run, be it before the dry run is over.
+        let claim = self.engine.claim().map_err(No::not_now)?;
+        let script = self.script(&request)?;
+        let arguments = Arguments::from_json(&request.parameters_json).map_err(No::usage)?;
+        let who = if request.who.is_empty() { "unknown".into() } else { request.who };
+        let ask = Ask { script, arguments, seed: request.seed, who };
+        let rig = self.engine.rig();
+        let now = self.engine.clock().now().wall;
+        let mut order = order::order(ask, &rig, now).map_err(No::usage)?;
+
+        let twin_order = order.clone();
+        let twin_rig = rig.clone();
+        let plan = tokio::task::spawn_blocking(move || twin::dry_run(&twin_rig, twin_order))
+            .await
+            .map_err(No::failed)?
+            .map_err(No::failed)?;
+        if !plan.is_possible() {
+            let refused = plan.outcome.exit_status == pb::ExitStatus::Refused;
+            let exit_code = if refused { exit::REFUSED } else { exit::FAILED };
+            return Err(No { exit_code, error: plan.outcome.message });
+        }
+        claim.check().map_err(No::failed)?;
+        order.planned = Some(plan.promise());
+        let (recording, path) =
+            order::recording(&order, &rig, &self.config.rig_toml, &self.config.recordings, now)
+                .map_err(No::failed)?;
+        let path = std::path::absolute(&path).unwrap_or(path);
+        info!(run = order.run_id, recording = %path.display(), presses = plan.promise().presses, "run accepted");
+        let record = Box::new(OnThread::start(recording).map_err(No::failed)?);
+        order.recording = path.display().to_string();
+        let run_id = order.run_id.clone();
+        tokio::spawn(claim.run(order, record));
+        // The answer tells the state of the run that was asked for, not of the one before it.
+        self.engine.state().wait_for(|state| state.run_id == run_id).await.map(drop).map_err(No::failed)
+    }
+
+    fn script(&self, request: &pb::RunRequest) -> Result<Script, No> {
+        if request.script.is_empty() {
+            experiments::named(&request.experiment, self.config.experiments.as_deref()).map_err(No::usage)
+        } else {
+            Script::parse(&request.experiment, &request.script).map_err(No::usage)
+        }
+    }
+
+    fn reply(&self, done: Result<(), No>) -> pb::CommandReply {
+        let (ok, error, exit_code) = match done {
+            Ok(()) => (true, String::new(), 0),
+            Err(No { exit_code, error }) => (false, error, exit_code),
+        };
+        pb::CommandReply {
+            ok,
+            error,
+            exit_code,
+            state: Some(self.engine.state().borrow().clone()),
+            rig: self.engine.rig().name.clone(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            stage: Some(*self.engine.stage_state().borrow()),
+            health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()))),
+        }
+    }
+}
+
+impl No {
+    fn failed(error: impl fmt::Display) -> Self {
+        Self { exit_code: exit::FAILED, error: format!("{error}") }
+    }
+
+    fn not_now(error: impl fmt::Display) -> Self {
+        Self { exit_code: exit::NOT_NOW, error: format!("{error}") }
+    }
+
+    fn usage(error: impl fmt::Display) -> Self {
+        Self { exit_code: exit::USAGE, error: format!("{error}") }
+    }
+}

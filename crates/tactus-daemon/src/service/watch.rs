@@ -1,0 +1,33 @@
+//! The engine's viewers are the bus.
+
+use tactus_bus::Publisher;
+use tactus_engine::Publish;
+use tactus_schema::{Frame, pb};
+
+pub(super) struct OnBus(pub(super) Publisher);
+
+impl Publish for OnBus {
+    fn sensor_info(&self, info: &pb::SensorInfo) {
+        self.0.publish(info);
+    }
+
+    fn frame(&self, frame: &Frame) {
+        self.0.publish_frame(frame);
+    }
+
+    fn stage(&self, state: &pb::StageState) {
+        self.0.publish(state);
+    }
+
+    fn event(&self, event: &pb::RunEvent) {
+        self.0.publish(event);
+    }
+
+    fn state(&self, state: &pb::RunState) {
+        self.0.publish(state);
+    }
+
+    fn safety(&self, event: &pb::SafetyEvent) {
+        self.0.publish(event);
+    }
+}

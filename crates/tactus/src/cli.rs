@@ -1,0 +1,227 @@
+//! The commands and their arguments.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+
+use crate::commands;
+use crate::exit::Exit;
+
+/// A lab service for tactile arrays: run experiments, watch, record, export.
+#[derive(Debug, Parser)]
+#[command(name = "tactus", version, about)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Arguments of every command.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Common {
+    /// Where the service listens.
+    #[arg(
+        long,
+        global = true,
+        value_name = "ENDPOINT",
+        default_value = "tcp/127.0.0.1:7447",
+        env = "TACTUS_ENDPOINT"
+    )]
+    pub(crate) endpoint: String,
+    /// Which rig, where several are served.
+    #[arg(long, global = true, value_name = "NAME", env = "TACTUS_RIG")]
+    pub(crate) rig: Option<String>,
+    /// One JSON object on standard output, for machines.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run an experiment; without a service, on the embedded simulated rig.
+    Run(RunArgs),
+    /// Show what an experiment would do: parameters, presses, duration, extremes, or the refused step.
+    Plan(PlanArgs),
+    /// What the service is doing.
+    Status,
+    /// Stop motion now, retract, end the run.
+    Stop(StopArgs),
+    /// Hold the run before its next step.
+    Pause,
+    /// Let a held run go on.
+    Resume,
+    /// Clear the stage's alarm and home it.
+    Reset,
+    /// Live view: the image, the stage, the run.
+    Watch,
+    /// Look into recordings.
+    #[command(subcommand)]
+    Record(RecordCommand),
+    /// Make the measurement table (Parquet) of recordings.
+    Export(ExportArgs),
+    /// Make a whole recording of one that was cut off.
+    Recover(RecoverArgs),
+    /// Make the report of a recording again.
+    Report(ReportArgs),
+    /// Check files: configurations, rigs, scripts, tables, recordings.
+    Validate(ValidateArgs),
+    /// Print the completions for a shell.
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+}
+
+/// Which experiment, and with what.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ExperimentArgs {
+    /// Name of an experiment, or path of a .star file.
+    pub(crate) experiment: String,
+    /// A parameter of the script, such as `depths_mm=[0.2,0.4]`.
+    #[arg(short = 'p', long = "param", value_name = "NAME=VALUE")]
+    pub(crate) parameters: Vec<String>,
+    /// Seed of the random order and, on a simulated rig, of its noise.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RunArgs {
+    #[command(flatten)]
+    pub(crate) experiment: ExperimentArgs,
+    /// Use the embedded simulated rig even if a service is there.
+    #[arg(long)]
+    pub(crate) embedded: bool,
+    /// The embedded rig's file, in place of the shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rig_file: Option<PathBuf>,
+    /// Let the embedded rig run in real time; else nobody waits.
+    #[arg(long)]
+    pub(crate) real_time: bool,
+    /// Where the run's folder goes.
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    pub(crate) out: PathBuf,
+    /// Who runs it, for the recording.
+    #[arg(long, env = "USER", default_value = "unknown")]
+    pub(crate) who: String,
+    /// Make no report.
+    #[arg(long)]
+    pub(crate) no_report: bool,
+}
+
+/// Arguments of `plan`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct PlanArgs {
+    #[command(flatten)]
+    pub(crate) experiment: ExperimentArgs,
+    /// The rig's file, in place of the shipped simulated one.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rig_file: Option<PathBuf>,
+}
+
+/// Arguments of `stop`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct StopArgs {
+    /// The data so far are not to be used: the run ends as aborted.
+    #[arg(long)]
+    pub(crate) abort: bool,
+    /// Why, for the recording.
+    #[arg(long, default_value = "")]
+    pub(crate) reason: String,
+}
+
+#[derive(Debug, Subcommand)]
+enum RecordCommand {
+    /// Summarise a recording.
+    Info {
+        /// The recording.
+        file: PathBuf,
+    },
+}
+
+/// Arguments of `export`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ExportArgs {
+    /// The recordings.
+    #[arg(required = true)]
+    pub(crate) recordings: Vec<PathBuf>,
+    /// The table; beside the first recording if not given.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Arguments of `recover`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RecoverArgs {
+    /// The recording that was cut off.
+    pub(crate) recording: PathBuf,
+    /// The whole one; beside it if not given.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Arguments of `report`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ReportArgs {
+    /// The recording.
+    pub(crate) recording: PathBuf,
+    /// The report; `report.html` beside the recording if not given.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Arguments of `validate`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ValidateArgs {
+    /// .toml, .star, .parquet or .mcap files.
+    #[arg(required = true)]
+    pub(crate) files: Vec<PathBuf>,
+}
+
+/// Runs `tactus` with the process's arguments.
+pub fn main() -> ExitCode {
+    let Cli { common, command } = Cli::parse();
+    // Scripts log through the service's own lines; a person at the terminal needs warnings only.
+    tactus_daemon::logging::start(
+        tactus_daemon::config::LogFormat::Text,
+        "warn,zenoh=error,zenoh_transport=error",
+    );
+    match dispatch(&common, command) {
+        Ok(exit) => exit.into(),
+        Err(error) => {
+            let exit = Exit::of_error(&error);
+            if common.json {
+                println!("{}", serde_json::json!({ "error": format!("{error:#}"), "exit_code": exit as u8 }));
+            } else {
+                eprintln!("tactus: {error:#}");
+            }
+            exit.into()
+        }
+    }
+}
+
+fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
+    match command {
+        Command::Run(args) => commands::run::run(common, &args),
+        Command::Plan(args) => commands::plan::plan(common, &args),
+        Command::Status => commands::control::status(common),
+        Command::Stop(args) => commands::control::stop(common, &args),
+        Command::Pause => commands::control::pause(common),
+        Command::Resume => commands::control::resume(common),
+        Command::Reset => commands::control::reset(common),
+        Command::Watch => commands::watch::watch(common),
+        Command::Record(RecordCommand::Info { file }) => commands::files::info(common, &file),
+        Command::Export(args) => commands::files::export(common, &args),
+        Command::Recover(args) => commands::files::recover(common, &args),
+        Command::Report(args) => commands::files::report(common, &args),
+        Command::Validate(args) => Ok(commands::validate::validate(common, &args)),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "tactus", &mut std::io::stdout());
+            Ok(Exit::Done)
+        }
+    }
+}

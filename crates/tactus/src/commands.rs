@@ -1,0 +1,8 @@
+//! One module a command, or a family of them.
+
+pub(crate) mod control;
+pub(crate) mod files;
+pub(crate) mod plan;
+pub(crate) mod run;
+pub(crate) mod validate;
+pub(crate) mod watch;

@@ -1,0 +1,177 @@
+//! `status`, `stop`, `pause`, `resume`, `reset`: one question, one answer.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tactus_schema::key::Command;
+use tactus_schema::pb;
+
+use crate::cli::{Common, StopArgs};
+use crate::connection::{self, PATIENCE};
+use crate::exit::{self, Exit};
+use crate::output::{duration, print_fields};
+
+/// How long a stage may take to home.
+const HOMING_PATIENCE: Duration = Duration::from_mins(2);
+
+pub(crate) fn status(common: &Common) -> anyhow::Result<Exit> {
+    command(common, Command::Status, &pb::CommandRequest::default())
+}
+
+pub(crate) fn stop(common: &Common, args: &StopArgs) -> anyhow::Result<Exit> {
+    let request = pb::CommandRequest { who: "cli".into(), reason: args.reason.clone(), abort: args.abort };
+    command(common, Command::Stop, &request)
+}
+
+pub(crate) fn pause(common: &Common) -> anyhow::Result<Exit> {
+    command(common, Command::Pause, &pb::CommandRequest { who: "cli".into(), ..Default::default() })
+}
+
+pub(crate) fn resume(common: &Common) -> anyhow::Result<Exit> {
+    command(common, Command::Resume, &pb::CommandRequest { who: "cli".into(), ..Default::default() })
+}
+
+pub(crate) fn reset(common: &Common) -> anyhow::Result<Exit> {
+    command(common, Command::Reset, &pb::CommandRequest { who: "cli".into(), ..Default::default() })
+}
+
+fn command(common: &Common, command: Command, request: &pb::CommandRequest) -> anyhow::Result<Exit> {
+    let reply = connection::runtime()?.block_on(async {
+        let client = connection::require(common).await?;
+        let reply = connection::ask(&client, command, request, patience(command)).await?;
+        client.close().await?;
+        anyhow::Ok(reply)
+    })?;
+    if common.json {
+        println!("{}", to_json(&reply));
+    } else {
+        print(&reply);
+    }
+    Ok(Exit::Done)
+}
+
+/// Homing takes its time; all else is answered at once.
+fn patience(command: Command) -> Duration {
+    if command == Command::Reset { HOMING_PATIENCE } else { PATIENCE }
+}
+
+/// The answer, as `--json` shows it.
+fn to_json(reply: &pb::CommandReply) -> Value {
+    let state = reply.state.clone().unwrap_or_default();
+    let stage = reply.stage.unwrap_or_default();
+    let health = reply.health.clone().unwrap_or_default();
+    json!({
+        "rig": reply.rig,
+        "version": reply.version,
+        "simulated": health.simulated,
+        "run": {
+            "run_id": state.run_id,
+            "experiment": state.experiment,
+            "phase": phase_word(state.phase()),
+            "exit_status": exit::word(state.exit_status()),
+            "presses": state.presses,
+            "presses_planned": state.presses_planned,
+            "dwells": state.dwells,
+            "dwells_planned": state.dwells_planned,
+            "frames": state.frames,
+            "frames_lost": state.frames_lost,
+            "elapsed_s": state.elapsed_s,
+            "remaining_s": (state.remaining_s >= 0.0).then_some(state.remaining_s),
+            "message": state.message,
+            "recording": state.recording,
+        },
+        "stage": {
+            "status": stage_word(stage.status()),
+            "x_mm": stage.x_mm,
+            "y_mm": stage.y_mm,
+            "z_mm": stage.z_mm,
+            "alarm": stage.alarm,
+        },
+        "sensor": {
+            "connected": health.sensor_connected,
+            "frames": health.frames,
+            "frames_lost": health.frames_lost,
+            "frames_dropped_on_bus": health.frames_dropped_on_bus,
+            "clock_offset_s": health.clock_offset_s,
+            "clock_uncertainty_s": health.clock_uncertainty_s,
+        },
+        "uptime_s": health.uptime_s,
+    })
+}
+
+fn print(reply: &pb::CommandReply) {
+    let state = reply.state.clone().unwrap_or_default();
+    let stage = reply.stage.unwrap_or_default();
+    let health = reply.health.clone().unwrap_or_default();
+    let simulated = if health.simulated { " (SIMULATED)" } else { "" };
+    let run = match state.phase() {
+        pb::RunPhase::Idle | pb::RunPhase::Unspecified => "none since the start".into(),
+        pb::RunPhase::Finished => {
+            format!("{}: {} {}", state.run_id, exit::word(state.exit_status()), state.message)
+        }
+        phase @ (pb::RunPhase::Preparing
+        | pb::RunPhase::Running
+        | pb::RunPhase::Paused
+        | pb::RunPhase::Stopping) => format!(
+            "{}: {}, {}/{} presses, {} frames, {} lost, {} left {}",
+            state.run_id,
+            phase_word(phase),
+            state.presses,
+            state.presses_planned,
+            state.frames,
+            state.frames_lost,
+            duration(state.remaining_s.max(0.0)),
+            state.message
+        ),
+    };
+    let sensor = if health.sensor_connected { "connected" } else { "LOST" };
+    let clock = match (health.clock_offset_s, health.clock_uncertainty_s) {
+        (Some(offset_s), Some(uncertainty_s)) => {
+            format!("device clock {offset_s:+.3} s, known to {:.1} ms", uncertainty_s * 1e3)
+        }
+        _ => "no estimate of the device clock".into(),
+    };
+    print_fields(&[
+        ("rig", format!("{}{simulated}", reply.rig)),
+        ("run", run.trim_end().to_owned()),
+        (
+            "stage",
+            format!(
+                "{} at x {:.3}, y {:.3}, z {:.3} mm",
+                stage_word(stage.status()),
+                stage.x_mm,
+                stage.y_mm,
+                stage.z_mm
+            ),
+        ),
+        ("sensor", format!("{sensor}, {} frames, {} lost; {clock}", health.frames, health.frames_lost)),
+        ("service", format!("version {}, up {}", reply.version, duration(health.uptime_s))),
+    ]);
+}
+
+/// The word for where a run stands.
+pub(crate) fn phase_word(phase: pb::RunPhase) -> &'static str {
+    match phase {
+        pb::RunPhase::Unspecified => "unknown",
+        pb::RunPhase::Idle => "idle",
+        pb::RunPhase::Preparing => "preparing",
+        pb::RunPhase::Running => "running",
+        pb::RunPhase::Paused => "paused",
+        pb::RunPhase::Stopping => "stopping",
+        pb::RunPhase::Finished => "finished",
+    }
+}
+
+/// The word for what the stage does.
+pub(crate) fn stage_word(status: pb::StageStatus) -> &'static str {
+    match status {
+        pb::StageStatus::Unspecified => "unknown",
+        pb::StageStatus::Disconnected => "DISCONNECTED",
+        pb::StageStatus::Unhomed => "not homed",
+        pb::StageStatus::Idle => "idle",
+        pb::StageStatus::Moving => "moving",
+        pb::StageStatus::Hold => "hold",
+        pb::StageStatus::Homing => "homing",
+        pb::StageStatus::Alarm => "ALARM",
+    }
+}

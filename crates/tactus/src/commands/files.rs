@@ -1,0 +1,82 @@
+//! `record info`, `export`, `recover`, `report`: what is done with recordings.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+use tactus_record::Completeness;
+
+use crate::cli::{Common, ExportArgs, RecoverArgs, ReportArgs};
+use crate::commands::run::write_report;
+use crate::exit::Exit;
+use crate::output::print_fields;
+
+pub(crate) fn info(common: &Common, file: &Path) -> anyhow::Result<Exit> {
+    let info = tactus_record::info(file)?;
+    if common.json {
+        println!("{}", serde_json::to_string(&info)?);
+    } else {
+        println!("{info}");
+    }
+    let whole = info.completeness == Completeness::Complete && info.exit_status.is_some();
+    if !whole {
+        eprintln!(
+            "tactus: this recording was cut off; `tactus recover {}` makes a whole one of it",
+            file.display()
+        );
+    }
+    Ok(if whole { Exit::Done } else { Exit::Degraded })
+}
+
+pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit> {
+    let out = args.out.clone().unwrap_or_else(|| beside(args.recordings.first(), "table.parquet"));
+    let summary = tactus_record::export(&args.recordings, &out)?;
+    if common.json {
+        println!("{}", serde_json::to_string(&summary)?);
+    } else {
+        for warning in &summary.warnings {
+            eprintln!("warning: {warning}");
+        }
+        print_fields(&[
+            ("table", out.display().to_string()),
+            ("rows", summary.rows.to_string()),
+            ("runs", summary.runs.to_string()),
+        ]);
+    }
+    Ok(if summary.warnings.is_empty() { Exit::Done } else { Exit::Degraded })
+}
+
+pub(crate) fn recover(common: &Common, args: &RecoverArgs) -> anyhow::Result<Exit> {
+    let out = args.out.clone().unwrap_or_else(|| beside(Some(&args.recording), "recovered.mcap"));
+    let recovery = tactus_record::recover(&args.recording, &out)?;
+    if common.json {
+        println!(
+            "{}",
+            json!({
+                "recording": out,
+                "damage": recovery.damage,
+                "messages": recovery.messages,
+                "closed_as_crashed": recovery.closed,
+                "info": recovery.info,
+            })
+        );
+    } else {
+        println!("recovered {} messages into {}", recovery.messages, out.display());
+        println!("{}", recovery.info);
+    }
+    Ok(Exit::Done)
+}
+
+pub(crate) fn report(common: &Common, args: &ReportArgs) -> anyhow::Result<Exit> {
+    let out = args.out.clone().unwrap_or_else(|| beside(Some(&args.recording), "report.html"));
+    let path = write_report(&args.recording, &out)?;
+    if common.json {
+        println!("{}", json!({ "report": path }));
+    } else {
+        print_fields(&[("report", path.display().to_string())]);
+    }
+    Ok(Exit::Done)
+}
+
+fn beside(recording: Option<&PathBuf>, name: &str) -> PathBuf {
+    recording.map_or_else(|| PathBuf::from(name), |recording| recording.with_file_name(name))
+}

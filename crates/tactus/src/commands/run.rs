@@ -1,0 +1,122 @@
+//! `run`: one experiment, on the service or on the embedded simulated rig, with progress and a report.
+
+mod embedded;
+mod served;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use serde_json::json;
+use tactus_plan::{Arguments, Script};
+use tactus_schema::pb;
+
+use crate::cli::{Common, ExperimentArgs, RunArgs};
+use crate::connection;
+use crate::exit::{self, Exit, Failure};
+use crate::output::{duration, print_fields};
+
+/// How a run ended, wherever it ran.
+struct Summary {
+    run_id: String,
+    experiment: String,
+    exit_status: pb::ExitStatus,
+    message: String,
+    simulated: bool,
+    embedded: bool,
+    frames: u64,
+    frames_lost: u64,
+    presses: u32,
+    dwells: u32,
+    duration_s: f64,
+    recording: PathBuf,
+}
+
+pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
+    let (script, arguments) = experiment(&args.experiment)?;
+    let summary = if args.embedded || args.rig_file.is_some() {
+        embedded::run(common, args, script, arguments, "as asked")?
+    } else {
+        let runtime = connection::runtime()?;
+        match runtime.block_on(connection::find(common))? {
+            Some(client) => runtime.block_on(served::run(client, common, args, &script, &arguments))?,
+            None => {
+                embedded::run(common, args, script, arguments, &format!("no service at {}", common.endpoint))?
+            }
+        }
+    };
+    let report =
+        if args.no_report { None } else { make_report(&summary.recording, &args.out.join(&summary.run_id)) };
+    if common.json {
+        println!("{}", to_json(&summary, report.as_deref()));
+    } else {
+        print(&summary, report.as_deref());
+    }
+    Ok(Exit::of_run(summary.exit_status))
+}
+
+/// The script and the parameters that were asked for.
+pub(super) fn experiment(args: &ExperimentArgs) -> anyhow::Result<(Script, Arguments)> {
+    let script = tactus_daemon::experiments::find(&args.experiment, None)
+        .map_err(|error| Failure::new(Exit::Usage, error))?;
+    let mut arguments = Arguments::default();
+    for parameter in &args.parameters {
+        arguments.set(parameter).map_err(|error| Failure::new(Exit::Usage, error))?;
+    }
+    Ok((script, arguments))
+}
+
+/// Writes the report beside the recording, or where that may not be written, into the run's folder here.
+fn make_report(recording: &Path, folder: &Path) -> Option<PathBuf> {
+    let made = write_report(recording, &recording.with_file_name("report.html")).or_else(|_| {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        write_report(recording, &folder.join("report.html"))
+    });
+    match made {
+        Ok(path) => Some(path),
+        Err(error) => {
+            eprintln!("tactus: no report: {error:#}; `tactus report {}` makes it", recording.display());
+            None
+        }
+    }
+}
+
+/// Writes the report of a recording and returns its absolute path.
+pub(super) fn write_report(recording: &Path, path: &Path) -> anyhow::Result<PathBuf> {
+    let report = tactus_report::run_report(recording)?;
+    std::fs::write(path, tactus_report::render_html(&report)).with_context(|| path.display().to_string())?;
+    Ok(std::path::absolute(path)?)
+}
+
+fn to_json(summary: &Summary, report: Option<&Path>) -> serde_json::Value {
+    json!({
+        "run_id": summary.run_id,
+        "experiment": summary.experiment,
+        "exit_status": exit::word(summary.exit_status),
+        "message": summary.message,
+        "simulated": summary.simulated,
+        "embedded": summary.embedded,
+        "frames": summary.frames,
+        "frames_lost": summary.frames_lost,
+        "presses": summary.presses,
+        "dwells": summary.dwells,
+        "duration_s": summary.duration_s,
+        "recording": summary.recording,
+        "report": report,
+    })
+}
+
+fn print(summary: &Summary, report: Option<&Path>) {
+    let simulated = if summary.simulated { " (SIMULATED)" } else { "" };
+    let mut fields = vec![
+        ("run", format!("{}{simulated}", summary.run_id)),
+        ("ended", format!("{} {}", exit::word(summary.exit_status), summary.message).trim_end().to_owned()),
+        ("presses", format!("{}, {} dwells", summary.presses, summary.dwells)),
+        ("frames", format!("{}, {} lost", summary.frames, summary.frames_lost)),
+        ("duration", duration(summary.duration_s)),
+        ("recording", summary.recording.display().to_string()),
+    ];
+    if let Some(report) = report {
+        fields.push(("report", report.display().to_string()));
+    }
+    print_fields(&fields);
+}

@@ -1,0 +1,114 @@
+//! A run on the embedded simulated rig.
+
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use tactus_daemon::config;
+use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG};
+use tactus_daemon::order::Ask;
+use tactus_engine::{Engine, StopOrder};
+use tactus_plan::{Arguments, Script};
+use tactus_schema::Rig;
+use tactus_schema::pb::{self, RunPhase};
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::time::{MissedTickBehavior, interval};
+
+use super::Summary;
+use crate::cli::{Common, RunArgs};
+use crate::connection;
+use crate::exit::{Exit, Failure};
+use crate::progress::Progress;
+
+/// How often the progress is drawn.
+const REDRAW: Duration = Duration::from_millis(100);
+
+pub(super) fn run(
+    common: &Common,
+    args: &RunArgs,
+    script: Script,
+    arguments: Arguments,
+    why: &str,
+) -> anyhow::Result<Summary> {
+    let (rig, rig_toml) = match &args.rig_file {
+        Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?,
+        None => (Rig::from_toml(SIMULATED_RIG)?, SIMULATED_RIG.to_owned()),
+    };
+    if !rig.simulated {
+        let error =
+            format!("rig {:?} is not simulated: real devices are run by the service, `tactusd`", rig.name);
+        return Err(Failure::new(Exit::Usage, error).into());
+    }
+    let pace = if args.real_time { Pace::Real } else { Pace::Virtual };
+    if !common.json {
+        let time = if args.real_time { "real time" } else { "virtual time, nobody waits" };
+        println!("SIMULATED: running on the embedded simulated rig {:?} ({why}; {time})", rig.name);
+    }
+    let ask = Ask { script, arguments, seed: args.experiment.seed, who: args.who.clone() };
+    let simulated = rig.simulated;
+    let silent = common.json;
+    let mut attending = None;
+    let done = embedded::run(&rig, &rig_toml, ask, &args.out, pace, |engine, _| {
+        attending = attend(engine.clone(), silent);
+    });
+    if let Some(attending) = attending {
+        // It ends with the run, and takes the bar away; a panic there has told itself.
+        drop(attending.join());
+    }
+    let Finished { outcome, recording } = done.map_err(|error| match error {
+        EmbeddedError::NotPossible(plan) => {
+            let refused = plan.outcome.exit_status == pb::ExitStatus::Refused;
+            let exit = if refused { Exit::Refused } else { Exit::Failed };
+            anyhow::Error::from(Failure::new(exit, format!("nothing was moved: {}", plan.outcome.message)))
+        }
+        EmbeddedError::Script(error) => Failure::new(Exit::Usage, error).into(),
+        error @ EmbeddedError::NotEmbedded { .. } => Failure::new(Exit::Usage, error).into(),
+        error @ (EmbeddedError::Rig(_)
+        | EmbeddedError::Engine(_)
+        | EmbeddedError::Twin(_)
+        | EmbeddedError::Record(_)
+        | EmbeddedError::System(_)) => error.into(),
+    })?;
+    Ok(Summary {
+        run_id: outcome.run_id,
+        experiment: outcome.experiment,
+        exit_status: outcome.exit_status,
+        message: outcome.message,
+        simulated,
+        embedded: true,
+        frames: outcome.frames,
+        frames_lost: outcome.frames_lost,
+        presses: outcome.presses,
+        dwells: outcome.dwells,
+        duration_s: outcome.duration_s,
+        recording: std::path::absolute(recording)?,
+    })
+}
+
+/// Shows the progress and passes Ctrl-C on, from a thread of its own: the run may take this one.
+fn attend(engine: Engine, silent: bool) -> Option<JoinHandle<()>> {
+    // Without a thread there is no progress, but the run goes on.
+    let spawned = thread::Builder::new().name("progress".into()).spawn(move || {
+        if let Ok(runtime) = connection::runtime() {
+            runtime.block_on(follow(&engine, &Progress::new(silent)));
+        }
+    });
+    spawned.ok()
+}
+
+async fn follow(engine: &Engine, progress: &Progress) {
+    let Ok(mut interrupts) = signal(SignalKind::interrupt()) else { return };
+    let mut redraw = interval(REDRAW);
+    redraw.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    let (state, mut ended) = (engine.state(), engine.state());
+    loop {
+        tokio::select! {
+            biased;
+            Some(()) = interrupts.recv() => {
+                progress.say("Ctrl-C: stopping and retracting");
+                engine.stop(StopOrder { by: "cli".into(), reason: "Ctrl-C".into(), abort: false });
+            }
+            _ = ended.wait_for(|state| state.phase() == RunPhase::Finished) => return progress.clear(),
+            _ = redraw.tick() => progress.show(&state.borrow().clone()),
+        }
+    }
+}

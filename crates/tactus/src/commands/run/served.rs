@@ -1,0 +1,86 @@
+//! A run on the service.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use tactus_bus::{Client, History};
+use tactus_plan::{Arguments, Script};
+use tactus_schema::key::Command;
+use tactus_schema::pb::{self, RunPhase, RunState};
+use tokio::signal::unix::{SignalKind, signal};
+
+use super::Summary;
+use crate::cli::{Common, RunArgs};
+use crate::connection::{self, PATIENCE};
+use crate::progress::Progress;
+
+/// How long the dry run may take before the service answers.
+const DRY_RUN_PATIENCE: Duration = Duration::from_mins(5);
+
+pub(super) async fn run(
+    client: Client,
+    common: &Common,
+    args: &RunArgs,
+    script: &Script,
+    arguments: &Arguments,
+) -> anyhow::Result<Summary> {
+    if !common.json {
+        println!("running on the service at {} (rig {:?})", client.endpoint(), client.rig());
+    }
+    let mut states = client.subscribe::<RunState>(History::Last).await?;
+    let request = pb::RunRequest {
+        experiment: script.name().to_owned(),
+        script: script.source().to_owned(),
+        parameters_json: arguments.to_json(),
+        seed: args.experiment.seed,
+        who: args.who.clone(),
+    };
+    let reply = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await?;
+    let accepted = reply.state.context("the service's answer has no state; is it of another version?")?;
+
+    let progress = Progress::new(common.json);
+    let mut alive = client.alive();
+    let mut interrupts = signal(SignalKind::interrupt())?;
+    let finished = loop {
+        tokio::select! {
+            biased;
+            Some(()) = interrupts.recv() => {
+                progress.say("Ctrl-C: stopping and retracting");
+                let request = pb::CommandRequest { who: "cli".into(), reason: "Ctrl-C".into(), abort: false };
+                if let Err(error) = connection::ask(&client, Command::Stop, &request, PATIENCE).await {
+                    progress.say(&format!("STOP FAILED: {error:#}; Ctrl-C tries again"));
+                }
+            }
+            there = alive.changed() => if there != Some(true) {
+                bail!("the service went away during run {}; `tactus status` tells whether it is back", accepted.run_id);
+            },
+            state = states.recv() => {
+                let state = state.context("the connection to the service ended")?;
+                if state.run_id != accepted.run_id {
+                    continue;
+                }
+                if state.phase() == RunPhase::Finished {
+                    break state;
+                }
+                progress.show(&state);
+            }
+        }
+    };
+    progress.clear();
+    client.close().await?;
+    Ok(Summary {
+        exit_status: finished.exit_status(),
+        run_id: finished.run_id,
+        experiment: finished.experiment,
+        message: finished.message,
+        simulated: finished.simulated,
+        embedded: false,
+        frames: finished.frames,
+        frames_lost: finished.frames_lost,
+        presses: finished.presses,
+        dwells: finished.dwells,
+        duration_s: finished.elapsed_s,
+        recording: PathBuf::from(finished.recording),
+    })
+}

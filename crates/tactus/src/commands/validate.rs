@@ -1,0 +1,88 @@
+//! `validate`: every file goes through the constructor that the service uses.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use serde_json::json;
+use tactus_daemon::config::{self, Config};
+use tactus_daemon::embedded::SIMULATED_RIG;
+use tactus_daemon::experiments;
+use tactus_plan::RigView;
+use tactus_record::Completeness;
+use tactus_schema::Rig;
+
+use crate::cli::{Common, ValidateArgs};
+use crate::exit::Exit;
+
+pub(crate) fn validate(common: &Common, args: &ValidateArgs) -> Exit {
+    let results: Vec<_> = args.files.iter().map(|file| (file, check(file))).collect();
+    for (file, result) in &results {
+        match result {
+            _ if common.json => {}
+            Ok(what) => println!("{}: ok, {what}", file.display()),
+            Err(error) => eprintln!("{}: {error:#}", file.display()),
+        }
+    }
+    if common.json {
+        let files: Vec<_> = results
+            .iter()
+            .map(|(file, result)| match result {
+                Ok(what) => json!({ "file": file, "ok": true, "what": what }),
+                Err(error) => json!({ "file": file, "ok": false, "error": format!("{error:#}") }),
+            })
+            .collect();
+        println!("{}", json!({ "files": files }));
+    }
+    if results.iter().all(|(_, result)| result.is_ok()) { Exit::Done } else { Exit::Failed }
+}
+
+/// What the file is, in words, if nothing is wrong with it.
+fn check(file: &Path) -> anyhow::Result<String> {
+    match file.extension().and_then(|extension| extension.to_str()) {
+        Some("toml") => check_toml(file),
+        Some("star") => check_script(file),
+        Some("parquet") => {
+            let table = tactus_record::table::validate(file)?;
+            Ok(format!("a measurement table of {} rows, {} runs", table.rows, table.runs))
+        }
+        Some("mcap") => check_recording(file),
+        _ => bail!("only .toml, .star, .parquet and .mcap files can be validated"),
+    }
+}
+
+/// A rig says so in its `schema`; what has none is a service's configuration.
+fn check_toml(file: &Path) -> anyhow::Result<String> {
+    let text = std::fs::read_to_string(file).context("cannot be read")?;
+    let is_rig = text.lines().any(|line| line.trim_start().starts_with("schema"));
+    if is_rig {
+        let (rig, _) = config::load_rig(file)?;
+        return Ok(format!("rig {:?}, {} x {} elements", rig.name, rig.array.rows(), rig.array.cols()));
+    }
+    let config = Config::load(file)?;
+    Ok(format!("a service's configuration for rig {:?}", config.rig.name))
+}
+
+fn check_script(file: &Path) -> anyhow::Result<String> {
+    let script = experiments::find(&file.to_string_lossy(), None)?;
+    let rig = Rig::from_toml(SIMULATED_RIG)?;
+    let parameters = script.parameters(&RigView::of(&rig))?;
+    Ok(format!(
+        "experiment {:?} with {} parameters; `tactus plan` dry-runs it",
+        script.name(),
+        parameters.len()
+    ))
+}
+
+fn check_recording(file: &Path) -> anyhow::Result<String> {
+    let info = tactus_record::info(file)?;
+    match (&info.completeness, info.exit_status) {
+        (Completeness::Complete, Some(status)) => Ok(format!(
+            "the recording of run {}, {status}, {} frames, {} lost",
+            info.run_id, info.frames, info.frames_lost
+        )),
+        (Completeness::Complete, None) => bail!("the run was never closed; `tactus recover` closes it"),
+        (Completeness::Truncated { at_byte, reason }, _) => {
+            bail!("damaged at byte {at_byte}: {reason}; `tactus recover` saves what is before it")
+        }
+    }
+}

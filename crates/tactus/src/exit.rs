@@ -1,0 +1,87 @@
+//! The exit codes: 0 done; 1 failed; 2 usage; 3 done but something was lost; 4 refused by safety; 5 not now.
+
+use std::fmt;
+use std::process::ExitCode;
+
+use tactus_schema::pb::ExitStatus;
+
+/// How the program ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Exit {
+    Done = 0,
+    Failed = 1,
+    Usage = 2,
+    Degraded = 3,
+    Refused = 4,
+    NotNow = 5,
+}
+
+/// An error with the exit code that belongs to it. Errors without one are failures.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub(crate) exit: Exit,
+    message: String,
+}
+
+impl Failure {
+    pub(crate) fn new(exit: Exit, message: impl fmt::Display) -> Self {
+        Self { exit, message: message.to_string() }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl Exit {
+    /// The exit code of a run that ended so.
+    pub(crate) fn of_run(status: ExitStatus) -> Self {
+        match status {
+            ExitStatus::Done => Self::Done,
+            ExitStatus::Degraded => Self::Degraded,
+            ExitStatus::Refused => Self::Refused,
+            ExitStatus::Unspecified
+            | ExitStatus::Failed
+            | ExitStatus::Stopped
+            | ExitStatus::Aborted
+            | ExitStatus::Crashed => Self::Failed,
+        }
+    }
+
+    /// The exit code that the service put into an answer.
+    pub(crate) fn of_reply(code: u32) -> Self {
+        [Self::Done, Self::Failed, Self::Usage, Self::Degraded, Self::Refused, Self::NotNow]
+            .into_iter()
+            .find(|exit| *exit as u32 == code)
+            .unwrap_or(Self::Failed)
+    }
+
+    /// The exit code of an error.
+    pub(crate) fn of_error(error: &anyhow::Error) -> Self {
+        error.downcast_ref::<Failure>().map_or(Self::Failed, |failure| failure.exit)
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// The word for an exit status, as it stands in JSON and on the terminal.
+pub(crate) fn word(status: ExitStatus) -> &'static str {
+    match status {
+        ExitStatus::Unspecified => "unknown",
+        ExitStatus::Done => "done",
+        ExitStatus::Degraded => "degraded",
+        ExitStatus::Failed => "failed",
+        ExitStatus::Stopped => "stopped",
+        ExitStatus::Aborted => "aborted",
+        ExitStatus::Refused => "refused",
+        ExitStatus::Crashed => "crashed",
+    }
+}

@@ -1,0 +1,12 @@
+//! The command line of Tactus: a client of the service, and everything that works on files.
+#![expect(clippy::print_stdout, reason = "standard output is this program's interface")]
+#![expect(clippy::print_stderr, reason = "errors and hints go to standard error, results to standard output")]
+
+mod cli;
+mod commands;
+mod connection;
+mod exit;
+mod output;
+mod progress;
+
+pub use cli::main;

@@ -1,0 +1,7 @@
+//! `tactus`: the command line and terminal view.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    tactus::main()
+}

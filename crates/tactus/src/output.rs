@@ -1,0 +1,51 @@
+//! What people read: aligned tables, and durations in words.
+
+use std::fmt::Write as _;
+
+/// Prints `name  value` lines with the values aligned.
+pub(crate) fn print_fields(fields: &[(&str, String)]) {
+    let width = fields.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    for (name, value) in fields {
+        println!("{name:width$}  {value}");
+    }
+}
+
+/// Prints a table with a header, columns aligned to their widest cell.
+pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
+    let mut widths: Vec<_> = header.iter().map(|cell| cell.chars().count()).collect();
+    for row in rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = (*width).max(cell.chars().count());
+        }
+    }
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        let mut line = String::new();
+        for (cell, width) in cells.zip(&widths) {
+            // Writing to a string cannot fail.
+            let _written = write!(line, "{cell:width$}  ");
+        }
+        println!("{}", line.trim_end());
+    };
+    line(&mut header.iter().copied());
+    for row in rows {
+        line(&mut row.iter().map(String::as_str));
+    }
+}
+
+/// `4 min 05 s`, `12.3 s`.
+pub(crate) fn duration(seconds: f64) -> String {
+    if seconds < 60.0 {
+        return format!("{seconds:.1} s");
+    }
+    let whole = seconds.round();
+    let (hours, minutes, rest) = ((whole / 3600.0).floor(), (whole / 60.0).floor() % 60.0, whole % 60.0);
+    if hours > 0.0 {
+        format!("{hours:.0} h {minutes:02.0} min")
+    } else {
+        format!("{minutes:.0} min {rest:02.0} s")
+    }
+}
+
+#[cfg(test)]
+#[path = "output_tests.rs"]
+mod tests;

@@ -1,0 +1,51 @@
+//! What the program says of itself.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use std::process::{Command, Output};
+
+fn tactus(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tactus")).args(args).output().unwrap()
+}
+
+#[test]
+fn the_help_names_every_command() {
+    let help = String::from_utf8(tactus(&["--help"]).stdout).unwrap();
+    for command in [
+        "run",
+        "plan",
+        "status",
+        "stop",
+        "pause",
+        "resume",
+        "reset",
+        "watch",
+        "record",
+        "export",
+        "recover",
+        "report",
+        "validate",
+        "completions",
+    ] {
+        assert!(help.lines().any(|line| line.trim_start().starts_with(command)), "{command} in {help}");
+    }
+}
+
+#[test]
+fn completions_are_there_for_each_shell() {
+    for (shell, word) in [("bash", "complete"), ("zsh", "#compdef tactus"), ("fish", "complete -c tactus")] {
+        let completions = tactus(&["completions", shell]);
+        assert!(completions.status.success());
+        assert!(String::from_utf8(completions.stdout).unwrap().contains(word), "{shell}");
+    }
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2_and_a_missing_service_says_how_to_start_one() {
+    assert_eq!(tactus(&["runn"]).status.code(), Some(2));
+    let status = tactus(&["--endpoint", "tcp/127.0.0.1:1", "status"]);
+    assert_eq!(status.status.code(), Some(1));
+    let said = String::from_utf8(status.stderr).unwrap();
+    assert!(said.contains("no service at tcp/127.0.0.1:1") && said.contains("tactusd --config"), "{said}");
+    let endpoint = tactus(&["--endpoint", "nowhere", "status"]);
+    assert_eq!(endpoint.status.code(), Some(2));
+}
