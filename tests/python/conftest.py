@@ -1,0 +1,18 @@
+"""The runs that the tests look at."""
+
+import pytest
+from lab import Lab, tactus
+
+
+@pytest.fixture(scope="session")
+def element_centres(tmp_path_factory):
+    """An element-centre run on the embedded rig: its summary."""
+    folder = tmp_path_factory.mktemp("embedded")
+    return tactus("run", "element-centres", "--embedded", "--seed", 3, "--no-report", cwd=folder)
+
+
+@pytest.fixture
+def lab(tmp_path):
+    lab = Lab(tmp_path)
+    yield lab
+    lab.close()

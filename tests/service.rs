@@ -1,0 +1,211 @@
+//! The service against virtual devices on pseudo-terminals, in real time.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rustix::process::Signal;
+use serde_json::Value;
+use tactus_e2e::{Lab, tactus};
+use tactus_record::{Entry, Message};
+use tactus_schema::pb::{self, run_event::Event};
+
+const HOLD: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 600.0)\n";
+const PRESSES: &str =
+    "def run(rig):\n    tare()\n    for i in range(4):\n        press(5.0, 5.0, depths_mm = [0.2, 0.4])\n";
+const LONG_DWELL: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 3.0)\n";
+
+fn messages(recording: &Path) -> Vec<Message> {
+    let entries = tactus_record::read(recording).unwrap();
+    entries
+        .filter_map(|entry| match entry.unwrap() {
+            Entry::Message { message, .. } => Some(message),
+            Entry::Run(_) | Entry::Attachment(_) => None,
+        })
+        .collect()
+}
+
+fn events(recording: &Path) -> Vec<Event> {
+    let of_run = |message| if let Message::Event(event) = message { event.event } else { None };
+    messages(recording).into_iter().filter_map(of_run).collect()
+}
+
+fn recording(lab: &Lab) -> PathBuf {
+    let runs: Vec<_> =
+        fs::read_dir(lab.folder.path().join("runs")).unwrap().map(|run| run.unwrap().path()).collect();
+    assert_eq!(runs.len(), 1, "{runs:?}");
+    runs[0].join("recording.mcap")
+}
+
+/// Waits until the array feels the tip, as a viewer of the live frames sees it.
+fn wait_until_pressing(lab: &Lab) {
+    let mut viewer = lab.start_tactus(&["watch", "--json"]);
+    viewer.wait_until(|line| {
+        let frame: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
+        let counts = frame["counts"].as_array().unwrap();
+        // At rest an element reads about 100 counts; a press of 0.2 mm adds 200.
+        counts.iter().any(|count| count.as_f64().unwrap() > 250.0)
+    });
+}
+
+/// What the service is doing.
+fn status(lab: &Lab) -> Value {
+    let said = lab.tactus(&["--json", "status"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    said.json()
+}
+
+#[test]
+fn a_run_started_by_the_cli_is_done_and_recorded() {
+    let lab = Lab::start(|rig| rig);
+    let script = lab.script("presses.star", PRESSES);
+    let said = lab.tactus(&["--json", "run", &script]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let summary = said.json();
+    assert_eq!(
+        (&summary["presses"], &summary["dwells"], &summary["frames_lost"]),
+        (&4.into(), &8.into(), &0.into())
+    );
+    assert_eq!(summary["embedded"], false);
+    let frames = messages(Path::new(summary["recording"].as_str().unwrap()))
+        .iter()
+        .filter(|message| matches!(message, Message::Frame(_)))
+        .count();
+    assert_eq!(frames as u64, summary["frames"].as_u64().unwrap());
+    assert!(Path::new(summary["report"].as_str().unwrap()).is_file());
+}
+
+#[test]
+fn sigterm_in_the_middle_of_a_press_retracts_and_closes_the_recording() {
+    let lab = Lab::start(|rig| rig);
+    let script = lab.script("hold.star", HOLD);
+    let _client = lab.start_tactus(&["run", &script]);
+    wait_until_pressing(&lab);
+    let recording = recording(&lab);
+    lab.daemon.signal(Signal::TERM);
+    let (code, said) = lab.daemon.wait();
+    assert_eq!(code, Some(0), "{said}");
+
+    let info = tactus(lab.folder.path(), &["--json", "record", "info", &recording.display().to_string()]);
+    assert_eq!(info.code, Some(0), "{info:?}");
+    assert_eq!(info.json()["exit_status"], "stopped");
+    let cleanup = events(&recording)
+        .into_iter()
+        .find_map(|event| if let Event::Cleanup(cleanup) = event { Some(cleanup) } else { None });
+    let cleanup = cleanup.expect("a clean-up event");
+    assert!(cleanup.retracted && (cleanup.z_mm - 2.0).abs() < 0.01, "{cleanup:?}");
+}
+
+#[test]
+fn a_sensor_that_goes_for_two_seconds_is_a_gap_of_sixty_frames_and_the_press_is_repeated() {
+    let mut lab = Lab::start(|rig| rig);
+    let script = lab.script("long.star", LONG_DWELL);
+    let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
+    wait_until_pressing(&lab);
+    lab.mock.type_line("sensor disconnect 2s");
+    let (code, said) = client.wait();
+    assert_eq!(code, Some(3), "{said}");
+
+    let recording = recording(&lab);
+    let events = events(&recording);
+    let gaps: Vec<_> = events
+        .iter()
+        .filter_map(|event| if let Event::Gap(gap) = event { Some(gap) } else { None })
+        .collect();
+    assert_eq!(gaps.len(), 1, "{gaps:?}");
+    // Two seconds without a device, and the time in which the driver finds it again.
+    assert!((59..=110).contains(&gaps[0].frames_lost), "{gaps:?}");
+    assert_eq!(gaps[0].next_seq - gaps[0].after_seq - 1, gaps[0].frames_lost);
+    assert!(events.iter().any(|event| matches!(event, Event::PressRepeated(_))));
+    let Some(Event::Finished(finished)) = events.last() else { panic!("{events:?}") };
+    assert_eq!(finished.exit_status(), pb::ExitStatus::Degraded);
+    assert_eq!((finished.presses, finished.frames_lost), (1, gaps[0].frames_lost));
+}
+
+#[test]
+fn where_the_policy_says_fail_a_lost_sensor_fails_the_run_with_the_tip_up() {
+    let mut lab = Lab::start(|rig| rig.replace("on_gap = \"repeat\"", "on_gap = \"fail\""));
+    let script = lab.script("hold.star", HOLD);
+    let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
+    wait_until_pressing(&lab);
+    lab.mock.type_line("sensor disconnect 2s");
+    let (code, said) = client.wait();
+    assert_eq!(code, Some(1), "{said}");
+    let events = events(&recording(&lab));
+    assert!(
+        events.iter().any(|event| matches!(event, Event::Cleanup(cleanup) if cleanup.retracted)),
+        "{events:?}"
+    );
+}
+
+#[test]
+fn stop_pause_and_resume_work_from_another_client() {
+    let lab = Lab::start(|rig| rig);
+    assert_eq!(lab.tactus(&["pause"]).code, Some(1), "no run can be paused");
+    assert_eq!(lab.tactus(&["stop"]).code, Some(0), "stop is never refused");
+
+    let script = lab.script("presses.star", PRESSES);
+    let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
+    wait_until_pressing(&lab);
+    assert_eq!(lab.tactus(&["pause"]).code, Some(0));
+    let paused = loop {
+        let status = status(&lab);
+        if status["run"]["phase"] == "paused" {
+            break status;
+        }
+    };
+    assert!(paused["stage"]["z_mm"].as_f64().unwrap() > 1.9, "a paused rig presses nothing: {paused}");
+    assert_eq!(lab.tactus(&["run", &script]).code, Some(5), "one run at a time");
+    assert_eq!(lab.tactus(&["resume"]).code, Some(0));
+    wait_until_pressing(&lab);
+    assert_eq!(lab.tactus(&["stop", "--abort", "--reason", "wrong covering"]).code, Some(0));
+    let (code, said) = client.wait();
+    assert_eq!(code, Some(1), "{said}");
+    let events = events(&recording(&lab));
+    let Some(Event::Finished(finished)) = events.last() else { panic!("{events:?}") };
+    assert_eq!(finished.exit_status(), pb::ExitStatus::Aborted);
+    assert!(finished.message.contains("wrong covering"), "{finished:?}");
+    assert!(events.iter().any(|event| matches!(event, Event::Paused(_))));
+    assert!(events.iter().any(|event| matches!(event, Event::Resumed(_))));
+}
+
+#[test]
+fn a_service_that_is_killed_leaves_a_recording_that_lacks_at_most_a_second() {
+    let lab = Lab::start(|rig| rig);
+    let script = lab.script("hold.star", HOLD);
+    let _client = lab.start_tactus(&["run", &script]);
+    wait_until_pressing(&lab);
+    let recording = recording(&lab);
+    let before = status(&lab)["run"]["frames"].as_u64().unwrap();
+    lab.daemon.signal(Signal::KILL);
+    let (code, _) = lab.daemon.wait();
+    assert_eq!(code, None);
+    let frames =
+        messages(&recording).iter().filter(|message| matches!(message, Message::Frame(_))).count() as u64;
+    assert!(frames + 30 >= before, "{frames} of {before}");
+    let info = tactus(lab.folder.path(), &["record", "info", &recording.display().to_string()]);
+    assert_eq!(info.code, Some(3), "{info:?}");
+}
+
+#[test]
+fn an_alarm_fails_the_run_and_only_an_explicit_reset_makes_the_stage_move_again() {
+    let mut lab = Lab::start(|rig| rig);
+    let script = lab.script("hold.star", HOLD);
+    let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
+    wait_until_pressing(&lab);
+    lab.mock.type_line("stage alarm 1");
+    let (code, said) = client.wait();
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("alarm 1"), "{said}");
+
+    let presses = lab.script("presses.star", PRESSES);
+    let refused = lab.tactus(&["--json", "run", &presses, "--no-report"]);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert_eq!(refused.json()["presses"], 0, "nothing moves before the reset");
+
+    let reset = lab.tactus(&["--json", "reset"]);
+    assert_eq!(reset.code, Some(0), "{reset:?}");
+    assert_eq!(reset.json()["stage"]["status"], "idle");
+    let done = lab.tactus(&["--json", "run", &presses, "--no-report"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+}

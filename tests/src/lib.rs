@@ -1,0 +1,260 @@
+//! Drives the real binaries: starts them, waits for what they say, ends them.
+//!
+//! The binaries are those that `cargo test --workspace` has just built. Nothing here sleeps: every wait is
+//! for a line, an answer or an exit, with a deadline that only a hang can reach.
+#![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Output, Stdio};
+use std::sync::mpsc::{self, Receiver};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Only a hang takes this long.
+pub const DEADLINE: Duration = Duration::from_mins(2);
+
+/// Path of one of our binaries.
+///
+/// # Panics
+/// If it is not there: `cargo test --workspace` builds it.
+pub fn binary(name: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("a test knows its own path");
+    let folder = test.ancestors().nth(2).expect("tests stand in target/<profile>/deps");
+    let path = folder.join(name);
+    assert!(path.is_file(), "{} is missing: run `cargo test --workspace`", path.display());
+    path
+}
+
+/// A file of the repository.
+pub fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+/// What a finished command said.
+#[derive(Debug)]
+pub struct Said {
+    /// Exit code; `None` after a signal.
+    pub code: Option<i32>,
+    /// Standard output.
+    pub out: String,
+    /// Standard error.
+    pub err: String,
+}
+
+impl Said {
+    /// The one JSON object on standard output.
+    ///
+    /// # Panics
+    /// If it is none.
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error} in {self:?}"))
+    }
+}
+
+impl From<Output> for Said {
+    fn from(output: Output) -> Self {
+        Self {
+            code: output.status.code(),
+            out: String::from_utf8_lossy(&output.stdout).into_owned(),
+            err: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+}
+
+/// Runs `tactus` to its end, in `folder`.
+///
+/// # Panics
+/// If it cannot be started.
+pub fn tactus(folder: &Path, args: &[&str]) -> Said {
+    let output = Command::new(binary("tactus")).args(args).current_dir(folder).stdin(Stdio::null()).output();
+    output.expect("tactus starts").into()
+}
+
+/// A process that runs beside the test and is killed with it.
+#[derive(Debug)]
+pub struct Process {
+    name: String,
+    child: Child,
+    stdin: ChildStdin,
+    lines: Receiver<String>,
+    seen: Vec<String>,
+}
+
+impl Process {
+    /// Starts one of our binaries; what it writes to standard output and standard error are its lines.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start(name: &str, folder: &Path, args: &[&str]) -> Self {
+        let mut child = Command::new(binary(name))
+            .args(args)
+            .current_dir(folder)
+            .env("RUST_LOG", "info,zenoh=error")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        let (told, lines) = mpsc::channel();
+        let stdin = child.stdin.take().expect("stdin is piped");
+        let streams: [Box<dyn std::io::Read + Send>; 2] = [
+            Box::new(child.stdout.take().expect("stdout is piped")),
+            Box::new(child.stderr.take().expect("stderr is piped")),
+        ];
+        for stream in streams {
+            let told = told.clone();
+            thread::spawn(move || {
+                let lines = BufReader::new(stream).lines().map_while(Result::ok);
+                lines.map(|line| told.send(line)).take_while(Result::is_ok).for_each(drop);
+            });
+        }
+        Self { name: name.to_owned(), child, stdin, lines, seen: Vec::new() }
+    }
+
+    /// Waits for a line that contains `text`, and returns it.
+    ///
+    /// # Panics
+    /// If the process ends or hangs before it says so.
+    pub fn wait_for(&mut self, text: &str) -> String {
+        self.wait_until(|line| line.contains(text))
+    }
+
+    /// Waits for a line that `is_it`, and returns it.
+    ///
+    /// # Panics
+    /// If the process ends or hangs before it says so.
+    pub fn wait_until(&mut self, is_it: impl Fn(&str) -> bool) -> String {
+        let deadline = Instant::now() + DEADLINE;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let Ok(line) = self.lines.recv_timeout(left) else {
+                panic!("{} never said what was waited for; it said:\n{}", self.name, self.seen.join("\n"));
+            };
+            self.seen.push(line.clone());
+            if is_it(&line) {
+                return line;
+            }
+        }
+    }
+
+    /// Types a line into its standard input.
+    ///
+    /// # Panics
+    /// If it does not read any more.
+    pub fn type_line(&mut self, line: &str) {
+        writeln!(self.stdin, "{line}")
+            .and_then(|()| self.stdin.flush())
+            .expect("the process reads its input");
+    }
+
+    /// Sends a signal.
+    ///
+    /// # Panics
+    /// If it has gone already.
+    pub fn signal(&self, signal: Signal) {
+        let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw).expect("a process id");
+        kill_process(pid, signal).expect("the process is there");
+    }
+
+    /// Waits for its end and returns the exit code and everything it said.
+    ///
+    /// # Panics
+    /// If it hangs.
+    pub fn wait(mut self) -> (Option<i32>, String) {
+        let deadline = Instant::now() + DEADLINE;
+        // Both streams end with the process.
+        loop {
+            match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(line) => self.seen.push(line),
+                Err(mpsc::RecvTimeoutError::Disconnected) => break,
+                Err(mpsc::RecvTimeoutError::Timeout) => {
+                    panic!("{} does not end; it said:\n{}", self.name, self.seen.join("\n"))
+                }
+            }
+        }
+        let status = self.child.wait().expect("a child can be waited for");
+        (status.code(), self.seen.join("\n"))
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        if self.child.kill().is_ok() {
+            drop(self.child.wait());
+        }
+    }
+}
+
+/// A virtual rig on pseudo-terminals and a service that owns it, in a folder of their own.
+#[derive(Debug)]
+pub struct Lab {
+    /// The virtual devices; faults are typed into them.
+    pub mock: Process,
+    /// The service.
+    pub daemon: Process,
+    /// Where it listens.
+    pub endpoint: String,
+    /// The working directory of both.
+    pub folder: TempDir,
+}
+
+impl Lab {
+    /// Starts both and waits until frames flow. `change` may rewrite the rig file.
+    ///
+    /// # Panics
+    /// If one of them does not start.
+    pub fn start(change: impl Fn(String) -> String) -> Self {
+        let folder = TempDir::new().expect("a folder");
+        let rig = fs::read_to_string(repository("config/rigs/pty.toml")).expect("the shipped rig");
+        fs::write(folder.path().join("rig.toml"), change(rig)).expect("a writable folder");
+        let endpoint = free_endpoint();
+        let config = format!("rig = \"rig.toml\"\nrecordings = \"runs\"\n[bus]\nlisten = [\"{endpoint}\"]\n");
+        fs::write(folder.path().join("tactusd.toml"), config).expect("a writable folder");
+        let mut mock = Process::start(
+            "tactus-mock",
+            folder.path(),
+            &["rig", "--config", "rig.toml", "--link-dir", "mock"],
+        );
+        mock.wait_for("stage");
+        let mut daemon = Process::start("tactusd", folder.path(), &["--config", "tactusd.toml"]);
+        daemon.wait_for("ready");
+        Self { mock, daemon, endpoint, folder }
+    }
+
+    /// Runs `tactus` against the service, to its end.
+    pub fn tactus(&self, args: &[&str]) -> Said {
+        tactus(self.folder.path(), &[&["--endpoint", &self.endpoint], args].concat())
+    }
+
+    /// Starts `tactus` against the service.
+    pub fn start_tactus(&self, args: &[&str]) -> Process {
+        Process::start("tactus", self.folder.path(), &[&["--endpoint", &self.endpoint], args].concat())
+    }
+
+    /// Writes an experiment script into the folder, and returns its path.
+    ///
+    /// # Panics
+    /// If the folder is not writable.
+    pub fn script(&self, name: &str, source: &str) -> String {
+        let path = self.folder.path().join(name);
+        fs::write(&path, source).expect("a writable folder");
+        path.display().to_string()
+    }
+}
+
+/// An endpoint on this machine that nobody uses.
+///
+/// # Panics
+/// If there is none.
+pub fn free_endpoint() -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    format!("tcp/{}", listener.local_addr().expect("a bound port"))
+}
