@@ -118,7 +118,7 @@ impl Supervisor {
 
     /// A run begins: the zeros of the last one are no longer true.
     pub fn begin(&mut self, depth_max_mm: f64) {
-        self.limits.depth_max_mm = depth_max_mm;
+        self.set_depth_max_mm(depth_max_mm);
         self.reference_counts = None;
         self.tare_counts = None;
     }

@@ -74,14 +74,6 @@ impl From<Exit> for ExitCode {
 
 /// The word for an exit status, as it stands in JSON and on the terminal.
 pub(crate) fn word(status: ExitStatus) -> &'static str {
-    match status {
-        ExitStatus::Unspecified => "unknown",
-        ExitStatus::Done => "done",
-        ExitStatus::Degraded => "degraded",
-        ExitStatus::Failed => "failed",
-        ExitStatus::Stopped => "stopped",
-        ExitStatus::Aborted => "aborted",
-        ExitStatus::Refused => "refused",
-        ExitStatus::Crashed => "crashed",
-    }
+    // A recording always has a status; a run in progress has none yet.
+    if status == ExitStatus::Unspecified { "unknown" } else { tactus_record::exit_status_name(status) }
 }

@@ -195,6 +195,11 @@ impl Run<'_> {
         self.set_phase(Phase::Retract, -1);
         self.shared.retract().await?;
         self.set_phase(Phase::Idle, -1);
+        self.await_the_sensors_return().await
+    }
+
+    /// A silence is no reason to end once frames flow again; then the supervisor watches again.
+    async fn await_the_sensors_return(&self) -> Result<(), Broken> {
         self.shared.forgive_silence();
         self.wait_for_sensor().await?;
         self.shared.live().supervisor.rearm(self.shared.clock.now().mono);
@@ -266,9 +271,7 @@ impl Run<'_> {
             }
             repeats += 1;
             warn!(%broken, "average broken off; it will be repeated");
-            self.shared.forgive_silence();
-            self.wait_for_sensor().await?;
-            self.shared.live().supervisor.rearm(self.shared.clock.now().mono);
+            self.await_the_sensors_return().await?;
         }
     }
 
