@@ -54,7 +54,7 @@ impl Truth {
     /// If the rig was not made by its own constructors, which check what is needed here.
     #[expect(clippy::expect_used, reason = "a checked rig lists its tools, and makes a model")]
     pub fn of(rig: &Rig, simulation: &Simulation, seed: u64) -> Self {
-        let tool = |id: &str| rig.indenters.get(id).copied().expect("a rig's tools are listed");
+        let tool = |id: &str| rig.indenters.get(id).cloned().expect("a rig's tools are listed");
         let response = Response {
             sensitivity_counts_per_mm: spread(
                 &rig.sensitivity_counts_per_mm,
@@ -62,7 +62,7 @@ impl Truth {
                 simulation.seed,
             ),
             baseline_counts: rig.baseline_counts.clone(),
-            quadratic_per_mm: simulation.quadratic_per_mm,
+            quadratic_per_mm: vec![simulation.quadratic_per_mm; rig.array.elements()],
             reference_indenter: tool(&rig.sensitivity_reference.indenter),
             reference_covering: rig.sensitivity_reference.covering,
         };

@@ -159,7 +159,7 @@ impl World {
         self.image_at_mm = Some(key);
         let Truth { model, registration, indenter, wiring, .. } = &*self.truth;
         let contact = Contact {
-            indenter: *indenter,
+            indenter: indenter.clone(),
             position_mm: registration.to_sensor([tip_mm[0], tip_mm[1]]),
             // The tool's sides run along the robot's axes.
             rotation_deg: -registration.rotation_deg,

@@ -101,7 +101,7 @@ async fn a_press_reads_what_the_declared_model_says() {
         Response {
             sensitivity_counts_per_mm: rig.sensitivity_counts_per_mm.clone(),
             baseline_counts: rig.baseline_counts.clone(),
-            quadratic_per_mm: 0.0,
+            quadratic_per_mm: vec![0.0; 48],
             reference_indenter: rig.mounted().unwrap(),
             reference_covering: rig.sensitivity_reference.covering,
         },

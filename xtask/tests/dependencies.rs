@@ -6,8 +6,10 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 14] = [
+const ROWS: [&str; 16] = [
     "tactus-model",
+    "tactus-solid",
+    "tactus-scene",
     "tactus-schema",
     "tactus-wire",
     "tactus-plan",
@@ -24,8 +26,10 @@ const ROWS: [&str; 14] = [
 ];
 
 /// What each layer must not reach for, not even through its dependencies' features.
-const NEVER: [(&str, &[&str]); 3] = [
+const NEVER: [(&str, &[&str]); 5] = [
     ("tactus-model", &["tokio", "rand", "serde"]),
+    ("tactus-solid", &["tokio", "rand", "serde"]),
+    ("tactus-scene", &["tokio", "rand", "serde"]),
     ("tactus-wire", &["tokio", "rand"]),
     ("tactus-plan", &["tokio"]),
 ];

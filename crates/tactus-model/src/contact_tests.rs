@@ -1,3 +1,5 @@
+use std::f64::consts::PI;
+
 use super::*;
 
 fn contact(indenter: Indenter, rotation_deg: f64, depth_mm: f64) -> Contact {
@@ -18,7 +20,7 @@ fn moments(contact: Contact, sigma_mm: f64) -> [f64; 3] {
 
 fn assert_moments(contact: Contact, want: [f64; 3]) {
     for sigma_mm in [0.05, 1.0, 10.0] {
-        for (got, want) in moments(contact, sigma_mm).into_iter().zip(want) {
+        for (got, want) in moments(contact.clone(), sigma_mm).into_iter().zip(want) {
             assert!((got / want - 1.0).abs() < 1e-9, "{contact:?} sigma {sigma_mm}: {got} {want}");
         }
     }
@@ -61,7 +63,7 @@ fn the_slices_of_a_turned_box_have_its_volume_and_moments() {
         let (sin, cos) = f64::to_radians(degrees).sin_cos();
         let in_x = along * cos * cos + across * sin * sin;
         let in_y = along * sin * sin + across * cos * cos;
-        assert_moments(contact(tool, degrees, 0.4), [volume, in_x, in_y]);
+        assert_moments(contact(tool.clone(), degrees, 0.4), [volume, in_x, in_y]);
     }
 }
 
@@ -75,8 +77,8 @@ fn three_times_finer_slices_change_nothing() {
     ];
     for sigma_mm in [0.1, 0.3, 1.0, 3.0] {
         let blur = Blur { sigma_mm };
-        for tool in tools {
-            let contact = contact(tool, 20.0, 0.7);
+        for tool in &tools {
+            let contact = contact(tool.clone(), 20.0, 0.7);
             for (dx, dy) in [(0.0, 0.0), (1.4, -0.5), (-0.2, 2.3)] {
                 let side = |centre: f64| [centre - 0.9, centre + 0.9];
                 let signal = |fineness: f64| -> f64 {

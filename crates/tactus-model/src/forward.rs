@@ -10,8 +10,8 @@ pub struct Response {
     pub sensitivity_counts_per_mm: Vec<f64>,
     /// Reading at rest, one per element, row-major.
     pub baseline_counts: Vec<f64>,
-    /// `k` of `R(u) = u + k u^2`, in 1/mm: 0 for a linear response (Sec. 2.2).
-    pub quadratic_per_mm: f64,
+    /// `k` of `R(u) = u + k u^2`, in 1/mm, one per element, row-major: 0 for a linear response (Sec. 2.2).
+    pub quadratic_per_mm: Vec<f64>,
     /// The tool for which sensitivity is stated.
     pub reference_indenter: Indenter,
     /// The covering for which sensitivity is stated.
@@ -51,7 +51,7 @@ const SIGMA_MAX_ELEMENTS: f64 = 10_000.0;
 /// ```text
 /// d_e      = integral over element e's square of (I * G_sigma)      mm^3; I the penetration map
 /// u_e      = d_e / d_ref                                            mm, the equivalent indentation
-/// counts_e = baseline_e + sensitivity_e * (u_e + k u_e^2)
+/// counts_e = baseline_e + sensitivity_e * (u_e + k_e u_e^2)
 /// ```
 ///
 /// `d_ref` is what one mm of the reference indenter at an element's own centre gives under the reference
@@ -151,10 +151,9 @@ impl ForwardModel {
     pub fn respond(&self, values: &mut [f64]) {
         assert_eq!(values.len(), self.array.elements(), "one value per element");
         let Response { sensitivity_counts_per_mm, baseline_counts, quadratic_per_mm, .. } = &self.response;
-        for ((value, sensitivity), baseline) in
-            values.iter_mut().zip(sensitivity_counts_per_mm).zip(baseline_counts)
-        {
-            *value = baseline + sensitivity * (*value + quadratic_per_mm * *value * *value);
+        let parameters = sensitivity_counts_per_mm.iter().zip(baseline_counts).zip(quadratic_per_mm);
+        for (value, ((sensitivity, baseline), quadratic)) in values.iter_mut().zip(parameters) {
+            *value = baseline + sensitivity * (*value + quadratic * *value * *value);
         }
     }
 }
@@ -164,6 +163,7 @@ impl Response {
         for (field, values) in [
             ("sensitivity_counts_per_mm", &self.sensitivity_counts_per_mm),
             ("baseline_counts", &self.baseline_counts),
+            ("quadratic_per_mm", &self.quadratic_per_mm),
         ] {
             if values.len() != elements {
                 return Err(ModelError::Length { field, values: values.len(), elements });
@@ -172,18 +172,13 @@ impl Response {
                 return Err(ModelError::Range { field, range: "finite", value });
             }
         }
-        let value = self.quadratic_per_mm;
-        if value.is_finite() {
-            Ok(())
-        } else {
-            Err(ModelError::Range { field: "quadratic_per_mm", range: "finite", value })
-        }
+        Ok(())
     }
 
     /// `d_ref`: what the reference press gives at an element's own centre, in mm^3 per mm of depth.
     fn reference_mm2(&self, sigma_mm: f64, element_mm: [f64; 2]) -> f64 {
         let reference = Contact {
-            indenter: self.reference_indenter,
+            indenter: self.reference_indenter.clone(),
             position_mm: [0.0, 0.0],
             rotation_deg: 0.0,
             depth_mm: 1.0,

@@ -11,7 +11,7 @@ fn linear(elements: usize) -> Response {
     Response {
         sensitivity_counts_per_mm: vec![1000.0; elements],
         baseline_counts: vec![100.0; elements],
-        quadratic_per_mm: 0.0,
+        quadratic_per_mm: vec![0.0; elements],
         reference_indenter: CYLINDER,
         reference_covering: THIN,
     }
@@ -140,7 +140,7 @@ fn a_box_agrees_with_its_closed_form() {
 
 #[test]
 fn the_reference_press_reads_the_sensitivity() {
-    let quadratic = Response { quadratic_per_mm: 0.15, ..linear(48) };
+    let quadratic = Response { quadratic_per_mm: vec![0.15; 48], ..linear(48) };
     let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, quadratic).unwrap();
     for element in [0, 21, 47] {
         let centre = model.array().centre_mm(element).unwrap();
@@ -174,7 +174,7 @@ fn all_that_presses_arrives_on_an_array_without_gaps() {
     for (tool, depth, want) in
         [(CYLINDER, 0.5, 0.125 * std::f64::consts::PI), (BOX, 0.5, 1.5), (SPHERE, 2.0, half_ball)]
     {
-        let got = volume_of(&at(tool, middle, depth));
+        let got = volume_of(&at(tool.clone(), middle, depth));
         assert!((got / want - 1.0).abs() < 1e-12, "{tool:?}: {got} {want}");
     }
     let turned = Contact { rotation_deg: 30.0, ..at(BOX, middle, 0.5) };
@@ -214,7 +214,7 @@ fn unfit_parameters_are_refused_by_name() {
         |psf, response| ForwardModel::new(Array::digitacts(), psf, response).unwrap_err().to_string();
     let short = Response { baseline_counts: vec![0.0; 47], ..linear(48) };
     assert_eq!(refused(Psf::PAPER, short), "baseline_counts has 47 values for 48 elements");
-    let unknown = Response { quadratic_per_mm: f64::NAN, ..linear(48) };
+    let unknown = Response { quadratic_per_mm: vec![f64::NAN; 48], ..linear(48) };
     assert!(refused(Psf::PAPER, unknown).starts_with("quadratic_per_mm"));
     let sharp = Psf { sigma_intercept_mm: 0.0, sigma_per_mm: 0.0 };
     assert!(refused(sharp, linear(48)).starts_with("sigma"));
@@ -228,7 +228,7 @@ proptest! {
         x in 0.0..16.2, y in 0.0..11.8, depth in 0.05..0.7, tool in prop::sample::select(vec![CYLINDER, SPHERE, BOX]),
     ) {
         let model = digitacts(Psf::PAPER);
-        let one = image(&model, &at(tool, [x, y], depth));
+        let one = image(&model, &at(tool.clone(), [x, y], depth));
         let other = image(&model, &at(tool, [16.2 - x, 11.8 - y], depth));
         for (a, b) in one.iter().zip(other.iter().rev()) {
             prop_assert!((a - b).abs() < 1e-9, "{a} {b}");
@@ -239,7 +239,7 @@ proptest! {
     fn flat_tools_press_in_proportion_to_depth(x in 0.0..16.2, y in 0.0..11.8, depth in 0.05..0.7) {
         let model = digitacts(Psf::PAPER);
         for tool in [CYLINDER, BOX] {
-            let unit = indentation(&model, &at(tool, [x, y], 1.0), THIN);
+            let unit = indentation(&model, &at(tool.clone(), [x, y], 1.0), THIN);
             let got = indentation(&model, &at(tool, [x, y], depth), THIN);
             for (a, b) in got.iter().zip(&unit) {
                 prop_assert!((a - depth * b).abs() <= 1e-14 + 1e-12 * a.abs(), "{a} {b}");

@@ -20,6 +20,7 @@ mod contact;
 mod covering;
 mod forward;
 mod indenter;
+mod mesh;
 mod quadrature;
 mod readout;
 mod registration;
@@ -29,6 +30,7 @@ pub use contact::Contact;
 pub use covering::{Covering, Psf};
 pub use forward::{ForwardModel, ModelError, Response};
 pub use indenter::Indenter;
+pub use mesh::{Mesh, MeshError};
 pub use readout::Readout;
 pub use registration::Registration;
 

@@ -259,7 +259,7 @@ impl Rig {
 
     /// The tool on the stage.
     pub fn mounted(&self) -> Option<Indenter> {
-        self.indenters.get(&self.indenter).copied()
+        self.indenters.get(&self.indenter).cloned()
     }
 }
 

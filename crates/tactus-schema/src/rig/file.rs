@@ -1,9 +1,10 @@
 //! The rig file as it is written: raw serde types, checked into [`Rig`].
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Registration, Response};
+use tactus_model::{Array, Covering, ForwardModel, Indenter, Mesh, Psf, Registration, Response};
 
 use super::one_or_each::OneOrEach;
 use super::{
@@ -88,7 +89,13 @@ struct RawIndenter {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     diameter_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    apex_deg: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     size_mm: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    vertices_mm: Option<Vec<[f64; 3]>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    triangles: Option<Vec<[u32; 3]>>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -96,7 +103,9 @@ struct RawIndenter {
 enum Shape {
     Cylinder,
     Sphere,
+    Cone,
     Box,
+    Mesh,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -256,7 +265,7 @@ impl Rig {
                 "covering_mm": self.sensitivity_reference.covering.thickness_mm,
             },
             "baseline_counts": one_or_each(&self.baseline_counts),
-            "indenters": self.indenters.iter().map(|(id, tool)| (id.clone(), raw_indenter(*tool))).collect::<BTreeMap<_, _>>(),
+            "indenters": self.indenters.iter().map(|(id, tool)| (id.clone(), raw_indenter(tool))).collect::<BTreeMap<_, _>>(),
             "indenter": self.indenter,
             "covering": { "thickness_mm": self.covering.thickness_mm },
         })
@@ -273,14 +282,31 @@ fn one_or_each(values: &[f64]) -> OneOrEach {
     }
 }
 
-fn raw_indenter(tool: Indenter) -> RawIndenter {
-    let round = |shape, diameter_mm| RawIndenter { shape, diameter_mm: Some(diameter_mm), size_mm: None };
+fn raw_indenter(tool: &Indenter) -> RawIndenter {
+    let raw = |shape| RawIndenter {
+        shape,
+        diameter_mm: None,
+        apex_deg: None,
+        size_mm: None,
+        vertices_mm: None,
+        triangles: None,
+    };
     match tool {
-        Indenter::Cylinder { diameter_mm } => round(Shape::Cylinder, diameter_mm),
-        Indenter::Sphere { diameter_mm } => round(Shape::Sphere, diameter_mm),
-        Indenter::Box { size_mm } => {
-            RawIndenter { shape: Shape::Box, diameter_mm: None, size_mm: Some(size_mm) }
+        Indenter::Cylinder { diameter_mm } => {
+            RawIndenter { diameter_mm: Some(*diameter_mm), ..raw(Shape::Cylinder) }
         }
+        Indenter::Sphere { diameter_mm } => {
+            RawIndenter { diameter_mm: Some(*diameter_mm), ..raw(Shape::Sphere) }
+        }
+        Indenter::Cone { diameter_mm, apex_deg } => {
+            RawIndenter { diameter_mm: Some(*diameter_mm), apex_deg: Some(*apex_deg), ..raw(Shape::Cone) }
+        }
+        Indenter::Box { size_mm } => RawIndenter { size_mm: Some(*size_mm), ..raw(Shape::Box) },
+        Indenter::Mesh(mesh) => RawIndenter {
+            vertices_mm: Some(mesh.vertices_mm().to_vec()),
+            triangles: Some(mesh.triangles().to_vec()),
+            ..raw(Shape::Mesh)
+        },
     }
 }
 
@@ -376,11 +402,11 @@ fn check(raw: RawRig) -> Result<Rig, RigError> {
 /// A description that makes no forward model is none of a sensor.
 fn check_model(rig: &Rig) -> Result<(), RigError> {
     let reference = &rig.sensitivity_reference;
-    let Some(&reference_indenter) = rig.indenters.get(&reference.indenter) else { return Ok(()) };
+    let Some(reference_indenter) = rig.indenters.get(&reference.indenter).cloned() else { return Ok(()) };
     let response = Response {
         sensitivity_counts_per_mm: rig.sensitivity_counts_per_mm.clone(),
         baseline_counts: rig.baseline_counts.clone(),
-        quadratic_per_mm: 0.0,
+        quadratic_per_mm: vec![0.0; rig.array.elements()],
         reference_indenter,
         reference_covering: reference.covering,
     };
@@ -423,20 +449,36 @@ fn check_registration(field: &str, raw: &RawRegistration) -> Result<Registration
 
 fn check_indenter(id: &str, raw: &RawIndenter) -> Result<Indenter, RigError> {
     let field = |name: &str| format!("indenters.{id}.{name}");
-    match (raw.shape, raw.diameter_mm, raw.size_mm) {
-        (Shape::Cylinder, Some(diameter_mm), None) => {
+    let RawIndenter { shape, diameter_mm, apex_deg, size_mm, vertices_mm, triangles } = raw;
+    match (shape, *diameter_mm, *apex_deg, *size_mm, vertices_mm, triangles) {
+        (Shape::Cylinder, Some(diameter_mm), None, None, None, None) => {
             Ok(Indenter::Cylinder { diameter_mm: positive(field("diameter_mm"), diameter_mm)? })
         }
-        (Shape::Sphere, Some(diameter_mm), None) => {
+        (Shape::Sphere, Some(diameter_mm), None, None, None, None) => {
             Ok(Indenter::Sphere { diameter_mm: positive(field("diameter_mm"), diameter_mm)? })
         }
-        (Shape::Box, None, Some([x, y])) => Ok(Indenter::Box {
+        (Shape::Cone, Some(diameter_mm), Some(apex_deg), None, None, None) => {
+            if !(apex_deg > 0.0 && apex_deg < 180.0) {
+                return Err(wrong(field("apex_deg"), "the full angle at the tip lies between 0 and 180"));
+            }
+            Ok(Indenter::Cone { diameter_mm: positive(field("diameter_mm"), diameter_mm)?, apex_deg })
+        }
+        (Shape::Box, None, None, Some([x, y]), None, None) => Ok(Indenter::Box {
             size_mm: [positive(field("size_mm[0]"), x)?, positive(field("size_mm[1]"), y)?],
         }),
-        (Shape::Cylinder | Shape::Sphere, ..) => {
-            Err(wrong(field("shape"), "this shape has a diameter_mm and nothing else"))
+        (Shape::Mesh, None, None, None, Some(vertices_mm), Some(triangles)) => {
+            let mesh = Mesh::new(vertices_mm, triangles);
+            Ok(Indenter::Mesh(Arc::new(mesh.map_err(|error| wrong(field("triangles"), error.to_string()))?)))
         }
-        (Shape::Box, ..) => Err(wrong(field("shape"), "this shape has a size_mm = [x, y] and nothing else")),
+        (shape, ..) => Err(wrong(
+            field("shape"),
+            match shape {
+                Shape::Cylinder | Shape::Sphere => "this shape has a diameter_mm and nothing else",
+                Shape::Cone => "this shape has a diameter_mm and an apex_deg and nothing else",
+                Shape::Box => "this shape has a size_mm = [x, y] and nothing else",
+                Shape::Mesh => "this shape has vertices_mm and triangles and nothing else",
+            },
+        )),
     }
 }
 

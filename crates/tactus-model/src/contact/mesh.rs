@@ -1,0 +1,184 @@
+//! Meshes: what is seen of them from below, without a raster.
+//!
+//! A plane of one x cuts the triangles that stand below the surface in lines; the deepest of them at every y
+//! is what presses. Between the x of two corners these lines change smoothly, so that a quadrature whose
+//! panels end at the corners is exact to about 1e-11; corners closer to each other than 1/64 of the blur share
+//! a panel, which costs about 1e-6 on finely tessellated tools.
+
+use super::{Cut, Slice};
+use crate::Mesh;
+use crate::quadrature::smooth;
+
+/// Corners of a triangle below the surface: x, y and how far below, sensor frame.
+type Facet = [[f64; 3]; 3];
+
+/// A line in a plane of one x: from and to, each by its y and how far it stands below the surface.
+type Line = [[f64; 2]; 2];
+
+/// Slices of a mesh whose lowest point stands at a depth.
+pub(super) fn slices(
+    cut: Cut,
+    mesh: &Mesh,
+    position_mm: [f64; 2],
+    rotation_deg: f64,
+    depth_mm: f64,
+    sigma_mm: f64,
+) -> Vec<Slice> {
+    let [[least_x, most_x], _, _] = mesh.bounds_mm();
+    let sigma_mm = sigma_mm.max((most_x - least_x) / 1000.0);
+    let facets = facets(mesh, position_mm, rotation_deg, depth_mm);
+    let mut slices = Vec::new();
+    for panel in panels(&facets, sigma_mm / 64.0) {
+        let [from, to] = panel;
+        let crossed: Vec<&Facet> = facets.iter().filter(|facet| overlaps(facet, panel)).collect();
+        for (x_mm, width_mm) in smooth(from, to, sigma_mm) {
+            let lines: Vec<Line> = crossed.iter().filter_map(|facet| line_at(facet, x_mm)).collect();
+            for line in deepest(&lines) {
+                let [[from, below_from], [to, below_to]] = line;
+                let mut press = |y_mm, depth_mm| {
+                    slices.push(Slice { x_mm, y_mm, weight_mm2: width_mm * depth_mm });
+                };
+                if cut == Cut::Footprint {
+                    press([from, to], 1.0);
+                    continue;
+                }
+                // What all of the line shares, and upon it a stack of thin layers, each shorter than the one below.
+                let (least, most) = (below_from.min(below_to), below_from.max(below_to));
+                press([from, to], least);
+                if most - least > 1e-12 * most {
+                    let scale_mm = sigma_mm * (most - least) / (to - from);
+                    for (below, thickness_mm) in smooth(least, most, scale_mm) {
+                        let end = from + (to - from) * (below - below_from) / (below_to - below_from);
+                        let layer = if below_to > below_from { [end, to] } else { [from, end] };
+                        press(layer, thickness_mm);
+                    }
+                }
+            }
+        }
+    }
+    slices
+}
+
+/// The parts of the triangles that stand below the surface.
+fn facets(mesh: &Mesh, [x, y]: [f64; 2], rotation_deg: f64, depth_mm: f64) -> Vec<Facet> {
+    let (sin, cos) = rotation_deg.to_radians().sin_cos();
+    let [_, _, [lowest, _]] = mesh.bounds_mm();
+    let place = |[u, v, w]: [f64; 3]| [x + cos * u - sin * v, y + sin * u + cos * v, depth_mm - (w - lowest)];
+    let mut facets = Vec::new();
+    for corners in mesh.corners_mm() {
+        let polygon = below_surface(corners.map(place));
+        // A fan about the first corner.
+        if let [first, rest @ ..] = polygon.as_slice() {
+            facets.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+        }
+    }
+    facets
+}
+
+/// What of a triangle stands below the surface: three or four corners, or none.
+fn below_surface(facet: Facet) -> Vec<[f64; 3]> {
+    let mut polygon = Vec::with_capacity(4);
+    for (corner, next) in [(0, 1), (1, 2), (2, 0)].map(|(one, other)| (facet[one], facet[other])) {
+        if corner[2] > 0.0 {
+            polygon.push(corner);
+        }
+        if (corner[2] > 0.0) != (next[2] > 0.0) {
+            let share = corner[2] / (corner[2] - next[2]);
+            let along = |axis: usize| corner[axis] + share * (next[axis] - corner[axis]);
+            polygon.push([along(0), along(1), 0.0]);
+        }
+    }
+    polygon
+}
+
+/// Ranges of x between the corners of facets, none narrower than `least_mm` but perhaps the last.
+fn panels(facets: &[Facet], least_mm: f64) -> Vec<[f64; 2]> {
+    let mut corners: Vec<f64> = facets.iter().flatten().map(|[x, _, _]| *x).collect();
+    corners.sort_by(f64::total_cmp);
+    let Some((mut from, last)) = corners.first().copied().zip(corners.last().copied()) else {
+        return Vec::new();
+    };
+    let mut panels = Vec::new();
+    for to in corners {
+        if to - from >= least_mm || (to >= last && to > from) {
+            panels.push([from, to]);
+            from = to;
+        }
+    }
+    panels
+}
+
+fn overlaps(facet: &Facet, [from, to]: [f64; 2]) -> bool {
+    facet.iter().any(|[x, _, _]| *x > from) && facet.iter().any(|[x, _, _]| *x < to)
+}
+
+/// Where the plane of one x cuts a facet, from its least y to its greatest.
+fn line_at(facet: &Facet, x_mm: f64) -> Option<Line> {
+    let [a, b, c] = *facet;
+    let mut ends = [(a, b), (b, c), (c, a)].into_iter().filter_map(|(from, to)| {
+        ((from[0] < x_mm) != (to[0] < x_mm)).then(|| {
+            let share = (x_mm - from[0]) / (to[0] - from[0]);
+            [from[1] + share * (to[1] - from[1]), from[2] + share * (to[2] - from[2])]
+        })
+    });
+    let (one, other) = (ends.next()?, ends.next()?);
+    Some(if one[0] <= other[0] { [one, other] } else { [other, one] })
+}
+
+/// The deepest of several lines at every y, as lines that do not overlap; those that go on straight are joined.
+fn deepest(lines: &[Line]) -> Vec<Line> {
+    let mut ends: Vec<f64> = lines.iter().flatten().map(|[y, _]| *y).collect();
+    ends.sort_by(f64::total_cmp);
+    ends.dedup();
+    let mut visible: Vec<Line> = Vec::new();
+    for pair in ends.windows(2) {
+        let (mut from, to) = (pair[0], pair[1]);
+        let there: Vec<Line> =
+            lines.iter().filter(|[[start, _], [end, _]]| *start <= from && *end >= to).copied().collect();
+        let deeper = |a: &&Line, b: &&Line| at(a, from).total_cmp(&at(b, from)).then(at(a, to).total_cmp(&at(b, to)));
+        let Some(mut line) = there.iter().max_by(deeper).copied() else { continue };
+        loop {
+            // The first of the lines that come to stand deeper before the end.
+            let next = there
+                .iter()
+                .filter(|other| at(other, to) > at(&line, to))
+                .map(|other| (crossing(&line, other, [from, to]), *other))
+                .min_by(|a, b| a.0.total_cmp(&b.0).then(at(&b.1, to).total_cmp(&at(&a.1, to))));
+            let end = next.map_or(to, |(crossing, _)| crossing);
+            append(&mut visible, [[from, at(&line, from)], [end, at(&line, end)]]);
+            match next {
+                Some((crossing, deeper)) => (from, line) = (crossing, deeper),
+                None => break,
+            }
+        }
+    }
+    visible
+}
+
+/// How far below the surface a line stands at `y`.
+fn at(line: &Line, y: f64) -> f64 {
+    let [[from, below_from], [to, below_to]] = *line;
+    if to > from { below_from + (below_to - below_from) * (y - from) / (to - from) } else { below_from }
+}
+
+/// Where `other`, which stands no deeper than `line` at the range's start and deeper at its end, crosses it.
+fn crossing(line: &Line, other: &Line, [from, to]: [f64; 2]) -> f64 {
+    let (above, below) = (at(line, from) - at(other, from), at(other, to) - at(line, to));
+    (from + (to - from) * above / (above + below)).clamp(from, to)
+}
+
+fn append(visible: &mut Vec<Line>, line: Line) {
+    let [[from, below_from], [to, below_to]] = line;
+    if to <= from {
+        return;
+    }
+    if let Some([start, end]) = visible.last_mut() {
+        let slope = |[a, below_a]: [f64; 2], [b, below_b]: [f64; 2]| (below_b - below_a) / (b - a);
+        let straight = (slope(*start, *end) - slope(line[0], line[1])).abs() < 1e-9;
+        if end[0].total_cmp(&from).is_eq() && (end[1] - below_from).abs() < 1e-12 && straight {
+            *end = [to, below_to];
+            return;
+        }
+    }
+    visible.push(line);
+}

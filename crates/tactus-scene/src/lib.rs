@@ -1,0 +1,1 @@
+//! Scenes: meshes from files, made shapes, and their depth image under an orthographic camera.

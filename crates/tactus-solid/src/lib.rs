@@ -1,0 +1,1 @@
+//! Reference mechanics of an elastic covering.
