@@ -3,7 +3,9 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::{ForwardModel, Indenter, Readout, Registration, Response};
+use tactus_model::{
+    Covering, Effect, EffectError, ForwardModel, Indenter, Readout, Registration, Response, Simulator,
+};
 use tactus_schema::Rig;
 use tactus_schema::rig::{Miswired, SimulatedStage, Simulation};
 
@@ -84,6 +86,22 @@ impl Truth {
             stage: simulation.stage,
         }
     }
+
+    /// The sensor as it is, under a covering whose surface stands at a height.
+    pub(crate) fn sensor(&self, covering: Covering, surface_mm: f64) -> Result<Simulator, EffectError> {
+        let wired = self.wiring.iter().enumerate().filter(|(element, answers_for)| element != *answers_for);
+        Ok(Simulator {
+            model: self.model.clone(),
+            registration: self.registration,
+            surface_mm,
+            covering,
+            indenter: self.indenter.clone(),
+            effects: wired
+                .map(|(element, answers_for)| miswired(element, *answers_for))
+                .collect::<Result<_, _>>()?,
+            noise_rms_counts: self.noise_rms_counts,
+        })
+    }
 }
 
 /// Each declared sensitivity times one plus a normal deviate of standard deviation `spread`.
@@ -100,4 +118,14 @@ fn spread(declared: &[f64], spread: f64, seed: u64) -> Vec<f64> {
 fn wiring(elements: usize, miswired: &[Miswired]) -> Vec<usize> {
     let answers_for = |element| miswired.iter().find(|one| one.element == element).map(|one| one.answers_for);
     (0..elements).map(|element| answers_for(element).unwrap_or(element)).collect()
+}
+
+fn miswired(element: usize, answers_for: usize) -> Result<Effect, EffectError> {
+    let parameters = [
+        ("element", element as f64),
+        ("answers_for", answers_for as f64),
+        ("own_share", 0.0),
+        ("other_share", 1.0),
+    ];
+    Effect::new("miswired", parameters)
 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::{Contact, Covering};
+use tactus_model::{Covering, EffectError, Moment, Pipeline};
 use tactus_schema::rig::SimulatedStage;
 use tokio::time::Instant;
 
@@ -23,12 +23,11 @@ pub(crate) struct World {
     pub(crate) motion: Motion,
     covering: Covering,
     surface_mm: f64,
-    stiffness: f64,
     deepest_mm: f64,
     noise: ChaCha8Rng,
-    /// The noiseless image in counts and the true position that it was made for.
-    image: Vec<f64>,
-    image_at_mm: Option<Point>,
+    pipeline: Pipeline,
+    /// The pipeline's zero of time: when it was first looked at.
+    started: Option<Instant>,
 }
 
 impl Shared {
@@ -45,18 +44,22 @@ impl Shared {
 impl World {
     /// A rig that was just switched on: the tip stands near the top of its travel, and the controller
     /// believes that this is 0.
+    ///
+    /// # Panics
+    /// If the truth is not that of a checked rig, whose miswired elements are the array's.
+    #[expect(clippy::expect_used, reason = "a checked rig's miswired elements are the array's")]
     pub(crate) fn new(truth: Arc<Truth>, covering: Covering, surface_mm: f64) -> Self {
         let [x_mm, y_mm, z_mm] = truth.stage.travel_mm;
         let tip_mm = [middle(x_mm), middle(y_mm), z_mm[1] - 0.1 * (z_mm[1] - z_mm[0])];
+        let pipeline = pipeline(&truth, covering, surface_mm).expect("a checked rig makes a pipeline");
         Self {
             motion: Motion::at_rest([0.0; 3], tip_mm, truth.stage.acceleration_mm_per_s2),
             covering,
             surface_mm,
-            stiffness: 1.0,
             deepest_mm: surface_mm - tip_mm[2],
             noise: Draw::Noise.rng(truth.seed),
-            image: truth.model.response().baseline_counts.clone(),
-            image_at_mm: None,
+            pipeline,
+            started: None,
             truth,
         }
     }
@@ -68,12 +71,12 @@ impl World {
 
     /// One reading of all elements at `at`, into `counts`: noise, saturation, quantisation upon the image there.
     pub(crate) fn sample(&mut self, at: Instant, counts: &mut Vec<u16>) {
-        self.refresh_image(at);
-        let Self { truth, noise, image, .. } = self;
+        self.look(at);
+        let Self { truth, noise, pipeline, .. } = self;
         counts.clear();
-        counts.extend(image.iter().map(|clean| {
+        counts.extend(pipeline.counts().iter().map(|clean| {
             let deviation: f64 = StandardNormal.sample(noise);
-            let read = truth.readout.read(*clean, truth.noise_rms_counts * deviation);
+            let read = pipeline.read(*clean, truth.noise_rms_counts * deviation);
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -86,8 +89,8 @@ impl World {
 
     /// The image without noise, in counts, row-major.
     pub(crate) fn image(&mut self, at: Instant) -> &[f64] {
-        self.refresh_image(at);
-        &self.image
+        self.look(at);
+        self.pipeline.counts()
     }
 
     /// Where the tip truly is, in the stage's steps.
@@ -131,52 +134,37 @@ impl World {
     /// Puts another covering in place, its surface where the former one's was.
     pub(crate) fn set_covering_mm(&mut self, thickness_mm: f64) {
         self.covering = Covering { thickness_mm: thickness_mm.max(0.0) };
-        self.image_at_mm = None;
+        self.pipeline.set_covering(self.covering);
     }
 
     /// Moves the true surface, where the service believes 0.
     pub(crate) fn set_surface_mm(&mut self, surface_mm: f64, now: Instant) {
         self.settle(now);
         self.surface_mm = surface_mm;
-        self.image_at_mm = None;
+        self.pipeline.set_surface_mm(surface_mm);
         self.settle(now);
     }
 
     /// Makes the covering answer `stiffness` times as strongly as the model says.
     pub(crate) fn set_stiffness(&mut self, stiffness: f64) {
-        self.stiffness = stiffness;
-        self.image_at_mm = None;
+        self.pipeline.set_stiffness(stiffness);
     }
 
-    fn refresh_image(&mut self, at: Instant) {
+    fn look(&mut self, at: Instant) {
+        let started = *self.started.get_or_insert(at);
+        let moment = Moment::at(at.saturating_duration_since(started).as_secs_f64());
         let tip_mm = self.tip_mm(at);
-        let depth_mm = self.surface_mm - tip_mm[2];
-        // Above the surface every place gives the same image.
-        let key = if depth_mm > 0.0 { tip_mm } else { [f64::INFINITY; 3] };
-        if self.image_at_mm == Some(key) {
-            return;
-        }
-        self.image_at_mm = Some(key);
-        let Truth { model, registration, indenter, wiring, .. } = &*self.truth;
-        let contact = Contact {
-            indenter: indenter.clone(),
-            position_mm: registration.to_sensor([tip_mm[0], tip_mm[1]]),
-            // The tool's sides run along the robot's axes.
-            rotation_deg: -registration.rotation_deg,
-            depth_mm,
-        };
-        let mut felt_mm = vec![0.0; wiring.len()];
-        model.indentation(&contact, self.covering, &mut felt_mm);
-        for (element, source) in self.image.iter_mut().zip(wiring) {
-            *element = self.stiffness * felt_mm.get(*source).copied().unwrap_or(0.0);
-        }
-        model.respond(&mut self.image);
+        self.pipeline.step(moment, &tip_mm);
     }
 
     fn in_steps(&self, [x, y, z]: Point) -> Point {
         let SimulatedStage { lateral_step_mm, vertical_step_mm, .. } = self.truth.stage;
         [round_to(x, lateral_step_mm), round_to(y, lateral_step_mm), round_to(z, vertical_step_mm)]
     }
+}
+
+fn pipeline(truth: &Truth, covering: Covering, surface_mm: f64) -> Result<Pipeline, EffectError> {
+    Pipeline::new(&truth.sensor(covering, surface_mm)?)
 }
 
 fn round_to(value: f64, step: f64) -> f64 {

@@ -107,6 +107,38 @@ impl Array {
         }
     }
 
+    /// The resolution of the human fingertip (paper, Fig. 10): 14 rows of 20 at 70 per cm2.
+    ///
+    /// Touch receptors have no edges; elements take as much of their pitch as those of the `DigiTacts`.
+    pub fn fingertip() -> Self {
+        Self::even("fingertip", [14, 20], 70.0)
+    }
+
+    /// The resolution of the Tekscan sensor 5027 (paper, Fig. 10): 26 rows of 36 at 248 per cm2.
+    pub fn tekscan_5027() -> Self {
+        Self::even("tekscan-5027", [26, 36], 248.0)
+    }
+
+    /// The shipped arrays: `digitacts`, `fingertip` and `tekscan-5027`.
+    pub fn shipped() -> [Self; 3] {
+        [Self::digitacts(), Self::fingertip(), Self::tekscan_5027()]
+    }
+
+    /// Evenly spaced elements, as many on each cm2 as stated, 0.9 of their pitch wide; 30 Hz, 12 bit.
+    fn even(name: &str, [rows, cols]: [u32; 2], per_cm2: f64) -> Self {
+        let pitch_mm = 10.0 / per_cm2.sqrt();
+        let centres = |count: u32| (0..count).map(|place| (f64::from(place) + 0.45) * pitch_mm).collect();
+        Self {
+            name: name.into(),
+            element_mm: [0.9 * pitch_mm; 2],
+            col_centres_mm: centres(cols),
+            row_centres_mm: centres(rows),
+            rate_hz: 30.0,
+            full_scale_counts: 4095.0,
+            step_counts: 1.0,
+        }
+    }
+
     /// Name of the array's kind, such as `digitacts`.
     pub fn name(&self) -> &str {
         &self.name
@@ -163,6 +195,14 @@ impl Array {
         self.step_counts
     }
 
+    /// Median distance between the centres of neighbours along x: the "sensor element width" in which the
+    /// paper states lengths; the element's size where there is one column only.
+    pub fn pitch_mm(&self) -> f64 {
+        let mut steps_mm: Vec<f64> = self.col_centres_mm.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps_mm.sort_by(f64::total_cmp);
+        steps_mm.get(steps_mm.len() / 2).copied().unwrap_or(self.element_mm[0])
+    }
+
     /// Least and greatest x and y of the active area: `[[x_min, x_max], [y_min, y_max]]`.
     pub fn extent_mm(&self) -> [[f64; 2]; 2] {
         let along = |centres: &[f64], size: f64| {
@@ -171,6 +211,14 @@ impl Array {
             [least - size / 2.0, most + size / 2.0]
         };
         [along(&self.col_centres_mm, self.element_mm[0]), along(&self.row_centres_mm, self.element_mm[1])]
+    }
+
+    /// From where to where each column reaches along x, and each row along y.
+    pub(crate) fn sides_mm(&self) -> [Vec<[f64; 2]>; 2] {
+        let sides = |centres: &[f64], size: f64| {
+            centres.iter().map(|centre| [centre - size / 2.0, centre + size / 2.0]).collect()
+        };
+        [sides(&self.col_centres_mm, self.element_mm[0]), sides(&self.row_centres_mm, self.element_mm[1])]
     }
 }
 

@@ -33,3 +33,18 @@ fn overlapping_and_non_finite_descriptions_are_refused_with_the_field() {
     assert!(matches!(describe(vec![0.0], 0.0), Err(ArrayError::NotPositive { field: "rate_hz", .. })));
     assert_eq!(describe(vec![], 30.0), Err(ArrayError::Empty));
 }
+
+#[test]
+fn the_shipped_arrays_have_the_papers_resolutions() {
+    let wanted = [("digitacts", 6, 8, 25.0), ("fingertip", 14, 20, 70.0), ("tekscan-5027", 26, 36, 248.0)];
+    for (array, (name, rows, cols, per_cm2)) in Array::shipped().into_iter().zip(wanted) {
+        assert_eq!((array.name(), array.rows(), array.cols()), (name, rows, cols));
+        let density = 100.0 / array.pitch_mm().powi(2);
+        assert!((density / per_cm2 - 1.0).abs() < 1e-9, "{name}: {density} per cm2");
+        let Array { name, element_mm, col_centres_mm, row_centres_mm, .. } = array.clone();
+        assert_eq!(
+            Array::new(name, element_mm, col_centres_mm, row_centres_mm, 30.0, 4095.0, 1.0),
+            Ok(array)
+        );
+    }
+}

@@ -7,9 +7,9 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 ///
 /// In two dimensions the spread is the product of one along x and one along y.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Blur {
-    /// Positive.
-    pub(crate) sigma_mm: f64,
+pub struct Blur {
+    /// Standard deviation, positive.
+    pub sigma_mm: f64,
 }
 
 impl Blur {
@@ -19,7 +19,7 @@ impl Blur {
     ///
     /// Written as what arrives without blur (all or nothing) plus the tails that the blur adds or takes
     /// away: these keep their relative accuracy far from the element.
-    pub(crate) fn of_point(self, at_mm: f64, [least, greatest]: [f64; 2]) -> f64 {
+    pub fn of_point(self, at_mm: f64, [least, greatest]: [f64; 2]) -> f64 {
         let inside = least < at_mm && at_mm <= greatest;
         let tail = |edge_mm: f64| {
             let z = (edge_mm - at_mm) / self.sigma_mm;
@@ -34,7 +34,7 @@ impl Blur {
     /// With `E(z) = z Phi(z) + phi(z)`, the integral of `Phi`, it is the second difference of `sigma E`
     /// over the four distances between an end and an edge. `E(z) = max(z, 0) + T(|z|)`; the second
     /// difference of the first part is the overlap of line and side, which is all there is without blur.
-    pub(crate) fn of_line(self, [from, to]: [f64; 2], [least, greatest]: [f64; 2]) -> f64 {
+    pub fn of_line(self, [from, to]: [f64; 2], [least, greatest]: [f64; 2]) -> f64 {
         let overlap_mm = (to.min(greatest) - from.max(least)).max(0.0);
         let tail = |edge_mm: f64, end_mm: f64| {
             let z = ((edge_mm - end_mm) / self.sigma_mm).abs();
@@ -42,6 +42,44 @@ impl Blur {
         };
         let tails = tail(greatest, from) - tail(greatest, to) - tail(least, from) + tail(least, to);
         overlap_mm + self.sigma_mm * tails
+    }
+
+    /// First moment about 0 of what [`Blur::of_line`] counts, in mm^2: the integral of `y` times
+    /// [`Blur::of_point`] along the line.
+    ///
+    /// By parts, with `F(z) = ((z^2 + 1) Phi(z) + z phi(z)) / 2`, the integral of `E`: the difference of
+    /// `-sigma y E - sigma^2 F` over the same four distances, again as what is there without blur plus tails.
+    pub(crate) fn moment_of_line(self, [from, to]: [f64; 2], [least, greatest]: [f64; 2]) -> f64 {
+        let (low, high) = (from.max(least), to.min(greatest));
+        let overlap_mm2 = if high > low { (high * high - low * low) / 2.0 } else { 0.0 };
+        let rest = |edge_mm: f64, end_mm: f64| {
+            let z = (edge_mm - end_mm) / self.sigma_mm;
+            let beyond = z.abs();
+            let (density, tail) = (density(beyond), upper_tail(beyond));
+            let once = density - beyond * tail;
+            let twice = ((beyond * beyond + 1.0) * tail - beyond * density) / 2.0;
+            let step = if z > 0.0 { 0.5 - twice } else { twice };
+            -self.sigma_mm * (end_mm * once + self.sigma_mm * step)
+        };
+        overlap_mm2 + rest(greatest, to) - rest(greatest, from) - rest(least, to) + rest(least, from)
+    }
+
+    /// Derivatives of [`Blur::of_point`] by the point's place and by `sigma_mm`, in 1/mm.
+    pub(crate) fn slope_of_point(self, at_mm: f64, side_mm: [f64; 2]) -> [f64; 2] {
+        let [least, greatest] = side_mm.map(|edge_mm| (edge_mm - at_mm) / self.sigma_mm);
+        let by_place = density(least) - density(greatest);
+        let by_sigma = least * density(least) - greatest * density(greatest);
+        [by_place / self.sigma_mm, by_sigma / self.sigma_mm]
+    }
+
+    /// Derivatives of [`Blur::of_line`] by a shift of the line and by `sigma_mm`, both without unit.
+    pub(crate) fn slope_of_line(self, [from, to]: [f64; 2], side_mm: [f64; 2]) -> [f64; 2] {
+        let by_shift = self.of_point(to, side_mm) - self.of_point(from, side_mm);
+        let between = |end_mm: f64| {
+            let [least, greatest] = side_mm.map(|edge_mm| density((edge_mm - end_mm) / self.sigma_mm));
+            greatest - least
+        };
+        [by_shift, between(from) - between(to)]
     }
 }
 

@@ -51,3 +51,17 @@ fn without_blur_the_line_arrives_where_it_lies() {
     assert!((blur.of_point(0.5, SIDE_MM) - 1.0).abs() < 1e-15);
     assert!(blur.of_point(1.0, SIDE_MM).abs() < 1e-15);
 }
+
+#[test]
+fn the_moment_of_a_line_is_the_sum_of_its_points_moments() {
+    for sigma_mm in [0.1, 0.9, 3.0] {
+        let blur = Blur { sigma_mm };
+        for (from, to) in [(-0.5, 0.5), (0.2, 2.0), (-3.0, -2.5), (-4.0, 4.0), (1.5, 2.5), (0.9, 0.9)] {
+            let step = (to - from) / 20_000.0;
+            let places = (0..20_000).map(|k| from + step * (f64::from(k) + 0.5));
+            let want: f64 = places.map(|y| step * y * blur.of_point(y, [-0.9, 0.9])).sum();
+            let got = blur.moment_of_line([from, to], [-0.9, 0.9]);
+            assert!((got - want).abs() < 1e-7, "{sigma_mm} {from} {to}: {got} {want}");
+        }
+    }
+}

@@ -74,9 +74,7 @@ impl Contact {
             Indenter::Box { size_mm } => {
                 rectangle::slices(*position_mm, *size_mm, *rotation_deg, even_mm, sigma_mm)
             }
-            Indenter::Mesh(mesh) => {
-                mesh::slices(cut, mesh, *position_mm, *rotation_deg, *depth_mm, sigma_mm)
-            }
+            Indenter::Mesh(mesh) => mesh::slices(cut, mesh, *position_mm, *rotation_deg, *depth_mm, sigma_mm),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The base model: from a contact to the counts of every element.
 
 use crate::blur::Blur;
+use crate::contact::Slice;
 use crate::{Array, Contact, Covering, Indenter, Psf};
 
 /// How an element answers what reaches it.
@@ -49,7 +50,7 @@ const SIGMA_MAX_ELEMENTS: f64 = 10_000.0;
 /// The static base model of an array (science of the paper's Sec. 2 and Eq. 4).
 ///
 /// ```text
-/// d_e      = integral over element e's square of (I * G_sigma)      mm^3; I the penetration map
+/// d_e      = integral over element e's square of (I * G_sigma)      mm^3; I in [0, t] the penetration map
 /// u_e      = d_e / d_ref                                            mm, the equivalent indentation
 /// counts_e = baseline_e + sensitivity_e * (u_e + k_e u_e^2)
 /// ```
@@ -60,13 +61,15 @@ const SIGMA_MAX_ELEMENTS: f64 = 10_000.0;
 /// element's size or the spread. (For a tool such as a sphere, whose signal is not proportional to depth,
 /// this holds at a depth of 1 mm.)
 ///
+/// The tool goes no deeper than the covering: where it stands deeper, `I` is the thickness `t`.
+///
 /// Accuracy: integrals agree with direct quadrature to 1e-9 and better; see the tests.
 #[derive(Debug, Clone)]
 pub struct ForwardModel {
     array: Array,
     psf: Psf,
     response: Response,
-    reference_mm2: f64,
+    pub(crate) reference_mm2: f64,
 }
 
 impl ForwardModel {
@@ -123,20 +126,43 @@ impl ForwardModel {
     /// # Panics
     /// If `indentation_mm` has not one place per element.
     pub fn indentation(&self, contact: &Contact, covering: Covering, indentation_mm: &mut [f64]) {
+        self.indentation_spread(contact, covering, self.psf.sigma_mm(covering), indentation_mm);
+    }
+
+    /// As [`ForwardModel::indentation`], with another spread than the covering's: of standard deviation
+    /// `sigma_mm`, positive. In units of the reference press as it is, under its own spread.
+    ///
+    /// # Panics
+    /// If `indentation_mm` has not one place per element.
+    pub fn indentation_spread(
+        &self,
+        contact: &Contact,
+        covering: Covering,
+        sigma_mm: f64,
+        indentation_mm: &mut [f64],
+    ) {
         assert_eq!(indentation_mm.len(), self.array.elements(), "one place per element");
         indentation_mm.fill(0.0);
-        let blur = Blur { sigma_mm: self.psf.sigma_mm(covering) };
-        let [width_mm, height_mm] = self.array.element_mm();
-        let side = |centre: f64, size: f64| [centre - size / 2.0, centre + size / 2.0];
-        let mut of_cols = vec![0.0; self.array.cols()];
-        for slice in contact.slices(blur.sigma_mm) {
-            for (of_col, &centre) in of_cols.iter_mut().zip(self.array.col_centres_mm()) {
-                *of_col =
-                    slice.weight_mm2 * blur.of_point(slice.x_mm, side(centre, width_mm)) / self.reference_mm2;
-            }
-            let rows = indentation_mm.chunks_exact_mut(of_cols.len());
-            for (row, &centre) in rows.zip(self.array.row_centres_mm()) {
-                let of_row = blur.of_line(slice.y_mm, side(centre, height_mm));
+        let blur = Blur { sigma_mm };
+        self.press(&contact.slices(blur.sigma_mm), blur, 1.0, indentation_mm);
+        // The tool goes no deeper than the covering's foot: min(I, t) = max(0, I) - max(0, I - t).
+        if contact.depth_mm > covering.thickness_mm {
+            let beyond = Contact { depth_mm: contact.depth_mm - covering.thickness_mm, ..contact.clone() };
+            self.press(&beyond.slices(blur.sigma_mm), blur, -1.0, indentation_mm);
+        }
+    }
+
+    /// Adds what slices give, times `sign`.
+    fn press(&self, slices: &[Slice], blur: Blur, sign: f64, indentation_mm: &mut [f64]) {
+        let [cols, rows] = self.array.sides_mm();
+        let scale = sign / self.reference_mm2;
+        for of_one_x in slices.chunk_by(|one, other| one.x_mm.total_cmp(&other.x_mm).is_eq()) {
+            let Some(Slice { x_mm, .. }) = of_one_x.first() else { continue };
+            let of_cols: Vec<f64> =
+                cols.iter().map(|side_mm| scale * blur.of_point(*x_mm, *side_mm)).collect();
+            for (row, side_mm) in indentation_mm.chunks_exact_mut(cols.len()).zip(&rows) {
+                let of_row: f64 =
+                    of_one_x.iter().map(|slice| slice.weight_mm2 * blur.of_line(slice.y_mm, *side_mm)).sum();
                 for (element, of_col) in row.iter_mut().zip(&of_cols) {
                     *element += of_col * of_row;
                 }
@@ -155,6 +181,11 @@ impl ForwardModel {
         for (value, ((sensitivity, baseline), quadratic)) in values.iter_mut().zip(parameters) {
             *value = baseline + sensitivity * (*value + quadratic * *value * *value);
         }
+    }
+
+    /// `d_ref`: what one mm of the reference indenter at an element's own centre gives, in mm^3 per mm.
+    pub fn reference_mm2(&self) -> f64 {
+        self.reference_mm2
     }
 }
 
@@ -175,17 +206,17 @@ impl Response {
         Ok(())
     }
 
+    /// The reference indenter, 1 mm deep at the frame's origin.
+    pub(crate) fn reference_press(&self) -> Contact {
+        let indenter = self.reference_indenter.clone();
+        Contact { indenter, position_mm: [0.0, 0.0], rotation_deg: 0.0, depth_mm: 1.0 }
+    }
+
     /// `d_ref`: what the reference press gives at an element's own centre, in mm^3 per mm of depth.
     fn reference_mm2(&self, sigma_mm: f64, element_mm: [f64; 2]) -> f64 {
-        let reference = Contact {
-            indenter: self.reference_indenter.clone(),
-            position_mm: [0.0, 0.0],
-            rotation_deg: 0.0,
-            depth_mm: 1.0,
-        };
         let [side_x, side_y] = element_mm.map(|side| [-side / 2.0, side / 2.0]);
         let blur = Blur { sigma_mm };
-        let slices = reference.slices(sigma_mm).into_iter();
+        let slices = self.reference_press().slices(sigma_mm).into_iter();
         slices.map(|s| s.weight_mm2 * blur.of_point(s.x_mm, side_x) * blur.of_line(s.y_mm, side_y)).sum()
     }
 }

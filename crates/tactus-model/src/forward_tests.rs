@@ -1,8 +1,13 @@
+use std::sync::Arc;
+
 use proptest::prelude::*;
 
 use super::*;
+use crate::Mesh;
 
 const THIN: Covering = Covering { thickness_mm: 1.016 };
+/// Thick enough for the half ball.
+const DEEP: Covering = Covering { thickness_mm: 2.5 };
 const CYLINDER: Indenter = Indenter::Cylinder { diameter_mm: 1.0 };
 const SPHERE: Indenter = Indenter::Sphere { diameter_mm: 4.0 };
 const BOX: Indenter = Indenter::Box { size_mm: [3.0, 1.0] };
@@ -122,6 +127,50 @@ fn a_sphere_agrees_with_direct_quadrature() {
 }
 
 #[test]
+fn a_cone_agrees_with_direct_quadrature() {
+    let psf = Psf { sigma_intercept_mm: 1.0, sigma_per_mm: 0.0 };
+    let model = digitacts(psf);
+    let (position, depth) = ([6.3, 5.2], 0.7_f64);
+    let d_ref = round_by_quadrature([0.0; 2], 0.5, |_| 1.0, [0.0; 2], 1.0);
+    let cone = Indenter::Cone { diameter_mm: 3.0, apex_deg: 90.0 };
+    let got = indentation(&model, &at(cone, position, depth), THIN);
+    for element in [11, 18, 19, 26] {
+        let centre = model.array().centre_mm(element).unwrap();
+        let want = round_by_quadrature(position, depth, |r| depth - r, centre, 1.0) / d_ref;
+        assert!((got[element] / want - 1.0).abs() < 1e-9, "element {element}: {} {want}", got[element]);
+    }
+}
+
+#[test]
+fn a_mesh_agrees_with_the_box_that_it_is() {
+    let model = digitacts(Psf::PAPER);
+    let corners = [[-1.5, -0.5, 2.0], [1.5, -0.5, 2.0], [1.5, 0.5, 2.0], [-1.5, 0.5, 2.0]];
+    let mesh = Indenter::Mesh(Arc::new(Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).unwrap()));
+    for rotation_deg in [0.0, 30.0, 90.0] {
+        let press = |indenter| Contact { rotation_deg, ..at(indenter, [6.3, 5.2], 0.5) };
+        let got = indentation(&model, &press(mesh.clone()), THIN);
+        let want = indentation(&model, &press(BOX), THIN);
+        assert!(got.iter().zip(&want).all(|(got, want)| (got / want - 1.0).abs() < 1e-9));
+    }
+}
+
+#[test]
+fn a_tool_goes_no_deeper_than_the_covering() {
+    let model = digitacts(Psf::PAPER);
+    let press =
+        |indenter: &Indenter, depth| indentation(&model, &at(indenter.clone(), [6.3, 5.2], depth), THIN);
+    for flat in [CYLINDER, BOX] {
+        let (through, foot) = (press(&flat, 1.5), press(&flat, THIN.thickness_mm));
+        assert!(through.iter().zip(&foot).all(|(through, foot)| (through - foot).abs() < 1e-12));
+    }
+    // A cylinder's worth of covering is all that a thick needle displaces, however deep it goes.
+    let needle = Indenter::Cone { diameter_mm: 1.0, apex_deg: 1.0 };
+    let deep = at(needle, [6.3, 5.2], 200.0);
+    let (got, want) = (indentation(&model, &deep, THIN), press(&CYLINDER, THIN.thickness_mm));
+    assert!(got.iter().zip(&want).all(|(got, want)| (got / want - 1.0).abs() < 1e-9));
+}
+
+#[test]
 fn a_box_agrees_with_its_closed_form() {
     let model = digitacts(Psf::PAPER);
     let sigma = Psf::PAPER.sigma_mm(THIN);
@@ -168,7 +217,7 @@ fn all_that_presses_arrives_on_an_array_without_gaps() {
     let array = Array::new("wide", [1.8, 1.8], centres.clone(), centres, 30.0, 4095.0, 1.0).unwrap();
     let model = ForwardModel::new(array, Psf::PAPER, linear(1600)).unwrap();
     let volume_of =
-        |contact: &Contact| indentation(&model, contact, THIN).iter().sum::<f64>() * model.reference_mm2;
+        |contact: &Contact| indentation(&model, contact, DEEP).iter().sum::<f64>() * model.reference_mm2;
     let middle = [35.3, 34.6];
     let half_ball = 2.0 * std::f64::consts::PI * 8.0 / 3.0;
     for (tool, depth, want) in

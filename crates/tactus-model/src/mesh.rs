@@ -47,8 +47,8 @@ impl Mesh {
 
     /// Checks triangles, each by the indices of its corners, and makes a mesh of them.
     ///
-    /// Triangles that cannot be seen from below, being upright or without area, are left out, and so are
-    /// vertices that no triangle names.
+    /// Triangles without area are left out, and so are vertices that no triangle names. Upright triangles stay:
+    /// turned, they may be seen from below.
     ///
     /// # Errors
     /// [`MeshError`] says which vertex or triangle is wrong, or that nothing is left to press.
@@ -58,6 +58,7 @@ impl Mesh {
         }
         let mut mesh = Self { vertices_mm: Vec::new(), triangles: Vec::new(), bounds_mm: [[0.0; 2]; 3] };
         let mut places = vec![None; vertices_mm.len()];
+        let mut seen = false;
         for (triangle, corners) in triangles.iter().enumerate() {
             let corner_mm = |vertex: u32| {
                 let vertices = vertices_mm.len();
@@ -65,9 +66,11 @@ impl Mesh {
                 vertices_mm.get(vertex as usize).copied().ok_or(missing)
             };
             let [a, b, c] = *corners;
-            if area_from_below_mm2([corner_mm(a)?, corner_mm(b)?, corner_mm(c)?]) == 0.0 {
+            let [from_x, from_y, from_z] = twice_areas_mm2([corner_mm(a)?, corner_mm(b)?, corner_mm(c)?]);
+            if from_x == 0.0 && from_y == 0.0 && from_z == 0.0 {
                 continue;
             }
+            seen |= from_z != 0.0;
             mesh.triangles.push(corners.map(|vertex| {
                 let place = &mut places[vertex as usize];
                 *place.get_or_insert_with(|| {
@@ -77,7 +80,7 @@ impl Mesh {
                 })
             }));
         }
-        if mesh.triangles.is_empty() {
+        if !seen {
             return Err(MeshError::Empty);
         }
         mesh.bounds_mm = bounds_mm(&mesh.vertices_mm);
@@ -120,9 +123,9 @@ impl Mesh {
     }
 }
 
-/// Area of a triangle's shadow on the plane.
-fn area_from_below_mm2([a, b, c]: [[f64; 3]; 3]) -> f64 {
-    ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs() / 2.0
+/// Twice the area of a triangle as seen along x, y and z.
+fn twice_areas_mm2([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
+    [(1, 2), (2, 0), (0, 1)].map(|(u, v)| (b[u] - a[u]) * (c[v] - a[v]) - (c[u] - a[u]) * (b[v] - a[v]))
 }
 
 fn bounds_mm(vertices_mm: &[[f64; 3]]) -> [[f64; 2]; 3] {

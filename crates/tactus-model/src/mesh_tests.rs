@@ -3,8 +3,8 @@ use super::*;
 const CORNERS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 3.0]];
 
 #[test]
-fn upright_triangles_and_unused_vertices_are_left_out() {
-    let mesh = Mesh::new(&CORNERS, &[[0, 1, 3], [0, 1, 2], [1, 1, 2]]).unwrap();
+fn triangles_without_area_and_unused_vertices_are_left_out() {
+    let mesh = Mesh::new(&CORNERS, &[[1, 1, 2], [0, 1, 2]]).unwrap();
     assert_eq!(mesh.triangles(), [[0, 1, 2]]);
     assert_eq!(mesh.bounds_mm(), [[0.0, 2.0], [0.0, 1.0], [0.0, 0.0]]);
     assert_eq!(mesh.corners_mm().collect::<Vec<_>>(), [[CORNERS[0], CORNERS[1], CORNERS[2]]]);
@@ -25,9 +25,13 @@ fn what_is_no_tool_is_refused() {
 
 #[test]
 fn a_turned_mesh_shows_another_side() {
-    let mesh = Mesh::new(&CORNERS, &[[0, 1, 2]]).unwrap();
+    // One triangle faces down, one stands upright.
+    let mesh = Mesh::new(&CORNERS, &[[0, 1, 2], [0, 1, 3]]).unwrap();
     let quarter_about_z = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
-    assert_eq!(mesh.turned(quarter_about_z).unwrap().bounds_mm(), [[-1.0, 0.0], [0.0, 2.0], [0.0, 0.0]]);
-    let upright = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
-    assert_eq!(mesh.turned(upright), Err(MeshError::Empty));
+    assert_eq!(mesh.turned(quarter_about_z).unwrap().bounds_mm(), [[-1.0, 0.0], [0.0, 2.0], [0.0, 3.0]]);
+    // Swapping y and z lays the upright one down.
+    let lying = mesh.turned([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]).unwrap();
+    assert_eq!(lying.bounds_mm(), [[0.0, 2.0], [0.0, 3.0], [0.0, 1.0]]);
+    let flat = Mesh::new(&CORNERS, &[[0, 1, 2]]).unwrap();
+    assert_eq!(flat.turned([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]), Err(MeshError::Empty));
 }

@@ -15,18 +15,39 @@ const SIXTEEN: [(f64, f64); 8] = [
     (0.989_400_934_991_649_9, 0.027_152_459_411_754_1),
 ];
 
+/// The 2 nodes on `[-1, 1]` and their weight (same source, n = 2).
+const TWO: [(f64, f64); 1] = [(0.577_350_269_189_625_7, 1.0)];
+
 /// Positive half of the 4 nodes on `[-1, 1]` and their weights (same source, n = 4).
-const FOUR: [(f64, f64); 2] =
-    [(0.339_981_043_584_856_26, 0.652_145_154_862_546_1), (0.861_136_311_594_052_6, 0.347_854_845_137_453_85)];
+const FOUR: [(f64, f64); 2] = [
+    (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
+    (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+];
 
 /// Points and weights that integrate over `[from, to]` what a Gaussian of standard deviation `sigma_mm` has
-/// made smooth, to about 1e-11: 4 points over a quarter of a standard deviation, or 16 over each two of them.
+/// made smooth, to about 1e-11 (1e-9 if narrow): 2 points over 1/32 of a standard deviation, 4 over a quarter
+/// of it, or 16 over each two of them.
 pub(crate) fn smooth(from: f64, to: f64, sigma_mm: f64) -> impl Iterator<Item = (f64, f64)> {
-    let (nodes, panels) = if to - from <= sigma_mm / 4.0 {
-        (FOUR.as_slice(), 1)
+    if to - from <= sigma_mm / 32.0 {
+        panels(&TWO, from, to, 1)
+    } else if to - from <= sigma_mm / 4.0 {
+        panels(&FOUR, from, to, 1)
     } else {
-        (SIXTEEN.as_slice(), whole((to - from) / (2.0 * sigma_mm)))
-    };
+        panels(&SIXTEEN, from, to, whole((to - from) / (2.0 * sigma_mm)))
+    }
+}
+
+/// As [`smooth`], to about 1e-7 with fewer points: 4 over each standard deviation.
+pub(crate) fn coarse(from: f64, to: f64, sigma_mm: f64) -> impl Iterator<Item = (f64, f64)> {
+    panels(&FOUR, from, to, whole((to - from) / sigma_mm))
+}
+
+fn panels(
+    nodes: &'static [(f64, f64)],
+    from: f64,
+    to: f64,
+    panels: usize,
+) -> impl Iterator<Item = (f64, f64)> {
     let half = (to - from) / (2.0 * panels as f64);
     (0..panels).flat_map(move |panel| {
         let middle = from + half * (2.0 * panel as f64 + 1.0);

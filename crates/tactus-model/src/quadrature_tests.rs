@@ -29,8 +29,12 @@ fn panels_split_the_range() {
 #[test]
 fn a_gaussian_is_integrated_whatever_the_range() {
     // Twice the error function at the range's half width over the root of two.
-    for (half, want) in [(0.125, 0.099_476_449_660_225_8), (0.25, 0.197_412_651_364_847_04), (1.0, 0.682_689_492_137_085_9), (3.0, 0.997_300_203_936_739_8)]
-    {
+    for (half, want) in [
+        (0.125, 0.099_476_449_660_225_8),
+        (0.25, 0.197_412_651_364_847_04),
+        (1.0, 0.682_689_492_137_085_9),
+        (3.0, 0.997_300_203_936_739_8),
+    ] {
         let density = |x: f64| (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
         let got: f64 = smooth(-half, half, 1.0).map(|(x, weight)| weight * density(x)).sum();
         assert!((got - want).abs() < 1e-11, "{half}: {got} {want}");

@@ -1,9 +1,10 @@
-//! The contracts of Tactus: messages, bus keys, frames and times, the rig file, the measurement table.
+//! The contracts of Tactus: messages, bus keys, frames and times, the rig file, the model file, the measurement table.
 //!
 //! A change here is a new version, never a silent edit. No I/O: everything is parsed from and
 //! written to text or bytes that the caller reads and stores.
 
 pub mod key;
+pub mod model;
 pub mod rig;
 pub mod table;
 
@@ -13,6 +14,7 @@ mod time;
 
 pub use frame::{Frame, FrameFlags};
 pub use message::{Message, pb};
+pub use model::{Model, ModelFileError};
 pub use rig::{Rig, RigError};
 pub use time::{DeviceTick, MonoTime, Stamp, WallTime};
 

@@ -1,0 +1,125 @@
+//! A sensor on the test bench, and derivatives against differences.
+
+use super::{Base, Effect, Make, Now, Place};
+use crate::{
+    Array, Contact, Covering, ForwardModel, Indenter, Moment, Pipeline, Psf, Registration, Response,
+    Simulator,
+};
+
+pub(crate) const THIN: Covering = Covering { thickness_mm: 1.016 };
+
+pub(crate) const CYLINDER: Indenter = Indenter::Cylinder { diameter_mm: 1.0 };
+
+pub(crate) fn model() -> ForwardModel {
+    let response = Response {
+        sensitivity_counts_per_mm: (0..48).map(|element| 900.0 + 5.0 * f64::from(element)).collect(),
+        baseline_counts: vec![100.0; 48],
+        quadratic_per_mm: vec![0.15; 48],
+        reference_indenter: CYLINDER,
+        reference_covering: THIN,
+    };
+    ForwardModel::new(Array::digitacts(), Psf::PAPER, response).unwrap()
+}
+
+pub(crate) fn simulator(effects: impl IntoIterator<Item = Effect>) -> Simulator {
+    Simulator {
+        model: model(),
+        registration: Registration { origin_mm: [20.0, 15.0], rotation_deg: 3.0 },
+        surface_mm: 0.25,
+        covering: THIN,
+        indenter: CYLINDER,
+        effects: effects.into_iter().collect(),
+        noise_rms_counts: 0.0,
+    }
+}
+
+pub(crate) fn effect<const N: usize>(name: &str, parameters: [(&str, f64); N]) -> Effect {
+    Effect::new(name, parameters).unwrap()
+}
+
+/// The tip over an element's centre, in the robot frame, so deep.
+pub(crate) fn upon(simulator: &Simulator, element: usize, depth_mm: f64) -> [f64; 3] {
+    let [x, y] = simulator.registration.to_robot(simulator.model.array().centre_mm(element).unwrap());
+    [x, y, simulator.surface_mm - depth_mm]
+}
+
+/// Counts under a tip that rests at a place from the beginning.
+pub(crate) fn still(simulator: &Simulator, tip_mm: [f64; 3]) -> Vec<f64> {
+    Pipeline::new(simulator).unwrap().step(Moment::at(0.0), &tip_mm).to_vec()
+}
+
+/// Checks that the derivatives by `known` are those of central differences, and that there are no others.
+pub(crate) fn assert_slopes(effect: &Effect, known: &[&str]) {
+    for (index, (name, value)) in effect.parameters().enumerate() {
+        let slope = output(effect, Some(index));
+        assert_eq!(slope.is_some(), known.contains(&name), "{name}");
+        let Some(slope) = slope else { continue };
+        let step = 1e-4 * value.abs().max(0.1);
+        let at = |value| output(&effect.with(name, value).unwrap(), None).unwrap();
+        let (less, more) = (at(value - step), at(value + step));
+        let largest = slope.iter().fold(0.0_f64, |largest, one| largest.max(one.abs()));
+        assert!(largest > 0.0, "{name}");
+        for ((slope, less), more) in slope.iter().zip(less).zip(more) {
+            let want = (more - less) / (2.0 * step);
+            assert!((slope - want).abs() < 1e-6 * largest, "{name}: {slope} {want}");
+        }
+    }
+}
+
+/// What the effect makes of a short history, or the derivative of its last output by a parameter.
+fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
+    let model = model();
+    let base = Base { model: &model, covering: THIN };
+    let values = effect.values();
+    let history = |k: u32| -> (Now<'_>, Vec<f64>) {
+        let now = Now { t_s: f64::from(k * k), dt_s: f64::from(2 * k) / 10.0, temperature_c: None, base };
+        (now, (0..48).map(|element| (0.3 + f64::from(element * k)).sin()).collect())
+    };
+    let contact = Contact { indenter: CYLINDER, position_mm: [6.0, 5.0], rotation_deg: 10.0, depth_mm: 0.45 };
+    let mut slope = vec![0.0; 48];
+    match effect.definition().make {
+        Make::Motion(make) => {
+            let registration = Registration { origin_mm: [20.0, 15.0], rotation_deg: 3.0 };
+            let before = Place { tip_mm: [24.0, 22.0, -0.3], registration, surface_mm: 0.1 };
+            let (mut motion, mut place) = (make(values), before);
+            if let Some(parameter) = by {
+                let shift = motion.slope(parameter, base, &before)?;
+                let [x, y] = shift.position_mm;
+                return Some(vec![x, y, shift.rotation_deg, shift.depth_mm]);
+            }
+            motion.place(history(0).0, &mut place);
+            let Contact { position_mm: [x, y], rotation_deg, depth_mm, .. } = place.contact(CYLINDER);
+            Some(vec![x, y, rotation_deg, depth_mm])
+        }
+        Make::Contact(_) => by.is_none().then_some(slope),
+        Make::Covering(make) => {
+            let mut covering = make(values);
+            let (mut before, mut signal) = (Vec::new(), Vec::new());
+            for k in 0..6 {
+                let (now, input) = history(k);
+                (before, signal) = (input.clone(), input);
+                covering.signal(now, &contact, &mut signal);
+            }
+            let Some(parameter) = by else { return Some(signal) };
+            covering.slope(parameter, base, &contact, &before, &mut slope).then_some(slope)
+        }
+        Make::Element(make) => {
+            let (element, (_, felt), (_, mut signal)) = (make(values), history(1), history(2));
+            let Some(parameter) = by else {
+                element.signal(base, &felt, &mut signal);
+                return Some(signal);
+            };
+            element.slope(parameter, base, &felt, &signal, &mut slope).then_some(slope)
+        }
+        Make::Readout(make) => {
+            let (mut readout, mut counts) = (make(values), Vec::new());
+            for k in 0..6 {
+                let (now, input) = history(k);
+                counts = input;
+                readout.counts(now, &mut counts);
+            }
+            let Some(parameter) = by else { return Some(counts) };
+            readout.slope(parameter, &mut slope).then_some(slope)
+        }
+    }
+}

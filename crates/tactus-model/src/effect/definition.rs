@@ -1,0 +1,291 @@
+//! What an effect is, apart from what it does: its name, its parameters, and values for them.
+
+use super::{OnContact, OnCovering, OnElement, OnMotion, OnReadout, REGISTRY};
+use crate::Array;
+
+/// An effect's name, parameters and surroundings; its equation and source stand in its file.
+#[derive(Debug)]
+pub struct Definition {
+    /// The name in reports and model files: a contract.
+    pub name: &'static str,
+    /// What it is, in half a sentence.
+    pub summary: &'static str,
+    /// Its parameters, in the order in which their values are listed.
+    pub parameters: &'static [Parameter],
+    /// Effects, and base parameters by their names in the model file, that look alike in much of the data.
+    pub near_twins: &'static [&'static str],
+    /// Experiments, or parts of `diagnose`, that show it.
+    pub shown_by: &'static [&'static str],
+    /// Makes what does it, at a stage, of one value for each parameter.
+    pub make: Make,
+}
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// The name, its unit last.
+    pub name: &'static str,
+    /// With all parameters at these values the effect changes nothing.
+    pub neutral: f64,
+    /// Least and greatest value.
+    pub range: [f64; 2],
+    /// What kind of number it is.
+    pub kind: Kind,
+}
+
+/// Kinds of parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A real number.
+    Real,
+    /// Index of an element; no fit varies it, and it has no meaning on another array.
+    Element,
+}
+
+/// Where in the pipeline an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Stage {
+    Motion,
+    Contact,
+    Covering,
+    Element,
+    Readout,
+}
+
+/// Makes an effect's object, at its stage, of one value for each of its parameters.
+#[derive(Debug, Clone, Copy)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Make {
+    Motion(fn(&[f64]) -> Box<dyn OnMotion>),
+    Contact(fn(&[f64]) -> Box<dyn OnContact>),
+    Covering(fn(&[f64]) -> Box<dyn OnCovering>),
+    Element(fn(&[f64]) -> Box<dyn OnElement>),
+    Readout(fn(&[f64]) -> Box<dyn OnReadout>),
+}
+
+/// A definition with a value for each parameter, each within its range.
+#[derive(Debug, Clone)]
+pub struct Effect {
+    definition: &'static Definition,
+    values: Vec<f64>,
+}
+
+/// Why a name and parameters are no effect.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EffectError {
+    /// No effect of this name.
+    #[error("no effect {name:?}; there is: {}", names(REGISTRY.iter().map(|known| known.name)))]
+    Unknown {
+        /// The name.
+        name: String,
+    },
+    /// A parameter has no value.
+    #[error("{effect}: {parameter} is missing")]
+    Missing {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        parameter: &'static str,
+    },
+    /// The effect has no such parameter.
+    #[error("{effect}: no parameter {parameter:?}; there is: {known}")]
+    NoParameter {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        parameter: String,
+        /// What it has.
+        known: String,
+    },
+    /// A parameter is given twice.
+    #[error("{effect}: {parameter} is given twice")]
+    Twice {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        parameter: &'static str,
+    },
+    /// A value is out of its range.
+    #[error("{effect}: {parameter} must lie from {} to {}, not at {value}", range[0], range[1])]
+    Range {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        parameter: &'static str,
+        /// Least and greatest.
+        range: [f64; 2],
+        /// What it was.
+        value: f64,
+    },
+    /// An index is none of an element of the array.
+    #[error("{effect}: {parameter} must be one of the elements 0 to {last}, not {value}")]
+    Element {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter.
+        parameter: &'static str,
+        /// Index of the array's last element.
+        last: usize,
+        /// What it was.
+        value: f64,
+    },
+}
+
+impl Definition {
+    /// The effect of this name in the [`REGISTRY`].
+    ///
+    /// # Errors
+    /// [`EffectError::Unknown`] lists those that there are.
+    pub fn find(name: &str) -> Result<&'static Self, EffectError> {
+        let found = REGISTRY.iter().find(|known| known.name == name);
+        found.copied().ok_or_else(|| EffectError::Unknown { name: name.into() })
+    }
+
+    /// Where it acts.
+    pub fn stage(&self) -> Stage {
+        match self.make {
+            Make::Motion(_) => Stage::Motion,
+            Make::Contact(_) => Stage::Contact,
+            Make::Covering(_) => Stage::Covering,
+            Make::Element(_) => Stage::Element,
+            Make::Readout(_) => Stage::Readout,
+        }
+    }
+
+    fn check(&self, parameter: &Parameter, value: f64) -> Result<f64, EffectError> {
+        let Parameter { name, range, .. } = *parameter;
+        if (range[0]..=range[1]).contains(&value) {
+            Ok(value)
+        } else {
+            Err(EffectError::Range { effect: self.name, parameter: name, range, value })
+        }
+    }
+}
+
+impl Parameter {
+    /// A real number within a range.
+    pub const fn real(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
+        Self { name, neutral, range, kind: Kind::Real }
+    }
+
+    /// Index of an element.
+    pub const fn element(name: &'static str) -> Self {
+        Self { name, neutral: 0.0, range: [0.0, u32::MAX as f64], kind: Kind::Element }
+    }
+}
+
+impl Effect {
+    /// The effect of a name in the [`REGISTRY`], with a value for each parameter, in any order.
+    ///
+    /// # Errors
+    /// [`EffectError`] says what is unknown, missing or out of range.
+    pub fn new<'a>(
+        name: &str,
+        parameters: impl IntoIterator<Item = (&'a str, f64)>,
+    ) -> Result<Self, EffectError> {
+        Self::of(Definition::find(name)?, parameters)
+    }
+
+    /// An effect of any definition, with a value for each parameter, in any order.
+    ///
+    /// # Errors
+    /// As [`Effect::new`].
+    pub fn of<'a>(
+        definition: &'static Definition,
+        parameters: impl IntoIterator<Item = (&'a str, f64)>,
+    ) -> Result<Self, EffectError> {
+        let effect = definition.name;
+        let mut given = vec![None; definition.parameters.len()];
+        for (name, value) in parameters {
+            let Some(index) = definition.parameters.iter().position(|one| one.name == name) else {
+                let known = names(definition.parameters.iter().map(|one| one.name));
+                return Err(EffectError::NoParameter { effect, parameter: name.into(), known });
+            };
+            if given[index].replace(value).is_some() {
+                return Err(EffectError::Twice { effect, parameter: definition.parameters[index].name });
+            }
+        }
+        let value = |(parameter, value): (&Parameter, Option<f64>)| match value {
+            Some(value) => definition.check(parameter, value),
+            None => Err(EffectError::Missing { effect, parameter: parameter.name }),
+        };
+        let values = definition.parameters.iter().zip(given).map(value).collect::<Result<_, _>>()?;
+        Ok(Self { definition, values })
+    }
+
+    /// The effect that changes nothing.
+    pub fn neutral(definition: &'static Definition) -> Self {
+        Self { definition, values: definition.parameters.iter().map(|one| one.neutral).collect() }
+    }
+
+    /// The same effect with another value of one parameter.
+    ///
+    /// # Errors
+    /// [`EffectError::NoParameter`] and [`EffectError::Range`].
+    pub fn with(&self, parameter: &str, value: f64) -> Result<Self, EffectError> {
+        let replaced = |(name, old)| (name, if name == parameter { value } else { old });
+        let unknown = self.parameters().all(|(name, _)| name != parameter).then_some((parameter, value));
+        Self::of(self.definition, self.parameters().map(replaced).chain(unknown))
+    }
+
+    /// What it is.
+    pub fn definition(&self) -> &'static Definition {
+        self.definition
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.definition.name
+    }
+
+    /// Its parameters with their values.
+    pub fn parameters(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.definition.parameters.iter().map(|parameter| parameter.name).zip(self.values.iter().copied())
+    }
+
+    /// A parameter's value.
+    pub fn value(&self, parameter: &str) -> Option<f64> {
+        self.parameters().find(|(name, _)| *name == parameter).map(|(_, value)| value)
+    }
+
+    /// True if it names elements, and so belongs to one array.
+    pub fn names_elements(&self) -> bool {
+        self.definition.parameters.iter().any(|parameter| parameter.kind == Kind::Element)
+    }
+
+    /// Checks that the elements it names are the array's.
+    ///
+    /// # Errors
+    /// [`EffectError::Element`].
+    pub fn fits(&self, array: &Array) -> Result<(), EffectError> {
+        let last = array.elements() - 1;
+        for (parameter, &value) in self.definition.parameters.iter().zip(&self.values) {
+            let is_element = value.fract() == 0.0 && value <= last as f64;
+            if parameter.kind == Kind::Element && !is_element {
+                let (effect, parameter) = (self.name(), parameter.name);
+                return Err(EffectError::Element { effect, parameter, last, value });
+            }
+        }
+        Ok(())
+    }
+
+    /// One value for each parameter.
+    pub(crate) fn values(&self) -> &[f64] {
+        &self.values
+    }
+}
+
+impl PartialEq for Effect {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name() && self.values == other.values
+    }
+}
+
+fn names(names: impl Iterator<Item = &'static str>) -> String {
+    names.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+#[path = "definition_tests.rs"]
+mod tests;

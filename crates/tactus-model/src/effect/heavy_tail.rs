@@ -1,0 +1,53 @@
+//! `heavy-tail`: the point spread has more weight far out than a Gaussian.
+//!
+//! ```text
+//! G -> (1 - tail_share) G_sigma + tail_share G_(width_ratio sigma)
+//! ```
+//!
+//! Both of unit volume. The tail takes from the peak: sensitivity, stated for a Gaussian, is to be calibrated anew.
+//!
+//! # Source
+//! The layered elastic solution falls off more slowly than the Gaussian of its core (the paper's Fig. 3); a mixture
+//! of two Gaussians is the usual closed form of such a spread.
+
+use super::{Base, Definition, Make, OnCovering, Parameter, Press};
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "heavy-tail",
+    summary: "the point spread has more weight far out than a Gaussian",
+    parameters: &[
+        Parameter::real("tail_share", 0.0, [0.0, 1.0]),
+        Parameter::real("width_ratio", 2.0, [1.0, 10.0]),
+    ],
+    near_twins: &["crosstalk", "sigma_intercept_mm"],
+    shown_by: &["grid-sweep", "element-centres"],
+    make: Make::Covering(|values| Box::new(HeavyTail { tail_share: values[0], width_ratio: values[1] })),
+};
+
+#[derive(Debug)]
+struct HeavyTail {
+    tail_share: f64,
+    width_ratio: f64,
+}
+
+impl OnCovering for HeavyTail {
+    fn spread(&self, _: Base<'_>, presses: &mut Vec<Press>) {
+        if self.tail_share == 0.0 {
+            return;
+        }
+        let tail = |core: &Press| Press {
+            weight: self.tail_share * core.weight,
+            sigma_mm: self.width_ratio * core.sigma_mm,
+            contact: core.contact.clone(),
+        };
+        let tails: Vec<Press> = presses.iter().map(tail).collect();
+        for core in presses.iter_mut() {
+            core.weight *= 1.0 - self.tail_share;
+        }
+        presses.extend(tails);
+    }
+}
+
+#[cfg(test)]
+#[path = "heavy_tail_tests.rs"]
+mod tests;

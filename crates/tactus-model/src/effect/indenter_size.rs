@@ -1,0 +1,53 @@
+//! `indenter-size`: the tool is not as wide as declared.
+//!
+//! ```text
+//! width = ratio x declared width
+//! ```
+//!
+//! Widths are a cylinder's, sphere's or cone's diameter (a cone keeps its angle), a box's two sides, and for a mesh
+//! its x and y. Sensitivity keeps its meaning: it is stated for the reference tool as it is declared.
+//!
+//! # Source
+//! A tool's tolerance: nothing in the paper, which gives 1 mm without one.
+
+use std::sync::Arc;
+
+use super::{Base, Definition, Make, OnContact, Parameter};
+use crate::{Contact, Indenter};
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "indenter-size",
+    summary: "the tool is wider or narrower than declared",
+    parameters: &[Parameter::real("ratio", 1.0, [0.2, 5.0])],
+    near_twins: &["sigma_intercept_mm", "sensitivity_counts_per_mm"],
+    shown_by: &["grid-sweep", "element-centres"],
+    make: Make::Contact(|values| Box::new(IndenterSize { ratio: values[0] })),
+};
+
+#[derive(Debug)]
+struct IndenterSize {
+    ratio: f64,
+}
+
+impl OnContact for IndenterSize {
+    fn touch(&self, _: Base<'_>, contact: &mut Contact) {
+        match &mut contact.indenter {
+            Indenter::Cylinder { diameter_mm }
+            | Indenter::Sphere { diameter_mm }
+            | Indenter::Cone { diameter_mm, .. } => *diameter_mm *= self.ratio,
+            Indenter::Box { size_mm } => *size_mm = size_mm.map(|side_mm| side_mm * self.ratio),
+            Indenter::Mesh(mesh) => {
+                // A tool that would be larger than any tool keeps its size.
+                if let Ok(wider) =
+                    mesh.turned([[self.ratio, 0.0, 0.0], [0.0, self.ratio, 0.0], [0.0, 0.0, 1.0]])
+                {
+                    *mesh = Arc::new(wider);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "indenter_size_tests.rs"]
+mod tests;

@@ -1,0 +1,52 @@
+//! `low-pass`: the readout follows slowly.
+//!
+//! ```text
+//! c' = (counts - c) / time_constant          settled at the first moment
+//! ```
+//!
+//! # Source
+//! The first-order filter of a charge amplifier or of the controller's averaging.
+
+use super::lag::Lag;
+use super::{Definition, Make, Now, OnReadout, Parameter};
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "low-pass",
+    summary: "the readout is slow",
+    parameters: &[Parameter::real("time_constant_s", 0.0, [0.0, 10.0])],
+    near_twins: &["time-lag", "relaxation"],
+    shown_by: &["rates", "ladder"],
+    make: Make::Readout(|values| Box::new(LowPass { lag: Lag::new(values[0]) })),
+};
+
+#[derive(Debug)]
+struct LowPass {
+    lag: Lag,
+}
+
+impl OnReadout for LowPass {
+    fn counts(&mut self, now: Now<'_>, counts: &mut [f64]) {
+        if self.lag.has_begun() {
+            self.lag.follow(now.dt_s, counts);
+        } else {
+            self.lag.begin(counts, counts);
+        }
+        counts.copy_from_slice(self.lag.output());
+    }
+
+    fn slope(&self, parameter: usize, slope_counts: &mut [f64]) -> bool {
+        let known = parameter == 0 && self.lag.has_begun();
+        if known {
+            slope_counts.copy_from_slice(self.lag.by_tau());
+        }
+        known
+    }
+
+    fn reset(&mut self) {
+        self.lag.reset();
+    }
+}
+
+#[cfg(test)]
+#[path = "low_pass_tests.rs"]
+mod tests;

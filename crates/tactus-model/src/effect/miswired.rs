@@ -1,0 +1,83 @@
+//! `miswired`: an element is dead, or answers for another.
+//!
+//! ```text
+//! u_element -> own_share u_element + other_share u_answers_for
+//! ```
+//!
+//! Dead: both shares 0. The paper's faulty elements: `own_share` 0, `other_share` 1. Several are several effects, one
+//! for each element; every one takes what reached the elements themselves, so that their order does not matter. The
+//! element keeps its own gain and baseline.
+//!
+//! # Source
+//! The paper's Sec. 2.2: two elements responded to a stimulus of one adjacent element, but not to their own.
+
+use super::{Base, Definition, Make, OnElement, Parameter};
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "miswired",
+    summary: "an element is dead, or answers for another",
+    parameters: &[
+        Parameter::element("element"),
+        Parameter::element("answers_for"),
+        Parameter::real("own_share", 1.0, [0.0, 1.0]),
+        Parameter::real("other_share", 0.0, [-1.0, 1.0]),
+    ],
+    near_twins: &["sensitivity_counts_per_mm", "crosstalk"],
+    shown_by: &["element-centres"],
+    make: Make::Element(|values| {
+        Box::new(Miswired {
+            element: index(values[0]),
+            answers_for: index(values[1]),
+            own_share: values[2],
+            other_share: values[3],
+        })
+    }),
+};
+
+#[derive(Debug)]
+struct Miswired {
+    element: usize,
+    answers_for: usize,
+    own_share: f64,
+    other_share: f64,
+}
+
+impl OnElement for Miswired {
+    fn signal(&self, _: Base<'_>, felt_mm: &[f64], signal_mm: &mut [f64]) {
+        if let (Some(u), Some(other)) = (signal_mm.get_mut(self.element), felt_mm.get(self.answers_for)) {
+            *u = self.own_share * *u + self.other_share * other;
+        }
+    }
+
+    fn slope(
+        &self,
+        parameter: usize,
+        _: Base<'_>,
+        felt_mm: &[f64],
+        before_mm: &[f64],
+        slope_mm: &mut [f64],
+    ) -> bool {
+        let of = match parameter {
+            2 => before_mm.get(self.element),
+            3 => felt_mm.get(self.answers_for),
+            _ => None,
+        };
+        let (Some(of), Some(_)) = (of, slope_mm.get(self.element)) else { return false };
+        slope_mm.fill(0.0);
+        slope_mm[self.element] = *of;
+        true
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "an index, checked against the array"
+)]
+fn index(value: f64) -> usize {
+    value as usize
+}
+
+#[cfg(test)]
+#[path = "miswired_tests.rs"]
+mod tests;

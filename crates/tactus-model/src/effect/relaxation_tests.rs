@@ -1,0 +1,59 @@
+#![expect(clippy::float_cmp, reason = "these values are exact")]
+
+use crate::effect::bench::{assert_slopes, effect, simulator, upon};
+use crate::{Moment, Pipeline, Simulator, Trajectory};
+
+fn creeping() -> Simulator {
+    let mut one = simulator([effect("relaxation", [("relaxed_share", 0.3), ("time_constant_s", 4.0)])]);
+    let mut response = one.model.response().clone();
+    response.quadratic_per_mm = vec![0.0; 48];
+    response.baseline_counts = vec![0.0; 48];
+    one.model = crate::ForwardModel::new(one.model.array().clone(), one.model.psf(), response).unwrap();
+    one
+}
+
+#[test]
+fn a_step_that_is_held_falls_exponentially_and_comes_back() {
+    let one = creeping();
+    let (up, down) = (upon(&one, 21, -1.0), upon(&one, 21, 0.5));
+    let mut pipeline = Pipeline::new(&one).unwrap();
+    let at_once = pipeline.step(Moment::at(0.0), &down)[21];
+    for t_s in [0.1, 0.2, 1.0, 7.0, 100.0] {
+        let want = at_once * (1.0 - 0.3 * (1.0 - (-t_s / 4.0_f64).exp()));
+        assert!((pipeline.step(Moment::at(t_s), &down)[21] - want).abs() < 1e-9, "after {t_s} s");
+    }
+    // Released, it reads nothing; pressed again before it has recovered, it answers more weakly.
+    assert_eq!(pipeline.step(Moment::at(100.0), &up)[21], 0.0);
+    assert_eq!(pipeline.step(Moment::at(102.0), &up)[21], 0.0);
+    let again = pipeline.step(Moment::at(102.0), &down)[21];
+    assert!((again - at_once * (1.0 - 0.3 * (-0.5_f64).exp())).abs() < 1e-7, "{again}");
+    pipeline.reset();
+    assert!((pipeline.step(Moment::at(0.0), &down)[21] - at_once).abs() < 1e-12, "the past is forgotten");
+}
+
+#[test]
+fn a_press_reads_the_same_at_any_rate() {
+    // The reference tool's signal is in proportion to depth, and so straight between the points.
+    let one = creeping();
+    let press = Trajectory::new([
+        (0.0, upon(&one, 21, 0.0)),
+        (0.5, upon(&one, 21, 0.5)),
+        (3.0, upon(&one, 21, 0.5)),
+        (4.0, upon(&one, 21, 0.1)),
+    ])
+    .unwrap();
+    let last = |rate_hz: f64, frames| {
+        one.run(&press, rate_hz, frames, || 0.0).unwrap().last().unwrap().clean_counts[21]
+    };
+    let slow = last(2.0, 9);
+    for (rate_hz, frames) in [(10.0, 41), (30.0, 121), (1000.0, 4001)] {
+        let fast = last(rate_hz, frames);
+        assert!((fast - slow).abs() < 1e-9, "{rate_hz} Hz: {fast} {slow}");
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_differences() {
+    let names = ["relaxed_share", "time_constant_s"];
+    assert_slopes(&effect("relaxation", [(names[0], 0.3), (names[1], 0.8)]), &names);
+}

@@ -1,0 +1,183 @@
+//! What an effect of each stage is given, and what it may change.
+
+use std::fmt::Debug;
+
+use crate::{Contact, Covering, ForwardModel, Indenter, Registration};
+
+/// The base model, and the covering in place.
+#[derive(Debug, Clone, Copy)]
+pub struct Base<'a> {
+    /// The base model.
+    pub model: &'a ForwardModel,
+    /// The covering in place.
+    pub covering: Covering,
+}
+
+/// An instant, for effects that depend on time.
+#[derive(Debug, Clone, Copy)]
+pub struct Now<'a> {
+    /// Time since the start, in s.
+    pub t_s: f64,
+    /// Time since the moment before, in s; 0 at the first, and never negative.
+    pub dt_s: f64,
+    /// Temperature of the sensor, where it is known.
+    pub temperature_c: Option<f64>,
+    /// The base model and the covering.
+    pub base: Base<'a>,
+}
+
+/// Where the tip is, and where the sensor is taken to lie; all in the robot frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// The tip.
+    pub tip_mm: [f64; 3],
+    /// Where the sensor lies.
+    pub registration: Registration,
+    /// Height of the covering's surface under the tip.
+    pub surface_mm: f64,
+}
+
+/// By how much a contact changes, per unit of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Shift {
+    /// Of the tool's axis, sensor frame.
+    pub position_mm: [f64; 2],
+    /// Of the tool's rotation.
+    pub rotation_deg: f64,
+    /// Of its depth.
+    pub depth_mm: f64,
+}
+
+/// A share of what reaches the elements: a contact and its spread.
+///
+/// Spread conserves what is spread: a press of another width has the same volume.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Press {
+    /// By what it is multiplied.
+    pub weight: f64,
+    /// The tool in the covering.
+    pub contact: Contact,
+    /// Standard deviation of its Gaussian.
+    pub sigma_mm: f64,
+}
+
+/// An effect between what the stage says and where the tool touches.
+pub trait OnMotion: Debug + Send + Sync {
+    /// The instant whose place on the path counts at `t_s`.
+    fn instant_s(&self, t_s: f64) -> f64 {
+        t_s
+    }
+
+    /// Changes where the tip is, or where the sensor lies.
+    fn place(&mut self, _now: Now<'_>, _place: &mut Place) {}
+
+    /// Derivative of the contact by the parameter of an index; `before` is what [`OnMotion::place`] was given.
+    fn slope(&self, _parameter: usize, _base: Base<'_>, _before: &Place) -> Option<Shift> {
+        None
+    }
+
+    /// Forgets the past.
+    fn reset(&mut self) {}
+}
+
+/// An effect on the tool and how it stands; without memory.
+pub trait OnContact: Debug + Send + Sync {
+    /// Changes the contact.
+    fn touch(&self, base: Base<'_>, contact: &mut Contact);
+}
+
+/// An effect of the covering.
+pub trait OnCovering: Debug + Send + Sync {
+    /// Changes how presses spread, before the elements integrate them; without memory. At first there is one,
+    /// of weight 1, with the base model's spread.
+    fn spread(&self, _base: Base<'_>, _presses: &mut Vec<Press>) {}
+
+    /// Changes what reaches the elements: equivalent indentations in mm, row-major.
+    fn signal(&mut self, _now: Now<'_>, _contact: &Contact, _signal_mm: &mut [f64]) {}
+
+    /// Derivative of what [`OnCovering::signal`] last gave by the parameter of an index, at the input `before`, in
+    /// mm per unit. False, and `slope_mm` as it was, where there is no closed form.
+    fn slope(
+        &self,
+        _parameter: usize,
+        _base: Base<'_>,
+        _contact: &Contact,
+        _before_mm: &[f64],
+        _slope_mm: &mut [f64],
+    ) -> bool {
+        false
+    }
+
+    /// Forgets the past.
+    fn reset(&mut self) {}
+}
+
+/// An effect in the elements; without memory.
+pub trait OnElement: Debug + Send + Sync {
+    /// Changes the elements' signals before their response: equivalent indentations in mm, row-major.
+    /// `felt_mm` is what reached each element, before any effect of this stage.
+    fn signal(&self, _base: Base<'_>, _felt_mm: &[f64], _signal_mm: &mut [f64]) {}
+
+    /// Changes counts after the response.
+    fn counts(&self, _base: Base<'_>, _counts: &mut [f64]) {}
+
+    /// Derivative of what [`OnElement::signal`] gives by the parameter of an index, at the input `before`, in mm
+    /// per unit. False, and `slope_mm` as it was, where there is no closed form.
+    fn slope(
+        &self,
+        _parameter: usize,
+        _base: Base<'_>,
+        _felt_mm: &[f64],
+        _before_mm: &[f64],
+        _slope_mm: &mut [f64],
+    ) -> bool {
+        false
+    }
+}
+
+/// An effect in the readout.
+pub trait OnReadout: Debug + Send + Sync {
+    /// Changes counts, row-major, before noise comes upon them.
+    fn counts(&mut self, _now: Now<'_>, _counts: &mut [f64]) {}
+
+    /// What comes before the converter: changes a noisy reading.
+    fn convert(&self, counts: f64) -> f64 {
+        counts
+    }
+
+    /// Derivative of what [`OnReadout::counts`] last gave by the parameter of an index, in counts per unit. False,
+    /// and `slope_counts` as it was, where there is no closed form.
+    fn slope(&self, _parameter: usize, _slope_counts: &mut [f64]) -> bool {
+        false
+    }
+
+    /// Forgets the past.
+    fn reset(&mut self) {}
+}
+
+impl Base<'_> {
+    /// The base model's spread under the covering in place.
+    pub fn sigma_mm(&self) -> f64 {
+        self.model.psf().sigma_mm(self.covering)
+    }
+}
+
+impl Place {
+    /// The tip in the sensor's plane.
+    pub fn position_mm(&self) -> [f64; 2] {
+        let [x_mm, y_mm, _] = self.tip_mm;
+        self.registration.to_sensor([x_mm, y_mm])
+    }
+
+    /// A tool standing there.
+    pub fn contact(&self, indenter: Indenter) -> Contact {
+        let [_, _, z_mm] = self.tip_mm;
+        Contact {
+            indenter,
+            position_mm: self.position_mm(),
+            // The tool's sides run along the robot's axes.
+            rotation_deg: -self.registration.rotation_deg,
+            depth_mm: self.surface_mm - z_mm,
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! `surface-offset`: the covering's surface is not at the height where the one touch put it.
+//!
+//! ```text
+//! depth = surface + offset - z
+//! ```
+//!
+//! A threshold of contact is the same with a negative offset.
+//!
+//! # Source
+//! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
+
+use super::{Base, Definition, Make, Now, OnMotion, Parameter, Place, Shift};
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "surface-offset",
+    summary: "the covering's surface stands higher or lower than the touch that found it says",
+    parameters: &[Parameter::real("offset_mm", 0.0, [-2.0, 2.0])],
+    near_twins: &["saturation", "hardening"],
+    shown_by: &["corners", "element-centres", "ladder"],
+    make: Make::Motion(|values| Box::new(SurfaceOffset { offset_mm: values[0] })),
+};
+
+#[derive(Debug)]
+struct SurfaceOffset {
+    offset_mm: f64,
+}
+
+impl OnMotion for SurfaceOffset {
+    fn place(&mut self, _: Now<'_>, place: &mut Place) {
+        place.surface_mm += self.offset_mm;
+    }
+
+    fn slope(&self, parameter: usize, _: Base<'_>, _: &Place) -> Option<Shift> {
+        (parameter == 0).then_some(Shift { depth_mm: 1.0, ..Shift::default() })
+    }
+}
+
+#[cfg(test)]
+#[path = "surface_offset_tests.rs"]
+mod tests;

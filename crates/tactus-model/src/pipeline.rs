@@ -1,0 +1,263 @@
+//! The pipeline in time: from where the tip is to what every element reads.
+
+use crate::effect::{
+    Base, Effect, EffectError, Make, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Place, Press,
+};
+use crate::{Contact, Covering, ForwardModel, Indenter, Path, Readout, Registration, Simulator};
+
+/// An instant at which the elements are read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Time since the start, in s.
+    pub t_s: f64,
+    /// Temperature of the sensor, where it is known.
+    pub temperature_c: Option<f64>,
+}
+
+/// A [`Simulator`] at work, moment by moment.
+///
+/// ```text
+/// motion    path at t, effects        -> tip, registration, surface
+/// contact   effects                   -> tool, position, rotation, depth = surface - z
+/// covering  base model u_e, effects   -> what reaches every element, in mm
+/// element   effects, base response    -> counts
+/// readout   effects; then read()      -> what the converter gives
+/// ```
+///
+/// What has no memory is computed again only when the contact changes: a tip that rests costs next to nothing.
+/// With no effects counts are those of [`ForwardModel::image`], to the bit.
+///
+/// Moments need not be evenly spaced, nor need each of them be a frame. Time does not go back: a moment before the
+/// last one is taken to be at the same instant.
+#[derive(Debug)]
+pub struct Pipeline {
+    model: ForwardModel,
+    readout: Readout,
+    registration: Registration,
+    surface_mm: f64,
+    covering: Covering,
+    indenter: Indenter,
+    stiffness: f64,
+    stages: Stages,
+    last_s: Option<f64>,
+    pressed: Pressed,
+    felt_mm: Vec<f64>,
+    counts: Vec<f64>,
+}
+
+/// The effects of each stage, in their order.
+#[derive(Debug, Default)]
+struct Stages {
+    motion: Vec<Box<dyn OnMotion>>,
+    contact: Vec<Box<dyn OnContact>>,
+    covering: Vec<Box<dyn OnCovering>>,
+    element: Vec<Box<dyn OnElement>>,
+    readout: Vec<Box<dyn OnReadout>>,
+}
+
+/// What was last pressed, and what of it reached the elements.
+#[derive(Debug)]
+struct Pressed {
+    /// Where: position, rotation and depth; `None` if it is to be computed anew.
+    at: Option<([f64; 2], f64, f64)>,
+    contact: Contact,
+    presses: Vec<Press>,
+    reached_mm: Vec<f64>,
+    of_one_mm: Vec<f64>,
+}
+
+impl Moment {
+    /// An instant, the temperature being unknown.
+    pub fn at(t_s: f64) -> Self {
+        Self { t_s, temperature_c: None }
+    }
+}
+
+impl Pipeline {
+    /// A sensor with no past.
+    ///
+    /// # Errors
+    /// [`EffectError::Element`] if an effect names an element that the array has not.
+    pub fn new(simulator: &Simulator) -> Result<Self, EffectError> {
+        let Simulator { model, registration, surface_mm, covering, indenter, effects, .. } =
+            simulator.clone();
+        let elements = model.array().elements();
+        effects.iter().try_for_each(|effect| effect.fits(model.array()))?;
+        Ok(Self {
+            readout: Readout::of(model.array()),
+            registration,
+            surface_mm,
+            covering,
+            stiffness: 1.0,
+            stages: Stages::of(&effects),
+            last_s: None,
+            pressed: Pressed {
+                at: None,
+                contact: Contact {
+                    indenter: indenter.clone(),
+                    position_mm: [0.0; 2],
+                    rotation_deg: 0.0,
+                    depth_mm: 0.0,
+                },
+                presses: Vec::new(),
+                reached_mm: vec![0.0; elements],
+                of_one_mm: vec![0.0; elements],
+            },
+            felt_mm: vec![0.0; elements],
+            counts: vec![0.0; elements],
+            indenter,
+            model,
+        })
+    }
+
+    /// Counts of every element at a moment, row-major, before noise and converter.
+    ///
+    /// `path`: the tip in the robot frame, z up; a place where it rests, a [`Trajectory`](crate::Trajectory), or a
+    /// function of time.
+    pub fn step(&mut self, moment: Moment, path: &impl Path) -> &[f64] {
+        let Moment { t_s, temperature_c } = moment;
+        let dt_s = self.last_s.map_or(0.0, |last_s| (t_s - last_s).max(0.0));
+        self.last_s = Some(self.last_s.map_or(t_s, |last_s| last_s.max(t_s)));
+        let base = Base { model: &self.model, covering: self.covering };
+        let now = Now { t_s, dt_s, temperature_c, base };
+
+        let instant_s = self.stages.motion.iter().fold(t_s, |t_s, effect| effect.instant_s(t_s));
+        let mut place = Place {
+            tip_mm: path.at(instant_s),
+            registration: self.registration,
+            surface_mm: self.surface_mm,
+        };
+        for effect in &mut self.stages.motion {
+            effect.place(now, &mut place);
+        }
+        self.pressed.press(&place, &self.indenter, base, &self.stages);
+
+        for (felt, reached) in self.felt_mm.iter_mut().zip(&self.pressed.reached_mm) {
+            *felt = self.stiffness * reached;
+        }
+        for effect in &mut self.stages.covering {
+            effect.signal(now, &self.pressed.contact, &mut self.felt_mm);
+        }
+        self.counts.copy_from_slice(&self.felt_mm);
+        for effect in &self.stages.element {
+            effect.signal(base, &self.felt_mm, &mut self.counts);
+        }
+        self.model.respond(&mut self.counts);
+        for effect in &self.stages.element {
+            effect.counts(base, &mut self.counts);
+        }
+        for effect in &mut self.stages.readout {
+            effect.counts(now, &mut self.counts);
+        }
+        &self.counts
+    }
+
+    /// Counts of the last moment, as [`Pipeline::step`] gave them; 0 before the first.
+    pub fn counts(&self) -> &[f64] {
+        &self.counts
+    }
+
+    /// What is read of `counts` when `noise_counts` of noise come upon them. The noise is a sample that the caller
+    /// draws.
+    pub fn read(&self, counts: f64, noise_counts: f64) -> f64 {
+        let noisy = counts + noise_counts;
+        self.readout
+            .read(self.stages.readout.iter().fold(noisy, |counts, effect| effect.convert(counts)), 0.0)
+    }
+
+    /// The tool as it last stood in the covering, after the effects of motion and contact.
+    pub fn contact(&self) -> &Contact {
+        &self.pressed.contact
+    }
+
+    /// Forgets the past: what every effect remembers, and the time.
+    pub fn reset(&mut self) {
+        let Stages { motion, contact: _, covering, element: _, readout } = &mut self.stages;
+        for effect in motion {
+            effect.reset();
+        }
+        for effect in covering {
+            effect.reset();
+        }
+        for effect in readout {
+            effect.reset();
+        }
+        self.last_s = None;
+    }
+
+    /// Puts another covering in place.
+    pub fn set_covering(&mut self, covering: Covering) {
+        self.covering = covering;
+        self.pressed.at = None;
+    }
+
+    /// Moves the covering's surface, robot frame.
+    pub fn set_surface_mm(&mut self, surface_mm: f64) {
+        self.surface_mm = surface_mm;
+    }
+
+    /// Makes the covering answer `stiffness` times as strongly as the model says; 1 at first.
+    pub fn set_stiffness(&mut self, stiffness: f64) {
+        self.stiffness = stiffness;
+    }
+}
+
+impl Stages {
+    fn of(effects: &[Effect]) -> Self {
+        let mut stages = Self::default();
+        for effect in effects {
+            let values = effect.values();
+            match effect.definition().make {
+                Make::Motion(make) => stages.motion.push(make(values)),
+                Make::Contact(make) => stages.contact.push(make(values)),
+                Make::Covering(make) => stages.covering.push(make(values)),
+                Make::Element(make) => stages.element.push(make(values)),
+                Make::Readout(make) => stages.readout.push(make(values)),
+            }
+        }
+        stages
+    }
+}
+
+impl Pressed {
+    fn press(&mut self, place: &Place, indenter: &Indenter, base: Base<'_>, stages: &Stages) {
+        let contact = place.contact(indenter.clone());
+        let at = (contact.position_mm, contact.rotation_deg, contact.depth_mm);
+        if self.at == Some(at) {
+            return;
+        }
+        self.at = Some(at);
+        self.contact = contact;
+        for effect in &stages.contact {
+            effect.touch(base, &mut self.contact);
+        }
+        self.presses.clear();
+        self.presses.push(Press { weight: 1.0, contact: self.contact.clone(), sigma_mm: base.sigma_mm() });
+        for effect in &stages.covering {
+            effect.spread(base, &mut self.presses);
+        }
+        self.reached_mm.fill(0.0);
+        for press in self.presses.iter().filter(|press| press.contact.depth_mm > 0.0) {
+            press.indentation(base, &mut self.of_one_mm);
+            for (reached, of_one) in self.reached_mm.iter_mut().zip(&self.of_one_mm) {
+                *reached += press.weight * of_one;
+            }
+        }
+    }
+}
+
+impl Press {
+    /// What reaches every element, in units of the base model's reference press; nothing of a spread that none can
+    /// be.
+    fn indentation(&self, base: Base<'_>, indentation_mm: &mut [f64]) {
+        if self.sigma_mm > 0.0 {
+            base.model.indentation_spread(&self.contact, base.covering, self.sigma_mm, indentation_mm);
+        } else {
+            indentation_mm.fill(0.0);
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "pipeline_tests.rs"]
+mod tests;

@@ -1,0 +1,152 @@
+#![expect(clippy::float_cmp, reason = "these values are exact")]
+
+use super::*;
+use crate::Trajectory;
+use crate::effect::bench::{THIN, effect, simulator, still, upon};
+use crate::effect::{Effect, REGISTRY};
+
+/// A press with a slide, on both sides of the surface.
+fn way(simulator: &Simulator) -> Trajectory {
+    Trajectory::new([
+        (0.0, upon(simulator, 20, -1.0)),
+        (1.0, upon(simulator, 20, 0.5)),
+        (2.0, upon(simulator, 22, 0.3)),
+        (2.5, upon(simulator, 22, -2.0)),
+    ])
+    .unwrap()
+}
+
+#[test]
+fn without_effects_counts_are_the_base_models_to_the_bit() {
+    let plain = simulator([]);
+    let (way, mut pipeline) = (way(&plain), Pipeline::new(&plain).unwrap());
+    for k in 0..80 {
+        let t_s = f64::from(k) / 30.0;
+        let [x, y, z] = way.at(t_s);
+        let contact = Contact {
+            indenter: plain.indenter.clone(),
+            position_mm: plain.registration.to_sensor([x, y]),
+            rotation_deg: -3.0,
+            depth_mm: 0.25 - z,
+        };
+        let mut want = vec![0.0; 48];
+        plain.model.image(&contact, THIN, &mut want);
+        assert_eq!(pipeline.step(Moment::at(t_s), &way), want, "at {t_s} s");
+        assert_eq!(*pipeline.contact(), contact);
+    }
+}
+
+#[test]
+fn neutral_effects_change_nothing_to_the_bit() {
+    let plain = simulator([]);
+    let way = way(&plain);
+    let mut without = Pipeline::new(&plain).unwrap();
+    let neutral = REGISTRY.iter().map(|definition| Effect::neutral(definition));
+    let mut pipelines: Vec<Pipeline> =
+        neutral.clone().map(|effect| Pipeline::new(&simulator([effect])).unwrap()).collect();
+    pipelines.push(Pipeline::new(&simulator(neutral)).unwrap());
+    for k in 0..80 {
+        let moment = Moment::at(f64::from(k) / 30.0);
+        let want = without.step(moment, &way).to_vec();
+        for pipeline in &mut pipelines {
+            let counts = pipeline.step(moment, &way).to_vec();
+            assert!(counts.iter().zip(&want).all(|(a, b)| a.to_bits() == b.to_bits()), "{pipeline:?}");
+            for (noisy, noise) in counts.iter().zip([0.4, -0.7, 1e4].into_iter().cycle()) {
+                assert_eq!(
+                    pipeline.read(*noisy, noise),
+                    Readout::of(plain.model.array()).read(*noisy, noise)
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn every_effect_that_is_not_neutral_changes_something() {
+    let plain = simulator([]);
+    let way = way(&plain);
+    for definition in REGISTRY {
+        let strong = definition.parameters.iter().fold(Effect::neutral(definition), |effect, parameter| {
+            let [least, most] = parameter.range;
+            let value = if parameter.name == "element" { 20.0 } else { 0.9 * parameter.neutral + 0.1 * most };
+            if parameter.name == "answers_for" {
+                effect
+            } else {
+                effect.with(parameter.name, value.max(least)).unwrap()
+            }
+        });
+        let images = |effects: Vec<Effect>| -> Vec<_> {
+            simulator(effects).run(&way, 30.0, 80, || 0.0).unwrap().map(|image| image.counts).collect()
+        };
+        assert_ne!(images(vec![strong]), images(vec![]), "{}", definition.name);
+    }
+}
+
+#[test]
+fn changes_of_covering_surface_and_stiffness_show_under_a_resting_tip() {
+    let plain = simulator([]);
+    let tip_mm = upon(&plain, 21, 0.5);
+    let mut pipeline = Pipeline::new(&plain).unwrap();
+    let mut read = |change: &dyn Fn(&mut Pipeline)| {
+        change(&mut pipeline);
+        pipeline.step(Moment::at(1.0), &tip_mm).to_vec()
+    };
+    let first = read(&|_| {});
+    assert_eq!(first, still(&plain, tip_mm));
+    let thick = Simulator { covering: Covering { thickness_mm: 5.08 }, ..plain.clone() };
+    assert_eq!(read(&|one| one.set_covering(thick.covering)), still(&thick, tip_mm));
+    let high = Simulator { surface_mm: 0.35, ..thick.clone() };
+    assert_eq!(read(&|one| one.set_surface_mm(0.35)), still(&high, tip_mm));
+    let soft = read(&|one| one.set_stiffness(0.5))[21] - 100.0;
+    let hard = still(&high, tip_mm)[21] - 100.0;
+    assert!(soft < 0.5 * hard && soft > 0.4 * hard, "the quadratic term loses more than half: {soft} {hard}");
+}
+
+#[test]
+fn a_path_that_is_late_is_asked_for_an_earlier_instant() {
+    #[derive(Debug)]
+    struct Late(f64);
+    impl OnMotion for Late {
+        fn instant_s(&self, t_s: f64) -> f64 {
+            t_s - self.0
+        }
+    }
+    static LATE: crate::effect::Definition = crate::effect::Definition {
+        name: "late",
+        summary: "a lab's own effect",
+        parameters: &[crate::effect::Parameter::real("lag_s", 0.0, [-1.0, 1.0])],
+        near_twins: &[],
+        shown_by: &[],
+        make: Make::Motion(|values| Box::new(Late(values[0]))),
+    };
+    let plain = simulator([]);
+    let way = way(&plain);
+    for lag_s in [-0.4, 0.3] {
+        let late = simulator([Effect::of(&LATE, [("lag_s", lag_s)]).unwrap()]);
+        let got = Pipeline::new(&late).unwrap().step(Moment::at(1.5), &way).to_vec();
+        assert_eq!(got, still(&plain, way.at(1.5 - lag_s)));
+    }
+}
+
+#[test]
+fn time_that_goes_back_stands_still() {
+    let creeping = simulator([effect("relaxation", [("relaxed_share", 0.3), ("time_constant_s", 1.0)])]);
+    let tip_mm = upon(&creeping, 21, 0.5);
+    let (mut straight, mut back) = (Pipeline::new(&creeping).unwrap(), Pipeline::new(&creeping).unwrap());
+    for t_s in [0.0, 1.0, 2.0] {
+        straight.step(Moment::at(t_s), &tip_mm);
+    }
+    for t_s in [0.0, 1.0, 0.2, 2.0] {
+        back.step(Moment::at(t_s), &tip_mm);
+    }
+    assert_eq!(straight.step(Moment::at(2.0), &tip_mm), back.step(Moment::at(2.0), &tip_mm));
+}
+
+#[test]
+fn a_place_that_is_no_number_does_not_panic() {
+    let everything = simulator(REGISTRY.iter().map(|definition| Effect::neutral(definition)));
+    let mut pipeline = Pipeline::new(&everything).unwrap();
+    for tip_mm in [[f64::NAN; 3], [f64::INFINITY; 3], [1e300, -1e300, -1e300]] {
+        pipeline.step(Moment::at(f64::NAN), &tip_mm);
+    }
+}

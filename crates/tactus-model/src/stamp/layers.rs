@@ -1,0 +1,379 @@
+//! The tables of a stamp and how they are sampled.
+
+use super::field::{Field, Grid, spline};
+use super::{reach_mm, single};
+use crate::blur::Blur;
+use crate::quadrature::{coarse, whole};
+use crate::{Contact, Indenter};
+
+/// Beyond so many standard deviations from the tool nothing is left of it.
+const TAIL: f64 = 6.0;
+/// Nodes in a standard deviation.
+const NODES_PER_SIGMA: f64 = 8.0;
+/// Pieces of the depth, before those that jumps of the touched area add.
+const DEPTH_PIECES: u32 = 8;
+
+/// Tables over the tool's frame, one for each piece of the depth.
+#[derive(Debug, Clone)]
+pub(super) struct Layers {
+    origin_mm: [f32; 2],
+    per_mm: f32,
+    nodes: [usize; 2],
+    turns: Turns,
+    depth: Depth,
+}
+
+/// Nodes of the rotation.
+#[derive(Debug, Clone, Copy)]
+enum Turns {
+    /// A round tool: one.
+    Round,
+    /// A tool above square elements: three over a quarter turn.
+    Square,
+    /// A tool above oblong elements: seven over half a turn.
+    Oblong,
+}
+
+/// How the signal grows with depth.
+#[derive(Debug, Clone)]
+enum Depth {
+    /// A flat underside: in proportion, as the table of 1 mm says.
+    Flat(Vec<f32>),
+    /// Otherwise: piece by piece.
+    Pieces(Vec<Piece>),
+}
+
+/// A cubic over one range of depth, by value and slope at both ends.
+#[derive(Debug, Clone)]
+struct Piece {
+    from_mm: f64,
+    to_mm: f64,
+    table: Vec<f32>,
+}
+
+impl Turns {
+    fn nodes_rad(self) -> Vec<f64> {
+        let count = self.count();
+        (0..count).map(|node| self.period_rad() * node as f64 / count as f64).collect()
+    }
+
+    fn count(self) -> usize {
+        match self {
+            Self::Round => 1,
+            Self::Square => 3,
+            Self::Oblong => 7,
+        }
+    }
+
+    fn period_rad(self) -> f64 {
+        match self {
+            Self::Round | Self::Oblong => std::f64::consts::PI,
+            Self::Square => std::f64::consts::FRAC_PI_2,
+        }
+    }
+
+    /// Weights of the nodes in the trigonometric polynomial through them.
+    fn weights(self, rotation_rad: f64) -> [f64; 7] {
+        let count = self.count();
+        let turn = std::f64::consts::TAU / self.period_rad();
+        let mut weights = [0.0; 7];
+        for (node, weight) in weights.iter_mut().take(count).enumerate() {
+            let angle = turn * rotation_rad - std::f64::consts::TAU * node as f64 / count as f64;
+            let harmonics = (1..=count / 2).map(|n| 2.0 * (n as f64 * angle).cos());
+            *weight = (1.0 + harmonics.sum::<f64>()) / count as f64;
+        }
+        weights
+    }
+}
+
+impl Layers {
+    /// Tables for a tool and depths up to `depth_max_mm`, in units of the reference press.
+    pub(super) fn new(
+        press: &Contact,
+        depth_max_mm: f64,
+        sigma_mm: f64,
+        element_mm: [f64; 2],
+        reference_mm2: f64,
+    ) -> Self {
+        let [width_mm, height_mm] = element_mm;
+        let turns = match press.indenter {
+            Indenter::Cylinder { .. } | Indenter::Sphere { .. } | Indenter::Cone { .. } => Turns::Round,
+            Indenter::Box { .. } | Indenter::Mesh(_) if width_mm.total_cmp(&height_mm).is_eq() => {
+                Turns::Square
+            }
+            Indenter::Box { .. } | Indenter::Mesh(_) => Turns::Oblong,
+        };
+        let step_mm = sigma_mm / NODES_PER_SIGMA;
+        let half_mm = reach_mm(&press.indenter) + TAIL * sigma_mm + width_mm.hypot(height_mm) / 2.0;
+        let steps = whole(half_mm / step_mm);
+        let grid = Grid { origin_mm: [-(steps as f64) * step_mm; 2], step_mm, nodes: [2 * steps + 1; 2] };
+        let maker = Maker { press, sigma_mm, element_mm, turns, grid, reference_mm2 };
+        Self {
+            origin_mm: grid.origin_mm.map(single),
+            per_mm: single(1.0 / step_mm),
+            nodes: grid.nodes,
+            turns,
+            depth: maker.depth(depth_max_mm),
+        }
+    }
+
+    /// Signal of every element, in units of the reference press, for a tool at a positive depth.
+    ///
+    /// `axes`: for x and y where the tool stands, and the elements' centres.
+    pub(super) fn sample(
+        &self,
+        [(tool_x, columns), (tool_y, rows)]: [(f64, &Vec<f32>); 2],
+        rotation_deg: f64,
+        depth_mm: f64,
+        values: &mut [f32],
+    ) {
+        let rotation_rad = if matches!(self.turns, Turns::Round) { 0.0 } else { rotation_deg.to_radians() };
+        let turns = self.turns.weights(rotation_rad);
+        let place = Place {
+            tool: [single(tool_x), single(tool_y)],
+            turn: {
+                let (sin, cos) = rotation_rad.sin_cos();
+                [single(sin), single(cos)]
+            },
+            columns,
+            rows,
+        };
+        match &self.depth {
+            Depth::Flat(table) => match self.turns {
+                Turns::Round => self.taps::<1, 4>(table, &place, &weigh(&turns, &[depth_mm]), values),
+                Turns::Square => self.taps::<3, 12>(table, &place, &weigh(&turns, &[depth_mm]), values),
+                Turns::Oblong => self.taps::<7, 28>(table, &place, &weigh(&turns, &[depth_mm]), values),
+            },
+            Depth::Pieces(pieces) => {
+                let piece = piece_at(pieces, depth_mm);
+                let (table, by_depth) = (&piece.table, piece.weights(depth_mm));
+                match self.turns {
+                    Turns::Round => self.taps::<4, 16>(table, &place, &weigh(&turns, &by_depth), values),
+                    Turns::Square => self.taps::<12, 48>(table, &place, &weigh(&turns, &by_depth), values),
+                    Turns::Oblong => self.taps::<28, 112>(table, &place, &weigh(&turns, &by_depth), values),
+                }
+            }
+        }
+    }
+
+    /// The spline's 4 x 4 nodes about every element, `C` channels each; `N = 4 C` numbers of a row of nodes lie
+    /// side by side.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 1 and the number of nodes, some hundreds"
+    )]
+    fn taps<const C: usize, const N: usize>(
+        &self,
+        table: &[f32],
+        place: &Place<'_>,
+        channels: &[f32; C],
+        values: &mut [f32],
+    ) {
+        let [columns, rows] = self.nodes;
+        let [sin, cos] = place.turn;
+        let last = [columns, rows].map(|nodes| nodes as f32 - 2.0);
+        let mut values = values.iter_mut();
+        for centre_y in place.rows {
+            let dy = centre_y - place.tool[1];
+            for (centre_x, value) in place.columns.iter().zip(values.by_ref()) {
+                let dx = centre_x - place.tool[0];
+                let x = (cos * dx + sin * dy - self.origin_mm[0]) * self.per_mm;
+                let y = (cos * dy - sin * dx - self.origin_mm[1]) * self.per_mm;
+                if !(x >= 1.0 && y >= 1.0 && x < last[0] && y < last[1]) {
+                    *value = 0.0;
+                    continue;
+                }
+                let (column, row) = (x as i32 as usize - 1, y as i32 as usize - 1);
+                let across = cubic(x - (column + 1) as f32);
+                let along = cubic(y - (row + 1) as f32);
+                let mut sum = [0.0_f32; N];
+                for (node, weight) in along.into_iter().enumerate() {
+                    let first = ((row + node) * columns + column) * C;
+                    let Some(nodes) = table.get(first..first + N) else { continue };
+                    for (sum, value) in sum.iter_mut().zip(nodes) {
+                        *sum += weight * value;
+                    }
+                }
+                let mut total = [0.0_f32; C];
+                for (node, weight) in across.into_iter().enumerate() {
+                    for (total, sum) in total.iter_mut().zip(&sum[node * C..]) {
+                        *total += weight * sum;
+                    }
+                }
+                *value = total.iter().zip(channels).map(|(total, share)| total * share).sum();
+            }
+        }
+    }
+}
+
+/// Where the tool stands, its turn as sine and cosine, and the elements' centres.
+struct Place<'a> {
+    tool: [f32; 2],
+    turn: [f32; 2],
+    columns: &'a [f32],
+    rows: &'a [f32],
+}
+
+/// Channels' weights: turns by depth.
+fn weigh<const C: usize>(turns: &[f64; 7], by_depth: &[f64]) -> [f32; C] {
+    std::array::from_fn(|channel| {
+        single(turns[channel / by_depth.len()] * by_depth[channel % by_depth.len()])
+    })
+}
+
+/// Weights of a cubic B-spline's four nodes, `t` of a step beyond the second.
+fn cubic(t: f32) -> [f32; 4] {
+    const SIXTH: f32 = 1.0 / 6.0;
+    let u = 1.0 - t;
+    let inner = |t: f32| (2.0 / 3.0) + t * t * (0.5 * t - 1.0);
+    [u * u * u * SIXTH, inner(t), inner(u), t * t * t * SIXTH]
+}
+
+/// The piece that a depth falls in.
+fn piece_at(pieces: &[Piece], depth_mm: f64) -> &Piece {
+    let place = pieces.partition_point(|piece| piece.to_mm < depth_mm);
+    &pieces[place.min(pieces.len() - 1)]
+}
+
+impl Piece {
+    /// Hermite's weights of the values and slopes at both ends.
+    fn weights(&self, depth_mm: f64) -> [f64; 4] {
+        let width_mm = self.to_mm - self.from_mm;
+        let t = (depth_mm - self.from_mm) / width_mm;
+        let u = 1.0 - t;
+        [u * u * (1.0 + 2.0 * t), t * t * (1.0 + 2.0 * u), t * u * u * width_mm, -t * t * u * width_mm]
+    }
+}
+
+/// Makes tables.
+struct Maker<'a> {
+    press: &'a Contact,
+    sigma_mm: f64,
+    element_mm: [f64; 2],
+    turns: Turns,
+    grid: Grid,
+    reference_mm2: f64,
+}
+
+/// What a table holds, at a depth.
+#[derive(Clone, Copy)]
+enum Channel {
+    Value(f64),
+    Slope(f64),
+}
+
+/// The spline coefficients of one channel, one table for each turn.
+type Tables = Vec<Vec<f64>>;
+
+impl Maker<'_> {
+    fn depth(&self, depth_max_mm: f64) -> Depth {
+        let Some(jumps_mm) = jumps_mm(&self.press.indenter, depth_max_mm) else {
+            return Depth::Flat(interleave(&[&self.tables(Channel::Slope(depth_max_mm))]));
+        };
+        let even = (0..=DEPTH_PIECES).map(|end| depth_max_mm * f64::from(end) / f64::from(DEPTH_PIECES));
+        let mut ends_mm: Vec<f64> = even.chain(jumps_mm.iter().copied()).collect();
+        ends_mm.sort_by(f64::total_cmp);
+        // Ends that fall together would give a piece without width; slopes are taken well within one.
+        let least_mm = 1e-6 * depth_max_mm;
+        let aside_mm = 1e-3 * least_mm;
+        ends_mm.dedup_by(|after, before| *after - *before < least_mm);
+        let mut pieces = Vec::new();
+        let mut before: Option<(f64, Tables, Tables)> = None;
+        for to_mm in ends_mm {
+            let value = self.tables(Channel::Value(to_mm));
+            let below = self.tables(Channel::Slope(to_mm + aside_mm));
+            let jumps = jumps_mm.iter().any(|jump_mm| (jump_mm - to_mm).abs() < least_mm);
+            let above = if jumps { self.tables(Channel::Slope(to_mm - aside_mm)) } else { below.clone() };
+            if let Some((from_mm, from_value, from_slope)) = before {
+                let table = interleave(&[&from_value, &value, &from_slope, &above]);
+                pieces.push(Piece { from_mm, to_mm, table });
+            }
+            before = Some((to_mm, value, below));
+        }
+        Depth::Pieces(pieces)
+    }
+
+    fn tables(&self, channel: Channel) -> Tables {
+        let field = self.field(channel);
+        self.turns.nodes_rad().into_iter().map(|turn_rad| self.integrated(&field, turn_rad)).collect()
+    }
+
+    /// The blurred penetration at a depth, or its slope by depth, on a grid twice as fine as the table's.
+    fn field(&self, channel: Channel) -> Field {
+        let blur = Blur { sigma_mm: self.sigma_mm };
+        let at = |depth_mm| Contact { depth_mm, ..self.press.clone() };
+        let slices = match channel {
+            Channel::Value(depth_mm) => at(depth_mm).slices(self.sigma_mm),
+            Channel::Slope(depth_mm) => at(depth_mm).footprint(self.sigma_mm),
+        };
+        let nodes = self.grid.nodes.map(|nodes| 2 * nodes - 1);
+        Field::of(&slices, blur, Grid { step_mm: self.grid.step_mm / 2.0, nodes, ..self.grid })
+    }
+
+    /// A field integrated over an element turned by `turn_rad` at every node, in units of the reference press,
+    /// as spline coefficients.
+    fn integrated(&self, field: &Field, turn_rad: f64) -> Vec<f64> {
+        let (sin, cos) = turn_rad.sin_cos();
+        let along = |side: f64| coarse(-side / 2.0, side / 2.0, self.sigma_mm).collect::<Vec<_>>();
+        let [along_x, along_y] = self.element_mm.map(along);
+        let mut points = Vec::with_capacity(along_x.len() * along_y.len());
+        for (x, width) in &along_x {
+            for (y, height) in &along_y {
+                points.push(([cos * x + sin * y, cos * y - sin * x], width * height / self.reference_mm2));
+            }
+        }
+        let [columns, rows] = self.grid.places_mm();
+        let mut values = Vec::with_capacity(columns.len() * rows.len());
+        for y in &rows {
+            for x in &columns {
+                values
+                    .push(points.iter().map(|([dx, dy], weight)| weight * field.at([x + dx, y + dy])).sum());
+            }
+        }
+        spline(values, self.grid.nodes)
+    }
+}
+
+/// One table of several channels: node by node, in each node turn by turn, in each turn channel by channel.
+fn interleave(channels: &[&Tables]) -> Vec<f32> {
+    let turns = channels.iter().map(|tables| tables.len()).min().unwrap_or(0);
+    let order: Vec<&Vec<f64>> =
+        (0..turns).flat_map(|turn| channels.iter().map(move |tables| &tables[turn])).collect();
+    let nodes = order.first().map_or(0, |table| table.len());
+    (0..nodes).flat_map(|node| order.iter().map(move |table| single(table[node]))).collect()
+}
+
+/// Depths below `depth_max_mm` at which the touched area jumps; `None` if the whole underside is flat.
+fn jumps_mm(indenter: &Indenter, depth_max_mm: f64) -> Option<Vec<f64>> {
+    match indenter {
+        Indenter::Cylinder { .. } | Indenter::Box { .. } => None,
+        Indenter::Sphere { diameter_mm } => Some(within(diameter_mm / 2.0, depth_max_mm)),
+        Indenter::Cone { diameter_mm, apex_deg } => {
+            Some(within(diameter_mm / 2.0 / (apex_deg.to_radians() / 2.0).tan(), depth_max_mm))
+        }
+        Indenter::Mesh(mesh) => {
+            let [_, _, [lowest, _]] = mesh.bounds_mm();
+            let mut flat = true;
+            let mut jumps = Vec::new();
+            for corners in mesh.corners_mm() {
+                let heights = corners.map(|[_, _, z]| z - lowest);
+                let (least, most) = (
+                    heights.iter().copied().fold(f64::INFINITY, f64::min),
+                    heights.iter().copied().fold(0.0, f64::max),
+                );
+                if least < depth_max_mm {
+                    flat &= most <= 0.0;
+                    if most - least < 1e-9 && most > 0.0 {
+                        jumps.push(most);
+                    }
+                }
+            }
+            (!flat).then_some(jumps)
+        }
+    }
+}
+
+fn within(height_mm: f64, depth_max_mm: f64) -> Vec<f64> {
+    if height_mm < depth_max_mm { vec![height_mm] } else { Vec::new() }
+}
