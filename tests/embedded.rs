@@ -119,7 +119,7 @@ fn plan_promises_what_run_then_does() {
 #[test]
 fn every_shipped_file_is_valid() {
     let folder = TempDir::new().unwrap();
-    let files: Vec<_> = ["config", "config/rigs", "experiments"]
+    let files: Vec<_> = ["config", "config/rigs", "config/models", "experiments"]
         .iter()
         .flat_map(|folder| fs::read_dir(repository(folder)).unwrap())
         .map(|file| file.unwrap().path())

@@ -155,6 +155,43 @@ fn a_mesh_agrees_with_the_box_that_it_is() {
 }
 
 #[test]
+fn a_tool_nearly_along_the_axes_is_as_exact_as_any() {
+    // A long bar turned by a little: by Gauss-Legendre over the bar itself, in its own frame.
+    let model = digitacts(Psf { sigma_intercept_mm: 1.0, sigma_per_mm: 0.0 });
+    let d_ref = round_by_quadrature([0.0; 2], 0.5, |_| 1.0, [0.0; 2], 1.0);
+    let corners = [[-1.0, -5.0, 0.0], [1.0, -5.0, 0.0], [1.0, 5.0, 0.0], [-1.0, 5.0, 0.0]];
+    let mesh = Indenter::Mesh(Arc::new(Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).unwrap()));
+    for rotation_deg in [0.01, 0.3, 2.0, 89.8] {
+        let (sin, cos) = f64::to_radians(rotation_deg).sin_cos();
+        for tool in [Indenter::Box { size_mm: [2.0, 10.0] }, mesh.clone()] {
+            let contact = Contact { rotation_deg, ..at(tool, [6.3, 5.2], 0.5) };
+            let got = indentation(&model, &contact, THIN);
+            for element in [3, 18, 27, 42] {
+                let centre = model.array().centre_mm(element).unwrap();
+                let (across, along) = (48, 192);
+                let (du, dv) = (2.0 / f64::from(across), 10.0 / f64::from(along));
+                let mut want = 0.0;
+                for i in 0..=across {
+                    for j in 0..=along {
+                        let (u, v) = (-1.0 + du * f64::from(i), -5.0 + dv * f64::from(j));
+                        want += boole(i, across)
+                            * boole(j, along)
+                            * share_by_quadrature(6.3 + cos * u - sin * v, centre[0], 1.8, 1.0)
+                            * share_by_quadrature(5.2 + sin * u + cos * v, centre[1], 1.8, 1.0);
+                    }
+                }
+                want *= 0.5 * du * dv * (2.0_f64 / 45.0).powi(2) / d_ref;
+                assert!(
+                    (got[element] - want).abs() < 1e-9,
+                    "{rotation_deg} degrees, element {element}: {} {want}",
+                    got[element]
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn a_tool_goes_no_deeper_than_the_covering() {
     let model = digitacts(Psf::PAPER);
     let press =

@@ -3,7 +3,9 @@
 use crate::effect::{
     Base, Effect, EffectError, Make, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Place, Press,
 };
-use crate::{Contact, Covering, ForwardModel, Indenter, Path, Readout, Registration, Simulator};
+use crate::{
+    Contact, Covering, ForwardModel, Indenter, Path, Readout, Registration, Simulator, Stamp, StampError,
+};
 
 /// An instant at which the elements are read.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +43,7 @@ pub struct Pipeline {
     stages: Stages,
     last_s: Option<f64>,
     pressed: Pressed,
+    stamp: Option<Stamp>,
     felt_mm: Vec<f64>,
     counts: Vec<f64>,
 }
@@ -103,6 +106,7 @@ impl Pipeline {
                 reached_mm: vec![0.0; elements],
                 of_one_mm: vec![0.0; elements],
             },
+            stamp: None,
             felt_mm: vec![0.0; elements],
             counts: vec![0.0; elements],
             indenter,
@@ -130,7 +134,7 @@ impl Pipeline {
         for effect in &mut self.stages.motion {
             effect.place(now, &mut place);
         }
-        self.pressed.press(&place, &self.indenter, base, &self.stages);
+        self.pressed.press(&place, &self.indenter, base, &self.stages, self.stamp.as_ref());
 
         for (felt, reached) in self.felt_mm.iter_mut().zip(&self.pressed.reached_mm) {
             *felt = self.stiffness * reached;
@@ -185,9 +189,22 @@ impl Pipeline {
         self.last_s = None;
     }
 
+    /// Makes presses up to `depth_max_mm` deep fast by a [`Stamp`] of the tool, at the cost of its accuracy and of the
+    /// time that it takes to make. It serves wherever no effect changes the tool or the spread, until another
+    /// covering is put in place.
+    ///
+    /// # Errors
+    /// As [`Stamp::new`].
+    pub fn hasten(&mut self, depth_max_mm: f64) -> Result<(), StampError> {
+        self.stamp = Some(Stamp::new(&self.model, &self.indenter, self.covering, depth_max_mm)?);
+        self.pressed.at = None;
+        Ok(())
+    }
+
     /// Puts another covering in place.
     pub fn set_covering(&mut self, covering: Covering) {
         self.covering = covering;
+        self.stamp = None;
         self.pressed.at = None;
     }
 
@@ -220,7 +237,14 @@ impl Stages {
 }
 
 impl Pressed {
-    fn press(&mut self, place: &Place, indenter: &Indenter, base: Base<'_>, stages: &Stages) {
+    fn press(
+        &mut self,
+        place: &Place,
+        indenter: &Indenter,
+        base: Base<'_>,
+        stages: &Stages,
+        stamp: Option<&Stamp>,
+    ) {
         let contact = place.contact(indenter.clone());
         let at = (contact.position_mm, contact.rotation_deg, contact.depth_mm);
         if self.at == Some(at) {
@@ -237,8 +261,13 @@ impl Pressed {
             effect.spread(base, &mut self.presses);
         }
         self.reached_mm.fill(0.0);
+        // A stamp is of the tool and the spread as they are.
+        let stamp = stamp.filter(|_| stages.contact.is_empty());
         for press in self.presses.iter().filter(|press| press.contact.depth_mm > 0.0) {
-            press.indentation(base, &mut self.of_one_mm);
+            let stamped = stamp.is_some_and(|stamp| press.stamped(stamp, base, &mut self.of_one_mm));
+            if !stamped {
+                press.indentation(base, &mut self.of_one_mm);
+            }
             for (reached, of_one) in self.reached_mm.iter_mut().zip(&self.of_one_mm) {
                 *reached += press.weight * of_one;
             }
@@ -247,6 +276,20 @@ impl Pressed {
 }
 
 impl Press {
+    /// As [`Press::indentation`] by a stamp; false if it is not for this press.
+    fn stamped(&self, stamp: &Stamp, base: Base<'_>, indentation_mm: &mut [f64]) -> bool {
+        let Contact { position_mm, rotation_deg, depth_mm, .. } = self.contact;
+        let mut single_mm = vec![0.0_f32; indentation_mm.len()];
+        let is_bases = self.sigma_mm.to_bits() == base.sigma_mm().to_bits();
+        if !is_bases || stamp.indentation(position_mm, rotation_deg, depth_mm, &mut single_mm).is_err() {
+            return false;
+        }
+        for (wide_mm, single_mm) in indentation_mm.iter_mut().zip(single_mm) {
+            *wide_mm = f64::from(single_mm);
+        }
+        true
+    }
+
     /// What reaches every element, in units of the base model's reference press; nothing of a spread that none can
     /// be.
     fn indentation(&self, base: Base<'_>, indentation_mm: &mut [f64]) {

@@ -37,6 +37,23 @@ fn without_effects_counts_are_the_base_models_to_the_bit() {
 }
 
 #[test]
+fn a_hastened_pipeline_reads_the_same_but_for_the_stamps_error() {
+    for effects in [vec![], vec![effect("relaxation", [("relaxed_share", 0.3), ("time_constant_s", 0.5)])]] {
+        let simulator = simulator(effects);
+        let way = way(&simulator);
+        let (mut exact, mut hastened) =
+            (Pipeline::new(&simulator).unwrap(), Pipeline::new(&simulator).unwrap());
+        // The way goes 0.75 mm deep: the deepest part is computed exactly.
+        hastened.hasten(0.6).unwrap();
+        for k in 0..80 {
+            let moment = Moment::at(f64::from(k) / 30.0);
+            let (want, got) = (exact.step(moment, &way), hastened.step(moment, &way));
+            assert!(want.iter().zip(got).all(|(want, got)| (want - got).abs() < 0.05), "{want:?} {got:?}");
+        }
+    }
+}
+
+#[test]
 fn neutral_effects_change_nothing_to_the_bit() {
     let plain = simulator([]);
     let way = way(&plain);

@@ -15,7 +15,7 @@ use layers::Layers;
 /// ```
 ///
 /// is smooth in all its arguments: the blur has removed what a table would miss. So `T` is made once, exactly,
-/// and sampled: by cubic B-splines over `p` (nodes an eighth of the blur apart), by three nodes of a trigonometric
+/// and sampled: by cubic B-splines over `p` (nodes a sixth of the blur apart), by three nodes of a trigonometric
 /// polynomial over the quarter turn after which a square comes to lie on itself, and by cubic Hermite
 /// polynomials over depth, whose pieces end where the area touched jumps. Tools that are round need one
 /// rotation, and tools whose underside is flat one depth. An image then takes 16 to 192 multiplications an
@@ -107,7 +107,7 @@ pub enum StampError {
 impl Stamp {
     /// Makes the stamp of a tool under a covering for depths up to `depth_max_mm`, in mm.
     ///
-    /// Takes milliseconds for flat tools, about a second for finely tessellated ones.
+    /// Takes milliseconds for flat tools, seconds for finely tessellated ones.
     ///
     /// # Errors
     /// [`StampError::DepthMax`] unless `0 < depth_max_mm <= ` the covering's thickness; [`StampError::Fine`] if the
@@ -165,20 +165,37 @@ impl Stamp {
         depth_mm: f64,
         counts: &mut [f32],
     ) -> Result<(), StampError> {
-        if counts.len() != self.response.len() {
-            return Err(StampError::Length { elements: self.response.len(), places: counts.len() });
+        self.indentation(position_mm, rotation_deg, depth_mm, counts)?;
+        for (count, element) in counts.iter_mut().zip(&self.response) {
+            *count = element.baseline + element.gain * (*count + element.quadratic * *count * *count);
+        }
+        Ok(())
+    }
+
+    /// Equivalent indentation of every element, in mm, for a tool placed as in [`Stamp::image`].
+    ///
+    /// `indentation_mm`: one per element, row-major, overwritten.
+    ///
+    /// # Errors
+    /// As [`Stamp::image`].
+    pub fn indentation(
+        &self,
+        position_mm: [f64; 2],
+        rotation_deg: f64,
+        depth_mm: f64,
+        indentation_mm: &mut [f32],
+    ) -> Result<(), StampError> {
+        if indentation_mm.len() != self.response.len() {
+            return Err(StampError::Length { elements: self.response.len(), places: indentation_mm.len() });
         }
         if depth_mm.is_nan() || depth_mm > self.depth_max_mm {
             return Err(StampError::Depth { depth_mm, depth_max_mm: self.depth_max_mm });
         }
         if depth_mm > 0.0 {
             let offsets = [(position_mm[0], &self.col_centres_mm), (position_mm[1], &self.row_centres_mm)];
-            self.layers.sample(offsets, rotation_deg, depth_mm, counts);
+            self.layers.sample(offsets, rotation_deg, depth_mm, indentation_mm);
         } else {
-            counts.fill(0.0);
-        }
-        for (count, element) in counts.iter_mut().zip(&self.response) {
-            *count = element.baseline + element.gain * (*count + element.quadratic * *count * *count);
+            indentation_mm.fill(0.0);
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ pub mod model;
 pub mod rig;
 pub mod table;
 
+mod description;
 mod frame;
 mod message;
 mod time;

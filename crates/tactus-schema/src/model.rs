@@ -13,6 +13,7 @@ use tactus_model::{
 };
 
 use crate::Rig;
+use crate::description::WrongField;
 
 pub use file::SCHEMA;
 
@@ -96,6 +97,12 @@ pub enum ModelFileError {
         /// What is wrong with it, and what would be right.
         problem: String,
     },
+}
+
+impl From<WrongField> for ModelFileError {
+    fn from(WrongField { field, problem }: WrongField) -> Self {
+        Self::Field { field, problem }
+    }
 }
 
 impl Model {

@@ -91,6 +91,16 @@ fn contradictions_are_refused_with_their_field() {
             "base.baseline_counts: 1 values for 48 elements",
         ),
         ("baseline_counts = 100.0", "baseline_counts = nan", "base.baseline_counts[0]: "),
+        (
+            "baseline_counts = 100.0",
+            "baseline_counts = 100.0\nbaseline_counts_se = -1.0",
+            "base.baseline_counts_se[0]: not negative",
+        ),
+        (
+            "diameter_mm = 1.0",
+            "size_mm = [1.0, 1.0]",
+            "base.sensitivity_reference.indenter.shape: this shape has a diameter_mm and nothing else",
+        ),
         ("noise_rms_counts = 2.0", "noise_rms_counts = -2.0", "base.noise_rms_counts: not negative"),
         ("sigma_intercept_mm = 2.22", "sigma_intercept_mm = 0.0", "base.psf.sigma_intercept_mm: positive"),
         (

@@ -5,11 +5,15 @@
 //! and, for the service, links, envelope, motion, policy and simulation.
 
 mod file;
-mod one_or_each;
+mod registration;
+mod service;
+mod simulation;
 
 use std::collections::BTreeMap;
 
 use tactus_model::{Array, ArrayError, Covering, Indenter, Psf, Registration};
+
+use crate::description::WrongField;
 
 pub use file::SCHEMA;
 
@@ -249,6 +253,12 @@ pub enum RigError {
         /// What is wrong with it, and what would be right.
         problem: String,
     },
+}
+
+impl From<WrongField> for RigError {
+    fn from(WrongField { field, problem }: WrongField) -> Self {
+        Self::Field { field, problem }
+    }
 }
 
 impl Rig {

@@ -58,6 +58,28 @@ fn a_shape_takes_its_own_size_only() {
 }
 
 #[test]
+fn cones_and_meshes_stand_in_the_file_and_go_with_data() {
+    let cone = "shape = \"cone\"\ndiameter_mm = 4.0\napex_deg = 60.0";
+    let wedge = "shape = \"mesh\"\nvertices_mm = [[0.0, 0.0, 0.0], [3, 0, 0.1], [1.0, 1.0, 0.25]]\n\
+                 triangles = [[0, 1, 2]]";
+    let toml = format!("{SIM}\n[indenters.cone60]\n{cone}\n[indenters.wedge]\n{wedge}\n");
+    let rig = Rig::from_toml(&toml).unwrap();
+    assert_eq!(rig.indenters["cone60"], Indenter::Cone { diameter_mm: 4.0, apex_deg: 60.0 });
+    let corners_mm = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.1], [1.0, 1.0, 0.25]];
+    let mesh = tactus_model::Mesh::new(&corners_mm, &[[0, 1, 2]]).unwrap();
+    assert_eq!(rig.indenters["wedge"], Indenter::Mesh(mesh.into()));
+    assert_eq!(Rig::from_json(&rig.to_json()).unwrap().indenters, rig.indenters);
+
+    for (from, to, refusal) in [
+        ("apex_deg = 60.0", "apex_deg = 180.0", "indenters.cone60.apex_deg: the full angle"),
+        ("[[0, 1, 2]]", "[[0, 1, 7]]", "indenters.wedge.triangles: triangle 0 names vertex 7 of 3"),
+    ] {
+        let error = Rig::from_toml(&toml.replace(from, to)).unwrap_err().to_string();
+        assert!(error.starts_with(refusal), "{error}");
+    }
+}
+
+#[test]
 fn numbers_of_any_spelling_are_read_from_json() {
     let json = Rig::from_toml(SIM).unwrap().to_json();
     let spelt = json.replace("\"baseline_counts\":100.0", "\"baseline_counts\":1e2");

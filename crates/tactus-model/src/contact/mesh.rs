@@ -32,7 +32,9 @@ pub(super) fn slices(
     for panel in panels(&facets, sigma_mm / 64.0) {
         let [from, to] = panel;
         let crossed: Vec<&Facet> = facets.iter().filter(|facet| overlaps(facet, panel)).collect();
-        for (x_mm, width_mm) in smooth(from, to, sigma_mm) {
+        // Where an edge runs nearly along y, a line's end goes far within a narrow panel.
+        let goes_mm = crossed.iter().map(|facet| goes_mm(facet, to - from)).fold(to - from, f64::max);
+        for (x_mm, width_mm) in smooth(from, to, sigma_mm * (to - from) / goes_mm) {
             let lines: Vec<Line> = crossed.iter().filter_map(|facet| line_at(facet, x_mm)).collect();
             for line in deepest(&lines) {
                 let [[from, below_from], [to, below_to]] = line;
@@ -133,6 +135,14 @@ fn turn(from: &[f64; 3], to: &[f64; 3], point: &[f64; 3]) -> f64 {
 
 fn overlaps(facet: &Facet, [from, to]: [f64; 2]) -> bool {
     facet.iter().any(|[x, _, _]| *x > from) && facet.iter().any(|[x, _, _]| *x < to)
+}
+
+/// How far along y a facet's edges go at most within a width of x.
+fn goes_mm([a, b, c]: &Facet, width_mm: f64) -> f64 {
+    let edges = [[a, b], [b, c], [c, a]].map(|[from, to]| [(to[0] - from[0]).abs(), (to[1] - from[1]).abs()]);
+    // An edge along y is a panel's border.
+    let slanting = edges.into_iter().filter(|[along_x, _]| *along_x > 0.0);
+    slanting.map(|[along_x, along_y]| along_y * (width_mm / along_x).min(1.0)).fold(0.0, f64::max)
 }
 
 /// Where the plane of one x cuts a facet, from its least y to its greatest.

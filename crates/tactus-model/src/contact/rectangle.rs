@@ -30,7 +30,14 @@ pub(super) fn slices(
         .windows(2)
         .filter_map(|pair| <[f64; 2]>::try_from(pair).ok())
         .filter(|[from, to]| to > from)
-        .flat_map(|[from, to]| smooth(from, to, sigma_mm))
+        .flat_map(|[from, to]| {
+            // Where a side runs nearly along y, an end goes far within a narrow range.
+            let (starts, ends) = (chord(from), chord(to));
+            let goes_mm = (ends[0] - starts[0]).abs().max((ends[1] - starts[1]).abs());
+            // A side along y has no end in its band.
+            let goes_mm = goes_mm.min(width_mm.hypot(height_mm));
+            smooth(from, to, sigma_mm * ((to - from) / goes_mm).min(1.0))
+        })
         .map(|(dx, width_mm)| {
             let [low, high] = chord(dx);
             Slice { x_mm: x + dx, y_mm: [y + low, y + high], weight_mm2: depth_mm * width_mm }

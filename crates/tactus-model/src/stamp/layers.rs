@@ -1,5 +1,7 @@
 //! The tables of a stamp and how they are sampled.
 
+use wide::{f32x4, f32x8};
+
 use super::field::{Field, Grid, spline};
 use super::{reach_mm, single};
 use crate::blur::Blur;
@@ -9,7 +11,7 @@ use crate::{Contact, Indenter};
 /// Beyond so many standard deviations from the tool nothing is left of it.
 const TAIL: f64 = 6.0;
 /// Nodes in a standard deviation.
-const NODES_PER_SIGMA: f64 = 8.0;
+const NODES_PER_SIGMA: f64 = 6.0;
 /// Pieces of the depth, before those that jumps of the touched area add.
 const DEPTH_PIECES: u32 = 8;
 
@@ -139,70 +141,144 @@ impl Layers {
             rows,
         };
         match &self.depth {
-            Depth::Flat(table) => match self.turns {
-                Turns::Round => self.taps::<1, 4>(table, &place, &weigh(&turns, &[depth_mm]), values),
-                Turns::Square => self.taps::<3, 12>(table, &place, &weigh(&turns, &[depth_mm]), values),
-                Turns::Oblong => self.taps::<7, 28>(table, &place, &weigh(&turns, &[depth_mm]), values),
-            },
+            Depth::Flat(table) => {
+                let channels = [depth_mm];
+                match self.turns {
+                    Turns::Round => self.taps::<1>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Square => self.taps::<3>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Oblong => self.taps::<7>(table, &place, &weigh(&turns, &channels), values),
+                }
+            }
             Depth::Pieces(pieces) => {
                 let piece = piece_at(pieces, depth_mm);
-                let (table, by_depth) = (&piece.table, piece.weights(depth_mm));
+                let (table, channels) = (&piece.table, piece.weights(depth_mm));
                 match self.turns {
-                    Turns::Round => self.taps::<4, 16>(table, &place, &weigh(&turns, &by_depth), values),
-                    Turns::Square => self.taps::<12, 48>(table, &place, &weigh(&turns, &by_depth), values),
-                    Turns::Oblong => self.taps::<28, 112>(table, &place, &weigh(&turns, &by_depth), values),
+                    Turns::Round => self.taps::<4>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Square => self.taps::<12>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Oblong => self.taps::<28>(table, &place, &weigh(&turns, &channels), values),
                 }
             }
         }
     }
 
-    /// The spline's 4 x 4 nodes about every element, `C` channels each; `N = 4 C` numbers of a row of nodes lie
-    /// side by side.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "between 1 and the number of nodes, some hundreds"
-    )]
-    fn taps<const C: usize, const N: usize>(
+    /// Signals of all elements by `C` channels of a table.
+    fn taps<const C: usize>(
         &self,
         table: &[f32],
         place: &Place<'_>,
         channels: &[f32; C],
         values: &mut [f32],
     ) {
-        let [columns, rows] = self.nodes;
-        let [sin, cos] = place.turn;
-        let last = [columns, rows].map(|nodes| nodes as f32 - 2.0);
-        let mut values = values.iter_mut();
-        for centre_y in place.rows {
+        let channels = channels.map(f32x4::splat);
+        for (row, centre_y) in values.chunks_exact_mut(place.columns.len()).zip(place.rows) {
             let dy = centre_y - place.tool[1];
-            for (centre_x, value) in place.columns.iter().zip(values.by_ref()) {
-                let dx = centre_x - place.tool[0];
-                let x = (cos * dx + sin * dy - self.origin_mm[0]) * self.per_mm;
-                let y = (cos * dy - sin * dx - self.origin_mm[1]) * self.per_mm;
-                if !(x >= 1.0 && y >= 1.0 && x < last[0] && y < last[1]) {
-                    *value = 0.0;
-                    continue;
+            for (values, centres_x) in row.chunks_mut(LANES).zip(place.columns.chunks(LANES)) {
+                let spots = self.spots(place, centres_x, dy);
+                for (lane, value) in values.iter_mut().enumerate() {
+                    // Beyond the table there is nothing.
+                    *value = if spots.inside[lane] > 0.0 {
+                        spots.sample(lane, table, self.nodes[0], &channels)
+                    } else {
+                        0.0
+                    };
                 }
-                let (column, row) = (x as i32 as usize - 1, y as i32 as usize - 1);
-                let across = cubic(x - (column + 1) as f32);
-                let along = cubic(y - (row + 1) as f32);
-                let mut sum = [0.0_f32; N];
-                for (node, weight) in along.into_iter().enumerate() {
-                    let first = ((row + node) * columns + column) * C;
-                    let Some(nodes) = table.get(first..first + N) else { continue };
-                    for (sum, value) in sum.iter_mut().zip(nodes) {
-                        *sum += weight * value;
-                    }
-                }
-                let mut total = [0.0_f32; C];
-                for (node, weight) in across.into_iter().enumerate() {
-                    for (total, sum) in total.iter_mut().zip(&sum[node * C..]) {
-                        *total += weight * sum;
-                    }
-                }
-                *value = total.iter().zip(channels).map(|(total, share)| total * share).sum();
             }
+        }
+    }
+
+    /// Where some elements of a row fall among the nodes.
+    fn spots(&self, place: &Place<'_>, centres_x: &[f32], dy: f32) -> Spots {
+        let [sin, cos] = place.turn;
+        let mut dx = [0.0_f32; LANES];
+        for (dx, centre_x) in dx.iter_mut().zip(centres_x) {
+            *dx = centre_x - place.tool[0];
+        }
+        let dx = f32x8::from(dx);
+        let [x0, y0] = [sin * dy - self.origin_mm[0], cos * dy - self.origin_mm[1]];
+        let along_x = Spline::at((dx * cos + x0) * self.per_mm, self.nodes[0]);
+        let along_y = Spline::at((dx * -sin + y0) * self.per_mm, self.nodes[1]);
+        Spots {
+            inside: (along_x.inside & along_y.inside & f32x8::ONE).to_array(),
+            column: along_x.first,
+            row: along_y.first,
+            across: along_x.weights.map(f32x8::to_array),
+            along: along_y.weights.map(f32x8::to_array),
+        }
+    }
+}
+
+/// Elements whose places are computed together.
+const LANES: usize = 8;
+
+/// Where elements fall among a table's nodes, if they do: the first of the 4 x 4 about each, and their weights,
+/// node by node.
+struct Spots {
+    /// 1 or 0.
+    inside: [f32; LANES],
+    column: [u32; LANES],
+    row: [u32; LANES],
+    across: [[f32; LANES]; 4],
+    along: [[f32; LANES]; 4],
+}
+
+impl Spots {
+    /// The spline at one spot.
+    #[inline]
+    fn sample<const C: usize>(
+        &self,
+        lane: usize,
+        table: &[f32],
+        columns: usize,
+        channels: &[f32x4; C],
+    ) -> f32 {
+        let [column, row] = [self.column[lane], self.row[lane]].map(|node| node as usize);
+        let first = row * C * columns + column;
+        // Each begins with four neighbours of a row, channel by channel, row by row.
+        let mut rows = table.get(first..).unwrap_or_default().chunks_exact(columns);
+        let mut sums = [f32x4::ZERO; C];
+        for weights in &self.along {
+            let weight = f32x4::splat(weights[lane]);
+            for sum in &mut sums {
+                let Some(four) = rows.next().and_then(|row| row.first_chunk::<4>()) else { return 0.0 };
+                *sum += weight * f32x4::from(*four);
+            }
+        }
+        let mut mixed = f32x4::ZERO;
+        for (sum, share) in sums.into_iter().zip(channels) {
+            mixed += sum * share;
+        }
+        (mixed * f32x4::from(self.across.map(|weights| weights[lane]))).reduce_add()
+    }
+}
+
+/// Along one axis: the first of four nodes about each place, and the weights of a cubic B-spline there.
+struct Spline {
+    /// All bits set or none.
+    inside: f32x8,
+    first: [u32; LANES],
+    weights: [f32x8; 4],
+}
+
+impl Spline {
+    /// For places in steps between nodes.
+    #[inline]
+    fn at(places: f32x8, nodes: usize) -> Self {
+        const SIXTH: f32 = 1.0 / 6.0;
+        // From here on singles are whole numbers, and their last bits count.
+        const WHOLE: f32 = 8_388_608.0;
+        let within = places.fast_max(f32x8::splat(1.5)).fast_min(f32x8::splat(nodes as f32 - 3.0));
+        let shifted = within - 0.5 + WHOLE;
+        let t = within - (shifted - WHOLE);
+        let u = 1.0 - t;
+        Self {
+            inside: places.simd_eq(within),
+            first: shifted.to_array().map(|shifted| (shifted.to_bits() & 0x7f_ffff) - 1),
+            weights: [
+                u * u * u * SIXTH,
+                t * t * (t * 0.5 - 1.0) + 2.0 / 3.0,
+                u * u * (u * 0.5 - 1.0) + 2.0 / 3.0,
+                t * t * t * SIXTH,
+            ],
         }
     }
 }
@@ -220,14 +296,6 @@ fn weigh<const C: usize>(turns: &[f64; 7], by_depth: &[f64]) -> [f32; C] {
     std::array::from_fn(|channel| {
         single(turns[channel / by_depth.len()] * by_depth[channel % by_depth.len()])
     })
-}
-
-/// Weights of a cubic B-spline's four nodes, `t` of a step beyond the second.
-fn cubic(t: f32) -> [f32; 4] {
-    const SIXTH: f32 = 1.0 / 6.0;
-    let u = 1.0 - t;
-    let inner = |t: f32| (2.0 / 3.0) + t * t * (0.5 * t - 1.0);
-    [u * u * u * SIXTH, inner(t), inner(u), t * t * t * SIXTH]
 }
 
 /// The piece that a depth falls in.
@@ -269,7 +337,10 @@ type Tables = Vec<Vec<f64>>;
 impl Maker<'_> {
     fn depth(&self, depth_max_mm: f64) -> Depth {
         let Some(jumps_mm) = jumps_mm(&self.press.indenter, depth_max_mm) else {
-            return Depth::Flat(interleave(&[&self.tables(Channel::Slope(depth_max_mm))]));
+            return Depth::Flat(interleave(
+                &[&self.tables(Channel::Slope(depth_max_mm))],
+                self.grid.nodes[0],
+            ));
         };
         let even = (0..=DEPTH_PIECES).map(|end| depth_max_mm * f64::from(end) / f64::from(DEPTH_PIECES));
         let mut ends_mm: Vec<f64> = even.chain(jumps_mm.iter().copied()).collect();
@@ -286,7 +357,7 @@ impl Maker<'_> {
             let jumps = jumps_mm.iter().any(|jump_mm| (jump_mm - to_mm).abs() < least_mm);
             let above = if jumps { self.tables(Channel::Slope(to_mm - aside_mm)) } else { below.clone() };
             if let Some((from_mm, from_value, from_slope)) = before {
-                let table = interleave(&[&from_value, &value, &from_slope, &above]);
+                let table = interleave(&[&from_value, &value, &from_slope, &above], self.grid.nodes[0]);
                 pieces.push(Piece { from_mm, to_mm, table });
             }
             before = Some((to_mm, value, below));
@@ -335,13 +406,15 @@ impl Maker<'_> {
     }
 }
 
-/// One table of several channels: node by node, in each node turn by turn, in each turn channel by channel.
-fn interleave(channels: &[&Tables]) -> Vec<f32> {
+/// One table of several channels: row by row of nodes, in each row turn by turn, in each turn channel by channel;
+/// and one row more, so that a whole row follows every node.
+fn interleave(channels: &[&Tables], columns: usize) -> Vec<f32> {
     let turns = channels.iter().map(|tables| tables.len()).min().unwrap_or(0);
     let order: Vec<&Vec<f64>> =
         (0..turns).flat_map(|turn| channels.iter().map(move |tables| &tables[turn])).collect();
-    let nodes = order.first().map_or(0, |table| table.len());
-    (0..nodes).flat_map(|node| order.iter().map(move |table| single(table[node]))).collect()
+    let rows = order.first().map_or(0, |table| table.len() / columns);
+    let row = |row: usize| order.iter().flat_map(move |table| &table[row * columns..(row + 1) * columns]);
+    (0..rows).flat_map(row).map(|value| single(*value)).chain(std::iter::repeat_n(0.0, columns)).collect()
 }
 
 /// Depths below `depth_max_mm` at which the touched area jumps; `None` if the whole underside is flat.
@@ -356,7 +429,8 @@ fn jumps_mm(indenter: &Indenter, depth_max_mm: f64) -> Option<Vec<f64>> {
             let [_, _, [lowest, _]] = mesh.bounds_mm();
             let mut flat = true;
             let mut jumps = Vec::new();
-            for corners in mesh.corners_mm() {
+            // Upright sides press nothing by themselves.
+            for corners in mesh.corners_mm().filter(|corners| twice_shadow_mm2(corners) != 0.0) {
                 let heights = corners.map(|[_, _, z]| z - lowest);
                 let (least, most) = (
                     heights.iter().copied().fold(f64::INFINITY, f64::min),
@@ -372,6 +446,11 @@ fn jumps_mm(indenter: &Indenter, depth_max_mm: f64) -> Option<Vec<f64>> {
             (!flat).then_some(jumps)
         }
     }
+}
+
+/// Twice the area that a triangle covers, seen from below.
+fn twice_shadow_mm2([a, b, c]: &[[f64; 3]; 3]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }
 
 fn within(height_mm: f64, depth_max_mm: f64) -> Vec<f64> {

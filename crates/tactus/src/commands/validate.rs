@@ -9,7 +9,7 @@ use tactus_daemon::embedded::SIMULATED_RIG;
 use tactus_daemon::experiments;
 use tactus_plan::RigView;
 use tactus_record::Completeness;
-use tactus_schema::Rig;
+use tactus_schema::{Model, Rig, model, rig};
 
 use crate::cli::{Common, ValidateArgs};
 use crate::exit::Exit;
@@ -50,16 +50,30 @@ fn check(file: &Path) -> anyhow::Result<String> {
     }
 }
 
-/// A rig says so in its `schema`; what has none is a service's configuration.
+/// A rig or a model says so in its `schema`; what has none is a service's configuration.
 fn check_toml(file: &Path) -> anyhow::Result<String> {
     let text = std::fs::read_to_string(file).context("cannot be read")?;
-    let is_rig = text.lines().any(|line| line.trim_start().starts_with("schema"));
-    if is_rig {
-        let (rig, _) = config::load_rig(file)?;
-        return Ok(format!("rig {:?}, {} x {} elements", rig.name, rig.array.rows(), rig.array.cols()));
+    match schema(&text) {
+        Some(rig::SCHEMA) => {
+            let (rig, _) = config::load_rig(file)?;
+            Ok(format!("rig {:?}, {} x {} elements", rig.name, rig.array.rows(), rig.array.cols()))
+        }
+        Some(model::SCHEMA) => {
+            let Model { base, effects } = Model::from_toml(&text)?;
+            let (name, rows, cols) = (base.array.name(), base.array.rows(), base.array.cols());
+            Ok(format!("model of {name:?}, {rows} x {cols} elements, {} effects", effects.len()))
+        }
+        Some(other) => bail!("schema {other:?} is unknown; there is: {}, {}", rig::SCHEMA, model::SCHEMA),
+        None => Ok(format!("a service's configuration for rig {:?}", Config::load(file)?.rig.name)),
     }
-    let config = Config::load(file)?;
-    Ok(format!("a service's configuration for rig {:?}", config.rig.name))
+}
+
+/// What stands between the quotes after `schema =`.
+fn schema(text: &str) -> Option<&str> {
+    text.lines().find_map(|line| {
+        let value = line.trim_start().strip_prefix("schema")?.trim_start().strip_prefix('=')?;
+        value.split(['"', '\'']).nth(1)
+    })
 }
 
 fn check_script(file: &Path) -> anyhow::Result<String> {
@@ -86,3 +100,7 @@ fn check_recording(file: &Path) -> anyhow::Result<String> {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "validate_tests.rs"]
+mod tests;

@@ -6,15 +6,43 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::{WrongField, finite, wrong};
+
 /// One number for all elements, or one each, row-major.
 ///
 /// Read by hand: an untagged enum cannot read numbers where some crate of the program has switched on
 /// `serde_json`'s `arbitrary_precision`, which gives a number as a map of its own.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-pub(super) enum OneOrEach {
+pub(crate) enum OneOrEach {
     One(f64),
     Each(Vec<f64>),
+}
+
+impl OneOrEach {
+    /// One number if all are the same to the bit.
+    pub(crate) fn of(values: &[f64]) -> Self {
+        match values {
+            [first, rest @ ..] if rest.iter().all(|value| value.to_bits() == first.to_bits()) => {
+                Self::One(*first)
+            }
+            _ => Self::Each(values.to_vec()),
+        }
+    }
+
+    pub(crate) fn check(self, field: &str, elements: usize) -> Result<Vec<f64>, WrongField> {
+        let values = match self {
+            Self::One(value) => vec![value; elements],
+            Self::Each(values) => values,
+        };
+        if values.len() != elements {
+            return Err(wrong(field, format!("{} values for {elements} elements", values.len())));
+        }
+        for (index, value) in values.iter().enumerate() {
+            finite(format!("{field}[{index}]"), *value)?;
+        }
+        Ok(values)
+    }
 }
 
 impl<'de> Deserialize<'de> for OneOrEach {

@@ -1,0 +1,35 @@
+//! What the rig file and the model file say in the same words: arrays, indenters, values of elements.
+//!
+//! A raw type is read as it is written; its `check` takes the path of its field in the file, for errors.
+
+mod array;
+mod indenter;
+mod number;
+mod one_or_each;
+
+pub(crate) use array::RawArray;
+pub(crate) use indenter::RawIndenter;
+pub(crate) use number::{finite, not_negative, positive, range};
+pub(crate) use one_or_each::OneOrEach;
+
+/// A field that is wrong; each file's error has it as its `Field`.
+#[derive(Debug)]
+pub(crate) struct WrongField {
+    /// Path of the field.
+    pub(crate) field: String,
+    /// What is wrong with it, and what would be right.
+    pub(crate) problem: String,
+}
+
+pub(crate) fn wrong(field: impl Into<String>, problem: impl Into<String>) -> WrongField {
+    WrongField { field: field.into(), problem: problem.into() }
+}
+
+/// A file of another schema, or of another version, is not guessed at.
+pub(crate) fn check_schema(read: &str, stated: &str) -> Result<(), WrongField> {
+    if stated == read {
+        Ok(())
+    } else {
+        Err(wrong("schema", format!("this program reads {read:?}, not {stated:?}")))
+    }
+}

@@ -1,0 +1,59 @@
+//! The elements, as both files write them.
+
+use serde::{Deserialize, Serialize};
+use tactus_model::{Array, ArrayError};
+
+use super::{WrongField, wrong};
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawArray {
+    name: String,
+    rows: usize,
+    cols: usize,
+    element_mm: [f64; 2],
+    col_centres_mm: Vec<f64>,
+    row_centres_mm: Vec<f64>,
+    rate_hz: f64,
+    full_scale_counts: f64,
+    step_counts: f64,
+}
+
+impl RawArray {
+    pub(crate) fn of(array: &Array) -> Self {
+        Self {
+            name: array.name().into(),
+            rows: array.rows(),
+            cols: array.cols(),
+            element_mm: array.element_mm(),
+            col_centres_mm: array.col_centres_mm().to_vec(),
+            row_centres_mm: array.row_centres_mm().to_vec(),
+            rate_hz: array.rate_hz(),
+            full_scale_counts: array.full_scale_counts(),
+            step_counts: array.step_counts(),
+        }
+    }
+
+    pub(crate) fn check<E>(self, field: &str) -> Result<Array, E>
+    where
+        E: From<WrongField> + From<ArrayError>,
+    {
+        for (name, stated, listed) in
+            [("rows", self.rows, self.row_centres_mm.len()), ("cols", self.cols, self.col_centres_mm.len())]
+        {
+            if stated != listed {
+                let problem = format!("says {stated}, but {listed} centres are listed");
+                return Err(wrong(format!("{field}.{name}"), problem).into());
+            }
+        }
+        Ok(Array::new(
+            self.name,
+            self.element_mm,
+            self.col_centres_mm,
+            self.row_centres_mm,
+            self.rate_hz,
+            self.full_scale_counts,
+            self.step_counts,
+        )?)
+    }
+}
