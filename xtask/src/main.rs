@@ -1,5 +1,6 @@
-//! Chores of the repository: `cargo xtask proto` compiles the messages.
+//! Chores of the repository: `cargo xtask proto` compiles the messages, `cargo xtask assets` makes the tools.
 
+mod assets;
 mod messages;
 
 use std::path::{Path, PathBuf};
@@ -10,7 +11,8 @@ fn main() -> Result<()> {
     let task = std::env::args().nth(1);
     match task.as_deref() {
         Some("proto") => messages::compile(&repository(), &repository()),
-        other => bail!("unknown task {other:?}; there is: proto"),
+        Some("assets") => assets::write(&repository()),
+        other => bail!("unknown task {other:?}; there are: proto, assets"),
     }
 }
 
