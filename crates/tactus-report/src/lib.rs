@@ -4,9 +4,12 @@
 //! said, as data; [`render_html`] makes one HTML page of it, with its style and figures inline, that loads nothing
 //! from anywhere. The same recording always gives the same page.
 //!
+//! [`figures`] draws the paper's figures again from the model.
+//!
 //! - [`fit`] fits polynomials by least squares, with standard errors.
 //! - [`plot`] draws figures and heat images as SVG; it knows nothing of runs.
 
+pub mod figures;
 pub mod fit;
 pub mod plot;
 

@@ -1,7 +1,8 @@
 //! Figures as SVG text: axes with rounded ticks and units, lines, points, stems and heat images.
 //!
 //! Everything here is a value that displays itself as one `<svg>` element. Colours are those of [`STYLE`], which the
-//! page holds once, so that one figure reads well on light and dark ground and on paper.
+//! page holds once, so that one figure reads well on light and dark ground and on paper. A [`Sheet`] puts several
+//! panels beside each other and holds its style itself, as a file that stands alone.
 //!
 //! ```
 //! use tactus_report::plot::{Axis, Figure, Ink, Series};
@@ -17,14 +18,20 @@ mod colour;
 mod decimate;
 mod figure;
 mod heat;
+mod picture;
 mod series;
+mod sheet;
+mod view;
 
 pub use axis::Axis;
 pub use colour::{ColourBar, Scale};
 pub use decimate::{extremes, steps};
 pub use figure::Figure;
-pub use heat::{Heat, Mosaic, Tile};
+pub use heat::{Heat, Image, Mosaic, Tile};
+pub use picture::png;
 pub use series::{Ink, Series};
+pub use sheet::{Label, Panel, Sheet};
+pub use view::{Face, Paint, View};
 
 pub(crate) use axis::{number, round_step};
 

@@ -98,6 +98,13 @@ impl AxisScale {
         (value - lo) / (hi - lo)
     }
 
+    /// Whether a tick stands at either end.
+    pub(super) fn spans_range(&self) -> bool {
+        let at =
+            |tick: Option<&f64>, end: f64| tick.is_some_and(|tick| (self.share(*tick) - end).abs() < 1e-9);
+        at(self.ticks.first(), 0.0) && at(self.ticks.last(), 1.0)
+    }
+
     /// A tick's text, with as many decimals as the ticks differ in.
     pub(super) fn label(&self, tick: f64) -> String {
         number(tick, self.decimals)

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::Axis;
 use super::axis::{AxisScale, number};
+use super::{Axis, Panel};
 use crate::markup::Text;
 
 /// Number of colours that a scale has; more are hardly told apart in small cells.
@@ -57,15 +57,20 @@ impl Scale {
 }
 
 /// The colour of a level as `#rrggbb`.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]
 pub(super) fn colour(level: u8) -> String {
+    let [r, g, b] = rgb(level);
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// The colour of a level: red, green, blue.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]
+pub(super) fn rgb(level: u8) -> [u8; 3] {
     let place = f64::from(level.min(LEVELS - 1)) / f64::from(LEVELS - 1) * (VIRIDIS.len() - 1) as f64;
     let below = (place as usize).min(VIRIDIS.len() - 2);
     let share = place - below as f64;
-    let [r, g, b] = std::array::from_fn(|channel| {
+    std::array::from_fn(|channel| {
         (VIRIDIS[below][channel] * (1.0 - share) + VIRIDIS[below + 1][channel] * share).round() as u8
-    });
-    format!("#{r:02x}{g:02x}{b:02x}")
+    })
 }
 
 /// A legend of a colour scale; displays itself as SVG.
@@ -77,16 +82,27 @@ pub struct ColourBar {
     pub title: String,
 }
 
+/// Room at both ends of a colour bar, for its ticks' labels.
+const LEFT_PX: f64 = 12.0;
+/// Width of one colour in a colour bar.
+const STEP_PX: f64 = 6.0;
+
 impl fmt::Display for ColourBar {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const LEFT_PX: f64 = 12.0;
-        const STEP_PX: f64 = 6.0;
-        let width_px = STEP_PX * f64::from(LEVELS);
-        let all_px = width_px + 2.0 * LEFT_PX + 260.0;
+        let all_px = STEP_PX * f64::from(LEVELS) + 2.0 * LEFT_PX + 260.0;
         write!(
             f,
-            r#"<svg class="figure" viewBox="0 0 {all_px} 34" width="{all_px}" height="34" role="img"><title>colour scale</title><g class="cells">"#
+            r#"<svg class="figure" viewBox="0 0 {all_px} 34" width="{all_px}" height="34" role="img"><title>colour scale</title>"#
         )?;
+        self.draw(f)?;
+        f.write_str("</svg>")
+    }
+}
+
+impl Panel for ColourBar {
+    fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width_px = STEP_PX * f64::from(LEVELS);
+        f.write_str(r#"<g class="cells">"#)?;
         for level in 0..LEVELS {
             let x = LEFT_PX + STEP_PX * f64::from(level);
             write!(f, r#"<path fill="{}" d="M{x} 2h{STEP_PX}v12h-{STEP_PX}z"/>"#, colour(level))?;
@@ -104,7 +120,10 @@ impl fmt::Display for ColourBar {
         }
         let beside = width_px + LEFT_PX + 14.0;
         write!(f, r#"<text class="name" x="{beside}" y="12">{}</text>"#, Text(&self.title))?;
-        write!(f, r#"<text x="{beside}" y="30">{} to {}</text></svg>"#, number(lo, 0), number(hi, 0))
+        if ticks.spans_range() {
+            return Ok(());
+        }
+        write!(f, r#"<text x="{beside}" y="30">{} to {}</text>"#, number(lo, 0), number(hi, 0))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Axis, Series, axis::AxisScale, series::Mark};
+use super::{Axis, Panel, Series, axis::AxisScale, series::Mark};
 use crate::markup::Text;
 
 /// Room left of the axes, for tick labels and the axis's title.
@@ -56,19 +56,25 @@ impl Figure {
 impl fmt::Display for Figure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [width, height] = self.size_px;
-        let frame = Frame::new(self);
         write!(
             f,
             r#"<svg class="figure" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img"><title>{}</title>"#,
             Text(&self.name)
         )?;
+        self.draw(f)?;
+        f.write_str("</svg>")
+    }
+}
+
+impl Panel for Figure {
+    fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let frame = Frame::new(self);
         frame.grid(f)?;
         for series in &self.series {
             frame.series(f, series)?;
         }
         frame.axes(f, self)?;
-        legend(f, &self.series)?;
-        f.write_str("</svg>")
+        legend(f, &self.series)
     }
 }
 

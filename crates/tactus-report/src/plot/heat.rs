@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use super::{Scale, colour::colour};
+use super::{Panel, Scale, colour::colour};
 use crate::markup::Text;
 
 /// One value for each of `rows x cols` elements, row-major; row 0 is drawn at the bottom, as y points up.
@@ -14,6 +14,19 @@ pub struct Heat<'a> {
     pub rows: usize,
     /// Number of columns.
     pub cols: usize,
+}
+
+/// A heat image with a colour scale of its own, for a [`Sheet`](super::Sheet); its origin is its upper left corner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image<'a> {
+    /// The values.
+    pub heat: Heat<'a>,
+    /// Side of an element's square.
+    pub cell_px: f64,
+    /// The colours.
+    pub scale: Scale,
+    /// What it shows, as a tooltip.
+    pub title: String,
 }
 
 /// A heat image and where it stands.
@@ -42,6 +55,15 @@ pub struct Mosaic<'a> {
     pub tiles: Vec<Tile<'a>>,
     /// Texts, by the lower left corner of each.
     pub captions: Vec<([f64; 2], String)>,
+}
+
+impl Panel for Image<'_> {
+    fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { heat, cell_px, scale, title } = self;
+        write!(f, r#"<g class="cells" transform="scale({cell_px})"><title>{}</title>"#, Text(title))?;
+        heat.write(f, *scale)?;
+        f.write_str("</g>")
+    }
 }
 
 impl fmt::Display for Mosaic<'_> {

@@ -102,7 +102,9 @@ fn describe(indenter: &Indenter) -> String {
     match indenter {
         Indenter::Cylinder { diameter_mm } => format!("cylinder of {diameter_mm} mm"),
         Indenter::Sphere { diameter_mm } => format!("sphere of {diameter_mm} mm"),
-        Indenter::Cone { diameter_mm, apex_deg } => format!("cone of {apex_deg} degrees and {diameter_mm} mm"),
+        Indenter::Cone { diameter_mm, apex_deg } => {
+            format!("cone of {apex_deg} degrees and {diameter_mm} mm")
+        }
         Indenter::Mesh(mesh) => format!("mesh of {} triangles", mesh.triangles().len()),
         Indenter::Box { size_mm: [x_mm, y_mm] } => format!("box of {x_mm} x {y_mm} mm"),
     }
