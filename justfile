@@ -43,9 +43,9 @@ deny-tool:
         cargo install --locked cargo-deny --version 0.20.2 --no-default-features \
         --root {{ tools }} --target-dir {{ tools }}/build
 
-# Every shipped configuration, rig and script goes through the constructor that the service uses.
+# Every shipped configuration, rig, model and script goes through the constructor that the service uses.
 validate: build
-    target/debug/tactus validate config/*.toml config/rigs/*.toml experiments/*.star
+    target/debug/tactus validate config/*.toml config/rigs/*.toml config/models/*.toml experiments/*.star
 
 # The unit file: known keys only, and a sandbox.
 systemd:
@@ -65,6 +65,30 @@ python-tools:
 proto:
     cargo xtask proto
 
+# How fast the forward model is, how it grows, how far from the machine's limits: bench/README.md.
+bench:
+    cargo bench --package tactus-bench --bench forward -- --quick
+    cargo run --release --package tactus-bench -- growth
+    cargo run --release --package tactus-bench -- limits
+
+# The same against others' programs, side by side.
+bench-peers *arguments: bench-peers-tools
+    cargo build --release --package tactus-bench
+    {{ tools }}/peers/bin/python bench/peers/forward.py {{ arguments }}
+
+# A virtual environment with the peers.
+bench-peers-tools:
+    test -d {{ tools }}/peers || python3 -m venv {{ tools }}/peers
+    {{ tools }}/peers/bin/pip install --quiet --requirement bench/peers/requirements.txt
+
 # Build times from nothing, and the slowest crates.
 build-times:
     cargo build --release --timings
+
+# The shaders against the processor. They need a Vulkan driver; where none is, one in software is installed.
+gpu:
+    compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null || \
+        (apt-get update -qq && apt-get install -qq --no-install-recommends mesa-vulkan-drivers)
+    cargo clippy -p tactus-scene --features gpu --all-targets -- -D warnings
+    cargo test -p tactus-scene --features gpu --test gpu
+    cargo run --quiet -p tactus --features gpu -- simulate --scene wrench --roll-deg 10 --gpu

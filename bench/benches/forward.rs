@@ -1,0 +1,82 @@
+//! Time of one image: every array, tool and way, and how it grows with elements and triangles.
+
+use anyhow::Result;
+use criterion::{BenchmarkGroup, BenchmarkId, Criterion, measurement::WallTime};
+use tactus_bench::{Painter, Tool, Way, even, fine_sphere, model, poses};
+use tactus_model::{Array, ForwardModel, Indenter};
+
+fn main() -> Result<()> {
+    let mut criterion = Criterion::default().configure_from_args();
+    arrays(&mut criterion)?;
+    elements(&mut criterion)?;
+    triangles(&mut criterion)?;
+    criterion.final_summary();
+    Ok(())
+}
+
+/// Only what has a mesh is drawn.
+fn ways(tool: Tool) -> &'static [Way] {
+    match tool {
+        Tool::H => &[Way::Stamp, Way::Raster, Way::Exact],
+        Tool::Cylinder => &[Way::Stamp, Way::Exact],
+    }
+}
+
+/// The shipped arrays.
+fn arrays(criterion: &mut Criterion) -> Result<()> {
+    for tool in [Tool::Cylinder, Tool::H] {
+        let mut group = criterion.benchmark_group(format!("{tool:?}").to_lowercase());
+        for array in Array::shipped() {
+            let model = model(array.clone())?;
+            for way in ways(tool) {
+                press(&mut group, array.name(), *way, &model, &tool.indenter())?;
+            }
+        }
+        group.finish();
+    }
+    Ok(())
+}
+
+/// One area in ever finer elements.
+fn elements(criterion: &mut Criterion) -> Result<()> {
+    let mut group = criterion.benchmark_group("elements");
+    for fineness in [1, 2, 4] {
+        let model = even(fineness)?;
+        for way in ways(Tool::H) {
+            press(&mut group, model.array().elements(), *way, &model, &Tool::H.indenter())?;
+        }
+    }
+    group.finish();
+    Ok(())
+}
+
+/// One sphere in ever finer triangles.
+fn triangles(criterion: &mut Criterion) -> Result<()> {
+    let mut group = criterion.benchmark_group("triangles");
+    group.sample_size(10);
+    let model = even(1)?;
+    for triangles in [500, 2_000, 8_000, 32_000] {
+        for way in ways(Tool::H) {
+            press(&mut group, triangles, *way, &model, &fine_sphere(triangles)?)?;
+        }
+    }
+    group.finish();
+    Ok(())
+}
+
+fn press(
+    group: &mut BenchmarkGroup<'_, WallTime>,
+    size: impl std::fmt::Display,
+    way: Way,
+    model: &ForwardModel,
+    indenter: &Indenter,
+) -> Result<()> {
+    let mut painter = Painter::new(way, model, indenter)?;
+    let mut image = vec![0.0; model.array().elements()];
+    let mut poses = poses(model.array(), 1024).into_iter().cycle();
+    let id = BenchmarkId::new(format!("{way:?}").to_lowercase(), size);
+    group.bench_function(id, |bencher| {
+        bencher.iter(|| poses.next().map(|pose| painter.image(&pose, &mut image)));
+    });
+    Ok(())
+}

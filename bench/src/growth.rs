@@ -1,0 +1,95 @@
+//! How the time of an image grows with the elements and with the tool's triangles.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use tactus_model::Indenter;
+
+use crate::{Painter, Tool, Way, even, fine_sphere, per_image_s};
+
+/// Rows and columns against those of the `DigiTacts` array: 48, 192 and 768 elements.
+const FINENESSES: [u32; 3] = [1, 2, 4];
+/// Triangles of a sphere.
+const TRIANGLES: [u32; 4] = [500, 2_000, 8_000, 32_000];
+
+/// Times at several sizes, and the power of the size that fits them best.
+#[derive(Debug, Clone)]
+pub struct Growth {
+    /// What was timed.
+    pub what: String,
+    /// What the size counts.
+    pub size_of: &'static str,
+    /// Size and seconds.
+    pub points: Vec<[f64; 2]>,
+}
+
+impl Growth {
+    /// Every growth there is.
+    ///
+    /// # Errors
+    /// If an image cannot be made.
+    pub fn measure() -> Result<Vec<Self>> {
+        let mut growths = Vec::new();
+        for way in [Way::Stamp, Way::Raster, Way::Exact] {
+            growths.push(Self::with_elements(Tool::H, way)?);
+        }
+        for way in [Way::Stamp, Way::Exact] {
+            growths.push(Self::with_elements(Tool::Cylinder, way)?);
+        }
+        growths.extend(Self::with_triangles(Way::Stamp)?);
+        for way in [Way::Raster, Way::Exact] {
+            let [_, image] = Self::with_triangles(way)?;
+            growths.push(image);
+        }
+        Ok(growths)
+    }
+
+    /// `p` of the time `~ size^p`: the slope of the line through the logarithms, by least squares.
+    pub fn exponent(&self) -> f64 {
+        let logs = self.points.iter().map(|point| point.map(f64::ln));
+        let count = self.points.len() as f64;
+        let mean = |axis: usize| logs.clone().map(|log| log[axis]).sum::<f64>() / count;
+        let (mean_size, mean_time) = (mean(0), mean(1));
+        let product = |a: f64, b: f64| (a - mean_size) * b;
+        let along: f64 = logs.clone().map(|[size, time]| product(size, time - mean_time)).sum();
+        along / logs.clone().map(|[size, _]| product(size, size - mean_size)).sum::<f64>()
+    }
+
+    fn with_elements(tool: Tool, way: Way) -> Result<Self> {
+        let indenter = tool.indenter();
+        let point = |fineness: &u32| {
+            let model = even(*fineness)?;
+            let mut painter = Painter::new(way, &model, &indenter)?;
+            Ok([model.array().elements() as f64, per_image_s(&mut painter, model.array())?])
+        };
+        let points = FINENESSES.iter().map(point).collect::<Result<_>>()?;
+        Ok(Self { what: format!("image, {tool:?}, {way:?}").to_lowercase(), size_of: "elements", points })
+    }
+
+    /// Of what is made ready before the first pose, and of an image.
+    fn with_triangles(way: Way) -> Result<[Self; 2]> {
+        let model = even(1)?;
+        let (mut ready, mut image) = (Vec::new(), Vec::new());
+        for triangles in TRIANGLES {
+            let indenter = fine_sphere(triangles)?;
+            let started = Instant::now();
+            let mut painter = Painter::new(way, &model, &indenter)?;
+            let size = of_mesh(&indenter);
+            ready.push([size, started.elapsed().as_secs_f64()]);
+            image.push([size, per_image_s(&mut painter, model.array())?]);
+        }
+        let named = |what: &str, points| {
+            let what = format!("{what}, sphere, {way:?}").to_lowercase();
+            Self { what, size_of: "triangles", points }
+        };
+        Ok([named("making ready", ready), named("image", image)])
+    }
+}
+
+fn of_mesh(indenter: &Indenter) -> f64 {
+    if let Indenter::Mesh(mesh) = indenter { mesh.triangles().len() as f64 } else { 0.0 }
+}
+
+#[cfg(test)]
+#[path = "growth_tests.rs"]
+mod tests;

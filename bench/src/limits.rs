@@ -1,0 +1,153 @@
+//! What this machine can do at most, and what of it a kernel uses.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use anyhow::Result;
+use tactus_model::Array;
+
+use crate::{Painter, Tool, Way, model, per_image_s, poses};
+
+/// Rates of one core, and how near to them the kernels come.
+///
+/// For the stamp the formulas are, per element that the tool reaches and with `C` channels (1 for the cylinder, 3
+/// for the H: the nodes of its rotation):
+///
+/// ```text
+/// flops = 32 C (4 x 4 nodes, a multiplication and an addition each) + 12 C (weights along x) + 41 (place, spline
+///         weights, response)
+/// bytes = 64 C (4 x 4 nodes) + 20 (centre, response) + 4 (the count)
+/// ```
+///
+/// The exact way has no such line: it spends its time in `erfc` and `exp`.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// Single-precision operations, a multiplication and an addition counting two, with the vector width and
+    /// instructions that this program is compiled for.
+    pub flops_per_s: f64,
+    /// Reading from the first and the second cache and from memory.
+    pub bytes_per_s: [f64; 3],
+    /// What was held against them.
+    pub kernels: Vec<Kernel>,
+}
+
+/// One kernel on one array.
+#[derive(Debug, Clone)]
+pub struct Kernel {
+    /// Which array.
+    pub array: String,
+    /// Which tool.
+    pub tool: Tool,
+    /// Floating-point operations of an image.
+    pub flops: f64,
+    /// Bytes that an image reads and writes.
+    pub bytes: f64,
+    /// Time of an image.
+    pub image_s: f64,
+}
+
+/// Places that fill the first cache's half, the second's half, and no cache.
+const PLACES: [usize; 3] = [4 << 10, 128 << 10, 64 << 20];
+
+impl Limits {
+    /// Measures the machine and the kernels.
+    ///
+    /// # Errors
+    /// If an image cannot be made.
+    pub fn measure() -> Result<Self> {
+        let mut kernels = Vec::new();
+        for array in Array::shipped() {
+            for tool in [Tool::H, Tool::Cylinder] {
+                kernels.push(Kernel::of_stamp(&array, tool)?);
+            }
+        }
+        Ok(Self { flops_per_s: flops_per_s(), bytes_per_s: PLACES.map(bytes_per_s), kernels })
+    }
+}
+
+impl Kernel {
+    fn of_stamp(array: &Array, tool: Tool) -> Result<Self> {
+        let mut painter = Painter::new(Way::Stamp, &model(array.clone())?, &tool.indenter())?;
+        let channels = match tool {
+            Tool::H => 3.0,
+            Tool::Cylinder => 1.0,
+        };
+        let reached = reached(&mut painter, array)?;
+        Ok(Self {
+            array: array.name().into(),
+            tool,
+            flops: reached * (44.0 * channels + 41.0),
+            bytes: reached * (64.0 * channels + 24.0),
+            image_s: per_image_s(&mut painter, array)?,
+        })
+    }
+}
+
+/// Elements that a tool reaches at all, on average.
+fn reached(painter: &mut Painter, array: &Array) -> Result<f64> {
+    let mut image = vec![0.0; array.elements()];
+    let poses = poses(array, 256);
+    let mut reached = 0;
+    for pose in &poses {
+        painter.image(pose, &mut image)?;
+        reached += image.iter().filter(|count| count.abs() > 0.0).count();
+    }
+    Ok(reached as f64 / poses.len() as f64)
+}
+
+/// Numbers in a vector register.
+const LANES: usize = if cfg!(target_feature = "avx512f") {
+    16
+} else if cfg!(target_feature = "avx") {
+    8
+} else {
+    4
+};
+
+/// Enough chains of operations, each waiting for itself only, to keep the units busy, and few enough for the
+/// registers.
+fn flops_per_s() -> f64 {
+    const CHAINS: usize = 12;
+    const ROUNDS: u32 = 1_000_000;
+    let round = || {
+        let (factor, offset) = (black_box(0.999_f32), black_box(0.001_f32));
+        let mut sums = [[1.0_f32; LANES]; CHAINS];
+        for _ in 0..ROUNDS {
+            for sum in &mut sums {
+                *sum = sum.map(|lane| lane * factor + offset);
+            }
+        }
+        black_box(sums);
+    };
+    2.0 * f64::from(ROUNDS) * (LANES * CHAINS) as f64 / least_s(round)
+}
+
+/// Adds up a list, over and over where it is short.
+fn bytes_per_s(places: usize) -> f64 {
+    /// As many sums side by side as hide the time of one addition.
+    const SUMS: usize = 64;
+    let list = vec![1_u32; places];
+    let rounds = (PLACES[2] / places).max(1);
+    let round = || {
+        for _ in 0..rounds {
+            let mut sums = [0_u32; SUMS];
+            for several in black_box(&list).chunks_exact(SUMS) {
+                for (sum, one) in sums.iter_mut().zip(several) {
+                    *sum = sum.wrapping_add(*one);
+                }
+            }
+            black_box(sums);
+        }
+    };
+    (rounds * places * size_of::<u32>()) as f64 / least_s(round)
+}
+
+/// Least of several times: what disturbs only ever adds.
+fn least_s(work: impl Fn()) -> f64 {
+    let time_s = |_| {
+        let started = Instant::now();
+        work();
+        started.elapsed().as_secs_f64()
+    };
+    (0..10).map(time_s).fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,166 @@
+//! `tactus-bench`: what `just bench` and `just bench-peers` run beside criterion.
+#![expect(clippy::print_stdout, reason = "standard output is this program's interface")]
+
+use std::time::Duration;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use serde_json::json;
+use tactus_bench::{COVERING, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses};
+use tactus_model::Array;
+
+/// How fast the forward model is, how exact, how it grows, and how far from the machine's limits.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Args {
+    #[command(subcommand)]
+    part: Part,
+}
+
+#[derive(Debug, Subcommand)]
+enum Part {
+    /// Images a second over many poses, and the greatest error against the exact way.
+    Forward {
+        /// Which array: `digitacts`, `fingertip` or `tekscan-5027`.
+        #[arg(long, value_parser = shipped, default_value = "digitacts")]
+        array: Array,
+        /// What presses.
+        #[arg(long, value_enum, default_value = "h")]
+        tool: Tool,
+        /// From pose to image.
+        #[arg(long = "path", value_enum, default_value = "stamp")]
+        way: Way,
+        /// How many press at once.
+        #[arg(long, default_value_t = 1)]
+        threads: usize,
+        /// For how long.
+        #[arg(long, default_value_t = 1.0)]
+        seconds: f64,
+        /// How many images to hold against the exact way's.
+        #[arg(long, default_value_t = 200)]
+        compared: u32,
+        /// One JSON object instead of a line of text.
+        #[arg(long)]
+        json: bool,
+    },
+    /// An array, its model, some poses and their images, as JSON: what the peers press.
+    Scene {
+        /// Which array: `digitacts`, `fingertip` or `tekscan-5027`.
+        #[arg(long, value_parser = shipped, default_value = "digitacts")]
+        array: Array,
+        /// What presses.
+        #[arg(long, value_enum, default_value = "h")]
+        tool: Tool,
+        /// From pose to image.
+        #[arg(long = "path", value_enum, default_value = "stamp")]
+        way: Way,
+    },
+    /// How the time of an image grows with elements and triangles.
+    Growth,
+    /// What of this machine's arithmetic and bandwidth the kernels use.
+    Limits,
+}
+
+fn main() -> Result<()> {
+    match Args::parse().part {
+        Part::Forward { array, tool, way, threads, seconds, compared, json } => {
+            let time = Duration::try_from_secs_f64(seconds)?;
+            forward(&Forward::measure(&array, tool, way, threads, time, compared)?, json);
+        }
+        Part::Scene { array, tool, way } => scene(array, tool, way)?,
+        Part::Growth => growth(&Growth::measure()?),
+        Part::Limits => limits(&Limits::measure()?),
+    }
+    Ok(())
+}
+
+fn shipped(name: &str) -> Result<Array, String> {
+    let named = Array::shipped().into_iter().find(|array| array.name() == name);
+    named.ok_or_else(|| "there are digitacts, fingertip and tekscan-5027".into())
+}
+
+fn forward(measured: &Forward, as_json: bool) {
+    let Forward { array, tool, way, threads, ready_s, images_per_s, error } = measured;
+    let (rows, cols) = (array.rows(), array.cols());
+    let [tool, way] = [format!("{tool:?}"), format!("{way:?}")].map(|name| name.to_lowercase());
+    if as_json {
+        let line = json!({
+            "array": array.name(), "rows": rows, "cols": cols, "tool": tool, "path": way, "threads": threads,
+            "ready_s": ready_s, "images_per_s": images_per_s, "error": error,
+            "version": env!("CARGO_PKG_VERSION"),
+        });
+        println!("{line}");
+    } else {
+        let within = error.map(|error| format!(", within {error:.1e} of the peak")).unwrap_or_default();
+        println!(
+            "{} ({rows} x {cols}), {tool}, {way}, {threads} threads: {images_per_s:.0} images/s, ready in {:.1} ms{within}",
+            array.name(),
+            ready_s * 1e3
+        );
+    }
+}
+
+fn scene(array: Array, tool: Tool, way: Way) -> Result<()> {
+    const POSES: u32 = 64;
+    let model = model(array)?;
+    let array = model.array();
+    let mut painter = Painter::new(way, &model, &tool.indenter())?;
+    let mut images = Vec::new();
+    let mut image = vec![0.0; array.elements()];
+    let poses = poses(array, POSES);
+    for pose in &poses {
+        painter.image(pose, &mut image)?;
+        images.push(image.clone());
+    }
+    let poses = poses.iter().map(|Pose { position_mm, rotation_deg, depth_mm }| {
+        json!({ "position_mm": position_mm, "rotation_deg": rotation_deg, "depth_mm": depth_mm })
+    });
+    let scene = json!({
+        "col_centres_mm": array.col_centres_mm(),
+        "row_centres_mm": array.row_centres_mm(),
+        "element_mm": array.element_mm(),
+        "sigma_mm": model.psf().sigma_mm(COVERING),
+        "sensitivity_counts_per_mm": model.response().sensitivity_counts_per_mm.first(),
+        "quadratic_per_mm": model.response().quadratic_per_mm.first(),
+        "poses": poses.collect::<Vec<_>>(),
+        "images": images,
+    });
+    println!("{scene}");
+    Ok(())
+}
+
+fn growth(growths: &[Growth]) {
+    for growth in growths {
+        println!("{}: time ~ {}^{:.2}", growth.what, growth.size_of, growth.exponent());
+        for [size, time_s] in &growth.points {
+            println!("  {size:>6.0} {:>12.3} us", time_s * 1e6);
+        }
+    }
+}
+
+fn limits(limits: &Limits) {
+    let Limits { flops_per_s, bytes_per_s: [first, second, memory], kernels } = limits;
+    println!("one core, as compiled: {:.1} Gflop/s single precision", flops_per_s / 1e9);
+    println!(
+        "reading: {:.0} GB/s first cache, {:.0} second, {:.1} memory",
+        first / 1e9,
+        second / 1e9,
+        memory / 1e9
+    );
+    println!(
+        "stamp, an image: flops = n (44 C + 41), bytes = n (64 C + 24), n elements reached, C = 3 (h), 1 (cylinder)"
+    );
+    println!(
+        "{:<14}{:<10}{:>10}{:>10}{:>9}{:>12}{:>14}",
+        "array", "tool", "flops", "bytes", "us", "of flops", "of 2nd cache"
+    );
+    for Kernel { array, tool, flops, bytes, image_s } in kernels {
+        println!(
+            "{array:<14}{:<10}{flops:>10.0}{bytes:>10.0}{:>9.2}{:>11.0}%{:>13.0}%",
+            format!("{tool:?}").to_lowercase(),
+            image_s * 1e6,
+            100.0 * flops / image_s / flops_per_s,
+            100.0 * bytes / image_s / second
+        );
+    }
+}

@@ -1,0 +1,46 @@
+//! The models that are measured.
+
+use anyhow::Result;
+use tactus_model::{Array, ForwardModel, Indenter, Psf, Response};
+
+use crate::COVERING;
+
+/// A model of an array: the paper's spread on the pitch it was measured at, one pitch on others (the paper's
+/// Fig. 10); a slightly bent response from a baseline of 0, so that counts are the rise.
+///
+/// # Errors
+/// None in truth: the parameters make a model.
+pub fn model(array: Array) -> Result<ForwardModel> {
+    let psf = if array == Array::digitacts() {
+        Psf::PAPER
+    } else {
+        Psf { sigma_intercept_mm: array.pitch_mm(), sigma_per_mm: 0.0 }
+    };
+    with_psf(array, psf)
+}
+
+/// A model of `fineness` times as many rows and columns as the `DigiTacts` array has, on about its area and under
+/// its spread.
+///
+/// # Errors
+/// None in truth: the parameters make a model.
+pub fn even(fineness: u32) -> Result<ForwardModel> {
+    let pitch_mm = 2.0 / f64::from(fineness);
+    let centres = |count: u32| (0..count).map(|place| (f64::from(place) + 0.45) * pitch_mm).collect();
+    let element_mm = [0.9 * pitch_mm; 2];
+    let array =
+        Array::new("even", element_mm, centres(8 * fineness), centres(6 * fineness), 30.0, 4095.0, 1.0)?;
+    with_psf(array, Psf::PAPER)
+}
+
+fn with_psf(array: Array, psf: Psf) -> Result<ForwardModel> {
+    let elements = array.elements();
+    let response = Response {
+        sensitivity_counts_per_mm: vec![1000.0; elements],
+        baseline_counts: vec![0.0; elements],
+        quadratic_per_mm: vec![0.05; elements],
+        reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
+        reference_covering: COVERING,
+    };
+    Ok(ForwardModel::new(array, psf, response)?)
+}
