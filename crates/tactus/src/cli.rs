@@ -66,6 +66,10 @@ enum Command {
     Recover(RecoverArgs),
     /// Make the report of a recording again.
     Report(ReportArgs),
+    /// What a sensor reads of a tool: an image, frames along a path, or live on the bus.
+    Simulate(SimulateArgs),
+    /// Draw the paper's figures.
+    Figures(FiguresArgs),
     /// Check files: configurations, rigs, scripts, tables, recordings.
     Validate(ValidateArgs),
     /// Print the completions for a shell.
@@ -174,6 +178,82 @@ pub(crate) struct ReportArgs {
     pub(crate) out: Option<PathBuf>,
 }
 
+/// Arguments of `simulate`; places in the sensor's frame.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SimulateArgs {
+    /// The tool: h, wrench, spaceship, cylinder, sphere, cone, or a file (.stl, .obj, .ply; in mm).
+    #[arg(long, default_value = "h")]
+    pub(crate) scene: String,
+    /// The array: digitacts, fingertip, tekscan-5027; the model's own if not given.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) array: Option<String>,
+    /// A calibrated sensor's model, in place of the paper's.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+    /// Thickness of the covering.
+    #[arg(long, value_name = "MM", default_value_t = 1.016)]
+    pub(crate) covering_mm: f64,
+    /// How far the tool's lowest point stands below the covering's surface.
+    #[arg(long, value_name = "MM", default_value_t = 0.3, allow_negative_numbers = true)]
+    pub(crate) depth_mm: f64,
+    /// The tool's angle about the vertical, counter-clockwise.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) angle_deg: f64,
+    /// The tool's tilt about x, for meshes.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) roll_deg: f64,
+    /// The tool's tilt about y, for meshes.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) pitch_deg: f64,
+    /// Where the tool's axis stands; the array's middle if not given.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) x_mm: Option<f64>,
+    /// Where the tool's axis stands; the array's middle if not given.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) y_mm: Option<f64>,
+    /// Diameter of a cylinder, sphere or cone.
+    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    pub(crate) diameter_mm: f64,
+    /// Full angle at a cone's tip.
+    #[arg(long, value_name = "DEG", default_value_t = 90.0)]
+    pub(crate) apex_deg: f64,
+    /// Add the sensor's noise, saturation and steps; else counts before the converter.
+    #[arg(long)]
+    pub(crate) noise: bool,
+    /// Seed of the noise; each copy has the next one.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// That many sensors with the same characterisation.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) copies: u32,
+    /// Render the image on the graphics processor.
+    #[arg(long, conflicts_with_all = ["live", "trajectory"])]
+    pub(crate) gpu: bool,
+    /// The image as .png or .csv, or the frames as .csv.
+    #[arg(short, long, value_name = "FILE", conflicts_with = "live")]
+    pub(crate) out: Option<PathBuf>,
+    /// Frames along a path: CSV lines of `t_s,x_mm,y_mm,z_mm`, the surface at z = 0.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) trajectory: Option<PathBuf>,
+    /// Frames a second, up to 1000; the array's own if not given.
+    #[arg(long, value_name = "HZ")]
+    pub(crate) rate_hz: Option<f64>,
+    /// Publish frames of the moving tool on a bus at the endpoint, as a real sensor's.
+    #[arg(long)]
+    pub(crate) live: bool,
+    /// End the live frames after so long.
+    #[arg(long, value_name = "S", requires = "live")]
+    pub(crate) seconds: Option<f64>,
+}
+
+/// Arguments of `figures`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct FiguresArgs {
+    /// Where the figures go.
+    #[arg(short, long, value_name = "DIR", default_value = "figures")]
+    pub(crate) out: PathBuf,
+}
+
 /// Arguments of `validate`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ValidateArgs {
@@ -218,6 +298,8 @@ fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
         Command::Export(args) => commands::files::export(common, &args),
         Command::Recover(args) => commands::files::recover(common, &args),
         Command::Report(args) => commands::files::report(common, &args),
+        Command::Simulate(args) => commands::simulate::simulate(common, &args),
+        Command::Figures(args) => commands::figures::figures(common, &args),
         Command::Validate(args) => Ok(commands::validate::validate(common, &args)),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "tactus", &mut std::io::stdout());

@@ -1,8 +1,10 @@
 //! One module a command, or a family of them.
 
 pub(crate) mod control;
+pub(crate) mod figures;
 pub(crate) mod files;
 pub(crate) mod plan;
 pub(crate) mod run;
+pub(crate) mod simulate;
 pub(crate) mod validate;
 pub(crate) mod watch;

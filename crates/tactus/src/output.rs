@@ -1,6 +1,7 @@
 //! What people read: aligned tables, and durations in words.
 
 use std::fmt::Write as _;
+use std::io::{ErrorKind, Write as _};
 
 /// Prints `name  value` lines with the values aligned.
 pub(crate) fn print_fields(fields: &[(&str, String)]) {
@@ -29,6 +30,15 @@ pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
     line(&mut header.iter().copied());
     for row in rows {
         line(&mut row.iter().map(String::as_str));
+    }
+}
+
+/// Writes much to standard output; a reader that has seen enough and goes away is no error.
+pub(crate) fn write(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
     }
 }
 

@@ -1,0 +1,125 @@
+//! `simulate`: what a sensor reads of a tool, as an image, as frames along a path, or live on the bus.
+
+mod live;
+mod picture;
+mod scene;
+mod series;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde_json::json;
+use tactus_model::{Array, Contact, Readout};
+
+use crate::cli::{Common, SimulateArgs};
+use crate::exit::Exit;
+use crate::output::{self, print_fields};
+use scene::Scene;
+
+pub(crate) fn simulate(common: &Common, args: &SimulateArgs) -> anyhow::Result<Exit> {
+    let scene = Scene::of(args)?;
+    match (&args.trajectory, args.live) {
+        (trajectory, true) => live::publish(common, args, &scene, trajectory.as_deref()),
+        (Some(trajectory), false) => series::write(common, args, &scene, trajectory),
+        (None, false) => image(common, args, &scene),
+    }
+}
+
+/// One image of the tool at rest.
+fn image(common: &Common, args: &SimulateArgs, scene: &Scene) -> anyhow::Result<Exit> {
+    let (clean_counts, computed_by) =
+        if args.gpu { scene.gpu_image()? } else { (scene.image(), "cpu".into()) };
+    let array = scene.array();
+    let copies: Vec<Vec<f64>> = (0..args.copies)
+        .map(|copy| {
+            if args.noise {
+                read(scene, &clean_counts, args.seed.wrapping_add(u64::from(copy)))
+            } else {
+                clean_counts.clone()
+            }
+        })
+        .collect();
+    if let Some(out) = &args.out {
+        picture::write(out, array, &copies)?;
+    }
+    if common.json {
+        output::write(&format!("{}\n", to_json(args, scene, &copies, &computed_by)))?;
+    } else {
+        print(args, scene, &copies, &computed_by)?;
+    }
+    Ok(Exit::Done)
+}
+
+/// What the converter gives of counts under the sensor's own noise.
+fn read(scene: &Scene, clean_counts: &[f64], seed: u64) -> Vec<f64> {
+    let readout = Readout::of(scene.array());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut noise = || {
+        let deviate: f64 = StandardNormal.sample(&mut rng);
+        scene.simulator.noise_rms_counts * deviate
+    };
+    clean_counts.iter().map(|counts| readout.read(*counts, noise())).collect()
+}
+
+fn rows<'a>(array: &Array, image: &'a [f64]) -> Vec<&'a [f64]> {
+    image.chunks(array.cols()).collect()
+}
+
+fn to_json(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &str) -> serde_json::Value {
+    let array = scene.array();
+    let Contact { position_mm: [x_mm, y_mm], rotation_deg, depth_mm, .. } = scene.contact;
+    json!({
+        "simulated": true,
+        "scene": args.scene,
+        "array": { "name": array.name(), "rows": array.rows(), "cols": array.cols() },
+        "x_mm": x_mm,
+        "y_mm": y_mm,
+        "angle_deg": rotation_deg,
+        "depth_mm": depth_mm,
+        "covering_mm": scene.simulator.covering.thickness_mm,
+        "sigma_mm": scene.sigma_mm(),
+        "noise": args.noise,
+        "computed_by": computed_by,
+        "unit": "counts",
+        "image": copies.first().map(|image| rows(array, image)),
+        "copies": (copies.len() > 1).then(|| copies.iter().map(|image| rows(array, image)).collect::<Vec<_>>()),
+        "out": args.out,
+    })
+}
+
+fn print(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &str) -> anyhow::Result<()> {
+    let array = scene.array();
+    let Contact { position_mm: [x_mm, y_mm], rotation_deg, depth_mm, .. } = scene.contact;
+    let mut fields = vec![
+        ("scene", format!("{} (simulated, {computed_by})", args.scene)),
+        ("array", format!("{}, {} rows of {}", array.name(), array.rows(), array.cols())),
+        ("tool", format!("at {x_mm:.2}, {y_mm:.2} mm, {rotation_deg} degrees, {depth_mm} mm deep")),
+        (
+            "covering",
+            format!("{} mm, sigma {:.3} mm", scene.simulator.covering.thickness_mm, scene.sigma_mm()),
+        ),
+    ];
+    let full_scale_counts = array.full_scale_counts();
+    let beyond = copies.iter().flatten().filter(|counts| **counts > full_scale_counts).count();
+    if beyond > 0 {
+        fields.push((
+            "note",
+            format!("{beyond} values exceed the converter's {full_scale_counts}; --noise reads them"),
+        ));
+    }
+    if let Some(out) = &args.out {
+        fields.push(("written", out.display().to_string()));
+    }
+    print_fields(&fields);
+    let mut text = String::new();
+    for image in copies {
+        text.push('\n');
+        // As it lies before the eye: y points up.
+        for row in rows(array, image).iter().rev() {
+            let cells: Vec<_> = row.iter().map(|counts| format!("{counts:5.0}")).collect();
+            text.push_str(&cells.join(" "));
+            text.push('\n');
+        }
+    }
+    output::write(&text)
+}

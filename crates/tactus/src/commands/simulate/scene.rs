@@ -1,0 +1,177 @@
+//! Which sensor, which tool, where.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context, anyhow, bail};
+use tactus_model::{Array, Contact, Covering, Indenter, Mesh, Psf, Registration, Simulator};
+use tactus_scene::{Attitude, shapes};
+#[cfg(feature = "gpu")]
+use tactus_scene::{GpuRenderer, Pose, Renderer};
+use tactus_schema::model::Model;
+
+use crate::cli::SimulateArgs;
+use crate::exit::{Exit, Failure};
+
+/// The characterisation of the paper's sensor.
+const PAPER_MODEL: &str = include_str!("../../../../../config/models/digitacts.toml");
+
+/// A sensor and the tool that stands in its covering.
+#[derive(Debug, Clone)]
+pub(super) struct Scene {
+    /// The sensor; the robot's frame is its own.
+    pub(super) simulator: Simulator,
+    /// The tool in the pose that was asked for.
+    pub(super) contact: Contact,
+}
+
+impl Scene {
+    pub(super) fn of(args: &SimulateArgs) -> anyhow::Result<Self> {
+        let usage = |error: &dyn std::fmt::Display| Failure::new(Exit::Usage, error);
+        let model = model(args)?;
+        let indenter = indenter(args).map_err(|error| usage(&format!("{error:#}")))?;
+        let [[x0, x1], [y0, y1]] = model.base.array.extent_mm();
+        let position_mm =
+            [args.x_mm.unwrap_or(f64::midpoint(x0, x1)), args.y_mm.unwrap_or(f64::midpoint(y0, y1))];
+        let [x_mm, y_mm] = position_mm;
+        if ![x_mm, y_mm, args.angle_deg, args.depth_mm].iter().all(|value| value.is_finite()) {
+            return Err(usage(&"the tool's place, angle and depth must be finite numbers").into());
+        }
+        if !(args.covering_mm.is_finite() && args.covering_mm > 0.0) {
+            return Err(usage(&format!("--covering-mm must be positive, not {}", args.covering_mm)).into());
+        }
+        let covering = Covering { thickness_mm: args.covering_mm };
+        // The robot's frame is the sensor's, but for the tool's angle, which a path does not have.
+        let registration = Registration { origin_mm: [0.0; 2], rotation_deg: 0.0 };
+        let simulator = model.simulator(registration, 0.0, covering, yawed(&indenter, args.angle_deg)?)?;
+        let contact =
+            Contact { indenter, position_mm, rotation_deg: args.angle_deg, depth_mm: args.depth_mm };
+        Ok(Self { simulator, contact })
+    }
+
+    pub(super) fn array(&self) -> &Array {
+        self.simulator.model.array()
+    }
+
+    pub(super) fn sigma_mm(&self) -> f64 {
+        self.simulator.model.psf().sigma_mm(self.simulator.covering)
+    }
+
+    /// Counts before noise and converter, rendered on the graphics processor, and by which.
+    #[cfg(feature = "gpu")]
+    pub(super) fn gpu_image(&self) -> anyhow::Result<(Vec<f64>, String)> {
+        let Indenter::Mesh(mesh) = &self.contact.indenter else {
+            bail!("the GPU renders meshes: h, wrench, spaceship or a file");
+        };
+        let Simulator { model, covering, .. } = &self.simulator;
+        let mut renderer = GpuRenderer::new(Renderer::new(model.clone(), *covering, Arc::clone(mesh))?)?;
+        let Contact { position_mm, rotation_deg, depth_mm, .. } = self.contact;
+        let pose = Pose { position_mm, attitude: Attitude::upright(rotation_deg), depth_mm };
+        let mut counts = vec![0.0; self.array().elements()];
+        renderer.images(&[pose], &mut counts)?;
+        Ok((counts.into_iter().map(f64::from).collect(), renderer.adapter().to_owned()))
+    }
+
+    /// There is no such path in this build.
+    #[cfg(not(feature = "gpu"))]
+    #[expect(clippy::unused_self, reason = "as the other build's")]
+    pub(super) fn gpu_image(&self) -> anyhow::Result<(Vec<f64>, String)> {
+        bail!(
+            "this tactus was built without its GPU path: build it with `--features gpu`, or leave --gpu out"
+        )
+    }
+
+    /// Counts before noise and converter, by the exact model.
+    pub(super) fn image(&self) -> Vec<f64> {
+        let mut counts = vec![0.0; self.array().elements()];
+        self.simulator.model.image(&self.contact, self.simulator.covering, &mut counts);
+        counts
+    }
+}
+
+/// The model that was asked for: a file's, or the paper's, on the array that was asked for.
+fn model(args: &SimulateArgs) -> anyhow::Result<Model> {
+    let array = args.array.as_deref().map(array).transpose()?;
+    if let Some(path) = &args.model {
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let model = Model::from_toml(&text)
+            .map_err(|error| Failure::new(Exit::Usage, format!("{}: {error}", path.display())))?;
+        return Ok(match array {
+            Some(array) if array != model.base.array => model.on(array),
+            _ => model,
+        });
+    }
+    let paper = Model::from_toml(PAPER_MODEL)?;
+    Ok(match array {
+        Some(array) if array != paper.base.array => {
+            // The paper's Fig. 10 gives sensors that it did not characterise a spread of one element width.
+            let psf = Psf { sigma_intercept_mm: array.pitch_mm(), sigma_per_mm: 0.0 };
+            let mut model = paper.on(array);
+            model.base.psf = psf;
+            model
+        }
+        _ => paper,
+    })
+}
+
+fn array(name: &str) -> Result<Array, Failure> {
+    let shipped = Array::shipped();
+    let names: Vec<_> = shipped.iter().map(|array| array.name().to_owned()).collect();
+    shipped.into_iter().find(|array| array.name() == name).ok_or_else(|| {
+        Failure::new(
+            Exit::Usage,
+            format!("no array {name:?}: there are {}; others come in a model file", names.join(", ")),
+        )
+    })
+}
+
+/// A made tool by its name, a simple one by its shape, or a mesh from a file.
+fn indenter(args: &SimulateArgs) -> anyhow::Result<Indenter> {
+    let diameter_mm = args.diameter_mm;
+    if !(diameter_mm.is_finite() && diameter_mm > 0.0) {
+        bail!("--diameter-mm must be positive, not {diameter_mm}");
+    }
+    let mesh = match args.scene.as_str() {
+        "cylinder" => return Ok(Indenter::Cylinder { diameter_mm }),
+        "sphere" => return Ok(Indenter::Sphere { diameter_mm }),
+        "cone" if args.apex_deg > 0.0 && args.apex_deg < 180.0 => {
+            return Ok(Indenter::Cone { diameter_mm, apex_deg: args.apex_deg });
+        }
+        "cone" => bail!("--apex-deg is the full angle at the tip, between 0 and 180"),
+        scene => match shapes::Scene::named(scene) {
+            Some(scene) => scene.mesh(),
+            None if Path::new(scene).exists() => {
+                tactus_scene::load(Path::new(scene)).map_err(|error| anyhow!("{scene}: {error}"))?
+            }
+            None => bail!(
+                "no scene {scene:?}: there are h, wrench, spaceship, cylinder, sphere, cone, and files \
+                 .stl, .obj, .ply"
+            ),
+        },
+    };
+    Ok(Indenter::Mesh(Arc::new(turned(mesh, args)?)))
+}
+
+/// The tool in its attitude; its angle about the vertical is the contact's.
+fn turned(mesh: Mesh, args: &SimulateArgs) -> anyhow::Result<Mesh> {
+    let attitude = Attitude { yaw_deg: 0.0, pitch_deg: args.pitch_deg, roll_deg: args.roll_deg };
+    if attitude == Attitude::default() {
+        return Ok(mesh);
+    }
+    Ok(mesh.turned(attitude.matrix())?)
+}
+
+/// The tool turned about its axis.
+fn yawed(indenter: &Indenter, angle_deg: f64) -> anyhow::Result<Indenter> {
+    Ok(match indenter {
+        Indenter::Mesh(mesh) if angle_deg != 0.0 => {
+            Indenter::Mesh(Arc::new(mesh.turned(Attitude::upright(angle_deg).matrix())?))
+        }
+        Indenter::Mesh(_)
+        | Indenter::Cylinder { .. }
+        | Indenter::Sphere { .. }
+        | Indenter::Cone { .. }
+        | Indenter::Box { .. } => indenter.clone(),
+    })
+}
