@@ -182,7 +182,7 @@ fn of_surfaces_that_pass_through_each_other_the_deepest_presses() {
     // Deeper, the whole area: its mean depth is h - 1/4.
     for degrees in [0.0, 25.0, 90.0] {
         let got = moments(&contact(crossed.clone(), degrees, 0.9), 1.0)[0];
-        assert!((got - 2.0 * 0.65).abs() < 1e-3, "{degrees}: {got}");
+        assert!((got - 2.0 * 0.65).abs() < 1e-9, "{degrees}: {got}");
     }
 }
 

@@ -18,6 +18,14 @@ const SIXTEEN: [(f64, f64); 8] = [
 /// The 2 nodes on `[-1, 1]` and their weight (same source, n = 2).
 const TWO: [(f64, f64); 1] = [(0.577_350_269_189_625_7, 1.0)];
 
+/// Positive half of the 8 nodes on `[-1, 1]` and their weights (same source, n = 8).
+const EIGHT: [(f64, f64); 4] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_5),
+    (0.960_289_856_497_536_3, 0.101_228_536_290_376_3),
+];
+
 /// Positive half of the 4 nodes on `[-1, 1]` and their weights (same source, n = 4).
 const FOUR: [(f64, f64); 2] = [
     (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
@@ -26,14 +34,16 @@ const FOUR: [(f64, f64); 2] = [
 
 /// Points and weights that integrate over `[from, to]` what a Gaussian of standard deviation `sigma_mm` has
 /// made smooth, to about 1e-11 (1e-9 if narrow): 2 points over 1/32 of a standard deviation, 4 over a quarter
-/// of it, or 16 over each two of them.
+/// of it, 8 over two of them, or 16 over each four.
 pub(crate) fn smooth(from: f64, to: f64, sigma_mm: f64) -> impl Iterator<Item = (f64, f64)> {
     if to - from <= sigma_mm / 32.0 {
         panels(&TWO, from, to, 1)
     } else if to - from <= sigma_mm / 4.0 {
         panels(&FOUR, from, to, 1)
+    } else if to - from <= 2.0 * sigma_mm {
+        panels(&EIGHT, from, to, 1)
     } else {
-        panels(&SIXTEEN, from, to, whole((to - from) / (2.0 * sigma_mm)))
+        panels(&SIXTEEN, from, to, whole((to - from) / (4.0 * sigma_mm)))
     }
 }
 

@@ -1,9 +1,9 @@
 //! Meshes: what is seen of them from below, without a raster.
 //!
-//! A plane of one x cuts the triangles that stand below the surface in lines; the deepest of them at every y
-//! is what presses. Between the x of two corners, or of two edges' crossing as seen from below, these lines
-//! change smoothly, so that a quadrature whose panels end there is exact to about 1e-9. Of tools with many
-//! corners those closer than 1/64 of the blur share a panel, and the crossings of edges are not looked for:
+//! A plane of one x cuts the triangles that stand below the surface in lines; the deepest of them at every y is
+//! what presses. Between the x of two corners, or of places where edges cross as seen from below or pass through a
+//! triangle, these lines change smoothly, so that a quadrature whose panels end there is exact to about 1e-9. Of
+//! tools with many corners those closer than 1/64 of the blur share a panel, and crossings are not looked for:
 //! together about 1e-5 of the image's peak.
 
 use super::{Cut, Slice};
@@ -107,6 +107,7 @@ fn panels(facets: &[Facet], least_mm: f64) -> Vec<[f64; 2]> {
         let edges: Vec<_> = facets.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]]).collect();
         for (place, one) in edges.iter().enumerate() {
             corners.extend(edges[place + 1..].iter().filter_map(|other| crossing_x(one, other)));
+            corners.extend(facets.iter().filter_map(|facet| pierced_x(one, facet)));
         }
     }
     corners.sort_by(f64::total_cmp);
@@ -135,6 +136,25 @@ fn turn(from: &[f64; 3], to: &[f64; 3], point: &[f64; 3]) -> f64 {
 
 fn overlaps(facet: &Facet, [from, to]: [f64; 2]) -> bool {
     facet.iter().any(|[x, _, _]| *x > from) && facet.iter().any(|[x, _, _]| *x < to)
+}
+
+/// Where an edge passes through a facet from one side to the other.
+fn pierced_x([from, to]: &[[f64; 3]; 2], [a, b, c]: &Facet) -> Option<f64> {
+    let whole = turn(a, b, c);
+    // Barycentric weights, and how far a point stands beyond the facet's plane.
+    let weights =
+        |point: &[f64; 3]| [turn(b, c, point), turn(c, a, point), turn(a, b, point)].map(|w| w / whole);
+    let beyond = |point: &[f64; 3]| {
+        let [wa, wb, wc] = weights(point);
+        point[2] - (wa * a[2] + wb * b[2] + wc * c[2])
+    };
+    let (before, after) = (beyond(from), beyond(to));
+    if before * after >= 0.0 {
+        return None;
+    }
+    let share = before / (before - after);
+    let point: [f64; 3] = std::array::from_fn(|axis| from[axis] + share * (to[axis] - from[axis]));
+    weights(&point).iter().all(|weight| *weight > -1e-9).then_some(point[0])
 }
 
 /// How far along y a facet's edges go at most within a width of x.

@@ -22,6 +22,7 @@ pub(super) struct Layers {
     per_mm: f32,
     nodes: [usize; 2],
     turns: Turns,
+    circle: Vec<[f64; 2]>,
     depth: Depth,
 }
 
@@ -74,17 +75,29 @@ impl Turns {
         }
     }
 
-    /// Weights of the nodes in the trigonometric polynomial through them.
-    fn weights(self, rotation_rad: f64) -> [f64; 7] {
-        let count = self.count();
-        let turn = std::f64::consts::TAU / self.period_rad();
+    /// Weights of the nodes in the trigonometric polynomial through them, for a rotation by its sine and cosine.
+    fn weights(self, [sin, cos]: [f64; 2], nodes: &[[f64; 2]]) -> [f64; 7] {
+        let times = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a * d + b * c, b * d - a * c];
+        let twice = times([sin, cos], [sin, cos]);
+        let turned = if matches!(self, Self::Square) { times(twice, twice) } else { twice };
         let mut weights = [0.0; 7];
-        for (node, weight) in weights.iter_mut().take(count).enumerate() {
-            let angle = turn * rotation_rad - std::f64::consts::TAU * node as f64 / count as f64;
-            let harmonics = (1..=count / 2).map(|n| 2.0 * (n as f64 * angle).cos());
-            *weight = (1.0 + harmonics.sum::<f64>()) / count as f64;
+        for (weight, [sin, cos]) in weights.iter_mut().zip(nodes) {
+            let aside = times(turned, [-sin, *cos]);
+            let mut harmonic = [0.0, 1.0];
+            let mut sum = 1.0;
+            for _ in 0..nodes.len() / 2 {
+                harmonic = times(harmonic, aside);
+                sum += 2.0 * harmonic[1];
+            }
+            *weight = sum / nodes.len() as f64;
         }
         weights
+    }
+
+    /// Sine and cosine of every node's share of the full circle.
+    fn circle(self) -> Vec<[f64; 2]> {
+        let count = self.count();
+        (0..count).map(|node| (std::f64::consts::TAU * node as f64 / count as f64).sin_cos().into()).collect()
     }
 }
 
@@ -115,6 +128,7 @@ impl Layers {
             per_mm: single(1.0 / step_mm),
             nodes: grid.nodes,
             turns,
+            circle: turns.circle(),
             depth: maker.depth(depth_max_mm),
         }
     }
@@ -129,47 +143,45 @@ impl Layers {
         depth_mm: f64,
         values: &mut [f32],
     ) {
-        let rotation_rad = if matches!(self.turns, Turns::Round) { 0.0 } else { rotation_deg.to_radians() };
-        let turns = self.turns.weights(rotation_rad);
-        let place = Place {
-            tool: [single(tool_x), single(tool_y)],
-            turn: {
-                let (sin, cos) = rotation_rad.sin_cos();
-                [single(sin), single(cos)]
-            },
-            columns,
-            rows,
+        let turn: [f64; 2] = match self.turns {
+            Turns::Round => [0.0, 1.0],
+            Turns::Square | Turns::Oblong => rotation_deg.to_radians().sin_cos().into(),
         };
+        let turns = self.turns.weights(turn, &self.circle);
+        let tool = [single(tool_x), single(tool_y)];
+        let place = Place { tool, turn: turn.map(single), columns, rows };
         match &self.depth {
             Depth::Flat(table) => {
                 let channels = [depth_mm];
                 match self.turns {
-                    Turns::Round => self.taps::<1>(table, &place, &weigh(&turns, &channels), values),
-                    Turns::Square => self.taps::<3>(table, &place, &weigh(&turns, &channels), values),
-                    Turns::Oblong => self.taps::<7>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Round => self.taps::<1, 4>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Square => self.taps::<3, 12>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Oblong => self.taps::<7, 28>(table, &place, &weigh(&turns, &channels), values),
                 }
             }
             Depth::Pieces(pieces) => {
                 let piece = piece_at(pieces, depth_mm);
                 let (table, channels) = (&piece.table, piece.weights(depth_mm));
                 match self.turns {
-                    Turns::Round => self.taps::<4>(table, &place, &weigh(&turns, &channels), values),
-                    Turns::Square => self.taps::<12>(table, &place, &weigh(&turns, &channels), values),
-                    Turns::Oblong => self.taps::<28>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Round => self.taps::<4, 16>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Square => self.taps::<12, 48>(table, &place, &weigh(&turns, &channels), values),
+                    Turns::Oblong => self.taps::<28, 112>(table, &place, &weigh(&turns, &channels), values),
                 }
             }
         }
     }
 
-    /// Signals of all elements by `C` channels of a table.
-    fn taps<const C: usize>(
+    /// Signals of all elements by `C` channels of a table; `N = 4 C` numbers are those of four neighbours.
+    fn taps<const C: usize, const N: usize>(
         &self,
         table: &[f32],
         place: &Place<'_>,
         channels: &[f32; C],
         values: &mut [f32],
     ) {
-        let channels = channels.map(f32x4::splat);
+        let channels = std::array::from_fn(|four| {
+            f32x4::from(std::array::from_fn::<f32, 4, _>(|lane| channels[(4 * four + lane) % C]))
+        });
         for (row, centre_y) in values.chunks_exact_mut(place.columns.len()).zip(place.rows) {
             let dy = centre_y - place.tool[1];
             for (values, centres_x) in row.chunks_mut(LANES).zip(place.columns.chunks(LANES)) {
@@ -177,7 +189,7 @@ impl Layers {
                 for (lane, value) in values.iter_mut().enumerate() {
                     // Beyond the table there is nothing.
                     *value = if spots.inside[lane] > 0.0 {
-                        spots.sample(lane, table, self.nodes[0], &channels)
+                        spots.sample::<C, N>(lane, table, self.nodes[0], &channels)
                     } else {
                         0.0
                     };
@@ -222,9 +234,9 @@ struct Spots {
 }
 
 impl Spots {
-    /// The spline at one spot.
+    /// The spline at one spot. `channels`: the channels' weights, again and again.
     #[inline]
-    fn sample<const C: usize>(
+    fn sample<const C: usize, const N: usize>(
         &self,
         lane: usize,
         table: &[f32],
@@ -232,22 +244,24 @@ impl Spots {
         channels: &[f32x4; C],
     ) -> f32 {
         let [column, row] = [self.column[lane], self.row[lane]].map(|node| node as usize);
-        let first = row * C * columns + column;
-        // Each begins with four neighbours of a row, channel by channel, row by row.
-        let mut rows = table.get(first..).unwrap_or_default().chunks_exact(columns);
+        let first = C * (row * columns + column);
+        // Each begins with four neighbours of a row, with all their channels.
+        let mut rows = table.get(first..).unwrap_or_default().chunks_exact(C * columns);
         let mut sums = [f32x4::ZERO; C];
         for weights in &self.along {
+            let Some(row) = rows.next().and_then(|row| row.first_chunk::<N>()) else { return 0.0 };
             let weight = f32x4::splat(weights[lane]);
-            for sum in &mut sums {
-                let Some(four) = rows.next().and_then(|row| row.first_chunk::<4>()) else { return 0.0 };
-                *sum += weight * f32x4::from(*four);
+            for (four, sum) in sums.iter_mut().enumerate() {
+                *sum += weight * f32x4::from(std::array::from_fn::<f32, 4, _>(|lane| row[4 * four + lane]));
             }
         }
-        let mut mixed = f32x4::ZERO;
-        for (sum, share) in sums.into_iter().zip(channels) {
-            mixed += sum * share;
+        let across = self.across.map(|weights| weights[lane]);
+        let mut total = f32x4::ZERO;
+        for (four, (sum, channels)) in sums.into_iter().zip(channels).enumerate() {
+            let across = f32x4::from(std::array::from_fn::<f32, 4, _>(|lane| across[(4 * four + lane) / C]));
+            total += sum * channels * across;
         }
-        (mixed * f32x4::from(self.across.map(|weights| weights[lane]))).reduce_add()
+        total.reduce_add()
     }
 }
 
@@ -406,15 +420,15 @@ impl Maker<'_> {
     }
 }
 
-/// One table of several channels: row by row of nodes, in each row turn by turn, in each turn channel by channel;
-/// and one row more, so that a whole row follows every node.
+/// One table of several channels: node by node, in each node turn by turn, in each turn channel by channel; and
+/// one row of nodes more, so that a whole row follows every node.
 fn interleave(channels: &[&Tables], columns: usize) -> Vec<f32> {
     let turns = channels.iter().map(|tables| tables.len()).min().unwrap_or(0);
     let order: Vec<&Vec<f64>> =
         (0..turns).flat_map(|turn| channels.iter().map(move |tables| &tables[turn])).collect();
-    let rows = order.first().map_or(0, |table| table.len() / columns);
-    let row = |row: usize| order.iter().flat_map(move |table| &table[row * columns..(row + 1) * columns]);
-    (0..rows).flat_map(row).map(|value| single(*value)).chain(std::iter::repeat_n(0.0, columns)).collect()
+    let nodes = order.first().map_or(0, |table| table.len());
+    let of_nodes = (0..nodes).flat_map(|node| order.iter().map(move |table| single(table[node])));
+    of_nodes.chain(std::iter::repeat_n(0.0, columns * order.len())).collect()
 }
 
 /// Depths below `depth_max_mm` at which the touched area jumps; `None` if the whole underside is flat.
