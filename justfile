@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd python
+ci: fmt lint docs deny test validate systemd python gpu
 
 # The README's second command.
 test:
@@ -65,16 +65,20 @@ python-tools:
 proto:
     cargo xtask proto
 
+# The made tools as STL, after a change of their shapes.
+assets:
+    cargo xtask assets
+
 # How fast the forward model is, how it grows, how far from the machine's limits: bench/README.md.
 bench:
     cargo bench --package tactus-bench --bench forward -- --quick
     cargo run --release --package tactus-bench -- growth
     cargo run --release --package tactus-bench -- limits
 
-# The same against others' programs, side by side.
+# The same beside others' programs. Compiled for the processor at hand, as the peers' wheels choose their instructions when they run.
 bench-peers *arguments: bench-peers-tools
-    cargo build --release --package tactus-bench
-    {{ tools }}/peers/bin/python bench/peers/forward.py {{ arguments }}
+    RUSTFLAGS="-C target-cpu=native" cargo build --release --package tactus-bench --target-dir target/native
+    {{ tools }}/peers/bin/python bench/peers/forward.py --binary target/native/release/tactus-bench {{ arguments }}
 
 # A virtual environment with the peers.
 bench-peers-tools:

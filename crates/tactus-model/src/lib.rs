@@ -1,19 +1,98 @@
-//! Forward model of a tactile array under an elastic covering.
+//! Forward model of a tactile array under an elastic covering: what every element reads of a tool.
 //!
-//! The sensor is a grid of square elements under a covering of thickness `t`. An indenter that
-//! stands a depth below the covering's undeformed surface makes a penetration map `I(x, y)` in mm.
-//! The covering spreads it by a Gaussian point spread function (PSF), each element integrates the
-//! spread map over its active square, and the element answers with counts:
+//! # Geometry
+//!
+//! The sensor is a grid of rectangular elements ([`Array`]), row-major, row 0 column 0 at the origin corner of the
+//! sensor frame; x runs along columns, y along rows, both in mm. The `DigiTacts` of the paper has 6 rows of 8
+//! elements of 1.8 mm, 2.0 mm apart but for the middle column gap of each of its two halves (Fig. 1). On it lies a
+//! [`Covering`] of thickness `t`. A [`Registration`] takes the robot's frame to the sensor's:
 //!
 //! ```text
-//! d_e      = integral over element e of (I * G_sigma)
-//! counts_e = baseline_e + gain_e * R(d_e)
+//! p_sensor = Rot(-rotation) (p_robot - origin)
 //! ```
 //!
-//! [`ForwardModel`] gives counts as real numbers; [`Readout`] makes of them what a converter gives. A [`Simulator`]
-//! puts both into time: its [`Pipeline`] follows a tip, with the [`effect`]s that the base model lacks.
+//! # One image
+//!
+//! An [`Indenter`] (cylinder, sphere, cone, box, or any [`Mesh`]) that stands a depth `z` below the undeformed surface
+//! ([`Contact`]) makes the penetration map
+//!
+//! ```text
+//! I(x, y) = how far the tool's underside stands below the surface, in [0, t] mm            (Sec. 5, Fig. 7)
+//! ```
+//!
+//! The covering spreads it by a Gaussian point spread function of unit volume, whose width grows with thickness
+//! ([`Psf`], Eq. 4), each element integrates the spread map over its active area, and answers ([`Response`], Sec. 2.2):
+//!
+//! ```text
+//! d_e      = integral over element e of (I * G_sigma)             mm^3     sigma = intercept + slope t
+//! u_e      = d_e / d_ref                                          mm
+//! counts_e = baseline_e + sensitivity_e (u_e + k_e u_e^2)
+//! ```
+//!
+//! `d_ref` is what the reference tool gives, 1 mm deep at the element's own centre under the reference covering: so
+//! sensitivity is what a calibration measures, counts per mm of that press. [`Readout`] then makes of counts what a
+//! converter gives: noise, saturation, quantisation, in this order.
+//!
+//! A Gaussian blur and the integral over a rectangle separate into x and y. A tool is cut into slices of one x; the
+//! share of a line that arrives between two edges has a closed form in the error function, and along x the integrand
+//! is smooth, so that Gauss-Legendre quadrature between its corners converges at once ([`Blur`]).
+//!
+//! | what | held against | agrees to |
+//! |---|---|---|
+//! | cylinder, sphere, cone | direct quadrature over the tool's face, without the error function | 1e-9 of each element |
+//! | box, mesh | closed form; direct quadrature in the tool's own frame | 1e-9 |
+//! | mesh of many triangles | finer slices | about 1e-5 of the peak |
+//! | derivatives ([`Gradient`]) | central differences | 1e-6 of the largest |
+//! | [`Stamp`] | the exact image | 5e-5 of the peak (4e-6 measured for the paper's H) |
+//!
+//! Also held by tests: all that presses arrives (mass), mirror symmetry, linearity in depth of flat tools, and the
+//! limits of no spread and endless spread.
+//!
+//! ```
+//! use tactus_model::{Array, Contact, Covering, ForwardModel, Indenter, Psf, Response};
+//!
+//! let covering = Covering { thickness_mm: 1.016 };
+//! let cylinder = Indenter::Cylinder { diameter_mm: 1.0 };
+//! let response = Response {
+//!     sensitivity_counts_per_mm: vec![1000.0; 48],
+//!     baseline_counts: vec![100.0; 48],
+//!     quadratic_per_mm: vec![0.0; 48],
+//!     reference_indenter: cylinder.clone(),
+//!     reference_covering: covering,
+//! };
+//! let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, response)?;
+//!
+//! // Upon the centre of row 2, column 1, half a millimetre deep.
+//! let press = Contact { indenter: cylinder, position_mm: [2.9, 4.9], rotation_deg: 0.0, depth_mm: 0.5 };
+//! let mut counts = [0.0; 48];
+//! model.image(&press, covering, &mut counts);
+//! assert!((counts[17] - 600.0).abs() < 1e-9);
+//! // Its neighbour along x feels 0.77 of it: the spread of Eq. 4 is 1.36 element widths.
+//! assert!(((counts[16] - 100.0) / 500.0 - 0.77).abs() < 0.005);
+//!
+//! // How the image changes with what is not known exactly.
+//! let gradient = model.gradient(&press, covering);
+//! assert!((gradient.by_depth_mm[17] - 1000.0).abs() < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # In time
+//!
+//! A [`Simulator`] is a sensor as a value: the model, where it lies, what covers it, its tool, its noise, and the
+//! [`effect`]s that the base model lacks. Its [`Pipeline`] follows a [`Path`], such as a [`Trajectory`] of the stage,
+//! moment by moment: motion, contact, covering, element, readout. Clones are as many sensors.
+//!
+//! # Speed
+//!
+//! A [`Stamp`] is a tool's image made ready: sampled instead of computed, some 1.7 million images a second on a core
+//! for any mesh on 48 elements, where the exact image of a cylinder takes 7 us and of the H 500 us.
 //!
 //! This crate has no I/O, no async, no clock and no global random numbers.
+//!
+//! # Source
+//!
+//! Pezzementi, Jantho, Estrade and Hager, *Characterization and Simulation of Tactile Sensors*, Haptics Symposium 2010;
+//! section, figure and equation numbers are the paper's.
 
 pub mod effect;
 

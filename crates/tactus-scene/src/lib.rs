@@ -1,4 +1,62 @@
-//! Scenes: meshes from files, made shapes, and their depth image under an orthographic camera.
+//! Scenes: meshes from files, made tools, and what a sensor sees of them, as the paper's simulator does (Sec. 5).
+//!
+//! The sensor is an orthographic camera that looks up at the tool, and its viewing volume is the covering. The z-buffer
+//! is the penetration map, which a Gaussian blur and the elements' areas turn into signals, and the response into counts:
+//!
+//! ```text
+//! Z        = z-buffer of the tool's depth below the surface, in [0, covering thickness], in mm; rows x cols cells
+//! d        = A_y Z A_x^T                                                               mm^3, one per element
+//! counts_e = baseline_e + sensitivity_e (u_e + k_e u_e^2),   u_e = d_e / d_ref
+//! ```
+//!
+//! `A_x[col, i]` is the length of cell `i` that arrives in column `col` after the blur: blur and integration separate
+//! into x and y, and both are in it, exactly. What is not exact is the edge of the tool between cells: a cell holds the
+//! mean of 16 samples.
+//!
+//! | | |
+//! |---|---|
+//! | [`load`], [`read`] | a [`Mesh`](tactus_model::Mesh) from STL (binary, ASCII), OBJ or PLY, in mm |
+//! | [`shapes`] | tools made here: H, wrench, spaceship (Fig. 9, 10) |
+//! | [`Pose`], [`Attitude`] | where the tool stands, how it is turned and tilted, how deep |
+//! | [`Renderer`] | its [`DepthMap`] and image on the CPU |
+//! | `GpuRenderer` | the same by compute shaders, many poses at once; with the feature `gpu` |
+//!
+//! Accuracy against [`ForwardModel::image`](tactus_model::ForwardModel::image), which needs no raster: 8e-4 of the
+//! image's peak at most over the three tools, three arrays and many poses (held to 1e-3); order 1.6 in the size of a cell.
+//! CPU and GPU agree to 1.3e-6 of full scale (held to 1e-5), since what a triangle covers is decided in integers that are
+//! made once for both.
+//!
+//! What becomes of odd meshes: triangles without area are left out; through a hole the next surface above is seen; the
+//! order of a triangle's corners does not matter; surfaces may pass through each other. Coordinates that are not finite,
+//! indices that name no vertex, spans beyond 1 m, and surfaces that cannot be seen from below are refused.
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Response};
+//! use tactus_scene::{Attitude, Pose, Renderer, shapes::Scene};
+//!
+//! # let covering = Covering { thickness_mm: 1.016 };
+//! # let response = Response {
+//! #     sensitivity_counts_per_mm: vec![1000.0; 48],
+//! #     baseline_counts: vec![100.0; 48],
+//! #     quadratic_per_mm: vec![0.0; 48],
+//! #     reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
+//! #     reference_covering: covering,
+//! # };
+//! let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, response)?;
+//! let renderer = Renderer::new(model, covering, Arc::new(Scene::H.mesh()))?;
+//! // In the sensor's middle, turned by 30 degrees and tilted by 2, its lowest corner 0.3 mm deep.
+//! let attitude = Attitude { yaw_deg: 30.0, roll_deg: 2.0, ..Attitude::default() };
+//! let pose = Pose { position_mm: [8.1, 5.9], attitude, depth_mm: 0.3 };
+//! let mut counts = [0.0; 48];
+//! renderer.image(&pose, &mut counts)?;
+//! assert!(counts[20] > 500.0);
+//! let map = renderer.depth_map(&pose)?;
+//! let deepest = map.penetration_mm.iter().copied().fold(0.0, f32::max);
+//! assert!(deepest > 0.25 && deepest <= 0.3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod depth;
 mod facet;

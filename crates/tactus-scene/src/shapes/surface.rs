@@ -4,8 +4,8 @@ use super::outline::{polar, triangles};
 
 /// Triangles that enclose a solid, or several that may overlap; in mm.
 ///
-/// Seen from outside, the corners of every triangle run counter-clockwise. In contrast to a
-/// [`Mesh`](tactus_model::Mesh), upright sides are there.
+/// Seen from outside, the corners of every triangle run counter-clockwise: a solid's surface, of which a
+/// [`Mesh`](tactus_model::Mesh) needs no such order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
     vertices_mm: Vec<[f64; 3]>,
