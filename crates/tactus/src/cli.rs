@@ -70,7 +70,7 @@ enum Command {
     Simulate(SimulateArgs),
     /// Draw the paper's figures.
     Figures(FiguresArgs),
-    /// Check files: configurations, rigs, scripts, tables, recordings.
+    /// Check files: configurations, rigs, models, scripts, tables, recordings.
     Validate(ValidateArgs),
     /// Print the completions for a shell.
     Completions {
@@ -181,7 +181,7 @@ pub(crate) struct ReportArgs {
 /// Arguments of `simulate`; places in the sensor's frame.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SimulateArgs {
-    /// The tool: h, wrench, spaceship, cylinder, sphere, cone, or a file (.stl, .obj, .ply; in mm).
+    /// The tool: h, wrench, spaceship, cylinder, sphere, cone, box, or a file (.stl, .obj, .ply; in mm).
     #[arg(long, default_value = "h")]
     pub(crate) scene: String,
     /// The array: digitacts, fingertip, tekscan-5027; the model's own if not given.
@@ -214,6 +214,9 @@ pub(crate) struct SimulateArgs {
     /// Diameter of a cylinder, sphere or cone.
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     pub(crate) diameter_mm: f64,
+    /// Sides of a box along x and y.
+    #[arg(long, value_name = "X,Y", value_delimiter = ',', default_values_t = [3.0, 1.0])]
+    pub(crate) size_mm: Vec<f64>,
     /// Full angle at a cone's tip.
     #[arg(long, value_name = "DEG", default_value_t = 90.0)]
     pub(crate) apex_deg: f64,

@@ -13,6 +13,7 @@ use tactus_device::Clock;
 use tactus_model::{Indenter, Moment, Pipeline, Trajectory};
 use tactus_schema::key::Keys;
 use tactus_schema::{DeviceTick, Frame, FrameFlags, MonoTime, pb};
+use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 
@@ -107,6 +108,7 @@ pub(super) fn publish(
             let task = tokio::spawn(sensor.run(publisher, args.seconds));
             sensors.push((bus, alive, task, refusing));
         }
+        let mut terminate = signal(SignalKind::terminate()).context("the system gives no SIGTERM")?;
         let ended = async {
             for (_, _, task, _) in &mut sensors {
                 task.await.context("a sensor's task broke off")??;
@@ -116,6 +118,7 @@ pub(super) fn publish(
         tokio::select! {
             ended = ended => ended?,
             interrupt = tokio::signal::ctrl_c() => interrupt.context("the system gives no SIGINT")?,
+            _ = terminate.recv() => {}
         }
         for (bus, alive, task, refusing) in sensors {
             task.abort();

@@ -132,9 +132,20 @@ fn indenter(args: &SimulateArgs) -> anyhow::Result<Indenter> {
     if !(diameter_mm.is_finite() && diameter_mm > 0.0) {
         bail!("--diameter-mm must be positive, not {diameter_mm}");
     }
+    let attitude = Attitude { yaw_deg: 0.0, pitch_deg: args.pitch_deg, roll_deg: args.roll_deg };
+    let simple = ["cylinder", "sphere", "cone", "box"].contains(&args.scene.as_str());
+    if simple && attitude != Attitude::default() {
+        bail!("only a mesh can be tilted, not a {}", args.scene);
+    }
     let mesh = match args.scene.as_str() {
         "cylinder" => return Ok(Indenter::Cylinder { diameter_mm }),
         "sphere" => return Ok(Indenter::Sphere { diameter_mm }),
+        "box" if args.size_mm.iter().all(|side| side.is_finite() && *side > 0.0) => {
+            let [x_mm, y_mm] =
+                <[f64; 2]>::try_from(&*args.size_mm).context("--size-mm takes two sides, as 3,1")?;
+            return Ok(Indenter::Box { size_mm: [x_mm, y_mm] });
+        }
+        "box" => bail!("--size-mm takes two positive sides, as 3,1"),
         "cone" if args.apex_deg > 0.0 && args.apex_deg < 180.0 => {
             return Ok(Indenter::Cone { diameter_mm, apex_deg: args.apex_deg });
         }
@@ -145,33 +156,29 @@ fn indenter(args: &SimulateArgs) -> anyhow::Result<Indenter> {
                 tactus_scene::load(Path::new(scene)).map_err(|error| anyhow!("{scene}: {error}"))?
             }
             None => bail!(
-                "no scene {scene:?}: there are h, wrench, spaceship, cylinder, sphere, cone, and files \
+                "no scene {scene:?}: there are h, wrench, spaceship, cylinder, sphere, cone, box, and files \
                  .stl, .obj, .ply"
             ),
         },
     };
-    Ok(Indenter::Mesh(Arc::new(turned(mesh, args)?)))
-}
-
-/// The tool in its attitude; its angle about the vertical is the contact's.
-fn turned(mesh: Mesh, args: &SimulateArgs) -> anyhow::Result<Mesh> {
-    let attitude = Attitude { yaw_deg: 0.0, pitch_deg: args.pitch_deg, roll_deg: args.roll_deg };
-    if attitude == Attitude::default() {
-        return Ok(mesh);
-    }
-    Ok(mesh.turned(attitude.matrix())?)
+    let tilted = if attitude == Attitude::default() { mesh } else { mesh.turned(attitude.matrix())? };
+    Ok(Indenter::Mesh(Arc::new(tilted)))
 }
 
 /// The tool turned about its axis.
 fn yawed(indenter: &Indenter, angle_deg: f64) -> anyhow::Result<Indenter> {
+    let turned = |mesh: &Mesh| mesh.turned(Attitude::upright(angle_deg).matrix());
     Ok(match indenter {
-        Indenter::Mesh(mesh) if angle_deg != 0.0 => {
-            Indenter::Mesh(Arc::new(mesh.turned(Attitude::upright(angle_deg).matrix())?))
+        Indenter::Mesh(mesh) if angle_deg != 0.0 => Indenter::Mesh(Arc::new(turned(mesh)?)),
+        Indenter::Box { size_mm } if angle_deg != 0.0 => {
+            let [x, y] = size_mm.map(|side| side / 2.0);
+            let corners = [[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]];
+            Indenter::Mesh(Arc::new(turned(&Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]])?)?))
         }
         Indenter::Mesh(_)
+        | Indenter::Box { .. }
         | Indenter::Cylinder { .. }
         | Indenter::Sphere { .. }
-        | Indenter::Cone { .. }
-        | Indenter::Box { .. } => indenter.clone(),
+        | Indenter::Cone { .. } => indenter.clone(),
     })
 }
