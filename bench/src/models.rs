@@ -1,9 +1,7 @@
 //! The models that are measured.
 
 use anyhow::Result;
-use tactus_model::{Array, ForwardModel, Indenter, Psf, Response};
-
-use crate::COVERING;
+use tactus_model::{Array, ForwardModel, Psf, Response};
 
 /// A model of an array: the paper's spread on the pitch it was measured at, one pitch on others (the paper's
 /// Fig. 10); a slightly bent response from a baseline of 0, so that counts are the rise.
@@ -35,12 +33,7 @@ pub fn even(fineness: u32) -> Result<ForwardModel> {
 
 fn with_psf(array: Array, psf: Psf) -> Result<ForwardModel> {
     let elements = array.elements();
-    let response = Response {
-        sensitivity_counts_per_mm: vec![1000.0; elements],
-        baseline_counts: vec![0.0; elements],
-        quadratic_per_mm: vec![0.05; elements],
-        reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
-        reference_covering: COVERING,
-    };
+    let response =
+        Response { quadratic_per_mm: vec![0.05; elements], ..Response::uniform(elements, 1000.0, 0.0) };
     Ok(ForwardModel::new(array, psf, response)?)
 }

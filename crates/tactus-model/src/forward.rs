@@ -190,6 +190,18 @@ impl ForwardModel {
 }
 
 impl Response {
+    /// Elements that all answer alike and linearly, their sensitivity stated for the paper's press: a cylinder of
+    /// 1 mm under a covering of 1.016 mm (0.04 inch).
+    pub fn uniform(elements: usize, sensitivity_counts_per_mm: f64, baseline_counts: f64) -> Self {
+        Self {
+            sensitivity_counts_per_mm: vec![sensitivity_counts_per_mm; elements],
+            baseline_counts: vec![baseline_counts; elements],
+            quadratic_per_mm: vec![0.0; elements],
+            reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
+            reference_covering: Covering { thickness_mm: 1.016 },
+        }
+    }
+
     fn check(&self, elements: usize) -> Result<(), ModelError> {
         for (field, values) in [
             ("sensitivity_counts_per_mm", &self.sensitivity_counts_per_mm),

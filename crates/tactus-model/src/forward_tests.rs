@@ -13,13 +13,7 @@ const SPHERE: Indenter = Indenter::Sphere { diameter_mm: 4.0 };
 const BOX: Indenter = Indenter::Box { size_mm: [3.0, 1.0] };
 
 fn linear(elements: usize) -> Response {
-    Response {
-        sensitivity_counts_per_mm: vec![1000.0; elements],
-        baseline_counts: vec![100.0; elements],
-        quadratic_per_mm: vec![0.0; elements],
-        reference_indenter: CYLINDER,
-        reference_covering: THIN,
-    }
+    Response::uniform(elements, 1000.0, 100.0)
 }
 
 fn digitacts(psf: Psf) -> ForwardModel {

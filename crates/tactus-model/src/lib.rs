@@ -53,13 +53,7 @@
 //!
 //! let covering = Covering { thickness_mm: 1.016 };
 //! let cylinder = Indenter::Cylinder { diameter_mm: 1.0 };
-//! let response = Response {
-//!     sensitivity_counts_per_mm: vec![1000.0; 48],
-//!     baseline_counts: vec![100.0; 48],
-//!     quadratic_per_mm: vec![0.0; 48],
-//!     reference_indenter: cylinder.clone(),
-//!     reference_covering: covering,
-//! };
+//! let response = Response::uniform(48, 1000.0, 100.0);
 //! let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, response)?;
 //!
 //! // Upon the centre of row 2, column 1, half a millimetre deep.

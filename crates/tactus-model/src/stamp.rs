@@ -29,14 +29,7 @@ use layers::Layers;
 ///
 /// let covering = Covering { thickness_mm: 1.016 };
 /// let indenter = Indenter::Cylinder { diameter_mm: 1.0 };
-/// let response = Response {
-///     sensitivity_counts_per_mm: vec![1000.0; 48],
-///     baseline_counts: vec![100.0; 48],
-///     quadratic_per_mm: vec![0.0; 48],
-///     reference_indenter: indenter.clone(),
-///     reference_covering: covering,
-/// };
-/// let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, response)?;
+/// let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, Response::uniform(48, 1000.0, 100.0))?;
 /// let stamp = Stamp::new(&model, &indenter, covering, 0.6)?;
 /// let mut counts = [0.0; 48];
 /// stamp.image([2.9, 4.9], 0.0, 0.3, &mut counts)?;

@@ -129,14 +129,7 @@ const FIGURES: [PaperFigure; 7] = [
 
 /// Elements that all answer alike: 1 count for each mm of equivalent indentation.
 fn uniform(array: Array, psf: Psf) -> Result<ForwardModel, ModelError> {
-    let elements = array.elements();
-    let response = Response {
-        sensitivity_counts_per_mm: vec![1.0; elements],
-        baseline_counts: vec![0.0; elements],
-        quadratic_per_mm: vec![0.0; elements],
-        reference_indenter: REFERENCE_INDENTER,
-        reference_covering: COVERINGS[0],
-    };
+    let response = Response::uniform(array.elements(), 1.0, 0.0);
     ForwardModel::new(array, psf, response)
 }
 

@@ -5,7 +5,7 @@
 
 use std::{env, error::Error, sync::Arc, time::Instant};
 
-use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Response};
+use tactus_model::{Array, Covering, ForwardModel, Psf, Response};
 use tactus_scene::shapes::Scene;
 use tactus_scene::{Attitude, GpuRenderer, Pose, Renderer};
 
@@ -42,14 +42,7 @@ const COVERING: Covering = Covering { thickness_mm: 1.016 };
 
 /// Spread by the paper's `sigma` under the `DigiTacts`, by one pitch under the others.
 fn model(array: Array) -> Result<ForwardModel, Box<dyn Error>> {
-    let elements = array.elements();
-    let response = Response {
-        sensitivity_counts_per_mm: vec![1000.0; elements],
-        baseline_counts: vec![100.0; elements],
-        quadratic_per_mm: vec![0.0; elements],
-        reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
-        reference_covering: COVERING,
-    };
+    let response = Response::uniform(array.elements(), 1000.0, 100.0);
     let psf = match array.name() {
         "digitacts" => Psf::PAPER,
         _ => Psf { sigma_intercept_mm: array.pitch_mm(), sigma_per_mm: 0.0 },

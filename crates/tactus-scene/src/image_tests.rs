@@ -1,17 +1,11 @@
 use super::*;
 use crate::Attitude;
-use tactus_model::{Array, Indenter, Psf, Response};
+use tactus_model::{Array, Psf, Response};
 
 const COVERING: Covering = Covering { thickness_mm: 1.016 };
 
 fn renderer(covering: Covering) -> Result<Renderer, RenderError> {
-    let response = Response {
-        sensitivity_counts_per_mm: vec![1000.0; 48],
-        baseline_counts: vec![100.0; 48],
-        quadratic_per_mm: vec![0.1; 48],
-        reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
-        reference_covering: COVERING,
-    };
+    let response = Response { quadratic_per_mm: vec![0.1; 48], ..Response::uniform(48, 1000.0, 100.0) };
     let square = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]];
     let mesh = Mesh::new(&square, &[[0, 1, 2], [0, 2, 3]]).unwrap();
     let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, response).unwrap();

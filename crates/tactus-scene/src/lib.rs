@@ -33,18 +33,11 @@
 //! ```
 //! use std::sync::Arc;
 //!
-//! use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Response};
+//! use tactus_model::{Array, Covering, ForwardModel, Psf, Response};
 //! use tactus_scene::{Attitude, Pose, Renderer, shapes::Scene};
 //!
-//! # let covering = Covering { thickness_mm: 1.016 };
-//! # let response = Response {
-//! #     sensitivity_counts_per_mm: vec![1000.0; 48],
-//! #     baseline_counts: vec![100.0; 48],
-//! #     quadratic_per_mm: vec![0.0; 48],
-//! #     reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
-//! #     reference_covering: covering,
-//! # };
-//! let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, response)?;
+//! let covering = Covering { thickness_mm: 1.016 };
+//! let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, Response::uniform(48, 1000.0, 100.0))?;
 //! let renderer = Renderer::new(model, covering, Arc::new(Scene::H.mesh()))?;
 //! // In the sensor's middle, turned by 30 degrees and tilted by 2, its lowest corner 0.3 mm deep.
 //! let attitude = Attitude { yaw_deg: 30.0, roll_deg: 2.0, ..Attitude::default() };

@@ -16,14 +16,7 @@ const TOLERANCE: f64 = 1e-3;
 
 /// The paper's `sigma` for the `DigiTacts` and one pitch for the other arrays (Fig. 10).
 fn model(array: Array) -> ForwardModel {
-    let elements = array.elements();
-    let response = Response {
-        sensitivity_counts_per_mm: vec![1000.0; elements],
-        baseline_counts: vec![0.0; elements],
-        quadratic_per_mm: vec![0.0; elements],
-        reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
-        reference_covering: COVERING,
-    };
+    let response = Response::uniform(array.elements(), 1000.0, 0.0);
     let psf = match array.name() {
         "digitacts" => Psf::PAPER,
         _ => Psf { sigma_intercept_mm: array.pitch_mm(), sigma_per_mm: 0.0 },

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use tactus_model::{Array, Covering, ForwardModel, Indenter, Mesh, Psf, Response};
+use tactus_model::{Array, Covering, ForwardModel, Mesh, Psf, Response};
 use tactus_scene::shapes::SCENES;
 use tactus_scene::{Attitude, GpuError, GpuRenderer, Pose, RenderError, Renderer};
 
@@ -19,10 +19,8 @@ fn renderer(array: Array, mesh: Mesh) -> Renderer {
     let elements = array.elements();
     let response = Response {
         sensitivity_counts_per_mm: (0..elements).map(|element| 900.0 + element as f64).collect(),
-        baseline_counts: vec![BASELINE.into(); elements],
         quadratic_per_mm: vec![0.05; elements],
-        reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
-        reference_covering: COVERING,
+        ..Response::uniform(elements, 1000.0, BASELINE.into())
     };
     let psf = Psf { sigma_intercept_mm: array.pitch_mm(), sigma_per_mm: 0.0 };
     Renderer::new(ForwardModel::new(array, psf, response).unwrap(), COVERING, Arc::new(mesh)).unwrap()

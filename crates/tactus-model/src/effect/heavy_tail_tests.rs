@@ -1,4 +1,4 @@
-use crate::effect::bench::{CYLINDER, THIN, assert_slopes, effect, model, simulator, still, upon};
+use crate::effect::bench::{assert_slopes, effect, model, simulator, still, upon};
 use crate::{Array, Blur, Covering, ForwardModel, Psf, Response};
 
 fn tail(tail_share: f64, width_ratio: f64) -> crate::Effect {
@@ -8,13 +8,8 @@ fn tail(tail_share: f64, width_ratio: f64) -> crate::Effect {
 #[test]
 fn a_point_is_spread_by_the_mixture() {
     // So small a tool is a point, and so fine an element reads the spread itself.
-    let response = Response {
-        sensitivity_counts_per_mm: vec![1.0; 9],
-        baseline_counts: vec![0.0; 9],
-        quadratic_per_mm: vec![0.0; 9],
-        reference_indenter: crate::Indenter::Cylinder { diameter_mm: 1e-3 },
-        reference_covering: THIN,
-    };
+    let reference_indenter = crate::Indenter::Cylinder { diameter_mm: 1e-3 };
+    let response = Response { reference_indenter, ..Response::uniform(9, 1.0, 0.0) };
     let centres = vec![0.0, 1.0, 4.0];
     let array = Array::new("fine", [1e-3; 2], centres.clone(), centres, 30.0, 4095.0, 1.0).unwrap();
     let mut one = simulator([tail(0.3, 2.5)]);
@@ -34,13 +29,7 @@ fn nothing_pressed_is_lost_or_gained() {
     // An array that covers all of both Gaussians: each element reads in proportion to its share.
     let centres: Vec<f64> = (0..30).map(|k| 2.0 * f64::from(k)).collect();
     let array = Array::new("wide", [2.0; 2], centres.clone(), centres, 30.0, 4095.0, 1.0).unwrap();
-    let response = Response {
-        sensitivity_counts_per_mm: vec![1.0; 900],
-        baseline_counts: vec![0.0; 900],
-        quadratic_per_mm: vec![0.0; 900],
-        reference_indenter: CYLINDER,
-        reference_covering: THIN,
-    };
+    let response = Response::uniform(900, 1.0, 0.0);
     let mut one = simulator([tail(0.4, 2.0)]);
     one.model = ForwardModel::new(array, Psf::PAPER, response).unwrap();
     let mut plain = one.clone();
