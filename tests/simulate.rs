@@ -187,6 +187,9 @@ fn what_cannot_be_simulated_is_refused_with_what_to_do() {
         (&["--model", "missing.toml"], "missing.toml"),
         (&["--trajectory", "path.csv"], "times must rise"),
         (&["--live", "--rate-hz", "2000"], "--rate-hz"),
+        (&["--live", "--seconds", "nan"], "--seconds"),
+        (&["--live", "--rig", "a/b"], "letters, digits"),
+        (&["--scene", "."], "its name must end in .stl, .obj or .ply"),
         (&["--out", "image.jpeg"], ".png or .csv"),
         (&["--gpu"], "GPU"),
     ] {

@@ -245,7 +245,7 @@ pub(crate) struct SimulateArgs {
     #[arg(long)]
     pub(crate) live: bool,
     /// End the live frames after so long.
-    #[arg(long, value_name = "S", requires = "live")]
+    #[arg(long, value_name = "S", requires = "live", allow_negative_numbers = true)]
     pub(crate) seconds: Option<f64>,
 }
 

@@ -80,6 +80,14 @@ pub(super) fn publish(
     let first: Endpoint =
         common.endpoint.parse().map_err(|error: BusError| Failure::new(Exit::Usage, error))?;
     let name = common.rig.as_deref().unwrap_or("simulated");
+    if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
+        let problem =
+            format!("--rig {name:?}: letters, digits, '-' and '_' only: it becomes part of the bus keys");
+        return Err(Failure::new(Exit::Usage, problem).into());
+    }
+    if let Some(seconds) = args.seconds.filter(|seconds| !(seconds.is_finite() && *seconds > 0.0)) {
+        return Err(Failure::new(Exit::Usage, format!("--seconds must be positive, not {seconds}")).into());
+    }
     connection::runtime()?.block_on(async {
         let clock = Clock::real();
         let mut sensors = Vec::new();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail};
 use tactus_model::{Array, Contact, Covering, Indenter, Mesh, Psf, Registration, Simulator};
-use tactus_scene::{Attitude, shapes};
+use tactus_scene::{Attitude, FileError, shapes};
 #[cfg(feature = "gpu")]
 use tactus_scene::{GpuRenderer, Pose, Renderer};
 use tactus_schema::model::Model;
@@ -152,9 +152,7 @@ fn indenter(args: &SimulateArgs) -> anyhow::Result<Indenter> {
         "cone" => bail!("--apex-deg is the full angle at the tip, between 0 and 180"),
         scene => match shapes::Scene::named(scene) {
             Some(scene) => scene.mesh(),
-            None if Path::new(scene).exists() => {
-                tactus_scene::load(Path::new(scene)).map_err(|error| anyhow!("{scene}: {error}"))?
-            }
+            None if Path::new(scene).exists() => load(Path::new(scene))?,
             None => bail!(
                 "no scene {scene:?}: there are h, wrench, spaceship, cylinder, sphere, cone, box, and files \
                  .stl, .obj, .ply"
@@ -163,6 +161,15 @@ fn indenter(args: &SimulateArgs) -> anyhow::Result<Indenter> {
     };
     let tilted = if attitude == Attitude::default() { mesh } else { mesh.turned(attitude.matrix())? };
     Ok(Indenter::Mesh(Arc::new(tilted)))
+}
+
+/// A mesh from a file. What is wrong inside it is said with its name.
+fn load(path: &Path) -> anyhow::Result<Mesh> {
+    use FileError::{Broken, Io, Mesh, NoFaces, TooLarge, UnknownFormat};
+    tactus_scene::load(path).map_err(|error| match error {
+        Io { .. } | UnknownFormat { .. } => error.into(),
+        TooLarge { .. } | Broken { .. } | NoFaces { .. } | Mesh(_) => anyhow!("{}: {error}", path.display()),
+    })
 }
 
 /// The tool turned about its axis.
