@@ -66,6 +66,8 @@ enum Command {
     Recover(RecoverArgs),
     /// Make the report of a recording again.
     Report(ReportArgs),
+    /// Characterise the sensor from recordings or tables: faults, place, responses, point spread.
+    Calibrate(CalibrateArgs),
     /// What a sensor reads of a tool: an image, frames along a path, or live on the bus.
     Simulate(SimulateArgs),
     /// Draw the paper's figures.
@@ -176,6 +178,17 @@ pub(crate) struct ReportArgs {
     /// The report; `report.html` beside the recording if not given.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
+}
+
+/// Arguments of `calibrate`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct CalibrateArgs {
+    /// Recordings and measurement tables of one rig.
+    #[arg(required = true, value_name = "RECORDING|TABLE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Where model.toml, calibration.json and report.html go.
+    #[arg(short, long, value_name = "DIR", default_value = "calibration")]
+    pub(crate) out: PathBuf,
 }
 
 /// Arguments of `simulate`; places in the sensor's frame.
@@ -301,6 +314,7 @@ fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
         Command::Export(args) => commands::files::export(common, &args),
         Command::Recover(args) => commands::files::recover(common, &args),
         Command::Report(args) => commands::files::report(common, &args),
+        Command::Calibrate(args) => commands::calibrate::calibrate(common, &args),
         Command::Simulate(args) => commands::simulate::simulate(common, &args),
         Command::Figures(args) => commands::figures::figures(common, &args),
         Command::Validate(args) => Ok(commands::validate::validate(common, &args)),

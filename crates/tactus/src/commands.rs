@@ -1,5 +1,6 @@
 //! One module a command, or a family of them.
 
+pub(crate) mod calibrate;
 pub(crate) mod control;
 pub(crate) mod figures;
 pub(crate) mod files;

@@ -1,0 +1,351 @@
+//! The whole calibration: what the presses tell of the sensor, step upon step.
+
+use serde::Serialize;
+use tactus_model::{Covering, ModelError, Psf, Response};
+
+use crate::{
+    Declared, Estimate, Health, Readings, RegistrationFit, ResponseFit, SpreadFit, ThicknessFit,
+    faults::{FaultKind, examine},
+    readings::distinct_places,
+    registration::{Place, register},
+    response::respond,
+    spread::spreads,
+    thickness::against_thickness,
+};
+
+/// Residuals of so many times the noise say that the model is not the sensor's.
+const MISFIT: f64 = 1.5;
+
+/// What was found about a sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Calibration {
+    /// What it rests on.
+    pub data: Data,
+    /// Noise of the median element at rest, in counts.
+    pub noise_rms_counts: Option<f64>,
+    /// Each element's reading at rest, with its scatter from rest to rest as the error.
+    pub baseline_counts: Vec<Option<Estimate>>,
+    /// Faulty elements.
+    pub health: Health,
+    /// Where the sensor lies.
+    pub registration: Option<RegistrationFit>,
+    /// How its elements answer.
+    pub response: Option<ResponseFit>,
+    /// The spread of each covering at each depth.
+    pub spreads: Vec<SpreadFit>,
+    /// Spread against thickness.
+    pub thickness: Option<ThicknessFit>,
+    /// What could not be determined, and what it would take; a sentence each.
+    pub missing: Vec<String>,
+    /// What a reader must know before using a number; a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// What a calibration rests on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Data {
+    /// Ids of the runs.
+    pub runs: Vec<String>,
+    /// Presses in them.
+    pub presses: usize,
+    /// Dwells in these.
+    pub dwells: usize,
+    /// Frames in all.
+    pub frames: u64,
+    /// Frames left out because an element read what no noise explains.
+    pub frames_left_out: u64,
+    /// The coverings pressed, in mm.
+    pub coverings_mm: Vec<f64>,
+    /// The covering for which sensitivities are stated, in mm.
+    pub reference_covering_mm: f64,
+}
+
+/// Characterises a sensor from what was measured, starting from what is declared.
+///
+/// The steps are the paper's: faulty elements, registration (Sec. 2.1), response (Sec. 2.2), spread (Sec. 3.1, Eq. 3),
+/// spread against thickness (Eq. 4). Each takes the results of those before it, errors included. A step for which the
+/// data do not suffice is left out; [`Calibration::missing`] says so, and later steps use what is declared.
+///
+/// # Errors
+/// [`ModelError`] if the declared description makes no model with the covering that was pressed as its reference.
+pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration, ModelError> {
+    let mut warnings = Vec::new();
+    let mut missing = Vec::new();
+    let declared = &referred(declared, readings, &mut warnings)?;
+    let reference_mm = declared.model.response().reference_covering.thickness_mm;
+
+    let mut place = Place::declared(declared, reference_mm);
+    let mut health = examine(declared, readings, &place);
+    let mut sound = health.sound(readings.elements);
+    let registration = match register(declared, readings, &sound) {
+        Ok((registration, fitted)) => {
+            place = fitted;
+            // Now that the place is known, faults show more clearly.
+            health = examine(declared, readings, &place);
+            sound = health.sound(readings.elements);
+            let again = register(declared, readings, &sound);
+            Some(match again {
+                Ok((registration, fitted)) => {
+                    place = fitted;
+                    registration
+                }
+                Err(_) => registration,
+            })
+        }
+        Err(problem) => {
+            missing.push(format!("Registration: {problem}. Origin, rotation and surface are taken as declared."));
+            None
+        }
+    };
+    let mut calibration = Calibration {
+        data: Data::of(readings, reference_mm),
+        noise_rms_counts: typical(readings.noise_rms_counts.iter().flatten().copied()),
+        baseline_counts: readings
+            .rest_counts
+            .iter()
+            .map(|rest| rest.map(|[value, standard_error]| Estimate { value, standard_error }))
+            .collect(),
+        health,
+        registration,
+        response: None,
+        spreads: Vec::new(),
+        thickness: None,
+        missing,
+        warnings,
+    };
+    match respond(declared, readings, &sound, &place) {
+        Err(problem) => {
+            calibration.missing.push(format!(
+                "Response of the elements: {problem}. Without it images cannot be corrected, and no spread be fitted."
+            ));
+        }
+        Ok((response, gains)) => {
+            calibration.response = Some(response);
+            let (fitted, refused) = spreads(declared, readings, &gains, &place);
+            calibration.missing.extend(refused.into_iter().map(|problem| format!("Spread: {problem}.")));
+            calibration.thickness = against_thickness(&fitted);
+            calibration.spreads = fitted.fits;
+        }
+    }
+    calibration.remark(declared, readings);
+    Ok(calibration)
+}
+
+impl Calibration {
+    /// Spread against thickness for a model, and its standard errors where it was fitted.
+    ///
+    /// With one covering only, the declared slope stays and the intercept is made to fit. `None` if the data say
+    /// nothing, or what they say is no spread: an intercept that is not positive, a slope below 0.
+    pub fn psf(&self, declared: Psf) -> Option<(Psf, [Option<f64>; 2])> {
+        let thickness = self.thickness.as_ref()?;
+        let (psf, errors) = match (&thickness.linear, thickness.coverings.as_slice()) {
+            (Some(line), _) => {
+                let [intercept, slope] = line.coefficients;
+                let psf = Psf { sigma_intercept_mm: intercept.value, sigma_per_mm: slope.value };
+                (psf, [Some(intercept.standard_error), Some(slope.standard_error)])
+            }
+            (None, [covering]) => {
+                let sigma_intercept_mm = covering.sigma_mm.value - declared.sigma_per_mm * covering.covering_mm;
+                (Psf { sigma_intercept_mm, ..declared }, [Some(covering.sigma_mm.standard_error), None])
+            }
+            _ => return None,
+        };
+        (psf.sigma_intercept_mm > 0.0 && psf.sigma_per_mm >= 0.0).then_some((psf, errors))
+    }
+
+    /// The elements' responses for a model: what was fitted, and for the others the median of it; the errors of
+    /// sensitivity, baseline and curvature beside them. `None` if none was fitted.
+    pub fn responses(&self, declared: &Response) -> Option<(Response, [Vec<f64>; 3])> {
+        let fitted = self.response.as_ref()?;
+        let elements = self.baseline_counts.len();
+        let median = |of: fn(&crate::ElementResponse) -> f64| typical(fitted.elements.iter().map(of)).unwrap_or_default();
+        let mut response = Response {
+            sensitivity_counts_per_mm: vec![median(|one| one.sensitivity_counts_per_mm.value); elements],
+            quadratic_per_mm: vec![median(|one| one.quadratic_per_mm.value); elements],
+            baseline_counts: declared.baseline_counts.clone(),
+            reference_indenter: declared.reference_indenter.clone(),
+            reference_covering: Covering { thickness_mm: self.data.reference_covering_mm },
+        };
+        let mut errors = [vec![0.0; elements], vec![0.0; elements], vec![0.0; elements]];
+        for one in &fitted.elements {
+            response.sensitivity_counts_per_mm[one.element] = one.sensitivity_counts_per_mm.value;
+            response.quadratic_per_mm[one.element] = one.quadratic_per_mm.value;
+            errors[0][one.element] = one.sensitivity_counts_per_mm.standard_error;
+            errors[2][one.element] = one.quadratic_per_mm.standard_error;
+        }
+        for (element, baseline) in self.baseline_counts.iter().enumerate() {
+            if let Some(baseline) = baseline {
+                response.baseline_counts[element] = baseline.value;
+                errors[1][element] = baseline.standard_error;
+            }
+        }
+        Some((response, errors))
+    }
+
+    fn remark(&mut self, declared: &Declared, readings: &Readings) {
+        let unrested = readings.presses.iter().filter(|press| press.rest.is_none()).count();
+        if unrested > 0 {
+            self.warnings.push(format!("{unrested} presses have no reading at rest before them and are left out."));
+        }
+        if readings.frames_left_out > 0 {
+            self.warnings.push(format!(
+                "{} of {} frames are left out: an element read what no noise explains.",
+                readings.frames_left_out, readings.frames
+            ));
+        }
+        let unknown = readings.presses.iter().filter(|press| declared.indenter(press).is_none()).count();
+        if unknown > 0 {
+            self.warnings.push(format!("{unknown} presses are left out: their tool is not in the rig's description."));
+        }
+        if !self.health.not_judged.is_empty() {
+            self.missing.push(format!(
+                "Health of {} elements: no reference press came near them ({}).",
+                self.health.not_judged.len(),
+                listed(&self.health.not_judged)
+            ));
+        }
+        if let Some(registration) = &self.registration {
+            self.remark_registration(&registration.clone());
+        }
+        if let Some(response) = &self.response {
+            let without: Vec<usize> = (0..readings.elements)
+                .filter(|element| response.elements.iter().all(|one| one.element != *element))
+                .filter(|element| self.health.faults.iter().all(|fault| fault.element != *element))
+                .collect();
+            if !without.is_empty() {
+                self.missing.push(format!(
+                    "Response of {} elements: they were not pressed at their centres ({}).",
+                    without.len(),
+                    listed(&without)
+                ));
+            }
+            if response.trials.iter().all(|trial| trial.heldout_rms_counts.is_none()) {
+                self.missing.push(
+                    "Form of the response: it takes three depths in a press to hold one out. It is taken to be linear.".into(),
+                );
+            }
+        }
+        match &self.thickness {
+            None if self.response.is_some() && self.spreads.is_empty() => {
+                let places = distinct_places(readings.presses.iter().map(|press| press.place_mm)).len();
+                self.missing.push(format!(
+                    "Point spread: {places} places were pressed; it takes 9 under one covering, between the elements."
+                ));
+            }
+            Some(thickness) if thickness.coverings.len() < 2 => self.missing.push(
+                "Spread against thickness: one covering was pressed; it takes two for a line, three for a parabola.".into(),
+            ),
+            _ => {}
+        }
+        for covering in self.thickness.iter().flat_map(|thickness| &thickness.coverings) {
+            if covering.chance.is_some_and(|chance| chance < 1e-3) {
+                self.warnings.push(format!(
+                    "Under the covering of {:.3} mm the spread changes with depth by {:.3} mm, more than its errors explain.",
+                    covering.covering_mm, covering.range_mm
+                ));
+            }
+        }
+        if let Some(line) = self.thickness.as_ref().and_then(|thickness| thickness.linear.as_ref())
+            && line.chance.is_some_and(|chance| chance < 1e-3)
+        {
+            self.warnings.push(format!(
+                "Spread against thickness is no straight line: points lie {:.3} mm rms off it, more than their errors explain. The \
+                 errors of the line are widened accordingly.",
+                line.rms_mm
+            ));
+        }
+        let noisy = |fault: &&crate::Fault| matches!(fault.kind, FaultKind::Noisy { .. });
+        if self.health.faults.iter().any(|fault| noisy(&fault)) {
+            self.warnings.push("Noisy elements are left out of all fits, though they may respond.".into());
+        }
+    }
+
+    fn remark_registration(&mut self, registration: &RegistrationFit) {
+        if registration.rotation_deg.is_none() {
+            self.missing.push(
+                "Rotation: the presses lie too close together, within two pitches; it is taken as declared.".into(),
+            );
+        }
+        if registration.surface_mm.is_none() {
+            self.missing.push("Surface: one depth was pressed only; its height is taken as declared.".into());
+        }
+        if !registration.left_out.is_empty() {
+            self.warnings.push(format!(
+                "{} presses contradict the others and are left out of the registration.",
+                registration.left_out.len()
+            ));
+        }
+        if registration.residual_in_noise > MISFIT {
+            self.warnings.push(format!(
+                "Residuals of the registration are {:.1} times the noise: the base model lacks something, and errors are wider \
+                 for it but may still be too small.",
+                registration.residual_in_noise
+            ));
+        }
+        if let Some(scale) = registration.scale
+            && !scale.covers(1.0)
+            && (scale.value - 1.0).abs() > 1e-3
+        {
+            self.warnings.push(format!(
+                "Distances measured are {:.4} +- {:.4} of those declared: check the element centres and the stage's steps per mm.",
+                scale.value, scale.standard_error
+            ));
+        }
+    }
+}
+
+impl Data {
+    fn of(readings: &Readings, reference_covering_mm: f64) -> Self {
+        let mut coverings_mm: Vec<f64> = readings.presses.iter().map(|press| press.covering_mm).collect();
+        coverings_mm.sort_by(f64::total_cmp);
+        coverings_mm.dedup_by(|next, last| *next - *last < 5e-4);
+        Self {
+            runs: readings.runs.clone(),
+            presses: readings.presses.len(),
+            dwells: readings.presses.iter().map(|press| press.dwells.len()).sum(),
+            frames: readings.frames,
+            frames_left_out: readings.frames_left_out,
+            coverings_mm,
+            reference_covering_mm,
+        }
+    }
+}
+
+/// What is declared, with the reference press that was most made where the declared one was not.
+fn referred(declared: &Declared, readings: &Readings, warnings: &mut Vec<String>) -> Result<Declared, ModelError> {
+    if readings.presses.iter().any(|press| declared.is_reference(press)) {
+        return Ok(declared.clone());
+    }
+    let known = || readings.presses.iter().filter(|press| declared.indenter(press).is_some());
+    let alike = |press: &&crate::Press| {
+        let of = |other: &&crate::Press| {
+            other.indenter == press.indenter && (other.covering_mm - press.covering_mm).abs() < 5e-4
+        };
+        known().filter(of).count()
+    };
+    let Some(press) = known().max_by_key(alike) else { return Ok(declared.clone()) };
+    let Some(indenter) = declared.indenter(press) else { return Ok(declared.clone()) };
+    warnings.push(format!(
+        "Nothing was pressed with the declared reference tool under the declared reference covering: sensitivities are stated \
+         for tool {:?} under {:.3} mm.",
+        &*press.indenter, press.covering_mm
+    ));
+    let response = Response {
+        reference_indenter: indenter.clone(),
+        reference_covering: Covering { thickness_mm: press.covering_mm },
+        ..declared.model.response().clone()
+    };
+    let (array, psf) = (declared.array().clone(), declared.model.psf());
+    Ok(Declared { model: tactus_model::ForwardModel::new(array, psf, response)?, ..declared.clone() })
+}
+
+fn listed(elements: &[usize]) -> String {
+    elements.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// The middle value; `None` of nothing.
+fn typical(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}

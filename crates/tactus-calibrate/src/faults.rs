@@ -1,0 +1,247 @@
+//! Faulty elements, found from what they read and when.
+//!
+//! | fault | evidence |
+//! |---|---|
+//! | stuck | one and the same reading in every frame, while others have noise |
+//! | noisy | a standard deviation at rest several times the median element's |
+//! | cross-wired | its readings follow, press by press, what another element must feel, and not what itself must |
+//! | dead | pressed as hard as others, it does not rise above its noise |
+//!
+//! What an element must feel is the base model's equivalent indentation. An element is judged only if it was pressed
+//! near enough: those that were not are listed, so that nobody takes silence for health.
+//!
+//! # Source
+//! Paper, Sec. 2.2: two elements "responded to a stimulus of one adjacent element, but not to the element itself".
+
+use serde::Serialize;
+use tactus_model::Covering;
+
+use crate::{
+    readings::{Readings, distinct_places},
+    registration::Place,
+    setting::{Declared, across},
+};
+
+/// Noise of so many times the median is no chance.
+const NOISY: f64 = 3.0;
+/// Frames at rest that it takes to know a noise.
+const FRAMES_LEAST: u64 = 30;
+/// An element counts as pressed if it must have felt this share of what any element felt.
+const PRESSED: f64 = 0.85;
+/// A dead element rises less than this share of the median element, and than these many standard deviations.
+const DEAD: [f64; 2] = [0.02, 8.0];
+/// Likeness is the cosine between readings and what must have been felt; a stranger's must exceed the own by this.
+const STRANGER: f64 = 0.02;
+/// Places around an element that it takes to tell whose signal it gives.
+const PLACES_LEAST: usize = 4;
+
+/// What is wrong with an element.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fault {
+    /// The element.
+    pub element: usize,
+    /// What kind of fault it is.
+    pub kind: FaultKind,
+    /// The numbers that show it, in a sentence.
+    pub evidence: String,
+}
+
+/// Kinds of faults.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum FaultKind {
+    /// It answers to nothing.
+    Dead,
+    /// It always reads the same.
+    Stuck {
+        /// That reading.
+        counts: f64,
+    },
+    /// It gives another element's signal.
+    CrossWired {
+        /// The other one.
+        answers_for: usize,
+    },
+    /// Its noise is far above the others'.
+    Noisy {
+        /// Its standard deviation at rest.
+        rms_counts: f64,
+    },
+}
+
+/// The verdicts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Health {
+    /// What was found, in order of the elements.
+    pub faults: Vec<Fault>,
+    /// Elements that no press came near enough to: nothing is known of their response.
+    pub not_judged: Vec<usize>,
+}
+
+impl Health {
+    /// For each element, true if nothing speaks against it.
+    pub(crate) fn sound(&self, elements: usize) -> Vec<bool> {
+        (0..elements).map(|element| self.faults.iter().all(|fault| fault.element != element)).collect()
+    }
+}
+
+/// Judges every element.
+pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &Place) -> Health {
+    let trials = Trials::of(declared, readings, place);
+    let typical_noise = typical(readings.noise_rms_counts.iter().flatten().copied());
+    let (mut faults, mut not_judged) = (Vec::new(), Vec::new());
+    for element in 0..readings.elements {
+        let fault = |kind, evidence| Fault { element, kind, evidence };
+        if let Some(counts) = stuck(readings, element, typical_noise) {
+            let evidence = format!("reads {counts} in each of {} frames", readings.frames);
+            faults.push(fault(FaultKind::Stuck { counts: f64::from(counts) }, evidence));
+            continue;
+        }
+        let noise = readings.noise_rms_counts[element].unwrap_or(0.0);
+        if readings.frames_at_rest >= FRAMES_LEAST && noise > NOISY * typical_noise {
+            let evidence = format!(
+                "{noise:.1} counts rms at rest over {} frames, where the median element has {typical_noise:.1}",
+                readings.frames_at_rest
+            );
+            faults.push(fault(FaultKind::Noisy { rms_counts: noise }, evidence));
+            continue;
+        }
+        match trials.verdict(element, noise) {
+            Verdict::Unknown => not_judged.push(element),
+            Verdict::Sound => {}
+            Verdict::Faulty(kind, evidence) => faults.push(fault(kind, evidence)),
+        }
+    }
+    Health { faults, not_judged }
+}
+
+fn stuck(readings: &Readings, element: usize, typical_noise: f64) -> Option<f32> {
+    let others_vary = typical_noise > 0.0
+        && readings.constant_counts.iter().filter(|constant| constant.is_none()).count() * 2 > readings.elements;
+    readings.constant_counts[element].filter(|_| others_vary && readings.frames >= FRAMES_LEAST)
+}
+
+/// Every press at its deepest, as the elements must have felt it and as they read it.
+struct Trials {
+    /// By press and element.
+    felt: Vec<Vec<f64>>,
+    rises: Vec<Vec<f64>>,
+    /// Standard deviation of a rise in units of one frame's noise.
+    spread: Vec<f64>,
+    places_mm: Vec<[f64; 2]>,
+    /// Greatest that each element felt, over the greatest that any did.
+    reach: Vec<f64>,
+    /// Rise of the median among the elements that were pressed.
+    typical_rise: f64,
+}
+
+enum Verdict {
+    Unknown,
+    Sound,
+    Faulty(FaultKind, String),
+}
+
+impl Trials {
+    fn of(declared: &Declared, readings: &Readings, place: &Place) -> Self {
+        let mut trials = Self {
+            felt: Vec::new(),
+            rises: Vec::new(),
+            spread: Vec::new(),
+            places_mm: Vec::new(),
+            reach: vec![0.0; readings.elements],
+            typical_rise: 0.0,
+        };
+        let Ok(model) = declared.unit_model(place.sigma_mm) else { return trials };
+        for press in across(declared, readings) {
+            let Some((dwell, indenter)) = press.deepest().zip(declared.indenter(press)) else { continue };
+            let Some(variance) = press.rise(dwell, 0).map(|[_, variance]| variance) else { continue };
+            let contact = place.setting.contact(press, dwell, indenter);
+            let mut felt = vec![0.0; readings.elements];
+            model.indentation(&contact, Covering { thickness_mm: press.covering_mm }, &mut felt);
+            let rises = (0..readings.elements).filter_map(|element| press.rise(dwell, element)).map(|[rise, _]| rise);
+            trials.rises.push(rises.collect());
+            trials.felt.push(felt);
+            trials.spread.push(variance.sqrt());
+            trials.places_mm.push(press.place_mm);
+        }
+        let most = trials.felt.iter().flatten().copied().fold(0.0, f64::max);
+        if most > 0.0 {
+            for felt in &trials.felt {
+                for (reach, felt) in trials.reach.iter_mut().zip(felt) {
+                    *reach = reach.max(felt / most);
+                }
+            }
+        }
+        let pressed = (0..readings.elements).filter(|element| trials.reach[*element] >= PRESSED);
+        trials.typical_rise = typical(pressed.map(|element| trials.greatest(element)[0]));
+        trials
+    }
+
+    fn verdict(&self, element: usize, noise: f64) -> Verdict {
+        if self.reach[element] < PRESSED {
+            return Verdict::Unknown;
+        }
+        let [rise, spread] = self.greatest(element);
+        let [share, deviations] = DEAD;
+        if rise < share * self.typical_rise && rise < deviations * noise * spread {
+            let evidence = format!(
+                "rose by {rise:.1} counts at most under presses that raised the median element by {:.0}",
+                self.typical_rise
+            );
+            return Verdict::Faulty(FaultKind::Dead, evidence);
+        }
+        if distinct(&self.places_mm) < PLACES_LEAST {
+            return Verdict::Sound;
+        }
+        let own = self.likeness(element, element);
+        let best = (0..self.reach.len())
+            .map(|other| (other, self.likeness(element, other)))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        match best {
+            // The stranger's likeness must be that of a signal, not of noise.
+            Some((other, likeness))
+                if other != element && likeness > own + STRANGER && 1.0 - likeness < (1.0 - own) / 4.0 =>
+            {
+                let evidence = format!(
+                    "over {} presses its readings are like what element {other} must feel (cosine {likeness:.4}), not like what \
+                     itself must ({own:.4})",
+                    self.rises.len()
+                );
+                Verdict::Faulty(FaultKind::CrossWired { answers_for: other }, evidence)
+            }
+            _ => Verdict::Sound,
+        }
+    }
+
+    /// Greatest rise of an element, either way, and its standard deviation in units of a frame's noise.
+    fn greatest(&self, element: usize) -> [f64; 2] {
+        let rises = self.rises.iter().zip(&self.spread).map(|(rises, spread)| [rises[element].abs(), *spread]);
+        rises.max_by(|a, b| a[0].total_cmp(&b[0])).unwrap_or([0.0, 1.0])
+    }
+
+    /// Cosine between what an element read and what another must have felt, whatever the sign of its sensitivity.
+    fn likeness(&self, element: usize, other: usize) -> f64 {
+        let (mut both, mut read, mut felt) = (0.0, 0.0, 0.0);
+        for (rises, felts) in self.rises.iter().zip(&self.felt) {
+            both += rises[element] * felts[other];
+            read += rises[element] * rises[element];
+            felt += felts[other] * felts[other];
+        }
+        if read > 0.0 && felt > 0.0 { (both / (read * felt).sqrt()).abs() } else { 0.0 }
+    }
+}
+
+fn distinct(places_mm: &[[f64; 2]]) -> usize {
+    distinct_places(places_mm.iter().copied()).len()
+}
+
+/// The middle value; 0 of nothing.
+fn typical(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+#[path = "faults_tests.rs"]
+mod tests;

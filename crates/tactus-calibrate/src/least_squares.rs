@@ -1,0 +1,186 @@
+//! Weighted least squares, linear or not, by the damped Gauss-Newton method (Levenberg and Marquardt).
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Damping beyond which no step helps any more.
+const DAMPING_MAX: f64 = 1e10;
+const ROUNDS_MAX: usize = 60;
+/// A step that promises to lessen the cost by less than this share of it is the last.
+const PROMISE_LEAST: f64 = 1e-10;
+
+/// The normal equations of one round, gathered reading by reading.
+#[derive(Debug, Clone)]
+pub(crate) struct Normal {
+    gram: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Sum of the squared residuals, weighted.
+    pub(crate) cost: f64,
+    /// Number of readings.
+    pub(crate) readings: usize,
+}
+
+impl Normal {
+    pub(crate) fn new(parameters: usize) -> Self {
+        let (gram, right) = (DMatrix::zeros(parameters, parameters), DVector::zeros(parameters));
+        Self { gram, right, cost: 0.0, readings: 0 }
+    }
+
+    /// Adds a reading: its residual (measured less predicted), the prediction's derivatives by the parameters that it
+    /// depends on, and its weight, one over its variance.
+    pub(crate) fn add(&mut self, residual: f64, slopes: &[(usize, f64)], weight: f64) {
+        self.cost += weight * residual * residual;
+        self.readings += 1;
+        for (place, (row, slope)) in slopes.iter().enumerate() {
+            let weighted = weight * slope;
+            self.right[*row] += weighted * residual;
+            for (column, other) in &slopes[..=place] {
+                self.gram[(*row.max(column), *row.min(column))] += weighted * other;
+            }
+        }
+    }
+
+    /// Takes away what readings share, an error common to all of them: sums over the readings, each with its weight over
+    /// a variance, of residuals and slopes, and the weight of their product.
+    ///
+    /// With readings of variances `1/w_j` and a common error of variance `1/m`, the inverse covariance is
+    /// `diag(w) - w w^T / (m + sum w)` (Sherman and Morrison).
+    pub(crate) fn take_common(&mut self, residual: f64, slopes: &[(usize, f64)], weight: f64) {
+        self.add(residual, slopes, -weight);
+        self.readings -= 1;
+    }
+
+    /// Solves for a step with damped normal equations; parameters that are not free stay.
+    fn step(&self, free: &[bool], damping: f64) -> Option<DVector<f64>> {
+        let mut gram = self.gram.clone();
+        let mut right = self.right.clone();
+        for (index, free) in free.iter().enumerate() {
+            if *free {
+                gram[(index, index)] *= 1.0 + damping;
+            } else {
+                hold(&mut gram, index);
+                right[index] = 0.0;
+            }
+        }
+        Some(scaled(gram)?.solve(&right))
+    }
+
+    fn covariance(&self, free: &[bool]) -> Option<DMatrix<f64>> {
+        let mut gram = self.gram.clone();
+        for (index, _) in free.iter().enumerate().filter(|(_, free)| !**free) {
+            hold(&mut gram, index);
+        }
+        let mut covariance = scaled(gram)?.inverse();
+        for (index, _) in free.iter().enumerate().filter(|(_, free)| !**free) {
+            covariance[(index, index)] = 0.0;
+        }
+        Some(covariance)
+    }
+}
+
+/// Where the cost is least.
+#[derive(Debug, Clone)]
+pub(crate) struct Fit {
+    pub(crate) parameters: Vec<f64>,
+    /// Covariance of the parameters if the weights are right; 0 for those that were not free.
+    pub(crate) covariance: DMatrix<f64>,
+    /// Cost over degrees of freedom: 1 if the weights are right and the model holds.
+    pub(crate) misfit: f64,
+}
+
+impl Fit {
+    /// The factor by which variances grow because the model does not hold to the noise; at least 1.
+    pub(crate) fn inflation(&self) -> f64 {
+        self.misfit.max(1.0)
+    }
+}
+
+/// Minimises the cost over the free parameters, from a start. `evaluate` gives the normal equations at parameters, or
+/// `None` where there is no model.
+///
+/// `None` if the readings do not determine the free parameters.
+pub(crate) fn minimise(
+    start: Vec<f64>,
+    free: &[bool],
+    mut evaluate: impl FnMut(&[f64]) -> Option<Normal>,
+) -> Option<Fit> {
+    let mut at = DVector::from_vec(start);
+    let mut normal = evaluate(at.as_slice())?;
+    let mut damping = 1e-6;
+    for _ in 0..ROUNDS_MAX {
+        let Some(step) = normal.step(free, damping) else {
+            damping = (damping * 100.0_f64).max(1e-6);
+            if damping > DAMPING_MAX {
+                return None;
+            }
+            continue;
+        };
+        let promise = step.dot(&normal.right);
+        if promise <= PROMISE_LEAST * (normal.cost + f64::MIN_POSITIVE) {
+            break;
+        }
+        let there = &at + &step;
+        match evaluate(there.as_slice()).filter(|next| next.cost < normal.cost) {
+            Some(next) => {
+                (at, normal) = (there, next);
+                damping = (damping / 10.0).max(1e-12);
+            }
+            None if damping > DAMPING_MAX => break,
+            None => damping = (damping * 10.0).max(1e-6),
+        }
+    }
+    let covariance = normal.covariance(free)?;
+    let estimated = free.iter().filter(|free| **free).count();
+    let freedom = normal.readings.checked_sub(estimated).filter(|freedom| *freedom > 0)?;
+    let misfit = normal.cost / freedom as f64;
+    Some(Fit { parameters: at.as_slice().to_vec(), covariance, misfit })
+}
+
+/// A Cholesky decomposition with rows and columns scaled to a diagonal of ones.
+struct Scaled {
+    scale: DVector<f64>,
+    cholesky: Cholesky<f64, nalgebra::Dyn>,
+}
+
+/// `None` if the matrix, of which the lower triangle counts, is singular.
+fn scaled(mut gram: DMatrix<f64>) -> Option<Scaled> {
+    let scale = gram.diagonal().map(|square| 1.0 / square.sqrt());
+    if !scale.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    for column in 0..gram.ncols() {
+        for row in column..gram.nrows() {
+            gram[(row, column)] *= scale[row] * scale[column];
+        }
+    }
+    let cholesky = Cholesky::new(gram)?;
+    // A pivot of the size of rounding errors: the parameters cannot be told apart.
+    let least = cholesky.l_dirty().diagonal().min();
+    (least > 1e-7).then_some(Scaled { scale, cholesky })
+}
+
+impl Scaled {
+    fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+        self.cholesky.solve(&right.component_mul(&self.scale)).component_mul(&self.scale)
+    }
+
+    fn inverse(&self) -> DMatrix<f64> {
+        let mut inverse = self.cholesky.inverse();
+        for column in 0..inverse.ncols() {
+            for row in 0..inverse.nrows() {
+                inverse[(row, column)] *= self.scale[row] * self.scale[column];
+            }
+        }
+        inverse
+    }
+}
+
+/// Takes a parameter out of the equations.
+fn hold(gram: &mut DMatrix<f64>, index: usize) {
+    gram.row_mut(index).fill(0.0);
+    gram.column_mut(index).fill(0.0);
+    gram[(index, index)] = 1.0;
+}
+
+#[cfg(test)]
+#[path = "least_squares_tests.rs"]
+mod tests;

@@ -1,0 +1,323 @@
+//! What was measured: frames gathered into presses, each with its dwells and the reading at rest before it.
+
+mod segment;
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use tactus_model::{Array, Phase};
+
+use segment::{Kind, Segment};
+
+/// Above this height nothing touches the covering, however wrong the believed surface may be.
+const CLEAR_MM: f64 = 0.3;
+
+/// One row of the measurement table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample<'a> {
+    /// Run id; the samples of a run come one after the other, in order of time.
+    pub run: &'a str,
+    /// Press index in the run; -1 outside a press.
+    pub press: i32,
+    /// What the stage was doing.
+    pub phase: Phase,
+    /// Stage position, robot frame.
+    pub position_mm: [f64; 3],
+    /// Thickness of the covering in place.
+    pub covering_mm: f64,
+    /// Id of the tool on the stage.
+    pub indenter: &'a str,
+    /// Raw counts, row-major, one per element.
+    pub counts: &'a [f32],
+}
+
+/// Frames gathered into what calibration works on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Readings {
+    /// Number of elements.
+    pub elements: usize,
+    /// Ids of the runs.
+    pub runs: Vec<String>,
+    /// The presses, run by run, in order.
+    pub presses: Vec<Press>,
+    /// Of each element, its standard deviation at rest, at least that of rounding to the converter's step; none of an
+    /// element that was never at rest.
+    pub noise_rms_counts: Vec<Option<f64>>,
+    /// Of each element, its mean at rest and the scatter of that from one rest to the next.
+    pub rest_counts: Vec<Option<[f64; 2]>>,
+    /// Of each element, its reading if that was the same in every frame.
+    pub constant_counts: Vec<Option<f32>>,
+    /// Frames in all.
+    pub frames: u64,
+    /// Frames at rest.
+    pub frames_at_rest: u64,
+    /// Frames left out because an element read what no noise explains.
+    pub frames_left_out: u64,
+}
+
+/// One contact at one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Press {
+    /// Index of its run in [`Readings::runs`].
+    pub run: usize,
+    /// Its index in the run.
+    pub index: i32,
+    /// Where it was; robot frame.
+    pub place_mm: [f64; 2],
+    /// Thickness of the covering in place.
+    pub covering_mm: f64,
+    /// Id of the tool on the stage.
+    pub indenter: Arc<str>,
+    /// The reading at rest before it, if there was one.
+    pub rest: Option<Rest>,
+    /// Its dwells, in order of time: where depths were held, the mean of each; else every frame of its loading.
+    pub dwells: Vec<Dwell>,
+}
+
+/// The reading before a press, with nothing on the covering.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rest {
+    /// Mean of each element.
+    pub counts: Vec<f64>,
+    /// Frames in the mean.
+    pub frames: usize,
+}
+
+/// The readings at one depth of a press.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dwell {
+    /// Height of the tip in the robot frame; the depth is the surface's height less this.
+    pub height_mm: f64,
+    /// Mean of each element, raw.
+    pub counts: Vec<f64>,
+    /// Frames in the mean.
+    pub frames: usize,
+    /// True if the tip stood still.
+    pub held: bool,
+}
+
+/// Gathers samples into [`Readings`].
+#[derive(Debug)]
+pub struct Gather {
+    elements: usize,
+    step_counts: f64,
+    readings: Readings,
+    /// The frames of the stretch of time that is not over yet.
+    segment: Segment,
+    rest: Option<Rest>,
+    loading: Vec<Dwell>,
+    noise: Vec<Noise>,
+    range_counts: Vec<Option<[f32; 2]>>,
+    indenters: BTreeMap<String, Arc<str>>,
+}
+
+/// Sums of one element's readings at rest.
+#[derive(Debug, Clone, Default)]
+struct Noise {
+    squares: f64,
+    freedom: f64,
+    means: Vec<f64>,
+}
+
+impl Press {
+    /// Rise of an element at a dwell above its rest, and the variance of that in units of one frame's.
+    ///
+    /// `None` if nothing was at rest before the press, or the element is none.
+    pub fn rise(&self, dwell: &Dwell, element: usize) -> Option<[f64; 2]> {
+        let rest = self.rest.as_ref()?;
+        let rise = dwell.counts.get(element)? - rest.counts.get(element)?;
+        Some([rise, 1.0 / dwell.frames as f64 + 1.0 / rest.frames as f64])
+    }
+
+    /// The dwell that went deepest.
+    pub fn deepest(&self) -> Option<&Dwell> {
+        self.dwells.iter().min_by(|a, b| a.height_mm.total_cmp(&b.height_mm))
+    }
+}
+
+impl Gather {
+    /// Nothing gathered yet, of an array.
+    pub fn new(array: &Array) -> Self {
+        let elements = array.elements();
+        Self {
+            elements,
+            step_counts: array.step_counts(),
+            readings: Readings {
+                elements,
+                runs: Vec::new(),
+                presses: Vec::new(),
+                noise_rms_counts: Vec::new(),
+                rest_counts: Vec::new(),
+                constant_counts: Vec::new(),
+                frames: 0,
+                frames_at_rest: 0,
+                frames_left_out: 0,
+            },
+            segment: Segment::default(),
+            rest: None,
+            loading: Vec::new(),
+            noise: vec![Noise::default(); elements],
+            range_counts: vec![None; elements],
+            indenters: BTreeMap::new(),
+        }
+    }
+
+    /// Takes the next sample.
+    ///
+    /// # Panics
+    /// If it has not one count per element.
+    pub fn take(&mut self, sample: Sample<'_>) {
+        assert_eq!(sample.counts.len(), self.elements, "one count per element");
+        self.readings.frames += 1;
+        for (range, count) in self.range_counts.iter_mut().zip(sample.counts) {
+            let [least, most] = range.unwrap_or([*count; 2]);
+            *range = Some([least.min(*count), most.max(*count)]);
+        }
+        if self.readings.runs.last().is_none_or(|run| run != sample.run) {
+            self.close();
+            self.end_press();
+            self.rest = None;
+            self.readings.runs.push(sample.run.to_owned());
+        }
+        let kind = Kind::of(&sample);
+        if kind != self.segment.kind {
+            self.close();
+            self.segment.kind = kind;
+        }
+        if let Kind::Load(press) | Kind::Hold(press) = kind
+            && self.readings.presses.last().is_none_or(|last| {
+                last.index != press || last.run + 1 != self.readings.runs.len()
+            })
+        {
+            self.end_press();
+            self.begin_press(&sample);
+        }
+        if kind != Kind::Between {
+            self.segment.push(sample.position_mm, sample.counts);
+        }
+    }
+
+    /// Everything that was gathered.
+    pub fn finish(mut self) -> Readings {
+        self.close();
+        self.end_press();
+        let Self { mut readings, noise, range_counts, step_counts, .. } = self;
+        readings.presses.retain(|press| !press.dwells.is_empty());
+        // Frames in motion are for a press that is all there is: one place, one depth.
+        if distinct_depths(&readings.presses) > 1 || distinct_places(readings.presses.iter().map(|press| press.place_mm)).len() > 1 {
+            for press in &mut readings.presses {
+                press.dwells.retain(|dwell| dwell.held);
+            }
+            readings.presses.retain(|press| !press.dwells.is_empty());
+        }
+        // The standard deviation of an even distribution over one step.
+        let rounding_counts = step_counts / 12.0_f64.sqrt();
+        for noise in noise {
+            readings.noise_rms_counts.push(noise.rms().map(|rms| rms.max(rounding_counts)));
+            readings.rest_counts.push(noise.mean());
+        }
+        readings.constant_counts = range_counts
+            .into_iter()
+            .map(|range| range.and_then(|[least, most]| (least >= most).then_some(least)))
+            .collect();
+        readings
+    }
+
+    /// Ends the stretch of time in hand and makes of it what it is.
+    fn close(&mut self) {
+        let segment = std::mem::take(&mut self.segment);
+        match segment.kind {
+            Kind::Between => {}
+            Kind::Rest => self.end_rest(&segment),
+            Kind::Load(_) => self.loading.extend(segment.frames()),
+            Kind::Hold(_) => self.end_hold(segment),
+        }
+    }
+
+    fn end_rest(&mut self, segment: &Segment) {
+        let Some(mean) = segment.mean(self.step_counts) else { return };
+        self.readings.frames_left_out += mean.left_out as u64;
+        self.readings.frames_at_rest += mean.frames as u64;
+        for ((noise, counts), squares) in self.noise.iter_mut().zip(&mean.counts).zip(&mean.squares) {
+            noise.squares += squares;
+            noise.freedom += mean.frames as f64 - 1.0;
+            noise.means.push(*counts);
+        }
+        self.rest = Some(Rest { counts: mean.counts, frames: mean.frames });
+    }
+
+    fn end_hold(&mut self, mut segment: Segment) {
+        let Some(height_mm) = segment.settle() else { return };
+        let Some(mean) = segment.mean(self.step_counts) else { return };
+        self.readings.frames_left_out += mean.left_out as u64;
+        if let Some(press) = self.readings.presses.last_mut() {
+            press.dwells.push(Dwell { height_mm, counts: mean.counts, frames: mean.frames, held: true });
+        }
+    }
+
+    fn begin_press(&mut self, sample: &Sample<'_>) {
+        let [x_mm, y_mm, _] = sample.position_mm;
+        let indenter = match self.indenters.get(sample.indenter) {
+            Some(known) => Arc::clone(known),
+            None => {
+                let name: Arc<str> = sample.indenter.into();
+                self.indenters.insert(sample.indenter.to_owned(), Arc::clone(&name));
+                name
+            }
+        };
+        self.readings.presses.push(Press {
+            run: self.readings.runs.len() - 1,
+            index: sample.press,
+            place_mm: [x_mm, y_mm],
+            covering_mm: sample.covering_mm,
+            indenter,
+            rest: self.rest.clone(),
+            dwells: Vec::new(),
+        });
+    }
+
+    /// Gives the press in hand its frames in motion; whether they stay is decided when all is known.
+    fn end_press(&mut self) {
+        let loading = std::mem::take(&mut self.loading);
+        if let Some(press) = self.readings.presses.last_mut() {
+            press.dwells.splice(0..0, loading);
+        }
+    }
+}
+
+impl Noise {
+    fn rms(&self) -> Option<f64> {
+        (self.freedom > 0.0).then(|| (self.squares / self.freedom).sqrt())
+    }
+
+    /// Mean over the rests, and the standard deviation of one rest's mean from it.
+    fn mean(&self) -> Option<[f64; 2]> {
+        let rests = self.means.len() as f64;
+        let mean = (rests > 0.0).then(|| self.means.iter().sum::<f64>() / rests)?;
+        let squares: f64 = self.means.iter().map(|rest| (rest - mean).powi(2)).sum();
+        Some([mean, if rests > 1.0 { (squares / (rests - 1.0)).sqrt() } else { 0.0 }])
+    }
+}
+
+/// Number of depths, 10 um apart, that were held.
+fn distinct_depths(presses: &[Press]) -> usize {
+    let held = presses.iter().flat_map(|press| press.dwells.iter().filter(|dwell| dwell.held));
+    let mut heights: Vec<f64> = held.map(|dwell| dwell.height_mm).collect();
+    heights.sort_by(f64::total_cmp);
+    heights.dedup_by(|next, last| *next - *last < 0.01);
+    heights.len()
+}
+
+/// Places at least 50 um apart that were pressed, in order.
+pub(crate) fn distinct_places(places_mm: impl IntoIterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    let mut places: Vec<[f64; 2]> = Vec::new();
+    for [x, y] in places_mm {
+        if places.iter().all(|[other_x, other_y]| (x - other_x).hypot(y - other_y) > 0.05) {
+            places.push([x, y]);
+        }
+    }
+    places
+}
+
+#[cfg(test)]
+#[path = "readings_tests.rs"]
+mod tests;

@@ -1,0 +1,134 @@
+//! A stretch of frames of one kind, and its mean without outlying frames.
+
+use tactus_model::Phase;
+
+use super::{CLEAR_MM, Dwell, Sample};
+
+/// A frame is left out if an element is so many robust standard deviations away from its median.
+const OUTLYING: f64 = 10.0;
+/// Median absolute deviation to standard deviation, of a normal distribution.
+const MAD_TO_SD: f64 = 1.4826;
+/// A tip within this of where it mostly was has arrived.
+const STILL_MM: f64 = 0.002;
+
+/// What a stretch of frames is good for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Kind {
+    /// Nothing: on the way, or going up.
+    #[default]
+    Between,
+    /// Nothing touches.
+    Rest,
+    /// Going deeper in the press of that index.
+    Load(i32),
+    /// Holding a depth in the press of that index.
+    Hold(i32),
+}
+
+impl Kind {
+    pub(super) fn of(sample: &Sample<'_>) -> Self {
+        match sample.phase {
+            Phase::Idle => Self::Rest,
+            Phase::Approach | Phase::Retract if sample.position_mm[2] >= CLEAR_MM => Self::Rest,
+            Phase::Load if sample.press >= 0 => Self::Load(sample.press),
+            Phase::Hold if sample.press >= 0 => Self::Hold(sample.press),
+            Phase::Approach | Phase::Retract | Phase::Load | Phase::Hold | Phase::Unload => Self::Between,
+        }
+    }
+}
+
+/// Frames of one kind.
+#[derive(Debug, Default)]
+pub(super) struct Segment {
+    pub(super) kind: Kind,
+    heights_mm: Vec<f64>,
+    /// Frame after frame.
+    counts: Vec<f32>,
+}
+
+/// Mean over the frames of a segment.
+pub(super) struct Mean {
+    pub(super) counts: Vec<f64>,
+    /// Sum of the squared deviations of each element.
+    pub(super) squares: Vec<f64>,
+    pub(super) frames: usize,
+    pub(super) left_out: usize,
+}
+
+impl Segment {
+    pub(super) fn push(&mut self, [_, _, z_mm]: [f64; 3], counts: &[f32]) {
+        self.heights_mm.push(z_mm);
+        self.counts.extend_from_slice(counts);
+    }
+
+    /// Keeps the frames in which the tip stood still and gives its height; none if there are none.
+    ///
+    /// The first and the last of them go too: positions between two reports are not exact, and the tip may still
+    /// have moved, or moved on.
+    pub(super) fn settle(&mut self) -> Option<f64> {
+        let elements = self.elements()?;
+        let height_mm = median(&mut self.heights_mm.clone())?;
+        let mut still: Vec<usize> = (0..self.heights_mm.len())
+            .filter(|frame| (self.heights_mm[*frame] - height_mm).abs() <= STILL_MM)
+            .collect();
+        if still.len() > 3 {
+            still = still[1..still.len() - 1].to_vec();
+        }
+        self.counts = still.iter().flat_map(|frame| &self.counts[frame * elements..(frame + 1) * elements]).copied().collect();
+        self.heights_mm = still.iter().map(|frame| self.heights_mm[*frame]).collect();
+        Some(height_mm)
+    }
+
+    /// The mean of each element over the frames in which none reads what noise cannot explain.
+    pub(super) fn mean(&self, step_counts: f64) -> Option<Mean> {
+        let elements = self.elements()?;
+        let frames = self.heights_mm.len();
+        let column = |element: usize| (0..frames).map(move |frame| f64::from(self.counts[frame * elements + element]));
+        let mut sound = vec![true; frames];
+        // Fewer tell no outlier from the rest.
+        if frames >= 5 {
+            for element in 0..elements {
+                let centre = median(&mut column(element).collect::<Vec<_>>())?;
+                let spread = median(&mut column(element).map(|count| (count - centre).abs()).collect::<Vec<_>>())?;
+                let reach = OUTLYING * (MAD_TO_SD * spread).max(step_counts);
+                for (sound, count) in sound.iter_mut().zip(column(element)) {
+                    *sound &= (count - centre).abs() <= reach;
+                }
+            }
+        }
+        let kept = sound.iter().filter(|sound| **sound).count();
+        // If nothing is left, nothing stood still: a mean would be none.
+        if kept == 0 {
+            return None;
+        }
+        let (mut counts, mut squares) = (Vec::with_capacity(elements), Vec::with_capacity(elements));
+        for element in 0..elements {
+            let kept_counts = || column(element).zip(&sound).filter(|(_, sound)| **sound).map(|(count, _)| count);
+            let mean = kept_counts().sum::<f64>() / kept as f64;
+            squares.push(kept_counts().map(|count| (count - mean).powi(2)).sum());
+            counts.push(mean);
+        }
+        Some(Mean { counts, squares, frames: kept, left_out: frames - kept })
+    }
+
+    /// Every frame by itself.
+    pub(super) fn frames(&self) -> impl Iterator<Item = Dwell> {
+        let elements = self.elements().unwrap_or(1);
+        self.heights_mm.iter().zip(self.counts.chunks_exact(elements)).map(|(height_mm, counts)| Dwell {
+            height_mm: *height_mm,
+            counts: counts.iter().map(|count| f64::from(*count)).collect(),
+            frames: 1,
+            held: false,
+        })
+    }
+
+    fn elements(&self) -> Option<usize> {
+        self.counts.len().checked_div(self.heights_mm.len()).filter(|elements| *elements > 0)
+    }
+}
+
+/// The middle value; the upper of two.
+fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}

@@ -1,0 +1,347 @@
+//! Where the sensor lies: rotation, translation and the height of its surface, from presses at places apart.
+//!
+//! The rise of element `e` in a press at `p` with the tip at height `z` is predicted as
+//!
+//! ```text
+//! s_e (v + k v^2)      v = u_e(p_sensor, depth, sigma)      p_sensor = Rot(-rotation) (p - origin) / scale
+//!                      depth = surface - z
+//! ```
+//!
+//! with `u_e` the equivalent indentation of the base model. All of it is fitted at once by weighted least squares:
+//! origin, rotation, surface, the spread of the covering in place, one curvature `k` for all, and a sensitivity for
+//! each element; so neither unequal elements nor a wrong spread move the result. The scale is no part of the fit: it
+//! is fitted once more beside all others, as a check. It should be 1.
+//!
+//! # Source
+//! Paper, Sec. 2.1: two points near opposite corners, where a light press excites an element's neighbours alike, give
+//! orientation and place; the surface is measured at one point.
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+use tactus_model::{Covering, ForwardModel, Gradient, Registration};
+
+use crate::{
+    Estimate,
+    least_squares::{Fit, Normal, minimise},
+    readings::{Press, Readings, distinct_places},
+    setting::{Declared, Setting, across, goes_across},
+};
+
+/// Places that must be pressed for a place of the sensor to follow.
+const PLACES_LEAST: usize = 4;
+/// An element takes part if it rose so many standard deviations of its noise.
+const RISE_LEAST: f64 = 20.0;
+/// A press is left out if its misfit is so many times the median press's.
+const OUTLYING: f64 = 6.0;
+
+/// Parameters before the elements' sensitivities.
+const SHARED: usize = 7;
+const X: usize = 0;
+const Y: usize = 1;
+const ROTATION: usize = 2;
+const SCALE: usize = 3;
+const SURFACE: usize = 4;
+const SIGMA: usize = 5;
+const CURVATURE: usize = 6;
+
+/// Where the sensor lies in the robot's frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegistrationFit {
+    /// The sensor frame's origin, in mm.
+    pub origin_mm: [Estimate; 2],
+    /// Angle from the robot's x axis to the sensor's; not estimated where the places lie too close together.
+    pub rotation_deg: Option<Estimate>,
+    /// Height of the covering's surface; not estimated where one depth was pressed only.
+    pub surface_mm: Option<Estimate>,
+    /// Distances in the robot's frame over those declared for the sensor.
+    pub scale: Option<Estimate>,
+    /// Spread under the covering in place, as these presses show it.
+    pub sigma_mm: Estimate,
+    /// The covering in place.
+    pub covering_mm: f64,
+    /// Ids of the runs that it rests on.
+    pub runs: Vec<String>,
+    /// Presses that it rests on.
+    pub presses: usize,
+    /// Presses left out because the others contradict them: index of the run, index of the press.
+    pub left_out: Vec<(String, i32)>,
+    /// Root mean square of the residuals in units of the noise: 1 if the model holds.
+    pub residual_in_noise: f64,
+}
+
+/// What later steps take from a registration.
+#[derive(Debug, Clone)]
+pub(crate) struct Place {
+    pub(crate) setting: Setting,
+    pub(crate) sigma_mm: f64,
+    /// Covariance of origin x, origin y, rotation in degrees, surface, sigma.
+    pub(crate) covariance: DMatrix<f64>,
+}
+
+impl Place {
+    /// As declared, and taken for exact.
+    pub(crate) fn declared(declared: &Declared, covering_mm: f64) -> Self {
+        let covariance = DMatrix::zeros(Self::UNSURE, Self::UNSURE);
+        Self { setting: declared.setting(), sigma_mm: declared.sigma_mm(covering_mm), covariance }
+    }
+
+    /// Number of its parameters that are not sure.
+    pub(crate) const UNSURE: usize = 5;
+
+    /// With one of its unsure parameters moved.
+    pub(crate) fn moved(&self, parameter: usize, by: f64) -> Self {
+        let mut moved = self.clone();
+        match parameter {
+            0 | 1 => moved.setting.registration.origin_mm[parameter] += by,
+            2 => moved.setting.registration.rotation_deg += by,
+            3 => moved.setting.surface_mm += by,
+            _ => moved.sigma_mm += by,
+        }
+        moved
+    }
+}
+
+/// Fits the registration; without one, says why not.
+pub(crate) fn register(
+    declared: &Declared,
+    readings: &Readings,
+    sound: &[bool],
+) -> Result<(RegistrationFit, Place), String> {
+    let presses: Vec<&Press> = across(declared, readings).into_iter().filter(|press| press.rest.is_some()).collect();
+    let places = distinct_places(presses.iter().map(|press| press.place_mm)).len();
+    if places < PLACES_LEAST {
+        return Err(format!(
+            "{places} places were pressed with the reference tool under the reference covering; it takes {PLACES_LEAST}"
+        ));
+    }
+    let covering_mm = declared.model.response().reference_covering.thickness_mm;
+    let mut problem = Problem::new(declared, readings, sound, presses)?;
+    let mut left_out = Vec::new();
+    let mut fit = problem.fit(None).ok_or(UNDETERMINED)?;
+    // Twice: a gross outlier may hide another.
+    for _ in 0..2 {
+        let outlying = problem.outlying(&fit);
+        if outlying.is_empty() || problem.presses.len() < outlying.len() + PLACES_LEAST {
+            break;
+        }
+        left_out.extend(outlying.iter().map(|index| {
+            let press = problem.presses[*index];
+            (readings.runs[press.run].clone(), press.index)
+        }));
+        let kept = problem.presses.iter().enumerate().filter(|(index, _)| !outlying.contains(index));
+        let kept: Vec<&Press> = kept.map(|(_, press)| *press).collect();
+        problem = Problem::new(declared, readings, sound, kept)?;
+        fit = problem.fit(None).ok_or(UNDETERMINED)?;
+    }
+    let place = problem.place(&fit);
+    let estimate = |index: usize| {
+        Estimate::new(fit.parameters[index], fit.covariance[(index, index)] * fit.inflation())
+    };
+    let free = |index: usize| problem.free[index];
+    let mut runs: Vec<usize> = problem.presses.iter().map(|press| press.run).collect();
+    runs.dedup();
+    let registration = RegistrationFit {
+        origin_mm: [estimate(X), estimate(Y)],
+        rotation_deg: free(ROTATION).then(|| estimate(ROTATION)),
+        surface_mm: free(SURFACE).then(|| estimate(SURFACE)),
+        scale: problem.scale(&fit),
+        sigma_mm: estimate(SIGMA),
+        covering_mm,
+        runs: runs.into_iter().map(|run| readings.runs[run].clone()).collect(),
+        presses: problem.presses.len(),
+        left_out,
+        residual_in_noise: fit.misfit.sqrt(),
+    };
+    Ok((registration, place))
+}
+
+const UNDETERMINED: &str = "the presses do not determine the sensor's place";
+
+/// The readings and what may move to explain them.
+struct Problem<'a> {
+    declared: &'a Declared,
+    presses: Vec<&'a Press>,
+    /// Elements that take part, and their noise.
+    elements: Vec<(usize, f64)>,
+    start: Vec<f64>,
+    free: Vec<bool>,
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        declared: &'a Declared,
+        readings: &Readings,
+        sound: &[bool],
+        presses: Vec<&'a Press>,
+    ) -> Result<Self, String> {
+        let elements = taking_part(readings, sound, &presses);
+        if elements.is_empty() {
+            return Err("no sound element rose above its noise".into());
+        }
+        let mut depths: Vec<f64> =
+            presses.iter().flat_map(|press| press.dwells.iter().map(|dwell| dwell.height_mm)).collect();
+        depths.sort_by(f64::total_cmp);
+        depths.dedup_by(|next, last| *next - *last < 0.01);
+        let [x, y] = declared.registration.origin_mm;
+        let sigma_mm = declared.sigma_mm(declared.model.response().reference_covering.thickness_mm);
+        let mut start = vec![x, y, declared.registration.rotation_deg, 1.0, 0.0, sigma_mm, 0.0];
+        let sensitivities = &declared.model.response().sensitivity_counts_per_mm;
+        start.extend(elements.iter().map(|(element, _)| sensitivities[*element]));
+        let mut free = vec![true; start.len()];
+        free[ROTATION] = goes_across(declared, presses.iter().copied());
+        free[SCALE] = false;
+        free[SURFACE] = depths.len() >= 2;
+        free[CURVATURE] = depths.len() >= 3;
+        Ok(Self { declared, presses, elements, start, free })
+    }
+
+    fn fit(&self, scale: Option<&Fit>) -> Option<Fit> {
+        let (start, mut free) = (scale.map_or(&self.start, |fit| &fit.parameters), self.free.clone());
+        free[SCALE] = scale.is_some();
+        minimise(start.clone(), &free, |parameters| self.normal(parameters))
+    }
+
+    /// The check: the scale, fitted beside all others.
+    fn scale(&self, fit: &Fit) -> Option<Estimate> {
+        let fit = self.free[ROTATION].then(|| self.fit(Some(fit)))??;
+        Some(Estimate::new(fit.parameters[SCALE], fit.covariance[(SCALE, SCALE)] * fit.inflation()))
+    }
+
+    fn normal(&self, parameters: &[f64]) -> Option<Normal> {
+        let mut normal = Normal::new(parameters.len());
+        self.each(parameters, |_, residual, slopes, weight| normal.add(residual, slopes, weight))?;
+        Some(normal)
+    }
+
+    /// Presses whose dwells the model misses by far more than those of others.
+    fn outlying(&self, fit: &Fit) -> Vec<usize> {
+        let mut costs = vec![(0.0, 0_u32); self.presses.len()];
+        let whole = self.each(&fit.parameters, |press, residual, _, weight| {
+            costs[press].0 += weight * residual * residual;
+            costs[press].1 += 1;
+        });
+        if whole.is_none() {
+            return Vec::new();
+        }
+        let misfits: Vec<f64> =
+            costs.iter().map(|(cost, readings)| (cost / f64::from((*readings).max(1))).sqrt()).collect();
+        let mut sorted = misfits.clone();
+        sorted.sort_by(f64::total_cmp);
+        let limit = OUTLYING * sorted[sorted.len() / 2].max(1.0);
+        (0..misfits.len()).filter(|press| misfits[*press] > limit).collect()
+    }
+
+    /// Gives every reading: index of its press, residual, slopes by the parameters, weight.
+    fn each(
+        &self,
+        parameters: &[f64],
+        mut take: impl FnMut(usize, f64, &[(usize, f64)], f64),
+    ) -> Option<()> {
+        let (model, setting) = (self.model(parameters)?, setting(parameters));
+        for (index, press) in self.presses.iter().enumerate() {
+            let indenter = self.declared.indenter(press)?;
+            for dwell in &press.dwells {
+                let contact = setting.contact(press, dwell, indenter);
+                let gradient = model.gradient(&contact, Covering { thickness_mm: press.covering_mm });
+                let by_setting = Slopes::of(&setting, contact.position_mm);
+                for (place, (element, noise)) in self.elements.iter().enumerate() {
+                    let Some([rise, variance]) = press.rise(dwell, *element) else { continue };
+                    let (predicted, slopes) = self.predict(parameters, &gradient, &by_setting, place, *element);
+                    take(index, rise - predicted, &slopes, 1.0 / (variance * noise * noise));
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn predict(
+        &self,
+        parameters: &[f64],
+        gradient: &Gradient,
+        by_setting: &Slopes,
+        place: usize,
+        element: usize,
+    ) -> (f64, [(usize, f64); SHARED + 1]) {
+        let (sensitivity, curvature) = (parameters[SHARED + place], parameters[CURVATURE]);
+        let v = gradient.counts[element];
+        let per_v = sensitivity * (1.0 + 2.0 * curvature * v);
+        let [by_x, by_y] = &gradient.by_position_mm;
+        let along = |[x, y]: [f64; 2]| per_v * (by_x[element] * x + by_y[element] * y);
+        let turned = -per_v * gradient.by_rotation_deg[element];
+        let slopes = [
+            (X, along(by_setting.by_origin[0])),
+            (Y, along(by_setting.by_origin[1])),
+            (ROTATION, along(by_setting.by_rotation_deg) + turned),
+            (SCALE, along(by_setting.by_scale)),
+            (SURFACE, per_v * gradient.by_depth_mm[element]),
+            (SIGMA, per_v * gradient.by_sigma_intercept_mm[element]),
+            (CURVATURE, sensitivity * v * v),
+            (SHARED + place, v + curvature * v * v),
+        ];
+        (sensitivity * (v + curvature * v * v), slopes)
+    }
+
+    fn model(&self, parameters: &[f64]) -> Option<ForwardModel> {
+        (parameters[SCALE] > 0.0).then(|| self.declared.unit_model(parameters[SIGMA]).ok())?
+    }
+
+    fn place(&self, fit: &Fit) -> Place {
+        let order = [X, Y, ROTATION, SURFACE, SIGMA];
+        let covariance = DMatrix::from_fn(order.len(), order.len(), |row, column| {
+            fit.inflation() * fit.covariance[(order[row], order[column])]
+        });
+        Place { setting: setting(&fit.parameters), sigma_mm: fit.parameters[SIGMA], covariance }
+    }
+}
+
+fn setting(parameters: &[f64]) -> Setting {
+    Setting {
+        registration: Registration {
+            origin_mm: [parameters[X], parameters[Y]],
+            rotation_deg: parameters[ROTATION],
+        },
+        scale: parameters[SCALE],
+        surface_mm: parameters[SURFACE],
+    }
+}
+
+/// Sound elements that rose well above their noise, each with it.
+fn taking_part(readings: &Readings, sound: &[bool], presses: &[&Press]) -> Vec<(usize, f64)> {
+    let rises = |element: usize, noise: f64| {
+        presses.iter().any(|press| {
+            press.dwells.iter().any(|dwell| {
+                let rise = press.rise(dwell, element);
+                rise.is_some_and(|[rise, variance]| rise.abs() > RISE_LEAST * noise * variance.sqrt())
+            })
+        })
+    };
+    let noises = readings.noise_rms_counts.iter().enumerate();
+    noises
+        .filter_map(|(element, noise)| Some((element, noise.filter(|noise| *noise > 0.0)?)))
+        .filter(|(element, noise)| sound[*element] && rises(*element, *noise))
+        .collect()
+}
+
+/// How a place on the sensor moves with the setting: derivatives of its x and y.
+struct Slopes {
+    by_origin: [[f64; 2]; 2],
+    by_rotation_deg: [f64; 2],
+    by_scale: [f64; 2],
+}
+
+impl Slopes {
+    fn of(setting: &Setting, [x, y]: [f64; 2]) -> Self {
+        let (sin, cos) = setting.registration.rotation_deg.to_radians().sin_cos();
+        let [s, c] = [sin, cos].map(|part| part / setting.scale);
+        let turn = 1.0_f64.to_radians();
+        Self {
+            by_origin: [[-c, s], [-s, -c]],
+            by_rotation_deg: [y * turn, -x * turn],
+            by_scale: [-x / setting.scale, -y / setting.scale],
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "registration_tests.rs"]
+mod tests;

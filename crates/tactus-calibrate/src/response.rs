@@ -1,0 +1,253 @@
+//! How each element answers to presses on its own centre (paper, Sec. 2.2 and Fig. 2).
+//!
+//! The rise of element `e` over its rest, in a press near its centre, is fitted as
+//!
+//! ```text
+//! linear            s_e u
+//! shared quadratic  s_e (u + k u^2)          one k for all elements
+//! own quadratic     s_e (u + k_e u^2)
+//! ```
+//!
+//! over the equivalent indentation `u` of the press: its depth below the fitted surface, times what the base model says
+//! of its distance from the centre (a factor near 1). All dwells of a press stand on one reading at rest; its error
+//! is common to them, which the weights know.
+//!
+//! Which of the three the data want is decided on dwells that were held out: each fifth is predicted from the others, and
+//! a form with more parameters must beat the one before it by two standard errors over the elements.
+
+mod fit;
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+use tactus_model::Covering;
+
+use crate::{
+    Estimate,
+    readings::Readings,
+    registration::Place,
+    setting::Declared,
+};
+
+use fit::{Group, fit, heldout};
+
+/// A press counts as one at an element's centre if the element feels this share of what it would feel there.
+const NEAR: f64 = 0.9;
+/// Presses with so many dwells are preferred to others.
+const DWELLS_LEAST: usize = 3;
+/// A step to find how results move with the sensor's place, in mm or degrees.
+const STEP: f64 = 1e-4;
+
+/// A form of the response.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// `s_e u`.
+    Linear,
+    /// `s_e (u + k u^2)`.
+    SharedQuadratic,
+    /// `s_e (u + k_e u^2)`.
+    OwnQuadratic,
+}
+
+impl Form {
+    /// Every form, from few parameters to many.
+    pub const ALL: [Self; 3] = [Self::Linear, Self::SharedQuadratic, Self::OwnQuadratic];
+
+    /// Its name in words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::SharedQuadratic => "quadratic, one curvature",
+            Self::OwnQuadratic => "quadratic, own curvatures",
+        }
+    }
+}
+
+/// The elements' responses.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ResponseFit {
+    /// The form that the data want.
+    pub form: Form,
+    /// How each form fares.
+    pub trials: Vec<Trial>,
+    /// The common curvature `k` of the shared quadratic, in 1/mm, if there is such a fit.
+    pub shared_quadratic_per_mm: Option<Estimate>,
+    /// The elements, in order; faulty ones and those without a press at their centre are missing.
+    pub elements: Vec<ElementResponse>,
+}
+
+/// How one form fares.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Trial {
+    /// The form.
+    pub form: Form,
+    /// Root mean square of the residuals, in counts.
+    pub rms_counts: f64,
+    /// The same on dwells that took no part in the fit; `None` where there are too few dwells to hold any out.
+    pub heldout_rms_counts: Option<f64>,
+}
+
+/// One element's response.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ElementResponse {
+    /// The element.
+    pub element: usize,
+    /// Equivalent indentation in mm and rise in counts of each dwell.
+    pub points: Vec<[f64; 2]>,
+    /// `s_e` of the linear form, in counts per mm.
+    pub linear_counts_per_mm: Estimate,
+    /// `s_e` and `k_e` of the form with own curvatures, in counts per mm and 1/mm, if there is such a fit.
+    pub quadratic: Option<[Estimate; 2]>,
+    /// `s_e` of the form that the data want; its error holds that of the sensor's place and surface too.
+    pub sensitivity_counts_per_mm: Estimate,
+    /// `k` of that form; 0 if it is linear.
+    pub quadratic_per_mm: Estimate,
+}
+
+impl ElementResponse {
+    /// The indentation `u` that gives a rise in counts: the response turned round. `None` beyond its turning point.
+    pub fn indentation_mm(&self, rise_counts: f64) -> Option<f64> {
+        turned_round(rise_counts / self.sensitivity_counts_per_mm.value, self.quadratic_per_mm.value)
+    }
+}
+
+/// `u` of `linear = u + k u^2`; the root that goes to `linear` as `k` goes to 0.
+pub(crate) fn turned_round(linear_mm: f64, quadratic_per_mm: f64) -> Option<f64> {
+    let square = 1.0 + 4.0 * quadratic_per_mm * linear_mm;
+    (square > 0.0).then(|| 2.0 * linear_mm / (1.0 + square.sqrt()))
+}
+
+/// What later steps take from the responses.
+#[derive(Debug, Clone)]
+pub(crate) struct Gains {
+    /// The elements, and `s` and `k` of each.
+    pub(crate) elements: Vec<(usize, [f64; 2])>,
+    /// Covariance of all `s`, then all `k`, the sensor's place given.
+    pub(crate) own: DMatrix<f64>,
+    /// Derivatives of the same by the unsure parameters of the sensor's place.
+    pub(crate) by_place: DMatrix<f64>,
+}
+
+/// Fits the responses; without, says why not.
+pub(crate) fn respond(
+    declared: &Declared,
+    readings: &Readings,
+    sound: &[bool],
+    place: &Place,
+) -> Result<(ResponseFit, Gains), String> {
+    let groups = |place: &Place| groups(declared, readings, sound, place);
+    let here = groups(place);
+    if here.is_empty() {
+        return Err("no sound element was pressed at its centre with the reference tool under the reference covering".into());
+    }
+    let fits = Form::ALL.map(|form| fit(form, &here, |_| true));
+    let linear = fits[0].as_ref().ok_or("the readings do not determine the responses")?;
+    let form = chosen(&here);
+    let [_, shared, own] = &fits;
+    let wanted = match form {
+        Form::Linear => linear,
+        Form::SharedQuadratic => shared.as_ref().unwrap_or(linear),
+        Form::OwnQuadratic => own.as_ref().unwrap_or(linear),
+    };
+    let elements = wanted.elements.clone();
+    let by_place = DMatrix::from_columns(
+        &(0..Place::UNSURE)
+            .map(|parameter| {
+                let moved = fit(wanted.form, &groups(&place.moved(parameter, STEP)), |_| true);
+                let moved = moved.filter(|moved| moved.elements == elements);
+                moved.map_or_else(|| wanted.expanded() * 0.0, |moved| (moved.expanded() - wanted.expanded()) / STEP)
+            })
+            .collect::<Vec<_>>(),
+    );
+    let own_covariance = wanted.expanded_covariance();
+    let covariance = &own_covariance + &by_place * &place.covariance * by_place.transpose();
+    let count = elements.len();
+    let responses = elements.iter().enumerate().map(|(index, element)| {
+        let [s, k] = wanted.response(index);
+        let of_element = here.iter().filter(|group| group.element == *element);
+        ElementResponse {
+            element: *element,
+            points: of_element.flat_map(|group| group.points.iter().map(|point| [point.u_mm, point.rise_counts])).collect(),
+            linear_counts_per_mm: linear.sensitivity(index),
+            quadratic: own.as_ref().map(|own| [own.sensitivity(index), own.curvature(index)]),
+            sensitivity_counts_per_mm: Estimate::new(s, covariance[(index, index)]),
+            quadratic_per_mm: Estimate::new(k, covariance[(count + index, count + index)]),
+        }
+    });
+    let trials = fits.iter().flatten().map(|fit| Trial {
+        form: fit.form,
+        rms_counts: fit.rms_counts(&here),
+        heldout_rms_counts: heldout(fit.form, &here).map(|errors| rms(errors.iter().map(|error| error.counts))),
+    });
+    let response = ResponseFit {
+        form: wanted.form,
+        trials: trials.collect(),
+        shared_quadratic_per_mm: shared.as_ref().map(|shared| shared.curvature(0)),
+        elements: responses.collect(),
+    };
+    let gains = Gains {
+        elements: elements.iter().enumerate().map(|(index, element)| (*element, wanted.response(index))).collect(),
+        own: own_covariance,
+        by_place,
+    };
+    Ok((response, gains))
+}
+
+/// The form with the fewest parameters that no other beats on held-out dwells.
+fn chosen(groups: &[Group]) -> Form {
+    let mut best = Form::Linear;
+    let Some(mut best_errors) = heldout(best, groups) else { return best };
+    for form in [Form::SharedQuadratic, Form::OwnQuadratic] {
+        let Some(errors) = heldout(form, groups) else { continue };
+        // By element: errors of one element hang together.
+        let mut gains: std::collections::BTreeMap<usize, f64> = std::collections::BTreeMap::new();
+        for (before, after) in best_errors.iter().zip(&errors) {
+            *gains.entry(before.element).or_default() += before.in_noise.powi(2) - after.in_noise.powi(2);
+        }
+        let count = gains.len() as f64;
+        let mean = gains.values().sum::<f64>() / count;
+        let variance = gains.values().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        if mean > 2.0 * (variance / count).sqrt() && mean > 0.0 {
+            (best, best_errors) = (form, errors);
+        }
+    }
+    best
+}
+
+/// The presses at the centres of sound elements.
+fn groups(declared: &Declared, readings: &Readings, sound: &[bool], place: &Place) -> Vec<Group> {
+    let mut near: Vec<Vec<Group>> = vec![Vec::new(); readings.elements];
+    let Ok(model) = declared.unit_model(place.sigma_mm) else { return Vec::new() };
+    let centre_mm = declared.array().centre_mm(0).unwrap_or_default();
+    let mut felt = vec![0.0; readings.elements];
+    let mut felt_at_centre = felt.clone();
+    for press in readings.presses.iter().filter(|press| declared.is_reference(press)) {
+        let (Some(indenter), Some(deepest)) = (declared.indenter(press), press.deepest()) else { continue };
+        let covering = Covering { thickness_mm: press.covering_mm };
+        let mut contact = place.setting.contact(press, deepest, indenter);
+        model.indentation(&contact, covering, &mut felt);
+        contact.position_mm = centre_mm;
+        model.indentation(&contact, covering, &mut felt_at_centre);
+        for (element, groups) in near.iter_mut().enumerate() {
+            let noise = readings.noise_rms_counts[element].filter(|_| sound[element]);
+            if let Some(noise) = noise.filter(|_| felt[element] > NEAR * felt_at_centre[0]) {
+                groups.extend(Group::of(declared, &model, place, press, element, noise));
+            }
+        }
+    }
+    for groups in &mut near {
+        if groups.iter().any(|group| group.points.len() >= DWELLS_LEAST) {
+            groups.retain(|group| group.points.len() >= DWELLS_LEAST);
+        }
+    }
+    near.into_iter().flatten().collect()
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (squares, count) = values.fold((0.0, 0.0), |(squares, count), value| (squares + value * value, count + 1.0));
+    if count > 0.0 { f64::sqrt(squares / count) } else { 0.0 }
+}
+
+#[cfg(test)]
+#[path = "response_tests.rs"]
+mod tests;

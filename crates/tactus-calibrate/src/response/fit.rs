@@ -1,0 +1,215 @@
+//! One form of the response, fitted to the presses at the elements' centres.
+
+use nalgebra::{DMatrix, DVector};
+use tactus_model::{Covering, ForwardModel};
+
+use super::{Form, rms};
+use crate::{
+    Estimate,
+    least_squares::{self, Normal, minimise},
+    readings::Press,
+    registration::Place,
+    setting::Declared,
+};
+
+/// Dwells are held out in so many turns.
+const FOLDS: usize = 5;
+
+/// An element's readings in a press at its centre.
+#[derive(Debug, Clone)]
+pub(super) struct Group {
+    pub(super) element: usize,
+    pub(super) points: Vec<Point>,
+    noise_counts: f64,
+    rest_frames: usize,
+}
+
+/// One dwell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point {
+    pub(super) u_mm: f64,
+    pub(super) rise_counts: f64,
+    frames: usize,
+}
+
+/// The error of a prediction.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct HeldOut {
+    pub(super) element: usize,
+    pub(super) counts: f64,
+    /// In units of its standard deviation.
+    pub(super) in_noise: f64,
+}
+
+/// A fitted form.
+#[derive(Debug, Clone)]
+pub(super) struct Fitted {
+    pub(super) form: Form,
+    /// The elements, in the order of their parameters.
+    pub(super) elements: Vec<usize>,
+    fit: least_squares::Fit,
+}
+
+impl Group {
+    pub(super) fn of(
+        declared: &Declared,
+        model: &ForwardModel,
+        place: &Place,
+        press: &Press,
+        element: usize,
+        noise_counts: f64,
+    ) -> Option<Self> {
+        let (indenter, rest_frames) = (declared.indenter(press)?, press.rest.as_ref()?.frames);
+        let mut felt = vec![0.0; model.array().elements()];
+        let points = press.dwells.iter().filter_map(|dwell| {
+            let contact = place.setting.contact(press, dwell, indenter);
+            model.indentation(&contact, Covering { thickness_mm: press.covering_mm }, &mut felt);
+            let [rise_counts, _] = press.rise(dwell, element)?;
+            Some(Point { u_mm: felt[element], rise_counts, frames: dwell.frames })
+        });
+        let points = points.collect();
+        Some(Self { element, points, noise_counts, rest_frames })
+    }
+}
+
+impl Fitted {
+    /// `s` and `k` of the element at an index.
+    pub(super) fn response(&self, index: usize) -> [f64; 2] {
+        let parameters = &self.fit.parameters;
+        [parameters[index], self.curvature_at(index).map_or(0.0, |at| parameters[at])]
+    }
+
+    pub(super) fn sensitivity(&self, index: usize) -> Estimate {
+        self.estimate(index)
+    }
+
+    /// `k` of the element at an index; 0 in the linear form.
+    pub(super) fn curvature(&self, index: usize) -> Estimate {
+        self.curvature_at(index).map_or(Estimate { value: 0.0, standard_error: 0.0 }, |at| self.estimate(at))
+    }
+
+    /// All `s`, then all `k`.
+    pub(super) fn expanded(&self) -> DVector<f64> {
+        let count = self.elements.len();
+        DVector::from_fn(2 * count, |row, _| self.place(row).map_or(0.0, |at| self.fit.parameters[at]))
+    }
+
+    pub(super) fn expanded_covariance(&self) -> DMatrix<f64> {
+        let count = 2 * self.elements.len();
+        DMatrix::from_fn(count, count, |row, column| match (self.place(row), self.place(column)) {
+            (Some(row), Some(column)) => self.fit.inflation() * self.fit.covariance[(row, column)],
+            _ => 0.0,
+        })
+    }
+
+    pub(super) fn rms_counts(&self, groups: &[Group]) -> f64 {
+        rms(groups.iter().flat_map(|group| {
+            group.points.iter().map(|point| point.rise_counts - self.predicted(group.element, point.u_mm))
+        }))
+    }
+
+    fn predicted(&self, element: usize, u_mm: f64) -> f64 {
+        let index = self.elements.binary_search(&element).unwrap_or_default();
+        let [s, k] = self.response(index);
+        s * (u_mm + k * u_mm * u_mm)
+    }
+
+    fn estimate(&self, at: usize) -> Estimate {
+        Estimate::new(self.fit.parameters[at], self.fit.covariance[(at, at)] * self.fit.inflation())
+    }
+
+    /// Where among the parameters the curvature of the element at an index stands.
+    fn curvature_at(&self, index: usize) -> Option<usize> {
+        let count = self.elements.len();
+        match self.form {
+            Form::Linear => None,
+            Form::SharedQuadratic => Some(count),
+            Form::OwnQuadratic => Some(count + index),
+        }
+    }
+
+    /// Where among the parameters a row of all `s`, then all `k`, stands.
+    fn place(&self, row: usize) -> Option<usize> {
+        let count = self.elements.len();
+        if row < count { Some(row) } else { self.curvature_at(row - count) }
+    }
+}
+
+/// Fits a form to the dwells that are kept; their index in their press decides.
+pub(super) fn fit(form: Form, groups: &[Group], keep: impl Fn(usize) -> bool) -> Option<Fitted> {
+    let mut elements: Vec<usize> = groups.iter().map(|group| group.element).collect();
+    elements.dedup();
+    let count = elements.len();
+    let curvatures = match form {
+        Form::Linear => 0,
+        Form::SharedQuadratic => 1,
+        Form::OwnQuadratic => count,
+    };
+    let free = vec![true; count + curvatures];
+    let mut start: Vec<f64> = elements.iter().map(|element| slope(groups, *element)).collect();
+    start.resize(count + curvatures, 0.0);
+    let mut fitted = Fitted {
+        form,
+        elements,
+        fit: least_squares::Fit { parameters: start.clone(), covariance: DMatrix::zeros(0, 0), misfit: 1.0 },
+    };
+    fitted.fit = minimise(start, &free, |parameters| {
+        let mut normal = Normal::new(parameters.len());
+        for group in groups {
+            let index = fitted.elements.binary_search(&group.element).ok()?;
+            let (s, at) = (parameters[index], fitted.curvature_at(index));
+            let k = at.map_or(0.0, |at| parameters[at]);
+            let per_square = 1.0 / (group.noise_counts * group.noise_counts);
+            // The error of the rest is common to all dwells of the press.
+            let (mut residuals, mut by_s, mut by_k, mut frames) = (0.0, 0.0, 0.0, 0.0);
+            for (_, point) in group.points.iter().enumerate().filter(|(dwell, _)| keep(*dwell)) {
+                let shape = point.u_mm + k * point.u_mm * point.u_mm;
+                let residual = point.rise_counts - s * shape;
+                let slopes = [(index, shape), (at.unwrap_or(0), s * point.u_mm * point.u_mm)];
+                let slopes = if at.is_some() { &slopes[..] } else { &slopes[..1] };
+                let weight = point.frames as f64;
+                normal.add(residual, slopes, weight * per_square);
+                residuals += weight * residual;
+                by_s += weight * shape;
+                by_k += weight * s * point.u_mm * point.u_mm;
+                frames += weight;
+            }
+            let slopes = [(index, by_s), (at.unwrap_or(0), by_k)];
+            let slopes = if at.is_some() { &slopes[..] } else { &slopes[..1] };
+            normal.take_common(residuals, slopes, per_square / (group.rest_frames as f64 + frames));
+        }
+        Some(normal)
+    })?;
+    Some(fitted)
+}
+
+/// Counts per mm of an element, as a line through zero has it: where every form starts.
+fn slope(groups: &[Group], element: usize) -> f64 {
+    let points = groups.iter().filter(|group| group.element == element).flat_map(|group| &group.points);
+    let [above, below] = points.fold([0.0, 0.0], |[above, below], point| {
+        [above + point.u_mm * point.rise_counts, below + point.u_mm * point.u_mm]
+    });
+    above / below
+}
+
+/// Errors of predictions of dwells that took no part in the fit; `None` if the presses have too few dwells.
+pub(super) fn heldout(form: Form, groups: &[Group]) -> Option<Vec<HeldOut>> {
+    let dwells = groups.iter().map(|group| group.points.len()).min()?;
+    if dwells < 3 {
+        return None;
+    }
+    let folds = FOLDS.min(dwells);
+    let mut errors = Vec::new();
+    for fold in 0..folds {
+        let fitted = fit(form, groups, |dwell| dwell % folds != fold)?;
+        for group in groups {
+            for (_, point) in group.points.iter().enumerate().filter(|(dwell, _)| dwell % folds == fold) {
+                let counts = point.rise_counts - fitted.predicted(group.element, point.u_mm);
+                let variance = 1.0 / point.frames as f64 + 1.0 / group.rest_frames as f64;
+                let in_noise = counts / (group.noise_counts * variance.sqrt());
+                errors.push(HeldOut { element: group.element, counts, in_noise });
+            }
+        }
+    }
+    Some(errors)
+}

@@ -1,0 +1,358 @@
+//! The point spread of each covering at each depth (paper, Sec. 3, Eq. 3).
+//!
+//! ```text
+//! Q(sigma) = sum_i <E_i(sigma), D_i>        sigma+ maximises Q
+//! ```
+//!
+//! `D_i` is the image of press `i`, each element's rise turned into indentation by its own response; `E_i` is the image
+//! that the base model gives for the tool at that place under a Gaussian of that sigma. Both are scaled to unit L2 norm:
+//! with unit sum or unit peak the maximum runs away. Faulty elements take no part.
+//!
+//! The maximum is found by Newton's method. Its standard error has two parts: the scatter of the presses' own slopes
+//! (the sandwich estimate, which asks for no model of the noise), and what the errors of the elements' responses and of
+//! the sensor's place do to it, which is common to many presses and coverings, by first derivatives.
+
+use std::{num::NonZero, thread};
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use tactus_model::{Contact, Covering, ForwardModel};
+
+use crate::{
+    Estimate,
+    readings::{Dwell, Press, Readings, distinct_places},
+    registration::Place,
+    response::{Gains, turned_round},
+    setting::Declared,
+};
+
+/// Depths that differ by less belong together.
+const DEPTH_STEP_MM: f64 = 0.02;
+/// It takes so many places to see a spread between elements.
+const PLACES_LEAST: usize = 9;
+/// A press is left out if its image is so many times less like the model's than the median press's.
+const OUTLYING: f64 = 40.0;
+/// Sigma is looked for between these, in pitches.
+const SIGMA_PITCHES: [f64; 2] = [0.05, 50.0];
+const ROUNDS_MAX: usize = 30;
+/// A step to find how the slopes move with a press's place.
+const STEP_MM: f64 = 1e-4;
+
+/// The spread that presses to one depth under one covering show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpreadFit {
+    /// Thickness of the covering.
+    pub covering_mm: f64,
+    /// Depth of the presses below the fitted surface.
+    pub depth_mm: f64,
+    /// Run that the presses are of.
+    pub run: String,
+    /// Presses that it rests on.
+    pub presses: usize,
+    /// Presses left out because their images are like none of the model's.
+    pub left_out: usize,
+    /// sigma+.
+    pub sigma_mm: Estimate,
+    /// The part of its standard error that more presses would lessen.
+    pub scatter_mm: f64,
+    /// Mean cosine between measured and modelled images at sigma+: 1 if the spread is a Gaussian and nothing is amiss.
+    pub likeness: f64,
+}
+
+/// All spreads, and the covariance of their errors in mm^2.
+#[derive(Debug, Clone)]
+pub(crate) struct Spreads {
+    pub(crate) fits: Vec<SpreadFit>,
+    pub(crate) covariance: DMatrix<f64>,
+}
+
+/// Fits the spread of every covering at every depth; what cannot be fitted is said.
+pub(crate) fn spreads(
+    declared: &Declared,
+    readings: &Readings,
+    gains: &Gains,
+    place: &Place,
+) -> (Spreads, Vec<String>) {
+    let groups = groups(declared, readings);
+    let one = |group: &Group<'_>| Search::new(declared, gains, place, group)?.run(readings, group);
+    let threads = thread::available_parallelism().map_or(1, NonZero::get).min(groups.len().max(1));
+    // Every thread takes each so-and-so-many-th group, so that thick and thin coverings are shared out.
+    let results = thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads)
+            .map(|first| {
+                let mine = groups.iter().enumerate().skip(first).step_by(threads);
+                scope.spawn(move || mine.map(|(index, group)| (index, one(group))).collect::<Vec<_>>())
+            })
+            .collect();
+        let results = workers.into_iter().flat_map(|worker| {
+            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        });
+        let mut results: Vec<_> = results.collect();
+        results.sort_by_key(|(index, _)| *index);
+        results
+    });
+    let (mut found, mut refused) = (Vec::new(), Vec::new());
+    for ((_, result), group) in results.into_iter().zip(&groups) {
+        match result {
+            Ok(one) => found.push(one),
+            Err(problem) => refused.push(format!(
+                "no spread of the covering of {:.3} mm from presses to {:.2} mm: {problem}",
+                group.covering_mm, -group.height_mm
+            )),
+        }
+    }
+    let covariance = covariance(&found, gains, place);
+    let mut fits: Vec<SpreadFit> = found.into_iter().map(|found| found.fit).collect();
+    for (index, fit) in fits.iter_mut().enumerate() {
+        fit.sigma_mm = Estimate::new(fit.sigma_mm.value, covariance[(index, index)]);
+    }
+    (Spreads { fits, covariance }, refused)
+}
+
+/// Presses of one run to one depth under one covering.
+struct Group<'a> {
+    covering_mm: f64,
+    height_mm: f64,
+    presses: Vec<(&'a Press, &'a Dwell)>,
+}
+
+/// Of each covering, the presses of the run with the most, by depth.
+fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<Group<'a>> {
+    let known = |press: &&Press| press.rest.is_some() && declared.indenter(press).is_some();
+    let mut coverings: Vec<f64> = readings.presses.iter().filter(known).map(|press| press.covering_mm).collect();
+    coverings.sort_by(f64::total_cmp);
+    coverings.dedup_by(|next, last| *next - *last < 5e-4);
+    let mut groups = Vec::new();
+    for covering_mm in coverings {
+        let under = |press: &&Press| (press.covering_mm - covering_mm).abs() < 5e-4;
+        let of_run = |run: usize| {
+            readings.presses.iter().filter(move |press| press.run == run).filter(known).filter(under)
+        };
+        let most = (0..readings.runs.len()).max_by_key(|run| (of_run(*run).count(), std::cmp::Reverse(*run)));
+        let mut presses: Vec<(&Press, &Dwell)> = most
+            .into_iter()
+            .flat_map(of_run)
+            .flat_map(|press| press.dwells.iter().map(move |dwell| (press, dwell)))
+            .collect();
+        presses.sort_by(|(_, one), (_, other)| other.height_mm.total_cmp(&one.height_mm));
+        for alike in presses.chunk_by(|(_, one), (_, other)| one.height_mm - other.height_mm < DEPTH_STEP_MM) {
+            let height_mm = alike.iter().map(|(_, dwell)| dwell.height_mm).sum::<f64>() / alike.len() as f64;
+            let places = distinct_places(alike.iter().map(|(press, _)| press.place_mm)).len();
+            if places >= PLACES_LEAST {
+                groups.push(Group { covering_mm, height_mm, presses: alike.to_vec() });
+            }
+        }
+    }
+    groups
+}
+
+/// One fit, and how it moves with what it rests on.
+struct Found {
+    fit: SpreadFit,
+    variance: f64,
+    /// By all sensitivities, then all curvatures.
+    by_gains: DVector<f64>,
+    by_place: DVector<f64>,
+}
+
+fn covariance(found: &[Found], gains: &Gains, place: &Place) -> DMatrix<f64> {
+    let count = found.len();
+    let mut covariance = DMatrix::from_diagonal(&DVector::from_fn(count, |row, _| found[row].variance));
+    if count > 0 {
+        let by_gains = DMatrix::from_fn(count, gains.own.nrows(), |row, column| found[row].by_gains[column]);
+        // A wrong place acts on its own, and through the responses.
+        let by_place = DMatrix::from_fn(count, Place::UNSURE, |row, column| found[row].by_place[column])
+            + &by_gains * &gains.by_place;
+        covariance += &by_gains * &gains.own * by_gains.transpose();
+        covariance += &by_place * &place.covariance * by_place.transpose();
+    }
+    covariance
+}
+
+/// One image: where the tool stood, and what the elements read, as indentations of unit norm.
+struct Image {
+    contact: Contact,
+    place_mm: [f64; 2],
+    measured: Vec<f64>,
+    norm_mm: f64,
+}
+
+/// The search for one sigma.
+struct Search<'a> {
+    declared: &'a Declared,
+    gains: &'a Gains,
+    place: &'a Place,
+    covering: Covering,
+    images: Vec<Image>,
+    /// Presses with an element beyond the turning point of its response.
+    left_out: usize,
+}
+
+/// What one image says at a sigma.
+struct Slope {
+    likeness: f64,
+    /// Derivative of the likeness by sigma.
+    by_sigma: f64,
+    /// Minus its second derivative, where model and image agree.
+    curvature: f64,
+    /// Derivative of the modelled image of unit norm.
+    shape: Vec<f64>,
+}
+
+impl<'a> Search<'a> {
+    fn new(declared: &'a Declared, gains: &'a Gains, place: &'a Place, group: &Group<'_>) -> Result<Self, String> {
+        let covering = Covering { thickness_mm: group.covering_mm };
+        let mut search = Self { declared, gains, place, covering, images: Vec::new(), left_out: 0 };
+        for (press, dwell) in &group.presses {
+            let Some(indenter) = declared.indenter(press) else { continue };
+            let measured = gains.elements.iter().map(|(element, [s, k])| {
+                let [rise, _] = press.rise(dwell, *element)?;
+                turned_round(rise / s, *k)
+            });
+            let Some(mut measured) = measured.collect::<Option<Vec<f64>>>() else {
+                search.left_out += 1;
+                continue;
+            };
+            let norm_mm = norm(&measured);
+            if norm_mm > 0.0 {
+                measured.iter_mut().for_each(|value| *value /= norm_mm);
+                let contact = place.setting.contact(press, dwell, indenter);
+                search.images.push(Image { contact, place_mm: press.place_mm, measured, norm_mm });
+            }
+        }
+        if search.images.len() < PLACES_LEAST {
+            return Err(format!("{} images are left; it takes {PLACES_LEAST}", search.images.len()));
+        }
+        Ok(search)
+    }
+
+    fn run(mut self, readings: &Readings, group: &Group<'_>) -> Result<Found, String> {
+        let (mut sigma_mm, mut slopes) = self.maximise()?;
+        let mut unlike: Vec<f64> = slopes.iter().map(|slope| 1.0 - slope.likeness).collect();
+        unlike.sort_by(f64::total_cmp);
+        let limit = OUTLYING * unlike[unlike.len() / 2].max(1e-9);
+        let outlying = slopes.iter().filter(|slope| 1.0 - slope.likeness > limit).count();
+        if outlying > 0 && self.images.len() - outlying >= PLACES_LEAST {
+            let mut likenesses = slopes.iter().map(|slope| slope.likeness);
+            self.images.retain(|_| likenesses.next().is_some_and(|likeness| 1.0 - likeness <= limit));
+            self.left_out += outlying;
+            (sigma_mm, slopes) = self.maximise()?;
+        }
+        let count = slopes.len() as f64;
+        let curvature: f64 = slopes.iter().map(|slope| slope.curvature).sum();
+        let squares: f64 = slopes.iter().map(|slope| slope.by_sigma * slope.by_sigma).sum();
+        let variance = squares * count / (count - 1.0) / (curvature * curvature);
+        let fit = SpreadFit {
+            covering_mm: group.covering_mm,
+            depth_mm: self.place.setting.surface_mm - group.height_mm,
+            run: group.presses.first().map(|(press, _)| readings.runs[press.run].clone()).unwrap_or_default(),
+            presses: slopes.len(),
+            left_out: self.left_out,
+            sigma_mm: Estimate::new(sigma_mm, variance),
+            scatter_mm: variance.sqrt(),
+            likeness: slopes.iter().map(|slope| slope.likeness).sum::<f64>() / count,
+        };
+        let by_gains = self.by_gains(&slopes) / curvature;
+        let by_place = self.by_place(sigma_mm, &slopes)? / curvature;
+        Ok(Found { fit, variance, by_gains, by_place })
+    }
+
+    /// sigma+, and what every image says there.
+    fn maximise(&self) -> Result<(f64, Vec<Slope>), String> {
+        let pitch_mm = self.declared.array().pitch_mm();
+        let [least, most] = SIGMA_PITCHES.map(|pitches| pitches * pitch_mm);
+        let mut sigma_mm = self.declared.sigma_mm(self.covering.thickness_mm).clamp(least, most);
+        for _ in 0..ROUNDS_MAX {
+            let slopes = self.slopes(sigma_mm)?;
+            let by_sigma: f64 = slopes.iter().map(|slope| slope.by_sigma).sum();
+            let curvature: f64 = slopes.iter().map(|slope| slope.curvature).sum();
+            if curvature.is_nan() || curvature <= 0.0 {
+                break;
+            }
+            // Far from the maximum a whole step may go astray.
+            let step = (by_sigma / curvature).clamp(-0.4 * sigma_mm, 0.6 * sigma_mm);
+            sigma_mm += step;
+            if !(least..=most).contains(&sigma_mm) {
+                break;
+            }
+            if step.abs() < 1e-9 * sigma_mm {
+                return Ok((sigma_mm, slopes));
+            }
+        }
+        Err(format!("the images fit no sigma between {least:.2} and {most:.0} mm"))
+    }
+
+    fn slopes(&self, sigma_mm: f64) -> Result<Vec<Slope>, String> {
+        let model = self.declared.unit_model(sigma_mm).map_err(|error| error.to_string())?;
+        Ok(self.images.iter().map(|image| self.slope(&model, image, &image.contact)).collect())
+    }
+
+    fn slope(&self, model: &ForwardModel, image: &Image, contact: &Contact) -> Slope {
+        let gradient = model.gradient(contact, self.covering);
+        let modelled = self.gains.elements.iter().map(|(element, _)| gradient.counts[*element]);
+        let mut modelled: Vec<f64> = modelled.collect();
+        let by_sigma = self.gains.elements.iter().map(|(element, _)| gradient.by_sigma_intercept_mm[*element]);
+        let mut shape: Vec<f64> = by_sigma.collect();
+        let length = norm(&modelled).max(f64::MIN_POSITIVE);
+        modelled.iter_mut().for_each(|value| *value /= length);
+        let along = dot(&modelled, &shape);
+        for (shape, modelled) in shape.iter_mut().zip(&modelled) {
+            *shape = (*shape - along * modelled) / length;
+        }
+        Slope {
+            likeness: dot(&image.measured, &modelled),
+            by_sigma: dot(&image.measured, &shape),
+            curvature: dot(&shape, &shape),
+            shape,
+        }
+    }
+
+    /// How the sum of the slopes moves with the elements' responses.
+    fn by_gains(&self, slopes: &[Slope]) -> DVector<f64> {
+        let count = self.gains.elements.len();
+        let mut by_gains = DVector::zeros(2 * count);
+        for (image, slope) in self.images.iter().zip(slopes) {
+            for (index, (_, [s, k])) in self.gains.elements.iter().enumerate() {
+                let v = image.measured[index] * image.norm_mm;
+                let by_v = (slope.shape[index] - image.measured[index] * slope.by_sigma) / image.norm_mm;
+                let per_mm = 1.0 + 2.0 * k * v;
+                by_gains[index] -= by_v * (v + k * v * v) / (s * per_mm);
+                by_gains[count + index] -= by_v * v * v / per_mm;
+            }
+        }
+        by_gains
+    }
+
+    /// How the sum of the slopes moves with the sensor's place.
+    fn by_place(&self, sigma_mm: f64, slopes: &[Slope]) -> Result<DVector<f64>, String> {
+        let model = self.declared.unit_model(sigma_mm).map_err(|error| error.to_string())?;
+        let mut by_place = DVector::zeros(Place::UNSURE);
+        for (image, slope) in self.images.iter().zip(slopes) {
+            let mut along = [0.0; 2];
+            for (axis, along) in along.iter_mut().enumerate() {
+                let mut contact = image.contact.clone();
+                contact.position_mm[axis] += STEP_MM;
+                *along = (self.slope(&model, image, &contact).by_sigma - slope.by_sigma) / STEP_MM;
+            }
+            for parameter in 0..3 {
+                let moved = self.place.moved(parameter, STEP_MM).setting.on_sensor(image.place_mm);
+                for axis in 0..2 {
+                    by_place[parameter] += along[axis] * (moved[axis] - image.contact.position_mm[axis]) / STEP_MM;
+                }
+            }
+        }
+        Ok(by_place)
+    }
+}
+
+fn dot(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(a, b)| a * b).sum()
+}
+
+fn norm(vector: &[f64]) -> f64 {
+    dot(vector, vector).sqrt()
+}
+
+#[cfg(test)]
+#[path = "spread_tests.rs"]
+mod tests;
