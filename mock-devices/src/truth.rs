@@ -26,6 +26,8 @@ pub struct Truth {
     pub noise_rms_counts: f64,
     /// Where the sensor really lies in the robot's frame.
     pub registration: Registration,
+    /// Height of the covering's surface where the service believes 0, when the rig is switched on.
+    pub surface_mm: f64,
     /// The tool on the stage.
     pub indenter: Indenter,
     /// The stage.
@@ -84,14 +86,15 @@ impl Truth {
                 }),
                 rotation_deg: rig.registration.rotation_deg + error.rotation_deg,
             },
+            surface_mm: simulation.surface_mm,
             indenter: tool(&rig.indenter),
             stage: simulation.stage,
         }
     }
 
-    /// The sensor as it is, under a covering whose surface stands at a height. Stuck and noisy elements are not in it:
-    /// their faults come after the signal, where they are read.
-    pub(crate) fn sensor(&self, covering: Covering, surface_mm: f64) -> Result<Simulator, EffectError> {
+    /// The sensor as it is under a covering. Stuck and noisy elements are not in it: their faults come after the
+    /// signal, where they are read.
+    pub(crate) fn sensor(&self, covering: Covering) -> Result<Simulator, EffectError> {
         let effects = self.faults.iter().filter_map(|(element, fault)| match fault {
             ElementFault::Miswired { answers_for } => Some(answers(*element, *answers_for, 1.0)),
             ElementFault::Dead => Some(answers(*element, *element, 0.0)),
@@ -100,7 +103,7 @@ impl Truth {
         Ok(Simulator {
             model: self.model.clone(),
             registration: self.registration,
-            surface_mm,
+            surface_mm: self.surface_mm,
             covering,
             indenter: self.indenter.clone(),
             effects: effects.collect::<Result<_, _>>()?,

@@ -48,15 +48,15 @@ impl World {
     /// # Panics
     /// If the truth is not that of a checked rig, whose faulty elements are the array's.
     #[expect(clippy::expect_used, reason = "a checked rig's faulty elements are the array's")]
-    pub(crate) fn new(truth: Arc<Truth>, covering: Covering, surface_mm: f64) -> Self {
+    pub(crate) fn new(truth: Arc<Truth>, covering: Covering) -> Self {
         let [x_mm, y_mm, z_mm] = truth.stage.travel_mm;
         let tip_mm = [middle(x_mm), middle(y_mm), z_mm[1] - 0.1 * (z_mm[1] - z_mm[0])];
-        let pipeline = pipeline(&truth, covering, surface_mm).expect("a checked rig makes a pipeline");
+        let pipeline = pipeline(&truth, covering).expect("a checked rig makes a pipeline");
         Self {
             motion: Motion::at_rest([0.0; 3], tip_mm, truth.stage.acceleration_mm_per_s2),
             covering,
-            surface_mm,
-            deepest_mm: surface_mm - tip_mm[2],
+            surface_mm: truth.surface_mm,
+            deepest_mm: truth.surface_mm - tip_mm[2],
             noise: Draw::Noise.rng(truth.seed),
             pipeline,
             started: None,
@@ -175,8 +175,8 @@ impl World {
     }
 }
 
-fn pipeline(truth: &Truth, covering: Covering, surface_mm: f64) -> Result<Pipeline, EffectError> {
-    Pipeline::new(&truth.sensor(covering, surface_mm)?)
+fn pipeline(truth: &Truth, covering: Covering) -> Result<Pipeline, EffectError> {
+    Pipeline::new(&truth.sensor(covering)?)
 }
 
 fn round_to(value: f64, step: f64) -> f64 {
