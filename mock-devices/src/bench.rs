@@ -18,7 +18,7 @@ pub(crate) fn sim_rig() -> Rig {
 pub(crate) fn world_of(rig: &Rig, seed: u64) -> Shared {
     let simulation = simulation_of(rig);
     let truth = Arc::new(Truth::of(rig, &simulation, seed));
-    Shared::new(World::new(truth, rig.covering, simulation.surface_mm))
+    Shared::new(World::new(truth, rig.covering))
 }
 
 /// A device, the world around it, and the present instant.

@@ -118,7 +118,7 @@ impl RigControl {
 
     /// What every element reads at present but for noise and quantisation, in counts, row-major.
     pub fn image_counts(&self) -> Vec<f64> {
-        self.world.lock().image(Instant::now()).to_vec()
+        self.world.lock().image(Instant::now())
     }
 
     /// What the rig hides from the service.
@@ -128,7 +128,7 @@ impl RigControl {
 
     fn check_element(&self, fault: SensorFault) -> Result<(), FaultError> {
         let (SensorFault::Stuck(element) | SensorFault::Saturate(element)) = fault else { return Ok(()) };
-        let last = self.truth().wiring.len() - 1;
+        let last = self.truth().model.array().elements() - 1;
         if element > last { Err(FaultError::Element { element, last }) } else { Ok(()) }
     }
 }

@@ -72,7 +72,7 @@ pub(crate) struct Started {
 pub(crate) fn start_devices(rig: &Rig, seed: u64, now: Instant) -> Started {
     let simulation = crate::twin::simulation_of(rig);
     let truth = Arc::new(Truth::of(rig, &simulation, seed));
-    let world = Shared::new(World::new(truth, rig.covering, simulation.surface_mm));
+    let world = Shared::new(World::new(truth, rig.covering));
     let (control, taps) = RigControl::new(world.clone(), now);
     let sensor = VirtualSensor::new(world.clone(), now);
     let stage = VirtualStage::new(world, now);

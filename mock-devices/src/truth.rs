@@ -1,5 +1,7 @@
 //! What a simulated rig hides from the service: the truth that calibration is to find.
 
+use std::collections::BTreeMap;
+
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -7,7 +9,7 @@ use tactus_model::{
     Covering, Effect, EffectError, ForwardModel, Indenter, Readout, Registration, Response, Simulator,
 };
 use tactus_schema::Rig;
-use tactus_schema::rig::{Miswired, SimulatedStage, Simulation};
+use tactus_schema::rig::{ElementFault, SimulatedStage, Simulation};
 
 /// The true sensor, stage and tool behind a rig description; all of it follows from the description and a seed.
 #[derive(Debug, Clone)]
@@ -18,12 +20,14 @@ pub struct Truth {
     pub model: ForwardModel,
     /// The converter.
     pub readout: Readout,
-    /// For each element, row-major, the element whose signal it gives: itself unless it is miswired.
-    pub wiring: Vec<usize>,
-    /// Standard deviation of an element's noise.
+    /// What is wrong with elements, by index.
+    pub faults: BTreeMap<usize, ElementFault>,
+    /// Standard deviation of an element's noise, unless it is noisy.
     pub noise_rms_counts: f64,
     /// Where the sensor really lies in the robot's frame.
     pub registration: Registration,
+    /// Height of the covering's surface where the service believes 0, when the rig is switched on.
+    pub surface_mm: f64,
     /// The tool on the stage.
     pub indenter: Indenter,
     /// The stage.
@@ -74,7 +78,7 @@ impl Truth {
             seed,
             model,
             readout: Readout::of(&rig.array),
-            wiring: wiring(rig.array.elements(), &simulation.miswired),
+            faults: simulation.faults.clone(),
             noise_rms_counts: simulation.noise_rms_counts,
             registration: Registration {
                 origin_mm: std::array::from_fn(|axis| {
@@ -82,23 +86,27 @@ impl Truth {
                 }),
                 rotation_deg: rig.registration.rotation_deg + error.rotation_deg,
             },
+            surface_mm: simulation.surface_mm,
             indenter: tool(&rig.indenter),
             stage: simulation.stage,
         }
     }
 
-    /// The sensor as it is, under a covering whose surface stands at a height.
-    pub(crate) fn sensor(&self, covering: Covering, surface_mm: f64) -> Result<Simulator, EffectError> {
-        let wired = self.wiring.iter().enumerate().filter(|(element, answers_for)| element != *answers_for);
+    /// The sensor as it is under a covering. Stuck and noisy elements are not in it: their faults come after the
+    /// signal, where they are read.
+    pub(crate) fn sensor(&self, covering: Covering) -> Result<Simulator, EffectError> {
+        let effects = self.faults.iter().filter_map(|(element, fault)| match fault {
+            ElementFault::Miswired { answers_for } => Some(answers(*element, *answers_for, 1.0)),
+            ElementFault::Dead => Some(answers(*element, *element, 0.0)),
+            ElementFault::Stuck { .. } | ElementFault::Noisy { .. } => None,
+        });
         Ok(Simulator {
             model: self.model.clone(),
             registration: self.registration,
-            surface_mm,
+            surface_mm: self.surface_mm,
             covering,
             indenter: self.indenter.clone(),
-            effects: wired
-                .map(|(element, answers_for)| miswired(element, *answers_for))
-                .collect::<Result<_, _>>()?,
+            effects: effects.collect::<Result<_, _>>()?,
             noise_rms_counts: self.noise_rms_counts,
         })
     }
@@ -115,17 +123,13 @@ fn spread(declared: &[f64], spread: f64, seed: u64) -> Vec<f64> {
         .collect()
 }
 
-fn wiring(elements: usize, miswired: &[Miswired]) -> Vec<usize> {
-    let answers_for = |element| miswired.iter().find(|one| one.element == element).map(|one| one.answers_for);
-    (0..elements).map(|element| answers_for(element).unwrap_or(element)).collect()
-}
-
-fn miswired(element: usize, answers_for: usize) -> Result<Effect, EffectError> {
+/// An element that gives a share of another's signal in place of its own.
+fn answers(element: usize, answers_for: usize, share: f64) -> Result<Effect, EffectError> {
     let parameters = [
         ("element", element as f64),
         ("answers_for", answers_for as f64),
         ("own_share", 0.0),
-        ("other_share", 1.0),
+        ("other_share", share),
     ];
     Effect::new("miswired", parameters)
 }

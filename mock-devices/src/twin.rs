@@ -1,5 +1,7 @@
 //! The simulation of a rig that has none of its own.
 
+use std::collections::BTreeMap;
+
 use tactus_schema::Rig;
 use tactus_schema::rig::{RegistrationError, SimulatedStage, Simulation};
 
@@ -28,7 +30,7 @@ fn ideal(rig: &Rig) -> Simulation {
         quadratic_per_mm: 0.0,
         surface_mm: 0.0,
         registration_error: RegistrationError::default(),
-        miswired: Vec::new(),
+        faults: BTreeMap::new(),
         stage: rig.simulation.as_ref().map_or_else(|| stage_for(rig), |simulation| simulation.stage),
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_model::{Covering, EffectError, Moment, Pipeline};
-use tactus_schema::rig::SimulatedStage;
+use tactus_schema::rig::{ElementFault, SimulatedStage};
 use tokio::time::Instant;
 
 use crate::motion::{Motion, Point};
@@ -46,17 +46,17 @@ impl World {
     /// believes that this is 0.
     ///
     /// # Panics
-    /// If the truth is not that of a checked rig, whose miswired elements are the array's.
-    #[expect(clippy::expect_used, reason = "a checked rig's miswired elements are the array's")]
-    pub(crate) fn new(truth: Arc<Truth>, covering: Covering, surface_mm: f64) -> Self {
+    /// If the truth is not that of a checked rig, whose faulty elements are the array's.
+    #[expect(clippy::expect_used, reason = "a checked rig's faulty elements are the array's")]
+    pub(crate) fn new(truth: Arc<Truth>, covering: Covering) -> Self {
         let [x_mm, y_mm, z_mm] = truth.stage.travel_mm;
         let tip_mm = [middle(x_mm), middle(y_mm), z_mm[1] - 0.1 * (z_mm[1] - z_mm[0])];
-        let pipeline = pipeline(&truth, covering, surface_mm).expect("a checked rig makes a pipeline");
+        let pipeline = pipeline(&truth, covering).expect("a checked rig makes a pipeline");
         Self {
             motion: Motion::at_rest([0.0; 3], tip_mm, truth.stage.acceleration_mm_per_s2),
             covering,
-            surface_mm,
-            deepest_mm: surface_mm - tip_mm[2],
+            surface_mm: truth.surface_mm,
+            deepest_mm: truth.surface_mm - tip_mm[2],
             noise: Draw::Noise.rng(truth.seed),
             pipeline,
             started: None,
@@ -74,9 +74,15 @@ impl World {
         self.look(at);
         let Self { truth, noise, pipeline, .. } = self;
         counts.clear();
-        counts.extend(pipeline.counts().iter().map(|clean| {
-            let deviation: f64 = StandardNormal.sample(noise);
-            let read = pipeline.read(*clean, truth.noise_rms_counts * deviation);
+        counts.extend(pipeline.counts().iter().enumerate().map(|(element, clean)| {
+            // Drawn for a stuck element too, so that its fault changes no other's noise.
+            let deviate: f64 = StandardNormal.sample(noise);
+            let noise_rms_counts = match truth.faults.get(&element) {
+                Some(ElementFault::Stuck { counts }) => return *counts,
+                Some(ElementFault::Noisy { noise_rms_counts }) => *noise_rms_counts,
+                Some(ElementFault::Miswired { .. } | ElementFault::Dead) | None => truth.noise_rms_counts,
+            };
+            let read = pipeline.read(*clean, noise_rms_counts * deviate);
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -88,9 +94,15 @@ impl World {
     }
 
     /// The image without noise, in counts, row-major.
-    pub(crate) fn image(&mut self, at: Instant) -> &[f64] {
+    pub(crate) fn image(&mut self, at: Instant) -> Vec<f64> {
         self.look(at);
-        self.pipeline.counts()
+        let read = |(element, clean): (usize, &f64)| match self.truth.faults.get(&element) {
+            Some(ElementFault::Stuck { counts }) => f64::from(*counts),
+            Some(ElementFault::Miswired { .. } | ElementFault::Dead | ElementFault::Noisy { .. }) | None => {
+                *clean
+            }
+        };
+        self.pipeline.counts().iter().enumerate().map(read).collect()
     }
 
     /// Where the tip truly is, in the stage's steps.
@@ -163,8 +175,8 @@ impl World {
     }
 }
 
-fn pipeline(truth: &Truth, covering: Covering, surface_mm: f64) -> Result<Pipeline, EffectError> {
-    Pipeline::new(&truth.sensor(covering, surface_mm)?)
+fn pipeline(truth: &Truth, covering: Covering) -> Result<Pipeline, EffectError> {
+    Pipeline::new(&truth.sensor(covering)?)
 }
 
 fn round_to(value: f64, step: f64) -> f64 {

@@ -16,6 +16,8 @@ use crate::recorder::{InPlace, OnThread};
 use crate::twin::{self, Plan, TwinError};
 use crate::{devices, virtual_time};
 
+pub use tactus_mock::Truth;
+
 /// The rig that needs no hardware, as it is shipped in `config/rigs/sim.toml`.
 pub const SIMULATED_RIG: &str = include_str!("../../../config/rigs/sim.toml");
 
@@ -69,6 +71,15 @@ pub enum EmbeddedError {
     /// The system gave no thread or runtime.
     #[error("no run: {0}")]
     System(#[from] io::Error),
+}
+
+/// What a simulated rig hides from the service, the same in all its runs: what comparisons hold findings against.
+/// The virtual devices are made of this very [`Truth`].
+///
+/// `None` for a rig that hides nothing: one with physical devices, or a description that came with data.
+pub fn truth(rig: &Rig) -> Option<Truth> {
+    let simulation = rig.simulation.as_ref().filter(|_| rig.simulated)?;
+    Some(Truth::of(rig, simulation, simulation.seed))
 }
 
 /// Dry-runs the experiment on the rig's twin and then runs it on the rig, whose devices must be embedded.

@@ -1,12 +1,16 @@
 //! The embedded rig: production drivers and engine against virtual devices, in virtual time.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+use std::collections::BTreeMap;
+
 use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG};
-use tactus_daemon::experiments;
 use tactus_daemon::order::Ask;
+use tactus_daemon::{devices, experiments};
+use tactus_device::Clock;
 use tactus_plan::{Arguments, Script};
 use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
+use tactus_schema::rig::ElementFault;
 use tempfile::TempDir;
 
 fn run(script: Script, arguments: Arguments, rig_toml: &str) -> Result<(Finished, TempDir), EmbeddedError> {
@@ -36,4 +40,38 @@ fn what_the_twin_refuses_leaves_nothing_behind() {
     };
     assert_eq!(plan.outcome.exit_status, ExitStatus::Refused);
     assert!(plan.outcome.message.contains("deep.star:2"), "{}", plan.outcome.message);
+}
+
+#[test]
+fn the_truth_is_the_rig_files_and_the_devices_own() {
+    let toml = SIMULATED_RIG
+        .replace("surface_mm = 0.0", "surface_mm = 0.05\nstuck = [{ element = 5, counts = 812 }]");
+    let rig = Rig::from_toml(&toml).unwrap();
+    let truth = embedded::truth(&rig).unwrap();
+    assert_eq!((truth.surface_mm, truth.noise_rms_counts, truth.model.psf()), (0.05, 2.0, rig.psf));
+    assert!((truth.registration.origin_mm[0] - 20.06).abs() < 1e-12);
+    let response = truth.model.response();
+    assert_eq!(response.quadratic_per_mm, [0.15; 48]);
+    assert!(response.sensitivity_counts_per_mm.iter().all(|gain| (600.0..1400.0).contains(gain)));
+    let faults = [
+        (5, ElementFault::Stuck { counts: 812 }),
+        (18, ElementFault::Miswired { answers_for: 19 }),
+        (22, ElementFault::Miswired { answers_for: 23 }),
+    ];
+    assert_eq!(truth.faults, BTreeMap::from(faults));
+
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
+    let of_the_devices = runtime.unwrap().block_on(async {
+        let service = rig.service.as_ref().unwrap();
+        devices::open(&rig, service, truth.seed, Clock::paused()).control.unwrap().truth()
+    });
+    assert_eq!(format!("{truth:?}"), format!("{of_the_devices:?}"));
+}
+
+#[test]
+fn a_rig_that_hides_nothing_has_no_truth() {
+    let simulated = Rig::from_toml(SIMULATED_RIG).unwrap();
+    let real = Rig { simulated: false, ..simulated.clone() };
+    let of_data = Rig::from_json(&simulated.to_json()).unwrap();
+    assert!(embedded::truth(&real).is_none() && embedded::truth(&of_data).is_none());
 }

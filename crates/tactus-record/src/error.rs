@@ -73,32 +73,38 @@ pub enum RecordError {
     },
 }
 
-/// Why recordings could not be made into a measurement table.
+/// Why recordings and measurement tables gave no rows, or no table could be made of them.
 #[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// No recording was named.
-    #[error("no recording to export")]
+pub enum RowsError {
+    /// No file was named.
+    #[error("no recording or measurement table was named")]
     Nothing,
+    /// The file is of another kind.
+    #[error("{} is neither a recording (MCAP) nor a measurement table (Parquet): only these hold measured rows", path.display())]
+    Neither {
+        /// The file.
+        path: PathBuf,
+    },
     /// A recording could not be read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// The table could not be written.
+    /// A table could not be read or written, or a row breaks its contract.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// One table describes one rig.
-    #[error("{} was made with another rig than {}: export them apart", path.display(), first.display())]
+    /// Rows that stand together are of one rig.
+    #[error("{} was made with another rig than {}: take them apart", path.display(), first.display())]
     RigsDiffer {
-        /// The first recording.
+        /// The first file.
         first: PathBuf,
         /// The one that differs.
         path: PathBuf,
     },
-    /// One run may stand in a table once.
-    #[error("{} holds run {run:?}, which is in the table already", path.display())]
+    /// A run may be taken once.
+    #[error("{} holds run {run:?}, which was taken already", path.display())]
     RunTwice {
-        /// The recording.
+        /// The file.
         path: PathBuf,
-        /// Its run.
+        /// The run.
         run: String,
     },
     /// The stage never said where it was.

@@ -8,10 +8,11 @@
 //! - [`Reader`] streams one, whole or damaged; [`info()`] summarises it; [`recover()`] makes a whole one of a damaged one.
 //! - [`Timeline`] knows where the stage was and what it did at each frame's sampling time.
 //! - [`export()`] makes the measurement table of any number of recordings; [`table`] reads and checks such a table,
-//!   whoever wrote it.
+//!   whoever wrote it; [`rows::visit`] gives the rows of either kind of file.
 //!
 //! Everything here is blocking: callers give it a thread of its own.
 
+pub mod rows;
 pub mod table;
 
 mod channel;
@@ -29,7 +30,7 @@ mod tally;
 mod timeline;
 
 pub use clock::{EpochClock, NoClock};
-pub use error::{ExportError, RecordError};
+pub use error::{RecordError, RowsError};
 pub use export::{ExportSummary, export};
 pub use header::{Attachment, Header, RunMetadata, Script};
 pub use info::{AttachmentInfo, Info, exit_status_name, info};

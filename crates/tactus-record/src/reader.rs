@@ -67,15 +67,10 @@ pub struct Reader<R = BufReader<File>> {
 /// If the file cannot be read or does not begin as an MCAP file.
 pub fn read(path: impl AsRef<Path>) -> Result<Reader, RecordError> {
     let path = path.as_ref();
-    let failed = |action, source| RecordError::Io { action, path: path.to_owned(), source };
-    let mut start = Vec::new();
-    let file = File::open(path).map_err(|error| failed("open", error))?;
-    file.take(mcap::MAGIC.len() as u64).read_to_end(&mut start).map_err(|error| failed("read", error))?;
-    if start != mcap::MAGIC {
+    if first_bytes(path)? != mcap::MAGIC {
         return Err(RecordError::NotMcap { path: path.to_owned() });
     }
-    let file = File::open(path).map_err(|error| failed("open", error))?;
-    Ok(Reader::new(BufReader::with_capacity(64 * 1024, file)))
+    Ok(Reader::new(BufReader::with_capacity(64 * 1024, open(path)?)))
 }
 
 /// Opens a recording and reads up to the record that says which run it is.
@@ -89,6 +84,18 @@ pub(crate) fn read_run(path: &Path) -> Result<(RunMetadata, Reader), RecordError
         }
     }
     Err(RecordError::NoRun { path: path.to_owned() })
+}
+
+/// As many bytes as MCAP's magic has, or all if there are fewer: they tell kinds of files apart.
+pub(crate) fn first_bytes(path: &Path) -> Result<Vec<u8>, RecordError> {
+    let mut start = Vec::new();
+    let mut bytes = open(path)?.take(mcap::MAGIC.len() as u64);
+    bytes.read_to_end(&mut start).map_err(|source| io_error(path, source))?;
+    Ok(start)
+}
+
+fn open(path: &Path) -> Result<File, RecordError> {
+    File::open(path).map_err(|source| RecordError::Io { action: "open", path: path.to_owned(), source })
 }
 
 pub(crate) fn io_error(path: &Path, source: io::Error) -> RecordError {

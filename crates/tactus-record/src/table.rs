@@ -21,6 +21,9 @@ use tactus_schema::{
 pub use error::TableError;
 pub use write::TableWriter;
 
+pub(crate) use check::Checker;
+pub(crate) use read::TableReader;
+
 /// A checked measurement table in memory, by columns.
 #[derive(Debug, Clone)]
 pub struct Table {
@@ -94,7 +97,10 @@ pub struct Validated {
 /// [`TableError`] names the column, and the row where there is one.
 pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
     let mut rows = Rows::default();
-    let head = read::visit(path.as_ref(), |row| rows.push(row))?;
+    let head = TableReader::open(path.as_ref())?.visit(|row| {
+        rows.push(row);
+        Ok::<_, TableError>(())
+    })?;
     Ok(rows.into_table(head))
 }
 
@@ -104,12 +110,13 @@ pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
 /// As [`read()`].
 pub fn validate(path: impl AsRef<Path>) -> Result<Validated, TableError> {
     let (mut rows, mut runs, mut last) = (0, 0, String::new());
-    let head = read::visit(path.as_ref(), |row| {
+    let head = TableReader::open(path.as_ref())?.visit(|row| {
         rows += 1;
         if rows == 1 || last != row.run {
             runs += 1;
             row.run.clone_into(&mut last);
         }
+        Ok::<_, TableError>(())
     })?;
     Ok(Validated { head, rows, runs })
 }

@@ -12,7 +12,7 @@ use std::{
 
 use synthetic::{Fed, Plan, Run, TICK_NS};
 use tactus_record::{
-    ExportError, Recording, export,
+    Recording, RowsError, export,
     table::{self, Table},
 };
 use tactus_schema::{Rig, pb, table::Phase};
@@ -232,7 +232,7 @@ fn runs_follow_each_other_in_one_table() {
 
     let out = dir.path().join("twice.parquet");
     let twice = export(&[&first, &first], &out).unwrap_err();
-    assert!(matches!(&twice, ExportError::RunTwice { run, .. } if run == "first"), "{twice}");
+    assert!(matches!(&twice, RowsError::RunTwice { run, .. } if run == "first"), "{twice}");
     assert!(!out.exists() && fs::read_dir(dir.path()).unwrap().count() == 3, "nothing is left behind");
 }
 
@@ -245,7 +245,7 @@ fn runs_on_different_rigs_do_not_mix() {
     let second = dir.path().join("second.mcap");
     other.record(&second).unwrap();
     let error = export(&[&first, &second], dir.path().join("out.parquet")).unwrap_err();
-    assert!(matches!(error, ExportError::RigsDiffer { .. }), "{error}");
+    assert!(matches!(error, RowsError::RigsDiffer { .. }), "{error}");
 }
 
 #[test]
@@ -260,8 +260,8 @@ fn a_recording_without_positions_is_refused() {
         true
     });
     let error = export(&[&path], dir.path().join("out.parquet")).unwrap_err();
-    assert!(matches!(error, ExportError::NoStage { .. }), "{error}");
-    assert!(matches!(export::<PathBuf>(&[], dir.path().join("out.parquet")), Err(ExportError::Nothing)));
+    assert!(matches!(error, RowsError::NoStage { .. }), "{error}");
+    assert!(matches!(export::<PathBuf>(&[], dir.path().join("out.parquet")), Err(RowsError::Nothing)));
 }
 
 #[test]
@@ -278,7 +278,7 @@ fn a_frame_of_another_array_is_refused_with_its_row() {
         true
     });
     let error = export(&[&path], dir.path().join("out.parquet")).unwrap_err();
-    let ExportError::Table(error) = error else { panic!("{error}") };
+    let RowsError::Table(error) = error else { panic!("{error}") };
     assert_eq!((error.row(), error.column()), (Some(17), Some("counts")));
 }
 

@@ -194,8 +194,8 @@ pub struct Simulation {
     pub registration_error: RegistrationError,
     /// True height of the covering's surface where the service believes 0.
     pub surface_mm: f64,
-    /// Cross-wired elements: `element` answers for `answers_for`.
-    pub miswired: Vec<Miswired>,
+    /// What is wrong with elements, by index: in the file, the lists `miswired`, `dead`, `stuck` and `noisy`.
+    pub faults: BTreeMap<usize, ElementFault>,
     /// The stage's true kinematics.
     pub stage: SimulatedStage,
 }
@@ -209,13 +209,26 @@ pub struct RegistrationError {
     pub rotation_deg: f64,
 }
 
-/// An element that answers for another (the paper's two faulty elements).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Miswired {
-    /// Index of the faulty element.
-    pub element: usize,
-    /// Index of the element whose signal it gives.
-    pub answers_for: usize,
+/// What is wrong with a simulated element.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ElementFault {
+    /// It gives the signal of another, by its own gain (the paper's two faulty elements).
+    Miswired {
+        /// Index of the other.
+        answers_for: usize,
+    },
+    /// It answers to nothing: its baseline, and its noise.
+    Dead,
+    /// It always reads the same, without noise.
+    Stuck {
+        /// What it reads; within full scale.
+        counts: u16,
+    },
+    /// It has a noise of its own.
+    Noisy {
+        /// Standard deviation of its noise.
+        noise_rms_counts: f64,
+    },
 }
 
 /// The virtual platen-forcer.

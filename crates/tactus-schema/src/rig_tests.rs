@@ -45,6 +45,39 @@ fn contradictions_are_refused_with_their_field() {
 }
 
 #[test]
+fn a_simulated_element_has_one_fault_at_most() {
+    let with = |faults: &str| {
+        Rig::from_toml(&SIM.replace("[simulation.stage]", &format!("{faults}\n[simulation.stage]")))
+    };
+    let rig = with(
+        "dead = [3]\nstuck = [{ element = 5, counts = 812 }]\nnoisy = [{ element = 7, noise_rms_counts = 25 }]",
+    );
+    let want = BTreeMap::from([
+        (3, ElementFault::Dead),
+        (5, ElementFault::Stuck { counts: 812 }),
+        (7, ElementFault::Noisy { noise_rms_counts: 25.0 }),
+        (18, ElementFault::Miswired { answers_for: 19 }),
+        (22, ElementFault::Miswired { answers_for: 23 }),
+    ]);
+    assert_eq!(rig.unwrap().simulation.unwrap().faults, want);
+
+    for (faults, refusal) in [
+        ("dead = [48]", "simulation.dead: elements are 0 to 47"),
+        ("dead = [3, 3]", "simulation.dead: element 3 has a fault already"),
+        ("dead = [18]", "simulation.dead: element 18 has a fault already"),
+        ("stuck = [{ element = 48, counts = 0 }]", "simulation.stuck: elements are 0 to 47"),
+        ("stuck = [{ element = 5, counts = 4096 }]", "simulation.stuck: counts are 0 to 4095, not 4096"),
+        ("noisy = [{ element = 7, noise_rms_counts = -1.0 }]", "simulation.noisy"),
+        ("noisy = [{ element = 22, noise_rms_counts = 1.0 }]", "simulation.noisy: element 22 has a fault"),
+    ] {
+        let error = with(faults).unwrap_err().to_string();
+        assert!(error.starts_with(refusal), "{faults}: {error}");
+    }
+    let error = refused("answers_for = 19", "answers_for = 18");
+    assert!(error.starts_with("simulation.miswired: element 18 answers for itself"), "{error}");
+}
+
+#[test]
 fn the_json_that_goes_with_data_reads_back_without_links_limits_and_secrets() {
     let rig = Rig::from_toml(SIM).unwrap();
     let back = Rig::from_json(&rig.to_json()).unwrap();

@@ -1,13 +1,13 @@
 //! What the contract asks of values.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, path::Path};
 
 use tactus_schema::Rig;
 
-use super::RowView;
+use super::{RowView, TableError};
 
 /// Checks rows in the order in which they stand in the table.
-pub(super) struct Checker {
+pub(crate) struct Checker {
     elements: usize,
     indenters: BTreeSet<String>,
     run: Option<String>,
@@ -17,13 +17,13 @@ pub(super) struct Checker {
 
 /// What is wrong with a row.
 #[derive(Debug, PartialEq)]
-pub(super) struct Fault {
-    pub(super) column: &'static str,
-    pub(super) problem: String,
+pub(crate) struct Fault {
+    column: &'static str,
+    problem: String,
 }
 
 impl Checker {
-    pub(super) fn new(rig: &Rig) -> Self {
+    pub(crate) fn new(rig: &Rig) -> Self {
         Self {
             elements: rig.array.elements(),
             indenters: rig.indenters.keys().cloned().collect(),
@@ -33,7 +33,7 @@ impl Checker {
         }
     }
 
-    pub(super) fn check(&mut self, row: &RowView<'_>) -> Result<(), Fault> {
+    pub(crate) fn check(&mut self, row: &RowView<'_>) -> Result<(), Fault> {
         self.order(row)?;
         if row.press < -1 {
             return Err(fault(
@@ -80,6 +80,13 @@ impl Checker {
         }
         self.last_t_ns = row.t_ns;
         Ok(())
+    }
+}
+
+impl Fault {
+    /// The fault of a row of a file.
+    pub(crate) fn at(self, path: &Path, row: u64) -> TableError {
+        TableError::Value { path: path.to_owned(), row, column: self.column, problem: self.problem }
     }
 }
 

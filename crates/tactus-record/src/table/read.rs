@@ -4,7 +4,7 @@ use std::{
     collections::BTreeMap,
     fs::File,
     panic::{self, AssertUnwindSafe},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use parquet::{
@@ -26,28 +26,59 @@ use super::{
     layout::{CONTRACT, find},
 };
 
-/// Gives every row to `take`, in order, once it has passed; one row group at a time is in memory.
-pub(super) fn visit(path: &Path, mut take: impl FnMut(RowView<'_>)) -> Result<Head, TableError> {
-    let file = File::open(path);
-    let file = file.map_err(|source| TableError::Io { action: "open", path: path.to_owned(), source })?;
-    let failed = |source| TableError::Parquet { path: path.to_owned(), source };
-    let bytes = file
-        .metadata()
-        .map_err(|source| TableError::Io { action: "read", path: path.to_owned(), source })?
-        .len();
-    let reader = SerializedFileReader::new(file).map_err(failed)?;
-    within(reader.metadata(), bytes).map_err(failed)?;
-    let head = head(path, reader.metadata())?;
-    let leaves = leaves(path, reader.metadata())?;
-    let mut checker = Checker::new(&head.rig);
-    let mut first_row = 0;
-    for index in 0..reader.num_row_groups() {
-        let group = reader.get_row_group(index).map_err(failed)?;
-        let source = Source { path, group: group.as_ref(), first_row };
-        let group = undamaged(path, index, || Group::read(&source, &leaves))?;
-        first_row += group.visit(&source, &mut checker, &mut take)?;
+/// A table whose head was read and whose rows are still to be.
+pub(crate) struct TableReader {
+    path: PathBuf,
+    file: SerializedFileReader<File>,
+    head: Head,
+    /// Indices of the leaves of the contract's columns, in the contract's order.
+    leaves: [usize; CONTRACT.len()],
+}
+
+impl TableReader {
+    /// Opens a table.
+    pub(crate) fn open(path: &Path) -> Result<Self, TableError> {
+        let file = File::open(path);
+        let file = file.map_err(|source| TableError::Io { action: "open", path: path.to_owned(), source })?;
+        let failed = |source| TableError::Parquet { path: path.to_owned(), source };
+        let bytes = file
+            .metadata()
+            .map_err(|source| TableError::Io { action: "read", path: path.to_owned(), source })?
+            .len();
+        let file = SerializedFileReader::new(file).map_err(failed)?;
+        within(file.metadata(), bytes).map_err(failed)?;
+        let head = head(path, file.metadata())?;
+        let leaves = leaves(path, file.metadata())?;
+        Ok(Self { path: path.to_owned(), file, head, leaves })
     }
-    Ok(head)
+
+    /// The file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What it says of all its rows.
+    pub(crate) fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// Gives every row to `take`, in order, once it has passed; one row group at a time is in memory.
+    pub(crate) fn visit<E: From<TableError>>(
+        self,
+        mut take: impl FnMut(RowView<'_>) -> Result<(), E>,
+    ) -> Result<Head, E> {
+        let Self { path, file, head, leaves } = self;
+        let mut checker = Checker::new(&head.rig);
+        let mut first_row = 0;
+        for index in 0..file.num_row_groups() {
+            let group = file.get_row_group(index);
+            let group = group.map_err(|source| TableError::Parquet { path: path.clone(), source })?;
+            let source = Source { path: &path, group: group.as_ref(), first_row };
+            let group = undamaged(&path, index, || Group::read(&source, &leaves))?;
+            first_row += group.visit(&source, &mut checker, &mut take)?;
+        }
+        Ok(head)
+    }
 }
 
 /// Checks that every column lies within the file, which the library takes for granted.
@@ -92,7 +123,6 @@ fn head(path: &Path, metadata: &ParquetMetaData) -> Result<Head, TableError> {
     }
 }
 
-/// Indices of the leaves of the contract's columns, in the contract's order.
 fn leaves(path: &Path, metadata: &ParquetMetaData) -> Result<[usize; CONTRACT.len()], TableError> {
     let schema = metadata.file_metadata().schema_descr();
     let mut leaves = [0; CONTRACT.len()];
@@ -138,12 +168,12 @@ impl Group {
     }
 
     /// Checks and gives every row; the number of rows.
-    fn visit(
+    fn visit<E: From<TableError>>(
         &self,
         source: &Source<'_>,
         checker: &mut Checker,
-        take: &mut impl FnMut(RowView<'_>),
-    ) -> Result<u64, TableError> {
+        take: &mut impl FnMut(RowView<'_>) -> Result<(), E>,
+    ) -> Result<u64, E> {
         for row in 0..self.t_ns.len() {
             let phase = Phase::from_name(&self.phase[row]).ok_or_else(|| {
                 let known = Phase::ALL.map(Phase::name).join(", ");
@@ -160,8 +190,9 @@ impl Group {
                 temperature_c: self.temperature_c[row],
                 counts: self.counts.row(row),
             };
-            checker.check(&view).map_err(|fault| source.fault(row, fault.column, fault.problem))?;
-            take(view);
+            let number = source.first_row + row as u64;
+            checker.check(&view).map_err(|fault| fault.at(source.path, number))?;
+            take(view)?;
         }
         Ok(self.t_ns.len() as u64)
     }

@@ -87,12 +87,12 @@ impl TableWriter {
     /// # Errors
     /// If it breaks the contract or cannot be written.
     pub fn push(&mut self, row: RowView<'_>) -> Result<(), TableError> {
-        self.checker.check(&row).map_err(|fault| TableError::Value {
-            path: self.path.clone(),
-            row: self.rows,
-            column: fault.column,
-            problem: fault.problem,
-        })?;
+        self.checker.check(&row).map_err(|fault| fault.at(&self.path, self.rows))?;
+        self.put(row)
+    }
+
+    /// Adds a row that has passed already.
+    pub(crate) fn put(&mut self, row: RowView<'_>) -> Result<(), TableError> {
         self.group.push(&row);
         self.rows += 1;
         if self.group.t_ns.len() >= GROUP_ROWS { self.close_group() } else { Ok(()) }

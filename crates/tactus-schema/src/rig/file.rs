@@ -166,7 +166,7 @@ impl RawRig {
             },
             sensitivity_reference: reference,
             service: service::check(self.envelope, self.motion, self.policy, self.sensor, self.stage)?,
-            simulation: self.simulation.map(|simulation| simulation.check(elements)).transpose()?,
+            simulation: self.simulation.map(|simulation| simulation.check(&array)).transpose()?,
             array,
             indenters,
         };

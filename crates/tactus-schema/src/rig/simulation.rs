@@ -1,10 +1,12 @@
 //! What the virtual devices of a simulated rig hide, as the rig file writes it.
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
-use tactus_model::Registration;
+use tactus_model::{Array, Registration};
 
 use super::registration::RawRegistration;
-use super::{Miswired, RegistrationError, SimulatedStage, Simulation};
+use super::{ElementFault, RegistrationError, SimulatedStage, Simulation};
 use crate::description::{WrongField, finite, not_negative, positive, range, wrong};
 
 #[derive(Debug, Deserialize)]
@@ -18,6 +20,12 @@ pub(super) struct RawSimulation {
     registration_error: RawRegistration,
     #[serde(default)]
     miswired: Vec<RawMiswired>,
+    #[serde(default)]
+    dead: Vec<usize>,
+    #[serde(default)]
+    stuck: Vec<RawStuck>,
+    #[serde(default)]
+    noisy: Vec<RawNoisy>,
     stage: RawSimulatedStage,
 }
 
@@ -26,6 +34,20 @@ pub(super) struct RawSimulation {
 struct RawMiswired {
     element: usize,
     answers_for: usize,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawStuck {
+    element: usize,
+    counts: u16,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawNoisy {
+    element: usize,
+    noise_rms_counts: f64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -39,10 +61,10 @@ struct RawSimulatedStage {
 }
 
 impl RawSimulation {
-    pub(super) fn check(self, elements: usize) -> Result<Simulation, WrongField> {
+    pub(super) fn check(self, array: &Array) -> Result<Simulation, WrongField> {
+        let faults = self.faults(array)?;
         let Registration { origin_mm, rotation_deg } =
             self.registration_error.check("simulation.registration_error")?;
-        let miswired = self.miswired.into_iter().map(|raw| raw.check(elements));
         Ok(Simulation {
             seed: self.seed,
             noise_rms_counts: not_negative("simulation.noise_rms_counts", self.noise_rms_counts)?,
@@ -50,20 +72,46 @@ impl RawSimulation {
             quadratic_per_mm: finite("simulation.quadratic_per_mm", self.quadratic_per_mm)?,
             surface_mm: finite("simulation.surface_mm", self.surface_mm)?,
             registration_error: RegistrationError { origin_mm, rotation_deg },
-            miswired: miswired.collect::<Result<_, _>>()?,
+            faults,
             stage: self.stage.check()?,
         })
     }
-}
 
-impl RawMiswired {
-    fn check(self, elements: usize) -> Result<Miswired, WrongField> {
-        let Self { element, answers_for } = self;
-        if element < elements && answers_for < elements {
-            Ok(Miswired { element, answers_for })
-        } else {
-            Err(wrong("simulation.miswired", format!("elements are 0 to {}", elements - 1)))
+    /// The four lists as one: an element has one fault at most.
+    fn faults(&self, array: &Array) -> Result<BTreeMap<usize, ElementFault>, WrongField> {
+        let mut faults = BTreeMap::new();
+        let mut add = |list: &str, element, fault| {
+            within(list, element, array)?;
+            match faults.insert(element, fault) {
+                None => Ok(()),
+                Some(_) => Err(wrong(list, format!("element {element} has a fault already: one at most"))),
+            }
+        };
+        for &RawMiswired { element, answers_for } in &self.miswired {
+            let list = "simulation.miswired";
+            within(list, answers_for, array)?;
+            if element == answers_for {
+                return Err(wrong(list, format!("element {element} answers for itself; name another")));
+            }
+            add(list, element, ElementFault::Miswired { answers_for })?;
         }
+        for &element in &self.dead {
+            add("simulation.dead", element, ElementFault::Dead)?;
+        }
+        for &RawStuck { element, counts } in &self.stuck {
+            let list = "simulation.stuck";
+            if f64::from(counts) > array.full_scale_counts() {
+                let problem = format!("counts are 0 to {}, not {counts}", array.full_scale_counts());
+                return Err(wrong(list, problem));
+            }
+            add(list, element, ElementFault::Stuck { counts })?;
+        }
+        for &RawNoisy { element, noise_rms_counts } in &self.noisy {
+            let list = "simulation.noisy";
+            let noise_rms_counts = not_negative(list, noise_rms_counts)?;
+            add(list, element, ElementFault::Noisy { noise_rms_counts })?;
+        }
+        Ok(faults)
     }
 }
 
@@ -82,5 +130,13 @@ impl RawSimulatedStage {
                 range(field("travel_mm[2]"), z_mm)?,
             ],
         })
+    }
+}
+
+fn within(list: &str, element: usize, array: &Array) -> Result<(), WrongField> {
+    if element < array.elements() {
+        Ok(())
+    } else {
+        Err(wrong(list, format!("elements are 0 to {}", array.elements() - 1)))
     }
 }

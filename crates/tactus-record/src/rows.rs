@@ -1,0 +1,215 @@
+//! Measured rows, of recordings and measurement tables alike.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use tactus_schema::{Frame, MonoTime, Rig};
+
+use crate::{
+    Completeness, Entry, Message, RowsError, Sampling, Timeline,
+    reader::{first_bytes, io_error, read_run},
+    table::{Checker, RowView, TableReader},
+};
+
+/// The first bytes of a Parquet file.
+const PARQUET_MAGIC: &[u8] = b"PAR1";
+
+/// Where rows came from.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The rig that was measured, as the first file describes it; covering and tool stand in the rows.
+    pub rig: Rig,
+    /// The runs, in the order of their rows.
+    pub runs: Vec<RunSource>,
+    /// What a reader of the rows should know, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Where the rows of one run came from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunSource {
+    /// Run id.
+    pub run: String,
+    /// The recording or table.
+    pub path: PathBuf,
+    /// True if no physical sensor was read.
+    pub simulated: bool,
+}
+
+/// Gives every row of recordings and measurement tables to `take`, file after file, in the order given.
+///
+/// A file is taken for what its first bytes say, whatever its name. The rows of a recording, whole or damaged, are
+/// those that [`export`](crate::export()) writes; the rows of a table are those that stand in it. Each is checked
+/// before it is given; no more than a few dozen bytes a frame of one recording, or one row group of one table, is in
+/// memory.
+///
+/// # Errors
+/// If a file is neither, cannot be read, was made with another rig or holds a run of a file before; if a recording
+/// holds no stage position; or if a row breaks the table's contract. Rows before it have then been given.
+pub fn visit<P: AsRef<Path>>(paths: &[P], mut take: impl FnMut(RowView<'_>)) -> Result<Source, RowsError> {
+    let mut gathered = Gathered::default();
+    let mut take = |row: RowView<'_>| {
+        take(row);
+        Ok(())
+    };
+    for path in paths.iter().map(AsRef::as_ref) {
+        let start = first_bytes(path)?;
+        if start == mcap::MAGIC {
+            gathered.recording(&Timeline::read(path)?, &mut take)?;
+        } else if start.starts_with(PARQUET_MAGIC) {
+            gathered.table(TableReader::open(path)?, &mut take)?;
+        } else {
+            return Err(RowsError::Neither { path: path.to_owned() });
+        }
+    }
+    gathered.into_source()
+}
+
+/// Files that go together.
+#[derive(Debug, Default)]
+pub(crate) struct Gathered {
+    /// The first file, and its rig.
+    first: Option<(PathBuf, Rig)>,
+    runs: Vec<RunSource>,
+    warnings: Vec<String>,
+}
+
+impl Gathered {
+    /// Gives the rows of a recording.
+    pub(crate) fn recording(
+        &mut self,
+        timeline: &Timeline,
+        mut take: impl FnMut(RowView<'_>) -> Result<(), RowsError>,
+    ) -> Result<(), RowsError> {
+        let (path, run) = (timeline.path(), timeline.run());
+        self.same_rig(path, timeline.rig())?;
+        self.new_run(path, &run.run_id, run.simulated)?;
+        if timeline.stage().is_empty() {
+            return Err(RowsError::NoStage { path: path.to_owned() });
+        }
+        let mut frames = Frames { timeline, last: None, moved: 0, by_arrival: 0 };
+        let mut checker = Checker::new(timeline.rig());
+        let mut index = 0;
+        let (_, reader) = read_run(path)?;
+        for entry in reader {
+            let entry = entry.map_err(|source| io_error(path, source))?;
+            if let Entry::Message { message: Message::Frame(frame), .. } = entry {
+                let row = frames.row(&frame)?;
+                checker.check(&row).map_err(|fault| fault.at(path, index))?;
+                take(row)?;
+                index += 1;
+            }
+        }
+        self.warnings.extend(frames.warnings());
+        Ok(())
+    }
+
+    /// Gives the rows of a table.
+    fn table(
+        &mut self,
+        table: TableReader,
+        mut take: impl FnMut(RowView<'_>) -> Result<(), RowsError>,
+    ) -> Result<(), RowsError> {
+        let (path, rig) = (table.path().to_owned(), &table.head().rig);
+        let (simulated, before) = (rig.simulated, self.runs.len());
+        self.same_rig(&path, rig)?;
+        table.visit(|row| {
+            if self.runs[before..].last().is_none_or(|last| last.run != row.run) {
+                self.new_run(&path, row.run, simulated)?;
+            }
+            take(row)
+        })?;
+        Ok(())
+    }
+
+    /// What was gathered.
+    pub(crate) fn into_source(self) -> Result<Source, RowsError> {
+        let Self { first, runs, warnings } = self;
+        let (_, rig) = first.ok_or(RowsError::Nothing)?;
+        Ok(Source { rig, runs, warnings })
+    }
+
+    fn same_rig(&mut self, path: &Path, rig: &Rig) -> Result<(), RowsError> {
+        let (first, first_rig) = self.first.get_or_insert_with(|| (path.to_owned(), rig.clone()));
+        if permanent(first_rig) == permanent(rig) {
+            Ok(())
+        } else {
+            Err(RowsError::RigsDiffer { first: first.clone(), path: path.to_owned() })
+        }
+    }
+
+    fn new_run(&mut self, path: &Path, run: &str, simulated: bool) -> Result<(), RowsError> {
+        let (path, run) = (path.to_owned(), run.to_owned());
+        if self.runs.iter().any(|known| known.run == run) {
+            return Err(RowsError::RunTwice { path, run });
+        }
+        self.runs.push(RunSource { run, path, simulated });
+        Ok(())
+    }
+}
+
+/// What must be the same in all runs; covering and tool stand in the rows.
+fn permanent(rig: &Rig) -> Rig {
+    Rig { covering: rig.sensitivity_reference.covering, indenter: String::new(), ..rig.clone() }
+}
+
+/// Turns the frames of one recording into rows.
+struct Frames<'a> {
+    timeline: &'a Timeline,
+    last: Option<MonoTime>,
+    /// Frames whose sampling time was not after the one before.
+    moved: u64,
+    by_arrival: u64,
+}
+
+impl Frames<'_> {
+    fn row<'a>(&'a mut self, frame: &'a Frame) -> Result<RowView<'a>, RowsError> {
+        let timeline = self.timeline;
+        let sampling = timeline.sampling(frame);
+        self.by_arrival += u64::from(matches!(sampling, Sampling::Arrival(_)));
+        let mut at = sampling.time();
+        if let Some(last) = self.last.filter(|last| at <= *last) {
+            at = last.after(Duration::from_nanos(1));
+            self.moved += 1;
+        }
+        self.last = Some(at);
+        let position_mm = timeline.position_mm(at);
+        let position_mm =
+            position_mm.ok_or_else(|| RowsError::NoStage { path: timeline.path().to_owned() })?;
+        let (phase, press) = timeline.phase(at);
+        Ok(RowView {
+            run: &timeline.run().run_id,
+            press,
+            phase,
+            t_ns: at.ns(),
+            position_mm,
+            covering_mm: timeline.covering_mm(at),
+            indenter: timeline.indenter(),
+            temperature_c: None,
+            counts: &frame.counts,
+        })
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let Self { timeline, moved, by_arrival, .. } = *self;
+        let mut warnings = Vec::new();
+        if let Completeness::Truncated { at_byte, reason } = timeline.completeness() {
+            warnings.push(format!("the recording is readable up to byte {at_byte} only: {reason}"));
+        }
+        for (epoch, clock) in timeline.clocks() {
+            if let Err(absent) = clock {
+                warnings.push(format!("connection {epoch}: {absent}; its frames are dated by their arrival"));
+            }
+        }
+        if by_arrival > 0 {
+            warnings.push(format!("{by_arrival} frames are dated by their arrival"));
+        }
+        if moved > 0 {
+            warnings.push(format!("{moved} frames did not come after the one before; moved to do so"));
+        }
+        let run = &timeline.run().run_id;
+        warnings.into_iter().map(|warning| format!("run {run}: {warning}")).collect()
+    }
+}
