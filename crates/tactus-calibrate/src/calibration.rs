@@ -23,7 +23,7 @@ pub struct Calibration {
     pub data: Data,
     /// Noise of the median element at rest, in counts.
     pub noise_rms_counts: Option<f64>,
-    /// Each element's reading at rest, with its scatter from rest to rest as the error.
+    /// Each element's reading at rest.
     pub baseline_counts: Vec<Option<Estimate>>,
     /// Faulty elements.
     pub health: Health,
@@ -206,6 +206,13 @@ impl Calibration {
         }
         if let Some(registration) = &self.registration {
             self.remark_registration(&registration.clone());
+        }
+        if self.registration.is_none() && self.response.is_some() {
+            self.warnings.push(
+                "Sensitivities rest on the declared place, surface and spread: as far as these are nominal, they are slopes at \
+                 the place that was pressed, not the elements' own."
+                    .into(),
+            );
         }
         if let Some(response) = &self.response {
             let without: Vec<usize> = (0..readings.elements)

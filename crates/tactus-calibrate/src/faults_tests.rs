@@ -1,0 +1,62 @@
+use super::*;
+use crate::{lab::Lab, lab::THIN_MM, readings::Readings};
+
+fn health(declared: &Declared, readings: &Readings) -> Health {
+    let place = Place::declared(declared, THIN_MM);
+    examine(declared, readings, &place)
+}
+
+#[test]
+fn a_sound_sensor_is_accused_of_nothing() {
+    let mut lab = Lab::new(1);
+    lab.centres();
+    let (declared, readings) = lab.readings();
+    assert_eq!(health(&declared, &readings), Health { faults: Vec::new(), not_judged: Vec::new() });
+}
+
+#[test]
+fn each_kind_of_fault_is_found_and_named() {
+    let mut lab = Lab::new(2);
+    lab.spoil = Box::new(|counts, _| {
+        counts[5] = 100.0;
+        counts[18] = counts[19];
+        // A noise that the dice of the lab do not throw: it swings.
+        counts[30] += if (counts[30] * 1e6).to_bits() & 1 == 0 { 30.0 } else { -30.0 };
+    });
+    lab.centres();
+    let (declared, mut readings) = lab.readings();
+    readings.constant_counts[40] = Some(812.0);
+    readings.noise_rms_counts[30] = Some(30.0);
+    let kinds: Vec<(usize, FaultKind)> =
+        health(&declared, &readings).faults.into_iter().map(|fault| (fault.element, fault.kind)).collect();
+    assert_eq!(
+        kinds,
+        [
+            (5, FaultKind::Dead),
+            (18, FaultKind::CrossWired { answers_for: 19 }),
+            (30, FaultKind::Noisy { rms_counts: 30.0 }),
+            (40, FaultKind::Stuck { counts: 812.0 }),
+        ]
+    );
+}
+
+#[test]
+fn elements_that_nobody_pressed_are_not_judged() {
+    let mut lab = Lab::new(3);
+    for element in [9, 10, 17, 18, 19] {
+        lab.press(lab.centre_mm(element), THIN_MM, &[0.3]);
+    }
+    let (declared, readings) = lab.readings();
+    let health = health(&declared, &readings);
+    assert!(health.faults.is_empty(), "{health:?}");
+    assert!(health.not_judged.contains(&47) && !health.not_judged.contains(&10), "{:?}", health.not_judged);
+}
+
+#[test]
+fn elements_that_fall_when_pressed_are_sound() {
+    let mut lab = Lab::new(4);
+    lab.spoil = Box::new(|counts, _| counts.iter_mut().for_each(|count| *count = 3000.0 - *count));
+    lab.centres();
+    let (declared, readings) = lab.readings();
+    assert!(health(&declared, &readings).faults.is_empty());
+}

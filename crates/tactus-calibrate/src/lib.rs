@@ -9,6 +9,8 @@
 mod calibration;
 mod estimate;
 mod faults;
+#[cfg(test)]
+mod lab;
 mod least_squares;
 mod readings;
 mod registration;

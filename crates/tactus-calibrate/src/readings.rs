@@ -10,6 +10,8 @@ use segment::{Kind, Segment};
 
 /// Above this height nothing touches the covering, however wrong the believed surface may be.
 const CLEAR_MM: f64 = 0.3;
+/// A press that holds so many depths shows by these how an element answers.
+const STEPS_LEAST: usize = 3;
 
 /// One row of the measurement table.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +44,7 @@ pub struct Readings {
     /// Of each element, its standard deviation at rest, at least that of rounding to the converter's step; none of an
     /// element that was never at rest.
     pub noise_rms_counts: Vec<Option<f64>>,
-    /// Of each element, its mean at rest and the scatter of that from one rest to the next.
+    /// Of each element, its mean at rest, and the standard error of that from its scatter between rests.
     pub rest_counts: Vec<Option<[f64; 2]>>,
     /// Of each element, its reading if that was the same in every frame.
     pub constant_counts: Vec<Option<f32>>,
@@ -69,7 +71,7 @@ pub struct Press {
     pub indenter: Arc<str>,
     /// The reading at rest before it, if there was one.
     pub rest: Option<Rest>,
-    /// Its dwells, in order of time: where depths were held, the mean of each; else every frame of its loading.
+    /// Its dwells, in order of time: where depths were held, the mean of each; else every frame of its loading too.
     pub dwells: Vec<Dwell>,
 }
 
@@ -131,6 +133,12 @@ impl Press {
     /// The dwell that went deepest.
     pub fn deepest(&self) -> Option<&Dwell> {
         self.dwells.iter().min_by(|a, b| a.height_mm.total_cmp(&b.height_mm))
+    }
+}
+
+impl Press {
+    fn held(&self) -> usize {
+        self.dwells.iter().filter(|dwell| dwell.held).count()
     }
 }
 
@@ -202,8 +210,9 @@ impl Gather {
         self.end_press();
         let Self { mut readings, noise, range_counts, step_counts, .. } = self;
         readings.presses.retain(|press| !press.dwells.is_empty());
-        // Frames in motion are for a press that is all there is: one place, one depth.
-        if distinct_depths(&readings.presses) > 1 || distinct_places(readings.presses.iter().map(|press| press.place_mm)).len() > 1 {
+        // Frames in motion are for presses that are all there is: at one place, with hardly a depth held.
+        let stepped = readings.presses.iter().any(|press| press.held() >= STEPS_LEAST);
+        if stepped || distinct_places(readings.presses.iter().map(|press| press.place_mm)).len() > 1 {
             for press in &mut readings.presses {
                 press.dwells.retain(|dwell| dwell.held);
             }
@@ -289,22 +298,14 @@ impl Noise {
         (self.freedom > 0.0).then(|| (self.squares / self.freedom).sqrt())
     }
 
-    /// Mean over the rests, and the standard deviation of one rest's mean from it.
+    /// Mean over the rests, and its standard error.
     fn mean(&self) -> Option<[f64; 2]> {
         let rests = self.means.len() as f64;
         let mean = (rests > 0.0).then(|| self.means.iter().sum::<f64>() / rests)?;
         let squares: f64 = self.means.iter().map(|rest| (rest - mean).powi(2)).sum();
-        Some([mean, if rests > 1.0 { (squares / (rests - 1.0)).sqrt() } else { 0.0 }])
+        let variance = if rests > 1.0 { squares / (rests - 1.0) / rests } else { self.squares / self.freedom.powi(2) };
+        Some([mean, variance.sqrt()])
     }
-}
-
-/// Number of depths, 10 um apart, that were held.
-fn distinct_depths(presses: &[Press]) -> usize {
-    let held = presses.iter().flat_map(|press| press.dwells.iter().filter(|dwell| dwell.held));
-    let mut heights: Vec<f64> = held.map(|dwell| dwell.height_mm).collect();
-    heights.sort_by(f64::total_cmp);
-    heights.dedup_by(|next, last| *next - *last < 0.01);
-    heights.len()
 }
 
 /// Places at least 50 um apart that were pressed, in order.

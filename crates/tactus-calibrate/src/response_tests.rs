@@ -1,0 +1,76 @@
+use super::*;
+use crate::{lab::Lab, registration::register};
+
+fn responded(lab: Lab) -> (ResponseFit, Vec<f64>) {
+    let gains = lab.model.response().sensitivity_counts_per_mm.clone();
+    let (declared, readings) = lab.readings();
+    let sound = vec![true; readings.elements];
+    let (_, place) = register(&declared, &readings, &sound).unwrap();
+    (respond(&declared, &readings, &sound, &place).unwrap().0, gains)
+}
+
+/// The same sensor with other curvatures.
+fn curved(seed: u64, quadratic_per_mm: impl Fn(usize) -> f64) -> Lab {
+    let mut lab = Lab::new(seed);
+    let response = tactus_model::Response {
+        quadratic_per_mm: (0..48).map(quadratic_per_mm).collect(),
+        ..lab.model.response().clone()
+    };
+    lab.model = tactus_model::ForwardModel::new(lab.model.array().clone(), lab.model.psf(), response).unwrap();
+    lab.centres();
+    lab
+}
+
+#[test]
+fn a_straight_response_is_found_straight() {
+    let (fit, gains) = responded(curved(1, |_| 0.0));
+    assert_eq!(fit.form, Form::Linear);
+    let worst = fit.elements.iter().map(|one| {
+        (one.sensitivity_counts_per_mm.value - gains[one.element]).abs() / one.sensitivity_counts_per_mm.standard_error
+    });
+    assert!(worst.fold(0.0, f64::max) < 4.5);
+}
+
+#[test]
+fn one_curvature_is_found_as_one() {
+    let (fit, gains) = responded(curved(2, |_| 0.15));
+    assert_eq!(fit.form, Form::SharedQuadratic);
+    let curvature = fit.shared_quadratic_per_mm.unwrap();
+    assert!((curvature.value - 0.15).abs() < 4.0 * curvature.standard_error + 1e-3, "{curvature:?}");
+    for one in &fit.elements {
+        let sensitivity = one.sensitivity_counts_per_mm;
+        assert!((sensitivity.value - gains[one.element]).abs() < 4.5 * sensitivity.standard_error, "{one:?}");
+        // Turned round, the response gives the depth that was pressed.
+        for [u_mm, rise] in &one.points {
+            assert!((one.indentation_mm(*rise).unwrap() - u_mm).abs() < 0.004, "{one:?}");
+        }
+    }
+}
+
+#[test]
+fn curvatures_that_differ_are_found_to() {
+    let (fit, _) = responded(curved(3, |element| if element % 2 == 0 { 0.1 } else { 0.5 }));
+    assert_eq!(fit.form, Form::OwnQuadratic);
+    let mean = |odd: usize| {
+        let of = fit.elements.iter().filter(|one| one.element % 2 == odd).map(|one| one.quadratic_per_mm.value);
+        of.sum::<f64>() / 24.0
+    };
+    assert!((mean(0) - 0.1).abs() < 0.01 && (mean(1) - 0.5).abs() < 0.02, "{} {}", mean(0), mean(1));
+}
+
+#[test]
+fn what_was_held_out_fares_worse_than_what_was_fitted() {
+    let (fit, _) = responded(curved(4, |_| 0.15));
+    let heldout: Vec<f64> = fit.trials.iter().map(|trial| trial.heldout_rms_counts.unwrap()).collect();
+    assert!(heldout[1] < heldout[0] && heldout[1] < heldout[2], "{heldout:?}");
+    assert!(fit.trials.iter().all(|trial| trial.heldout_rms_counts.unwrap() > trial.rms_counts));
+}
+
+#[test]
+fn a_response_turned_round_is_the_root_near_the_line() {
+    assert!((turned_round(0.5, 0.0).unwrap() - 0.5).abs() < 1e-15);
+    assert!((turned_round(0.7 + 0.2 * 0.49, 0.2).unwrap() - 0.7).abs() < 1e-12);
+    assert!((turned_round(0.7 - 0.2 * 0.49, -0.2).unwrap() - 0.7).abs() < 1e-12);
+    // A response that falls again never reads so much.
+    assert_eq!(turned_round(3.0, -0.2), None);
+}

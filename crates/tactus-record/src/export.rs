@@ -56,7 +56,7 @@ pub fn export<P: AsRef<Path>>(recordings: &[P], out: impl Into<PathBuf>) -> Resu
     let mut clocks = Vec::new();
     let mut add = |timeline: &Timeline| {
         clocks.push(RunClocks::of(timeline));
-        gathered.recording(timeline, |row| Ok(table.put(row)?))
+        gathered.recording(timeline, |_, row| Ok(table.put(row)?))
     };
     let filled = add(&first).and_then(|()| rest.iter().try_for_each(|path| add(&Timeline::read(path)?)));
     let source = match filled.and_then(|()| gathered.into_source()) {

@@ -38,7 +38,8 @@ pub struct RunSource {
     pub simulated: bool,
 }
 
-/// Gives every row of recordings and measurement tables to `take`, file after file, in the order given.
+/// Gives every row of recordings and measurement tables to `take`, each with the rig as its file describes it, file
+/// after file, in the order given.
 ///
 /// A file is taken for what its first bytes say, whatever its name. The rows of a recording, whole or damaged, are
 /// those that [`export`](crate::export()) writes; the rows of a table are those that stand in it. Each is checked
@@ -48,10 +49,13 @@ pub struct RunSource {
 /// # Errors
 /// If a file is neither, cannot be read, was made with another rig or holds a run of a file before; if a recording
 /// holds no stage position; or if a row breaks the table's contract. Rows before it have then been given.
-pub fn visit<P: AsRef<Path>>(paths: &[P], mut take: impl FnMut(RowView<'_>)) -> Result<Source, RowsError> {
+pub fn visit<P: AsRef<Path>>(
+    paths: &[P],
+    mut take: impl FnMut(&Rig, RowView<'_>),
+) -> Result<Source, RowsError> {
     let mut gathered = Gathered::default();
-    let mut take = |row: RowView<'_>| {
-        take(row);
+    let mut take = |rig: &Rig, row: RowView<'_>| {
+        take(rig, row);
         Ok(())
     };
     for path in paths.iter().map(AsRef::as_ref) {
@@ -81,7 +85,7 @@ impl Gathered {
     pub(crate) fn recording(
         &mut self,
         timeline: &Timeline,
-        mut take: impl FnMut(RowView<'_>) -> Result<(), RowsError>,
+        mut take: impl FnMut(&Rig, RowView<'_>) -> Result<(), RowsError>,
     ) -> Result<(), RowsError> {
         let (path, run) = (timeline.path(), timeline.run());
         self.same_rig(path, timeline.rig())?;
@@ -98,7 +102,7 @@ impl Gathered {
             if let Entry::Message { message: Message::Frame(frame), .. } = entry {
                 let row = frames.row(&frame)?;
                 checker.check(&row).map_err(|fault| fault.at(path, index))?;
-                take(row)?;
+                take(timeline.rig(), row)?;
                 index += 1;
             }
         }
@@ -110,16 +114,16 @@ impl Gathered {
     fn table(
         &mut self,
         table: TableReader,
-        mut take: impl FnMut(RowView<'_>) -> Result<(), RowsError>,
+        mut take: impl FnMut(&Rig, RowView<'_>) -> Result<(), RowsError>,
     ) -> Result<(), RowsError> {
-        let (path, rig) = (table.path().to_owned(), &table.head().rig);
+        let (path, rig) = (table.path().to_owned(), table.head().rig.clone());
         let (simulated, before) = (rig.simulated, self.runs.len());
-        self.same_rig(&path, rig)?;
+        self.same_rig(&path, &rig)?;
         table.visit(|row| {
             if self.runs[before..].last().is_none_or(|last| last.run != row.run) {
                 self.new_run(&path, row.run, simulated)?;
             }
-            take(row)
+            take(&rig, row)
         })?;
         Ok(())
     }

@@ -35,7 +35,7 @@ fn exported(recording: &Path) -> PathBuf {
 
 fn visited(paths: &[&PathBuf]) -> (Source, Vec<Row>) {
     let mut rows = Vec::new();
-    let source = rows::visit(paths, |row| {
+    let source = rows::visit(paths, |_, row| {
         rows.push(Row {
             run: row.run.into(),
             press: row.press,
@@ -53,7 +53,7 @@ fn visited(paths: &[&PathBuf]) -> (Source, Vec<Row>) {
 
 fn refused(paths: &[&PathBuf]) -> (RowsError, usize) {
     let mut given = 0;
-    let error = rows::visit(paths, |_| given += 1).unwrap_err();
+    let error = rows::visit(paths, |_, _| given += 1).unwrap_err();
     (error, given)
 }
 

@@ -1,24 +1,64 @@
 //! `calibrate`: what measured presses tell of the sensor, as a model, numbers and a report.
 
+mod model;
+mod print;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use serde_json::json;
-use tactus_calibrate::{Calibration, Declared, Gather, Sample, calibrate as characterise};
-use tactus_model::Effect;
-use tactus_schema::model::{Base, KnownEffect};
+use serde::Serialize;
+use tactus_calibrate::{Calibration, Declared, Gather, Sample};
+use tactus_record::rows::{self, RunSource};
 use tactus_schema::{Model, Rig};
 
 use crate::cli::{CalibrateArgs, Common};
 use crate::exit::Exit;
+use crate::output;
+
+/// Name of the form of `calibration.json`.
+const SCHEMA: &str = "tactus.calibration/1";
+
+/// A calibration, and where its readings came from.
+#[derive(Debug, Clone)]
+pub(crate) struct Calibrated {
+    pub(crate) rig: Rig,
+    pub(crate) simulated: bool,
+    pub(crate) runs: Vec<RunSource>,
+    /// What the files lack.
+    pub(crate) notes: Vec<String>,
+    pub(crate) calibration: Calibration,
+}
+
+/// `calibration.json`, and what `--json` prints.
+#[derive(Serialize)]
+struct Written<'a> {
+    schema: &'static str,
+    rig: &'a str,
+    simulated: bool,
+    files: Vec<&'a Path>,
+    notes: &'a [String],
+    #[serde(flatten)]
+    calibration: &'a Calibration,
+}
 
 pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result<Exit> {
-    let table = tactus_record::table::read(&args.files[0])?;
-    let rig = table.head().rig.clone();
-    let mut gather = Gather::new(&rig.array);
-    for row in table.rows() {
-        gather.take(Sample {
+    let calibrated = from_files(&args.files)?;
+    let paths = write(&calibrated, &args.out)?;
+    if common.json {
+        output::write(&format!("{}\n", calibrated.to_json()?))?;
+    } else {
+        print::calibrated(&calibrated, &paths);
+    }
+    let whole = calibrated.calibration.missing.is_empty() && calibrated.calibration.warnings.is_empty();
+    Ok(if whole && calibrated.notes.is_empty() { Exit::Done } else { Exit::Degraded })
+}
+
+/// Reads what was measured and characterises the sensor.
+pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
+    let mut gather = None;
+    let source = rows::visit(files, |rig, row| {
+        gather.get_or_insert_with(|| Gather::new(&rig.array)).take(Sample {
             run: row.run,
             press: row.press,
             phase: row.phase,
@@ -27,18 +67,48 @@ pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result
             indenter: row.indenter,
             counts: row.counts,
         });
-    }
-    let readings = gather.finish();
+    })?;
+    let rig = source.rig;
+    let readings = gather.unwrap_or_else(|| Gather::new(&rig.array)).finish();
+    let model = Model::of_rig(&rig).context("the rig's reference indenter is not among its tools")?;
     let declared = Declared {
-        model: Model::of_rig(&rig).context("no model")?.forward()?,
+        model: model.forward().context("the rig as it is declared makes no model")?,
         registration: rig.registration,
         indenters: rig.indenters.clone(),
     };
-    let start = std::time::Instant::now();
-    let calibration = characterise(&declared, &readings)?;
-    eprintln!("calibrated in {:?}", start.elapsed());
-    fs::create_dir_all(&args.out)?;
-    fs::write(args.out.join("calibration.json"), serde_json::to_string_pretty(&calibration)?)?;
-    let _ = (json!(0), common, Path::new(""), PathBuf::new(), Effect::new("", []), Rig::from_toml, |b: Base, k: KnownEffect, c: Calibration| (b, k, c));
-    Ok(Exit::Done)
+    let calibration = tactus_calibrate::calibrate(&declared, &readings)?;
+    let simulated = rig.simulated || source.runs.iter().any(|run| run.simulated);
+    Ok(Calibrated { rig, simulated, runs: source.runs, notes: source.warnings, calibration })
+}
+
+/// Writes model, numbers and report; returns the files.
+pub(crate) fn write(calibrated: &Calibrated, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let mut paths = Vec::new();
+    let mut put = |name: &str, text: String| {
+        let path = folder.join(name);
+        fs::write(&path, text).with_context(|| path.display().to_string())?;
+        paths.push(std::path::absolute(path)?);
+        anyhow::Ok(())
+    };
+    if let Some(model) = calibrated.model() {
+        put("model.toml", model.to_toml().context("the calibrated model")?)?;
+    }
+    put("calibration.json", calibrated.to_json()?)?;
+    Ok(paths)
+}
+
+impl Calibrated {
+    fn to_json(&self) -> anyhow::Result<String> {
+        let mut files: Vec<&Path> = self.runs.iter().map(|run| run.path.as_path()).collect();
+        files.dedup();
+        Ok(serde_json::to_string_pretty(&Written {
+            schema: SCHEMA,
+            rig: &self.rig.name,
+            simulated: self.simulated,
+            files,
+            notes: &self.notes,
+            calibration: &self.calibration,
+        })?)
+    }
 }

@@ -1,0 +1,96 @@
+//! A calibration for people at the terminal.
+
+use std::path::PathBuf;
+
+use tactus_calibrate::{Estimate, FaultKind};
+
+use super::Calibrated;
+use crate::output::{print_fields, print_table};
+
+pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
+    let Calibrated { rig, simulated, notes, calibration, .. } = calibrated;
+    let data = &calibration.data;
+    let mut fields = vec![
+        ("rig", format!("{}{}", rig.name, if *simulated { " (SIMULATED)" } else { "" })),
+        ("read", format!("{} runs, {} presses, {} dwells, {} frames", data.runs.len(), data.presses, data.dwells, data.frames)),
+    ];
+    if let Some(noise) = calibration.noise_rms_counts {
+        fields.push(("noise", format!("{noise:.2} counts rms")));
+    }
+    if let Some(registration) = &calibration.registration {
+        let [x, y] = registration.origin_mm;
+        fields.push(("origin", format!("{}, {} mm", estimate(x), estimate(y))));
+        if let Some(rotation) = registration.rotation_deg {
+            fields.push(("rotation", format!("{} deg", estimate(rotation))));
+        }
+        if let Some(surface) = registration.surface_mm {
+            fields.push(("surface", format!("{} mm", estimate(surface))));
+        }
+        if let Some(scale) = registration.scale {
+            fields.push(("scale", format!("{} (a check: 1)", estimate(scale))));
+        }
+    }
+    for fault in &calibration.health.faults {
+        let what = match fault.kind {
+            FaultKind::Dead => "is dead".into(),
+            FaultKind::Stuck { counts } => format!("is stuck at {counts}"),
+            FaultKind::CrossWired { answers_for } => format!("answers for {answers_for}"),
+            FaultKind::Noisy { rms_counts } => format!("is noisy: {rms_counts:.1} counts rms"),
+        };
+        fields.push(("faulty", format!("element {} {what}", fault.element)));
+    }
+    if let Some(response) = &calibration.response {
+        fields.push(("response", format!("{} of {} elements", response.form.name(), response.elements.len())));
+        if let Some(curvature) = response.shared_quadratic_per_mm {
+            fields.push(("curvature", format!("{} per mm, if one for all", estimate(curvature))));
+        }
+    }
+    if let Some(line) = calibration.thickness.as_ref().and_then(|thickness| thickness.linear.as_ref()) {
+        let pitch_mm = rig.array.pitch_mm();
+        let [intercept, slope] = line.coefficients;
+        fields.push(("sigma(t)", format!("({}) + ({}) t, in mm", estimate(intercept), estimate(slope))));
+        let intercept = estimate(intercept.in_units_of(pitch_mm));
+        fields.push(("", format!("({intercept}) + ({}) t, in pitches of {pitch_mm} mm (Eq. 4: 1.11 + 0.497 t)", estimate(slope))));
+    }
+    print_fields(&fields);
+    if !calibration.spreads.is_empty() {
+        println!();
+        let rows: Vec<Vec<String>> = calibration
+            .spreads
+            .iter()
+            .map(|spread| {
+                vec![
+                    format!("{:.3}", spread.covering_mm),
+                    format!("{:.3}", spread.depth_mm),
+                    spread.presses.to_string(),
+                    estimate(spread.sigma_mm),
+                    estimate(spread.sigma_mm.in_units_of(rig.array.pitch_mm())),
+                    format!("{:.6}", spread.likeness),
+                ]
+            })
+            .collect();
+        print_table(&["covering mm", "depth mm", "presses", "sigma+ mm", "pitches", "cosine"], &rows);
+    }
+    println!();
+    for note in notes.iter().chain(&calibration.warnings) {
+        println!("warning: {note}");
+    }
+    for missing in &calibration.missing {
+        println!("missing: {missing}");
+    }
+    for path in paths {
+        println!("{}", path.display());
+    }
+}
+
+/// `2.7256 +- 0.0007`: as many digits as the error's first.
+fn estimate(estimate: Estimate) -> String {
+    let Estimate { value, standard_error } = estimate;
+    if !(standard_error > 0.0 && standard_error.is_finite()) {
+        return format!("{value:.4}");
+    }
+    // 0.00073 has its first digit at the fourth place.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+    let digits = (-standard_error.log10()).ceil().clamp(0.0, 9.0) as usize;
+    format!("{value:.digits$} +- {standard_error:.digits$}")
+}
