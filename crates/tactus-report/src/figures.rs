@@ -31,12 +31,7 @@ pub use side_by_side::{SideBySide, side_by_side};
 pub use views::{pressed_view, tools_view};
 
 /// The paper's coverings: 0.04, 0.1, 0.14 and 0.2 inch.
-pub const COVERINGS: [Covering; 4] = [
-    Covering { thickness_mm: 1.016 },
-    Covering { thickness_mm: 2.54 },
-    Covering { thickness_mm: 3.556 },
-    Covering { thickness_mm: 5.08 },
-];
+pub const COVERINGS: [Covering; 4] = Covering::PAPER;
 
 /// Why there are no figures.
 #[derive(Debug, thiserror::Error)]
