@@ -18,9 +18,7 @@ use std::ops::RangeInclusive;
 use serde::Serialize;
 use tactus_model::{Covering, Psf};
 
-use crate::acuity::{
-    AcuityError, DiscretisingSensor, Grid, NYQUIST_FREQUENCY, NYQUIST_SIGMA, OFFSETS, OFFSETS_BETWEEN, passed,
-};
+use crate::acuity::{AcuityError, DiscretisingSensor, Grid, NYQUIST_FREQUENCY, NYQUIST_SIGMA, passed};
 
 /// What is asked of a covering.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,8 +66,8 @@ pub struct Acuity {
     pub sigma: f64,
     /// Distinct readings of a point that goes over one element: an upper bound of the places that can be told.
     pub locations: usize,
-    /// Separation at which two points first read otherwise than one of twice the force, mean over twenty places in
-    /// an element; `None` if that never happens at one of them.
+    /// Separation at which two points first read otherwise than one of twice the force, mean over two hundred
+    /// places in an element; `None` if that never happens at one of them.
     pub separation_mm: Option<f64>,
 }
 
@@ -221,12 +219,13 @@ impl Wanted {
     }
 
     fn acuity_of(&self, sensor: DiscretisingSensor) -> Acuity {
-        let separation = |offsets| sensor.mean_separation(offsets);
-        let both = separation(&OFFSETS).zip(separation(&OFFSETS_BETWEEN));
+        // Half an element: the other is its mirror image.
+        let places: [f64; 100] = std::array::from_fn(|nth| (nth as f64 + 0.5) / 200.0);
+        let separation = sensor.mean_separation(&places);
         Acuity {
             sigma: sensor.sigma(),
             locations: sensor.locations(),
-            separation_mm: both.map(|(one, other)| f64::midpoint(one, other) * self.pitch_mm),
+            separation_mm: separation.map(|apart| apart * self.pitch_mm),
         }
     }
 

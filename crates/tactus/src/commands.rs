@@ -1,6 +1,7 @@
 //! One module a command, or a family of them.
 
 pub(crate) mod control;
+pub(crate) mod design;
 pub(crate) mod figures;
 pub(crate) mod files;
 pub(crate) mod plan;
