@@ -115,11 +115,11 @@ pub(super) fn draw_two_points() -> Result<Drawing, FigureError> {
         "Separation at which two points about the same middle first read otherwise than one of twice the force, in steps of \
          0.02 f, mean over ten places of the middle; ranges as in Figure 6a, 1/f whole. Dots: the least separation of each row. \
          Left, for the paper's places the optimum is mostly {p10} to {p90}, in the middle {p50}: the paper's 0.35. Beside it, for \
-         as many places between those it is {b10} to {b90}, in the middle {b50}: the optimum hangs on the element's edge and \
-         middle, 0 and 0.5, where two points that part in opposite directions take from an element what they give it, and a \
-         small spread tells nothing until they reach the next edge. It also jumps from row to row, as the upper right shows: \
-         the curve is flat and ragged. Blank cells: half of the resolution is more than anything that is read, so that no \
-         separation is ever told. The dashed line is the spread that forbids aliasing, {NYQUIST_SIGMA:.3}."
+         as many places between those it is {b10} to {b90}, in the middle {b50}. So the optimum hangs on the places 0 and 0.5, an \
+         element's edge and middle: under a small spread, two points must part from there by two elements or one until any \
+         reading changes. It also jumps from row to row (lower right), because the curves are flat and ragged (upper right). \
+         Blank cells: nothing ever reads half a step, so that no separation is told. The dashed line is the spread that \
+         forbids aliasing, {NYQUIST_SIGMA:.3}."
     );
     Ok(Drawing { sheet, caption })
 }
