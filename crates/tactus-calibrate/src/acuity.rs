@@ -22,10 +22,10 @@
 //!
 //! # Steps that need no look
 //!
-//! A reading changes only where some `S_i` crosses a rounding boundary. While the points move by `h`, `S_i` moves by
-//! at most `|S_i'| h + M h^2 / 2`, as `|S_i''| <= M`; the steps within which that is less than the distance to the
-//! nearest boundary cannot change any reading and are left out. So the answer is that of stepping through them all,
-//! to the last count, which the tests hold.
+//! A reading changes only where some `S_i` crosses a rounding boundary. While the points move by `h`, `S_i` moves
+//! forwards by at most `|S_i'| h + M h^2 / 2` and backwards by at most `M h^2 / 2 - |S_i'| h`, as `|S_i''| <= M`; the steps
+//! within which neither reaches a boundary cannot change any reading and are left out. So the answer is that of stepping
+//! through them all, to the last count, which the tests hold.
 //!
 //! ```
 //! use tactus_calibrate::acuity::DiscretisingSensor;
@@ -215,13 +215,16 @@ impl DiscretisingSensor {
         // Far more than rounding errors of the shares and of the points' places can make.
         let doubt = 1e-14 * (1.0 + 1.0 / self.sigma);
         let clear = |(share, slope): (f64, f64)| {
-            let place = share / self.force_resolution + 0.5;
-            let left = place.fract().min(1.0 - place.fract()) * self.force_resolution - doubt;
-            if left <= 0.0 {
+            let above = (share / self.force_resolution + 0.5).fract();
+            let [ahead, behind] = if slope > 0.0 { [1.0 - above, above] } else { [above, 1.0 - above] };
+            let [ahead, behind] = [ahead, behind].map(|part| part * self.force_resolution - doubt);
+            if ahead.min(behind) <= 0.0 {
                 return 0.0;
             }
-            // The positive root of |slope| h + bend h^2 / 2 = left.
-            2.0 * left / (slope.abs() + (slope * slope + 2.0 * bend * left).sqrt())
+            // The first roots of ahead = |slope| h + bend h^2 / 2 and of behind = bend h^2 / 2 - |slope| h.
+            let root = |left: f64| (slope * slope + 2.0 * bend * left).sqrt();
+            let reaches = 2.0 * ahead / (slope.abs() + root(ahead));
+            reaches.min((slope.abs() + root(behind)) / bend)
         };
         shares.into_iter().zip(slopes).map(clear).fold(f64::INFINITY, f64::min)
     }
