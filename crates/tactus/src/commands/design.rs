@@ -199,7 +199,7 @@ fn notes(design: &Design, wanted: &Wanted, measured_pitch_mm: f64) -> Vec<String
     }
     notes.push(
         "Locations and separations are bounds for five elements in a row without noise, a press being all of the force steps \
-         together; a real sensor does worse."
+         together; a real sensor does worse. Separations are ragged, as they hang on where readings round."
             .into(),
     );
     notes
