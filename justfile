@@ -74,11 +74,17 @@ bench:
     cargo bench --package tactus-bench --bench forward -- --quick
     cargo run --release --package tactus-bench -- growth
     cargo run --release --package tactus-bench -- limits
+    cargo run --release --package tactus-bench -- acuity
 
 # The same beside others' programs. Compiled for the processor at hand, as the peers' wheels choose their instructions when they run.
 bench-peers *arguments: bench-peers-tools
     RUSTFLAGS="-C target-cpu=native" cargo build --release --package tactus-bench --target-dir target/native
     {{ tools }}/peers/bin/python bench/peers/forward.py --binary target/native/release/tactus-bench {{ arguments }}
+
+# Both panels of Fig. 6 beside a numpy program.
+bench-acuity *arguments: bench-peers-tools
+    cargo build --release --package tactus-bench
+    {{ tools }}/peers/bin/python bench/peers/acuity.py {{ arguments }}
 
 # A virtual environment with the peers.
 bench-peers-tools:

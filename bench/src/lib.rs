@@ -3,6 +3,7 @@
 //! Every part of the program (`tactus-bench --help`) and every criterion bench presses the same [`Tool`]s at the
 //! same [`Pose`]s on the same arrays, along one [`Way`] from pose to image or another.
 
+mod acuity;
 mod clock;
 mod forward;
 mod growth;
@@ -11,6 +12,7 @@ mod models;
 mod press;
 mod way;
 
+pub use acuity::Acuity;
 pub use clock::per_image_s;
 pub use forward::Forward;
 pub use growth::Growth;

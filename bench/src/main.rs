@@ -6,7 +6,10 @@ use std::time::Duration;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use serde_json::json;
-use tactus_bench::{COVERING, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses};
+use tactus_bench::{
+    Acuity, COVERING, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses,
+};
+use tactus_calibrate::acuity::Grid;
 use tactus_model::Array;
 
 /// How fast the forward model is, how exact, how it grows, and how far from the machine's limits.
@@ -55,6 +58,12 @@ enum Part {
         #[arg(long = "path", value_enum, default_value = "stamp")]
         way: Way,
     },
+    /// Both panels of Fig. 6, 25 x 25, and how their time grows.
+    Acuity {
+        /// The panels' values and times as one JSON object, without the growth.
+        #[arg(long)]
+        json: bool,
+    },
     /// How the time of an image grows with elements and triangles.
     Growth,
     /// What of this machine's arithmetic and bandwidth the kernels use.
@@ -68,6 +77,7 @@ fn main() -> Result<()> {
             forward(&Forward::measure(&array, tool, way, threads, time, compared)?, json);
         }
         Part::Scene { array, tool, way } => scene(array, tool, way)?,
+        Part::Acuity { json } => acuity(json)?,
         Part::Growth => growth(&Growth::measure()?),
         Part::Limits => limits(&Limits::measure()?),
     }
@@ -126,6 +136,23 @@ fn scene(array: Array, tool: Tool, way: Way) -> Result<()> {
         "images": images,
     });
     println!("{scene}");
+    Ok(())
+}
+
+fn acuity(as_json: bool) -> Result<()> {
+    const TIMES: usize = 5;
+    let Acuity { grid, locations, separations, panels_s: [one_s, other_s] } =
+        Acuity::measure(Grid::whole(), TIMES)?;
+    if as_json {
+        let panels = json!({
+            "sigmas": grid.sigmas, "force_resolutions": grid.force_resolutions, "locations": locations,
+            "separations": separations, "panels_s": [one_s, other_s], "version": env!("CARGO_PKG_VERSION"),
+        });
+        println!("{panels}");
+    } else {
+        println!("Fig. 6, 25 x 25: locations {:.1} ms, separations {:.1} ms", one_s * 1e3, other_s * 1e3);
+        growth(&Acuity::growth(TIMES)?);
+    }
     Ok(())
 }
 

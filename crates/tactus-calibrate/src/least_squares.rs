@@ -115,6 +115,7 @@ pub(crate) fn minimise(
             continue;
         };
         let promise = step.dot(&normal.right);
+        if std::env::var("DBG").is_ok() { eprintln!("{:?} cost {} damping {damping} promise {promise}", at.as_slice(), normal.cost); }
         if promise <= PROMISE_LEAST * (normal.cost + f64::MIN_POSITIVE) {
             break;
         }

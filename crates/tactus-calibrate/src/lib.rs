@@ -4,7 +4,13 @@
 //! and 3: faulty elements, registration, element response, point spread, spread against thickness. Every number comes
 //! with its standard error, which holds the errors of the steps before.
 //!
+//! [`acuity`] is how finely a row of elements that round can locate and tell apart (paper, Sec. 4); [`design`] makes of
+//! it which covering to order.
+//!
 //! This crate has no I/O, no async, no clock and no global random numbers.
+
+pub mod acuity;
+pub mod design;
 
 mod calibration;
 mod estimate;

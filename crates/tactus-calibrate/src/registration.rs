@@ -114,23 +114,18 @@ pub(crate) fn register(
             "{places} places were pressed with the reference tool under the reference covering; it takes {PLACES_LEAST}"
         ));
     }
-    let covering_mm = declared.model.response().reference_covering.thickness_mm;
+    let (count, covering_mm) = (presses.len(), declared.model.response().reference_covering.thickness_mm);
     let mut problem = Problem::new(declared, readings, sound, presses)?;
     let mut left_out = Vec::new();
     let mut fit = problem.fit(None).ok_or(UNDETERMINED)?;
-    // Twice: a gross outlier may hide another.
-    for _ in 0..2 {
-        let outlying = problem.outlying(&fit);
-        if outlying.is_empty() || problem.presses.len() < outlying.len() + PLACES_LEAST {
+    // One by one: what a gross outlier does to the fit may make others look like outliers.
+    while let Some(outlying) = problem.outlying(&fit) {
+        if problem.presses.len() <= PLACES_LEAST || left_out.len() * 10 >= count {
             break;
         }
-        left_out.extend(outlying.iter().map(|index| {
-            let press = problem.presses[*index];
-            (readings.runs[press.run].clone(), press.index)
-        }));
-        let kept = problem.presses.iter().enumerate().filter(|(index, _)| !outlying.contains(index));
-        let kept: Vec<&Press> = kept.map(|(_, press)| *press).collect();
-        problem = Problem::new(declared, readings, sound, kept)?;
+        let press = problem.presses.remove(outlying);
+        left_out.push((readings.runs[press.run].clone(), press.index));
+        problem = Problem::new(declared, readings, sound, problem.presses)?;
         fit = problem.fit(None).ok_or(UNDETERMINED)?;
     }
     let place = problem.place(&fit);
@@ -213,22 +208,20 @@ impl<'a> Problem<'a> {
         Some(normal)
     }
 
-    /// Presses whose dwells the model misses by far more than those of others.
-    fn outlying(&self, fit: &Fit) -> Vec<usize> {
+    /// The press that the model misses most, if it misses it by far more than others.
+    fn outlying(&self, fit: &Fit) -> Option<usize> {
         let mut costs = vec![(0.0, 0_u32); self.presses.len()];
-        let whole = self.each(&fit.parameters, |press, residual, _, weight| {
+        self.each(&fit.parameters, |press, residual, _, weight| {
             costs[press].0 += weight * residual * residual;
             costs[press].1 += 1;
-        });
-        if whole.is_none() {
-            return Vec::new();
-        }
+        })?;
         let misfits: Vec<f64> =
             costs.iter().map(|(cost, readings)| (cost / f64::from((*readings).max(1))).sqrt()).collect();
         let mut sorted = misfits.clone();
         sorted.sort_by(f64::total_cmp);
         let limit = OUTLYING * sorted[sorted.len() / 2].max(1.0);
-        (0..misfits.len()).filter(|press| misfits[*press] > limit).collect()
+        let worst = misfits.iter().enumerate().max_by(|one, other| one.1.total_cmp(other.1));
+        worst.filter(|(_, misfit)| **misfit > limit).map(|(press, _)| press)
     }
 
     /// Gives every reading: index of its press, residual, slopes by the parameters, weight.

@@ -35,6 +35,8 @@ const OUTLYING: f64 = 40.0;
 /// Sigma is looked for between these, in pitches.
 const SIGMA_PITCHES: [f64; 2] = [0.05, 50.0];
 const ROUNDS_MAX: usize = 30;
+/// A step by less than this share of sigma is the last: far below any error, and of no effect on what follows.
+const STEP_LEAST: f64 = 1e-7;
 /// A step to find how the slopes move with a press's place.
 const STEP_MM: f64 = 1e-4;
 
@@ -227,17 +229,16 @@ impl<'a> Search<'a> {
     }
 
     fn run(mut self, readings: &Readings, group: &Group<'_>) -> Result<Found, String> {
-        let (mut sigma_mm, mut slopes) = self.maximise()?;
+        // The median image's sigma is hardly moved by images that are like none.
+        let (start_mm, slopes) = self.maximise(median_step, self.declared.sigma_mm(self.covering.thickness_mm))?;
         let mut unlike: Vec<f64> = slopes.iter().map(|slope| 1.0 - slope.likeness).collect();
         unlike.sort_by(f64::total_cmp);
         let limit = OUTLYING * unlike[unlike.len() / 2].max(1e-9);
-        let outlying = slopes.iter().filter(|slope| 1.0 - slope.likeness > limit).count();
-        if outlying > 0 && self.images.len() - outlying >= PLACES_LEAST {
-            let mut likenesses = slopes.iter().map(|slope| slope.likeness);
-            self.images.retain(|_| likenesses.next().is_some_and(|likeness| 1.0 - likeness <= limit));
-            self.left_out += outlying;
-            (sigma_mm, slopes) = self.maximise()?;
-        }
+        let mut likenesses = slopes.iter().map(|slope| slope.likeness);
+        let before = self.images.len();
+        self.images.retain(|_| likenesses.next().is_some_and(|likeness| 1.0 - likeness <= limit));
+        self.left_out += before - self.images.len();
+        let (sigma_mm, slopes) = self.maximise(step, start_mm)?;
         let count = slopes.len() as f64;
         let curvature: f64 = slopes.iter().map(|slope| slope.curvature).sum();
         let squares: f64 = slopes.iter().map(|slope| slope.by_sigma * slope.by_sigma).sum();
@@ -257,26 +258,21 @@ impl<'a> Search<'a> {
         Ok(Found { fit, variance, by_gains, by_place })
     }
 
-    /// sigma+, and what every image says there.
-    fn maximise(&self) -> Result<(f64, Vec<Slope>), String> {
-        let pitch_mm = self.declared.array().pitch_mm();
-        let [least, most] = SIGMA_PITCHES.map(|pitches| pitches * pitch_mm);
-        let mut sigma_mm = self.declared.sigma_mm(self.covering.thickness_mm).clamp(least, most);
+    /// Where steps end, from a start, and what every image says there.
+    fn maximise(&self, step: fn(&[Slope]) -> f64, start_mm: f64) -> Result<(f64, Vec<Slope>), String> {
+        let [least, most] = SIGMA_PITCHES.map(|pitches| pitches * self.declared.array().pitch_mm());
+        let mut sigma_mm = start_mm.clamp(least, most);
         for _ in 0..ROUNDS_MAX {
             let slopes = self.slopes(sigma_mm)?;
-            let by_sigma: f64 = slopes.iter().map(|slope| slope.by_sigma).sum();
-            let curvature: f64 = slopes.iter().map(|slope| slope.curvature).sum();
-            if curvature.is_nan() || curvature <= 0.0 {
-                break;
-            }
             // Far from the maximum a whole step may go astray.
-            let step = (by_sigma / curvature).clamp(-0.4 * sigma_mm, 0.6 * sigma_mm);
+            let step = step(&slopes).clamp(-0.4 * sigma_mm, 0.6 * sigma_mm);
+            if step.abs() < STEP_LEAST * sigma_mm {
+                return Ok((sigma_mm, slopes));
+            }
             sigma_mm += step;
+            // A step that is no number ends here too.
             if !(least..=most).contains(&sigma_mm) {
                 break;
-            }
-            if step.abs() < 1e-9 * sigma_mm {
-                return Ok((sigma_mm, slopes));
             }
         }
         Err(format!("the images fit no sigma between {least:.2} and {most:.0} mm"))
@@ -343,6 +339,19 @@ impl<'a> Search<'a> {
         }
         Ok(by_place)
     }
+}
+
+/// Newton's step to the maximum of the sum.
+fn step(slopes: &[Slope]) -> f64 {
+    let sum = |of: fn(&Slope) -> f64| slopes.iter().map(of).sum::<f64>();
+    sum(|slope| slope.by_sigma) / sum(|slope| slope.curvature)
+}
+
+/// The median of the images' own steps.
+fn median_step(slopes: &[Slope]) -> f64 {
+    let mut steps: Vec<f64> = slopes.iter().map(|slope| slope.by_sigma / slope.curvature).collect();
+    steps.sort_by(f64::total_cmp);
+    steps[steps.len() / 2]
 }
 
 fn dot(one: &[f64], other: &[f64]) -> f64 {

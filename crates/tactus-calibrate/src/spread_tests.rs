@@ -1,4 +1,3 @@
-use super::*;
 use crate::{Calibration, calibrate, lab::Lab};
 
 const COVERINGS_MM: [f64; 4] = [1.016, 2.54, 3.556, 5.08];

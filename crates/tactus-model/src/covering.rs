@@ -7,6 +7,16 @@ pub struct Covering {
     pub thickness_mm: f64,
 }
 
+impl Covering {
+    /// The paper's coverings: 0.04, 0.1, 0.14 and 0.2 inch.
+    pub const PAPER: [Self; 4] = [
+        Self { thickness_mm: 1.016 },
+        Self { thickness_mm: 2.54 },
+        Self { thickness_mm: 3.556 },
+        Self { thickness_mm: 5.08 },
+    ];
+}
+
 /// Width of the Gaussian point spread function against covering thickness (Eq. 4).
 ///
 /// `sigma_mm = sigma_intercept_mm + sigma_per_mm * thickness_mm`

@@ -1,14 +1,16 @@
-//! The paper's figures, drawn again from the model: Figures 4, 5b, 8, 9b and 10.
+//! The paper's figures, drawn again from the model: Figures 4, 5b, 6, 8, 9b and 10.
 //!
 //! [`draw_all`] computes and writes them all. Each figure is also a function from plain inputs to a
 //! [`Sheet`], which displays itself as SVG. Where the paper shows its sensor, a virtual sensor stands in, with
 //! elements that differ, noise and a converter; every caption says so.
 
+mod acuity;
 mod imaging_models;
 mod page;
 mod point_spreads;
 mod resolutions;
 mod side_by_side;
+mod trade_off;
 mod views;
 mod virtual_sensor;
 
@@ -19,6 +21,7 @@ use std::{
     thread,
 };
 
+use tactus_calibrate::acuity::AcuityError;
 use tactus_model::{Array, Covering, ForwardModel, Indenter, ModelError, Psf, Response};
 use tactus_solid::layered::LayerError;
 
@@ -28,15 +31,11 @@ pub use imaging_models::{ModelledPress, imaging_models};
 pub use point_spreads::point_spreads;
 pub use resolutions::{Resolution, resolutions};
 pub use side_by_side::{SideBySide, side_by_side};
+pub use trade_off::trade_off;
 pub use views::{pressed_view, tools_view};
 
 /// The paper's coverings: 0.04, 0.1, 0.14 and 0.2 inch.
-pub const COVERINGS: [Covering; 4] = [
-    Covering { thickness_mm: 1.016 },
-    Covering { thickness_mm: 2.54 },
-    Covering { thickness_mm: 3.556 },
-    Covering { thickness_mm: 5.08 },
-];
+pub const COVERINGS: [Covering; 4] = Covering::PAPER;
 
 /// Why there are no figures.
 #[derive(Debug, thiserror::Error)]
@@ -47,6 +46,9 @@ pub enum FigureError {
     /// A figure's elastic layer cannot be made.
     #[error(transparent)]
     Layer(#[from] LayerError),
+    /// A figure's row of elements cannot be made.
+    #[error(transparent)]
+    Acuity(#[from] AcuityError),
     /// A file or folder cannot be written.
     #[error("{} cannot be written", path.display())]
     Write {
@@ -113,13 +115,15 @@ struct Drawing {
     caption: String,
 }
 
-const FIGURES: [PaperFigure; 7] = [
+const FIGURES: [PaperFigure; 9] = [
     PaperFigure { number: "4", title: "One press through four imaging models", draw: imaging_models::draw },
     PaperFigure {
         number: "5b",
         title: "Point spread functions of the four coverings",
         draw: point_spreads::draw,
     },
+    PaperFigure { number: "6a", title: "Locating a point", draw: acuity::draw_locations },
+    PaperFigure { number: "6b", title: "Telling two points apart", draw: acuity::draw_two_points },
     PaperFigure { number: "8a", title: "The H at several angles", draw: side_by_side::draw_angles },
     PaperFigure { number: "8b", title: "The H under each covering", draw: side_by_side::draw_coverings },
     PaperFigure { number: "9b", title: "The H in the covering", draw: views::draw_pressed },

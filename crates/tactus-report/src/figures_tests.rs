@@ -13,23 +13,25 @@ fn every_figure_is_drawn_whole_and_loads_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let mut steps = Vec::new();
     let paths = draw_all(&dir.path().join("figures"), |step| steps.push(step)).unwrap();
-    assert_eq!(steps.len(), 7);
-    assert_eq!(steps[6], Progress { title: "Wrench and spaceship", written: 7, figures: 7 });
+    assert_eq!(steps.len(), 9);
+    assert_eq!(steps[8], Progress { title: "Wrench and spaceship", written: 9, figures: 9 });
 
     let names: Vec<_> = paths.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
     // Images and colour bars.
     let panels = [
         ("figure-4.svg", 16 + 1),
         ("figure-5b.svg", 4),
+        ("figure-6a.svg", 2 + 1),
+        ("figure-6b.svg", 2 + 1),
         ("figure-8a.svg", 12 + 1),
         ("figure-8b.svg", 8 + 1),
         ("figure-9b.svg", 0),
         ("figure-10a.svg", 9 + 1),
         ("figure-10b.svg", 0),
     ];
-    assert_eq!(names[..7], panels.map(|(name, _)| name));
-    assert_eq!(names[7], "index.html");
-    let page = fs::read_to_string(&paths[7]).unwrap();
+    assert_eq!(names[..9], panels.map(|(name, _)| name));
+    assert_eq!(names[9], "index.html");
+    let page = fs::read_to_string(&paths[9]).unwrap();
     for (path, (name, panels)) in paths.iter().zip(panels) {
         let svg = fs::read_to_string(path).unwrap();
         assert_well_formed(&svg);

@@ -70,6 +70,8 @@ enum Command {
     Calibrate(CalibrateArgs),
     /// What a sensor reads of a tool: an image, frames along a path, or live on the bus.
     Simulate(SimulateArgs),
+    /// Which covering to order for a pitch and a force resolution.
+    Design(DesignArgs),
     /// Draw the paper's figures.
     Figures(FiguresArgs),
     /// Check files: configurations, rigs, models, scripts, tables, recordings.
@@ -262,6 +264,26 @@ pub(crate) struct SimulateArgs {
     pub(crate) seconds: Option<f64>,
 }
 
+/// Arguments of `design`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DesignArgs {
+    /// Distance between elements' centres; the model's if not given, and the paper's 2 without a model.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) pitch_mm: Option<f64>,
+    /// Steps of the converter that one press's whole signal is worth.
+    #[arg(long, value_name = "N")]
+    pub(crate) force_steps: u32,
+    /// Least spread, in pitches; that which forbids aliasing, 3/pi = 0.955, if not given.
+    #[arg(long, value_name = "PITCHES", allow_negative_numbers = true)]
+    pub(crate) min_sigma: Option<f64>,
+    /// A calibrated sensor's model, in place of the paper's Eq. 4.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+    /// Where the trade-off goes as a figure: .svg or .html.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
 /// Arguments of `figures`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct FiguresArgs {
@@ -316,6 +338,7 @@ fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
         Command::Report(args) => commands::files::report(common, &args),
         Command::Calibrate(args) => commands::calibrate::calibrate(common, &args),
         Command::Simulate(args) => commands::simulate::simulate(common, &args),
+        Command::Design(args) => commands::design::design(common, &args),
         Command::Figures(args) => commands::figures::figures(common, &args),
         Command::Validate(args) => Ok(commands::validate::validate(common, &args)),
         Command::Completions { shell } => {

@@ -1,0 +1,75 @@
+//! Both panels of Fig. 6, in full.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use tactus_calibrate::acuity::{Grid, OFFSETS};
+
+use crate::Growth;
+
+/// The panels of one size.
+#[derive(Debug, Clone)]
+pub struct Acuity {
+    /// Spreads and force resolutions.
+    pub grid: Grid,
+    /// Fig. 6a, row-major.
+    pub locations: Vec<usize>,
+    /// Fig. 6b, row-major.
+    pub separations: Vec<Option<f64>>,
+    /// Seconds of each panel, on all cores that the program may use: medians.
+    pub panels_s: [f64; 2],
+}
+
+impl Acuity {
+    /// Computes the panels so many times.
+    ///
+    /// # Errors
+    /// None in truth: the grids' spreads and resolutions are in range.
+    pub fn measure(grid: Grid, times: usize) -> Result<Self> {
+        let (locations, locations_s) = timed(times, || grid.map(|sensor| sensor.locations()))?;
+        let (separations, separations_s) =
+            timed(times, || grid.map(|sensor| sensor.mean_separation(&OFFSETS)))?;
+        Ok(Self { grid, locations, separations, panels_s: [locations_s, separations_s] })
+    }
+
+    /// How the time of both panels grows with their cells: 25 x 25, 50 x 50 and 100 x 100 over the same ranges; and how
+    /// that of one row grows with its force steps.
+    ///
+    /// # Errors
+    /// As [`Acuity::measure`].
+    pub fn growth(times: usize) -> Result<[Growth; 2]> {
+        let both = |grid: Grid| Self::measure(grid, times).map(|acuity| acuity.panels_s.iter().sum::<f64>());
+        let of_cells = |count: usize| Ok([(count * count) as f64, both(Grid::even(count))?]);
+        let of_steps = |steps: f64| {
+            let grid = Grid { force_resolutions: vec![1.0 / steps], ..Grid::even(25) };
+            Ok([steps, both(grid)?])
+        };
+        Ok([
+            Growth {
+                what: "both panels of Fig. 6".into(),
+                size_of: "cells",
+                points: [25, 50, 100].map(of_cells).into_iter().collect::<Result<_>>()?,
+            },
+            Growth {
+                what: "a row of both panels".into(),
+                size_of: "force steps",
+                points: [256.0, 1024.0, 4096.0].map(of_steps).into_iter().collect::<Result<_>>()?,
+            },
+        ])
+    }
+}
+
+/// What the work gives, and the median of its seconds.
+fn timed<T, E>(times: usize, work: impl Fn() -> Result<T, E>) -> Result<(T, f64), E> {
+    let once = || {
+        let started = Instant::now();
+        work().map(|done| (done, started.elapsed().as_secs_f64()))
+    };
+    let (done, first_s) = once()?;
+    let mut took_s = vec![first_s];
+    for _ in 1..times {
+        took_s.push(once()?.1);
+    }
+    took_s.sort_unstable_by(f64::total_cmp);
+    Ok((done, took_s[took_s.len() / 2]))
+}
