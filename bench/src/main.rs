@@ -6,10 +6,10 @@ use std::time::Duration;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use serde_json::json;
-use tactus_bench::{COVERING, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses};
+use tactus_bench::{COVERING, Fem, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses};
 use tactus_model::Array;
 
-/// How fast the forward model is, how exact, how it grows, and how far from the machine's limits.
+/// How fast the models are, how exact, how they grow, and how far from the machine's limits.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Args {
@@ -55,7 +55,22 @@ enum Part {
         #[arg(long = "path", value_enum, default_value = "stamp")]
         way: Way,
     },
-    /// How the time of an image grows with elements and triangles.
+    /// The finite element model of the covering under 1 N at the middle of its top: cubes of 1 mm, sides on rollers.
+    Fem {
+        /// Bricks along a side.
+        #[arg(long, default_value_t = 100)]
+        across: u32,
+        /// Layers of bricks.
+        #[arg(long, default_value_t = 10)]
+        layers: u32,
+        /// Of the bricks.
+        #[arg(long, default_value_t = 0.45)]
+        poisson_ratio: f64,
+        /// One JSON object, with the force at every node of the bottom, instead of a line of text.
+        #[arg(long)]
+        json: bool,
+    },
+    /// How the time of an image grows with elements and triangles, and that of the finite elements with bricks.
     Growth,
     /// What of this machine's arithmetic and bandwidth the kernels use.
     Limits,
@@ -68,6 +83,9 @@ fn main() -> Result<()> {
             forward(&Forward::measure(&array, tool, way, threads, time, compared)?, json);
         }
         Part::Scene { array, tool, way } => scene(array, tool, way)?,
+        Part::Fem { across, layers, poisson_ratio, json } => {
+            fem(&Fem::measure(across, layers, poisson_ratio)?, json);
+        }
         Part::Growth => growth(&Growth::measure()?),
         Part::Limits => limits(&Limits::measure()?),
     }
@@ -127,6 +145,23 @@ fn scene(array: Array, tool: Tool, way: Way) -> Result<()> {
     });
     println!("{scene}");
     Ok(())
+}
+
+fn fem(measured: &Fem, as_json: bool) {
+    let Fem { bricks, solve_s, reaction } = measured;
+    let sigma_mm = reaction.gaussian_sigma_mm();
+    if as_json {
+        let line = json!({
+            "solve_s": solve_s, "sigma_mm": sigma_mm, "forces": reaction.forces(), "version": env!("CARGO_PKG_VERSION"),
+        });
+        println!("{line}");
+    } else {
+        let (across, layers) = (bricks.across(), bricks.layers());
+        println!(
+            "{across} x {across} x {layers} bricks: {:.2} ms, sigma = {sigma_mm:.4} bricks",
+            solve_s * 1e3
+        );
+    }
 }
 
 fn growth(growths: &[Growth]) {
