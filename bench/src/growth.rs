@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use tactus_model::Indenter;
+use tactus_solid::fem::Bricks;
 
 use crate::{Fem, Painter, Tool, Way, even, fine_sphere, per_image_s};
 
@@ -94,7 +95,8 @@ impl Growth {
 
     fn with_bricks(how: &str, slabs: &[[u32; 2]]) -> Result<Self> {
         let point = |[across, layers]: &[u32; 2]| {
-            Ok([f64::from(across * across * layers), Fem::measure(*across, *layers, 0.45)?.solve_s])
+            let bricks = Bricks::cubes(*across, *layers, 1.0, 0.45)?;
+            Ok([f64::from(across * across * layers), Fem::measure(bricks).solve_s])
         };
         let points = slabs.iter().map(point).collect::<Result<_>>()?;
         Ok(Self { what: format!("finite elements, {how}"), size_of: "bricks", points })

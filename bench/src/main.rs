@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand};
 use serde_json::json;
 use tactus_bench::{COVERING, Fem, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses};
 use tactus_model::Array;
+use tactus_solid::fem::Bricks;
 
 /// How fast the models are, how exact, how they grow, and how far from the machine's limits.
 #[derive(Debug, Parser)]
@@ -66,6 +67,9 @@ enum Part {
         /// Of the bricks.
         #[arg(long, default_value_t = 0.45)]
         poisson_ratio: f64,
+        /// Bricks integrated in full, as plain ones are, not with mean dilatation.
+        #[arg(long)]
+        full: bool,
         /// One JSON object, with the force at every node of the bottom, instead of a line of text.
         #[arg(long)]
         json: bool,
@@ -83,8 +87,9 @@ fn main() -> Result<()> {
             forward(&Forward::measure(&array, tool, way, threads, time, compared)?, json);
         }
         Part::Scene { array, tool, way } => scene(array, tool, way)?,
-        Part::Fem { across, layers, poisson_ratio, json } => {
-            fem(&Fem::measure(across, layers, poisson_ratio)?, json);
+        Part::Fem { across, layers, poisson_ratio, full, json } => {
+            let bricks = Bricks::cubes(across, layers, 1.0, poisson_ratio)?;
+            fem(&Fem::measure(if full { bricks.integrated_in_full() } else { bricks }), json);
         }
         Part::Growth => growth(&Growth::measure()?),
         Part::Limits => limits(&Limits::measure()?),

@@ -1,10 +1,11 @@
-//! The paper's figures, drawn again from the model: Figures 4, 5b, 8, 9b and 10.
+//! The paper's figures, drawn again from the model: Figures 3, 4, 5b, 8, 9b and 10.
 //!
 //! [`draw_all`] computes and writes them all. Each figure is also a function from plain inputs to a
 //! [`Sheet`], which displays itself as SVG. Where the paper shows its sensor, a virtual sensor stands in, with
 //! elements that differ, noise and a converter; every caption says so.
 
 mod imaging_models;
+mod impulse_responses;
 mod page;
 mod point_spreads;
 mod resolutions;
@@ -20,11 +21,12 @@ use std::{
 };
 
 use tactus_model::{Array, Covering, ForwardModel, Indenter, ModelError, Psf, Response};
-use tactus_solid::layered::LayerError;
+use tactus_solid::{fem::BricksError, layered::LayerError};
 
 use crate::plot::Sheet;
 
 pub use imaging_models::{ModelledPress, imaging_models};
+pub use impulse_responses::{Widening, impulse_responses};
 pub use point_spreads::point_spreads;
 pub use resolutions::{Resolution, resolutions};
 pub use side_by_side::{SideBySide, side_by_side};
@@ -47,6 +49,9 @@ pub enum FigureError {
     /// A figure's elastic layer cannot be made.
     #[error(transparent)]
     Layer(#[from] LayerError),
+    /// A figure's finite elements cannot be made.
+    #[error(transparent)]
+    Bricks(#[from] BricksError),
     /// A file or folder cannot be written.
     #[error("{} cannot be written", path.display())]
     Write {
@@ -113,7 +118,8 @@ struct Drawing {
     caption: String,
 }
 
-const FIGURES: [PaperFigure; 7] = [
+const FIGURES: [PaperFigure; 8] = [
+    PaperFigure { number: "3", title: "Impulse responses of coverings", draw: impulse_responses::draw },
     PaperFigure { number: "4", title: "One press through four imaging models", draw: imaging_models::draw },
     PaperFigure {
         number: "5b",
