@@ -6,12 +6,14 @@
 //! node of the bottom (paper, Fig. 3).
 //!
 //! The slab's sides stand on rollers: they may slide, but not move outwards. Seen in a mirror at each side, the
-//! slab goes on for ever, with a load every `across` bricks; so the problem is periodic, all bricks are alike, and
-//! a wave of nodal displacements along the slab meets no other wave. Each wave's stiffness is a chain of `layers`
-//! equal 6 x 6 matrices. Going down, each layer's upper node is eliminated and its load is handed on to the node
-//! below; what is left at the fixed bottom is the reaction. No equation is approximated on this way: up to
-//! rounding the result is that of assembling the slab's stiffness matrix and factorising it. A slab of
-//! 100 x 100 x 10 bricks, which has 306,030 unknowns, takes some milliseconds.
+//! slab goes on for ever, with a load every `across` bricks. So the problem is periodic, all bricks are alike, and a
+//! wave of nodal displacements along the slab meets no other wave: a discrete Fourier transform along x and y leaves
+//! for each wave a chain of `layers` equal 6 x 6 matrices. Going down, each layer's upper node is eliminated and its
+//! load is handed on to the node below; what is left at the fixed bottom is the reaction. Nothing is approximated on
+//! this way: up to rounding the result is that of assembling the slab's equations and eliminating all unknowns. A
+//! slab of 100 x 100 x 10 bricks, some 300,000 of them, takes about half a millisecond.
+//!
+//! Free sides, as the paper's may have been, would change no force of that slab by more than 0.4 % of the peak.
 //!
 //! The strain energy of a brick, with the strain `e`, its trace `t` and the mean of `t` over the brick, `t0`, is
 //!
@@ -32,15 +34,27 @@
 //! # Ok::<(), tactus_solid::fem::BricksError>(())
 //! ```
 //!
+//! # Accuracy
+//! Against the layered solution: see [`Reaction::pressure_per_mm2`]. Against other finite element programs on the same
+//! mesh (`just fem-peers`): scikit-fem 12.0.2, with mean dilatation, 4e-15 of the peak, 1e-12 at a Poisson's ratio of
+//! 0.4999; `CalculiX` 2.20, integrated in full, 7e-8, half of the last digit that it prints.
+//!
 //! # Source
 //! The model: paper, Sec. 3. Mean dilatation: Nagtegaal, Parks and Rice, Comput. Methods Appl. Mech. Eng. 4 (1974);
 //! Hughes, Int. J. Numer. Methods Eng. 15 (1980).
 
+mod disc;
+mod even;
+mod reaction;
+
 use std::f64::consts::PI;
 
-use libm::{asin, cos, exp, sin, sqrt};
+use libm::{cos, sin};
 
-use crate::{quadrature::integrate, search::peak};
+use disc::force_of_disc;
+use even::Even;
+
+pub use reaction::Reaction;
 
 /// Bricks along a side of the slab, and layers of them, at most.
 pub const BRICKS_MAX: u32 = 2_000;
@@ -163,7 +177,11 @@ impl Bricks {
             return Ok(self.under_point());
         }
         let radius = diameter_mm / 2.0 / self.width_mm;
-        let load = Even::new(self.half() + 1, |x, y| force_of_disc(radius, [x, y].map(|steps| steps as f64)));
+        let half = self.half();
+        // A mirror image's disc reaches over to the nodes at the sides.
+        let discs = |steps: usize| if steps == half { 2.0 } else { 1.0 };
+        let force = |x: usize, y: usize| discs(x) * discs(y) * force_of_disc(radius, [x as f64, y as f64]);
+        let load = Even::new(half + 1, force);
         Ok(self.under(&load.transformed()))
     }
 
@@ -171,8 +189,8 @@ impl Bricks {
     /// and those on the nodes of the bottom, if both vary as `cos(x . wave)` from node to node. `wave` is in
     /// radians per brick, from `-pi` to `pi`. Even loads arrive in full: `transfer([0.0, 0.0]) = 1`.
     ///
-    /// In fine meshes it tends to that of the continuous
-    /// [`Layer`](crate::layered::Layer::transfer).
+    /// In fine meshes it tends to that of the elastic [`Layer`](crate::layered::Layer::transfer), with the square of
+    /// the brick's side.
     pub fn transfer(&self, wave: [f64; 2]) -> f64 {
         arriving(&self.layer_stiffness(wave), self.layers)
     }
@@ -238,14 +256,12 @@ impl Bricks {
     /// The reaction to a load given by its waves.
     fn under(&self, load: &Even) -> Reaction {
         let step = 2.0 * PI / f64::from(self.across);
-        let arrived = |x: usize, y: usize| {
-            // x and y are alike.
-            if x < y { 0.0 } else { self.transfer([x, y].map(|waves| step * waves as f64)) }
-        };
-        let transfer = Even::new(load.nodes, arrived);
+        let transfer = |x: usize, y: usize| self.transfer([x, y].map(|waves| step * waves as f64));
+        // x and y are alike.
+        let transfer = Even::new(load.nodes, |x, y| if x < y { 0.0 } else { transfer(x, y) });
         let nodes = f64::from(self.across * self.across);
-        let arrived = Even::new(load.nodes, |x, y| transfer.at(x.max(y), x.min(y)) * load.at(x, y) / nodes);
-        Reaction { bricks: *self, forces: arrived.transformed() }
+        let waves = Even::new(load.nodes, |x, y| transfer.at(x.max(y), x.min(y)) * load.at(x, y) / nodes);
+        Reaction { bricks: *self, forces: waves.transformed() }
     }
 
     fn half(&self) -> usize {
@@ -285,169 +301,6 @@ fn arriving(layer: &[[f64; 6]; 6], layers: u32) -> f64 {
         }
     }
     load[2]
-}
-
-/// Vertical reaction forces at the base of a slab under 1 N.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Reaction {
-    bricks: Bricks,
-    /// By distance from the load's axis in bricks, in the slab that goes on for ever: half of the force at a side's
-    /// node is the mirror image's.
-    forces: Even,
-}
-
-impl Reaction {
-    /// Forces at the nodes of the bottom in N, row-major, `across + 1` rows and columns; their sum is 1.
-    ///
-    /// At the sides a node carries half a brick, in the corners a quarter.
-    pub fn forces(&self) -> Vec<f64> {
-        let half = self.bricks.half();
-        let share = |steps: usize| if steps == half { 0.5 } else { 1.0 };
-        let steps = || (0..=2 * half).map(move |node| node.abs_diff(half));
-        steps().flat_map(|y| steps().map(move |x| share(x) * share(y) * self.forces.at(x, y))).collect()
-    }
-
-    /// Places in mm from the load's axis, and forces in N, of the nodes on the line along x through the middle of
-    /// the bottom (paper, Fig. 3a).
-    pub fn centre_line(&self) -> Vec<[f64; 2]> {
-        let half = self.bricks.half();
-        let line = self.forces().into_iter().skip(half * (2 * half + 1));
-        line.take(2 * half + 1)
-            .enumerate()
-            .map(|(node, force)| [(node as f64 - half as f64) * self.bricks.width_mm, force])
-            .collect()
-    }
-
-    /// Pressure in N/mm^2 about the bottom's node that is so many bricks from the load's axis along x and y: its
-    /// force over the area of a brick. 0 beyond the slab.
-    ///
-    /// Off the pressure under the elastic layer that the bricks stand for, with Poisson's ratios of 0.3, 0.45 and
-    /// 0.49, by at most this share of the peak: 10, 10 and 15 % with 5 layers of cubes, 3.4, 4.0 and 9.0 % with 10,
-    /// 0.35, 0.38 and 0.40 % with 32. Most of it is right below the load, where the node forces of a coarse mesh
-    /// alternate; it falls with the square of the brick's side.
-    pub fn pressure_per_mm2(&self, steps: [u32; 2]) -> f64 {
-        let [x, y] = steps.map(|steps| steps as usize);
-        if x.max(y) > self.bricks.half() { 0.0 } else { self.forces.at(x, y) / self.bricks.width_mm.powi(2) }
-    }
-
-    /// Share of the force that arrives at the rectangle `[[x_min, x_max], [y_min, y_max]]`, in mm from the load's
-    /// axis: what a sensor element there would measure. Each node's force counts as spread over a brick's square
-    /// about it; beyond the slab there is none.
-    pub fn force_on(&self, rectangle_mm: [[f64; 2]; 2]) -> f64 {
-        let half = self.bricks.half();
-        // The part of each node's square along an axis, both sides of the middle together.
-        let [along_x, along_y] = rectangle_mm.map(|side_mm| {
-            let [from, to] =
-                side_mm.map(|end_mm| (end_mm / self.bricks.width_mm).clamp(-(half as f64), half as f64));
-            let part = |node: f64| (to.min(node + 0.5) - from.max(node - 0.5)).max(0.0);
-            let parts = (0..=half).map(|steps| steps as f64);
-            parts
-                .map(|node| if node > 0.0 { part(node) + part(-node) } else { part(node) })
-                .collect::<Vec<_>>()
-        });
-        self.forces.weighted(&along_x, &along_y)
-    }
-
-    /// Standard deviation of the Gaussian that is most like the forces, in mm: the one whose values at the nodes,
-    /// scaled to unit L2 norm, have the greatest inner product with them (the paper's Eq. 3).
-    pub fn gaussian_sigma_mm(&self) -> f64 {
-        let half = self.bricks.half();
-        let likeness = |sigma: f64| {
-            let values: Vec<f64> = (0..=half)
-                .map(|steps| times(steps, half) * exp(-((steps * steps) as f64) / (2.0 * sigma * sigma)))
-                .collect();
-            let norm: f64 =
-                values.iter().enumerate().map(|(steps, value)| value * value / times(steps, half)).sum();
-            self.forces.weighted(&values, &values) / norm
-        };
-        self.bricks.width_mm * peak([0.1, half as f64], likeness)
-    }
-}
-
-/// Numbers on a periodic square grid that are the same at `-x`, and at `-y`; of the period, 0 to its half is kept.
-#[derive(Debug, Clone, PartialEq)]
-struct Even {
-    /// Along an axis: half a period and one.
-    nodes: usize,
-    values: Vec<f64>,
-}
-
-impl Even {
-    fn new(nodes: usize, value: impl Fn(usize, usize) -> f64) -> Self {
-        let value = &value;
-        Self { nodes, values: (0..nodes).flat_map(|y| (0..nodes).map(move |x| value(x, y))).collect() }
-    }
-
-    fn at(&self, x: usize, y: usize) -> f64 {
-        self.values[y * self.nodes + x]
-    }
-
-    /// The discrete Fourier transform, which is even again. Twice transformed, everything is as before, times the
-    /// number of nodes of a period.
-    fn transformed(&self) -> Self {
-        let half = self.nodes - 1;
-        let cosines = |wave: usize| {
-            let cosine = move |at: usize| cos(PI * ((wave * at) % (2 * half)) as f64 / half as f64);
-            (0..self.nodes).map(move |at| times(at, half) * cosine(at))
-        };
-        let cosines: Vec<Vec<f64>> = (0..self.nodes).map(|wave| cosines(wave).collect()).collect();
-        let along_x: Vec<Vec<f64>> = self
-            .values
-            .chunks(self.nodes)
-            .map(|row| cosines.iter().map(|wave| dot(wave, row)).collect())
-            .collect();
-        let mut values = Vec::with_capacity(self.values.len());
-        for wave in &cosines {
-            let mut sums = vec![0.0; self.nodes];
-            for (cosine, row) in wave.iter().zip(&along_x) {
-                sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += cosine * value);
-            }
-            values.append(&mut sums);
-        }
-        Self { nodes: self.nodes, values }
-    }
-
-    /// The sum of all numbers kept, each times a weight for its column and one for its row.
-    fn weighted(&self, along_x: &[f64], along_y: &[f64]) -> f64 {
-        self.values.chunks(self.nodes).zip(along_y).map(|(row, weight)| weight * dot(row, along_x)).sum()
-    }
-}
-
-/// How often a node so many steps from the middle is there in a period: on both sides, but for the ends.
-fn times(steps: usize, half: usize) -> f64 {
-    if steps == 0 || steps == half { 1.0 } else { 2.0 }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// The force on a node by 1 N spread evenly over a disc about the middle, by the node's bilinear shape function;
-/// lengths in bricks. Accurate to about 1e-12.
-fn force_of_disc(radius: f64, [x, y]: [f64; 2]) -> f64 {
-    if x.hypot(y) > radius + sqrt(2.0) {
-        return 0.0;
-    }
-    // Along y in closed form, along x = radius sin(turn) by quadrature between all kinks of the integrand.
-    let ahead = |from: f64| {
-        let from = from.clamp(-1.0, 1.0);
-        0.5 - from + from * from.abs() / 2.0
-    };
-    let force = |turn: f64| {
-        let (at, reach) = (radius * sin(turn), radius * cos(turn));
-        let share = (1.0 - (at - x).abs()).max(0.0);
-        share * (ahead(-reach - y) - ahead(reach - y)) * reach
-    };
-    let mut kinks = vec![-PI / 2.0, PI / 2.0];
-    let mut node = 0.0;
-    while node <= radius {
-        let turn = asin(node / radius);
-        kinks.extend([turn, -turn, PI / 2.0 - turn, turn - PI / 2.0]);
-        node += 1.0;
-    }
-    kinks.sort_by(f64::total_cmp);
-    let panels = kinks.windows(2).map(|ends| integrate([ends[0], ends[1]], PI, force));
-    panels.sum::<f64>() / (PI * radius * radius)
 }
 
 #[cfg(test)]

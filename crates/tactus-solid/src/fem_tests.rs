@@ -1,7 +1,9 @@
+use libm::exp;
+
 use super::*;
 use crate::layered::{Base, Layer};
 
-#[path = "fem_tests/element.rs"]
+#[path = "fem/element_tests.rs"]
 mod element;
 use element::{Element, Volume, reactions};
 
@@ -218,16 +220,16 @@ fn plain_bricks_sharpen_the_response_of_a_nearly_incompressible_covering() {
 }
 
 /// Forces in N from the middle along a row of the base of 20 x 20 x 5 cubes, Poisson's ratio 0.45, by the C3D8 of
-/// CalculiX 2.20: what `bench/peers/fem.py --peers CalculiX --meshes 20x5` compares.
+/// `CalculiX` 2.20: what `bench/peers/fem.py --peers CalculiX --meshes 20x5` compares.
 const CALCULIX: [f64; 8] = [
-    3.199946e-02,
-    2.724191e-02,
-    1.995396e-02,
-    1.247326e-02,
-    6.814864e-03,
-    3.355189e-03,
-    1.534524e-03,
-    6.842094e-04,
+    3.199_946e-02,
+    2.724_191e-02,
+    1.995_396e-02,
+    1.247_326e-02,
+    6.814_864e-03,
+    3.355_189e-03,
+    1.534_524e-03,
+    6.842_094e-04,
 ];
 
 #[test]
@@ -262,6 +264,12 @@ fn a_discs_forces_are_those_of_an_even_pressure() {
         let all: f64 = places().flat_map(|x| places().map(move |y| force_of_disc(radius, [x, y]))).sum();
         assert!((all - 1.0).abs() < 1e-12, "{radius}: {all}");
     }
+}
+
+#[test]
+fn a_disc_may_reach_the_sides() {
+    let forces = cubes(8, 3, 0.45).under_disc(8.0).unwrap().forces();
+    assert!((forces.iter().sum::<f64>() - 1.0).abs() < 1e-12);
 }
 
 #[test]
