@@ -96,7 +96,7 @@ bench-peers-tools:
     test -d {{ tools }}/peers || python3 -m venv {{ tools }}/peers
     {{ tools }}/peers/bin/pip install --quiet --requirement bench/peers/requirements.txt
 
-# The finite element model beside scikit-fem and CalculiX, which is installed from Debian where it is not; some 20 minutes.
+# The finite element model beside scikit-fem and CalculiX, which is installed from Debian where it is not; some ten minutes.
 fem-peers *arguments: solid-tools
     command -v ccx >/dev/null || (apt-get update -qq && apt-get install -qq --no-install-recommends calculix-ccx)
     cargo build --release --package tactus-bench

@@ -48,7 +48,8 @@ def main():
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/release/tactus-bench")
-    parser.add_argument("--meshes", nargs="+", type=mesh, default=[(20, 5), (40, 10), (100, 10)], help="ACROSSxLAYERS")
+    meshes = [(20, 5), (40, 10), (64, 10), (100, 10)]
+    parser.add_argument("--meshes", nargs="+", type=mesh, default=meshes, help="ACROSSxLAYERS")
     parser.add_argument("--poisson-ratios", nargs="+", type=float, default=[0.45])
     parser.add_argument("--peers", nargs="+", choices=PEERS, default=list(PEERS))
     parser.add_argument("--sides", nargs="+", choices=("rollers", "free"), default=["rollers", "free"])
