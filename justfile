@@ -69,9 +69,20 @@ proto:
 assets:
     cargo xtask assets
 
-# How fast the forward model is, how it grows, how far from the machine's limits: bench/README.md.
+# The finite element model of the covering against scikit-fem, on small meshes: equal reactions, or it fails.
+solid-check: build solid-tools
+    {{ tools }}/solid/bin/python bench/peers/fem.py --binary target/debug/tactus-bench --peers scikit-fem --sides rollers \
+        --meshes 12x3 16x4 --poisson-ratios 0.3 0.45 0.4999 --rounds 1 --within 1e-10
+
+# A virtual environment with scikit-fem.
+solid-tools:
+    test -d {{ tools }}/solid || python3 -m venv {{ tools }}/solid
+    {{ tools }}/solid/bin/pip install --quiet --requirement bench/peers/fem-requirements.txt
+
+# How fast the models are, how they grow, how far from the machine's limits: bench/README.md.
 bench:
     cargo bench --package tactus-bench --bench forward -- --quick
+    cargo bench --package tactus-bench --bench fem -- --quick
     cargo run --release --package tactus-bench -- growth
     cargo run --release --package tactus-bench -- limits
     cargo run --release --package tactus-bench -- acuity
@@ -90,6 +101,12 @@ bench-acuity *arguments: bench-peers-tools
 bench-peers-tools:
     test -d {{ tools }}/peers || python3 -m venv {{ tools }}/peers
     {{ tools }}/peers/bin/pip install --quiet --requirement bench/peers/requirements.txt
+
+# The finite element model beside scikit-fem and CalculiX, which is installed from Debian where it is not; some ten minutes.
+fem-peers *arguments: solid-tools
+    command -v ccx >/dev/null || (apt-get update -qq && apt-get install -qq --no-install-recommends calculix-ccx)
+    cargo build --release --package tactus-bench
+    {{ tools }}/solid/bin/python bench/peers/fem.py {{ arguments }}
 
 # Build times from nothing, and the slowest crates.
 build-times:

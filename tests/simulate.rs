@@ -210,7 +210,7 @@ fn the_papers_figures_are_drawn() {
         .iter()
         .map(|file| file.as_str().unwrap().to_owned())
         .collect();
-    assert_eq!(files.len(), 10);
+    assert_eq!(files.len(), 11);
     for file in files {
         let text = fs::read_to_string(folder.path().join(&file)).unwrap();
         assert!(text.contains("<svg") && text.contains("imulated") | !file.ends_with("html"), "{file}");

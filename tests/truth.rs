@@ -83,7 +83,17 @@ fn measured(seed: u64, points: u64) -> Found {
 
 fn run(folder: &Path, seed: u64, experiment: &str, parameters: &[String]) -> PathBuf {
     let seed = seed.to_string();
-    let mut args = vec!["--json", "run", experiment, "--embedded", "--no-report", "--rig-file", "rig.toml", "--seed", &seed];
+    let mut args = vec![
+        "--json",
+        "run",
+        experiment,
+        "--embedded",
+        "--no-report",
+        "--rig-file",
+        "rig.toml",
+        "--seed",
+        &seed,
+    ];
     for parameter in parameters {
         args.extend(["-p", parameter]);
     }
@@ -138,8 +148,16 @@ fn faults(rng: &mut impl Rng) -> [(&'static str, toml::Value); 4] {
     [
         ("dead", table(json!(dead))),
         ("stuck", table(stuck.iter().map(|e| json!({"element": e, "counts": 40 * (e + 1)})).collect())),
-        ("noisy", table(noisy.iter().map(|e| json!({"element": e, "noise_rms_counts": 20.0 + *e as f64})).collect())),
-        ("miswired", table(crossed.iter().map(|e| json!({"element": e, "answers_for": neighbour(*e)})).collect())),
+        (
+            "noisy",
+            table(
+                noisy.iter().map(|e| json!({"element": e, "noise_rms_counts": 20.0 + *e as f64})).collect(),
+            ),
+        ),
+        (
+            "miswired",
+            table(crossed.iter().map(|e| json!({"element": e, "answers_for": neighbour(*e)})).collect()),
+        ),
     ]
 }
 
@@ -194,7 +212,10 @@ fn compare(rig: &Rig, found: &Value) -> Found {
     Found {
         errors,
         missed: truth.faults.iter().filter(|(element, fault)| !right(**element, fault)).count(),
-        accused: accusations.keys().filter(|element| !truth.faults.contains_key(&(**element as usize))).count(),
+        accused: accusations
+            .keys()
+            .filter(|element| !truth.faults.contains_key(&(**element as usize)))
+            .count(),
         planted,
     }
 }
@@ -234,12 +255,20 @@ impl Tally {
             row.worst = row.worst.max(error.abs());
         }
         let sum = |of: fn(&Found) -> usize| found.iter().map(of).sum();
-        Self { rows, missed: sum(|found| found.missed), accused: sum(|found| found.accused), planted: sum(|found| found.planted) }
+        Self {
+            rows,
+            missed: sum(|found| found.missed),
+            accused: sum(|found| found.accused),
+            planted: sum(|found| found.planted),
+        }
     }
 
     fn print(&self, rigs: u64, points: u64) {
         println!("{rigs} rigs, sweep of {points} x {points} points, 4 coverings, 3 depths");
-        println!("{:<18}{:>10}{:>10}{:>10}{:>10}{:>10}", "quantity", "intervals", "covered", "bias", "scatter", "worst");
+        println!(
+            "{:<18}{:>10}{:>10}{:>10}{:>10}{:>10}",
+            "quantity", "intervals", "covered", "bias", "scatter", "worst"
+        );
         for (name, row) in &self.rows {
             let count = f64::from(row.intervals);
             println!(

@@ -1,16 +1,21 @@
-//! How the time of an image grows with the elements and with the tool's triangles.
+//! How the time of an image grows with the elements and with the tool's triangles, and that of the finite element
+//! model with its bricks.
 
 use std::time::Instant;
 
 use anyhow::Result;
 use tactus_model::Indenter;
+use tactus_solid::fem::Bricks;
 
-use crate::{Painter, Tool, Way, even, fine_sphere, per_image_s};
+use crate::{Fem, Painter, Tool, Way, even, fine_sphere, per_image_s};
 
 /// Rows and columns against those of the `DigiTacts` array: 48, 192 and 768 elements.
 const FINENESSES: [u32; 3] = [1, 2, 4];
 /// Triangles of a sphere.
 const TRIANGLES: [u32; 4] = [500, 2_000, 8_000, 32_000];
+/// Slabs: bricks along a side, and layers.
+const SLABS: [(&str, [[u32; 2]; 3]); 2] =
+    [("wider", [[50, 10], [100, 10], [200, 10]]), ("thicker", [[100, 10], [100, 20], [100, 40]])];
 
 /// Times at several sizes, and the power of the size that fits them best.
 #[derive(Debug, Clone)]
@@ -40,6 +45,9 @@ impl Growth {
         for way in [Way::Raster, Way::Exact] {
             let [_, image] = Self::with_triangles(way)?;
             growths.push(image);
+        }
+        for (how, slabs) in SLABS {
+            growths.push(Self::with_bricks(how, &slabs)?);
         }
         Ok(growths)
     }
@@ -83,6 +91,15 @@ impl Growth {
             Self { what, size_of: "triangles", points }
         };
         Ok([named("making ready", ready), named("image", image)])
+    }
+
+    fn with_bricks(how: &str, slabs: &[[u32; 2]]) -> Result<Self> {
+        let point = |[across, layers]: &[u32; 2]| {
+            let bricks = Bricks::cubes(*across, *layers, 1.0, 0.45)?;
+            Ok([f64::from(across * across * layers), Fem::measure(bricks).solve_s])
+        };
+        let points = slabs.iter().map(point).collect::<Result<_>>()?;
+        Ok(Self { what: format!("finite elements, {how}"), size_of: "bricks", points })
     }
 }
 

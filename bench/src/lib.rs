@@ -1,10 +1,12 @@
-//! How fast the forward model is, how exact, how it grows, and how far from the machine's limits.
+//! How fast the models are, how exact, how they grow, and how far from the machine's limits.
 //!
-//! Every part of the program (`tactus-bench --help`) and every criterion bench presses the same [`Tool`]s at the
-//! same [`Pose`]s on the same arrays, along one [`Way`] from pose to image or another.
+//! What measures the forward model (`tactus-bench --help`, the criterion bench) presses the same [`Tool`]s at the
+//! same [`Pose`]s on the same arrays, along one [`Way`] from pose to image or another. [`Fem`] is the finite element
+//! model of the covering.
 
 mod acuity;
 mod clock;
+mod fem;
 mod forward;
 mod growth;
 mod limits;
@@ -14,6 +16,7 @@ mod way;
 
 pub use acuity::Acuity;
 pub use clock::per_image_s;
+pub use fem::Fem;
 pub use forward::Forward;
 pub use growth::Growth;
 pub use limits::{Kernel, Limits};

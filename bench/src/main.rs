@@ -7,12 +7,13 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 use serde_json::json;
 use tactus_bench::{
-    Acuity, COVERING, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses,
+    Acuity, COVERING, Fem, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses,
 };
 use tactus_calibrate::acuity::Grid;
 use tactus_model::Array;
+use tactus_solid::fem::Bricks;
 
-/// How fast the forward model is, how exact, how it grows, and how far from the machine's limits.
+/// How fast the models are, how exact, how they grow, and how far from the machine's limits.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Args {
@@ -64,7 +65,25 @@ enum Part {
         #[arg(long)]
         json: bool,
     },
-    /// How the time of an image grows with elements and triangles.
+    /// The finite element model of the covering under 1 N at the middle of its top: cubes of 1 mm, sides on rollers.
+    Fem {
+        /// Bricks along a side.
+        #[arg(long, default_value_t = 100)]
+        across: u32,
+        /// Layers of bricks.
+        #[arg(long, default_value_t = 10)]
+        layers: u32,
+        /// Of the bricks.
+        #[arg(long, default_value_t = 0.45)]
+        poisson_ratio: f64,
+        /// Bricks integrated in full, as plain ones are, not with mean dilatation.
+        #[arg(long)]
+        full: bool,
+        /// One JSON object, with the force at every node of the bottom, instead of a line of text.
+        #[arg(long)]
+        json: bool,
+    },
+    /// How the time of an image grows with elements and triangles, and that of the finite elements with bricks.
     Growth,
     /// What of this machine's arithmetic and bandwidth the kernels use.
     Limits,
@@ -78,6 +97,10 @@ fn main() -> Result<()> {
         }
         Part::Scene { array, tool, way } => scene(array, tool, way)?,
         Part::Acuity { json } => acuity(json)?,
+        Part::Fem { across, layers, poisson_ratio, full, json } => {
+            let bricks = Bricks::cubes(across, layers, 1.0, poisson_ratio)?;
+            fem(&Fem::measure(if full { bricks.integrated_in_full() } else { bricks }), json);
+        }
         Part::Growth => growth(&Growth::measure()?),
         Part::Limits => limits(&Limits::measure()?),
     }
@@ -154,6 +177,23 @@ fn acuity(as_json: bool) -> Result<()> {
         growth(&Acuity::growth(TIMES)?);
     }
     Ok(())
+}
+
+fn fem(measured: &Fem, as_json: bool) {
+    let Fem { bricks, solve_s, reaction } = measured;
+    let sigma_mm = reaction.gaussian_sigma_mm();
+    if as_json {
+        let line = json!({
+            "solve_s": solve_s, "sigma_mm": sigma_mm, "forces": reaction.forces(), "version": env!("CARGO_PKG_VERSION"),
+        });
+        println!("{line}");
+    } else {
+        let (across, layers) = (bricks.across(), bricks.layers());
+        println!(
+            "{across} x {across} x {layers} bricks: {:.2} ms, sigma = {sigma_mm:.4} bricks",
+            solve_s * 1e3
+        );
+    }
 }
 
 fn growth(growths: &[Growth]) {

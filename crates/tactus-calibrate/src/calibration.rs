@@ -93,7 +93,9 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
             })
         }
         Err(problem) => {
-            missing.push(format!("Registration: {problem}. Origin, rotation and surface are taken as declared."));
+            missing.push(format!(
+                "Registration: {problem}. Origin, rotation and surface are taken as declared."
+            ));
             None
         }
     };
@@ -145,7 +147,8 @@ impl Calibration {
                 (psf, [Some(intercept.standard_error), Some(slope.standard_error)])
             }
             (None, [covering]) => {
-                let sigma_intercept_mm = covering.sigma_mm.value - declared.sigma_per_mm * covering.covering_mm;
+                let sigma_intercept_mm =
+                    covering.sigma_mm.value - declared.sigma_per_mm * covering.covering_mm;
                 (Psf { sigma_intercept_mm, ..declared }, [Some(covering.sigma_mm.standard_error), None])
             }
             _ => return None,
@@ -158,7 +161,9 @@ impl Calibration {
     pub fn responses(&self, declared: &Response) -> Option<(Response, [Vec<f64>; 3])> {
         let fitted = self.response.as_ref()?;
         let elements = self.baseline_counts.len();
-        let median = |of: fn(&crate::ElementResponse) -> f64| typical(fitted.elements.iter().map(of)).unwrap_or_default();
+        let median = |of: fn(&crate::ElementResponse) -> f64| {
+            typical(fitted.elements.iter().map(of)).unwrap_or_default()
+        };
         let mut response = Response {
             sensitivity_counts_per_mm: vec![median(|one| one.sensitivity_counts_per_mm.value); elements],
             quadratic_per_mm: vec![median(|one| one.quadratic_per_mm.value); elements],
@@ -185,7 +190,8 @@ impl Calibration {
     fn remark(&mut self, declared: &Declared, readings: &Readings) {
         let unrested = readings.presses.iter().filter(|press| press.rest.is_none()).count();
         if unrested > 0 {
-            self.warnings.push(format!("{unrested} presses have no reading at rest before them and are left out."));
+            self.warnings
+                .push(format!("{unrested} presses have no reading at rest before them and are left out."));
         }
         if readings.frames_left_out > 0 {
             self.warnings.push(format!(
@@ -195,7 +201,8 @@ impl Calibration {
         }
         let unknown = readings.presses.iter().filter(|press| declared.indenter(press).is_none()).count();
         if unknown > 0 {
-            self.warnings.push(format!("{unknown} presses are left out: their tool is not in the rig's description."));
+            self.warnings
+                .push(format!("{unknown} presses are left out: their tool is not in the rig's description."));
         }
         if !self.health.not_judged.is_empty() {
             self.missing.push(format!(
@@ -270,7 +277,8 @@ impl Calibration {
     fn remark_registration(&mut self, registration: &RegistrationFit) {
         if registration.rotation_deg.is_none() {
             self.missing.push(
-                "Rotation: the presses lie too close together, within two pitches; it is taken as declared.".into(),
+                "Rotation: the presses lie too close together, within two pitches; it is taken as declared."
+                    .into(),
             );
         }
         if registration.surface_mm.is_none() {
@@ -319,7 +327,11 @@ impl Data {
 }
 
 /// What is declared, with the reference press that was most made where the declared one was not.
-fn referred(declared: &Declared, readings: &Readings, warnings: &mut Vec<String>) -> Result<Declared, ModelError> {
+fn referred(
+    declared: &Declared,
+    readings: &Readings,
+    warnings: &mut Vec<String>,
+) -> Result<Declared, ModelError> {
     if readings.presses.iter().any(|press| declared.is_reference(press)) {
         return Ok(declared.clone());
     }

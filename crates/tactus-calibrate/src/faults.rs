@@ -117,7 +117,8 @@ pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &Place) -
 
 fn stuck(readings: &Readings, element: usize, typical_noise: f64) -> Option<f32> {
     let others_vary = typical_noise > 0.0
-        && readings.constant_counts.iter().filter(|constant| constant.is_none()).count() * 2 > readings.elements;
+        && readings.constant_counts.iter().filter(|constant| constant.is_none()).count() * 2
+            > readings.elements;
     readings.constant_counts[element].filter(|_| others_vary && readings.frames >= FRAMES_LEAST)
 }
 
@@ -158,7 +159,8 @@ impl Trials {
             let contact = place.setting.contact(press, dwell, indenter);
             let mut felt = vec![0.0; readings.elements];
             model.indentation(&contact, Covering { thickness_mm: press.covering_mm }, &mut felt);
-            let rises = (0..readings.elements).filter_map(|element| press.rise(dwell, element)).map(|[rise, _]| rise);
+            let rises =
+                (0..readings.elements).filter_map(|element| press.rise(dwell, element)).map(|[rise, _]| rise);
             trials.rises.push(rises.collect());
             trials.felt.push(felt);
             trials.spread.push(variance.sqrt());
@@ -215,7 +217,8 @@ impl Trials {
 
     /// Greatest rise of an element, either way, and its standard deviation in units of a frame's noise.
     fn greatest(&self, element: usize) -> [f64; 2] {
-        let rises = self.rises.iter().zip(&self.spread).map(|(rises, spread)| [rises[element].abs(), *spread]);
+        let rises =
+            self.rises.iter().zip(&self.spread).map(|(rises, spread)| [rises[element].abs(), *spread]);
         rises.max_by(|a, b| a[0].total_cmp(&b[0])).unwrap_or([0.0, 1.0])
     }
 

@@ -133,7 +133,15 @@ impl Lab {
             })
             .collect();
         let run = self.run.clone();
-        self.gather.take(Sample { run: &run, press, phase, position_mm, covering_mm, indenter: "cyl1", counts: &read });
+        self.gather.take(Sample {
+            run: &run,
+            press,
+            phase,
+            position_mm,
+            covering_mm,
+            indenter: "cyl1",
+            counts: &read,
+        });
     }
 
     /// What was measured.

@@ -1,10 +1,14 @@
-//! Weighted least squares, linear or not, by the damped Gauss-Newton method (Levenberg and Marquardt).
+//! Weighted least squares, linear or not, by the damped Gauss-Newton method.
+//!
+//! # Source
+//! Levenberg and Marquardt; the damping's schedule is that of Madsen, Nielsen and Tingleff, *Methods for Non-Linear Least
+//! Squares Problems* (2004), Sec. 3.2.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Damping beyond which no step helps any more.
 const DAMPING_MAX: f64 = 1e10;
-const ROUNDS_MAX: usize = 60;
+const ROUNDS_MAX: usize = 100;
 /// A step that promises to lessen the cost by less than this share of it is the last.
 const PROMISE_LEAST: f64 = 1e-10;
 
@@ -105,28 +109,27 @@ pub(crate) fn minimise(
 ) -> Option<Fit> {
     let mut at = DVector::from_vec(start);
     let mut normal = evaluate(at.as_slice())?;
-    let mut damping = 1e-6;
+    // Damping as by Nielsen: less after a step that kept its promise, more and more after steps that did not help.
+    let (mut damping, mut growth) = (1e-6, 2.0);
     for _ in 0..ROUNDS_MAX {
-        let Some(step) = normal.step(free, damping) else {
-            damping = (damping * 100.0_f64).max(1e-6);
-            if damping > DAMPING_MAX {
-                return None;
-            }
-            continue;
-        };
-        let promise = step.dot(&normal.right);
-        if std::env::var("DBG").is_ok() { eprintln!("{:?} cost {} damping {damping} promise {promise}", at.as_slice(), normal.cost); }
-        if promise <= PROMISE_LEAST * (normal.cost + f64::MIN_POSITIVE) {
+        let step = normal.step(free, damping);
+        let promise = step.as_ref().map_or(f64::INFINITY, |step| step.dot(&normal.right));
+        if promise <= PROMISE_LEAST * (normal.cost + f64::MIN_POSITIVE) || damping > DAMPING_MAX {
             break;
         }
-        let there = &at + &step;
-        match evaluate(there.as_slice()).filter(|next| next.cost < normal.cost) {
-            Some(next) => {
+        let there = step.map(|step| &at + step);
+        let next = there.as_ref().and_then(|there| evaluate(there.as_slice()));
+        match there.zip(next).filter(|(_, next)| next.cost < normal.cost) {
+            Some((there, next)) => {
+                let kept = (normal.cost - next.cost) / promise;
+                damping = (damping * (1.0 - (2.0 * kept - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-12);
+                growth = 2.0;
                 (at, normal) = (there, next);
-                damping = (damping / 10.0).max(1e-12);
             }
-            None if damping > DAMPING_MAX => break,
-            None => damping = (damping * 10.0).max(1e-6),
+            None => {
+                damping *= growth;
+                growth *= 2.0;
+            }
         }
     }
     let covariance = normal.covariance(free)?;

@@ -192,9 +192,11 @@ impl Gather {
             self.segment.kind = kind;
         }
         if let Kind::Load(press) | Kind::Hold(press) = kind
-            && self.readings.presses.last().is_none_or(|last| {
-                last.index != press || last.run + 1 != self.readings.runs.len()
-            })
+            && self
+                .readings
+                .presses
+                .last()
+                .is_none_or(|last| last.index != press || last.run + 1 != self.readings.runs.len())
         {
             self.end_press();
             self.begin_press(&sample);
@@ -303,7 +305,8 @@ impl Noise {
         let rests = self.means.len() as f64;
         let mean = (rests > 0.0).then(|| self.means.iter().sum::<f64>() / rests)?;
         let squares: f64 = self.means.iter().map(|rest| (rest - mean).powi(2)).sum();
-        let variance = if rests > 1.0 { squares / (rests - 1.0) / rests } else { self.squares / self.freedom.powi(2) };
+        let variance =
+            if rests > 1.0 { squares / (rests - 1.0) / rests } else { self.squares / self.freedom.powi(2) };
         Some([mean, variance.sqrt()])
     }
 }

@@ -3,7 +3,15 @@ use tactus_model::Array;
 use super::*;
 
 fn sample<'a>(press: i32, phase: Phase, z_mm: f64, counts: &'a [f32]) -> Sample<'a> {
-    Sample { run: "a", press, phase, position_mm: [1.0, 2.0, z_mm], covering_mm: 1.016, indenter: "cyl1", counts }
+    Sample {
+        run: "a",
+        press,
+        phase,
+        position_mm: [1.0, 2.0, z_mm],
+        covering_mm: 1.016,
+        indenter: "cyl1",
+        counts,
+    }
 }
 
 fn array() -> Array {

@@ -74,6 +74,8 @@ pub struct RegistrationFit {
 pub(crate) struct Place {
     pub(crate) setting: Setting,
     pub(crate) sigma_mm: f64,
+    /// Presses that contradict the others: index of the run, index in it.
+    pub(crate) contradicting: Vec<(usize, i32)>,
     /// Covariance of origin x, origin y, rotation in degrees, surface, sigma.
     pub(crate) covariance: DMatrix<f64>,
 }
@@ -82,11 +84,21 @@ impl Place {
     /// As declared, and taken for exact.
     pub(crate) fn declared(declared: &Declared, covering_mm: f64) -> Self {
         let covariance = DMatrix::zeros(Self::UNSURE, Self::UNSURE);
-        Self { setting: declared.setting(), sigma_mm: declared.sigma_mm(covering_mm), covariance }
+        Self {
+            setting: declared.setting(),
+            sigma_mm: declared.sigma_mm(covering_mm),
+            contradicting: Vec::new(),
+            covariance,
+        }
     }
 
     /// Number of its parameters that are not sure.
     pub(crate) const UNSURE: usize = 5;
+
+    /// True if nothing speaks against a press.
+    pub(crate) fn admits(&self, press: &Press) -> bool {
+        !self.contradicting.contains(&(press.run, press.index))
+    }
 
     /// With one of its unsure parameters moved.
     pub(crate) fn moved(&self, parameter: usize, by: f64) -> Self {
@@ -107,7 +119,8 @@ pub(crate) fn register(
     readings: &Readings,
     sound: &[bool],
 ) -> Result<(RegistrationFit, Place), String> {
-    let presses: Vec<&Press> = across(declared, readings).into_iter().filter(|press| press.rest.is_some()).collect();
+    let presses: Vec<&Press> =
+        across(declared, readings).into_iter().filter(|press| press.rest.is_some()).collect();
     let places = distinct_places(presses.iter().map(|press| press.place_mm)).len();
     if places < PLACES_LEAST {
         return Err(format!(
@@ -116,22 +129,21 @@ pub(crate) fn register(
     }
     let (count, covering_mm) = (presses.len(), declared.model.response().reference_covering.thickness_mm);
     let mut problem = Problem::new(declared, readings, sound, presses)?;
-    let mut left_out = Vec::new();
+    let mut contradicting = Vec::new();
     let mut fit = problem.fit(None).ok_or(UNDETERMINED)?;
     // One by one: what a gross outlier does to the fit may make others look like outliers.
     while let Some(outlying) = problem.outlying(&fit) {
-        if problem.presses.len() <= PLACES_LEAST || left_out.len() * 10 >= count {
+        if problem.presses.len() <= PLACES_LEAST || contradicting.len() * 10 >= count {
             break;
         }
         let press = problem.presses.remove(outlying);
-        left_out.push((readings.runs[press.run].clone(), press.index));
+        contradicting.push((press.run, press.index));
         problem = Problem::new(declared, readings, sound, problem.presses)?;
         fit = problem.fit(None).ok_or(UNDETERMINED)?;
     }
-    let place = problem.place(&fit);
-    let estimate = |index: usize| {
-        Estimate::new(fit.parameters[index], fit.covariance[(index, index)] * fit.inflation())
-    };
+    let place = Place { contradicting: contradicting.clone(), ..problem.place(&fit) };
+    let estimate =
+        |index: usize| Estimate::new(fit.parameters[index], fit.covariance[(index, index)] * fit.inflation());
     let free = |index: usize| problem.free[index];
     let mut runs: Vec<usize> = problem.presses.iter().map(|press| press.run).collect();
     runs.dedup();
@@ -144,7 +156,7 @@ pub(crate) fn register(
         covering_mm,
         runs: runs.into_iter().map(|run| readings.runs[run].clone()).collect(),
         presses: problem.presses.len(),
-        left_out,
+        left_out: contradicting.iter().map(|(run, index)| (readings.runs[*run].clone(), *index)).collect(),
         residual_in_noise: fit.misfit.sqrt(),
     };
     Ok((registration, place))
@@ -225,11 +237,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Gives every reading: index of its press, residual, slopes by the parameters, weight.
-    fn each(
-        &self,
-        parameters: &[f64],
-        mut take: impl FnMut(usize, f64, &[(usize, f64)], f64),
-    ) -> Option<()> {
+    fn each(&self, parameters: &[f64], mut take: impl FnMut(usize, f64, &[(usize, f64)], f64)) -> Option<()> {
         let (model, setting) = (self.model(parameters)?, setting(parameters));
         for (index, press) in self.presses.iter().enumerate() {
             let indenter = self.declared.indenter(press)?;
@@ -239,7 +247,8 @@ impl<'a> Problem<'a> {
                 let by_setting = Slopes::of(&setting, contact.position_mm);
                 for (place, (element, noise)) in self.elements.iter().enumerate() {
                     let Some([rise, variance]) = press.rise(dwell, *element) else { continue };
-                    let (predicted, slopes) = self.predict(parameters, &gradient, &by_setting, place, *element);
+                    let (predicted, slopes) =
+                        self.predict(parameters, &gradient, &by_setting, place, *element);
                     take(index, rise - predicted, &slopes, 1.0 / (variance * noise * noise));
                 }
             }
@@ -283,7 +292,12 @@ impl<'a> Problem<'a> {
         let covariance = DMatrix::from_fn(order.len(), order.len(), |row, column| {
             fit.inflation() * fit.covariance[(order[row], order[column])]
         });
-        Place { setting: setting(&fit.parameters), sigma_mm: fit.parameters[SIGMA], covariance }
+        Place {
+            setting: setting(&fit.parameters),
+            sigma_mm: fit.parameters[SIGMA],
+            contradicting: Vec::new(),
+            covariance,
+        }
     }
 }
 

@@ -54,7 +54,8 @@ fn a_stage_whose_steps_are_wrong_shows_in_the_scale() {
         4095.0,
         1.0,
     );
-    wrong.model = ForwardModel::new(longer.unwrap(), declared.model.psf(), declared.model.response().clone()).unwrap();
+    wrong.model =
+        ForwardModel::new(longer.unwrap(), declared.model.psf(), declared.model.response().clone()).unwrap();
     let scale = registered(&wrong, &readings).scale.unwrap();
     assert!((scale.value - 1.0 / 1.01).abs() < 5e-4 && !scale.covers(1.0), "{scale:?}");
 }

@@ -23,7 +23,7 @@ use tactus_model::Covering;
 
 use crate::{
     Estimate,
-    readings::Readings,
+    readings::{Press, Readings},
     registration::Place,
     setting::Declared,
 };
@@ -138,7 +138,10 @@ pub(crate) fn respond(
     let groups = |place: &Place| groups(declared, readings, sound, place);
     let here = groups(place);
     if here.is_empty() {
-        return Err("no sound element was pressed at its centre with the reference tool under the reference covering".into());
+        return Err(
+            "no sound element was pressed at its centre with the reference tool under the reference covering"
+                .into(),
+        );
     }
     let fits = Form::ALL.map(|form| fit(form, &here, |_| true));
     let linear = fits[0].as_ref().ok_or("the readings do not determine the responses")?;
@@ -155,7 +158,10 @@ pub(crate) fn respond(
             .map(|parameter| {
                 let moved = fit(wanted.form, &groups(&place.moved(parameter, STEP)), |_| true);
                 let moved = moved.filter(|moved| moved.elements == elements);
-                moved.map_or_else(|| wanted.expanded() * 0.0, |moved| (moved.expanded() - wanted.expanded()) / STEP)
+                moved.map_or_else(
+                    || wanted.expanded() * 0.0,
+                    |moved| (moved.expanded() - wanted.expanded()) / STEP,
+                )
             })
             .collect::<Vec<_>>(),
     );
@@ -167,7 +173,9 @@ pub(crate) fn respond(
         let of_element = here.iter().filter(|group| group.element == *element);
         ElementResponse {
             element: *element,
-            points: of_element.flat_map(|group| group.points.iter().map(|point| [point.u_mm, point.rise_counts])).collect(),
+            points: of_element
+                .flat_map(|group| group.points.iter().map(|point| [point.u_mm, point.rise_counts]))
+                .collect(),
             linear_counts_per_mm: linear.sensitivity(index),
             quadratic: own.as_ref().map(|own| [own.sensitivity(index), own.curvature(index)]),
             sensitivity_counts_per_mm: Estimate::new(s, covariance[(index, index)]),
@@ -177,7 +185,8 @@ pub(crate) fn respond(
     let trials = fits.iter().flatten().map(|fit| Trial {
         form: fit.form,
         rms_counts: fit.rms_counts(&here),
-        heldout_rms_counts: heldout(fit.form, &here).map(|errors| rms(errors.iter().map(|error| error.counts))),
+        heldout_rms_counts: heldout(fit.form, &here)
+            .map(|errors| rms(errors.iter().map(|error| error.counts))),
     });
     let response = ResponseFit {
         form: wanted.form,
@@ -186,7 +195,11 @@ pub(crate) fn respond(
         elements: responses.collect(),
     };
     let gains = Gains {
-        elements: elements.iter().enumerate().map(|(index, element)| (*element, wanted.response(index))).collect(),
+        elements: elements
+            .iter()
+            .enumerate()
+            .map(|(index, element)| (*element, wanted.response(index)))
+            .collect(),
         own: own_covariance,
         by_place,
     };
@@ -221,7 +234,8 @@ fn groups(declared: &Declared, readings: &Readings, sound: &[bool], place: &Plac
     let centre_mm = declared.array().centre_mm(0).unwrap_or_default();
     let mut felt = vec![0.0; readings.elements];
     let mut felt_at_centre = felt.clone();
-    for press in readings.presses.iter().filter(|press| declared.is_reference(press)) {
+    let trusted = |press: &&Press| declared.is_reference(press) && place.admits(press);
+    for press in readings.presses.iter().filter(trusted) {
         let (Some(indenter), Some(deepest)) = (declared.indenter(press), press.deepest()) else { continue };
         let covering = Covering { thickness_mm: press.covering_mm };
         let mut contact = place.setting.contact(press, deepest, indenter);
@@ -244,7 +258,8 @@ fn groups(declared: &Declared, readings: &Readings, sound: &[bool], place: &Plac
 }
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (squares, count) = values.fold((0.0, 0.0), |(squares, count), value| (squares + value * value, count + 1.0));
+    let (squares, count) =
+        values.fold((0.0, 0.0), |(squares, count), value| (squares + value * value, count + 1.0));
     if count > 0.0 { f64::sqrt(squares / count) } else { 0.0 }
 }
 

@@ -16,7 +16,8 @@ fn curved(seed: u64, quadratic_per_mm: impl Fn(usize) -> f64) -> Lab {
         quadratic_per_mm: (0..48).map(quadratic_per_mm).collect(),
         ..lab.model.response().clone()
     };
-    lab.model = tactus_model::ForwardModel::new(lab.model.array().clone(), lab.model.psf(), response).unwrap();
+    lab.model =
+        tactus_model::ForwardModel::new(lab.model.array().clone(), lab.model.psf(), response).unwrap();
     lab.centres();
     lab
 }
@@ -26,7 +27,8 @@ fn a_straight_response_is_found_straight() {
     let (fit, gains) = responded(curved(1, |_| 0.0));
     assert_eq!(fit.form, Form::Linear);
     let worst = fit.elements.iter().map(|one| {
-        (one.sensitivity_counts_per_mm.value - gains[one.element]).abs() / one.sensitivity_counts_per_mm.standard_error
+        (one.sensitivity_counts_per_mm.value - gains[one.element]).abs()
+            / one.sensitivity_counts_per_mm.standard_error
     });
     assert!(worst.fold(0.0, f64::max) < 4.5);
 }
@@ -52,7 +54,8 @@ fn curvatures_that_differ_are_found_to() {
     let (fit, _) = responded(curved(3, |element| if element % 2 == 0 { 0.1 } else { 0.5 }));
     assert_eq!(fit.form, Form::OwnQuadratic);
     let mean = |odd: usize| {
-        let of = fit.elements.iter().filter(|one| one.element % 2 == odd).map(|one| one.quadratic_per_mm.value);
+        let of =
+            fit.elements.iter().filter(|one| one.element % 2 == odd).map(|one| one.quadratic_per_mm.value);
         of.sum::<f64>() / 24.0
     };
     assert!((mean(0) - 0.1).abs() < 0.01 && (mean(1) - 0.5).abs() < 0.02, "{} {}", mean(0), mean(1));

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use tactus_model::{Array, Contact, Covering, ForwardModel, Indenter, ModelError, Psf, Registration, Response};
+use tactus_model::{
+    Array, Contact, Covering, ForwardModel, Indenter, ModelError, Psf, Registration, Response,
+};
 
 use crate::readings::{Dwell, Press, Readings};
 
@@ -43,7 +45,11 @@ impl Declared {
             reference_covering: declared.reference_covering,
             ..Response::uniform(self.array().elements(), 1.0, 0.0)
         };
-        ForwardModel::new(self.array().clone(), Psf { sigma_intercept_mm: sigma_mm, sigma_per_mm: 0.0 }, response)
+        ForwardModel::new(
+            self.array().clone(),
+            Psf { sigma_intercept_mm: sigma_mm, sigma_per_mm: 0.0 },
+            response,
+        )
     }
 
     /// As declared: at z = 0 stands the surface.
@@ -91,11 +97,19 @@ impl Setting {
 /// Sweeps over one element would outweigh them and tell less.
 pub(crate) fn across<'a>(declared: &Declared, readings: &'a Readings) -> Vec<&'a Press> {
     let of_run = |run: usize| {
-        readings.presses.iter().filter(move |press| press.run == run).filter(|press| declared.is_reference(press))
+        readings
+            .presses
+            .iter()
+            .filter(move |press| press.run == run)
+            .filter(|press| declared.is_reference(press))
     };
     let runs = || 0..readings.runs.len();
     let across: Vec<usize> = runs().filter(|run| goes_across(declared, of_run(*run))).collect();
-    if across.is_empty() { runs().flat_map(of_run).collect() } else { across.into_iter().flat_map(of_run).collect() }
+    if across.is_empty() {
+        runs().flat_map(of_run).collect()
+    } else {
+        across.into_iter().flat_map(of_run).collect()
+    }
 }
 
 /// True if presses lie so far apart that they tell a rotation.

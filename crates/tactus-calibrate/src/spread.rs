@@ -86,9 +86,9 @@ pub(crate) fn spreads(
                 scope.spawn(move || mine.map(|(index, group)| (index, one(group))).collect::<Vec<_>>())
             })
             .collect();
-        let results = workers.into_iter().flat_map(|worker| {
-            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        });
+        let results = workers
+            .into_iter()
+            .flat_map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         let mut results: Vec<_> = results.collect();
         results.sort_by_key(|(index, _)| *index);
         results
@@ -121,7 +121,8 @@ struct Group<'a> {
 /// Of each covering, the presses of the run with the most, by depth.
 fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<Group<'a>> {
     let known = |press: &&Press| press.rest.is_some() && declared.indenter(press).is_some();
-    let mut coverings: Vec<f64> = readings.presses.iter().filter(known).map(|press| press.covering_mm).collect();
+    let mut coverings: Vec<f64> =
+        readings.presses.iter().filter(known).map(|press| press.covering_mm).collect();
     coverings.sort_by(f64::total_cmp);
     coverings.dedup_by(|next, last| *next - *last < 5e-4);
     let mut groups = Vec::new();
@@ -137,7 +138,8 @@ fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<Group<'a>> {
             .flat_map(|press| press.dwells.iter().map(move |dwell| (press, dwell)))
             .collect();
         presses.sort_by(|(_, one), (_, other)| other.height_mm.total_cmp(&one.height_mm));
-        for alike in presses.chunk_by(|(_, one), (_, other)| one.height_mm - other.height_mm < DEPTH_STEP_MM) {
+        for alike in presses.chunk_by(|(_, one), (_, other)| one.height_mm - other.height_mm < DEPTH_STEP_MM)
+        {
             let height_mm = alike.iter().map(|(_, dwell)| dwell.height_mm).sum::<f64>() / alike.len() as f64;
             let places = distinct_places(alike.iter().map(|(press, _)| press.place_mm)).len();
             if places >= PLACES_LEAST {
@@ -202,7 +204,12 @@ struct Slope {
 }
 
 impl<'a> Search<'a> {
-    fn new(declared: &'a Declared, gains: &'a Gains, place: &'a Place, group: &Group<'_>) -> Result<Self, String> {
+    fn new(
+        declared: &'a Declared,
+        gains: &'a Gains,
+        place: &'a Place,
+        group: &Group<'_>,
+    ) -> Result<Self, String> {
         let covering = Covering { thickness_mm: group.covering_mm };
         let mut search = Self { declared, gains, place, covering, images: Vec::new(), left_out: 0 };
         for (press, dwell) in &group.presses {
@@ -230,7 +237,8 @@ impl<'a> Search<'a> {
 
     fn run(mut self, readings: &Readings, group: &Group<'_>) -> Result<Found, String> {
         // The median image's sigma is hardly moved by images that are like none.
-        let (start_mm, slopes) = self.maximise(median_step, self.declared.sigma_mm(self.covering.thickness_mm))?;
+        let (start_mm, slopes) =
+            self.maximise(median_step, self.declared.sigma_mm(self.covering.thickness_mm))?;
         let mut unlike: Vec<f64> = slopes.iter().map(|slope| 1.0 - slope.likeness).collect();
         unlike.sort_by(f64::total_cmp);
         let limit = OUTLYING * unlike[unlike.len() / 2].max(1e-9);
@@ -287,7 +295,8 @@ impl<'a> Search<'a> {
         let gradient = model.gradient(contact, self.covering);
         let modelled = self.gains.elements.iter().map(|(element, _)| gradient.counts[*element]);
         let mut modelled: Vec<f64> = modelled.collect();
-        let by_sigma = self.gains.elements.iter().map(|(element, _)| gradient.by_sigma_intercept_mm[*element]);
+        let by_sigma =
+            self.gains.elements.iter().map(|(element, _)| gradient.by_sigma_intercept_mm[*element]);
         let mut shape: Vec<f64> = by_sigma.collect();
         let length = norm(&modelled).max(f64::MIN_POSITIVE);
         modelled.iter_mut().for_each(|value| *value /= length);
@@ -333,7 +342,8 @@ impl<'a> Search<'a> {
             for parameter in 0..3 {
                 let moved = self.place.moved(parameter, STEP_MM).setting.on_sensor(image.place_mm);
                 for axis in 0..2 {
-                    by_place[parameter] += along[axis] * (moved[axis] - image.contact.position_mm[axis]) / STEP_MM;
+                    by_place[parameter] +=
+                        along[axis] * (moved[axis] - image.contact.position_mm[axis]) / STEP_MM;
                 }
             }
         }

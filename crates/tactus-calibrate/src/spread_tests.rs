@@ -71,5 +71,7 @@ fn nothing_measured_is_said_and_no_number_given() {
     let found = calibrate(&declared, &readings).unwrap();
     assert!(found.registration.is_none() && found.response.is_none() && found.thickness.is_none());
     assert!(found.missing.len() >= 3, "{:?}", found.missing);
-    assert!(found.psf(declared.model.psf()).is_none() && found.responses(declared.model.response()).is_none());
+    assert!(
+        found.psf(declared.model.psf()).is_none() && found.responses(declared.model.response()).is_none()
+    );
 }

@@ -82,16 +82,20 @@ pub(crate) fn against_thickness(spreads: &Spreads) -> Option<ThicknessFit> {
 fn covering(spreads: &Spreads, rows: &[usize]) -> CoveringSpread {
     let count = rows.len() as f64;
     let sigmas = rows.iter().map(|row| spreads.fits[*row].sigma_mm.value);
-    let [least, most] = sigmas.clone().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], sigma| {
-        [least.min(sigma), most.max(sigma)]
-    });
+    let [least, most] = sigmas
+        .clone()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], sigma| [least.min(sigma), most.max(sigma)]);
     let pairs = rows.iter().flat_map(|row| rows.iter().map(move |column| (*row, *column)));
     let variance: f64 = pairs.map(|pair| spreads.covariance[pair]).sum::<f64>() / (count * count);
     CoveringSpread {
         covering_mm: spreads.fits[rows[0]].covering_mm,
         sigma_mm: Estimate::new(sigmas.sum::<f64>() / count, variance),
         range_mm: most - least,
-        chance: chance(&spreads_of(spreads, rows), &DMatrix::from_element(rows.len(), 1, 1.0), &among(spreads, rows)),
+        chance: chance(
+            &spreads_of(spreads, rows),
+            &DMatrix::from_element(rows.len(), 1, 1.0),
+            &among(spreads, rows),
+        ),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The paper's figures, drawn again from the model: Figures 4, 5b, 6, 8, 9b and 10.
+//! The paper's figures, drawn again from the model: Figures 3, 4, 5b, 6, 8, 9b and 10.
 //!
 //! [`draw_all`] computes and writes them all. Each figure is also a function from plain inputs to a
 //! [`Sheet`], which displays itself as SVG. Where the paper shows its sensor, a virtual sensor stands in, with
@@ -6,6 +6,7 @@
 
 mod acuity;
 mod imaging_models;
+mod impulse_responses;
 mod page;
 mod point_spreads;
 mod resolutions;
@@ -23,11 +24,12 @@ use std::{
 
 use tactus_calibrate::acuity::AcuityError;
 use tactus_model::{Array, Covering, ForwardModel, Indenter, ModelError, Psf, Response};
-use tactus_solid::layered::LayerError;
+use tactus_solid::{fem::BricksError, layered::LayerError};
 
 use crate::plot::Sheet;
 
 pub use imaging_models::{ModelledPress, imaging_models};
+pub use impulse_responses::{Widening, impulse_responses};
 pub use point_spreads::point_spreads;
 pub use resolutions::{Resolution, resolutions};
 pub use side_by_side::{SideBySide, side_by_side};
@@ -49,6 +51,9 @@ pub enum FigureError {
     /// A figure's row of elements cannot be made.
     #[error(transparent)]
     Acuity(#[from] AcuityError),
+    /// A figure's finite elements cannot be made.
+    #[error(transparent)]
+    Bricks(#[from] BricksError),
     /// A file or folder cannot be written.
     #[error("{} cannot be written", path.display())]
     Write {
@@ -115,7 +120,8 @@ struct Drawing {
     caption: String,
 }
 
-const FIGURES: [PaperFigure; 9] = [
+const FIGURES: [PaperFigure; 10] = [
+    PaperFigure { number: "3", title: "Impulse responses of coverings", draw: impulse_responses::draw },
     PaperFigure { number: "4", title: "One press through four imaging models", draw: imaging_models::draw },
     PaperFigure {
         number: "5b",

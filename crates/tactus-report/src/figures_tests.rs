@@ -2,10 +2,11 @@ use std::fs;
 
 use tactus_model::{Array, Contact, Psf};
 use tactus_scene::shapes::{SCENES, Scene};
+use tactus_solid::layered::{Base, Layer};
 
 use super::{
-    COVERINGS, FigureError, ModelledPress, Progress, REFERENCE_INDENTER, Resolution, draw_all, point_spreads,
-    pressed_view, side_by_side, uniform, zero_to_one,
+    COVERINGS, FigureError, ModelledPress, Progress, REFERENCE_INDENTER, Resolution, Widening, draw_all,
+    point_spreads, pressed_view, side_by_side, uniform, zero_to_one,
 };
 
 #[test]
@@ -13,12 +14,13 @@ fn every_figure_is_drawn_whole_and_loads_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let mut steps = Vec::new();
     let paths = draw_all(&dir.path().join("figures"), |step| steps.push(step)).unwrap();
-    assert_eq!(steps.len(), 9);
-    assert_eq!(steps[8], Progress { title: "Wrench and spaceship", written: 9, figures: 9 });
+    assert_eq!(steps.len(), 10);
+    assert_eq!(steps[9], Progress { title: "Wrench and spaceship", written: 10, figures: 10 });
 
     let names: Vec<_> = paths.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
     // Images and colour bars.
     let panels = [
+        ("figure-3.svg", 0),
         ("figure-4.svg", 16 + 1),
         ("figure-5b.svg", 4),
         ("figure-6a.svg", 2 + 1),
@@ -29,9 +31,9 @@ fn every_figure_is_drawn_whole_and_loads_nothing() {
         ("figure-10a.svg", 9 + 1),
         ("figure-10b.svg", 0),
     ];
-    assert_eq!(names[..9], panels.map(|(name, _)| name));
-    assert_eq!(names[9], "index.html");
-    let page = fs::read_to_string(&paths[9]).unwrap();
+    assert_eq!(names[..10], panels.map(|(name, _)| name));
+    assert_eq!(names[10], "index.html");
+    let page = fs::read_to_string(&paths[10]).unwrap();
     for (path, (name, panels)) in paths.iter().zip(panels) {
         let svg = fs::read_to_string(path).unwrap();
         assert_well_formed(&svg);
@@ -54,7 +56,7 @@ fn a_folder_that_cannot_be_made_is_named() {
 }
 
 #[test]
-fn after_the_elements_an_elastic_layer_and_its_gaussian_are_nearly_identical() {
+fn after_the_elements_finite_elements_and_their_gaussian_are_nearly_identical() {
     for (covering, place_mm) in [(COVERINGS[0], [7.1, 4.9]), (COVERINGS[3], [6.1, 5.9])] {
         let press = ModelledPress::new(covering, "somewhere", place_mm).unwrap();
         for image in &press.images {
@@ -65,6 +67,38 @@ fn after_the_elements_an_elastic_layer_and_its_gaussian_are_nearly_identical() {
         assert!(press.difference_percent(3, 2) < 4.0, "{covering:?}");
         // The sensor's own spread, which elasticity does not give.
         assert!(press.difference_percent(2, 0) > 30.0, "{covering:?}");
+    }
+}
+
+#[test]
+fn the_elements_see_no_bricks() {
+    let (array, [x, y]) = (Array::digitacts(), [6.1, 5.9]);
+    let [width, height] = array.element_mm().map(|size_mm| size_mm / 2.0);
+    for covering in [COVERINGS[0], COVERINGS[3]] {
+        let press = ModelledPress::new(covering, "between four", [x, y]).unwrap();
+        let layer = Layer::new(covering.thickness_mm, 0.49, Base::Bonded).unwrap().under_disc(1.0);
+        let exact: Vec<_> = (0..array.elements())
+            .map(|element| array.centre_mm(element).unwrap())
+            .map(|[cx, cy]| {
+                layer.force_on([[cx - width - x, cx + width - x], [cy - height - y, cy + height - y]])
+            })
+            .collect();
+        let peak = exact.iter().copied().fold(0.0, f64::max);
+        let off = press.images[0].iter().zip(&exact).map(|(found, exact)| (found - exact / peak).abs());
+        let off = off.fold(0.0, f64::max);
+        assert!(off < 2e-3, "{covering:?}: {off}");
+    }
+}
+
+#[test]
+fn the_slope_of_the_papers_spread_is_elasticity_and_its_intercept_is_not() {
+    for poisson_ratio in [0.3, 0.45, 0.49] {
+        let Widening { line: [intercept, slope], sigmas, of_layer, .. } =
+            Widening::new(poisson_ratio).unwrap();
+        assert_eq!(sigmas.len(), 6);
+        assert!((0.43..0.47).contains(&slope), "nu {poisson_ratio}: {slope}");
+        assert!((0.15..0.25).contains(&intercept), "nu {poisson_ratio}: {intercept}");
+        assert!((slope - of_layer).abs() < 0.02, "nu {poisson_ratio}: {slope} for {of_layer}");
     }
 }
 

@@ -30,7 +30,7 @@ use std::f64::consts::PI;
 
 use libm::{exp, expm1, j0, j1};
 
-use crate::quadrature::integrate;
+use crate::{quadrature::integrate, search::peak};
 
 /// Beyond this `K` there is nothing: `T` falls like `K exp(-K)`.
 const WAVES_MAX: f64 = 36.0;
@@ -123,12 +123,7 @@ impl Layer {
             s * integrate([0.0, WAVES_MAX], 1.0, |k| self.transfer(k) * exp(-k * k * s * s / 2.0) * k)
         };
         // One maximum: every layer has it between 0.4 and 0.6.
-        let (mut low, mut high) = (0.1, 2.0);
-        while high - low > 1e-7 {
-            let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-            if likeness(left) < likeness(right) { low = left } else { high = right }
-        }
-        self.thickness_mm * f64::midpoint(low, high)
+        self.thickness_mm * peak([0.1, 2.0], likeness)
     }
 }
 

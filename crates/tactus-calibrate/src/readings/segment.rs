@@ -74,7 +74,11 @@ impl Segment {
         if still.len() > 3 {
             still = still[1..still.len() - 1].to_vec();
         }
-        self.counts = still.iter().flat_map(|frame| &self.counts[frame * elements..(frame + 1) * elements]).copied().collect();
+        self.counts = still
+            .iter()
+            .flat_map(|frame| &self.counts[frame * elements..(frame + 1) * elements])
+            .copied()
+            .collect();
         self.heights_mm = still.iter().map(|frame| self.heights_mm[*frame]).collect();
         Some(height_mm)
     }
@@ -83,13 +87,15 @@ impl Segment {
     pub(super) fn mean(&self, step_counts: f64) -> Option<Mean> {
         let elements = self.elements()?;
         let frames = self.heights_mm.len();
-        let column = |element: usize| (0..frames).map(move |frame| f64::from(self.counts[frame * elements + element]));
+        let column =
+            |element: usize| (0..frames).map(move |frame| f64::from(self.counts[frame * elements + element]));
         let mut sound = vec![true; frames];
         // Fewer tell no outlier from the rest.
         if frames >= 5 {
             for element in 0..elements {
                 let centre = median(&mut column(element).collect::<Vec<_>>())?;
-                let spread = median(&mut column(element).map(|count| (count - centre).abs()).collect::<Vec<_>>())?;
+                let spread =
+                    median(&mut column(element).map(|count| (count - centre).abs()).collect::<Vec<_>>())?;
                 let reach = OUTLYING * (MAD_TO_SD * spread).max(step_counts);
                 for (sound, count) in sound.iter_mut().zip(column(element)) {
                     *sound &= (count - centre).abs() <= reach;
@@ -103,7 +109,8 @@ impl Segment {
         }
         let (mut counts, mut squares) = (Vec::with_capacity(elements), Vec::with_capacity(elements));
         for element in 0..elements {
-            let kept_counts = || column(element).zip(&sound).filter(|(_, sound)| **sound).map(|(count, _)| count);
+            let kept_counts =
+                || column(element).zip(&sound).filter(|(_, sound)| **sound).map(|(count, _)| count);
             let mean = kept_counts().sum::<f64>() / kept as f64;
             squares.push(kept_counts().map(|count| (count - mean).powi(2)).sum());
             counts.push(mean);

@@ -19,7 +19,8 @@ impl Calibrated {
         if psf.is_none() && responses.is_none() {
             return None;
         }
-        let mut base = Base { noise_rms_counts: self.calibration.noise_rms_counts.unwrap_or(0.0), ..declared };
+        let mut base =
+            Base { noise_rms_counts: self.calibration.noise_rms_counts.unwrap_or(0.0), ..declared };
         if let Some((psf, errors)) = psf {
             (base.psf, base.psf_se) = (psf, errors);
         }

@@ -12,7 +12,16 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
     let data = &calibration.data;
     let mut fields = vec![
         ("rig", format!("{}{}", rig.name, if *simulated { " (SIMULATED)" } else { "" })),
-        ("read", format!("{} runs, {} presses, {} dwells, {} frames", data.runs.len(), data.presses, data.dwells, data.frames)),
+        (
+            "read",
+            format!(
+                "{} runs, {} presses, {} dwells, {} frames",
+                data.runs.len(),
+                data.presses,
+                data.dwells,
+                data.frames
+            ),
+        ),
     ];
     if let Some(noise) = calibration.noise_rms_counts {
         fields.push(("noise", format!("{noise:.2} counts rms")));
@@ -40,7 +49,8 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
         fields.push(("faulty", format!("element {} {what}", fault.element)));
     }
     if let Some(response) = &calibration.response {
-        fields.push(("response", format!("{} of {} elements", response.form.name(), response.elements.len())));
+        fields
+            .push(("response", format!("{} of {} elements", response.form.name(), response.elements.len())));
         if let Some(curvature) = response.shared_quadratic_per_mm {
             fields.push(("curvature", format!("{} per mm, if one for all", estimate(curvature))));
         }
@@ -50,7 +60,13 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
         let [intercept, slope] = line.coefficients;
         fields.push(("sigma(t)", format!("({}) + ({}) t, in mm", estimate(intercept), estimate(slope))));
         let intercept = estimate(intercept.in_units_of(pitch_mm));
-        fields.push(("", format!("({intercept}) + ({}) t, in pitches of {pitch_mm} mm (Eq. 4: 1.11 + 0.497 t)", estimate(slope))));
+        fields.push((
+            "",
+            format!(
+                "({intercept}) + ({}) t, in pitches of {pitch_mm} mm (Eq. 4: 1.11 + 0.497 t)",
+                estimate(slope)
+            ),
+        ));
     }
     print_fields(&fields);
     if !calibration.spreads.is_empty() {
