@@ -13,7 +13,7 @@ use std::thread;
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde_json::{Value, json};
+use serde_json::Value;
 use tactus_daemon::embedded::truth;
 use tactus_e2e::{repository, tactus};
 use tactus_schema::Rig;
@@ -139,26 +139,20 @@ fn faults(rng: &mut impl Rng) -> [(&'static str, toml::Value); 4] {
         let count = rng.random_range(0..=most);
         (0..count).map(|_| left.swap_remove(rng.random_range(0..left.len()))).collect::<Vec<_>>()
     };
-    let table = |value: Value| toml::Value::try_from(value).unwrap();
-    let dead = draw(rng, 2);
-    let stuck = draw(rng, 1);
+    let list = |entries: Vec<toml::Value>| toml::Value::Array(entries);
+    let entry = |pairs: [(&str, toml::Value); 2]| {
+        toml::Value::Table(pairs.into_iter().map(|(name, value)| (name.to_owned(), value)).collect())
+    };
+    let dead = draw(rng, 2).into_iter().map(toml::Value::from).collect();
+    let stuck = draw(rng, 1).into_iter().map(|e| entry([("element", e.into()), ("counts", (40 * (e + 1)).into())]));
+    let stuck = list(stuck.collect());
     let noisy = draw(rng, 2);
-    let crossed = draw(rng, 2);
+    let noisy = noisy.into_iter().map(|e| entry([("element", e.into()), ("noise_rms_counts", (20.0 + e as f64).into())]));
+    let noisy = list(noisy.collect());
     let neighbour = |element: i64| if element % 8 < 7 { element + 1 } else { element - 1 };
-    [
-        ("dead", table(json!(dead))),
-        ("stuck", table(stuck.iter().map(|e| json!({"element": e, "counts": 40 * (e + 1)})).collect())),
-        (
-            "noisy",
-            table(
-                noisy.iter().map(|e| json!({"element": e, "noise_rms_counts": 20.0 + *e as f64})).collect(),
-            ),
-        ),
-        (
-            "miswired",
-            table(crossed.iter().map(|e| json!({"element": e, "answers_for": neighbour(*e)})).collect()),
-        ),
-    ]
+    let crossed = draw(rng, 2).into_iter();
+    let crossed = crossed.map(|e| entry([("element", e.into()), ("answers_for", neighbour(e).into())]));
+    [("dead", list(dead)), ("stuck", stuck), ("noisy", noisy), ("miswired", list(crossed.collect()))]
 }
 
 fn compare(rig: &Rig, found: &Value) -> Found {

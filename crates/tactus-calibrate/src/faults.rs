@@ -79,9 +79,10 @@ pub struct Health {
 }
 
 impl Health {
-    /// For each element, true if nothing speaks against it.
+    /// For each element, true if it was judged and nothing speaks against it.
     pub(crate) fn sound(&self, elements: usize) -> Vec<bool> {
-        (0..elements).map(|element| self.faults.iter().all(|fault| fault.element != element)).collect()
+        let faulty = |element: usize| self.faults.iter().any(|fault| fault.element == element);
+        (0..elements).map(|element| !faulty(element) && !self.not_judged.contains(&element)).collect()
     }
 }
 

@@ -43,13 +43,25 @@ impl Normal {
         }
     }
 
-    /// Takes away what readings share, an error common to all of them: sums over the readings, each with its weight over
-    /// a variance, of residuals and slopes, and the weight of their product.
+    /// Adds an element's readings in one press, which all stand on one reading at rest, whose error they share.
     ///
-    /// With readings of variances `1/w_j` and a common error of variance `1/m`, the inverse covariance is
-    /// `diag(w) - w w^T / (m + sum w)` (Sherman and Morrison).
-    pub(crate) fn take_common(&mut self, residual: f64, slopes: &[(usize, f64)], weight: f64) {
-        self.add(residual, slopes, -weight);
+    /// With `n_j` frames in a reading and `m` at rest, of one noise, the covariance is that of `diag(1/n) + 1/m`; its
+    /// inverse is `diag(n) - n n^T / (m + sum n)` (Sherman and Morrison).
+    pub(crate) fn add_press(&mut self, readings: &[Reading], rest_frames: usize, noise: f64) {
+        let per_frame = 1.0 / (noise * noise);
+        let (mut residual, mut frames) = (0.0, 0.0);
+        let mut slopes: Vec<(usize, f64)> = Vec::new();
+        for reading in readings {
+            let count = reading.frames as f64;
+            self.add(reading.residual, &reading.slopes, count * per_frame);
+            residual += count * reading.residual;
+            frames += count;
+            slopes.resize(reading.slopes.len(), (0, 0.0));
+            for (sum, (parameter, slope)) in slopes.iter_mut().zip(&reading.slopes) {
+                *sum = (*parameter, sum.1 + count * slope);
+            }
+        }
+        self.add(residual, &slopes, -per_frame / (rest_frames as f64 + frames));
         self.readings -= 1;
     }
 
@@ -79,6 +91,16 @@ impl Normal {
         }
         Some(covariance)
     }
+}
+
+/// The mean over some frames, held against a prediction.
+#[derive(Debug, Clone)]
+pub(crate) struct Reading {
+    /// Measured less predicted.
+    pub(crate) residual: f64,
+    /// Derivatives of the prediction by parameters, in the same order in every reading of a press.
+    pub(crate) slopes: Vec<(usize, f64)>,
+    pub(crate) frames: usize,
 }
 
 /// Where the cost is least.

@@ -22,8 +22,8 @@ use tactus_model::{Covering, ForwardModel, Gradient, Registration};
 
 use crate::{
     Estimate,
-    least_squares::{Fit, Normal, minimise},
-    readings::{Press, Readings, distinct_places},
+    least_squares::{Fit, Normal, Reading, minimise},
+    readings::{Dwell, Press, Readings, distinct_places},
     setting::{Declared, Setting, across, goes_across},
 };
 
@@ -216,16 +216,22 @@ impl<'a> Problem<'a> {
 
     fn normal(&self, parameters: &[f64]) -> Option<Normal> {
         let mut normal = Normal::new(parameters.len());
-        self.each(parameters, |_, residual, slopes, weight| normal.add(residual, slopes, weight))?;
+        self.each(parameters, |press, noise, readings| {
+            normal.add_press(readings, rest_frames(self.presses[press]), noise);
+        })?;
         Some(normal)
     }
 
     /// The press that the model misses most, if it misses it by far more than others.
     fn outlying(&self, fit: &Fit) -> Option<usize> {
         let mut costs = vec![(0.0, 0_u32); self.presses.len()];
-        self.each(&fit.parameters, |press, residual, _, weight| {
-            costs[press].0 += weight * residual * residual;
-            costs[press].1 += 1;
+        self.each(&fit.parameters, |press, noise, readings| {
+            let rest = 1.0 / rest_frames(self.presses[press]) as f64;
+            for reading in readings {
+                let variance = 1.0 / reading.frames as f64 + rest;
+                costs[press].0 += (reading.residual / noise).powi(2) / variance;
+                costs[press].1 += 1;
+            }
         })?;
         let misfits: Vec<f64> =
             costs.iter().map(|(cost, readings)| (cost / f64::from((*readings).max(1))).sqrt()).collect();
@@ -236,21 +242,26 @@ impl<'a> Problem<'a> {
         worst.filter(|(_, misfit)| **misfit > limit).map(|(press, _)| press)
     }
 
-    /// Gives every reading: index of its press, residual, slopes by the parameters, weight.
-    fn each(&self, parameters: &[f64], mut take: impl FnMut(usize, f64, &[(usize, f64)], f64)) -> Option<()> {
+    /// Gives the readings of every element in every press: index of the press, noise, readings.
+    fn each(&self, parameters: &[f64], mut take: impl FnMut(usize, f64, &[Reading])) -> Option<()> {
         let (model, setting) = (self.model(parameters)?, setting(parameters));
         for (index, press) in self.presses.iter().enumerate() {
-            let indenter = self.declared.indenter(press)?;
-            for dwell in &press.dwells {
-                let contact = setting.contact(press, dwell, indenter);
-                let gradient = model.gradient(&contact, Covering { thickness_mm: press.covering_mm });
-                let by_setting = Slopes::of(&setting, contact.position_mm);
-                for (place, (element, noise)) in self.elements.iter().enumerate() {
-                    let Some([rise, variance]) = press.rise(dwell, *element) else { continue };
-                    let (predicted, slopes) =
-                        self.predict(parameters, &gradient, &by_setting, place, *element);
-                    take(index, rise - predicted, &slopes, 1.0 / (variance * noise * noise));
-                }
+            let (indenter, covering) = (self.declared.indenter(press)?, Covering { thickness_mm: press.covering_mm });
+            let dwells: Vec<(&Dwell, Gradient, Slopes)> = press
+                .dwells
+                .iter()
+                .map(|dwell| {
+                    let contact = setting.contact(press, dwell, indenter);
+                    (dwell, model.gradient(&contact, covering), Slopes::of(&setting, contact.position_mm))
+                })
+                .collect();
+            for (place, (element, noise)) in self.elements.iter().enumerate() {
+                let readings = dwells.iter().filter_map(|(dwell, gradient, by_setting)| {
+                    let [rise, _] = press.rise(dwell, *element)?;
+                    let (predicted, slopes) = self.predict(parameters, gradient, by_setting, place, *element);
+                    Some(Reading { residual: rise - predicted, slopes: slopes.to_vec(), frames: dwell.frames })
+                });
+                take(index, *noise, &readings.collect::<Vec<_>>());
             }
         }
         Some(())
@@ -299,6 +310,10 @@ impl<'a> Problem<'a> {
             covariance,
         }
     }
+}
+
+fn rest_frames(press: &Press) -> usize {
+    press.rest.as_ref().map_or(1, |rest| rest.frames)
 }
 
 fn setting(parameters: &[f64]) -> Setting {

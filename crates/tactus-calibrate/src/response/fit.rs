@@ -6,7 +6,7 @@ use tactus_model::{Covering, ForwardModel};
 use super::{Form, rms};
 use crate::{
     Estimate,
-    least_squares::{self, Normal, minimise},
+    least_squares::{self, Normal, Reading, minimise},
     readings::Press,
     registration::Place,
     setting::Declared,
@@ -159,24 +159,17 @@ pub(super) fn fit(form: Form, groups: &[Group], keep: impl Fn(usize) -> bool) ->
             let index = fitted.elements.binary_search(&group.element).ok()?;
             let (s, at) = (parameters[index], fitted.curvature_at(index));
             let k = at.map_or(0.0, |at| parameters[at]);
-            let per_square = 1.0 / (group.noise_counts * group.noise_counts);
-            // The error of the rest is common to all dwells of the press.
-            let (mut residuals, mut by_s, mut by_k, mut frames) = (0.0, 0.0, 0.0, 0.0);
-            for (_, point) in group.points.iter().enumerate().filter(|(dwell, _)| keep(*dwell)) {
-                let shape = point.u_mm + k * point.u_mm * point.u_mm;
-                let residual = point.rise_counts - s * shape;
-                let slopes = [(index, shape), (at.unwrap_or(0), s * point.u_mm * point.u_mm)];
-                let slopes = if at.is_some() { &slopes[..] } else { &slopes[..1] };
-                let weight = point.frames as f64;
-                normal.add(residual, slopes, weight * per_square);
-                residuals += weight * residual;
-                by_s += weight * shape;
-                by_k += weight * s * point.u_mm * point.u_mm;
-                frames += weight;
-            }
-            let slopes = [(index, by_s), (at.unwrap_or(0), by_k)];
-            let slopes = if at.is_some() { &slopes[..] } else { &slopes[..1] };
-            normal.take_common(residuals, slopes, per_square / (group.rest_frames as f64 + frames));
+            let kept = group.points.iter().enumerate().filter(|(dwell, _)| keep(*dwell));
+            let readings: Vec<Reading> = kept
+                .map(|(_, point)| {
+                    let square = point.u_mm * point.u_mm;
+                    let shape = point.u_mm + k * square;
+                    let mut slopes = vec![(index, shape)];
+                    slopes.extend(at.map(|at| (at, s * square)));
+                    Reading { residual: point.rise_counts - s * shape, slopes, frames: point.frames }
+                })
+                .collect();
+            normal.add_press(&readings, group.rest_frames, group.noise_counts);
         }
         Some(normal)
     })?;
