@@ -28,7 +28,7 @@ use crate::{
     setting::Declared,
 };
 
-use fit::{Group, fit, heldout};
+use fit::{Fitted, Group, fit, heldout};
 
 /// A press counts as one at an element's centre if the element feels this share of what it would feel there.
 const NEAR: f64 = 0.9;
@@ -153,20 +153,18 @@ pub(crate) fn respond(
         Form::OwnQuadratic => own.as_ref().unwrap_or(linear),
     };
     let elements = wanted.elements.clone();
-    let by_place = DMatrix::from_columns(
-        &(0..Place::UNSURE)
-            .map(|parameter| {
-                let moved = fit(wanted.form, &groups(&place.moved(parameter, STEP)), |_| true);
-                let moved = moved.filter(|moved| moved.elements == elements);
-                moved.map_or_else(
-                    || wanted.expanded() * 0.0,
-                    |moved| (moved.expanded() - wanted.expanded()) / STEP,
-                )
-            })
-            .collect::<Vec<_>>(),
-    );
-    let own_covariance = wanted.expanded_covariance();
-    let covariance = &own_covariance + &by_place * &place.covariance * by_place.transpose();
+    // A wrong place moves the responses.
+    let by_place = |fitted: &Fitted| {
+        let column = |parameter: usize| {
+            let moved = fit(fitted.form, &groups(&place.moved(parameter, STEP)), |_| true);
+            let moved = moved.filter(|moved| moved.elements == elements).unwrap_or_else(|| fitted.clone());
+            (moved.expanded() - fitted.expanded()) / STEP
+        };
+        DMatrix::from_columns(&(0..Place::UNSURE).map(column).collect::<Vec<_>>())
+    };
+    let moved_by = |by_place: &DMatrix<f64>| by_place * &place.covariance * by_place.transpose();
+    let (own_covariance, by_place_wanted) = (wanted.expanded_covariance(), by_place(wanted));
+    let covariance = &own_covariance + moved_by(&by_place_wanted);
     let count = elements.len();
     let responses = elements.iter().enumerate().map(|(index, element)| {
         let [s, k] = wanted.response(index);
@@ -191,7 +189,10 @@ pub(crate) fn respond(
     let response = ResponseFit {
         form: wanted.form,
         trials: trials.collect(),
-        shared_quadratic_per_mm: shared.as_ref().map(|shared| shared.curvature(0)),
+        shared_quadratic_per_mm: shared.as_ref().map(|shared| {
+            let covariance = shared.expanded_covariance() + moved_by(&by_place(shared));
+            Estimate::new(shared.response(0)[1], covariance[(count, count)])
+        }),
         elements: responses.collect(),
     };
     let gains = Gains {
@@ -201,7 +202,7 @@ pub(crate) fn respond(
             .map(|(index, element)| (*element, wanted.response(index)))
             .collect(),
         own: own_covariance,
-        by_place,
+        by_place: by_place_wanted,
     };
     Ok((response, gains))
 }
