@@ -40,7 +40,7 @@ pub(crate) fn digits(value: f64, digits: u32) -> String {
 
 /// A value and its standard error, to the digits that the error leaves: `2.7256 ± 0.0007`.
 ///
-/// The error has two digits if they are below 35, otherwise one.
+/// The error has two digits if its first three are below 355, otherwise one: the rounding of the particle data group.
 pub(crate) fn with_error(value: f64, error: f64) -> String {
     if !(error > 0.0 && error.is_finite()) {
         return digits(value, 4);
@@ -75,7 +75,7 @@ pub(crate) fn chance(chance: f64) -> String {
     if chance < 1e-3 { "< 0.001".into() } else { number(chance, 3) }
 }
 
-/// The place of the particle data group: two digits of an error below 355, otherwise one.
+/// Decimals for a value of this error.
 fn of_error(error: f64) -> usize {
     let leading = error / 10_f64.powf(error.log10().floor());
     decimals(error, if leading < 3.55 { 2 } else { 1 })
