@@ -36,6 +36,8 @@ pub use side_by_side::{SideBySide, side_by_side};
 pub use trade_off::trade_off;
 pub use views::{pressed_view, tools_view};
 
+pub(crate) use point_spreads::profiles;
+
 /// The paper's coverings: 0.04, 0.1, 0.14 and 0.2 inch.
 pub const COVERINGS: [Covering; 4] = Covering::PAPER;
 

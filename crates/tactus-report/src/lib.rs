@@ -4,16 +4,21 @@
 //! said, as data; [`render_html`] makes one HTML page of it, with its style and figures inline, that loads nothing
 //! from anywhere. The same recording always gives the same page.
 //!
-//! [`figures`] draws the paper's figures again from the model.
+//! [`figures`] draws the paper's figures again from the model; [`calibration`] reports what was measured of a
+//! sensor, [`study`] all of the paper on one rig.
 //!
 //! - [`fit`] fits polynomials by least squares, with standard errors.
 //! - [`plot`] draws figures and heat images as SVG; it knows nothing of runs.
 
+pub mod calibration;
 pub mod figures;
 pub mod fit;
 pub mod plot;
+pub mod study;
 
+mod document;
 mod markup;
+mod numbers;
 mod page;
 mod run;
 

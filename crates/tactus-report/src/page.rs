@@ -7,7 +7,12 @@ mod time;
 
 use std::fmt;
 
-use crate::{markup::Text, plot, run::RunReport};
+use crate::{
+    document::{document, notes},
+    markup::Text,
+    plot,
+    run::RunReport,
+};
 
 /// Width of the page's content.
 const WIDTH_PX: f64 = 1080.0;
@@ -19,56 +24,22 @@ const EVENTS_MAX: usize = 1500;
 ///
 /// Everything that comes from the recording is escaped; there is no script and no reference to anything outside.
 pub fn render_html(report: &RunReport) -> String {
-    Page(report).to_string()
+    let title = format!("{} \u{b7} {}", report.summary.experiment, report.summary.run_id);
+    document(title, fmt::from_fn(|f| body(f, report)))
 }
 
-struct Page<'a>(&'a RunReport);
-
-impl fmt::Display for Page<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let report = self.0;
-        writeln!(f, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">")?;
-        writeln!(f, "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">")?;
-        writeln!(
-            f,
-            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
-        )?;
-        writeln!(
-            f,
-            "<title>{} &#183; {}</title>",
-            Text(&report.summary.experiment),
-            Text(&report.summary.run_id)
-        )?;
-        writeln!(
-            f,
-            "<style>\n{}{}</style>\n</head>\n<body>\n<main>",
-            plot::STYLE,
-            include_str!("page/page.css")
-        )?;
-        summary::header(f, &report.summary)?;
-        notes(f, &report.notes)?;
-        summary::facts(f, report)?;
-        if let Some(response) = &report.response {
-            response::section(f, response)?;
-        }
-        images::section(f, report)?;
-        time::signal(f, report)?;
-        time::losses(f, report)?;
-        time::timing(f, &report.timing)?;
-        events(f, report)?;
-        writeln!(f, "</main>\n</body>\n</html>")
+fn body(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
+    summary::header(f, &report.summary)?;
+    notes(f, "", &report.notes)?;
+    summary::facts(f, report)?;
+    if let Some(response) = &report.response {
+        response::section(f, response)?;
     }
-}
-
-fn notes(f: &mut fmt::Formatter<'_>, notes: &[String]) -> fmt::Result {
-    if notes.is_empty() {
-        return Ok(());
-    }
-    writeln!(f, "<ul class=\"notes\">")?;
-    for note in notes {
-        writeln!(f, "<li>{}</li>", Text(note))?;
-    }
-    writeln!(f, "</ul>")
+    images::section(f, report)?;
+    time::signal(f, report)?;
+    time::losses(f, report)?;
+    time::timing(f, &report.timing)?;
+    events(f, report)
 }
 
 fn events(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
@@ -94,7 +65,3 @@ fn events(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
     }
     writeln!(f, "</table>\n</details>\n</section>")
 }
-
-#[cfg(test)]
-#[path = "page_tests.rs"]
-mod tests;

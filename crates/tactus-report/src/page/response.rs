@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use super::summary::plural;
 use crate::{
     fit::{Estimate, Polynomial},
     markup::Text,
+    numbers::{plural, with_error},
     plot::{Axis, Figure, Ink, Series, number},
     run::Response,
 };
@@ -143,10 +143,9 @@ fn table(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
     )
 }
 
-/// A value and its standard error, to two digits of the error.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 6")]
+/// With its standard error where it has one.
 fn estimate(estimate: &Estimate) -> String {
-    let Some(error) = estimate.standard_error else { return number(estimate.value, 2) };
-    let decimals = if error > 0.0 { (1.0 - error.log10().floor()).clamp(0.0, 6.0) as usize } else { 6 };
-    format!("{} \u{b1} {}", number(estimate.value, decimals), number(error, decimals))
+    estimate
+        .standard_error
+        .map_or_else(|| number(estimate.value, 2), |error| with_error(estimate.value, error))
 }

@@ -3,8 +3,9 @@
 use std::fmt;
 
 use crate::{
+    document::SIMULATED,
     markup::Text,
-    plot::number,
+    numbers::{count, duration, plural},
     run::{RunReport, Summary},
 };
 
@@ -18,7 +19,7 @@ pub(super) fn header(f: &mut fmt::Formatter<'_>, summary: &Summary) -> fmt::Resu
     writeln!(f, "<header>\n<div class=\"headline\"><h1>{}</h1>", Text(&summary.experiment))?;
     writeln!(f, "<span class=\"badge {class}\">{word}</span>")?;
     if summary.simulated {
-        writeln!(f, "<span class=\"badge warn\" title=\"No physical sensor was read.\">SIMULATED</span>")?;
+        writeln!(f, "{SIMULATED}")?;
     }
     writeln!(
         f,
@@ -99,24 +100,4 @@ pub(super) fn facts(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Resu
 /// A row of a table of facts; the value is markup.
 fn row(f: &mut fmt::Formatter<'_>, name: &str, value: impl fmt::Display) -> fmt::Result {
     writeln!(f, "<tr><th>{name}</th><td>{value}</td></tr>")
-}
-
-/// A whole number with its thousands apart.
-pub(super) fn count(value: u64) -> String {
-    number(value as f64, 0)
-}
-
-/// `1 gap`, `2 gaps`.
-pub(super) fn plural(value: u64, noun: &str) -> String {
-    format!("{} {noun}{}", count(value), if value == 1 { "" } else { "s" })
-}
-
-/// A time span in the two units that matter.
-pub(super) fn duration(seconds: f64) -> String {
-    if seconds < 59.95 {
-        return format!("{} s", number(seconds, 1));
-    }
-    let whole = seconds.round();
-    let (hours, minutes) = ((whole / 3600.0).floor(), (whole % 3600.0 / 60.0).floor());
-    if hours > 0.0 { format!("{hours} h {minutes} min") } else { format!("{minutes} min {} s", whole % 60.0) }
 }

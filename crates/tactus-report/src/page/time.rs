@@ -2,12 +2,10 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use super::{
-    WIDTH_PX,
-    summary::{count, duration, plural},
-};
+use super::WIDTH_PX;
 use crate::{
     markup::Text,
+    numbers::{count, duration, plural},
     plot::{Axis, Figure, Ink, Series, extremes, number, round_step, steps},
     run::{Intervals, RunReport, Timing},
 };

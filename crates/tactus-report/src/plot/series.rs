@@ -53,6 +53,12 @@ impl Series {
         Self::new(points, Mark::Stems, 1.5)
     }
 
+    /// A vertical bar from `lo` to `hi` at each `[x, lo, hi]`, as intervals are drawn.
+    pub fn bars(bars: impl IntoIterator<Item = [f64; 3]>) -> Self {
+        let points = bars.into_iter().flat_map(|[x, lo, hi]| [[x, lo], [x, hi], [f64::NAN; 2]]);
+        Self::new(points.collect(), Mark::Line, 1.5)
+    }
+
     /// In a colour.
     #[must_use]
     pub fn ink(mut self, ink: Ink) -> Self {
