@@ -144,10 +144,13 @@ fn faults(rng: &mut impl Rng) -> [(&'static str, toml::Value); 4] {
         toml::Value::Table(pairs.into_iter().map(|(name, value)| (name.to_owned(), value)).collect())
     };
     let dead = draw(rng, 2).into_iter().map(toml::Value::from).collect();
-    let stuck = draw(rng, 1).into_iter().map(|e| entry([("element", e.into()), ("counts", (40 * (e + 1)).into())]));
+    let stuck =
+        draw(rng, 1).into_iter().map(|e| entry([("element", e.into()), ("counts", (40 * (e + 1)).into())]));
     let stuck = list(stuck.collect());
     let noisy = draw(rng, 2);
-    let noisy = noisy.into_iter().map(|e| entry([("element", e.into()), ("noise_rms_counts", (20.0 + e as f64).into())]));
+    let noisy = noisy
+        .into_iter()
+        .map(|e| entry([("element", e.into()), ("noise_rms_counts", (20.0 + e as f64).into())]));
     let noisy = list(noisy.collect());
     let neighbour = |element: i64| if element % 8 < 7 { element + 1 } else { element - 1 };
     let crossed = draw(rng, 2).into_iter();

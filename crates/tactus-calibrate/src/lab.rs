@@ -14,6 +14,9 @@ pub(crate) const TOOL: Indenter = Indenter::Cylinder { diameter_mm: 1.0 };
 /// Its thinnest covering.
 pub(crate) const THIN_MM: f64 = 1.016;
 
+/// Changes the counts of a frame of a press.
+type Spoil = Box<dyn Fn(&mut [f64], i32)>;
+
 /// A made-up sensor.
 pub(crate) struct Lab {
     pub(crate) model: ForwardModel,
@@ -21,7 +24,7 @@ pub(crate) struct Lab {
     pub(crate) surface_mm: f64,
     pub(crate) noise_counts: f64,
     /// What is done to the counts of a frame, when, and by which press.
-    pub(crate) spoil: Box<dyn Fn(&mut [f64], i32)>,
+    pub(crate) spoil: Spoil,
     rng: ChaCha8Rng,
     gather: Gather,
     press: i32,

@@ -141,17 +141,14 @@ pub(crate) fn minimise(
         }
         let there = step.map(|step| &at + step);
         let next = there.as_ref().and_then(|there| evaluate(there.as_slice()));
-        match there.zip(next).filter(|(_, next)| next.cost < normal.cost) {
-            Some((there, next)) => {
-                let kept = (normal.cost - next.cost) / promise;
-                damping = (damping * (1.0 - (2.0 * kept - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-12);
-                growth = 2.0;
-                (at, normal) = (there, next);
-            }
-            None => {
-                damping *= growth;
-                growth *= 2.0;
-            }
+        if let Some((there, next)) = there.zip(next).filter(|(_, next)| next.cost < normal.cost) {
+            let kept = (normal.cost - next.cost) / promise;
+            damping = (damping * (1.0 - (2.0 * kept - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-12);
+            growth = 2.0;
+            (at, normal) = (there, next);
+        } else {
+            damping *= growth;
+            growth *= 2.0;
         }
     }
     let covariance = normal.covariance(free)?;

@@ -41,17 +41,17 @@ const NORRIS: [[f64; 2]; 36] = [
     [0.5, 0.2],
 ];
 
-fn line(parameters: &[f64]) -> Option<Normal> {
+fn line(parameters: &[f64]) -> Normal {
     let mut normal = Normal::new(2);
     for [x, y] in NORRIS {
         normal.add(y - parameters[0] - parameters[1] * x, &[(0, 1.0), (1, x)], 1.0);
     }
-    Some(normal)
+    normal
 }
 
 #[test]
 fn a_line_through_certified_data_has_the_certified_parameters_and_errors() {
-    let fit = minimise(vec![0.0, 0.0], &[true, true], line).unwrap();
+    let fit = minimise(vec![0.0, 0.0], &[true, true], |at| Some(line(at))).unwrap();
     let close = |got: f64, certified: f64| assert!((got / certified - 1.0).abs() < 1e-7, "{got} {certified}");
     close(fit.parameters[0], -0.262_323_073_774_029);
     close(fit.parameters[1], 1.002_116_818_020_45);
@@ -61,7 +61,7 @@ fn a_line_through_certified_data_has_the_certified_parameters_and_errors() {
 
 #[test]
 fn a_parameter_that_is_not_free_stays() {
-    let fit = minimise(vec![1.0, 0.0], &[false, true], line).unwrap();
+    let fit = minimise(vec![1.0, 0.0], &[false, true], |at| Some(line(at))).unwrap();
     assert!((fit.parameters[0] - 1.0).abs() < 1e-15);
     assert!(fit.covariance[(0, 0)].abs() < 1e-15 && fit.covariance[(0, 1)].abs() < 1e-15);
 }

@@ -267,14 +267,9 @@ impl Gather {
 
     fn begin_press(&mut self, sample: &Sample<'_>) {
         let [x_mm, y_mm, _] = sample.position_mm;
-        let indenter = match self.indenters.get(sample.indenter) {
-            Some(known) => Arc::clone(known),
-            None => {
-                let name: Arc<str> = sample.indenter.into();
-                self.indenters.insert(sample.indenter.to_owned(), Arc::clone(&name));
-                name
-            }
-        };
+        let name = sample.indenter;
+        let indenter = self.indenters.entry(name.to_owned()).or_insert_with(|| name.into());
+        let indenter = Arc::clone(indenter);
         self.readings.presses.push(Press {
             run: self.readings.runs.len() - 1,
             index: sample.press,

@@ -141,7 +141,7 @@ pub(crate) fn register(
         problem = Problem::new(declared, readings, sound, problem.presses)?;
         fit = problem.fit(None).ok_or(UNDETERMINED)?;
     }
-    let place = Place { contradicting: contradicting.clone(), ..problem.place(&fit) };
+    let place = place(&fit, contradicting.clone());
     let estimate =
         |index: usize| Estimate::new(fit.parameters[index], fit.covariance[(index, index)] * fit.inflation());
     let free = |index: usize| problem.free[index];
@@ -246,7 +246,8 @@ impl<'a> Problem<'a> {
     fn each(&self, parameters: &[f64], mut take: impl FnMut(usize, f64, &[Reading])) -> Option<()> {
         let (model, setting) = (self.model(parameters)?, setting(parameters));
         for (index, press) in self.presses.iter().enumerate() {
-            let (indenter, covering) = (self.declared.indenter(press)?, Covering { thickness_mm: press.covering_mm });
+            let (indenter, covering) =
+                (self.declared.indenter(press)?, Covering { thickness_mm: press.covering_mm });
             let dwells: Vec<(&Dwell, Gradient, Slopes)> = press
                 .dwells
                 .iter()
@@ -258,8 +259,13 @@ impl<'a> Problem<'a> {
             for (place, (element, noise)) in self.elements.iter().enumerate() {
                 let readings = dwells.iter().filter_map(|(dwell, gradient, by_setting)| {
                     let [rise, _] = press.rise(dwell, *element)?;
-                    let (predicted, slopes) = self.predict(parameters, gradient, by_setting, place, *element);
-                    Some(Reading { residual: rise - predicted, slopes: slopes.to_vec(), frames: dwell.frames })
+                    let (predicted, slopes) =
+                        Self::predict(parameters, gradient, by_setting, place, *element);
+                    Some(Reading {
+                        residual: rise - predicted,
+                        slopes: slopes.to_vec(),
+                        frames: dwell.frames,
+                    })
                 });
                 take(index, *noise, &readings.collect::<Vec<_>>());
             }
@@ -268,7 +274,6 @@ impl<'a> Problem<'a> {
     }
 
     fn predict(
-        &self,
         parameters: &[f64],
         gradient: &Gradient,
         by_setting: &Slopes,
@@ -282,10 +287,10 @@ impl<'a> Problem<'a> {
         let along = |[x, y]: [f64; 2]| per_v * (by_x[element] * x + by_y[element] * y);
         let turned = -per_v * gradient.by_rotation_deg[element];
         let slopes = [
-            (X, along(by_setting.by_origin[0])),
-            (Y, along(by_setting.by_origin[1])),
-            (ROTATION, along(by_setting.by_rotation_deg) + turned),
-            (SCALE, along(by_setting.by_scale)),
+            (X, along(by_setting.origin[0])),
+            (Y, along(by_setting.origin[1])),
+            (ROTATION, along(by_setting.rotation_deg) + turned),
+            (SCALE, along(by_setting.scale)),
             (SURFACE, per_v * gradient.by_depth_mm[element]),
             (SIGMA, per_v * gradient.by_sigma_intercept_mm[element]),
             (CURVATURE, sensitivity * v * v),
@@ -297,19 +302,14 @@ impl<'a> Problem<'a> {
     fn model(&self, parameters: &[f64]) -> Option<ForwardModel> {
         (parameters[SCALE] > 0.0).then(|| self.declared.unit_model(parameters[SIGMA]).ok())?
     }
+}
 
-    fn place(&self, fit: &Fit) -> Place {
-        let order = [X, Y, ROTATION, SURFACE, SIGMA];
-        let covariance = DMatrix::from_fn(order.len(), order.len(), |row, column| {
-            fit.inflation() * fit.covariance[(order[row], order[column])]
-        });
-        Place {
-            setting: setting(&fit.parameters),
-            sigma_mm: fit.parameters[SIGMA],
-            contradicting: Vec::new(),
-            covariance,
-        }
-    }
+fn place(fit: &Fit, contradicting: Vec<(usize, i32)>) -> Place {
+    let order = [X, Y, ROTATION, SURFACE, SIGMA];
+    let covariance = DMatrix::from_fn(order.len(), order.len(), |row, column| {
+        fit.inflation() * fit.covariance[(order[row], order[column])]
+    });
+    Place { setting: setting(&fit.parameters), sigma_mm: fit.parameters[SIGMA], contradicting, covariance }
 }
 
 fn rest_frames(press: &Press) -> usize {
@@ -346,9 +346,9 @@ fn taking_part(readings: &Readings, sound: &[bool], presses: &[&Press]) -> Vec<(
 
 /// How a place on the sensor moves with the setting: derivatives of its x and y.
 struct Slopes {
-    by_origin: [[f64; 2]; 2],
-    by_rotation_deg: [f64; 2],
-    by_scale: [f64; 2],
+    origin: [[f64; 2]; 2],
+    rotation_deg: [f64; 2],
+    scale: [f64; 2],
 }
 
 impl Slopes {
@@ -357,9 +357,9 @@ impl Slopes {
         let [s, c] = [sin, cos].map(|part| part / setting.scale);
         let turn = 1.0_f64.to_radians();
         Self {
-            by_origin: [[-c, s], [-s, -c]],
-            by_rotation_deg: [y * turn, -x * turn],
-            by_scale: [-x / setting.scale, -y / setting.scale],
+            origin: [[-c, s], [-s, -c]],
+            rotation_deg: [y * turn, -x * turn],
+            scale: [-x / setting.scale, -y / setting.scale],
         }
     }
 }

@@ -224,7 +224,7 @@ impl<'a> Search<'a> {
             };
             let norm_mm = norm(&measured);
             if norm_mm > 0.0 {
-                measured.iter_mut().for_each(|value| *value /= norm_mm);
+                scale(&mut measured, 1.0 / norm_mm);
                 let contact = place.setting.contact(press, dwell, indenter);
                 search.images.push(Image { contact, place_mm: press.place_mm, measured, norm_mm });
             }
@@ -299,7 +299,7 @@ impl<'a> Search<'a> {
             self.gains.elements.iter().map(|(element, _)| gradient.by_sigma_intercept_mm[*element]);
         let mut shape: Vec<f64> = by_sigma.collect();
         let length = norm(&modelled).max(f64::MIN_POSITIVE);
-        modelled.iter_mut().for_each(|value| *value /= length);
+        scale(&mut modelled, 1.0 / length);
         let along = dot(&modelled, &shape);
         for (shape, modelled) in shape.iter_mut().zip(&modelled) {
             *shape = (*shape - along * modelled) / length;
@@ -366,6 +366,12 @@ fn median_step(slopes: &[Slope]) -> f64 {
 
 fn dot(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
+}
+
+fn scale(vector: &mut [f64], by: f64) {
+    for value in vector {
+        *value *= by;
+    }
 }
 
 fn norm(vector: &[f64]) -> f64 {

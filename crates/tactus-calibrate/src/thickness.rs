@@ -145,7 +145,7 @@ fn chance(values: &DVector<f64>, design: &DMatrix<f64>, covariance: &DMatrix<f64
 /// Upper tail of the chi-squared distribution, by its finite series.
 fn chi_squared_beyond(freedom: usize, value: f64) -> f64 {
     let half = value.max(0.0) / 2.0;
-    let (mut tail, mut term, mut order) = if freedom % 2 == 0 {
+    let (mut tail, mut term, mut order) = if freedom.is_multiple_of(2) {
         (0.0, (-half).exp(), 0.0)
     } else {
         (libm::erfc(half.sqrt()), (-half).exp() * (half / std::f64::consts::PI).sqrt() * 2.0, 0.5)

@@ -10,6 +10,7 @@ use anyhow::Context;
 use serde::Serialize;
 use tactus_calibrate::{Calibration, Declared, Gather, Sample};
 use tactus_record::rows::{self, RunSource};
+use tactus_report::calibration::{CalibrationReport, calibration_html};
 use tactus_schema::{Model, Rig};
 
 use crate::cli::{CalibrateArgs, Common};
@@ -95,10 +96,24 @@ pub(crate) fn write(calibrated: &Calibrated, folder: &Path) -> anyhow::Result<Ve
         put("model.toml", model.to_toml().context("the calibrated model")?)?;
     }
     put("calibration.json", calibrated.to_json()?)?;
+    put("report.html", calibration_html(&calibrated.report()))?;
     Ok(paths)
 }
 
 impl Calibrated {
+    /// What its report shows.
+    pub(crate) fn report(&self) -> CalibrationReport<'_> {
+        CalibrationReport {
+            rig: &self.rig.name,
+            simulated: self.simulated,
+            array: &self.rig.array,
+            declared_registration: self.rig.registration,
+            declared_psf: self.rig.psf,
+            calibration: &self.calibration,
+            notes: &self.notes,
+        }
+    }
+
     fn to_json(&self) -> anyhow::Result<String> {
         let mut files: Vec<&Path> = self.runs.iter().map(|run| run.path.as_path()).collect();
         files.dedup();
