@@ -115,7 +115,7 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
         missing,
         warnings,
     };
-    match respond(declared, readings, &sound, &place) {
+    match respond(declared, readings, &calibration.health, &place) {
         Err(problem) => {
             calibration.missing.push(format!(
                 "Response of the elements: {problem}. Without it images cannot be corrected, and no spread be fitted."
@@ -172,7 +172,7 @@ impl Calibration {
             reference_covering: Covering { thickness_mm: self.data.reference_covering_mm },
         };
         let mut errors = [vec![0.0; elements], vec![0.0; elements], vec![0.0; elements]];
-        for one in &fitted.elements {
+        for one in fitted.elements.iter().chain(&fitted.cross_wired) {
             response.sensitivity_counts_per_mm[one.element] = one.sensitivity_counts_per_mm.value;
             response.quadratic_per_mm[one.element] = one.quadratic_per_mm.value;
             errors[0][one.element] = one.sensitivity_counts_per_mm.standard_error;

@@ -79,6 +79,14 @@ pub struct Health {
 }
 
 impl Health {
+    /// The element whose signal a cross-wired one gives.
+    pub(crate) fn answers_for(&self, element: usize) -> Option<usize> {
+        self.faults.iter().find_map(|fault| match fault.kind {
+            FaultKind::CrossWired { answers_for } if fault.element == element => Some(answers_for),
+            _ => None,
+        })
+    }
+
     /// For each element, true if it was judged and nothing speaks against it.
     pub(crate) fn sound(&self, elements: usize) -> Vec<bool> {
         let faulty = |element: usize| self.faults.iter().any(|fault| fault.element == element);

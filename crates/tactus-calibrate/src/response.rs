@@ -22,7 +22,7 @@ use serde::Serialize;
 use tactus_model::Covering;
 
 use crate::{
-    Estimate,
+    Estimate, Health,
     readings::{Press, Readings},
     registration::Place,
     setting::Declared,
@@ -74,6 +74,8 @@ pub struct ResponseFit {
     pub shared_quadratic_per_mm: Option<Estimate>,
     /// The elements, in order; faulty ones and those without a press at their centre are missing.
     pub elements: Vec<ElementResponse>,
+    /// The cross-wired elements, by presses at the centres of those whose signal they give; no fit rests on them.
+    pub cross_wired: Vec<ElementResponse>,
 }
 
 /// How one form fares.
@@ -132,10 +134,12 @@ pub(crate) struct Gains {
 pub(crate) fn respond(
     declared: &Declared,
     readings: &Readings,
-    sound: &[bool],
+    health: &Health,
     place: &Place,
 ) -> Result<(ResponseFit, Gains), String> {
-    let groups = |place: &Place| groups(declared, readings, sound, place);
+    let sound = health.sound(readings.elements);
+    let own = |element: usize| sound[element].then_some(element);
+    let groups = |place: &Place| groups(declared, readings, own, place);
     let here = groups(place);
     if here.is_empty() {
         return Err(
@@ -194,6 +198,7 @@ pub(crate) fn respond(
             Estimate::new(shared.response(0)[1], covariance[(count, count)])
         }),
         elements: responses.collect(),
+        cross_wired: cross_wired(declared, readings, health, place, wanted),
     };
     let gains = Gains {
         elements: elements
@@ -205,6 +210,34 @@ pub(crate) fn respond(
         by_place: by_place_wanted,
     };
     Ok((response, gains))
+}
+
+/// Responses of the cross-wired elements, with the curvature of the sound ones.
+fn cross_wired(
+    declared: &Declared,
+    readings: &Readings,
+    health: &Health,
+    place: &Place,
+    wanted: &Fitted,
+) -> Vec<ElementResponse> {
+    let mut there = groups(declared, readings, |element| health.answers_for(element), place);
+    let k = match wanted.form {
+        Form::Linear => 0.0,
+        Form::SharedQuadratic | Form::OwnQuadratic => wanted.typical_curvature(),
+    };
+    for point in there.iter_mut().flat_map(|group| &mut group.points) {
+        point.u_mm += k * point.u_mm * point.u_mm;
+    }
+    let Some(fitted) = fit(Form::Linear, &there, |_| true) else { return Vec::new() };
+    let responses = fitted.elements.iter().enumerate().map(|(index, element)| ElementResponse {
+        element: *element,
+        points: Vec::new(),
+        linear_counts_per_mm: fitted.sensitivity(index),
+        quadratic: None,
+        sensitivity_counts_per_mm: fitted.sensitivity(index),
+        quadratic_per_mm: Estimate::new(k, 0.0),
+    });
+    responses.collect()
 }
 
 /// The form with the fewest parameters that no other beats on held-out dwells.
@@ -228,8 +261,13 @@ fn chosen(groups: &[Group]) -> Form {
     best
 }
 
-/// The presses at the centres of sound elements.
-fn groups(declared: &Declared, readings: &Readings, sound: &[bool], place: &Place) -> Vec<Group> {
+/// The presses at the centres of elements, of which `signal_of` says whose signal they give, if they take part.
+fn groups(
+    declared: &Declared,
+    readings: &Readings,
+    signal_of: impl Fn(usize) -> Option<usize>,
+    place: &Place,
+) -> Vec<Group> {
     let mut near: Vec<Vec<Group>> = vec![Vec::new(); readings.elements];
     let Ok(model) = declared.unit_model(place.sigma_mm) else { return Vec::new() };
     let centre_mm = declared.array().centre_mm(0).unwrap_or_default();
@@ -244,9 +282,11 @@ fn groups(declared: &Declared, readings: &Readings, sound: &[bool], place: &Plac
         contact.position_mm = centre_mm;
         model.indentation(&contact, covering, &mut felt_at_centre);
         for (element, groups) in near.iter_mut().enumerate() {
-            let noise = readings.noise_rms_counts[element].filter(|_| sound[element]);
-            if let Some(noise) = noise.filter(|_| felt[element] > NEAR * felt_at_centre[0]) {
-                groups.extend(Group::of(declared, &model, place, press, element, noise));
+            let (Some(signal), Some(noise)) = (signal_of(element), readings.noise_rms_counts[element]) else {
+                continue;
+            };
+            if felt[signal] > NEAR * felt_at_centre[0] {
+                groups.extend(Group::of(declared, &model, place, press, [element, signal], noise));
             }
         }
     }

@@ -6,7 +6,8 @@ fn responded(lab: Lab) -> (ResponseFit, Vec<f64>) {
     let (declared, readings) = lab.readings();
     let sound = vec![true; readings.elements];
     let (_, place) = register(&declared, &readings, &sound).unwrap();
-    (respond(&declared, &readings, &sound, &place).unwrap().0, gains)
+    let health = Health { faults: Vec::new(), not_judged: Vec::new() };
+    (respond(&declared, &readings, &health, &place).unwrap().0, gains)
 }
 
 /// The same sensor with other curvatures.
@@ -67,6 +68,20 @@ fn what_was_held_out_fares_worse_than_what_was_fitted() {
     let heldout: Vec<f64> = fit.trials.iter().map(|trial| trial.heldout_rms_counts.unwrap()).collect();
     assert!(heldout[1] < heldout[0] && heldout[1] < heldout[2], "{heldout:?}");
     assert!(fit.trials.iter().all(|trial| trial.heldout_rms_counts.unwrap() > trial.rms_counts));
+}
+
+#[test]
+fn a_cross_wired_element_keeps_its_own_sensitivity() {
+    let mut lab = Lab::new(5);
+    let [own, other] = [18, 19].map(|element| lab.model.response().sensitivity_counts_per_mm[element]);
+    lab.spoil = Box::new(move |counts, _| counts[18] = 100.0 + (counts[19] - 100.0) * own / other);
+    lab.centres();
+    let (declared, readings) = lab.readings();
+    let fit = crate::calibrate(&declared, &readings).unwrap().response.unwrap();
+    assert!(fit.elements.iter().all(|one| one.element != 18));
+    let [crossed] = fit.cross_wired.as_slice() else { panic!("{:?}", fit.cross_wired) };
+    assert_eq!(crossed.element, 18);
+    assert!((crossed.sensitivity_counts_per_mm.value / own - 1.0).abs() < 0.01, "{crossed:?} {own}");
 }
 
 #[test]

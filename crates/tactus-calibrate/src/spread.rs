@@ -35,8 +35,9 @@ const OUTLYING: f64 = 40.0;
 /// Sigma is looked for between these, in pitches.
 const SIGMA_PITCHES: [f64; 2] = [0.05, 50.0];
 const ROUNDS_MAX: usize = 30;
-/// A step by less than this share of sigma is the last: far below any error, and of no effect on what follows.
-const STEP_LEAST: f64 = 1e-7;
+/// A step by less than this share of sigma is the last. First to see which images are like none, then for good: far
+/// below any error, and of no effect on what else is computed there.
+const STEP_LEAST: [f64; 2] = [1e-3, 1e-6];
 /// A step to find how the slopes move with a press's place.
 const STEP_MM: f64 = 1e-4;
 
@@ -238,7 +239,7 @@ impl<'a> Search<'a> {
     fn run(mut self, readings: &Readings, group: &Group<'_>) -> Result<Found, String> {
         // The median image's sigma is hardly moved by images that are like none.
         let (start_mm, slopes) =
-            self.maximise(median_step, self.declared.sigma_mm(self.covering.thickness_mm))?;
+            self.maximise(median_step, self.declared.sigma_mm(self.covering.thickness_mm), STEP_LEAST[0])?;
         let mut unlike: Vec<f64> = slopes.iter().map(|slope| 1.0 - slope.likeness).collect();
         unlike.sort_by(f64::total_cmp);
         let limit = OUTLYING * unlike[unlike.len() / 2].max(1e-9);
@@ -246,7 +247,7 @@ impl<'a> Search<'a> {
         let before = self.images.len();
         self.images.retain(|_| likenesses.next().is_some_and(|likeness| 1.0 - likeness <= limit));
         self.left_out += before - self.images.len();
-        let (sigma_mm, slopes) = self.maximise(step, start_mm)?;
+        let (sigma_mm, slopes) = self.maximise(step, start_mm, STEP_LEAST[1])?;
         let count = slopes.len() as f64;
         let curvature: f64 = slopes.iter().map(|slope| slope.curvature).sum();
         let squares: f64 = slopes.iter().map(|slope| slope.by_sigma * slope.by_sigma).sum();
@@ -267,17 +268,22 @@ impl<'a> Search<'a> {
     }
 
     /// Where steps end, from a start, and what every image says there.
-    fn maximise(&self, step: fn(&[Slope]) -> f64, start_mm: f64) -> Result<(f64, Vec<Slope>), String> {
+    fn maximise(
+        &self,
+        step: fn(&[Slope]) -> f64,
+        start_mm: f64,
+        step_least: f64,
+    ) -> Result<(f64, Vec<Slope>), String> {
         let [least, most] = SIGMA_PITCHES.map(|pitches| pitches * self.declared.array().pitch_mm());
         let mut sigma_mm = start_mm.clamp(least, most);
         for _ in 0..ROUNDS_MAX {
             let slopes = self.slopes(sigma_mm)?;
             // Far from the maximum a whole step may go astray.
             let step = step(&slopes).clamp(-0.4 * sigma_mm, 0.6 * sigma_mm);
-            if step.abs() < STEP_LEAST * sigma_mm {
+            sigma_mm += step;
+            if step.abs() < step_least * sigma_mm {
                 return Ok((sigma_mm, slopes));
             }
-            sigma_mm += step;
             // A step that is no number ends here too.
             if !(least..=most).contains(&sigma_mm) {
                 break;

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use tactus_plan::{Script, ScriptError};
 
 /// The scripts that come with Tactus, by name.
-pub const BUILT_IN: [(&str, &str); 4] = [
+pub const BUILT_IN: [(&str, &str); 5] = [
     ("corners", include_str!("../../../experiments/corners.star")),
     ("diagnose", include_str!("../../../experiments/diagnose.star")),
     ("element-centres", include_str!("../../../experiments/element-centres.star")),
     ("grid-sweep", include_str!("../../../experiments/grid-sweep.star")),
+    ("image", include_str!("../../../experiments/image.star")),
 ];
 
 /// Why there is no such experiment.

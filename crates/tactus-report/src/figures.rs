@@ -26,7 +26,7 @@ use tactus_calibrate::acuity::AcuityError;
 use tactus_model::{Array, Covering, ForwardModel, Indenter, ModelError, Psf, Response};
 use tactus_solid::{fem::BricksError, layered::LayerError};
 
-use crate::plot::Sheet;
+use crate::{plot::Sheet, study::StudyFigure};
 
 pub use imaging_models::{ModelledPress, imaging_models};
 pub use impulse_responses::{Widening, impulse_responses};
@@ -106,6 +106,29 @@ pub fn draw_all(out_dir: &Path, mut progress: impl FnMut(Progress)) -> Result<Ve
     })?;
     write("index.html", page::page(&drawings))?;
     Ok(paths)
+}
+
+/// Computes the figures of these numbers, in this order, such as `["3", "6a"]`; numbers that are none are left out.
+///
+/// The figures are computed side by side, each in a thread of its own.
+///
+/// # Errors
+/// If a figure's model cannot be made, which no shipped one does.
+pub fn finished(numbers: &[&str]) -> Result<Vec<StudyFigure>, FigureError> {
+    let wanted = numbers.iter().filter_map(|number| FIGURES.iter().find(|figure| figure.number == *number));
+    thread::scope(|scope| {
+        let threads: Vec<_> = wanted.map(|figure| (figure, scope.spawn(figure.draw))).collect();
+        let drawn = threads.into_iter().map(|(figure, thread)| {
+            let drawing = thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
+            Ok(StudyFigure {
+                number: figure.number.into(),
+                title: figure.title.into(),
+                caption: drawing.caption,
+                svg: drawing.sheet.to_string(),
+            })
+        });
+        drawn.collect()
+    })
 }
 
 /// One figure of the paper.

@@ -138,7 +138,7 @@ fn comparison(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Resu
     writeln!(
         f,
         "<div class=\"scroll\"><table class=\"numbers\">\n<thead><tr><th>quantity</th><th class=\"n\">paper</th><th class=\"n\">this rig</th>\
-         <th class=\"n\">95 % interval</th>{truth_head}<th>inside</th><th class=\"prose\"></th></tr></thead>\n<tbody>"
+         <th class=\"n\">95 % interval</th>{truth_head}<th>inside</th></tr></thead>\n<tbody>"
     )?;
     report.rows.iter().try_for_each(|row| compared(f, row, truths))?;
     writeln!(f, "</tbody></table></div>")?;
@@ -183,7 +183,16 @@ fn compared(f: &mut fmt::Formatter<'_>, row: &StudyRow, truths: bool) -> fmt::Re
         Some(false) => ("no", "bad"),
         None => ("", ""),
     };
-    writeln!(f, "<td class=\"{class}\">{word}</td><td class=\"prose note\">{}</td></tr>", Text(&row.note))
+    writeln!(f, "<td class=\"{class}\">{word}</td></tr>")?;
+    if row.note.is_empty() {
+        return Ok(());
+    }
+    let columns = if truths { 6 } else { 5 };
+    writeln!(
+        f,
+        "<tr class=\"under\"><td colspan=\"{columns}\" class=\"prose note\">{}</td></tr>",
+        Text(&row.note)
+    )
 }
 
 fn runs(f: &mut fmt::Formatter<'_>, runs: &[StudyRun]) -> fmt::Result {

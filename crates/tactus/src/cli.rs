@@ -68,6 +68,8 @@ enum Command {
     Report(ReportArgs),
     /// Characterise the sensor from recordings or tables: faults, place, responses, point spread.
     Calibrate(CalibrateArgs),
+    /// Everything in the paper on one rig: runs, calibration, mechanics, acuity, images, one report.
+    Study(StudyArgs),
     /// What a sensor reads of a tool: an image, frames along a path, or live on the bus.
     Simulate(SimulateArgs),
     /// Which covering to order for a pitch and a force resolution.
@@ -191,6 +193,29 @@ pub(crate) struct CalibrateArgs {
     /// Where model.toml, calibration.json and report.html go.
     #[arg(short, long, value_name = "DIR", default_value = "calibration")]
     pub(crate) out: PathBuf,
+}
+
+/// Arguments of `study`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct StudyArgs {
+    /// Where runs, results and the report go; an interrupted study goes on there.
+    #[arg(short, long, value_name = "DIR", default_value = "study")]
+    pub(crate) out: PathBuf,
+    /// Use the embedded simulated rig even if a service is there.
+    #[arg(long)]
+    pub(crate) embedded: bool,
+    /// The embedded rig's file, in place of the shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rig_file: Option<PathBuf>,
+    /// Seed of the random orders and, on a simulated rig, of its noise.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Points along each side of the grid sweep; the paper has 15.
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(3..=101))]
+    pub(crate) points: u32,
+    /// Who runs it, for the recordings.
+    #[arg(long, env = "USER", default_value = "unknown")]
+    pub(crate) who: String,
 }
 
 /// Arguments of `simulate`; places in the sensor's frame.
@@ -337,6 +362,7 @@ fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
         Command::Recover(args) => commands::files::recover(common, &args),
         Command::Report(args) => commands::files::report(common, &args),
         Command::Calibrate(args) => commands::calibrate::calibrate(common, &args),
+        Command::Study(args) => commands::study::study(common, &args),
         Command::Simulate(args) => commands::simulate::simulate(common, &args),
         Command::Design(args) => commands::design::design(common, &args),
         Command::Figures(args) => commands::figures::figures(common, &args),

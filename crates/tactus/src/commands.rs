@@ -8,5 +8,6 @@ pub(crate) mod files;
 pub(crate) mod plan;
 pub(crate) mod run;
 pub(crate) mod simulate;
+pub(crate) mod study;
 pub(crate) mod validate;
 pub(crate) mod watch;

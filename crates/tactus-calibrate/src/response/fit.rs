@@ -51,12 +51,13 @@ pub(super) struct Fitted {
 }
 
 impl Group {
+    /// An element's readings, which give some element's signal.
     pub(super) fn of(
         declared: &Declared,
         model: &ForwardModel,
         place: &Place,
         press: &Press,
-        element: usize,
+        [element, signal]: [usize; 2],
         noise_counts: f64,
     ) -> Option<Self> {
         let (indenter, rest_frames) = (declared.indenter(press)?, press.rest.as_ref()?.frames);
@@ -65,7 +66,7 @@ impl Group {
             let contact = place.setting.contact(press, dwell, indenter);
             model.indentation(&contact, Covering { thickness_mm: press.covering_mm }, &mut felt);
             let [rise_counts, _] = press.rise(dwell, element)?;
-            Some(Point { u_mm: felt[element], rise_counts, frames: dwell.frames })
+            Some(Point { u_mm: felt[signal], rise_counts, frames: dwell.frames })
         });
         let points = points.collect();
         Some(Self { element, points, noise_counts, rest_frames })
@@ -77,6 +78,14 @@ impl Fitted {
     pub(super) fn response(&self, index: usize) -> [f64; 2] {
         let parameters = &self.fit.parameters;
         [parameters[index], self.curvature_at(index).map_or(0.0, |at| parameters[at])]
+    }
+
+    /// `k` of the median element.
+    pub(super) fn typical_curvature(&self) -> f64 {
+        let mut curvatures: Vec<f64> =
+            (0..self.elements.len()).map(|index| self.response(index)[1]).collect();
+        curvatures.sort_by(f64::total_cmp);
+        curvatures.get(curvatures.len() / 2).copied().unwrap_or(0.0)
     }
 
     pub(super) fn sensitivity(&self, index: usize) -> Estimate {

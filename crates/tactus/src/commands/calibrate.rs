@@ -17,6 +17,8 @@ use crate::cli::{CalibrateArgs, Common};
 use crate::exit::Exit;
 use crate::output;
 
+pub(crate) use print::estimate;
+
 /// Name of the form of `calibration.json`.
 const SCHEMA: &str = "tactus.calibration/1";
 

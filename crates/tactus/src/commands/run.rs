@@ -16,34 +16,23 @@ use crate::exit::{self, Exit, Failure};
 use crate::output::{duration, print_fields};
 
 /// How a run ended, wherever it ran.
-struct Summary {
-    run_id: String,
-    experiment: String,
-    exit_status: pb::ExitStatus,
-    message: String,
-    simulated: bool,
-    embedded: bool,
-    frames: u64,
-    frames_lost: u64,
-    presses: u32,
-    dwells: u32,
-    duration_s: f64,
-    recording: PathBuf,
+pub(super) struct Summary {
+    pub(super) run_id: String,
+    pub(super) experiment: String,
+    pub(super) exit_status: pb::ExitStatus,
+    pub(super) message: String,
+    pub(super) simulated: bool,
+    pub(super) embedded: bool,
+    pub(super) frames: u64,
+    pub(super) frames_lost: u64,
+    pub(super) presses: u32,
+    pub(super) dwells: u32,
+    pub(super) duration_s: f64,
+    pub(super) recording: PathBuf,
 }
 
 pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
-    let (script, arguments) = experiment(&args.experiment)?;
-    let summary = if args.embedded || args.rig_file.is_some() {
-        embedded::run(common, args, script, arguments, "as asked")?
-    } else {
-        let runtime = connection::runtime()?;
-        match runtime.block_on(connection::find(common))? {
-            Some(client) => runtime.block_on(served::run(client, common, args, &script, &arguments))?,
-            None => {
-                embedded::run(common, args, script, arguments, &format!("no service at {}", common.endpoint))?
-            }
-        }
-    };
+    let summary = execute(common, args)?;
     let report =
         if args.no_report { None } else { make_report(&summary.recording, &args.out.join(&summary.run_id)) };
     if common.json {
@@ -52,6 +41,19 @@ pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
         print(&summary, report.as_deref());
     }
     Ok(Exit::of_run(summary.exit_status))
+}
+
+/// Runs the experiment, on the service if there is one, else embedded.
+pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<Summary> {
+    let (script, arguments) = experiment(&args.experiment)?;
+    if args.embedded || args.rig_file.is_some() {
+        return embedded::run(common, args, script, arguments, "as asked");
+    }
+    let runtime = connection::runtime()?;
+    match runtime.block_on(connection::find(common))? {
+        Some(client) => runtime.block_on(served::run(client, common, args, &script, &arguments)),
+        None => embedded::run(common, args, script, arguments, &format!("no service at {}", common.endpoint)),
+    }
 }
 
 /// The script and the parameters that were asked for.

@@ -100,7 +100,7 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
 }
 
 /// `2.7256 +- 0.0007`: as many digits as the error's first.
-fn estimate(estimate: Estimate) -> String {
+pub(crate) fn estimate(estimate: Estimate) -> String {
     let Estimate { value, standard_error } = estimate;
     if !(standard_error > 0.0 && standard_error.is_finite()) {
         return format!("{value:.4}");

@@ -1,0 +1,128 @@
+//! `study`: everything in the paper on one rig, in one go.
+//!
+//! Runs first, each a step that is not made again when an interrupted study goes on; then calibration, mechanics,
+//! acuity, images; then one report.
+
+mod images;
+mod rows;
+mod steps;
+
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Context;
+use serde_json::json;
+use tactus_report::figures;
+use tactus_report::study::{StudyFigure, StudyReport, StudyRow, StudyRun, study_html};
+
+use super::calibrate::{self, Calibrated};
+use crate::cli::{Common, StudyArgs};
+use crate::exit::Exit;
+use crate::output::duration;
+use steps::{Steps, Taken};
+
+/// What the model alone gives; Figures 2 and 5 come from the calibration, Figure 8 from the rig's own images.
+const FIGURES: [&str; 7] = ["3", "4", "6a", "6b", "9b", "10a", "10b"];
+
+pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
+    let start = Instant::now();
+    fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+    let mut steps = Steps::resume(args)?;
+    let taken = steps.measure(common, args)?;
+    let say = |what: &str| {
+        if !common.json {
+            println!("{what}");
+        }
+    };
+    say("calibration");
+    let recordings: Vec<_> = taken.iter().map(|taken| taken.recording.clone()).collect();
+    let calibrated = calibrate::from_files(&recordings)?;
+    calibrate::write(&calibrated, &args.out.join("calibration"))?;
+    let truth = rows::truth(&recordings[0])?;
+    let mut missing = Vec::new();
+    let images = if truth.is_some() && taken.iter().all(|taken| taken.embedded) {
+        images::take(common, args, &mut steps, &calibrated)?
+    } else {
+        missing.push(
+            "Figure 8: the images of an H need an H on the stage. Put it on, name it in the rig file, run `image`, and compare \
+             with `tactus simulate --scene h --model calibration/model.toml`."
+                .into(),
+        );
+        None
+    };
+    say("mechanics, acuity, figures");
+    let mut figures = figures::finished(&FIGURES)?;
+    let rows = rows::rows(&calibrated, truth.as_ref(), images.as_ref())?;
+    figures.extend(images.into_iter().flat_map(|images| images.figures));
+    write_report(args, &calibrated, &taken, &rows, &figures, &missing)?;
+    finish(common, args, &calibrated, &rows, start)
+}
+
+fn write_report(
+    args: &StudyArgs,
+    calibrated: &Calibrated,
+    taken: &[Taken],
+    rows: &[StudyRow],
+    figures: &[StudyFigure],
+    missing: &[String],
+) -> anyhow::Result<()> {
+    let runs: Vec<StudyRun> = taken.iter().map(Taken::run).collect();
+    let page = study_html(&StudyReport {
+        rig: &calibrated.rig.name,
+        simulated: calibrated.simulated,
+        runs: &runs,
+        rows,
+        calibration: Some(calibrated.report()),
+        figures,
+        missing,
+        warnings: &[],
+    });
+    put(&args.out.join("report.html"), &page)?;
+    for StudyFigure { number, svg, .. } in figures {
+        put(&args.out.join(format!("figure-{number}.svg")), svg)?;
+    }
+    Ok(())
+}
+
+fn put(path: &Path, text: &str) -> anyhow::Result<()> {
+    fs::write(path, text).with_context(|| path.display().to_string())
+}
+
+fn finish(
+    common: &Common,
+    args: &StudyArgs,
+    calibrated: &Calibrated,
+    rows: &[StudyRow],
+    start: Instant,
+) -> anyhow::Result<Exit> {
+    let report = std::path::absolute(args.out.join("report.html"))?;
+    let known = rows.iter().filter(|row| row.truth.is_some() && row.inside.is_some());
+    let (inside, known) = (known.clone().filter(|row| row.inside == Some(true)).count(), known.count());
+    if common.json {
+        let rows: Vec<_> = rows.iter().map(rows::to_json).collect();
+        println!(
+            "{}",
+            json!({
+                "schema": "tactus.study/1",
+                "rig": calibrated.rig.name,
+                "simulated": calibrated.simulated,
+                "rows": rows,
+                "truths": known,
+                "truths_inside": inside,
+                "missing": calibrated.calibration.missing,
+                "warnings": calibrated.calibration.warnings,
+                "report": report,
+                "seconds": start.elapsed().as_secs_f64(),
+            })
+        );
+    } else {
+        rows::print(rows);
+        if known > 0 {
+            println!("\n{inside} of {known} known truths inside their 95 % intervals");
+        }
+        println!("{}\ndone in {}", report.display(), duration(start.elapsed().as_secs_f64()));
+    }
+    let whole = calibrated.calibration.missing.is_empty();
+    Ok(if whole { Exit::Done } else { Exit::Degraded })
+}

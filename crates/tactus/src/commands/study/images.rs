@@ -1,0 +1,199 @@
+//! Figure 8: the H on the rig and in the calibrated model.
+//!
+//! The simulated rig has the H put on its stage, at several angles and under each covering, and its devices are asked for
+//! the images, as for any press. The model images the same presses.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Context;
+use tactus_calibrate::{Gather, Readings, Sample};
+use tactus_daemon::embedded::SIMULATED_RIG;
+use tactus_model::{Covering, Indenter, Mesh, Registration, Trajectory};
+use tactus_record::rows;
+use tactus_report::figures::{SideBySide, side_by_side};
+use tactus_report::study::StudyFigure;
+use tactus_scene::shapes::Scene;
+use toml::{Table, Value};
+
+use super::steps::{COVERINGS_MM, Step, Steps};
+use crate::cli::{Common, StudyArgs};
+use crate::commands::calibrate::Calibrated;
+
+const ANGLES_DEG: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 90.0];
+/// So lightly that no element leaves the envelope, wide as the H is.
+const DEPTH_MM: f64 = 0.04;
+
+/// The two parts of Figure 8.
+#[derive(Debug)]
+pub(super) struct Images {
+    pub(super) figures: [StudyFigure; 2],
+    /// Largest difference of an image to the model's, in percent of its range.
+    pub(super) worst_percent: f64,
+}
+
+/// Takes the images; none if the data gave no model.
+pub(super) fn take(
+    common: &Common,
+    args: &StudyArgs,
+    steps: &mut Steps,
+    calibrated: &Calibrated,
+) -> anyhow::Result<Option<Images>> {
+    if calibrated.model().is_none() {
+        return Ok(None);
+    }
+    let mut angles = Vec::new();
+    for angle_deg in ANGLES_DEG {
+        let heading = format!("{angle_deg}\u{b0}");
+        angles.extend(pressed(common, args, steps, calibrated, angle_deg, &[COVERINGS_MM[0]], |_| {
+            heading.clone()
+        })?);
+    }
+    let inches = |covering_mm: f64| format!("{:.2} inch", covering_mm / 25.4);
+    let coverings = pressed(common, args, steps, calibrated, 0.0, &COVERINGS_MM, inches)?;
+    let all = angles.iter().chain(&coverings);
+    let worst_percent = all.map(SideBySide::difference_percent).fold(0.0, f64::max);
+    let figure = |number: &str, title: &str, contacts: &[SideBySide], caption: &str| StudyFigure {
+        number: number.into(),
+        title: title.into(),
+        caption: format!(
+            "{caption} Above, what the rig's virtual sensor read, through its devices: simulated, with everything that the rig \
+             hides. Below, the model that calibration made of this rig, faulty elements included. Every image is scaled from \
+             zero to one by itself; at the foot, the largest difference of the two."
+        ),
+        svg: side_by_side(title, contacts).to_string(),
+    };
+    Ok(Some(Images {
+        figures: [
+            figure(
+                "8a",
+                "The H at several angles",
+                &angles,
+                "The H in the middle of the array under the thinnest covering.",
+            ),
+            figure(
+                "8b",
+                "The H under each covering",
+                &coverings,
+                "The H upright under each of the four coverings.",
+            ),
+        ],
+        worst_percent,
+    }))
+}
+
+/// The H at an angle under coverings, on the rig and in the model.
+fn pressed(
+    common: &Common,
+    args: &StudyArgs,
+    steps: &mut Steps,
+    calibrated: &Calibrated,
+    angle_deg: f64,
+    coverings_mm: &[f64],
+    heading: impl Fn(f64) -> String,
+) -> anyhow::Result<Vec<SideBySide>> {
+    let mesh = turned(&Scene::H.mesh(), angle_deg)?;
+    let of = if let [_] = coverings_mm { format!("{angle_deg} degrees") } else { "each covering".into() };
+    let step = Step {
+        name: format!("image of the H, {of}"),
+        experiment: "image",
+        parameters: vec![format!("depth_mm={DEPTH_MM}"), format!("coverings_mm={coverings_mm:?}")],
+        rig_file: Some(rig_with(args, &mesh, angle_deg)?),
+    };
+    let taken = steps.take(common, args, &step)?;
+    let mut gather = None;
+    rows::visit(&[&taken.recording], |rig, row| {
+        gather.get_or_insert_with(|| Gather::new(&rig.array)).take(Sample {
+            run: row.run,
+            press: row.press,
+            phase: row.phase,
+            position_mm: row.position_mm,
+            covering_mm: row.covering_mm,
+            indenter: row.indenter,
+            counts: row.counts,
+        });
+    })?;
+    let readings = gather.context("the image's recording has no frame")?.finish();
+    compare(calibrated, &readings, mesh, heading)
+}
+
+fn compare(
+    calibrated: &Calibrated,
+    readings: &Readings,
+    mesh: Mesh,
+    heading: impl Fn(f64) -> String,
+) -> anyhow::Result<Vec<SideBySide>> {
+    let model = calibrated.model().context("no model was made")?;
+    let (registration, surface_mm) = match &calibrated.calibration.registration {
+        Some(fit) => (
+            Registration {
+                origin_mm: fit.origin_mm.map(|along| along.value),
+                rotation_deg: fit
+                    .rotation_deg
+                    .map_or(calibrated.rig.registration.rotation_deg, |angle| angle.value),
+            },
+            fit.surface_mm.map_or(0.0, |surface| surface.value),
+        ),
+        None => (calibrated.rig.registration, 0.0),
+    };
+    let tool = Indenter::Mesh(Arc::new(mesh));
+    let mut compared = Vec::new();
+    for press in &readings.presses {
+        let Some((dwell, rest)) = press.deepest().zip(press.rest.as_ref()) else { continue };
+        let measured: Vec<f64> =
+            dwell.counts.iter().zip(&rest.counts).map(|(read, rest)| read - rest).collect();
+        let covering = Covering { thickness_mm: press.covering_mm };
+        let simulator = model.simulator(registration, surface_mm, covering, tool.clone())?;
+        let [x_mm, y_mm] = press.place_mm;
+        let there = Trajectory::new([(0.0, [x_mm, y_mm, dwell.height_mm])])?;
+        let image = simulator.run(&there, 1.0, 1, || 0.0)?.next().context("no image")?;
+        let baselines = &model.base.response.baseline_counts;
+        let modelled: Vec<f64> =
+            image.clean_counts.iter().zip(baselines).map(|(read, rest)| read - rest).collect();
+        compared.push(SideBySide {
+            heading: heading(press.covering_mm),
+            sensor: zero_to_one(&measured),
+            model: zero_to_one(&modelled),
+        });
+    }
+    Ok(compared)
+}
+
+fn turned(mesh: &Mesh, angle_deg: f64) -> anyhow::Result<Mesh> {
+    let (sin, cos) = angle_deg.to_radians().sin_cos();
+    Ok(mesh.turned([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])?)
+}
+
+/// The file of the same rig with the H on its stage.
+fn rig_with(args: &StudyArgs, mesh: &Mesh, angle_deg: f64) -> anyhow::Result<PathBuf> {
+    let text = match &args.rig_file {
+        Some(path) => fs::read_to_string(path).with_context(|| path.display().to_string())?,
+        None => SIMULATED_RIG.to_owned(),
+    };
+    let mut rig: Table = toml::from_str(&text)?;
+    let vertices: Vec<Value> = mesh.vertices_mm().iter().map(|vertex| Value::from(vertex.to_vec())).collect();
+    let triangle = |triangle: &[u32; 3]| Value::from(triangle.map(i64::from).to_vec());
+    let triangles: Vec<Value> = mesh.triangles().iter().map(triangle).collect();
+    let mut tool = Table::new();
+    tool.insert("shape".into(), "mesh".into());
+    tool.insert("vertices_mm".into(), vertices.into());
+    tool.insert("triangles".into(), triangles.into());
+    rig.insert("indenter".into(), "h".into());
+    let tools =
+        rig.get_mut("indenters").and_then(Value::as_table_mut).context("the rig file has no tools")?;
+    tools.insert("h".into(), tool.into());
+    let path = args.out.join(format!("rig-with-h-{angle_deg}.toml"));
+    fs::write(&path, toml::to_string(&rig)?).with_context(|| path.display().to_string())?;
+    Ok(path)
+}
+
+/// Scaled so that the least is 0 and the greatest 1.
+fn zero_to_one(image: &[f64]) -> Vec<f32> {
+    let [least, most] = image.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
+        [least.min(*value), most.max(*value)]
+    });
+    let range = if most > least { most - least } else { 1.0 };
+    #[expect(clippy::cast_possible_truncation, reason = "a colour needs no more digits")]
+    image.iter().map(|value| ((value - least) / range) as f32).collect()
+}

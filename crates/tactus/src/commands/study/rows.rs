@@ -1,0 +1,302 @@
+//! What there is to compare: quantity, paper, this rig, truth.
+
+use std::path::Path;
+
+use anyhow::Context;
+use serde_json::{Value, json};
+use tactus_calibrate::acuity::{DiscretisingSensor, NYQUIST_SIGMA};
+use tactus_calibrate::{Estimate, FaultKind, Form};
+use tactus_daemon::embedded::{self, Truth};
+use tactus_record::Timeline;
+use tactus_report::figures::Widening;
+use tactus_report::study::{Found, StudyRow};
+use tactus_schema::Rig;
+use tactus_schema::rig::ElementFault;
+
+use super::images::Images;
+use crate::commands::calibrate::{Calibrated, estimate};
+use crate::output::print_table;
+
+/// Poisson's ratio of the covering in the finite elements (rubber hardly changes its volume).
+const POISSON_RATIO: f64 = 0.45;
+/// Force steps of one unit reading for which the acuity is stated: 8 bit.
+const FORCE_STEPS: f64 = 256.0;
+
+/// What the rig of a recording hides, if it is a simulated one that says so.
+pub(super) fn truth(recording: &Path) -> anyhow::Result<Option<Truth>> {
+    let timeline = Timeline::read(recording)?;
+    let Some(text) = timeline.attachment("rig.toml") else { return Ok(None) };
+    let text = std::str::from_utf8(text).context("the recording's rig file is no text")?;
+    let rig = Rig::from_toml(text).context("the recording's rig file")?;
+    Ok(embedded::truth(&rig))
+}
+
+/// All quantities, in the paper's order.
+pub(super) fn rows(
+    calibrated: &Calibrated,
+    truth: Option<&Truth>,
+    images: Option<&Images>,
+) -> anyhow::Result<Vec<StudyRow>> {
+    let mut rows = registration(calibrated, truth);
+    rows.extend(response(calibrated, truth));
+    rows.extend(mechanics()?);
+    rows.extend(spread(calibrated, truth));
+    rows.extend(acuity()?);
+    if let Some(images) = images {
+        rows.push(StudyRow {
+            paper: Some("qualitatively similar".into()),
+            note: "Fig. 8: largest difference between the rig's images of the H and the model's".into(),
+            ..text("images of the H", "", format!("within {:.1} % of their range", images.worst_percent))
+        });
+    }
+    Ok(rows)
+}
+
+fn registration(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
+    let Some(fit) = &calibrated.calibration.registration else { return Vec::new() };
+    let of = |of: fn(&Truth) -> f64| truth.map(of);
+    let [x, y] = fit.origin_mm;
+    vec![
+        row("origin, x", "mm", Some(x), of(|truth| truth.registration.origin_mm[0])),
+        row("origin, y", "mm", Some(y), of(|truth| truth.registration.origin_mm[1])),
+        row("rotation", "deg", fit.rotation_deg, of(|truth| truth.registration.rotation_deg)),
+        row("surface height", "mm", fit.surface_mm, of(|truth| truth.surface_mm)),
+        StudyRow {
+            note: "a check of element centres and stage".into(),
+            ..row("scale", "", fit.scale, truth.map(|_| 1.0))
+        },
+    ]
+}
+
+fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
+    let calibration = &calibrated.calibration;
+    let faults: Vec<String> = calibration
+        .health
+        .faults
+        .iter()
+        .map(|fault| match fault.kind {
+            FaultKind::Dead => format!("{} dead", fault.element),
+            FaultKind::Stuck { .. } => format!("{} stuck", fault.element),
+            FaultKind::CrossWired { answers_for } => format!("{} answers for {answers_for}", fault.element),
+            FaultKind::Noisy { .. } => format!("{} noisy", fault.element),
+        })
+        .collect();
+    let found = if faults.is_empty() { "none".into() } else { faults.join(", ") };
+    let mut rows = vec![StudyRow {
+        paper: Some("two, answering a neighbour".into()),
+        inside: truth.map(|truth| {
+            calibration.health.faults.len() == truth.faults.len()
+                && calibration.health.faults.iter().all(|fault| {
+                    truth.faults.get(&fault.element).is_some_and(|truth| alike(&fault.kind, truth))
+                })
+        }),
+        note: truth.map_or_else(String::new, |truth| format!("planted: {}", planted(truth))),
+        ..text("faulty elements", "", found)
+    }];
+    let Some(fit) = &calibration.response else { return rows };
+    rows.push(StudyRow {
+        paper: Some("linear at low force, else quadratic".into()),
+        note: "chosen on held-out dwells".into(),
+        ..text("response", "", fit.form.name().into())
+    });
+    let curvature = if fit.form == Form::Linear {
+        fit.shared_quadratic_per_mm
+    } else {
+        fit.elements.first().map(|one| one.quadratic_per_mm)
+    };
+    if fit.form != Form::OwnQuadratic {
+        let truth = truth.map(|truth| truth.model.response().quadratic_per_mm[0]);
+        rows.push(row("curvature of the response", "1/mm", curvature, truth));
+    }
+    if let Some(truth) = truth {
+        let sensitivities = &truth.model.response().sensitivity_counts_per_mm;
+        let inside = |one: &&tactus_calibrate::ElementResponse| {
+            one.sensitivity_counts_per_mm.covers(sensitivities[one.element])
+        };
+        let (inside, of) = (fit.elements.iter().filter(inside).count(), fit.elements.len());
+        rows.push(StudyRow {
+            note: "95 % are expected on average over many rigs; on one rig their errors hang together".into(),
+            ..text("sensitivities inside their intervals", "", format!("{inside} of {of}"))
+        });
+    }
+    rows
+}
+
+fn alike(found: &FaultKind, truth: &ElementFault) -> bool {
+    match (found, truth) {
+        (FaultKind::Dead, ElementFault::Dead) | (FaultKind::Noisy { .. }, ElementFault::Noisy { .. }) => true,
+        (FaultKind::Stuck { counts }, ElementFault::Stuck { counts: planted }) => {
+            (counts - f64::from(*planted)).abs() < 0.5
+        }
+        (FaultKind::CrossWired { answers_for }, ElementFault::Miswired { answers_for: planted }) => {
+            answers_for == planted
+        }
+        _ => false,
+    }
+}
+
+fn planted(truth: &Truth) -> String {
+    let one = |(element, fault): (&usize, &ElementFault)| match fault {
+        ElementFault::Dead => format!("{element} dead"),
+        ElementFault::Stuck { .. } => format!("{element} stuck"),
+        ElementFault::Noisy { .. } => format!("{element} noisy"),
+        ElementFault::Miswired { answers_for } => format!("{element} answers for {answers_for}"),
+    };
+    let planted: Vec<String> = truth.faults.iter().map(one).collect();
+    if planted.is_empty() { "none".into() } else { planted.join(", ") }
+}
+
+/// What elasticity says of the spread, in bricks, which stand for the paper's unit of thickness in Fig. 3.
+fn mechanics() -> anyhow::Result<Vec<StudyRow>> {
+    let Widening { line: [intercept, slope], of_layer, .. } = Widening::new(POISSON_RATIO)?;
+    Ok(vec![
+        StudyRow {
+            paper: Some("0.5".into()),
+            note: format!("finite elements, Fig. 3, Poisson's ratio {POISSON_RATIO}; the continuous layer has {of_layer:.3}"),
+            ..text("spread of the covering alone, per thickness", "", format!("{slope:.3}"))
+        },
+        StudyRow {
+            paper: Some("0.9".into()),
+            note: "elasticity has none: what is left is the mesh's; the rest of the paper's belongs to its sensor".into(),
+            ..text("spread at no thickness, finite elements", "bricks", format!("{intercept:.2}"))
+        },
+    ])
+}
+
+fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
+    let pitch_mm = calibrated.rig.array.pitch_mm();
+    let Some(thickness) = &calibrated.calibration.thickness else { return Vec::new() };
+    let psf = truth.map(|truth| truth.model.psf());
+    let mut rows: Vec<StudyRow> = thickness
+        .coverings
+        .iter()
+        .map(|covering| {
+            let t = covering.covering_mm;
+            let truth = psf.map(|psf| (psf.sigma_intercept_mm + psf.sigma_per_mm * t) / pitch_mm);
+            StudyRow {
+                paper: Some(format!("{:.2} (Eq. 4)", 1.11 + 0.497 * t / 2.0)),
+                ..row(
+                    &format!("spread under {t:.3} mm"),
+                    "pitches",
+                    Some(covering.sigma_mm.in_units_of(pitch_mm)),
+                    truth,
+                )
+            }
+        })
+        .collect();
+    if let Some(line) = &thickness.linear {
+        let [intercept, slope] = line.coefficients;
+        rows.push(StudyRow {
+            paper: Some("1.11".into()),
+            ..row(
+                "Eq. 4, intercept",
+                "pitches",
+                Some(intercept.in_units_of(pitch_mm)),
+                psf.map(|psf| psf.sigma_intercept_mm / pitch_mm),
+            )
+        });
+        rows.push(StudyRow {
+            paper: Some("0.497".into()),
+            ..row("Eq. 4, slope", "", Some(slope), psf.map(|psf| psf.sigma_per_mm))
+        });
+    }
+    if let Some(parabola) = &thickness.quadratic {
+        let [_, _, bend] = parabola.coefficients;
+        let found = Estimate { value: bend.value * pitch_mm, standard_error: bend.standard_error * pitch_mm };
+        rows.push(StudyRow {
+            note: "of the quadratic fit of Fig. 5a; 0 if the spread is linear in thickness".into(),
+            ..row("spread against thickness, bend", "1/pitch", Some(found), truth.map(|_| 0.0))
+        });
+    }
+    rows
+}
+
+fn acuity() -> anyhow::Result<Vec<StudyRow>> {
+    let sigmas = (10..=60).map(|hundredth| f64::from(hundredth) / 100.0);
+    let located =
+        sigmas.map(|sigma| Ok((sigma, DiscretisingSensor::new(sigma, 1.0 / FORCE_STEPS)?.locations())));
+    let located = located.collect::<anyhow::Result<Vec<_>>>()?;
+    let mut best = (0.0, 0);
+    for one in located {
+        if one.1 > best.1 {
+            best = one;
+        }
+    }
+    Ok(vec![
+        StudyRow {
+            paper: Some("around 0.3".into()),
+            note: format!(
+                "Fig. 6a, {FORCE_STEPS} force steps: {} locations in an element; a ridge only where 1/f is whole",
+                best.1
+            ),
+            ..text("spread that locates best", "pitches", format!("{:.2}", best.0))
+        },
+        StudyRow {
+            paper: Some("1.0".into()),
+            note: "3 / pi, which the paper rounds".into(),
+            ..text("least spread without aliasing", "pitches", format!("{NYQUIST_SIGMA:.3}"))
+        },
+    ])
+}
+
+fn row(quantity: &str, unit: &str, found: Option<Estimate>, truth: Option<f64>) -> StudyRow {
+    StudyRow {
+        quantity: quantity.into(),
+        unit: unit.into(),
+        paper: None,
+        inside: found.zip(truth).map(|(found, truth)| found.covers(truth)),
+        found: found.map_or(Found::Nothing, Found::Estimate),
+        truth,
+        note: if found.is_some() { String::new() } else { "the data do not tell".into() },
+    }
+}
+
+fn text(quantity: &str, unit: &str, found: String) -> StudyRow {
+    StudyRow {
+        quantity: quantity.into(),
+        unit: unit.into(),
+        paper: None,
+        found: Found::Text(found),
+        truth: None,
+        inside: None,
+        note: String::new(),
+    }
+}
+
+/// A row for machines.
+pub(super) fn to_json(row: &StudyRow) -> Value {
+    let StudyRow { quantity, unit, paper, found, truth, inside, note } = row;
+    let found = match found {
+        Found::Estimate(Estimate { value, standard_error }) => {
+            json!({ "value": value, "standard_error": standard_error })
+        }
+        Found::Text(text) => json!(text),
+        Found::Nothing => Value::Null,
+    };
+    json!({
+        "quantity": quantity, "unit": unit, "paper": paper, "found": found, "truth": truth, "inside": inside, "note": note,
+    })
+}
+
+/// The rows for people.
+pub(super) fn print(rows: &[StudyRow]) {
+    let cells = rows.iter().map(|row| {
+        let found = match &row.found {
+            Found::Estimate(found) => estimate(*found),
+            Found::Text(text) => text.clone(),
+            Found::Nothing => "-".into(),
+        };
+        let truth = row.truth.map_or_else(String::new, |truth| format!("{truth:.5}"));
+        let inside = row.inside.map_or("", |inside| if inside { "yes" } else { "NO" });
+        vec![
+            row.quantity.clone(),
+            row.unit.clone(),
+            row.paper.clone().unwrap_or_default(),
+            found,
+            truth,
+            inside.into(),
+        ]
+    });
+    println!();
+    print_table(&["quantity", "unit", "paper", "this rig", "truth", "inside"], &cells.collect::<Vec<_>>());
+}

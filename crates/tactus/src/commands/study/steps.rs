@@ -1,0 +1,184 @@
+//! The runs of a study, remembered, so that none is made twice.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use serde::{Deserialize, Serialize};
+use tactus_report::study::StudyRun;
+use tactus_schema::pb::ExitStatus;
+
+use crate::cli::{Common, ExperimentArgs, RunArgs, StudyArgs};
+use crate::commands::run::execute;
+use crate::exit::{Exit, Failure};
+use crate::output::duration;
+
+/// Name of the form of `study.json`.
+const SCHEMA: &str = "tactus.study-steps/1";
+/// The paper's coverings: 0.04, 0.1, 0.14 and 0.2 inch.
+pub(super) const COVERINGS_MM: [f64; 4] = [1.016, 2.54, 3.556, 5.08];
+
+/// What was done already; kept in `study.json`.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Steps {
+    schema: String,
+    /// What the steps were made with; other steps do not go with them.
+    seed: u64,
+    points: u32,
+    rig_file: Option<PathBuf>,
+    taken: Vec<Taken>,
+    #[serde(skip)]
+    path: PathBuf,
+}
+
+/// A run that was made.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Taken {
+    pub(super) step: String,
+    pub(super) run_id: String,
+    pub(super) presses: u32,
+    pub(super) duration_s: f64,
+    pub(super) embedded: bool,
+    pub(super) recording: PathBuf,
+}
+
+/// A run to make.
+pub(super) struct Step {
+    pub(super) name: String,
+    pub(super) experiment: &'static str,
+    pub(super) parameters: Vec<String>,
+    /// An embedded rig for this step only.
+    pub(super) rig_file: Option<PathBuf>,
+}
+
+impl Taken {
+    pub(super) fn run(&self) -> StudyRun {
+        StudyRun {
+            name: self.step.clone(),
+            run_id: self.run_id.clone(),
+            presses: self.presses.into(),
+            duration_s: self.duration_s,
+            path: self.recording.display().to_string(),
+        }
+    }
+}
+
+impl Steps {
+    /// The steps of the study in the folder, or none yet.
+    pub(super) fn resume(args: &StudyArgs) -> anyhow::Result<Self> {
+        let path = args.out.join("study.json");
+        let new = Self {
+            schema: SCHEMA.into(),
+            seed: args.seed,
+            points: args.points,
+            rig_file: args.rig_file.clone(),
+            taken: Vec::new(),
+            path: path.clone(),
+        };
+        if !path.exists() {
+            return Ok(new);
+        }
+        let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let known: Self = serde_json::from_str(&text).with_context(|| {
+            format!("{} is no list of a study's steps; give another --out", path.display())
+        })?;
+        let same = |steps: &Self| (steps.schema.clone(), steps.seed, steps.points, steps.rig_file.clone());
+        if same(&known) != same(&new) {
+            let error = format!(
+                "{} is of a study with another seed, rig file or number of points: give another --out, or the same arguments",
+                path.display()
+            );
+            return Err(Failure::new(Exit::Usage, error).into());
+        }
+        Ok(Self { path, ..known })
+    }
+
+    /// Corners, element centres and the sweep, one covering after the other.
+    pub(super) fn measure(&mut self, common: &Common, args: &StudyArgs) -> anyhow::Result<Vec<Taken>> {
+        let plain = |name: &str, experiment| Step {
+            name: name.into(),
+            experiment,
+            parameters: Vec::new(),
+            rig_file: None,
+        };
+        let mut steps = vec![plain("corners", "corners"), plain("element-centres", "element-centres")];
+        steps.extend(COVERINGS_MM.map(|covering_mm| Step {
+            parameters: vec![
+                format!("coverings_mm=[{covering_mm}]"),
+                format!("points={}", args.points),
+                // The paper's grid, whatever the number of points in it.
+                format!("spacing_mm={}", 1.4 / f64::from(args.points - 1)),
+            ],
+            ..plain(&format!("sweep, {covering_mm} mm"), "grid-sweep")
+        }));
+        steps.iter().map(|step| self.take(common, args, step)).collect()
+    }
+
+    /// Makes a step's run, unless it was made already.
+    pub(super) fn take(&mut self, common: &Common, args: &StudyArgs, step: &Step) -> anyhow::Result<Taken> {
+        let known = self.taken.iter().find(|taken| taken.step == step.name && taken.recording.is_file());
+        if let Some(known) = known {
+            if !common.json {
+                println!("{}: made already, run {}", step.name, known.run_id);
+            }
+            return Ok(known.clone());
+        }
+        let rig_file = step.rig_file.as_ref().or(args.rig_file.as_ref());
+        let summary = execute(
+            // The run's own first line would stand before every step.
+            &Common { json: true, ..common.clone() },
+            &RunArgs {
+                experiment: ExperimentArgs {
+                    experiment: step.experiment.into(),
+                    parameters: step.parameters.clone(),
+                    seed: Some(args.seed),
+                },
+                embedded: args.embedded,
+                rig_file: rig_file.cloned(),
+                real_time: false,
+                out: args.out.join("runs"),
+                who: args.who.clone(),
+                no_report: true,
+            },
+        )
+        .with_context(|| format!("step {:?}", step.name))?;
+        if !matches!(summary.exit_status, ExitStatus::Done | ExitStatus::Degraded) {
+            let error = format!(
+                "step {:?} ended as {}: {}; the same command goes on from there",
+                step.name,
+                tactus_record::exit_status_name(summary.exit_status),
+                summary.message
+            );
+            return Err(Failure::new(Exit::of_run(summary.exit_status), error).into());
+        }
+        let taken = Taken {
+            step: step.name.clone(),
+            run_id: summary.run_id,
+            presses: summary.presses,
+            duration_s: summary.duration_s,
+            embedded: summary.embedded,
+            recording: std::path::absolute(&summary.recording)?,
+        };
+        if !common.json {
+            let simulated = if summary.simulated { "SIMULATED, " } else { "" };
+            println!(
+                "{}: {simulated}{} presses, {} of the rig's time",
+                step.name,
+                taken.presses,
+                duration(taken.duration_s)
+            );
+        }
+        self.taken.retain(|known| known.step != step.name);
+        self.taken.push(taken.clone());
+        self.keep()?;
+        Ok(taken)
+    }
+
+    /// Writes what was done; a study that is killed meanwhile finds the former list or this one.
+    fn keep(&self) -> anyhow::Result<()> {
+        let beside: &Path = &self.path.with_extension("json.new");
+        fs::write(beside, serde_json::to_string_pretty(self)?)
+            .with_context(|| beside.display().to_string())?;
+        fs::rename(beside, &self.path).with_context(|| self.path.display().to_string())
+    }
+}
