@@ -97,6 +97,11 @@ bench-acuity *arguments: bench-peers-tools
     cargo build --release --package tactus-bench
     {{ tools }}/peers/bin/python bench/peers/acuity.py {{ arguments }}
 
+# The fit of the point spreads to the paper's sweep, beside scipy's.
+bench-calibration *arguments: bench-peers-tools
+    cargo build --release --package tactus --package tactus-bench
+    {{ tools }}/peers/bin/python bench/peers/calibration.py {{ arguments }}
+
 # A virtual environment with the peers.
 bench-peers-tools:
     test -d {{ tools }}/peers || python3 -m venv {{ tools }}/peers

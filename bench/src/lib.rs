@@ -5,6 +5,7 @@
 //! model of the covering.
 
 mod acuity;
+mod calibration;
 mod clock;
 mod fem;
 mod forward;
@@ -15,6 +16,7 @@ mod press;
 mod way;
 
 pub use acuity::Acuity;
+pub use calibration::{Calibration, Sweep};
 pub use clock::per_image_s;
 pub use fem::Fem;
 pub use forward::Forward;

@@ -1,13 +1,14 @@
 //! `tactus-bench`: what `just bench` and `just bench-peers` run beside criterion.
 #![expect(clippy::print_stdout, reason = "standard output is this program's interface")]
 
-use std::time::Duration;
+use std::{path::PathBuf, time::Duration};
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use serde_json::json;
 use tactus_bench::{
-    Acuity, COVERING, Fem, Forward, Growth, Kernel, Limits, Painter, Pose, Tool, Way, model, poses,
+    Acuity, COVERING, Calibration, Fem, Forward, Growth, Kernel, Limits, Painter, Pose, Sweep, Tool, Way,
+    model, poses,
 };
 use tactus_calibrate::acuity::Grid;
 use tactus_model::Array;
@@ -83,6 +84,15 @@ enum Part {
         #[arg(long)]
         json: bool,
     },
+    /// A calibration from recordings: reading, the whole, and without the sweeps that its spreads are fitted to.
+    Calibrate {
+        /// The recordings.
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// One JSON object, with the images of the sweeps, instead of a line of text.
+        #[arg(long)]
+        json: bool,
+    },
     /// How the time of an image grows with elements and triangles, and that of the finite elements with bricks.
     Growth,
     /// What of this machine's arithmetic and bandwidth the kernels use.
@@ -96,6 +106,7 @@ fn main() -> Result<()> {
             forward(&Forward::measure(&array, tool, way, threads, time, compared)?, json);
         }
         Part::Scene { array, tool, way } => scene(array, tool, way)?,
+        Part::Calibrate { files, json } => calibrate(&Calibration::measure(&files, 5)?, json),
         Part::Acuity { json } => acuity(json)?,
         Part::Fem { across, layers, poisson_ratio, full, json } => {
             let bricks = Bricks::cubes(across, layers, 1.0, poisson_ratio)?;
@@ -160,6 +171,28 @@ fn scene(array: Array, tool: Tool, way: Way) -> Result<()> {
     });
     println!("{scene}");
     Ok(())
+}
+
+fn calibrate(measured: &Calibration, as_json: bool) {
+    let Calibration { presses, read_s, whole_s, without_sweeps_s, sweeps } = measured;
+    if as_json {
+        let sweeps = sweeps.iter().map(|sweep| {
+            let Sweep { covering_mm, depth_mm, sigma_mm, centres_mm, places_mm, images_mm } = sweep;
+            json!({
+                "covering_mm": covering_mm, "depth_mm": depth_mm, "sigma_mm": sigma_mm, "centres_mm": centres_mm,
+                "places_mm": places_mm, "images_mm": images_mm,
+            })
+        });
+        let line = json!({
+            "presses": presses, "read_s": read_s, "whole_s": whole_s, "without_sweeps_s": without_sweeps_s,
+            "sweeps": sweeps.collect::<Vec<_>>(), "version": env!("CARGO_PKG_VERSION"),
+        });
+        println!("{line}");
+    } else {
+        println!(
+            "{presses} presses: read in {read_s:.2} s, calibrated in {whole_s:.3} s, without the sweeps in {without_sweeps_s:.3} s"
+        );
+    }
 }
 
 fn acuity(as_json: bool) -> Result<()> {

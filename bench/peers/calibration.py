@@ -1,0 +1,115 @@
+"""The fit of the point spreads to the paper's sweep: ours and scipy.optimize on the same images, on one machine.
+
+The embedded rig makes the recordings. Ours reads them, calibrates, and prints the images that its spreads rest on.
+The scipy program maximises the same criterion (Eq. 3, images of unit L2 norm) over sigma for each covering and depth,
+by `minimize_scalar` with bounds; its model of a press is the 1 mm disc cut into 16 strips (Gauss and Legendre), each
+blurred and integrated by the error function, all presses of a sweep in one array.
+"""
+
+import os
+
+# One thread in every process. Must stand before numpy is loaded.
+os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
+
+import argparse
+import json
+import platform
+import statistics
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import scipy
+from scipy.optimize import minimize_scalar
+from scipy.special import ndtr
+
+REPOSITORY = Path(__file__).parents[2]
+ELEMENT_MM = 1.8
+RADIUS_MM = 0.5
+
+
+def main():
+    args = arguments()
+    with tempfile.TemporaryDirectory() as folder:
+        files = [record(args.tactus, folder, name, *more) for name, *more in experiments(args.points)]
+        ours = json.loads(run(args.binary, "calibrate", "--json", *files))
+        core = min(os.sched_getaffinity(0))
+        one_core = json.loads(run("taskset", "-c", str(core), args.binary, "calibrate", "--json", *files))
+    sweeps = [{key: np.array(value) for key, value in sweep.items()} for sweep in ours["sweeps"]]
+    rounds = [timed(lambda: [fit(sweep) for sweep in sweeps]) for _ in range(args.rounds)]
+    sigmas = rounds[0][0]
+    scipy_s = statistics.median(seconds for _, seconds in rounds)
+    spread_s, spread_one_core_s = (one["whole_s"] - one["without_sweeps_s"] for one in (ours, one_core))
+    worst = max(abs(ours_sigma - sigma) for ours_sigma, sigma in zip((s["sigma_mm"] for s in sweeps), sigmas))
+    print(f"{os.cpu_count()} cores, {platform.system()}; python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}")
+    print(f"presses: {ours['presses']}, of which sweeps {sum(len(s['places_mm']) for s in sweeps)}")
+    print(f"reading the recordings            {ours['read_s']:8.3f} s")
+    print(f"whole calibration                 {ours['whole_s']:8.3f} s, one core {one_core['whole_s']:.3f} s")
+    print(f"spreads alone, with their errors  {spread_s:8.3f} s, one core {spread_one_core_s:.3f} s")
+    print(f"scipy.optimize, spreads, no errors{scipy_s:8.3f} s: {scipy_s / spread_s:.1f} x, one core {scipy_s / spread_one_core_s:.1f} x")
+    print(f"greatest difference of a sigma    {worst:8.1e} mm")
+
+
+def experiments(points):
+    sweep = ["-p", f"points={points}", "-p", f"spacing_mm={1.4 / (points - 1)}"]
+    return [["corners"], ["element-centres"], ["grid-sweep", *sweep]]
+
+
+def record(tactus, folder, experiment, *parameters):
+    out = run(tactus, "--json", "run", experiment, "--embedded", "--no-report", "--seed", "1", "--out", folder, *parameters)
+    return json.loads(out)["recording"]
+
+
+def fit(sweep):
+    centres, places = sweep["centres_mm"], sweep["places_mm"]
+    measured = sweep["images_mm"] / np.linalg.norm(sweep["images_mm"], axis=1, keepdims=True)
+    columns, column_of = np.unique(centres[:, 0], return_inverse=True)
+    rows, row_of = np.unique(centres[:, 1], return_inverse=True)
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    strips = RADIUS_MM * nodes
+    half = np.sqrt(RADIUS_MM**2 - strips**2)
+
+    def unlike(sigma):
+        # Along x the strip is a line of no width; along y it reaches half a chord each way.
+        away = places[:, 0, None, None] + strips[:, None] - columns
+        along_x = weights[:, None] * (ndtr((away + ELEMENT_MM / 2) / sigma) - ndtr((away - ELEMENT_MM / 2) / sigma))
+        away = places[:, 1, None, None] - rows
+        along_y = sum(
+            sign * side * integral((away + sign * half[:, None] + side * ELEMENT_MM / 2), sigma)
+            for sign in (1, -1)
+            for side in (1, -1)
+        )
+        images = np.einsum("psc,psr->prc", along_x, along_y)[:, row_of, column_of]
+        return -np.sum(measured * images / np.linalg.norm(images, axis=1, keepdims=True))
+
+    return minimize_scalar(unlike, bounds=(0.5, 15.0), method="bounded", options={"xatol": 1e-7}).x
+
+
+def integral(x, sigma):
+    """The integral of the normal distribution function."""
+    return x * ndtr(x / sigma) + sigma / np.sqrt(2 * np.pi) * np.exp(-((x / sigma) ** 2) / 2)
+
+
+def timed(work):
+    start = time.perf_counter()
+    result = work()
+    return result, time.perf_counter() - start
+
+
+def run(*command):
+    return subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True).stdout
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/release/tactus-bench")
+    parser.add_argument("--tactus", type=Path, default=REPOSITORY / "target/release/tactus")
+    parser.add_argument("--points", type=int, default=15, help="points along each side of the sweep")
+    parser.add_argument("--rounds", type=int, default=5, help="the median of so many")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

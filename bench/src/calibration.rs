@@ -1,0 +1,135 @@
+//! A calibration from recordings: reading them, the whole of it, and the fit of the spreads.
+
+use std::{path::PathBuf, time::Instant};
+
+use anyhow::{Context, Result};
+use tactus_calibrate::{Declared, Gather, Readings, Sample, calibrate};
+use tactus_model::Registration;
+use tactus_record::rows;
+use tactus_schema::Model;
+
+/// The times of a calibration, and the images that its spreads were fitted to.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    /// Presses read.
+    pub presses: usize,
+    /// Seconds to read the recordings and gather their frames.
+    pub read_s: f64,
+    /// Seconds of the calibration: the median of so many.
+    pub whole_s: f64,
+    /// The same without the presses of the sweeps, of which only the spreads are fitted.
+    pub without_sweeps_s: f64,
+    /// The sweeps, by covering and depth.
+    pub sweeps: Vec<Sweep>,
+}
+
+/// Presses to one depth under one covering.
+#[derive(Debug, Clone)]
+pub struct Sweep {
+    /// Thickness of the covering.
+    pub covering_mm: f64,
+    /// Depth of the presses.
+    pub depth_mm: f64,
+    /// What was fitted.
+    pub sigma_mm: f64,
+    /// Centres of the elements that take part; sensor frame.
+    pub centres_mm: Vec<[f64; 2]>,
+    /// Where the presses stood; sensor frame.
+    pub places_mm: Vec<[f64; 2]>,
+    /// What these elements read in each, as indentations.
+    pub images_mm: Vec<Vec<f64>>,
+}
+
+impl Calibration {
+    /// Calibrates from recordings so many times.
+    ///
+    /// # Errors
+    /// If the files cannot be read, or show no spread.
+    pub fn measure(files: &[PathBuf], times: usize) -> Result<Self> {
+        let start = Instant::now();
+        let mut gather = None;
+        let source = rows::visit(files, |rig, row| {
+            gather.get_or_insert_with(|| Gather::new(&rig.array)).take(Sample {
+                run: row.run,
+                press: row.press,
+                phase: row.phase,
+                position_mm: row.position_mm,
+                covering_mm: row.covering_mm,
+                indenter: row.indenter,
+                counts: row.counts,
+            });
+        })?;
+        let readings = gather.context("the files hold no frame")?.finish();
+        let read_s = start.elapsed().as_secs_f64();
+        let rig = source.rig;
+        let declared = Declared {
+            model: Model::of_rig(&rig).context("the rig has no reference tool")?.forward()?,
+            registration: rig.registration,
+            indenters: rig.indenters,
+        };
+        let found = calibrate(&declared, &readings)?;
+        let sweeps = found.spreads.iter().map(|spread| spread.run.clone()).collect::<Vec<_>>();
+        let mut without = readings.clone();
+        without.presses.retain(|press| !sweeps.contains(&readings.runs[press.run]));
+        Ok(Self {
+            presses: readings.presses.len(),
+            read_s,
+            whole_s: median(times, || Ok(calibrate(&declared, &readings).map(|_| ())?))?,
+            without_sweeps_s: median(times, || Ok(calibrate(&declared, &without).map(|_| ())?))?,
+            sweeps: sweeps_of(&declared, &readings, &found)?,
+        })
+    }
+}
+
+fn sweeps_of(
+    declared: &Declared,
+    readings: &Readings,
+    found: &tactus_calibrate::Calibration,
+) -> Result<Vec<Sweep>> {
+    let responses = &found.response.as_ref().context("no response was fitted")?.elements;
+    let place = found.registration.as_ref().context("no place was found")?;
+    let registration = Registration {
+        origin_mm: place.origin_mm.map(|along| along.value),
+        rotation_deg: place.rotation_deg.map_or(declared.registration.rotation_deg, |angle| angle.value),
+    };
+    let surface_mm = place.surface_mm.map_or(0.0, |surface| surface.value);
+    let array = declared.model.array();
+    let sweep = |spread: &tactus_calibrate::SpreadFit| {
+        let mut sweep = Sweep {
+            covering_mm: spread.covering_mm,
+            depth_mm: spread.depth_mm,
+            sigma_mm: spread.sigma_mm.value,
+            centres_mm: responses.iter().filter_map(|one| array.centre_mm(one.element)).collect(),
+            places_mm: Vec::new(),
+            images_mm: Vec::new(),
+        };
+        let of_run = readings.presses.iter().filter(|press| readings.runs[press.run] == spread.run);
+        for press in of_run {
+            for dwell in &press.dwells {
+                if (surface_mm - dwell.height_mm - spread.depth_mm).abs() < 0.01 {
+                    let read = responses.iter().map(|one| {
+                        let [rise, _] = press.rise(dwell, one.element)?;
+                        one.indentation_mm(rise)
+                    });
+                    sweep.places_mm.push(registration.to_sensor(press.place_mm));
+                    sweep
+                        .images_mm
+                        .push(read.collect::<Option<_>>().context("a reading beyond the response")?);
+                }
+            }
+        }
+        Ok(sweep)
+    };
+    found.spreads.iter().map(sweep).collect()
+}
+
+fn median(times: usize, mut run: impl FnMut() -> Result<()>) -> Result<f64> {
+    let mut taken = Vec::new();
+    for _ in 0..times.max(1) {
+        let start = Instant::now();
+        run()?;
+        taken.push(start.elapsed().as_secs_f64());
+    }
+    taken.sort_by(f64::total_cmp);
+    Ok(taken[taken.len() / 2])
+}
