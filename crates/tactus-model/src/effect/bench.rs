@@ -72,7 +72,8 @@ fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
     let base = Base { model: &model, covering: THIN };
     let values = effect.values();
     let history = |k: u32| -> (Now<'_>, Vec<f64>) {
-        let now = Now { t_s: f64::from(k * k), dt_s: f64::from(2 * k) / 10.0, temperature_c: None, base };
+        let temperature_c = Some(20.0 + 0.3 * f64::from(k));
+        let now = Now { t_s: f64::from(k * k), dt_s: f64::from(2 * k) / 10.0, temperature_c, base };
         (now, (0..48).map(|element| (0.3 + f64::from(element * k)).sin()).collect())
     };
     let contact = Contact { indenter: CYLINDER, position_mm: [6.0, 5.0], rotation_deg: 10.0, depth_mm: 0.45 };
@@ -82,12 +83,17 @@ fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
             let registration = Registration { origin_mm: [20.0, 15.0], rotation_deg: 3.0 };
             let before = Place { tip_mm: [24.0, 22.0, -0.3], registration, surface_mm: 0.1 };
             let (mut motion, mut place) = (make(values), before);
+            for k in 0..6 {
+                // Up to the place, from both sides.
+                let aside_mm = 0.3 * (f64::from(5 - k) * 1.3).sin();
+                place = Place { tip_mm: before.tip_mm.map(|tip_mm| tip_mm + aside_mm), ..before };
+                motion.place(history(k).0, &mut place);
+            }
             if let Some(parameter) = by {
                 let shift = motion.slope(parameter, base, &before)?;
                 let [x, y] = shift.position_mm;
                 return Some(vec![x, y, shift.rotation_deg, shift.depth_mm]);
             }
-            motion.place(history(0).0, &mut place);
             let Contact { position_mm: [x, y], rotation_deg, depth_mm, .. } = place.contact(CYLINDER);
             Some(vec![x, y, rotation_deg, depth_mm])
         }
@@ -98,7 +104,9 @@ fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
             for k in 0..6 {
                 let (now, input) = history(k);
                 (before, signal) = (input.clone(), input);
-                covering.signal(now, &contact, &mut signal);
+                // Ever more slowly down to the contact.
+                let depth_mm = contact.depth_mm - 0.3 / f64::from(k + 1) + 0.05;
+                covering.signal(now, &Contact { depth_mm, ..contact.clone() }, &mut signal);
             }
             let Some(parameter) = by else { return Some(signal) };
             covering.slope(parameter, base, &contact, &before, &mut slope).then_some(slope)
