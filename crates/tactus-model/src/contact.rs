@@ -63,7 +63,7 @@ impl Contact {
     /// Accuracy: the same while all of a face touches; else about 1e-4 of the volume (a mesh: the same always).
     pub(crate) fn leaning(&self, lean: [f64; 2], sigma_mm: f64) -> Vec<Slice> {
         let Self { indenter, position_mm: [x, y], rotation_deg, depth_mm } = self;
-        if lean == [0.0; 2] || *depth_mm <= 0.0 {
+        if lean.iter().all(|by| *by == 0.0) || *depth_mm <= 0.0 {
             return self.slices(sigma_mm);
         }
         let lowered_mm = indenter.lowered_mm(lean);

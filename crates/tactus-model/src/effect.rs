@@ -104,6 +104,11 @@ mod surface_offset;
 mod surface_tilt;
 mod time_lag;
 
+/// The page on adding one: its last example runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/adding-an-effect.md")]
+struct AddingAnEffect;
+
 pub use definition::{Definition, Effect, EffectError, Kind, Make, Parameter, Stage};
 pub use stage::{Base, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Place, Press, Shift};
 
@@ -136,3 +141,7 @@ pub static REGISTRY: &[&Definition] = &[
     &periodic_interference::DEFINITION,
     &quantisation::DEFINITION,
 ];
+
+#[cfg(test)]
+#[path = "effect_tests.rs"]
+mod tests;

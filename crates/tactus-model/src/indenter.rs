@@ -41,7 +41,7 @@ impl Indenter {
             Self::Cylinder { diameter_mm } => by_x.hypot(by_y) * diameter_mm / 2.0,
             Self::Sphere { .. } | Self::Cone { .. } => 0.0,
             Self::Box { size_mm: [width_mm, height_mm] } => {
-                ((by_x * width_mm).abs() + (by_y * height_mm).abs()) / 2.0
+                f64::midpoint((by_x * width_mm).abs(), (by_y * height_mm).abs())
             }
             Self::Mesh(mesh) => {
                 let [_, _, [lowest, _]] = mesh.bounds_mm();

@@ -258,7 +258,7 @@ impl Pressed {
             let [x, y] = effect.lean();
             lean = [lean[0] + x, lean[1] + y];
         }
-        if lean != [0.0; 2] {
+        if lean.iter().any(|by| *by != 0.0) {
             self.contact.depth_mm += self.contact.indenter.lowered_mm(lean);
         }
         self.presses.clear();

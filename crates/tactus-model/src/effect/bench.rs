@@ -37,6 +37,36 @@ pub(crate) fn effect<const N: usize>(name: &str, parameters: [(&str, f64); N]) -
     Effect::new(name, parameters).unwrap()
 }
 
+/// As [`simulator`], with elements that answer in proportion and rest at 0.
+pub(crate) fn linear(effects: impl IntoIterator<Item = Effect>) -> Simulator {
+    let mut one = simulator(effects);
+    let response = Response::uniform(48, 1000.0, 0.0);
+    one.model = ForwardModel::new(one.model.array().clone(), one.model.psf(), response).unwrap();
+    one
+}
+
+/// What element 21 feels, in mm, of a tip upon it that goes straight from depth to depth: times in s and depths in
+/// mm. Without effects that is the depth.
+pub(crate) fn felt_mm<const N: usize>(effect: &Effect, depths: [(f64, f64); N]) -> [f64; N] {
+    let one = linear([effect.clone()]);
+    let mut pipeline = Pipeline::new(&one).unwrap();
+    depths.map(|(t_s, depth_mm)| pipeline.step(Moment::at(t_s), &upon(&one, 21, depth_mm))[21] / 1000.0)
+}
+
+/// An array of elements so fine that under a point they read the spread itself, at x and y of 0, 1 and 4 mm, the
+/// base model's of standard deviation 1 mm; the covering is 1.016 mm thick.
+pub(crate) fn fine(effect: Effect) -> Simulator {
+    let point = Indenter::Cylinder { diameter_mm: 1e-3 };
+    let response = Response { reference_indenter: point.clone(), ..Response::uniform(9, 1.0, 0.0) };
+    let centres = vec![0.0, 1.0, 4.0];
+    let array = Array::new("fine", [1e-3; 2], centres.clone(), centres, 30.0, 4095.0, 1.0).unwrap();
+    let mut one = simulator([effect]);
+    one.model =
+        ForwardModel::new(array, Psf { sigma_intercept_mm: 1.0, sigma_per_mm: 0.0 }, response).unwrap();
+    one.indenter = point;
+    one
+}
+
 /// The tip over an element's centre, in the robot frame, so deep.
 pub(crate) fn upon(simulator: &Simulator, element: usize, depth_mm: f64) -> [f64; 3] {
     let [x, y] = simulator.registration.to_robot(simulator.model.array().centre_mm(element).unwrap());

@@ -40,9 +40,8 @@ fn refused<const N: usize>(name: &str, parameters: [(&str, f64); N]) -> String {
 
 #[test]
 fn names_are_the_contracts_in_the_order_of_the_stages() {
-    let place = |definition: &&Definition| CONTRACT.iter().position(|name| *name == definition.name).unwrap();
-    let places: Vec<_> = REGISTRY.iter().map(place).collect();
-    assert!(places.is_sorted_by(|a, b| a < b), "{places:?}");
+    let names: Vec<_> = REGISTRY.iter().map(|definition| definition.name).collect();
+    assert_eq!(names, CONTRACT);
     assert!(REGISTRY.is_sorted_by_key(|definition| definition.stage()));
 }
 
@@ -56,6 +55,22 @@ fn a_definition_is_whole() {
         }
         for twin in definition.near_twins {
             assert!(CONTRACT.contains(twin) || BASE.contains(twin), "{name}: {twin}");
+        }
+    }
+}
+
+#[test]
+fn a_value_out_of_its_range_is_refused() {
+    for definition in REGISTRY {
+        let neutral = Effect::neutral(definition);
+        for Parameter { name, range: [least, most], .. } in definition.parameters {
+            for value in [least - 1e-9 - 1e-9 * least.abs(), most + 1e-9 + 1e-9 * most, f64::NAN] {
+                let refused = neutral.with(name, value).is_err();
+                assert!(refused, "{}: {name} = {value}", definition.name);
+            }
+            for value in [*least, *most] {
+                assert!(neutral.with(name, value).is_ok(), "{}: {name} = {value}", definition.name);
+            }
         }
     }
 }
