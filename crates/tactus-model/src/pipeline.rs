@@ -116,8 +116,8 @@ impl Pipeline {
 
     /// Counts of every element at a moment, row-major, before noise and converter.
     ///
-    /// `path`: the tip in the robot frame, z up; a place where it rests, a [`Trajectory`](crate::Trajectory), or a
-    /// function of time.
+    /// `path`: the tip in the robot frame, z up; a place where it rests, a [`Trajectory`](crate::Trajectory), a
+    /// [`Trail`](crate::Trail) of what is known so far, or a function of time.
     pub fn step(&mut self, moment: Moment, path: &impl Path) -> &[f64] {
         let Moment { t_s, temperature_c } = moment;
         let dt_s = self.last_s.map_or(0.0, |last_s| (t_s - last_s).max(0.0));

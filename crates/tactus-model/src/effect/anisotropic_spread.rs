@@ -11,7 +11,7 @@
 //!
 //! # Source
 //! A sheet that was drawn in one direction, or lies on electrodes that run in one: the Gaussian of an orthotropic
-//! medium, J. Crank, *The Mathematics of Diffusion* (1975), section 1.4.
+//! medium, J. Crank, *The Mathematics of Diffusion* (1975).
 
 use super::{Base, Definition, Make, OnCovering, Parameter, Press};
 

@@ -11,7 +11,7 @@
 //! Derivative in closed form, with memory. Cost: none.
 //!
 //! # Source
-//! The play operator: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (1989), chapter 1.
+//! The play operator: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (1989).
 
 use super::{Base, Definition, Make, Now, OnMotion, Parameter, Place, Shift};
 
@@ -74,8 +74,8 @@ impl Axis {
         let (least, most) = (stage_mm - self.half_mm, stage_mm + self.half_mm);
         let (at_mm, by_play) = match self.at {
             None => (stage_mm, 0.0),
-            Some((at_mm, _)) if at_mm <= least => (least, -0.5),
-            Some((at_mm, _)) if at_mm >= most => (most, 0.5),
+            Some((at_mm, _)) if at_mm < least => (least, -0.5),
+            Some((at_mm, _)) if at_mm > most => (most, 0.5),
             Some(at) => at,
         };
         self.at = Some((at_mm, by_play));

@@ -22,7 +22,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("warm_up_counts", 0.0, [-1000.0, 1000.0]),
         Parameter::real("time_constant_s", 300.0, [1.0, 1e4]),
     ],
-    near_twins: &["imprint", "relaxation", "gain-drift"],
+    near_twins: &["imprint", "relaxation", "gain-drift", "periodic-interference"],
     shown_by: &["drift"],
     make: Make::Readout(|values| {
         let [rate_counts_per_s, warm_up_counts, time_constant_s] = [values[0], values[1], values[2]];

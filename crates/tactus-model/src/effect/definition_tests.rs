@@ -30,6 +30,20 @@ const CONTRACT: [&str; 26] = [
     "quantisation",
 ];
 
+/// The experiments, and the parts of `diagnose`.
+const PARTS: [&str; 10] = [
+    "corners",
+    "element-centres",
+    "grid-sweep",
+    "drift",
+    "repeats",
+    "ladder",
+    "rates",
+    "approach",
+    "tilt",
+    "hold",
+];
+
 /// Parameters of the base that an effect can look like, as model files name them.
 const BASE: [&str; 4] =
     ["sigma_intercept_mm", "sensitivity_counts_per_mm", "quadratic_per_mm", "noise_rms_counts"];
@@ -53,8 +67,12 @@ fn a_definition_is_whole() {
         for parameter in definition.parameters {
             assert!(definition.check(parameter, parameter.neutral).is_ok(), "{name}: {}", parameter.name);
         }
+        for part in definition.shown_by {
+            assert!(PARTS.contains(part), "{name}: {part}");
+        }
         for twin in definition.near_twins {
-            assert!(CONTRACT.contains(twin) || BASE.contains(twin), "{name}: {twin}");
+            let is_mutual = Definition::find(twin).is_ok_and(|twin| twin.near_twins.contains(&name));
+            assert!(is_mutual || BASE.contains(twin), "{name}: {twin}");
         }
     }
 }

@@ -26,7 +26,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("loss_share", 0.0, [-1.0, 5.0]),
         Parameter::real("threshold_mm", 0.1, [1e-3, 2.0]),
     ],
-    near_twins: &["backlash", "softening", "relaxation", "imprint", "time-lag"],
+    near_twins: &["backlash", "softening", "relaxation", "imprint", "time-lag", "rate-stiffening"],
     shown_by: &["ladder", "repeats"],
     make: Make::Covering(|values| {
         let [loss_share, threshold_mm] = [values[0], values[1]];

@@ -8,10 +8,10 @@
 //! deeper, the other less deep, and while all of the face touches the volume is the same. Acts on tools with a flat
 //! face and on meshes; the head of a sphere or a cone stays as it is.
 //!
-//! No derivative in closed form. Cost: one image, of about 9 times as many slices.
+//! No derivative in closed form. Cost: one image, in four to five times its time.
 //!
 //! # Source
-//! A rigid flat punch that is turned about an axis in the plane: K. L. Johnson, *Contact Mechanics* (1985), chapter 2.
+//! A rigid flat punch that is turned about an axis in the plane: K. L. Johnson, *Contact Mechanics* (1985).
 
 use super::{Definition, Make, OnContact, Parameter};
 

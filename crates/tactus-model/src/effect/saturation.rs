@@ -1,11 +1,12 @@
 //! `saturation`: the response levels off at the top.
 //!
 //! ```text
-//! u_e -> c tanh(u_e / c)          c = 1 / inverse_ceiling
+//! u_e -> c tanh(u_e / c)          1 / c^2 = inverse_square_ceiling
 //! ```
 //!
 //! Small signals are as they were, large ones end at the ceiling `c`, before the element's gain and baseline. The
-//! converter's own end, which is sudden, is the base model's.
+//! converter's own end, which is sudden, is the base model's. The first term is `-u_e^3 / (3 c^2)`, in proportion to
+//! the parameter, so that a fit can start from none.
 //!
 //! Derivative in closed form. Cost: a hyperbolic tangent for each element.
 //!
@@ -18,10 +19,10 @@ use super::{Base, Definition, Make, OnElement, Parameter};
 pub(super) static DEFINITION: Definition = Definition {
     name: "saturation",
     summary: "the response levels off at the top",
-    parameters: &[Parameter::real("inverse_ceiling_per_mm", 0.0, [0.0, 10.0])],
+    parameters: &[Parameter::real("inverse_square_ceiling_per_mm2", 0.0, [0.0, 100.0])],
     near_twins: &["hardening", "surface-offset", "depth-dependent-spread", "quadratic_per_mm"],
     shown_by: &["ladder", "element-centres"],
-    make: Make::Element(|values| Box::new(Saturation { inverse_ceiling_per_mm: values[0] })),
+    make: Make::Element(|values| Box::new(Saturation { inverse_ceiling_per_mm: values[0].sqrt() })),
 };
 
 #[derive(Debug)]
@@ -50,19 +51,19 @@ impl OnElement for Saturation {
             return false;
         }
         for (slope, u) in slope_mm.iter_mut().zip(before_mm) {
-            *slope = u * u * bend(self.inverse_ceiling_per_mm * u);
+            *slope = u.powi(3) * bend(self.inverse_ceiling_per_mm * u);
         }
         true
     }
 }
 
-/// Derivative of `tanh(x) / x`.
+/// Derivative of `tanh(x) / x` by `x^2`.
 fn bend(x: f64) -> f64 {
     if x.abs() < 0.01 {
         // The difference below has lost its digits: the first terms of its series.
-        x * (-2.0 / 3.0 + 8.0 / 15.0 * x * x)
+        -1.0 / 3.0 + 4.0 / 15.0 * x * x
     } else {
-        (x / x.cosh().powi(2) - x.tanh()) / (x * x)
+        (x / x.cosh().powi(2) - x.tanh()) / (2.0 * x.powi(3))
     }
 }
 

@@ -11,7 +11,7 @@
 //! Derivative in closed form. Cost: a short history, as long as a scan.
 //!
 //! # Source
-//! Sequential sampling of a multiplexed converter: W. Kester (ed.), *The Data Conversion Handbook* (2005), chapter 8.
+//! Sequential sampling of a multiplexed converter: W. Kester (ed.), *The Data Conversion Handbook* (2005).
 
 use std::collections::VecDeque;
 

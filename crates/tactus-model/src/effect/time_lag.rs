@@ -11,7 +11,7 @@
 //!
 //! # Source
 //! Transport delay, the factor `exp(-s lag)` of a linear system: K. J. Astrom and R. M. Murray, *Feedback Systems*
-//! (2008), chapter 9.
+//! (2008).
 
 use super::{Definition, Make, OnMotion, Parameter};
 
@@ -19,7 +19,7 @@ pub(super) static DEFINITION: Definition = Definition {
     name: "time-lag",
     summary: "frames are late or early against the stage's positions",
     parameters: &[Parameter::real("lag_s", 0.0, [-1.0, 1.0])],
-    near_twins: &["low-pass", "relaxation", "scan-skew", "backlash", "hysteresis"],
+    near_twins: &["low-pass", "relaxation", "scan-skew", "backlash", "hysteresis", "rate-stiffening"],
     shown_by: &["rates", "ladder"],
     make: Make::Motion(|values| Box::new(TimeLag { lag_s: values[0] })),
 };
