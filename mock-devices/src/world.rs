@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::{Covering, EffectError, Moment, Pipeline};
+use tactus_model::{Covering, EffectError, Moment, Pipeline, Trail};
 use tactus_schema::rig::{ElementFault, SimulatedStage};
 use tokio::time::Instant;
 
@@ -26,8 +26,8 @@ pub(crate) struct World {
     deepest_mm: f64,
     noise: ChaCha8Rng,
     pipeline: Pipeline,
-    /// The pipeline's zero of time: when it was first looked at.
-    started: Option<Instant>,
+    /// The pipeline's zero of time, when it was first looked at, and where the tip was since.
+    trail: Option<(Instant, Trail)>,
 }
 
 impl Shared {
@@ -59,7 +59,7 @@ impl World {
             deepest_mm: truth.surface_mm - tip_mm[2],
             noise: Draw::Noise.rng(truth.seed),
             pipeline,
-            started: None,
+            trail: None,
             truth,
         }
     }
@@ -163,10 +163,11 @@ impl World {
     }
 
     fn look(&mut self, at: Instant) {
-        let started = *self.started.get_or_insert(at);
-        let moment = Moment::at(at.saturating_duration_since(started).as_secs_f64());
         let tip_mm = self.tip_mm(at);
-        self.pipeline.step(moment, &tip_mm);
+        let (started, trail) = self.trail.get_or_insert_with(|| (at, Trail::new(0.0, tip_mm)));
+        let t_s = at.saturating_duration_since(*started).as_secs_f64();
+        trail.push(t_s, tip_mm);
+        self.pipeline.step(Moment::at(t_s), trail);
     }
 
     fn in_steps(&self, [x, y, z]: Point) -> Point {

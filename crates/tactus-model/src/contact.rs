@@ -5,6 +5,7 @@ mod rectangle;
 mod round;
 
 use crate::Indenter;
+use crate::quadrature::smooth;
 
 /// A tool at a place and depth.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +32,9 @@ pub(crate) struct Slice {
     pub(crate) weight_mm2: f64,
 }
 
+/// A line in a plane of one x: from and to, each by its y and how far it stands below the surface.
+type Line = [[f64; 2]; 2];
+
 /// What is to be cut into slices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cut {
@@ -51,6 +55,42 @@ impl Contact {
     /// the penetration map by depth.
     pub(crate) fn footprint(&self, sigma_mm: f64) -> Vec<Slice> {
         self.cut(Cut::Footprint, sigma_mm)
+    }
+
+    /// As [`Contact::slices`], of a tool that leans: whose face stands deeper by `lean` per mm along its own x and
+    /// y, its lowest point at the contact's depth. Round heads roll and stay as they are.
+    ///
+    /// Accuracy: the same while all of a face touches; else about 1e-4 of the volume (a mesh: the same always).
+    pub(crate) fn leaning(&self, lean: [f64; 2], sigma_mm: f64) -> Vec<Slice> {
+        let Self { indenter, position_mm: [x, y], rotation_deg, depth_mm } = self;
+        if lean.iter().all(|by| *by == 0.0) || *depth_mm <= 0.0 {
+            return self.slices(sigma_mm);
+        }
+        let lowered_mm = indenter.lowered_mm(lean);
+        // Where the surface cuts through the face, what is below it ends in a corner.
+        let fine_mm = if *depth_mm < 2.0 * lowered_mm { sigma_mm / 16.0 } else { sigma_mm };
+        let strips: Vec<Slice> = match indenter {
+            Indenter::Cylinder { diameter_mm } => {
+                round::disc([*x, *y], diameter_mm / 2.0, 1.0, fine_mm).collect()
+            }
+            Indenter::Box { size_mm } => rectangle::slices([*x, *y], *size_mm, *rotation_deg, 1.0, fine_mm),
+            Indenter::Sphere { .. } | Indenter::Cone { .. } => return self.slices(sigma_mm),
+            Indenter::Mesh(mesh) => {
+                let depth_mm = depth_mm - lowered_mm;
+                let cut = Cut::Penetration;
+                return mesh::slices(cut, mesh, [*x, *y], *rotation_deg, depth_mm, lean, sigma_mm);
+            }
+        };
+        let (sin, cos) = rotation_deg.to_radians().sin_cos();
+        let [by_x, by_y] = [cos * lean[0] - sin * lean[1], sin * lean[0] + cos * lean[1]];
+        let mut slices = Vec::new();
+        for Slice { x_mm, y_mm, weight_mm2: width_mm } in strips {
+            let below = |y_mm: f64| depth_mm - lowered_mm + by_x * (x_mm - x) + by_y * (y_mm - y);
+            if let Some(line) = below_surface(y_mm.map(|y_mm| [y_mm, below(y_mm)])) {
+                stack(x_mm, width_mm, line, sigma_mm, &mut slices);
+            }
+        }
+        slices
     }
 
     fn cut(&self, cut: Cut, sigma_mm: f64) -> Vec<Slice> {
@@ -74,7 +114,39 @@ impl Contact {
             Indenter::Box { size_mm } => {
                 rectangle::slices(*position_mm, *size_mm, *rotation_deg, even_mm, sigma_mm)
             }
-            Indenter::Mesh(mesh) => mesh::slices(cut, mesh, *position_mm, *rotation_deg, *depth_mm, sigma_mm),
+            Indenter::Mesh(mesh) => {
+                mesh::slices(cut, mesh, *position_mm, *rotation_deg, *depth_mm, [0.0; 2], sigma_mm)
+            }
+        }
+    }
+}
+
+/// What of a line stands below the surface.
+fn below_surface([from, to]: Line) -> Option<Line> {
+    let at_surface = || {
+        let share = from[1] / (from[1] - to[1]);
+        [from[0] + share * (to[0] - from[0]), 0.0]
+    };
+    match (from[1] > 0.0, to[1] > 0.0) {
+        (true, true) => Some([from, to]),
+        (true, false) => Some([from, at_surface()]),
+        (false, true) => Some([at_surface(), to]),
+        (false, false) => None,
+    }
+}
+
+/// Adds slices of a line: what all of it shares, and upon it a stack of thin layers, each shorter than the one below.
+fn stack(x_mm: f64, width_mm: f64, line: Line, sigma_mm: f64, slices: &mut Vec<Slice>) {
+    let [[from, below_from], [to, below_to]] = line;
+    let mut press = |y_mm, depth_mm| slices.push(Slice { x_mm, y_mm, weight_mm2: width_mm * depth_mm });
+    let (least, most) = (below_from.min(below_to), below_from.max(below_to));
+    press([from, to], least);
+    if most - least > 1e-12 * most {
+        let scale_mm = sigma_mm * (most - least) / (to - from);
+        for (below, thickness_mm) in smooth(least, most, scale_mm) {
+            let end = from + (to - from) * (below - below_from) / (below_to - below_from);
+            let layer = if below_to > below_from { [end, to] } else { [from, end] };
+            press(layer, thickness_mm);
         }
     }
 }

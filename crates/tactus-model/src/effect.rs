@@ -26,12 +26,22 @@
 //! change of signal times `sensitivity (1 + 2 k u)`, a change of counts as it is, as long as no effect stands
 //! behind. Else two pipelines are differenced: [`Effect::with`] makes the other one.
 //!
-//! **There are**, in [`REGISTRY`]: `misregistration`, `surface-offset`, `surface-tilt`, `indenter-size`,
-//! `hardening`, `heavy-tail`, `relaxation`, `crosstalk`, `miswired`, `low-pass`, `quantisation`. These names are a
-//! contract of reports and model files. The design's table names the rest.
+//! **There are**, in [`REGISTRY`]; these names are a contract of reports and model files:
 //!
-//! **A lab's own effect** is one file of the kind below and one line in the registry; or, without touching this
-//! crate, a `static` [`Definition`] given to [`Effect::of`].
+//! | stage | effects |
+//! |---|---|
+//! | motion | `misregistration`, `surface-offset`, `surface-tilt`, `time-lag`, `backlash` |
+//! | contact | `indenter-size`, `indenter-tilt` |
+//! | covering, spread | `heavy-tail`, `anisotropic-spread`, `depth-dependent-spread` |
+//! | covering, signal | `hardening`, `edge-effect`, `relaxation`, `hysteresis`, `rate-stiffening`, `imprint`, `softening` |
+//! | element | `crosstalk`, `miswired`, `saturation` |
+//! | readout | `baseline-drift`, `gain-drift`, `low-pass`, `scan-skew`, `periodic-interference`, `quantisation` |
+//!
+//! **Cost**: an image is computed when the contact changes, as without effects; `heavy-tail` computes two, and one
+//! of a leaning tool takes several times as long. All else is some operations an element and moment.
+//!
+//! **A lab's own effect** is one file of the kind below and one line in the registry (`docs/adding-an-effect.md`
+//! goes through it); or, without touching this crate, a `static` [`Definition`] given to [`Effect::of`].
 //!
 //! ```
 //! use tactus_model::effect::{Base, Definition, Make, OnElement, Parameter};
@@ -62,22 +72,42 @@
 //! # Ok::<(), tactus_model::effect::EffectError>(())
 //! ```
 
+mod anisotropic_spread;
+mod backlash;
+mod baseline_drift;
 #[cfg(test)]
 pub(crate) mod bench;
 mod crosstalk;
 mod definition;
+mod depth_dependent_spread;
+mod edge_effect;
+mod gain_drift;
 mod hardening;
 mod heavy_tail;
+mod hysteresis;
+mod imprint;
 mod indenter_size;
+mod indenter_tilt;
 mod lag;
 mod low_pass;
 mod misregistration;
 mod miswired;
+mod periodic_interference;
 mod quantisation;
+mod rate_stiffening;
 mod relaxation;
+mod saturation;
+mod scan_skew;
+mod softening;
 mod stage;
 mod surface_offset;
 mod surface_tilt;
+mod time_lag;
+
+/// The page on adding one: its last example runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/adding-an-effect.md")]
+struct AddingAnEffect;
 
 pub use definition::{Definition, Effect, EffectError, Kind, Make, Parameter, Stage};
 pub use stage::{Base, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Place, Press, Shift};
@@ -87,12 +117,31 @@ pub static REGISTRY: &[&Definition] = &[
     &misregistration::DEFINITION,
     &surface_offset::DEFINITION,
     &surface_tilt::DEFINITION,
+    &time_lag::DEFINITION,
+    &backlash::DEFINITION,
     &indenter_size::DEFINITION,
+    &indenter_tilt::DEFINITION,
     &hardening::DEFINITION,
     &heavy_tail::DEFINITION,
+    &anisotropic_spread::DEFINITION,
+    &depth_dependent_spread::DEFINITION,
+    &edge_effect::DEFINITION,
     &relaxation::DEFINITION,
+    &hysteresis::DEFINITION,
+    &rate_stiffening::DEFINITION,
+    &imprint::DEFINITION,
+    &softening::DEFINITION,
     &crosstalk::DEFINITION,
     &miswired::DEFINITION,
+    &saturation::DEFINITION,
+    &baseline_drift::DEFINITION,
+    &gain_drift::DEFINITION,
     &low_pass::DEFINITION,
+    &scan_skew::DEFINITION,
+    &periodic_interference::DEFINITION,
     &quantisation::DEFINITION,
 ];
+
+#[cfg(test)]
+#[path = "effect_tests.rs"]
+mod tests;

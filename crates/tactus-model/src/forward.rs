@@ -2,6 +2,7 @@
 
 use crate::blur::Blur;
 use crate::contact::Slice;
+use crate::effect::Press;
 use crate::{Array, Contact, Covering, Indenter, Psf};
 
 /// How an element answers what reaches it.
@@ -126,43 +127,44 @@ impl ForwardModel {
     /// # Panics
     /// If `indentation_mm` has not one place per element.
     pub fn indentation(&self, contact: &Contact, covering: Covering, indentation_mm: &mut [f64]) {
-        self.indentation_spread(contact, covering, self.psf.sigma_mm(covering), indentation_mm);
+        let (contact, sigma_mm) = (contact.clone(), [self.psf.sigma_mm(covering); 2]);
+        self.indentation_of(
+            &Press { weight: 1.0, contact, lean: [0.0; 2], sigma_mm },
+            covering,
+            indentation_mm,
+        );
     }
 
-    /// As [`ForwardModel::indentation`], with another spread than the covering's: of standard deviation
-    /// `sigma_mm`, positive. In units of the reference press as it is, under its own spread.
+    /// As [`ForwardModel::indentation`], of a press with its own lean and spread, both of its `sigma_mm` positive;
+    /// its weight is the caller's to apply. In units of the reference press as it is, under its own spread.
     ///
     /// # Panics
     /// If `indentation_mm` has not one place per element.
-    pub fn indentation_spread(
-        &self,
-        contact: &Contact,
-        covering: Covering,
-        sigma_mm: f64,
-        indentation_mm: &mut [f64],
-    ) {
+    pub fn indentation_of(&self, press: &Press, covering: Covering, indentation_mm: &mut [f64]) {
         assert_eq!(indentation_mm.len(), self.array.elements(), "one place per element");
         indentation_mm.fill(0.0);
-        let blur = Blur { sigma_mm };
-        self.press(&contact.slices(blur.sigma_mm), blur, 1.0, indentation_mm);
+        let Press { contact, lean, sigma_mm, .. } = press;
+        let finest_mm = sigma_mm[0].min(sigma_mm[1]);
+        let blurs = sigma_mm.map(|sigma_mm| Blur { sigma_mm });
+        self.press(&contact.leaning(*lean, finest_mm), blurs, 1.0, indentation_mm);
         // The tool goes no deeper than the covering's foot: min(I, t) = max(0, I) - max(0, I - t).
         if contact.depth_mm > covering.thickness_mm {
             let beyond = Contact { depth_mm: contact.depth_mm - covering.thickness_mm, ..contact.clone() };
-            self.press(&beyond.slices(blur.sigma_mm), blur, -1.0, indentation_mm);
+            self.press(&beyond.leaning(*lean, finest_mm), blurs, -1.0, indentation_mm);
         }
     }
 
-    /// Adds what slices give, times `sign`.
-    fn press(&self, slices: &[Slice], blur: Blur, sign: f64, indentation_mm: &mut [f64]) {
+    /// Adds what slices give, spread along x and y, times `sign`.
+    fn press(&self, slices: &[Slice], [along_x, along_y]: [Blur; 2], sign: f64, indentation_mm: &mut [f64]) {
         let [cols, rows] = self.array.sides_mm();
         let scale = sign / self.reference_mm2;
         for of_one_x in slices.chunk_by(|one, other| one.x_mm.total_cmp(&other.x_mm).is_eq()) {
             let Some(Slice { x_mm, .. }) = of_one_x.first() else { continue };
             let of_cols: Vec<f64> =
-                cols.iter().map(|side_mm| scale * blur.of_point(*x_mm, *side_mm)).collect();
+                cols.iter().map(|side_mm| scale * along_x.of_point(*x_mm, *side_mm)).collect();
             for (row, side_mm) in indentation_mm.chunks_exact_mut(cols.len()).zip(&rows) {
-                let of_row: f64 =
-                    of_one_x.iter().map(|slice| slice.weight_mm2 * blur.of_line(slice.y_mm, *side_mm)).sum();
+                let of_slice = |slice: &Slice| slice.weight_mm2 * along_y.of_line(slice.y_mm, *side_mm);
+                let of_row: f64 = of_one_x.iter().map(of_slice).sum();
                 for (element, of_col) in row.iter_mut().zip(&of_cols) {
                     *element += of_col * of_row;
                 }

@@ -32,3 +32,22 @@ pub enum Indenter {
     /// Any shape, by its surface; shared, since a mesh may be large.
     Mesh(Arc<Mesh>),
 }
+
+impl Indenter {
+    /// By how much the lowest point of the tool stands deeper than the foot of its axis when it leans about it: when
+    /// its face stands deeper by `lean` per mm along its own x and y. Round heads roll, and stay as deep.
+    pub(crate) fn lowered_mm(&self, [by_x, by_y]: [f64; 2]) -> f64 {
+        match self {
+            Self::Cylinder { diameter_mm } => by_x.hypot(by_y) * diameter_mm / 2.0,
+            Self::Sphere { .. } | Self::Cone { .. } => 0.0,
+            Self::Box { size_mm: [width_mm, height_mm] } => {
+                f64::midpoint((by_x * width_mm).abs(), (by_y * height_mm).abs())
+            }
+            Self::Mesh(mesh) => {
+                let [_, _, [lowest, _]] = mesh.bounds_mm();
+                let below = |[u, v, w]: &[f64; 3]| by_x * u + by_y * v - (w - lowest);
+                mesh.vertices_mm().iter().map(below).fold(f64::NEG_INFINITY, f64::max)
+            }
+        }
+    }
+}

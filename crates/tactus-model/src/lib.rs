@@ -105,6 +105,7 @@ mod readout;
 mod registration;
 mod simulator;
 mod stamp;
+mod trail;
 mod trajectory;
 
 pub use array::{Array, ArrayError};
@@ -122,6 +123,7 @@ pub use readout::Readout;
 pub use registration::Registration;
 pub use simulator::{Image, Simulator};
 pub use stamp::{Stamp, StampError};
+pub use trail::Trail;
 pub use trajectory::{Path, Trajectory, TrajectoryError};
 
 /// Centre-to-centre distance of the DigiTacts elements, in mm: the "sensor element width" in which

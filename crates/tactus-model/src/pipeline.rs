@@ -116,8 +116,8 @@ impl Pipeline {
 
     /// Counts of every element at a moment, row-major, before noise and converter.
     ///
-    /// `path`: the tip in the robot frame, z up; a place where it rests, a [`Trajectory`](crate::Trajectory), or a
-    /// function of time.
+    /// `path`: the tip in the robot frame, z up; a place where it rests, a [`Trajectory`](crate::Trajectory), a
+    /// [`Trail`](crate::Trail) of what is known so far, or a function of time.
     pub fn step(&mut self, moment: Moment, path: &impl Path) -> &[f64] {
         let Moment { t_s, temperature_c } = moment;
         let dt_s = self.last_s.map_or(0.0, |last_s| (t_s - last_s).max(0.0));
@@ -252,11 +252,18 @@ impl Pressed {
         }
         self.at = Some(at);
         self.contact = contact;
+        let mut lean = [0.0; 2];
         for effect in &stages.contact {
             effect.touch(base, &mut self.contact);
+            let [x, y] = effect.lean();
+            lean = [lean[0] + x, lean[1] + y];
+        }
+        if lean.iter().any(|by| *by != 0.0) {
+            self.contact.depth_mm += self.contact.indenter.lowered_mm(lean);
         }
         self.presses.clear();
-        self.presses.push(Press { weight: 1.0, contact: self.contact.clone(), sigma_mm: base.sigma_mm() });
+        let (contact, sigma_mm) = (self.contact.clone(), [base.sigma_mm(); 2]);
+        self.presses.push(Press { weight: 1.0, contact, lean, sigma_mm });
         for effect in &stages.covering {
             effect.spread(base, &mut self.presses);
         }
@@ -280,7 +287,7 @@ impl Press {
     fn stamped(&self, stamp: &Stamp, base: Base<'_>, indentation_mm: &mut [f64]) -> bool {
         let Contact { position_mm, rotation_deg, depth_mm, .. } = self.contact;
         let mut single_mm = vec![0.0_f32; indentation_mm.len()];
-        let is_bases = self.sigma_mm.to_bits() == base.sigma_mm().to_bits();
+        let is_bases = self.sigma_mm.map(f64::to_bits) == [base.sigma_mm().to_bits(); 2];
         if !is_bases || stamp.indentation(position_mm, rotation_deg, depth_mm, &mut single_mm).is_err() {
             return false;
         }
@@ -293,8 +300,8 @@ impl Press {
     /// What reaches every element, in units of the base model's reference press; nothing of a spread that none can
     /// be.
     fn indentation(&self, base: Base<'_>, indentation_mm: &mut [f64]) {
-        if self.sigma_mm > 0.0 {
-            base.model.indentation_spread(&self.contact, base.covering, self.sigma_mm, indentation_mm);
+        if self.sigma_mm.iter().all(|sigma_mm| *sigma_mm > 0.0) {
+            base.model.indentation_of(self, base.covering, indentation_mm);
         } else {
             indentation_mm.fill(0.0);
         }

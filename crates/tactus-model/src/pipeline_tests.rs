@@ -3,7 +3,7 @@
 use super::*;
 use crate::Trajectory;
 use crate::effect::bench::{THIN, effect, simulator, still, upon};
-use crate::effect::{Effect, REGISTRY};
+use crate::effect::{Definition, Effect, REGISTRY};
 
 /// A press with a slide, on both sides of the surface.
 fn way(simulator: &Simulator) -> Trajectory {
@@ -83,20 +83,24 @@ fn every_effect_that_is_not_neutral_changes_something() {
     let plain = simulator([]);
     let way = way(&plain);
     for definition in REGISTRY {
-        let strong = definition.parameters.iter().fold(Effect::neutral(definition), |effect, parameter| {
-            let [least, most] = parameter.range;
-            let value = if parameter.name == "element" { 20.0 } else { 0.9 * parameter.neutral + 0.1 * most };
-            if parameter.name == "answers_for" {
-                effect
-            } else {
-                effect.with(parameter.name, value.max(least)).unwrap()
-            }
-        });
         let images = |effects: Vec<Effect>| -> Vec<_> {
             simulator(effects).run(&way, 30.0, 80, || 0.0).unwrap().map(|image| image.counts).collect()
         };
-        assert_ne!(images(vec![strong]), images(vec![]), "{}", definition.name);
+        assert_ne!(images(vec![strong(definition)]), images(vec![]), "{}", definition.name);
     }
+}
+
+/// An effect at a tenth of its range.
+fn strong(definition: &'static Definition) -> Effect {
+    definition.parameters.iter().fold(Effect::neutral(definition), |effect, parameter| {
+        let [least, most] = parameter.range;
+        let value = if parameter.name == "element" { 20.0 } else { 0.9 * parameter.neutral + 0.1 * most };
+        if parameter.name == "answers_for" {
+            effect
+        } else {
+            effect.with(parameter.name, value.max(least)).unwrap()
+        }
+    })
 }
 
 #[test]
@@ -128,7 +132,7 @@ fn a_path_that_is_late_is_asked_for_an_earlier_instant() {
             t_s - self.0
         }
     }
-    static LATE: crate::effect::Definition = crate::effect::Definition {
+    static LATE: Definition = Definition {
         name: "late",
         summary: "a lab's own effect",
         parameters: &[crate::effect::Parameter::real("lag_s", 0.0, [-1.0, 1.0])],
@@ -161,9 +165,13 @@ fn time_that_goes_back_stands_still() {
 
 #[test]
 fn a_place_that_is_no_number_does_not_panic() {
-    let everything = simulator(REGISTRY.iter().map(|definition| Effect::neutral(definition)));
-    let mut pipeline = Pipeline::new(&everything).unwrap();
-    for tip_mm in [[f64::NAN; 3], [f64::INFINITY; 3], [1e300, -1e300, -1e300]] {
-        pipeline.step(Moment::at(f64::NAN), &tip_mm);
+    let neutral = simulator(REGISTRY.iter().map(|definition| Effect::neutral(definition)));
+    let strong = simulator(REGISTRY.iter().map(|definition| strong(definition)));
+    for everything in [neutral, strong] {
+        let mut pipeline = Pipeline::new(&everything).unwrap();
+        for tip_mm in [[f64::NAN; 3], [f64::INFINITY; 3], [1e300, -1e300, -1e300]] {
+            pipeline.step(Moment::at(f64::NAN), &tip_mm);
+            pipeline.step(Moment::at(1.0), &tip_mm);
+        }
     }
 }

@@ -6,28 +6,26 @@
 //! tools with many corners those closer than 1/64 of the blur share a panel, and crossings are not looked for:
 //! together about 1e-5 of the image's peak.
 
-use super::{Cut, Slice};
+use super::{Cut, Line, Slice, stack};
 use crate::Mesh;
 use crate::quadrature::smooth;
 
 /// Corners of a triangle below the surface: x, y and how far below, sensor frame.
 type Facet = [[f64; 3]; 3];
 
-/// A line in a plane of one x: from and to, each by its y and how far it stands below the surface.
-type Line = [[f64; 2]; 2];
-
-/// Slices of a mesh whose lowest point stands at a depth.
+/// Slices of a mesh that stands at a depth and leans: of which, upright, the lowest point stood there.
 pub(super) fn slices(
     cut: Cut,
     mesh: &Mesh,
     position_mm: [f64; 2],
     rotation_deg: f64,
     depth_mm: f64,
+    lean: [f64; 2],
     sigma_mm: f64,
 ) -> Vec<Slice> {
     let [[least_x, most_x], _, _] = mesh.bounds_mm();
     let sigma_mm = sigma_mm.max((most_x - least_x) / 1000.0);
-    let facets = facets(mesh, position_mm, rotation_deg, depth_mm);
+    let facets = facets(mesh, position_mm, rotation_deg, depth_mm, lean);
     let mut slices = Vec::new();
     for panel in panels(&facets, sigma_mm / 64.0) {
         let [from, to] = panel;
@@ -37,24 +35,10 @@ pub(super) fn slices(
         for (x_mm, width_mm) in smooth(from, to, sigma_mm * (to - from) / goes_mm) {
             let lines: Vec<Line> = crossed.iter().filter_map(|facet| line_at(facet, x_mm)).collect();
             for line in deepest(&lines) {
-                let [[from, below_from], [to, below_to]] = line;
-                let mut press = |y_mm, depth_mm| {
-                    slices.push(Slice { x_mm, y_mm, weight_mm2: width_mm * depth_mm });
-                };
                 if cut == Cut::Footprint {
-                    press([from, to], 1.0);
-                    continue;
-                }
-                // What all of the line shares, and upon it a stack of thin layers, each shorter than the one below.
-                let (least, most) = (below_from.min(below_to), below_from.max(below_to));
-                press([from, to], least);
-                if most - least > 1e-12 * most {
-                    let scale_mm = sigma_mm * (most - least) / (to - from);
-                    for (below, thickness_mm) in smooth(least, most, scale_mm) {
-                        let end = from + (to - from) * (below - below_from) / (below_to - below_from);
-                        let layer = if below_to > below_from { [end, to] } else { [from, end] };
-                        press(layer, thickness_mm);
-                    }
+                    slices.push(Slice { x_mm, y_mm: line.map(|[y_mm, _]| y_mm), weight_mm2: width_mm });
+                } else {
+                    stack(x_mm, width_mm, line, sigma_mm, &mut slices);
                 }
             }
         }
@@ -63,10 +47,13 @@ pub(super) fn slices(
 }
 
 /// The parts of the triangles that stand below the surface.
-fn facets(mesh: &Mesh, [x, y]: [f64; 2], rotation_deg: f64, depth_mm: f64) -> Vec<Facet> {
+fn facets(mesh: &Mesh, [x, y]: [f64; 2], rotation_deg: f64, depth_mm: f64, lean: [f64; 2]) -> Vec<Facet> {
     let (sin, cos) = rotation_deg.to_radians().sin_cos();
     let [_, _, [lowest, _]] = mesh.bounds_mm();
-    let place = |[u, v, w]: [f64; 3]| [x + cos * u - sin * v, y + sin * u + cos * v, depth_mm - (w - lowest)];
+    let place = |[u, v, w]: [f64; 3]| {
+        let below_mm = depth_mm - (w - lowest) + lean[0] * u + lean[1] * v;
+        [x + cos * u - sin * v, y + sin * u + cos * v, below_mm]
+    };
     let mut facets = Vec::new();
     for corners in mesh.corners_mm() {
         let polygon = below_surface(corners.map(place));

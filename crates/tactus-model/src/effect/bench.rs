@@ -37,6 +37,36 @@ pub(crate) fn effect<const N: usize>(name: &str, parameters: [(&str, f64); N]) -
     Effect::new(name, parameters).unwrap()
 }
 
+/// As [`simulator`], with elements that answer in proportion and rest at 0.
+pub(crate) fn linear(effects: impl IntoIterator<Item = Effect>) -> Simulator {
+    let mut one = simulator(effects);
+    let response = Response::uniform(48, 1000.0, 0.0);
+    one.model = ForwardModel::new(one.model.array().clone(), one.model.psf(), response).unwrap();
+    one
+}
+
+/// What element 21 feels, in mm, of a tip upon it that goes straight from depth to depth: times in s and depths in
+/// mm. Without effects that is the depth.
+pub(crate) fn felt_mm<const N: usize>(effect: &Effect, depths: [(f64, f64); N]) -> [f64; N] {
+    let one = linear([effect.clone()]);
+    let mut pipeline = Pipeline::new(&one).unwrap();
+    depths.map(|(t_s, depth_mm)| pipeline.step(Moment::at(t_s), &upon(&one, 21, depth_mm))[21] / 1000.0)
+}
+
+/// An array of elements so fine that under a point they read the spread itself, at x and y of 0, 1 and 4 mm, the
+/// base model's of standard deviation 1 mm; the covering is 1.016 mm thick.
+pub(crate) fn fine(effect: Effect) -> Simulator {
+    let point = Indenter::Cylinder { diameter_mm: 1e-3 };
+    let response = Response { reference_indenter: point.clone(), ..Response::uniform(9, 1.0, 0.0) };
+    let centres = vec![0.0, 1.0, 4.0];
+    let array = Array::new("fine", [1e-3; 2], centres.clone(), centres, 30.0, 4095.0, 1.0).unwrap();
+    let mut one = simulator([effect]);
+    one.model =
+        ForwardModel::new(array, Psf { sigma_intercept_mm: 1.0, sigma_per_mm: 0.0 }, response).unwrap();
+    one.indenter = point;
+    one
+}
+
 /// The tip over an element's centre, in the robot frame, so deep.
 pub(crate) fn upon(simulator: &Simulator, element: usize, depth_mm: f64) -> [f64; 3] {
     let [x, y] = simulator.registration.to_robot(simulator.model.array().centre_mm(element).unwrap());
@@ -72,7 +102,8 @@ fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
     let base = Base { model: &model, covering: THIN };
     let values = effect.values();
     let history = |k: u32| -> (Now<'_>, Vec<f64>) {
-        let now = Now { t_s: f64::from(k * k), dt_s: f64::from(2 * k) / 10.0, temperature_c: None, base };
+        let temperature_c = Some(20.0 + 0.3 * f64::from(k));
+        let now = Now { t_s: f64::from(k * k), dt_s: f64::from(2 * k) / 10.0, temperature_c, base };
         (now, (0..48).map(|element| (0.3 + f64::from(element * k)).sin()).collect())
     };
     let contact = Contact { indenter: CYLINDER, position_mm: [6.0, 5.0], rotation_deg: 10.0, depth_mm: 0.45 };
@@ -82,12 +113,17 @@ fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
             let registration = Registration { origin_mm: [20.0, 15.0], rotation_deg: 3.0 };
             let before = Place { tip_mm: [24.0, 22.0, -0.3], registration, surface_mm: 0.1 };
             let (mut motion, mut place) = (make(values), before);
+            for k in 0..6 {
+                // Up to the place, from both sides.
+                let aside_mm = 0.3 * (f64::from(5 - k) * 1.3).sin();
+                place = Place { tip_mm: before.tip_mm.map(|tip_mm| tip_mm + aside_mm), ..before };
+                motion.place(history(k).0, &mut place);
+            }
             if let Some(parameter) = by {
                 let shift = motion.slope(parameter, base, &before)?;
                 let [x, y] = shift.position_mm;
                 return Some(vec![x, y, shift.rotation_deg, shift.depth_mm]);
             }
-            motion.place(history(0).0, &mut place);
             let Contact { position_mm: [x, y], rotation_deg, depth_mm, .. } = place.contact(CYLINDER);
             Some(vec![x, y, rotation_deg, depth_mm])
         }
@@ -98,7 +134,9 @@ fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
             for k in 0..6 {
                 let (now, input) = history(k);
                 (before, signal) = (input.clone(), input);
-                covering.signal(now, &contact, &mut signal);
+                // Ever more slowly down to the contact.
+                let depth_mm = contact.depth_mm - 0.3 / f64::from(k + 1) + 0.05;
+                covering.signal(now, &Contact { depth_mm, ..contact.clone() }, &mut signal);
             }
             let Some(parameter) = by else { return Some(signal) };
             covering.slope(parameter, base, &contact, &before, &mut slope).then_some(slope)

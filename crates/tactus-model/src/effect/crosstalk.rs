@@ -20,7 +20,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("row_share", 0.0, [-0.5, 0.5]),
         Parameter::real("column_share", 0.0, [-0.5, 0.5]),
     ],
-    near_twins: &["heavy-tail", "sigma_intercept_mm"],
+    near_twins: &["heavy-tail", "miswired", "anisotropic-spread", "sigma_intercept_mm"],
     shown_by: &["element-centres", "grid-sweep"],
     make: Make::Element(|values| Box::new(Crosstalk { shares: [values[0], values[1], values[2]] })),
 };

@@ -30,6 +30,20 @@ const CONTRACT: [&str; 26] = [
     "quantisation",
 ];
 
+/// The experiments, and the parts of `diagnose`.
+const PARTS: [&str; 10] = [
+    "corners",
+    "element-centres",
+    "grid-sweep",
+    "drift",
+    "repeats",
+    "ladder",
+    "rates",
+    "approach",
+    "tilt",
+    "hold",
+];
+
 /// Parameters of the base that an effect can look like, as model files name them.
 const BASE: [&str; 4] =
     ["sigma_intercept_mm", "sensitivity_counts_per_mm", "quadratic_per_mm", "noise_rms_counts"];
@@ -40,9 +54,8 @@ fn refused<const N: usize>(name: &str, parameters: [(&str, f64); N]) -> String {
 
 #[test]
 fn names_are_the_contracts_in_the_order_of_the_stages() {
-    let place = |definition: &&Definition| CONTRACT.iter().position(|name| *name == definition.name).unwrap();
-    let places: Vec<_> = REGISTRY.iter().map(place).collect();
-    assert!(places.is_sorted_by(|a, b| a < b), "{places:?}");
+    let names: Vec<_> = REGISTRY.iter().map(|definition| definition.name).collect();
+    assert_eq!(names, CONTRACT);
     assert!(REGISTRY.is_sorted_by_key(|definition| definition.stage()));
 }
 
@@ -54,8 +67,28 @@ fn a_definition_is_whole() {
         for parameter in definition.parameters {
             assert!(definition.check(parameter, parameter.neutral).is_ok(), "{name}: {}", parameter.name);
         }
+        for part in definition.shown_by {
+            assert!(PARTS.contains(part), "{name}: {part}");
+        }
         for twin in definition.near_twins {
-            assert!(CONTRACT.contains(twin) || BASE.contains(twin), "{name}: {twin}");
+            let is_mutual = Definition::find(twin).is_ok_and(|twin| twin.near_twins.contains(&name));
+            assert!(is_mutual || BASE.contains(twin), "{name}: {twin}");
+        }
+    }
+}
+
+#[test]
+fn a_value_out_of_its_range_is_refused() {
+    for definition in REGISTRY {
+        let neutral = Effect::neutral(definition);
+        for Parameter { name, range: [least, most], .. } in definition.parameters {
+            for value in [least - 1e-9 - 1e-9 * least.abs(), most + 1e-9 + 1e-9 * most, f64::NAN] {
+                let refused = neutral.with(name, value).is_err();
+                assert!(refused, "{}: {name} = {value}", definition.name);
+            }
+            for value in [*least, *most] {
+                assert!(neutral.with(name, value).is_ok(), "{}: {name} = {value}", definition.name);
+            }
         }
     }
 }

@@ -18,7 +18,7 @@ pub(super) static DEFINITION: Definition = Definition {
     name: "hardening",
     summary: "the response grows faster than depth",
     parameters: &[Parameter::real("cubic_per_mm2", 0.0, [-1.0, 10.0])],
-    near_twins: &["saturation", "surface-offset", "quadratic_per_mm"],
+    near_twins: &["saturation", "surface-offset", "depth-dependent-spread", "quadratic_per_mm"],
     shown_by: &["ladder", "element-centres"],
     make: Make::Covering(|values| Box::new(Hardening { cubic_per_mm2: values[0] })),
 };

@@ -37,8 +37,8 @@ impl OnCovering for HeavyTail {
         }
         let tail = |core: &Press| Press {
             weight: self.tail_share * core.weight,
-            sigma_mm: self.width_ratio * core.sigma_mm,
-            contact: core.contact.clone(),
+            sigma_mm: core.sigma_mm.map(|sigma_mm| self.width_ratio * sigma_mm),
+            ..core.clone()
         };
         let tails: Vec<Press> = presses.iter().map(tail).collect();
         for core in presses.iter_mut() {

@@ -1,4 +1,4 @@
-use crate::effect::bench::{assert_slopes, effect, model, simulator, still, upon};
+use crate::effect::bench::{assert_slopes, effect, fine, model, simulator, still, upon};
 use crate::{Array, Blur, Covering, ForwardModel, Psf, Response};
 
 fn tail(tail_share: f64, width_ratio: f64) -> crate::Effect {
@@ -7,15 +7,7 @@ fn tail(tail_share: f64, width_ratio: f64) -> crate::Effect {
 
 #[test]
 fn a_point_is_spread_by_the_mixture() {
-    // So small a tool is a point, and so fine an element reads the spread itself.
-    let reference_indenter = crate::Indenter::Cylinder { diameter_mm: 1e-3 };
-    let response = Response { reference_indenter, ..Response::uniform(9, 1.0, 0.0) };
-    let centres = vec![0.0, 1.0, 4.0];
-    let array = Array::new("fine", [1e-3; 2], centres.clone(), centres, 30.0, 4095.0, 1.0).unwrap();
-    let mut one = simulator([tail(0.3, 2.5)]);
-    one.model =
-        ForwardModel::new(array, Psf { sigma_intercept_mm: 1.0, sigma_per_mm: 0.0 }, response).unwrap();
-    one.indenter = crate::Indenter::Cylinder { diameter_mm: 1e-3 };
+    let one = fine(tail(0.3, 2.5));
     let counts = still(&one, upon(&one, 0, 1.0));
     let gaussian = |r2: f64, sigma: f64| (-0.5 * r2 / sigma.powi(2)).exp() / sigma.powi(2);
     for (element, r2) in [(0, 0.0), (1, 1.0), (4, 2.0), (8, 32.0)] {

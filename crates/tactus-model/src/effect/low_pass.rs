@@ -14,7 +14,7 @@ pub(super) static DEFINITION: Definition = Definition {
     name: "low-pass",
     summary: "the readout is slow",
     parameters: &[Parameter::real("time_constant_s", 0.0, [0.0, 10.0])],
-    near_twins: &["time-lag", "relaxation"],
+    near_twins: &["time-lag", "relaxation", "scan-skew", "rate-stiffening", "imprint"],
     shown_by: &["rates", "ladder"],
     make: Make::Readout(|values| Box::new(LowPass { lag: Lag::new(values[0]) })),
 };

@@ -20,7 +20,14 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("rotation_deg", 0.0, [-45.0, 45.0]),
         Parameter::real("scale_error", 0.0, [-0.2, 0.2]),
     ],
-    near_twins: &["surface-tilt", "gain-drift"],
+    near_twins: &[
+        "surface-tilt",
+        "gain-drift",
+        "backlash",
+        "indenter-tilt",
+        "edge-effect",
+        "anisotropic-spread",
+    ],
     shown_by: &["corners", "element-centres", "grid-sweep"],
     make: Make::Motion(|values| {
         Box::new(Misregistration {

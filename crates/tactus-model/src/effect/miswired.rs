@@ -22,7 +22,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("own_share", 1.0, [0.0, 1.0]),
         Parameter::real("other_share", 0.0, [-1.0, 1.0]),
     ],
-    near_twins: &["sensitivity_counts_per_mm", "crosstalk"],
+    near_twins: &["crosstalk", "sensitivity_counts_per_mm"],
     shown_by: &["element-centres"],
     make: Make::Element(|values| {
         Box::new(Miswired {

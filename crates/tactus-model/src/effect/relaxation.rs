@@ -23,7 +23,15 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("relaxed_share", 0.0, [-5.0, 1.0]),
         Parameter::real("time_constant_s", 10.0, [1e-3, 1e5]),
     ],
-    near_twins: &["low-pass", "time-lag", "rate-stiffening", "imprint"],
+    near_twins: &[
+        "low-pass",
+        "time-lag",
+        "rate-stiffening",
+        "imprint",
+        "hysteresis",
+        "baseline-drift",
+        "softening",
+    ],
     shown_by: &["hold", "rates", "repeats"],
     make: Make::Covering(|values| {
         Box::new(Relaxation { relaxed_share: values[0], relaxed: Lag::new(values[1]) })

@@ -57,8 +57,10 @@ pub struct Press {
     pub weight: f64,
     /// The tool in the covering.
     pub contact: Contact,
-    /// Standard deviation of its Gaussian.
-    pub sigma_mm: f64,
+    /// How the tool's face leans, as [`OnContact::lean`] says.
+    pub lean: [f64; 2],
+    /// Standard deviations of its Gaussian along the sensor's x and y.
+    pub sigma_mm: [f64; 2],
 }
 
 /// An effect between what the stage says and where the tool touches.
@@ -71,7 +73,7 @@ pub trait OnMotion: Debug + Send + Sync {
     /// Changes where the tip is, or where the sensor lies.
     fn place(&mut self, _now: Now<'_>, _place: &mut Place) {}
 
-    /// Derivative of the contact by the parameter of an index; `before` is what [`OnMotion::place`] was given.
+    /// Derivative of the contact by the parameter of an index; `before` is what [`OnMotion::place`] was last given.
     fn slope(&self, _parameter: usize, _base: Base<'_>, _before: &Place) -> Option<Shift> {
         None
     }
@@ -83,13 +85,19 @@ pub trait OnMotion: Debug + Send + Sync {
 /// An effect on the tool and how it stands; without memory.
 pub trait OnContact: Debug + Send + Sync {
     /// Changes the contact.
-    fn touch(&self, base: Base<'_>, contact: &mut Contact);
+    fn touch(&self, _base: Base<'_>, _contact: &mut Contact) {}
+
+    /// How the tool leans about the foot of its axis: by how much a flat face stands deeper per mm along the tool's
+    /// own x and y. A [`Contact`] is upright, so that this goes beside it; those of several effects add.
+    fn lean(&self) -> [f64; 2] {
+        [0.0; 2]
+    }
 }
 
 /// An effect of the covering.
 pub trait OnCovering: Debug + Send + Sync {
     /// Changes how presses spread, before the elements integrate them; without memory. At first there is one,
-    /// of weight 1, with the base model's spread.
+    /// of weight 1, with the base model's spread, the same along x and y.
     fn spread(&self, _base: Base<'_>, _presses: &mut Vec<Press>) {}
 
     /// Changes what reaches the elements: equivalent indentations in mm, row-major.

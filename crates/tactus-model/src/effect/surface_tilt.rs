@@ -19,7 +19,7 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("slope_x_mm_per_mm", 0.0, [-0.2, 0.2]),
         Parameter::real("slope_y_mm_per_mm", 0.0, [-0.2, 0.2]),
     ],
-    near_twins: &["misregistration", "gain-drift"],
+    near_twins: &["misregistration", "gain-drift", "indenter-tilt", "edge-effect"],
     shown_by: &["tilt", "element-centres"],
     make: Make::Motion(|values| Box::new(SurfaceTilt { slope_mm_per_mm: [values[0], values[1]] })),
 };

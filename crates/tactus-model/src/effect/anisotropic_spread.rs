@@ -1,0 +1,43 @@
+//! `anisotropic-spread`: the point spread is wider along one side of the sensor than along the other.
+//!
+//! ```text
+//! sigma_x = sqrt(ratio) sigma          sigma_y = sigma / sqrt(ratio)
+//! ```
+//!
+//! The area that a point is spread over stays. Axes are the sensor's: a Gaussian that lies askew is no product of one
+//! along x and one along y.
+//!
+//! No derivative in closed form. Cost: one image.
+//!
+//! # Source
+//! A sheet that was drawn in one direction, or lies on electrodes that run in one: the Gaussian of an orthotropic
+//! medium, J. Crank, *The Mathematics of Diffusion* (1975).
+
+use super::{Base, Definition, Make, OnCovering, Parameter, Press};
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "anisotropic-spread",
+    summary: "the point spread differs along x and y",
+    parameters: &[Parameter::real("ratio", 1.0, [0.2, 5.0])],
+    near_twins: &["crosstalk", "indenter-size", "misregistration", "sigma_intercept_mm"],
+    shown_by: &["grid-sweep", "element-centres"],
+    make: Make::Covering(|values| Box::new(AnisotropicSpread { ratio: values[0] })),
+};
+
+#[derive(Debug)]
+struct AnisotropicSpread {
+    ratio: f64,
+}
+
+impl OnCovering for AnisotropicSpread {
+    fn spread(&self, _: Base<'_>, presses: &mut Vec<Press>) {
+        for Press { sigma_mm: [x, y], .. } in presses {
+            *x *= self.ratio.sqrt();
+            *y /= self.ratio.sqrt();
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "anisotropic_spread_tests.rs"]
+mod tests;

@@ -1,0 +1,88 @@
+//! `backlash`: the tip is not where its stage says, but behind it, by direction of approach.
+//!
+//! ```text
+//! q(t) = max(x(t) - play / 2, min(x(t) + play / 2, q before))          on each of the robot's axes
+//! ```
+//!
+//! `x` is where the stage says that the tip is, `q` where it is. The tip follows half the play behind a stage that
+//! goes on, and rests for the whole play where the stage turns; of two opposite approaches the mean is the
+//! registration's, or the surface's. The tip begins amid its play.
+//!
+//! Derivative in closed form, with memory. Cost: none.
+//!
+//! # Source
+//! The play operator: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (1989).
+
+use super::{Base, Definition, Make, Now, OnMotion, Parameter, Place, Shift};
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "backlash",
+    summary: "the tip's place depends on the direction from which it came",
+    parameters: &[
+        Parameter::real("play_x_mm", 0.0, [0.0, 1.0]),
+        Parameter::real("play_y_mm", 0.0, [0.0, 1.0]),
+        Parameter::real("play_z_mm", 0.0, [0.0, 0.5]),
+    ],
+    near_twins: &["hysteresis", "misregistration", "surface-offset", "time-lag"],
+    shown_by: &["approach", "ladder"],
+    make: Make::Motion(|values| Box::new(Backlash { axes: [0, 1, 2].map(|axis| Axis::new(values[axis])) })),
+};
+
+#[derive(Debug)]
+struct Backlash {
+    axes: [Axis; 3],
+}
+
+/// A nut on a screw.
+#[derive(Debug)]
+struct Axis {
+    half_mm: f64,
+    /// Where it is, and by how much that changes with the play.
+    at: Option<(f64, f64)>,
+}
+
+impl OnMotion for Backlash {
+    fn place(&mut self, _: Now<'_>, place: &mut Place) {
+        for (axis, tip_mm) in self.axes.iter_mut().zip(&mut place.tip_mm) {
+            *tip_mm = axis.follow(*tip_mm);
+        }
+    }
+
+    fn slope(&self, parameter: usize, _: Base<'_>, before: &Place) -> Option<Shift> {
+        let (_, by_play) = self.axes.get(parameter)?.at?;
+        let (sin, cos) = before.registration.rotation_deg.to_radians().sin_cos();
+        Some(match parameter {
+            0 => Shift { position_mm: [by_play * cos, -by_play * sin], ..Shift::default() },
+            1 => Shift { position_mm: [by_play * sin, by_play * cos], ..Shift::default() },
+            _ => Shift { depth_mm: -by_play, ..Shift::default() },
+        })
+    }
+
+    fn reset(&mut self) {
+        for axis in &mut self.axes {
+            axis.at = None;
+        }
+    }
+}
+
+impl Axis {
+    fn new(play_mm: f64) -> Self {
+        Self { half_mm: play_mm / 2.0, at: None }
+    }
+
+    fn follow(&mut self, stage_mm: f64) -> f64 {
+        let (least, most) = (stage_mm - self.half_mm, stage_mm + self.half_mm);
+        let (at_mm, by_play) = match self.at {
+            None => (stage_mm, 0.0),
+            Some((at_mm, _)) if at_mm < least => (least, -0.5),
+            Some((at_mm, _)) if at_mm > most => (most, 0.5),
+            Some(at) => at,
+        };
+        self.at = Some((at_mm, by_play));
+        at_mm
+    }
+}
+
+#[cfg(test)]
+#[path = "backlash_tests.rs"]
+mod tests;

@@ -1,0 +1,42 @@
+//! `depth-dependent-spread`: the point spread changes with depth.
+//!
+//! ```text
+//! sigma -> sigma (1 + growth_share depth / thickness)          depth at most the thickness
+//! ```
+//!
+//! What is spread wider is not lost: the peak falls as the width grows.
+//!
+//! No derivative in closed form. Cost: one image.
+//!
+//! # Source
+//! The paper's Sec. 3 and Fig. 5a measure sigma at three depths under each covering and fit all with one line in
+//! thickness (Eq. 4); this is the first term that the line leaves out.
+
+use super::{Base, Definition, Make, OnCovering, Parameter, Press};
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "depth-dependent-spread",
+    summary: "the point spread changes with depth",
+    parameters: &[Parameter::real("growth_share", 0.0, [-0.9, 5.0])],
+    near_twins: &["hardening", "saturation", "quadratic_per_mm"],
+    shown_by: &["grid-sweep", "ladder", "tilt"],
+    make: Make::Covering(|values| Box::new(DepthDependentSpread { growth_share: values[0] })),
+};
+
+#[derive(Debug)]
+struct DepthDependentSpread {
+    growth_share: f64,
+}
+
+impl OnCovering for DepthDependentSpread {
+    fn spread(&self, base: Base<'_>, presses: &mut Vec<Press>) {
+        for Press { contact, sigma_mm, .. } in presses {
+            let depth_share = (contact.depth_mm / base.covering.thickness_mm).clamp(0.0, 1.0);
+            *sigma_mm = sigma_mm.map(|sigma_mm| sigma_mm * (1.0 + self.growth_share * depth_share));
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "depth_dependent_spread_tests.rs"]
+mod tests;

@@ -1,0 +1,93 @@
+//! `edge-effect`: the covering answers differently near its edge, or near the seam between two sensors.
+//!
+//! ```text
+//! u_e -> u_e (1 + edge_share exp(-edge distance / reach) + seam_share exp(-seam distance / reach))
+//! ```
+//!
+//! Distances are those of the tool's axis: from the nearest side of the active area (0 on it and outside), and from
+//! the line in the middle of x, where the paper's two sensors meet. A factor by the element's own place would be part
+//! of its sensitivity.
+//!
+//! Derivatives in closed form. Cost: none.
+//!
+//! # Source
+//! The paper's Fig. 1: two sensors side by side. What an edge disturbs dies away exponentially within about a
+//! thickness, by Saint-Venant's principle: S. P. Timoshenko and J. N. Goodier, *Theory of Elasticity* (1970).
+
+use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use crate::Contact;
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "edge-effect",
+    summary: "the response changes near the covering's edge or the seam between the sensors",
+    parameters: &[
+        Parameter::real("edge_share", 0.0, [-1.0, 2.0]),
+        Parameter::real("seam_share", 0.0, [-1.0, 2.0]),
+        Parameter::real("reach_mm", 2.0, [0.1, 20.0]),
+    ],
+    near_twins: &["surface-tilt", "misregistration", "sensitivity_counts_per_mm"],
+    shown_by: &["element-centres", "tilt", "corners"],
+    make: Make::Covering(|values| {
+        Box::new(EdgeEffect { shares: [values[0], values[1]], reach_mm: values[2] })
+    }),
+};
+
+#[derive(Debug)]
+struct EdgeEffect {
+    /// Of the edge and of the seam.
+    shares: [f64; 2],
+    reach_mm: f64,
+}
+
+impl OnCovering for EdgeEffect {
+    fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
+        let nearness = self.nearness(now.base, contact);
+        let added: f64 = self.shares.iter().zip(nearness).map(|(share, nearness)| share * nearness).sum();
+        for u in signal_mm {
+            *u *= 1.0 + added;
+        }
+    }
+
+    fn slope(
+        &self,
+        parameter: usize,
+        base: Base<'_>,
+        contact: &Contact,
+        before_mm: &[f64],
+        slope_mm: &mut [f64],
+    ) -> bool {
+        let nearness = self.nearness(base, contact);
+        let by_reach = |place: usize| {
+            let distance_mm = distances_mm(base, contact)[place];
+            self.shares[place] * nearness[place] * distance_mm / self.reach_mm.powi(2)
+        };
+        let factor = match parameter {
+            0 | 1 => nearness[parameter],
+            2 => by_reach(0) + by_reach(1),
+            _ => return false,
+        };
+        for (slope, u) in slope_mm.iter_mut().zip(before_mm) {
+            *slope = u * factor;
+        }
+        true
+    }
+}
+
+impl EdgeEffect {
+    /// 1 at the edge and at the seam, less further off.
+    fn nearness(&self, base: Base<'_>, contact: &Contact) -> [f64; 2] {
+        distances_mm(base, contact).map(|distance_mm| (-distance_mm / self.reach_mm).exp())
+    }
+}
+
+/// Of the tool's axis from the edge and from the seam.
+fn distances_mm(base: Base<'_>, contact: &Contact) -> [f64; 2] {
+    let [[x_min, x_max], [y_min, y_max]] = base.model.array().extent_mm();
+    let [x, y] = contact.position_mm;
+    let edge_mm = (x - x_min).min(x_max - x).min(y - y_min).min(y_max - y);
+    [edge_mm.max(0.0), (x - f64::midpoint(x_min, x_max)).abs()]
+}
+
+#[cfg(test)]
+#[path = "edge_effect_tests.rs"]
+mod tests;

@@ -1,0 +1,40 @@
+use crate::Effect;
+use crate::effect::bench::{assert_slopes, effect, felt_mm};
+
+fn dented(recovery_s: f64) -> Effect {
+    effect("imprint", [("set_share", 0.1), ("recovery_s", recovery_s)])
+}
+
+fn assert_near<const N: usize>(got: [f64; N], want: [f64; N]) {
+    let near = got.iter().zip(want).all(|(got, want)| (got - want).abs() < 1e-12);
+    assert!(near, "{got:?} {want:?}");
+}
+
+#[test]
+fn a_dent_recovers_exponentially_and_shows_only_where_nothing_presses_deeper() {
+    let got = felt_mm(
+        &dented(20.0),
+        [(0.0, 0.5), (3.0, 0.5), (3.0, -1.0), (13.0, -1.0), (13.0, 0.01), (13.0, 0.2), (33.0, 0.0)],
+    );
+    let left = |mm: f64, t_s: f64| 0.1 * mm * (-t_s / 20.0_f64).exp();
+    // The second press is shallow: the first one's dent is the deeper for as long as it is.
+    let last = left(0.5, 30.0).max(0.1 * (0.2 / 20.0 * 20.0) * (-20.0 / 20.0_f64).exp());
+    assert_near(got, [0.5, 0.5, 0.05, left(0.5, 10.0), left(0.5, 10.0), 0.2, last]);
+}
+
+#[test]
+fn a_slow_release_leaves_the_same_in_any_number_of_steps() {
+    // Down at 0.05 mm/s with a recovery of 3 s: below 0.15 mm the signal falls faster than the dent recovers.
+    let fine: [_; 101] = std::array::from_fn(|k| (k as f64 / 10.0, 0.5 - 0.05 * (k as f64 / 10.0)));
+    let [.., coarse] = felt_mm(&dented(3.0), [fine[0], fine[100]]);
+    let [.., fine] = felt_mm(&dented(3.0), fine);
+    assert_near([coarse, fine], [0.015 * (-1.0_f64).exp(); 2]);
+}
+
+#[test]
+fn derivatives_are_those_of_differences() {
+    assert_slopes(
+        &effect("imprint", [("set_share", 0.3), ("recovery_s", 5.0)]),
+        &["set_share", "recovery_s"],
+    );
+}

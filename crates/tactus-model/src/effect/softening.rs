@@ -1,0 +1,87 @@
+//! `softening`: what was pressed before answers more weakly, up to where it was pressed.
+//!
+//! ```text
+//! u -> u (1 - softened_share erf((1 - u^2 / m^2) / width_share))          m = greatest u so far
+//! ```
+//!
+//! each element by its own past. A first loading is the base model's, and so is going on beyond what was reached;
+//! below it unloading and every later press follow the same weaker curve. It does not recover.
+//!
+//! Derivatives in closed form. Cost: an error function for each element.
+//!
+//! # Source
+//! The Mullins effect in the pseudo-elastic form of R. W. Ogden and D. G. Roxburgh, *Proc. R. Soc. Lond. A* 455 (1999),
+//! with the strain energy of a linear spring and a width in proportion to the greatest energy.
+
+use libm::erf;
+use std::f64::consts::FRAC_2_SQRT_PI;
+
+use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use crate::Contact;
+
+pub(super) static DEFINITION: Definition = Definition {
+    name: "softening",
+    summary: "the response falls with earlier loading",
+    parameters: &[
+        Parameter::real("softened_share", 0.0, [-1.0, 1.0]),
+        Parameter::real("width_share", 1.0, [0.01, 10.0]),
+    ],
+    near_twins: &["hysteresis", "relaxation", "gain-drift"],
+    shown_by: &["repeats", "ladder"],
+    make: Make::Covering(|values| {
+        Box::new(Softening { softened_share: values[0], width_share: values[1], greatest_mm: Vec::new() })
+    }),
+};
+
+#[derive(Debug)]
+struct Softening {
+    softened_share: f64,
+    width_share: f64,
+    greatest_mm: Vec<f64>,
+}
+
+impl OnCovering for Softening {
+    fn signal(&mut self, _: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
+        self.greatest_mm.resize(signal_mm.len(), 0.0);
+        for (u, greatest_mm) in signal_mm.iter_mut().zip(&mut self.greatest_mm) {
+            *greatest_mm = greatest_mm.max(*u);
+            let below = widths_below(*u, *greatest_mm, self.width_share);
+            *u *= 1.0 - self.softened_share * erf(below);
+        }
+    }
+
+    fn slope(
+        &self,
+        parameter: usize,
+        _: Base<'_>,
+        _: &Contact,
+        before_mm: &[f64],
+        slope_mm: &mut [f64],
+    ) -> bool {
+        if parameter > 1 {
+            return false;
+        }
+        for ((slope, u), greatest_mm) in slope_mm.iter_mut().zip(before_mm).zip(&self.greatest_mm) {
+            let z = widths_below(*u, *greatest_mm, self.width_share);
+            *slope = if parameter == 0 {
+                -u * erf(z)
+            } else {
+                u * self.softened_share * FRAC_2_SQRT_PI * (-z * z).exp() * z / self.width_share
+            };
+        }
+        true
+    }
+
+    fn reset(&mut self) {
+        self.greatest_mm.clear();
+    }
+}
+
+/// How far below the greatest a signal is, in energy and in widths; 0 for what never was pressed.
+fn widths_below(u: f64, greatest_mm: f64, width_share: f64) -> f64 {
+    if greatest_mm > 0.0 { (1.0 - (u / greatest_mm).powi(2)).max(0.0) / width_share } else { 0.0 }
+}
+
+#[cfg(test)]
+#[path = "softening_tests.rs"]
+mod tests;
