@@ -211,7 +211,7 @@ fn compare(rig: &Rig, found: &Value) -> Found {
         missed: truth.faults.iter().filter(|(element, fault)| !right(**element, fault)).count(),
         accused: accusations
             .keys()
-            .filter(|element| !truth.faults.contains_key(&(**element as usize)))
+            .filter(|element| truth.faults.keys().all(|planted| *planted as u64 != **element))
             .count(),
         planted,
     }

@@ -1,20 +1,18 @@
 //! The whole calibration: what the presses tell of the sensor, step upon step.
 
+mod remarks;
+
 use serde::Serialize;
 use tactus_model::{Covering, ModelError, Psf, Response};
 
 use crate::{
     Declared, Estimate, Health, Readings, RegistrationFit, ResponseFit, SpreadFit, ThicknessFit,
-    faults::{FaultKind, examine},
-    readings::distinct_places,
+    faults::examine,
     registration::{Place, register},
     response::respond,
     spread::spreads,
     thickness::against_thickness,
 };
-
-/// Residuals of so many times the noise say that the model is not the sensor's.
-const MISFIT: f64 = 1.5;
 
 /// What was found about a sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -186,127 +184,6 @@ impl Calibration {
         }
         Some((response, errors))
     }
-
-    fn remark(&mut self, declared: &Declared, readings: &Readings) {
-        let unrested = readings.presses.iter().filter(|press| press.rest.is_none()).count();
-        if unrested > 0 {
-            self.warnings
-                .push(format!("{unrested} presses have no reading at rest before them and are left out."));
-        }
-        if readings.frames_left_out > 0 {
-            self.warnings.push(format!(
-                "{} of {} frames are left out: an element read what no noise explains.",
-                readings.frames_left_out, readings.frames
-            ));
-        }
-        let unknown = readings.presses.iter().filter(|press| declared.indenter(press).is_none()).count();
-        if unknown > 0 {
-            self.warnings
-                .push(format!("{unknown} presses are left out: their tool is not in the rig's description."));
-        }
-        if !self.health.not_judged.is_empty() {
-            self.missing.push(format!(
-                "Health of {} elements: no reference press came near them ({}).",
-                self.health.not_judged.len(),
-                listed(&self.health.not_judged)
-            ));
-        }
-        if let Some(registration) = &self.registration {
-            self.remark_registration(&registration.clone());
-        }
-        if self.registration.is_none() && self.response.is_some() {
-            self.warnings.push(
-                "Sensitivities rest on the declared place, surface and spread: as far as these are nominal, they are slopes at \
-                 the place that was pressed, not the elements' own."
-                    .into(),
-            );
-        }
-        if let Some(response) = &self.response {
-            let without: Vec<usize> = (0..readings.elements)
-                .filter(|element| response.elements.iter().all(|one| one.element != *element))
-                .filter(|element| self.health.faults.iter().all(|fault| fault.element != *element))
-                .collect();
-            if !without.is_empty() {
-                self.missing.push(format!(
-                    "Response of {} elements: they were not pressed at their centres ({}).",
-                    without.len(),
-                    listed(&without)
-                ));
-            }
-            if response.trials.iter().all(|trial| trial.heldout_rms_counts.is_none()) {
-                self.missing.push(
-                    "Form of the response: it takes three depths in a press to hold one out. It is taken to be linear.".into(),
-                );
-            }
-        }
-        match &self.thickness {
-            None if self.response.is_some() && self.spreads.is_empty() => {
-                let places = distinct_places(readings.presses.iter().map(|press| press.place_mm)).len();
-                self.missing.push(format!(
-                    "Point spread: {places} places were pressed; it takes 9 under one covering, between the elements."
-                ));
-            }
-            Some(thickness) if thickness.coverings.len() < 2 => self.missing.push(
-                "Spread against thickness: one covering was pressed; it takes two for a line, three for a parabola.".into(),
-            ),
-            _ => {}
-        }
-        for covering in self.thickness.iter().flat_map(|thickness| &thickness.coverings) {
-            if covering.chance.is_some_and(|chance| chance < 1e-3) {
-                self.warnings.push(format!(
-                    "Under the covering of {:.3} mm the spread changes with depth by {:.3} mm, more than its errors explain.",
-                    covering.covering_mm, covering.range_mm
-                ));
-            }
-        }
-        if let Some(line) = self.thickness.as_ref().and_then(|thickness| thickness.linear.as_ref())
-            && line.chance.is_some_and(|chance| chance < 1e-3)
-        {
-            self.warnings.push(format!(
-                "Spread against thickness is no straight line: points lie {:.3} mm rms off it, more than their errors explain. The \
-                 errors of the line are widened accordingly.",
-                line.rms_mm
-            ));
-        }
-        let noisy = |fault: &&crate::Fault| matches!(fault.kind, FaultKind::Noisy { .. });
-        if self.health.faults.iter().any(|fault| noisy(&fault)) {
-            self.warnings.push("Noisy elements are left out of all fits, though they may respond.".into());
-        }
-    }
-
-    fn remark_registration(&mut self, registration: &RegistrationFit) {
-        if registration.rotation_deg.is_none() {
-            self.missing.push(
-                "Rotation: the presses lie too close together, within two pitches; it is taken as declared."
-                    .into(),
-            );
-        }
-        if registration.surface_mm.is_none() {
-            self.missing.push("Surface: one depth was pressed only; its height is taken as declared.".into());
-        }
-        if !registration.left_out.is_empty() {
-            self.warnings.push(format!(
-                "{} presses contradict the others and are left out of the registration.",
-                registration.left_out.len()
-            ));
-        }
-        if registration.residual_in_noise > MISFIT {
-            self.warnings.push(format!(
-                "Residuals of the registration are {:.1} times the noise: the base model lacks something, and errors are wider \
-                 for it but may still be too small.",
-                registration.residual_in_noise
-            ));
-        }
-        if let Some(scale) = registration.scale
-            && !scale.covers(1.0)
-            && (scale.value - 1.0).abs() > 1e-3
-        {
-            self.warnings.push(format!(
-                "Distances measured are {:.4} +- {:.4} of those declared: check the element centres and the stage's steps per mm.",
-                scale.value, scale.standard_error
-            ));
-        }
-    }
 }
 
 impl Data {
@@ -356,10 +233,6 @@ fn referred(
     };
     let (array, psf) = (declared.array().clone(), declared.model.psf());
     Ok(Declared { model: tactus_model::ForwardModel::new(array, psf, response)?, ..declared.clone() })
-}
-
-fn listed(elements: &[usize]) -> String {
-    elements.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// The middle value; `None` of nothing.

@@ -83,7 +83,10 @@ impl Health {
     pub(crate) fn answers_for(&self, element: usize) -> Option<usize> {
         self.faults.iter().find_map(|fault| match fault.kind {
             FaultKind::CrossWired { answers_for } if fault.element == element => Some(answers_for),
-            _ => None,
+            FaultKind::CrossWired { .. }
+            | FaultKind::Dead
+            | FaultKind::Stuck { .. }
+            | FaultKind::Noisy { .. } => None,
         })
     }
 

@@ -34,6 +34,10 @@ use fit::{Fitted, Group, fit, heldout};
 const NEAR: f64 = 0.9;
 /// Presses with so many dwells are preferred to others.
 const DWELLS_LEAST: usize = 3;
+/// A response begins flat if its slope is fewer standard errors than this, or its curvature at the deepest press
+/// has more than this many times the share of the slope.
+const FLAT_ERRORS: f64 = 5.0;
+const FLAT_CURVATURE: f64 = 3.0;
 /// A step to find how results move with the sensor's place, in mm or degrees.
 const STEP: f64 = 1e-4;
 
@@ -72,6 +76,8 @@ pub struct ResponseFit {
     pub trials: Vec<Trial>,
     /// The common curvature `k` of the shared quadratic, in 1/mm, if there is such a fit.
     pub shared_quadratic_per_mm: Option<Estimate>,
+    /// Root mean square of the residuals of the wanted form in units of the noise: 1 if the form holds.
+    pub residual_in_noise: f64,
     /// The elements, in order; faulty ones and those without a press at their centre are missing.
     pub elements: Vec<ElementResponse>,
     /// The cross-wired elements, by presses at the centres of those whose signal they give; no fit rests on them.
@@ -107,6 +113,15 @@ pub struct ElementResponse {
 }
 
 impl ElementResponse {
+    /// True if the response begins so flat that its slope there is hardly told from 0, or is soon overtaken by its
+    /// curvature: then the two numbers say little apart from each other.
+    pub fn begins_flat(&self) -> bool {
+        let deepest_mm = self.points.iter().map(|[u_mm, _]| u_mm.abs()).fold(0.0, f64::max);
+        let sensitivity = self.sensitivity_counts_per_mm;
+        sensitivity.value.abs() < FLAT_ERRORS * sensitivity.standard_error
+            || (self.quadratic_per_mm.value * deepest_mm).abs() > FLAT_CURVATURE
+    }
+
     /// The indentation `u` that gives a rise in counts: the response turned round. `None` beyond its turning point.
     pub fn indentation_mm(&self, rise_counts: f64) -> Option<f64> {
         turned_round(rise_counts / self.sensitivity_counts_per_mm.value, self.quadratic_per_mm.value)
@@ -197,6 +212,7 @@ pub(crate) fn respond(
             let covariance = shared.expanded_covariance() + moved_by(&by_place(shared));
             Estimate::new(shared.response(0)[1], covariance[(count, count)])
         }),
+        residual_in_noise: wanted.residual_in_noise(),
         elements: responses.collect(),
         cross_wired: cross_wired(declared, readings, health, place, wanted),
     };

@@ -16,7 +16,7 @@ use std::{num::NonZero, thread};
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
-use tactus_model::{Contact, Covering, ForwardModel};
+use tactus_model::{Contact, Covering, effect};
 
 use crate::{
     Estimate,
@@ -38,6 +38,8 @@ const ROUNDS_MAX: usize = 30;
 /// A step by less than this share of sigma is the last. First to see which images are like none, then for good: far
 /// below any error, and of no effect on what else is computed there.
 const STEP_LEAST: [f64; 2] = [1e-3, 1e-6];
+/// A step in sigma, as a share of it.
+const STEP_SHARE: f64 = 1e-4;
 /// A step to find how the slopes move with a press's place.
 const STEP_MM: f64 = 1e-4;
 
@@ -263,7 +265,7 @@ impl<'a> Search<'a> {
             likeness: slopes.iter().map(|slope| slope.likeness).sum::<f64>() / count,
         };
         let by_gains = self.by_gains(&slopes) / curvature;
-        let by_place = self.by_place(sigma_mm, &slopes)? / curvature;
+        let by_place = self.by_place(sigma_mm, &slopes) / curvature;
         Ok(Found { fit, variance, by_gains, by_place })
     }
 
@@ -277,7 +279,7 @@ impl<'a> Search<'a> {
         let [least, most] = SIGMA_PITCHES.map(|pitches| pitches * self.declared.array().pitch_mm());
         let mut sigma_mm = start_mm.clamp(least, most);
         for _ in 0..ROUNDS_MAX {
-            let slopes = self.slopes(sigma_mm)?;
+            let slopes = self.slopes(sigma_mm);
             // Far from the maximum a whole step may go astray.
             let step = step(&slopes).clamp(-0.4 * sigma_mm, 0.6 * sigma_mm);
             sigma_mm += step;
@@ -292,18 +294,29 @@ impl<'a> Search<'a> {
         Err(format!("the images fit no sigma between {least:.2} and {most:.0} mm"))
     }
 
-    fn slopes(&self, sigma_mm: f64) -> Result<Vec<Slope>, String> {
-        let model = self.declared.unit_model(sigma_mm).map_err(|error| error.to_string())?;
-        Ok(self.images.iter().map(|image| self.slope(&model, image, &image.contact)).collect())
+    fn slopes(&self, sigma_mm: f64) -> Vec<Slope> {
+        self.images.iter().map(|image| self.slope(sigma_mm, image, &image.contact)).collect()
     }
 
-    fn slope(&self, model: &ForwardModel, image: &Image, contact: &Contact) -> Slope {
-        let gradient = model.gradient(contact, self.covering);
-        let modelled = self.gains.elements.iter().map(|(element, _)| gradient.counts[*element]);
-        let mut modelled: Vec<f64> = modelled.collect();
-        let by_sigma =
-            self.gains.elements.iter().map(|(element, _)| gradient.by_sigma_intercept_mm[*element]);
-        let mut shape: Vec<f64> = by_sigma.collect();
+    fn slope(&self, sigma_mm: f64, image: &Image, contact: &Contact) -> Slope {
+        // Two images a hair apart give the image between them and its slope, both to some 1e-8.
+        let step_mm = STEP_SHARE * sigma_mm;
+        let [less, more] = [sigma_mm - step_mm, sigma_mm + step_mm].map(|sigma_mm| {
+            let mut felt = vec![0.0; self.declared.array().elements()];
+            let press = effect::Press {
+                weight: 1.0,
+                contact: contact.clone(),
+                lean: [0.0; 2],
+                sigma_mm: [sigma_mm; 2],
+            };
+            self.declared.model.indentation_of(&press, self.covering, &mut felt);
+            felt
+        });
+        let elements = || self.gains.elements.iter().map(|(element, _)| *element);
+        let mut modelled: Vec<f64> =
+            elements().map(|element| f64::midpoint(less[element], more[element])).collect();
+        let mut shape: Vec<f64> =
+            elements().map(|element| (more[element] - less[element]) / (2.0 * step_mm)).collect();
         let length = norm(&modelled).max(f64::MIN_POSITIVE);
         scale(&mut modelled, 1.0 / length);
         let along = dot(&modelled, &shape);
@@ -335,15 +348,14 @@ impl<'a> Search<'a> {
     }
 
     /// How the sum of the slopes moves with the sensor's place.
-    fn by_place(&self, sigma_mm: f64, slopes: &[Slope]) -> Result<DVector<f64>, String> {
-        let model = self.declared.unit_model(sigma_mm).map_err(|error| error.to_string())?;
+    fn by_place(&self, sigma_mm: f64, slopes: &[Slope]) -> DVector<f64> {
         let mut by_place = DVector::zeros(Place::UNSURE);
         for (image, slope) in self.images.iter().zip(slopes) {
             let mut along = [0.0; 2];
             for (axis, along) in along.iter_mut().enumerate() {
                 let mut contact = image.contact.clone();
                 contact.position_mm[axis] += STEP_MM;
-                *along = (self.slope(&model, image, &contact).by_sigma - slope.by_sigma) / STEP_MM;
+                *along = (self.slope(sigma_mm, image, &contact).by_sigma - slope.by_sigma) / STEP_MM;
             }
             for parameter in 0..3 {
                 let moved = self.place.moved(parameter, STEP_MM).setting.on_sensor(image.place_mm);
@@ -353,7 +365,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        Ok(by_place)
+        by_place
     }
 }
 

@@ -7,7 +7,7 @@ use std::io::{ErrorKind, Write as _};
 pub(crate) fn print_fields(fields: &[(&str, String)]) {
     let width = fields.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     for (name, value) in fields {
-        println!("{name:width$}  {value}");
+        say(&format!("{name:width$}  {value}"));
     }
 }
 
@@ -25,11 +25,19 @@ pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
             // Writing to a string cannot fail.
             let _written = write!(line, "{cell:width$}  ");
         }
-        println!("{}", line.trim_end());
+        say(line.trim_end());
     };
     line(&mut header.iter().copied());
     for row in rows {
         line(&mut row.iter().map(String::as_str));
+    }
+}
+
+/// Prints a line. A reader that has seen enough and goes away, such as `head`, ends the program quietly: what it does
+/// is done before it prints.
+pub(crate) fn say(line: &str) {
+    if writeln!(std::io::stdout().lock(), "{line}").is_err() {
+        std::process::exit(0);
     }
 }
 

@@ -111,6 +111,10 @@ impl Fitted {
         })
     }
 
+    pub(super) fn residual_in_noise(&self) -> f64 {
+        self.fit.misfit.sqrt()
+    }
+
     pub(super) fn rms_counts(&self, groups: &[Group]) -> f64 {
         rms(groups.iter().flat_map(|group| {
             group.points.iter().map(|point| point.rise_counts - self.predicted(group.element, point.u_mm))

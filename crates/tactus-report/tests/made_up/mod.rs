@@ -61,6 +61,8 @@ pub(crate) fn whole() -> Calibration {
                 Trial { form: Form::SharedQuadratic, rms_counts: 0.65, heldout_rms_counts: Some(0.8) },
             ],
             shared_quadratic_per_mm: Some(sure(CURVATURE_PER_MM, 0.001)),
+            residual_in_noise: 1.0,
+            cross_wired: Vec::new(),
             elements: sound.map(element).collect(),
         }),
         thickness: Some(ThicknessFit {

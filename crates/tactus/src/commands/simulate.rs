@@ -28,7 +28,7 @@ pub(crate) fn simulate(common: &Common, args: &SimulateArgs) -> anyhow::Result<E
 /// One image of the tool at rest.
 fn image(common: &Common, args: &SimulateArgs, scene: &Scene) -> anyhow::Result<Exit> {
     let (clean_counts, computed_by) =
-        if args.gpu { scene.gpu_image()? } else { (scene.image(), "cpu".into()) };
+        if args.gpu { scene.gpu_image()? } else { (scene.image()?, "cpu".into()) };
     let array = scene.array();
     let copies: Vec<Vec<f64>> = (0..args.copies)
         .map(|copy| {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tactus_calibrate::{Estimate, FaultKind};
 
 use super::Calibrated;
-use crate::output::{print_fields, print_table};
+use crate::output::{print_fields, print_table, say};
 
 pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
     let Calibrated { rig, simulated, notes, calibration, .. } = calibrated;
@@ -70,7 +70,7 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
     }
     print_fields(&fields);
     if !calibration.spreads.is_empty() {
-        println!();
+        say("");
         let rows: Vec<Vec<String>> = calibration
             .spreads
             .iter()
@@ -87,15 +87,15 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
             .collect();
         print_table(&["covering mm", "depth mm", "presses", "sigma+ mm", "pitches", "cosine"], &rows);
     }
-    println!();
+    say("");
     for note in notes.iter().chain(&calibration.warnings) {
-        println!("warning: {note}");
+        say(&format!("warning: {note}"));
     }
     for missing in &calibration.missing {
-        println!("missing: {missing}");
+        say(&format!("missing: {missing}"));
     }
     for path in paths {
-        println!("{}", path.display());
+        say(&path.display().to_string());
     }
 }
 

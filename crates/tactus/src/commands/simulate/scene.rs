@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail};
-use tactus_model::{Array, Contact, Covering, Indenter, Mesh, Psf, Registration, Simulator};
+use tactus_model::{Array, Contact, Covering, Indenter, Mesh, Psf, Registration, Simulator, Trajectory};
 use tactus_scene::{Attitude, FileError, shapes};
 #[cfg(feature = "gpu")]
 use tactus_scene::{GpuRenderer, Pose, Renderer};
@@ -63,6 +63,9 @@ impl Scene {
         let Indenter::Mesh(mesh) = &self.contact.indenter else {
             bail!("the GPU renders meshes: h, wrench, spaceship or a file");
         };
+        if !self.simulator.effects.is_empty() {
+            bail!("the GPU renders the base model; this model has effects: leave --gpu out");
+        }
         let Simulator { model, covering, .. } = &self.simulator;
         let mut renderer = GpuRenderer::new(Renderer::new(model.clone(), *covering, Arc::clone(mesh))?)?;
         let Contact { position_mm, rotation_deg, depth_mm, .. } = self.contact;
@@ -81,11 +84,17 @@ impl Scene {
         )
     }
 
-    /// Counts before noise and converter, by the exact model.
-    pub(super) fn image(&self) -> Vec<f64> {
-        let mut counts = vec![0.0; self.array().elements()];
-        self.simulator.model.image(&self.contact, self.simulator.covering, &mut counts);
-        counts
+    /// Counts before noise and converter, by the exact model and its effects, of a tool that has just come.
+    pub(super) fn image(&self) -> anyhow::Result<Vec<f64>> {
+        if self.simulator.effects.is_empty() {
+            let mut counts = vec![0.0; self.array().elements()];
+            self.simulator.model.image(&self.contact, self.simulator.covering, &mut counts);
+            return Ok(counts);
+        }
+        let [x_mm, y_mm] = self.contact.position_mm;
+        let there = Trajectory::new([(0.0, [x_mm, y_mm, -self.contact.depth_mm])])?;
+        let image = self.simulator.run(&there, 1.0, 1, || 0.0)?.next();
+        Ok(image.context("a run of one image gave none")?.clean_counts)
     }
 }
 

@@ -1,0 +1,178 @@
+//! What a reader must know of a calibration: what is missing, and what speaks against its numbers.
+
+use super::Calibration;
+use crate::{
+    Declared, Readings, RegistrationFit, ResponseFit, ThicknessFit, faults::FaultKind,
+    readings::distinct_places,
+};
+
+/// Residuals of so many times the noise say that the model is not the sensor's.
+const MISFIT: f64 = 1.5;
+/// What chance gives in one case in a thousand is no chance.
+const IMPLAUSIBLE: f64 = 1e-3;
+
+impl Calibration {
+    pub(super) fn remark(&mut self, declared: &Declared, readings: &Readings) {
+        self.remark_data(declared, readings);
+        self.remark_health();
+        if let Some(registration) = self.registration.take() {
+            self.remark_registration(&registration);
+            self.registration = Some(registration);
+        }
+        if let Some(response) = self.response.take() {
+            self.remark_response(&response, readings.elements);
+            self.response = Some(response);
+        }
+        match self.thickness.take() {
+            Some(thickness) => {
+                self.remark_thickness(&thickness);
+                self.thickness = Some(thickness);
+            }
+            None if self.response.is_some() && self.spreads.is_empty() => {
+                let places = distinct_places(readings.presses.iter().map(|press| press.place_mm)).len();
+                self.missing.push(format!(
+                    "Point spread: {places} places were pressed; it takes 9 under one covering, between the elements."
+                ));
+            }
+            None => {}
+        }
+    }
+
+    fn remark_data(&mut self, declared: &Declared, readings: &Readings) {
+        let unrested = readings.presses.iter().filter(|press| press.rest.is_none()).count();
+        if unrested > 0 {
+            self.warnings
+                .push(format!("{unrested} presses have no reading at rest before them and are left out."));
+        }
+        if readings.frames_left_out > 0 {
+            self.warnings.push(format!(
+                "{} of {} frames are left out: an element read what no noise explains.",
+                readings.frames_left_out, readings.frames
+            ));
+        }
+        let unknown = readings.presses.iter().filter(|press| declared.indenter(press).is_none()).count();
+        if unknown > 0 {
+            self.warnings
+                .push(format!("{unknown} presses are left out: their tool is not in the rig's description."));
+        }
+    }
+
+    fn remark_health(&mut self) {
+        if !self.health.not_judged.is_empty() {
+            self.missing.push(format!(
+                "Health of {} elements: no reference press came near them ({}).",
+                self.health.not_judged.len(),
+                listed(&self.health.not_judged)
+            ));
+        }
+        if self.health.faults.iter().any(|fault| matches!(fault.kind, FaultKind::Noisy { .. })) {
+            self.warnings.push("Noisy elements are left out of all fits, though they may respond.".into());
+        }
+    }
+
+    fn remark_registration(&mut self, registration: &RegistrationFit) {
+        if registration.rotation_deg.is_none() {
+            self.missing.push(
+                "Rotation: the presses lie too close together, within two pitches; it is taken as declared."
+                    .into(),
+            );
+        }
+        if registration.surface_mm.is_none() {
+            self.missing.push("Surface: one depth was pressed only; its height is taken as declared.".into());
+        }
+        if !registration.left_out.is_empty() {
+            self.warnings.push(format!(
+                "{} presses contradict the others and are left out of registration and responses.",
+                registration.left_out.len()
+            ));
+        }
+        if registration.residual_in_noise > MISFIT {
+            self.warnings.push(format!(
+                "Residuals of the registration are {:.1} times the noise: the base model lacks something, and errors are wider \
+                 for it but may still be too small.",
+                registration.residual_in_noise
+            ));
+        }
+        if let Some(scale) = registration.scale
+            && !scale.covers(1.0)
+            && (scale.value - 1.0).abs() > 1e-3
+        {
+            self.warnings.push(format!(
+                "Distances measured are {:.4} +- {:.4} of those declared: check the element centres and the stage's steps per mm.",
+                scale.value, scale.standard_error
+            ));
+        }
+    }
+
+    fn remark_response(&mut self, response: &ResponseFit, elements: usize) {
+        if self.registration.is_none() {
+            self.warnings.push(
+                "Sensitivities rest on the declared place, surface and spread: as far as these are nominal, they are slopes at \
+                 the place that was pressed, not the elements' own."
+                    .into(),
+            );
+        }
+        if response.residual_in_noise > MISFIT {
+            self.warnings.push(format!(
+                "Residuals of the responses are {:.1} times the noise: no form tried here is the sensor's, and errors are wider \
+                 for it but may still be too small.",
+                response.residual_in_noise
+            ));
+        }
+        let flat = response.elements.iter().filter(|one| one.begins_flat()).map(|one| one.element);
+        let flat: Vec<usize> = flat.collect();
+        if !flat.is_empty() {
+            self.warnings.push(format!(
+                "The responses of {} elements begin flat ({}): their sensitivity at the surface and their curvature say little \
+                 apart from each other. Use them together, within the depths that were pressed.",
+                flat.len(),
+                listed(&flat)
+            ));
+        }
+        let fitted = |element: usize| response.elements.iter().any(|one| one.element == element);
+        let faulty = |element: usize| self.health.faults.iter().any(|fault| fault.element == element);
+        let without: Vec<usize> =
+            (0..elements).filter(|&element| !fitted(element) && !faulty(element)).collect();
+        if !without.is_empty() {
+            self.missing.push(format!(
+                "Response of {} elements: they were not pressed at their centres ({}).",
+                without.len(),
+                listed(&without)
+            ));
+        }
+        if response.trials.iter().all(|trial| trial.heldout_rms_counts.is_none()) {
+            self.missing.push(
+                "Form of the response: it takes three depths in a press to hold one out. It is taken to be linear.".into(),
+            );
+        }
+    }
+
+    fn remark_thickness(&mut self, thickness: &ThicknessFit) {
+        if thickness.coverings.len() < 2 {
+            self.missing.push(
+                "Spread against thickness: one covering was pressed; it takes two for a line, three for a parabola.".into(),
+            );
+        }
+        for covering in &thickness.coverings {
+            if covering.chance.is_some_and(|chance| chance < IMPLAUSIBLE) {
+                self.warnings.push(format!(
+                    "Under the covering of {:.3} mm the spread changes with depth by {:.3} mm, more than its errors explain.",
+                    covering.covering_mm, covering.range_mm
+                ));
+            }
+        }
+        if let Some(line) = &thickness.linear
+            && line.chance.is_some_and(|chance| chance < IMPLAUSIBLE)
+        {
+            self.warnings.push(format!(
+                "Spread against thickness is no straight line: points lie {:.3} mm rms off it, more than their errors explain. \
+                 The errors of the line are widened accordingly.",
+                line.rms_mm
+            ));
+        }
+    }
+}
+
+fn listed(elements: &[usize]) -> String {
+    elements.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
