@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd python gpu
+ci: fmt lint docs deny test validate systemd python solid-check gpu
 
 # The README's second command.
 test:
@@ -78,6 +78,12 @@ solid-check: build solid-tools
 solid-tools:
     test -d {{ tools }}/solid || python3 -m venv {{ tools }}/solid
     {{ tools }}/solid/bin/pip install --quiet --requirement bench/peers/fem-requirements.txt
+
+# Truth comes back: the paper's experiments on many simulated rigs whose truth varies, calibrated, all by the real binary; the table of
+# coverage. 200 rigs take about 20 minutes on two cores; tests/truth.rs does two of them, coarsely, with every other test.
+truth rigs="200":
+    cargo build --release --package tactus
+    TACTUS_TRUTH_RIGS={{ rigs }} TACTUS_TRUTH_POINTS=15 cargo test --release --package tactus-e2e --test truth -- --nocapture
 
 # How fast the models are, how they grow, how far from the machine's limits: bench/README.md.
 bench:
