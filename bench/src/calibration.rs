@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::Instant};
 
 use anyhow::{Context, Result};
-use tactus_calibrate::{Declared, Gather, Readings, Sample, calibrate};
+use tactus_calibrate::{Declared, Readings, calibrate};
 use tactus_model::Registration;
 use tactus_record::rows;
 use tactus_schema::Model;
@@ -47,19 +47,7 @@ impl Calibration {
     /// If the files cannot be read, or show no spread.
     pub fn measure(files: &[PathBuf], times: usize) -> Result<Self> {
         let start = Instant::now();
-        let mut gather = None;
-        let source = rows::visit(files, |rig, row| {
-            gather.get_or_insert_with(|| Gather::new(&rig.array)).take(Sample {
-                run: row.run,
-                press: row.press,
-                phase: row.phase,
-                position_mm: row.position_mm,
-                covering_mm: row.covering_mm,
-                indenter: row.indenter,
-                counts: row.counts,
-            });
-        })?;
-        let readings = gather.context("the files hold no frame")?.finish();
+        let (source, readings) = rows::readings(files)?;
         let read_s = start.elapsed().as_secs_f64();
         let rig = source.rig;
         let declared = Declared {

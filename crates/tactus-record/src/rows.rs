@@ -5,6 +5,7 @@ use std::{
     time::Duration,
 };
 
+use tactus_calibrate::{Gather, Readings, Sample};
 use tactus_schema::{Frame, MonoTime, Rig};
 
 use crate::{
@@ -69,6 +70,27 @@ pub fn visit<P: AsRef<Path>>(
         }
     }
     gathered.into_source()
+}
+
+/// The presses in recordings and measurement tables, as calibration takes them.
+///
+/// # Errors
+/// As [`visit`].
+pub fn readings<P: AsRef<Path>>(paths: &[P]) -> Result<(Source, Readings), RowsError> {
+    let mut gather = None;
+    let source = visit(paths, |rig, row| {
+        gather.get_or_insert_with(|| Gather::new(&rig.array)).take(Sample {
+            run: row.run,
+            press: row.press,
+            phase: row.phase,
+            position_mm: row.position_mm,
+            covering_mm: row.covering_mm,
+            indenter: row.indenter,
+            counts: row.counts,
+        });
+    })?;
+    let readings = gather.unwrap_or_else(|| Gather::new(&source.rig.array)).finish();
+    Ok((source, readings))
 }
 
 /// Files that go together.

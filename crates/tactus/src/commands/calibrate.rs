@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde::Serialize;
-use tactus_calibrate::{Calibration, Declared, Gather, Sample};
+use tactus_calibrate::{Calibration, Declared};
 use tactus_record::rows::{self, RunSource};
 use tactus_report::calibration::{CalibrationReport, calibration_html};
 use tactus_schema::{Model, Rig};
@@ -59,20 +59,8 @@ pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result
 
 /// Reads what was measured and characterises the sensor.
 pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
-    let mut gather = None;
-    let source = rows::visit(files, |rig, row| {
-        gather.get_or_insert_with(|| Gather::new(&rig.array)).take(Sample {
-            run: row.run,
-            press: row.press,
-            phase: row.phase,
-            position_mm: row.position_mm,
-            covering_mm: row.covering_mm,
-            indenter: row.indenter,
-            counts: row.counts,
-        });
-    })?;
+    let (source, readings) = rows::readings(files)?;
     let rig = source.rig;
-    let readings = gather.unwrap_or_else(|| Gather::new(&rig.array)).finish();
     let model = Model::of_rig(&rig).context("the rig's reference indenter is not among its tools")?;
     let declared = Declared {
         model: model.forward().context("the rig as it is declared makes no model")?,

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Context;
-use tactus_calibrate::{Gather, Readings, Sample};
+use tactus_calibrate::Readings;
 use tactus_daemon::embedded::SIMULATED_RIG;
 use tactus_model::{Covering, Indenter, Mesh, Registration, Trajectory};
 use tactus_record::rows;
@@ -102,19 +102,7 @@ fn pressed(
         rig_file: Some(rig_with(args, &mesh, angle_deg)?),
     };
     let taken = steps.take(common, args, &step)?;
-    let mut gather = None;
-    rows::visit(&[&taken.recording], |rig, row| {
-        gather.get_or_insert_with(|| Gather::new(&rig.array)).take(Sample {
-            run: row.run,
-            press: row.press,
-            phase: row.phase,
-            position_mm: row.position_mm,
-            covering_mm: row.covering_mm,
-            indenter: row.indenter,
-            counts: row.counts,
-        });
-    })?;
-    let readings = gather.context("the image's recording has no frame")?.finish();
+    let (_, readings) = rows::readings(&[&taken.recording])?;
     compare(calibrated, &readings, mesh, heading)
 }
 
