@@ -2,6 +2,8 @@
 
 mod remarks;
 
+pub(crate) use remarks::number_of;
+
 use serde::Serialize;
 use tactus_model::{Covering, ModelError, Psf, Response};
 

@@ -33,7 +33,7 @@ const DEAD: [f64; 2] = [0.02, 8.0];
 /// Likeness is the cosine between readings and what must have been felt; a stranger's must exceed the own by this.
 const STRANGER: f64 = 0.02;
 /// Places around an element that it takes to tell whose signal it gives.
-const PLACES_LEAST: usize = 4;
+pub(crate) const WIRING_PLACES_LEAST: usize = 4;
 
 /// What is wrong with an element.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -204,7 +204,7 @@ impl Trials {
             );
             return Verdict::Faulty(FaultKind::Dead, evidence);
         }
-        if distinct(&self.places_mm) < PLACES_LEAST {
+        if distinct(&self.places_mm) < WIRING_PLACES_LEAST {
             return Verdict::Sound;
         }
         let own = self.likeness(element, element);

@@ -22,6 +22,7 @@ use tactus_model::{Covering, ForwardModel, Gradient, Registration};
 
 use crate::{
     Estimate,
+    calibration::number_of,
     least_squares::{Fit, Normal, Reading, minimise},
     readings::{Dwell, Press, Readings, distinct_places},
     setting::{Declared, Setting, across, goes_across},
@@ -124,7 +125,8 @@ pub(crate) fn register(
     let places = distinct_places(presses.iter().map(|press| press.place_mm)).len();
     if places < PLACES_LEAST {
         return Err(format!(
-            "{places} places were pressed with the reference tool under the reference covering; it takes {PLACES_LEAST}"
+            "{} pressed with the reference tool under the reference covering; it takes {PLACES_LEAST}",
+            number_of(places)
         ));
     }
     let (count, covering_mm) = (presses.len(), declared.model.response().reference_covering.thickness_mm);

@@ -92,5 +92,5 @@ fn one_place_tells_nothing() {
     lab.press(place_mm, THIN_MM, &[0.2, 0.4]);
     let (declared, readings) = lab.readings();
     let refused = register(&declared, &readings, &[true; 48]).unwrap_err();
-    assert!(refused.contains("1 places"), "{refused}");
+    assert!(refused.contains("1 place was"), "{refused}");
 }

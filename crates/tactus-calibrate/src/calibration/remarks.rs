@@ -2,8 +2,10 @@
 
 use super::Calibration;
 use crate::{
-    Declared, Readings, RegistrationFit, ResponseFit, ThicknessFit, faults::FaultKind,
+    Declared, Readings, RegistrationFit, ResponseFit, ThicknessFit,
+    faults::{FaultKind, WIRING_PLACES_LEAST},
     readings::distinct_places,
+    setting::across,
 };
 
 /// Residuals of so many times the noise say that the model is not the sensor's.
@@ -14,7 +16,7 @@ const IMPLAUSIBLE: f64 = 1e-3;
 impl Calibration {
     pub(super) fn remark(&mut self, declared: &Declared, readings: &Readings) {
         self.remark_data(declared, readings);
-        self.remark_health();
+        self.remark_health(declared, readings);
         if let Some(registration) = self.registration.take() {
             self.remark_registration(&registration);
             self.registration = Some(registration);
@@ -31,7 +33,8 @@ impl Calibration {
             None if self.response.is_some() && self.spreads.is_empty() => {
                 let places = distinct_places(readings.presses.iter().map(|press| press.place_mm)).len();
                 self.missing.push(format!(
-                    "Point spread: {places} places were pressed; it takes 9 under one covering, between the elements."
+                    "Point spread: {} pressed; it takes 9 under one covering, between the elements.",
+                    number_of(places)
                 ));
             }
             None => {}
@@ -57,7 +60,14 @@ impl Calibration {
         }
     }
 
-    fn remark_health(&mut self) {
+    fn remark_health(&mut self, declared: &Declared, readings: &Readings) {
+        let places = distinct_places(across(declared, readings).iter().map(|press| press.place_mm)).len();
+        if places < WIRING_PLACES_LEAST {
+            self.missing.push(format!(
+                "Cross-wired elements: {} pressed, and it takes {WIRING_PLACES_LEAST} to tell whose signal an element gives.",
+                number_of(places)
+            ));
+        }
         if !self.health.not_judged.is_empty() {
             self.missing.push(format!(
                 "Health of {} elements: no reference press came near them ({}).",
@@ -171,6 +181,11 @@ impl Calibration {
             ));
         }
     }
+}
+
+/// `1 place was`, `2 places were`.
+pub(crate) fn number_of(places: usize) -> String {
+    if places == 1 { "1 place was".into() } else { format!("{places} places were") }
 }
 
 fn listed(elements: &[usize]) -> String {
