@@ -8,7 +8,7 @@ use serde::Serialize;
 use tactus_model::{Covering, ModelError, Psf, Response};
 
 use crate::{
-    Declared, Estimate, Health, Readings, RegistrationFit, ResponseFit, SpreadFit, ThicknessFit,
+    Declared, Estimate, Form, Health, Readings, RegistrationFit, ResponseFit, SpreadFit, ThicknessFit,
     faults::examine,
     registration::{Place, register},
     response::respond,
@@ -171,12 +171,17 @@ impl Calibration {
             reference_indenter: declared.reference_indenter.clone(),
             reference_covering: Covering { thickness_mm: self.data.reference_covering_mm },
         };
-        let mut errors = [vec![0.0; elements], vec![0.0; elements], vec![0.0; elements]];
+        // What was not fitted is known as well as elements are alike; a straight line, as well as a curvature is known.
+        let sensitivities: Vec<f64> =
+            fitted.elements.iter().map(|one| one.sensitivity_counts_per_mm.value).collect();
+        let bent = fitted.shared_quadratic_per_mm.map_or(0.0, |curvature| curvature.standard_error);
+        let mut errors = [vec![scatter(&sensitivities); elements], vec![0.0; elements], vec![bent; elements]];
         for one in fitted.elements.iter().chain(&fitted.cross_wired) {
             response.sensitivity_counts_per_mm[one.element] = one.sensitivity_counts_per_mm.value;
             response.quadratic_per_mm[one.element] = one.quadratic_per_mm.value;
             errors[0][one.element] = one.sensitivity_counts_per_mm.standard_error;
-            errors[2][one.element] = one.quadratic_per_mm.standard_error;
+            errors[2][one.element] =
+                one.quadratic_per_mm.standard_error.max(if fitted.form == Form::Linear { bent } else { 0.0 });
         }
         for (element, baseline) in self.baseline_counts.iter().enumerate() {
             if let Some(baseline) = baseline {
@@ -235,6 +240,13 @@ fn referred(
     };
     let (array, psf) = (declared.array().clone(), declared.model.psf());
     Ok(Declared { model: tactus_model::ForwardModel::new(array, psf, response)?, ..declared.clone() })
+}
+
+/// Standard deviation about the mean.
+fn scatter(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)).sqrt()
 }
 
 /// The middle value; `None` of nothing.

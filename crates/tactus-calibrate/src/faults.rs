@@ -14,21 +14,21 @@
 //! Paper, Sec. 2.2: two elements "responded to a stimulus of one adjacent element, but not to the element itself".
 
 use serde::Serialize;
-use tactus_model::Covering;
+use tactus_model::{Contact, Covering};
 
 use crate::{
     readings::{Readings, distinct_places},
     registration::Place,
-    setting::{Declared, across},
+    setting::{Declared, across, goes_across},
 };
 
 /// Noise of so many times the median is no chance.
 const NOISY: f64 = 3.0;
 /// Frames at rest that it takes to know a noise.
 const FRAMES_LEAST: u64 = 30;
-/// An element counts as pressed if it must have felt this share of what any element felt.
+/// An element counts as pressed if it must have felt this share of what a press at its own centre gives.
 const PRESSED: f64 = 0.85;
-/// A dead element rises less than this share of the median element, and than these many standard deviations.
+/// A dead element rises less than this share of the stronger ones, and than these many standard deviations.
 const DEAD: [f64; 2] = [0.02, 8.0];
 /// Likeness is the cosine between readings and what must have been felt; a stranger's must exceed the own by this.
 const STRANGER: f64 = 0.02;
@@ -100,7 +100,10 @@ impl Health {
 /// Judges every element.
 pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &Place) -> Health {
     let trials = Trials::of(declared, readings, place);
-    let typical_noise = typical(readings.noise_rms_counts.iter().flatten().copied());
+    // Elements that never change would make the others look noisy.
+    let varying = readings.noise_rms_counts.iter().zip(&readings.constant_counts);
+    let varying = varying.filter(|(_, constant)| constant.is_none()).filter_map(|(noise, _)| *noise);
+    let typical_noise = quantile(varying, 0.5);
     let (mut faults, mut not_judged) = (Vec::new(), Vec::new());
     for element in 0..readings.elements {
         let fault = |kind, evidence| Fault { element, kind, evidence };
@@ -128,10 +131,10 @@ pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &Place) -
 }
 
 fn stuck(readings: &Readings, element: usize, typical_noise: f64) -> Option<f32> {
-    let others_vary = typical_noise > 0.0
-        && readings.constant_counts.iter().filter(|constant| constant.is_none()).count() * 2
-            > readings.elements;
-    readings.constant_counts[element].filter(|_| others_vary && readings.frames >= FRAMES_LEAST)
+    // Its noise is that of rounding; where that is all that others have, a steady reading is no fault.
+    let rounding = readings.noise_rms_counts[element].unwrap_or(0.0);
+    readings.constant_counts[element]
+        .filter(|_| typical_noise > 2.0 * rounding && readings.frames >= FRAMES_LEAST)
 }
 
 /// Every press at its deepest, as the elements must have felt it and as they read it.
@@ -142,10 +145,14 @@ struct Trials {
     /// Standard deviation of a rise in units of one frame's noise.
     spread: Vec<f64>,
     places_mm: Vec<[f64; 2]>,
-    /// Greatest that each element felt, over the greatest that any did.
+    /// Greatest that each element felt of a press, over what it would have felt of it at its centre.
     reach: Vec<f64>,
-    /// Rise of the median among the elements that were pressed.
-    typical_rise: f64,
+    /// Rise of the stronger among the elements that were pressed; dead ones are not among them, be they many.
+    strong_rise: f64,
+    /// Greatest rise of any in units of its standard deviation.
+    clearest: f64,
+    /// True if the presses go across the sensor: in one patch all elements rise and fall alike.
+    across: bool,
 }
 
 enum Verdict {
@@ -162,15 +169,27 @@ impl Trials {
             spread: Vec::new(),
             places_mm: Vec::new(),
             reach: vec![0.0; readings.elements],
-            typical_rise: 0.0,
+            strong_rise: 0.0,
+            clearest: 0.0,
+            across: false,
         };
         let Ok(model) = declared.unit_model(place.sigma_mm) else { return trials };
+        let centre_mm = declared.array().centre_mm(0).unwrap_or_default();
+        let mut at_centre = vec![0.0; readings.elements];
         for press in across(declared, readings) {
             let Some((dwell, indenter)) = press.deepest().zip(declared.indenter(press)) else { continue };
             let Some(variance) = press.rise(dwell, 0).map(|[_, variance]| variance) else { continue };
             let contact = place.setting.contact(press, dwell, indenter);
             let mut felt = vec![0.0; readings.elements];
-            model.indentation(&contact, Covering { thickness_mm: press.covering_mm }, &mut felt);
+            let covering = Covering { thickness_mm: press.covering_mm };
+            model.indentation(&contact, covering, &mut felt);
+            let centred = Contact { position_mm: centre_mm, ..contact };
+            model.indentation(&centred, covering, &mut at_centre);
+            if at_centre[0] > 0.0 {
+                for (reach, felt) in trials.reach.iter_mut().zip(&felt) {
+                    *reach = reach.max(felt / at_centre[0]);
+                }
+            }
             let rises =
                 (0..readings.elements).filter_map(|element| press.rise(dwell, element)).map(|[rise, _]| rise);
             trials.rises.push(rises.collect());
@@ -178,33 +197,34 @@ impl Trials {
             trials.spread.push(variance.sqrt());
             trials.places_mm.push(press.place_mm);
         }
-        let most = trials.felt.iter().flatten().copied().fold(0.0, f64::max);
-        if most > 0.0 {
-            for felt in &trials.felt {
-                for (reach, felt) in trials.reach.iter_mut().zip(felt) {
-                    *reach = reach.max(felt / most);
-                }
-            }
-        }
-        let pressed = (0..readings.elements).filter(|element| trials.reach[*element] >= PRESSED);
-        trials.typical_rise = typical(pressed.map(|element| trials.greatest(element)[0]));
+        let pressed: Vec<usize> =
+            (0..readings.elements).filter(|element| trials.reach[*element] >= PRESSED).collect();
+        trials.strong_rise = quantile(pressed.iter().map(|element| trials.greatest(*element)[0]), 0.9);
+        let clear = |element: &usize| {
+            let noise = readings.noise_rms_counts[*element].unwrap_or(f64::INFINITY);
+            let [rise, spread] = trials.greatest(*element);
+            rise / (noise * spread)
+        };
+        trials.clearest = pressed.iter().map(clear).fold(0.0, f64::max);
+        trials.across = goes_across(declared, across(declared, readings).into_iter());
         trials
     }
 
     fn verdict(&self, element: usize, noise: f64) -> Verdict {
-        if self.reach[element] < PRESSED {
+        let [share, deviations] = DEAD;
+        // Presses that raise nothing are too light to judge by, or everything is dead.
+        if self.reach[element] < PRESSED || self.clearest < deviations {
             return Verdict::Unknown;
         }
         let [rise, spread] = self.greatest(element);
-        let [share, deviations] = DEAD;
-        if rise < share * self.typical_rise && rise < deviations * noise * spread {
+        if rise < share * self.strong_rise && rise < deviations * noise * spread {
             let evidence = format!(
-                "rose by {rise:.1} counts at most under presses that raised the median element by {:.0}",
-                self.typical_rise
+                "rose by {rise:.1} counts at most under presses that raised others by {:.0}",
+                self.strong_rise
             );
             return Verdict::Faulty(FaultKind::Dead, evidence);
         }
-        if distinct(&self.places_mm) < WIRING_PLACES_LEAST {
+        if !self.across || distinct(&self.places_mm) < WIRING_PLACES_LEAST {
             return Verdict::Sound;
         }
         let own = self.likeness(element, element);
@@ -250,11 +270,13 @@ fn distinct(places_mm: &[[f64; 2]]) -> usize {
     distinct_places(places_mm.iter().copied()).len()
 }
 
-/// The middle value; 0 of nothing.
-fn typical(values: impl Iterator<Item = f64>) -> f64 {
+/// The value below which this share of the values lies; 0 of nothing.
+fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
+    let place = (values.len() as f64 * share) as usize;
+    values.get(place).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

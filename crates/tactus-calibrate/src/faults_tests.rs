@@ -26,6 +26,7 @@ fn each_kind_of_fault_is_found_and_named() {
     lab.centres();
     let (declared, mut readings) = lab.readings();
     readings.constant_counts[40] = Some(812.0);
+    readings.noise_rms_counts[40] = Some(12.0_f64.sqrt().recip());
     readings.noise_rms_counts[30] = Some(30.0);
     let kinds: Vec<(usize, FaultKind)> =
         health(&declared, &readings).faults.into_iter().map(|fault| (fault.element, fault.kind)).collect();
@@ -59,4 +60,38 @@ fn elements_that_fall_when_pressed_are_sound() {
     lab.centres();
     let (declared, readings) = lab.readings();
     assert!(health(&declared, &readings).faults.is_empty());
+}
+
+#[test]
+fn many_dead_elements_do_not_pass_for_the_rule() {
+    let mut lab = Lab::new(5);
+    lab.spoil = Box::new(|counts, _| counts[..30].fill(100.0));
+    lab.centres();
+    let (declared, readings) = lab.readings();
+    let dead: Vec<usize> = health(&declared, &readings).faults.iter().map(|fault| fault.element).collect();
+    assert_eq!(dead, (0..30).collect::<Vec<_>>());
+}
+
+#[test]
+fn many_stuck_elements_do_not_make_the_others_noisy() {
+    let mut lab = Lab::new(6);
+    lab.centres();
+    let (declared, mut readings) = lab.readings();
+    for element in 0..30 {
+        readings.constant_counts[element] = Some(500.0);
+        readings.noise_rms_counts[element] = Some(12.0_f64.sqrt().recip());
+    }
+    let faults = health(&declared, &readings).faults;
+    assert_eq!(faults.len(), 30);
+    assert!(faults.iter().all(|fault| matches!(fault.kind, FaultKind::Stuck { .. })), "{faults:?}");
+}
+
+#[test]
+fn a_sensor_that_answers_to_nothing_is_not_judged() {
+    let mut lab = Lab::new(7);
+    lab.spoil = Box::new(|counts, _| counts.fill(100.0));
+    lab.centres();
+    let (declared, readings) = lab.readings();
+    let health = health(&declared, &readings);
+    assert_eq!((health.faults.len(), health.not_judged.len()), (0, 48));
 }

@@ -30,6 +30,8 @@ use crate::{
 
 /// Places that must be pressed for a place of the sensor to follow.
 const PLACES_LEAST: usize = 4;
+/// Beyond so many times the noise, presses in one patch say nothing sure of the sensor's place.
+const PATCH_MISFIT: f64 = 3.0;
 /// An element takes part if it rose so many standard deviations of its noise.
 const RISE_LEAST: f64 = 20.0;
 /// A press is left out if its misfit is so many times the median press's.
@@ -52,7 +54,7 @@ pub struct RegistrationFit {
     pub origin_mm: [Estimate; 2],
     /// Angle from the robot's x axis to the sensor's; not estimated where the places lie too close together.
     pub rotation_deg: Option<Estimate>,
-    /// Height of the covering's surface; not estimated where one depth was pressed only.
+    /// Height of the covering's surface; not estimated where fewer than three depths were pressed.
     pub surface_mm: Option<Estimate>,
     /// Distances in the robot's frame over those declared for the sensor.
     pub scale: Option<Estimate>,
@@ -122,6 +124,12 @@ pub(crate) fn register(
 ) -> Result<(RegistrationFit, Place), String> {
     let presses: Vec<&Press> =
         across(declared, readings).into_iter().filter(|press| press.rest.is_some()).collect();
+    if presses.is_empty() && !readings.presses.is_empty() {
+        return Err("no reference press has frames at rest before it, with nothing on the covering".into());
+    }
+    if presses.iter().all(|press| press.dwells.iter().all(|dwell| dwell.height_mm >= 0.0)) {
+        return Err("every reference press lies above the declared surface, z = 0".into());
+    }
     let places = distinct_places(presses.iter().map(|press| press.place_mm)).len();
     if places < PLACES_LEAST {
         return Err(format!(
@@ -140,8 +148,15 @@ pub(crate) fn register(
         }
         let press = problem.presses.remove(outlying);
         contradicting.push((press.run, press.index));
-        problem = Problem::new(declared, readings, sound, problem.presses)?;
+        problem.start.clone_from(&fit.parameters);
         fit = problem.fit(None).ok_or(UNDETERMINED)?;
+    }
+    let residual_in_noise = fit.misfit.sqrt();
+    if !problem.free[ROTATION] && residual_in_noise > PATCH_MISFIT {
+        return Err(format!(
+            "the presses lie within two pitches, and residuals are {residual_in_noise:.0} times the noise: a faulty element among \
+             them, perhaps, which such a patch cannot show"
+        ));
     }
     let place = place(&fit, contradicting.clone());
     let estimate =
@@ -159,7 +174,7 @@ pub(crate) fn register(
         runs: runs.into_iter().map(|run| readings.runs[run].clone()).collect(),
         presses: problem.presses.len(),
         left_out: contradicting.iter().map(|(run, index)| (readings.runs[*run].clone(), *index)).collect(),
-        residual_in_noise: fit.misfit.sqrt(),
+        residual_in_noise,
     };
     Ok((registration, place))
 }
@@ -199,8 +214,9 @@ impl<'a> Problem<'a> {
         let mut free = vec![true; start.len()];
         free[ROTATION] = goes_across(declared, presses.iter().copied());
         free[SCALE] = false;
-        free[SURFACE] = depths.len() >= 2;
-        free[CURVATURE] = depths.len() >= 3;
+        // Two depths cannot tell a surface that stands elsewhere from a response that is curved.
+        free[SURFACE] = depths.len() >= 3;
+        free[CURVATURE] = depths.len() >= 2;
         Ok(Self { declared, presses, elements, start, free })
     }
 

@@ -17,6 +17,8 @@
 
 mod fit;
 
+use std::collections::BTreeMap;
+
 use nalgebra::DMatrix;
 use serde::Serialize;
 use tactus_model::Covering;
@@ -32,6 +34,8 @@ use fit::{Fitted, Group, fit, heldout};
 
 /// A press counts as one at an element's centre if the element feels this share of what it would feel there.
 const NEAR: f64 = 0.9;
+/// So many elements tell by themselves how much a gain scatters between them.
+const ELEMENTS_LEAST: usize = 5;
 /// Presses with so many dwells are preferred to others.
 const DWELLS_LEAST: usize = 3;
 /// A response begins flat if its slope is fewer standard errors than this, or its curvature at the deepest press
@@ -154,7 +158,8 @@ pub(crate) fn respond(
 ) -> Result<(ResponseFit, Gains), String> {
     let sound = health.sound(readings.elements);
     let own = |element: usize| sound[element].then_some(element);
-    let groups = |place: &Place| groups(declared, readings, own, place);
+    // Which presses count is decided once: a hair's move of the sensor is not to change it.
+    let groups = |moved: &Place| groups(declared, readings, own, [place, moved]);
     let here = groups(place);
     if here.is_empty() {
         return Err(
@@ -162,10 +167,12 @@ pub(crate) fn respond(
                 .into(),
         );
     }
-    let fits = Form::ALL.map(|form| fit(form, &here, |_| true));
+    let fits = Form::ALL.map(|form| fit(form, &here, |_, _| true));
     let linear = fits[0].as_ref().ok_or("the readings do not determine the responses")?;
-    let form = chosen(&here);
     let [_, shared, own] = &fits;
+    // Where nothing can be held out, a curvature with its error says more than a straight line without.
+    let unheld = if shared.is_some() { Form::SharedQuadratic } else { Form::Linear };
+    let form = chosen(&here).unwrap_or(unheld);
     let wanted = match form {
         Form::Linear => linear,
         Form::SharedQuadratic => shared.as_ref().unwrap_or(linear),
@@ -175,7 +182,7 @@ pub(crate) fn respond(
     // A wrong place moves the responses.
     let by_place = |fitted: &Fitted| {
         let column = |parameter: usize| {
-            let moved = fit(fitted.form, &groups(&place.moved(parameter, STEP)), |_| true);
+            let moved = fit(fitted.form, &groups(&place.moved(parameter, STEP)), |_, _| true);
             let moved = moved.filter(|moved| moved.elements == elements).unwrap_or_else(|| fitted.clone());
             (moved.expanded() - fitted.expanded()) / STEP
         };
@@ -236,7 +243,7 @@ fn cross_wired(
     place: &Place,
     wanted: &Fitted,
 ) -> Vec<ElementResponse> {
-    let mut there = groups(declared, readings, |element| health.answers_for(element), place);
+    let mut there = groups(declared, readings, |element| health.answers_for(element), [place, place]);
     let k = match wanted.form {
         Form::Linear => 0.0,
         Form::SharedQuadratic | Form::OwnQuadratic => wanted.typical_curvature(),
@@ -244,7 +251,7 @@ fn cross_wired(
     for point in there.iter_mut().flat_map(|group| &mut group.points) {
         point.u_mm += k * point.u_mm * point.u_mm;
     }
-    let Some(fitted) = fit(Form::Linear, &there, |_| true) else { return Vec::new() };
+    let Some(fitted) = fit(Form::Linear, &there, |_, _| true) else { return Vec::new() };
     let responses = fitted.elements.iter().enumerate().map(|(index, element)| ElementResponse {
         element: *element,
         points: Vec::new(),
@@ -256,44 +263,51 @@ fn cross_wired(
     responses.collect()
 }
 
-/// The form with the fewest parameters that no other beats on held-out dwells.
-fn chosen(groups: &[Group]) -> Form {
+/// The form with the fewest parameters that no other beats on held-out dwells; `None` if none can be held out.
+fn chosen(groups: &[Group]) -> Option<Form> {
     let mut best = Form::Linear;
-    let Some(mut best_errors) = heldout(best, groups) else { return best };
+    let mut best_errors = heldout(best, groups)?;
     for form in [Form::SharedQuadratic, Form::OwnQuadratic] {
         let Some(errors) = heldout(form, groups) else { continue };
-        // By element: errors of one element hang together.
-        let mut gains: std::collections::BTreeMap<usize, f64> = std::collections::BTreeMap::new();
+        let mut by_element: BTreeMap<usize, f64> = BTreeMap::new();
+        let mut by_dwell = Vec::new();
         for (before, after) in best_errors.iter().zip(&errors) {
-            *gains.entry(before.element).or_default() += before.in_noise.powi(2) - after.in_noise.powi(2);
+            let gain = before.in_noise.powi(2) - after.in_noise.powi(2);
+            *by_element.entry(before.element).or_default() += gain;
+            by_dwell.push(gain);
         }
+        // Errors of one element hang together; but few elements say nothing of their own scatter.
+        let gains =
+            if by_element.len() >= ELEMENTS_LEAST { by_element.into_values().collect() } else { by_dwell };
         let count = gains.len() as f64;
-        let mean = gains.values().sum::<f64>() / count;
-        let variance = gains.values().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        let mean = gains.iter().sum::<f64>() / count;
+        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
         if mean > 2.0 * (variance / count).sqrt() && mean > 0.0 {
             (best, best_errors) = (form, errors);
         }
     }
-    best
+    Some(best)
 }
 
-/// The presses at the centres of elements, of which `signal_of` says whose signal they give, if they take part.
+/// The presses at the centres of elements, of which `signal_of` says whose signal they give, if they take part: chosen
+/// with the sensor at one place, felt with it at another.
 fn groups(
     declared: &Declared,
     readings: &Readings,
     signal_of: impl Fn(usize) -> Option<usize>,
-    place: &Place,
+    [chosen_at, place]: [&Place; 2],
 ) -> Vec<Group> {
     let mut near: Vec<Vec<Group>> = vec![Vec::new(); readings.elements];
-    let Ok(model) = declared.unit_model(place.sigma_mm) else { return Vec::new() };
+    let Ok(model) = declared.unit_model(chosen_at.sigma_mm) else { return Vec::new() };
+    let Ok(felt_by) = declared.unit_model(place.sigma_mm) else { return Vec::new() };
     let centre_mm = declared.array().centre_mm(0).unwrap_or_default();
     let mut felt = vec![0.0; readings.elements];
     let mut felt_at_centre = felt.clone();
-    let trusted = |press: &&Press| declared.is_reference(press) && place.admits(press);
+    let trusted = |press: &&Press| declared.is_reference(press) && chosen_at.admits(press);
     for press in readings.presses.iter().filter(trusted) {
         let (Some(indenter), Some(deepest)) = (declared.indenter(press), press.deepest()) else { continue };
         let covering = Covering { thickness_mm: press.covering_mm };
-        let mut contact = place.setting.contact(press, deepest, indenter);
+        let mut contact = chosen_at.setting.contact(press, deepest, indenter);
         model.indentation(&contact, covering, &mut felt);
         contact.position_mm = centre_mm;
         model.indentation(&contact, covering, &mut felt_at_centre);
@@ -302,7 +316,7 @@ fn groups(
                 continue;
             };
             if felt[signal] > NEAR * felt_at_centre[0] {
-                groups.extend(Group::of(declared, &model, place, press, [element, signal], noise));
+                groups.extend(Group::of(declared, &felt_by, place, press, [element, signal], noise));
             }
         }
     }

@@ -92,3 +92,46 @@ fn a_response_turned_round_is_the_root_near_the_line() {
     // A response that falls again never reads so much.
     assert_eq!(turned_round(3.0, -0.2), None);
 }
+
+#[test]
+fn a_press_that_was_cut_off_does_not_make_the_response_straight() {
+    let mut lab = Lab::new(6);
+    lab.centres();
+    let (declared, mut readings) = lab.readings();
+    readings.presses[20].dwells.truncate(2);
+    let fit = crate::calibrate(&declared, &readings).unwrap().response.unwrap();
+    assert_eq!(fit.form, Form::SharedQuadratic);
+    assert!(fit.trials.iter().all(|trial| trial.heldout_rms_counts.is_some()));
+}
+
+#[test]
+fn two_depths_give_a_curvature_with_its_error_and_no_surface() {
+    let mut lab = Lab::new(7);
+    lab.surface_mm = 0.0;
+    for element in 0..48 {
+        lab.press(lab.centre_mm(element), crate::lab::THIN_MM, &[0.2, 0.5]);
+    }
+    let gains = lab.model.response().sensitivity_counts_per_mm.clone();
+    let (declared, readings) = lab.readings();
+    let found = crate::calibrate(&declared, &readings).unwrap();
+    assert!(found.registration.unwrap().surface_mm.is_none());
+    let fit = found.response.unwrap();
+    assert_eq!(fit.form, Form::SharedQuadratic);
+    for one in &fit.elements {
+        let sensitivity = one.sensitivity_counts_per_mm;
+        assert!((sensitivity.value - gains[one.element]).abs() < 4.5 * sensitivity.standard_error, "{one:?}");
+    }
+}
+
+#[test]
+fn elements_that_were_not_fitted_are_not_known_exactly() {
+    let mut lab = Lab::new(8);
+    for element in [9, 10, 17, 18, 19] {
+        lab.press(lab.centre_mm(element), crate::lab::THIN_MM, &[0.2, 0.3, 0.4, 0.5, 0.6]);
+    }
+    let (declared, readings) = lab.readings();
+    let found = crate::calibrate(&declared, &readings).unwrap();
+    let (response, [errors, ..]) = found.responses(declared.model.response()).unwrap();
+    assert!(errors[47] > 20.0 && errors[47] > 5.0 * errors[18], "{} {}", errors[47], errors[18]);
+    assert!((response.sensitivity_counts_per_mm[47] - 1000.0).abs() < 3.0 * errors[47]);
+}

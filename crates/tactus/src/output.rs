@@ -33,12 +33,9 @@ pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
     }
 }
 
-/// Prints a line. A reader that has seen enough and goes away, such as `head`, ends the program quietly: what it does
-/// is done before it prints.
+/// Prints a line. A reader that has seen enough and goes away, such as `head`, is no reason to end what is being done.
 pub(crate) fn say(line: &str) {
-    if writeln!(std::io::stdout().lock(), "{line}").is_err() {
-        std::process::exit(0);
-    }
+    let _gone = writeln!(std::io::stdout().lock(), "{line}");
 }
 
 /// Writes much to standard output; a reader that has seen enough and goes away is no error.

@@ -2,10 +2,10 @@
 
 use super::Calibration;
 use crate::{
-    Declared, Readings, RegistrationFit, ResponseFit, ThicknessFit,
+    Declared, Form, Readings, RegistrationFit, ResponseFit, ThicknessFit,
     faults::{FaultKind, WIRING_PLACES_LEAST},
     readings::distinct_places,
-    setting::across,
+    setting::{across, goes_across},
 };
 
 /// Residuals of so many times the noise say that the model is not the sensor's.
@@ -61,10 +61,12 @@ impl Calibration {
     }
 
     fn remark_health(&mut self, declared: &Declared, readings: &Readings) {
-        let places = distinct_places(across(declared, readings).iter().map(|press| press.place_mm)).len();
-        if places < WIRING_PLACES_LEAST {
+        let presses = across(declared, readings);
+        let places = distinct_places(presses.iter().map(|press| press.place_mm)).len();
+        if places < WIRING_PLACES_LEAST || !goes_across(declared, presses.into_iter()) {
             self.missing.push(format!(
-                "Cross-wired elements: {} pressed, and it takes {WIRING_PLACES_LEAST} to tell whose signal an element gives.",
+                "Cross-wired elements: {} pressed; it takes {WIRING_PLACES_LEAST}, some pitches apart, to tell whose signal an \
+                 element gives.",
                 number_of(places)
             ));
         }
@@ -88,7 +90,7 @@ impl Calibration {
             );
         }
         if registration.surface_mm.is_none() {
-            self.missing.push("Surface: one depth was pressed only; its height is taken as declared.".into());
+            self.missing.push("Surface: it takes three depths; its height is taken as declared.".into());
         }
         if !registration.left_out.is_empty() {
             self.warnings.push(format!(
@@ -151,9 +153,15 @@ impl Calibration {
             ));
         }
         if response.trials.iter().all(|trial| trial.heldout_rms_counts.is_none()) {
-            self.missing.push(
-                "Form of the response: it takes three depths in a press to hold one out. It is taken to be linear.".into(),
-            );
+            self.missing.push(match response.form {
+                Form::Linear => "Form of the response: one depth was pressed. It is taken to be linear; as far as it is curved, \
+                                 sensitivities and spreads are off by more than their errors say."
+                    .into(),
+                Form::SharedQuadratic | Form::OwnQuadratic => {
+                    "Form of the response: it takes three depths in a press to hold one out. One curvature is taken for all."
+                        .into()
+                }
+            });
         }
     }
 
@@ -168,6 +176,16 @@ impl Calibration {
                 self.warnings.push(format!(
                     "Under the covering of {:.3} mm the spread changes with depth by {:.3} mm, more than its errors explain.",
                     covering.covering_mm, covering.range_mm
+                ));
+            }
+        }
+        if let Some(line) = &thickness.linear {
+            let [intercept, slope] = line.coefficients;
+            if intercept.value <= 0.0 || slope.value < 0.0 {
+                self.warnings.push(format!(
+                    "Spread against thickness has intercept {:.3} mm and slope {:.3}, which is no covering's: the model keeps the \
+                     declared spread.",
+                    intercept.value, slope.value
                 ));
             }
         }

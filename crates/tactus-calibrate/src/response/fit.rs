@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use tactus_model::{Covering, ForwardModel};
 
-use super::{Form, rms};
+use super::{DWELLS_LEAST, Form, rms};
 use crate::{
     Estimate,
     least_squares::{self, Normal, Reading, minimise},
@@ -51,7 +51,7 @@ pub(super) struct Fitted {
 }
 
 impl Group {
-    /// An element's readings, which give some element's signal.
+    /// An element's readings in a press, which give some element's signal, with the sensor at a place.
     pub(super) fn of(
         declared: &Declared,
         model: &ForwardModel,
@@ -148,8 +148,8 @@ impl Fitted {
     }
 }
 
-/// Fits a form to the dwells that are kept; their index in their press decides.
-pub(super) fn fit(form: Form, groups: &[Group], keep: impl Fn(usize) -> bool) -> Option<Fitted> {
+/// Fits a form to the dwells that are kept; their group and their index in it decide.
+pub(super) fn fit(form: Form, groups: &[Group], keep: impl Fn(&Group, usize) -> bool) -> Option<Fitted> {
     let mut elements: Vec<usize> = groups.iter().map(|group| group.element).collect();
     elements.dedup();
     let count = elements.len();
@@ -172,7 +172,7 @@ pub(super) fn fit(form: Form, groups: &[Group], keep: impl Fn(usize) -> bool) ->
             let index = fitted.elements.binary_search(&group.element).ok()?;
             let (s, at) = (parameters[index], fitted.curvature_at(index));
             let k = at.map_or(0.0, |at| parameters[at]);
-            let kept = group.points.iter().enumerate().filter(|(dwell, _)| keep(*dwell));
+            let kept = group.points.iter().enumerate().filter(|(dwell, _)| keep(group, *dwell));
             let readings: Vec<Reading> = kept
                 .map(|(_, point)| {
                     let square = point.u_mm * point.u_mm;
@@ -200,15 +200,13 @@ fn slope(groups: &[Group], element: usize) -> f64 {
 
 /// Errors of predictions of dwells that took no part in the fit; `None` if the presses have too few dwells.
 pub(super) fn heldout(form: Form, groups: &[Group]) -> Option<Vec<HeldOut>> {
-    let dwells = groups.iter().map(|group| group.points.len()).min()?;
-    if dwells < 3 {
-        return None;
-    }
-    let folds = FOLDS.min(dwells);
+    // A press with fewer dwells, cut off perhaps, takes part in the fits but holds none out.
+    let whole = |group: &&Group| group.points.len() >= DWELLS_LEAST;
+    let folds = FOLDS.min(groups.iter().filter(whole).map(|group| group.points.len()).min()?);
     let mut errors = Vec::new();
     for fold in 0..folds {
-        let fitted = fit(form, groups, |dwell| dwell % folds != fold)?;
-        for group in groups {
+        let fitted = fit(form, groups, |group, dwell| !whole(&group) || dwell % folds != fold)?;
+        for group in groups.iter().filter(whole) {
             for (_, point) in group.points.iter().enumerate().filter(|(dwell, _)| dwell % folds == fold) {
                 let counts = point.rise_counts - fitted.predicted(group.element, point.u_mm);
                 let variance = 1.0 / point.frames as f64 + 1.0 / group.rest_frames as f64;

@@ -6,7 +6,7 @@ mod print;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use serde::Serialize;
 use tactus_calibrate::{Calibration, Declared};
 use tactus_record::rows::{self, RunSource};
@@ -60,6 +60,9 @@ pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result
 /// Reads what was measured and characterises the sensor.
 pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
     let (source, readings) = rows::readings(files)?;
+    if readings.frames == 0 {
+        bail!("the files hold no frame");
+    }
     let rig = source.rig;
     let model = Model::of_rig(&rig).context("the rig's reference indenter is not among its tools")?;
     let declared = Declared {

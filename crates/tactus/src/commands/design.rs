@@ -13,7 +13,7 @@ use tactus_schema::model::Model;
 
 use crate::cli::{Common, DesignArgs};
 use crate::exit::{Exit, Failure};
-use crate::output::{print_fields, print_table};
+use crate::output::{self, print_fields, print_table, say};
 
 pub(crate) fn design(common: &Common, args: &DesignArgs) -> anyhow::Result<Exit> {
     let form = args.out.as_deref().map(Form::of).transpose()?;
@@ -37,11 +37,11 @@ pub(crate) fn design(common: &Common, args: &DesignArgs) -> anyhow::Result<Exit>
         said["force_resolution"] = json!(1.0 / f64::from(design.force_steps));
         said["notes"] = json!(notes);
         said["out"] = json!(args.out);
-        println!("{said}");
+        output::write(&format!("{said}\n"))?;
     } else {
         print(&design, &notes);
         if let Some(out) = &args.out {
-            println!("\n{}", out.display());
+            say(&format!("\n{}", out.display()));
         }
     }
     Ok(Exit::Done)
@@ -119,11 +119,11 @@ fn print(design: &Design, notes: &[String]) {
             ),
         ),
     ]);
-    println!();
+    say("");
     for note in notes {
-        println!("{note}");
+        say(note);
     }
-    println!();
+    say("");
     let row = |covered: &Covered| {
         let mut marks = Vec::new();
         if covered.of_the_paper {

@@ -19,7 +19,7 @@ use tactus_report::study::{StudyFigure, StudyReport, StudyRow, StudyRun, study_h
 use super::calibrate::{self, Calibrated};
 use crate::cli::{Common, StudyArgs};
 use crate::exit::Exit;
-use crate::output::duration;
+use crate::output::{self, duration, say};
 use steps::{Steps, Taken};
 
 /// What the model alone gives; Figures 2 and 5 come from the calibration, Figure 8 from the rig's own images.
@@ -28,19 +28,19 @@ const FIGURES: [&str; 7] = ["3", "4", "6a", "6b", "9b", "10a", "10b"];
 pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     let start = Instant::now();
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
-    let mut steps = Steps::resume(args)?;
+    let mut steps = Steps::resume(common, args)?;
     let taken = steps.measure(common, args)?;
-    let say = |what: &str| {
+    let tell = |what: &str| {
         if !common.json {
-            println!("{what}");
+            say(what);
         }
     };
-    say("calibration");
+    tell("calibration");
     let recordings: Vec<_> = taken.iter().map(|taken| taken.recording.clone()).collect();
     let calibrated = calibrate::from_files(&recordings)?;
     calibrate::write(&calibrated, &args.out.join("calibration"))?;
     let truth = rows::truth(&recordings[0])?;
-    let mut missing = Vec::new();
+    let mut missing = calibrated.calibration.missing.clone();
     let images = if truth.is_some() && taken.iter().all(|taken| taken.embedded) {
         images::take(common, args, &mut steps, &calibrated)?
     } else {
@@ -51,32 +51,43 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
         );
         None
     };
-    say("mechanics, acuity, figures");
+    tell("mechanics, acuity, figures");
     let mut figures = figures::finished(&FIGURES)?;
     let rows = rows::rows(&calibrated, truth.as_ref(), images.as_ref())?;
     figures.extend(images.into_iter().flat_map(|images| images.figures));
-    write_report(args, &calibrated, &taken, &rows, &figures, &missing)?;
-    finish(common, args, &calibrated, &rows, start)
+    let mut warnings: Vec<String> = taken.iter().filter_map(|taken| taken.degraded.clone()).collect();
+    warnings.extend(calibrated.notes.iter().chain(&calibrated.calibration.warnings).cloned());
+    let findings = Findings { rows, missing, warnings };
+    write_report(args, &calibrated, &taken, &findings, &figures)?;
+    finish(common, args, &calibrated, &findings, start)
+}
+
+/// What a study came to.
+struct Findings {
+    rows: Vec<StudyRow>,
+    /// What could not be done.
+    missing: Vec<String>,
+    /// What to know before using a number.
+    warnings: Vec<String>,
 }
 
 fn write_report(
     args: &StudyArgs,
     calibrated: &Calibrated,
     taken: &[Taken],
-    rows: &[StudyRow],
+    findings: &Findings,
     figures: &[StudyFigure],
-    missing: &[String],
 ) -> anyhow::Result<()> {
     let runs: Vec<StudyRun> = taken.iter().map(Taken::run).collect();
     let page = study_html(&StudyReport {
         rig: &calibrated.rig.name,
         simulated: calibrated.simulated,
         runs: &runs,
-        rows,
+        rows: &findings.rows,
         calibration: Some(calibrated.report()),
         figures,
-        missing,
-        warnings: &[],
+        missing: &findings.missing,
+        warnings: &findings.warnings,
     });
     put(&args.out.join("report.html"), &page)?;
     for StudyFigure { number, svg, .. } in figures {
@@ -93,7 +104,7 @@ fn finish(
     common: &Common,
     args: &StudyArgs,
     calibrated: &Calibrated,
-    rows: &[StudyRow],
+    Findings { rows, missing, warnings }: &Findings,
     start: Instant,
 ) -> anyhow::Result<Exit> {
     let report = std::path::absolute(args.out.join("report.html"))?;
@@ -101,28 +112,32 @@ fn finish(
     let (inside, known) = (known.clone().filter(|row| row.inside == Some(true)).count(), known.count());
     if common.json {
         let rows: Vec<_> = rows.iter().map(rows::to_json).collect();
-        println!(
-            "{}",
-            json!({
-                "schema": "tactus.study/1",
-                "rig": calibrated.rig.name,
-                "simulated": calibrated.simulated,
-                "rows": rows,
-                "truths": known,
-                "truths_inside": inside,
-                "missing": calibrated.calibration.missing,
-                "warnings": calibrated.calibration.warnings,
-                "report": report,
-                "seconds": start.elapsed().as_secs_f64(),
-            })
-        );
+        let found = json!({
+            "schema": "tactus.study/1",
+            "rig": calibrated.rig.name,
+            "simulated": calibrated.simulated,
+            "rows": rows,
+            "truths": known,
+            "truths_inside": inside,
+            "missing": missing,
+            "warnings": warnings,
+            "report": report,
+            "seconds": start.elapsed().as_secs_f64(),
+        });
+        output::write(&format!("{found}\n"))?;
     } else {
         rows::print(rows);
+        say("");
         if known > 0 {
-            println!("\n{inside} of {known} known truths inside their 95 % intervals");
+            say(&format!("{inside} of {known} known truths inside their 95 % intervals"));
         }
-        println!("{}\ndone in {}", report.display(), duration(start.elapsed().as_secs_f64()));
+        for warning in warnings {
+            say(&format!("warning: {warning}"));
+        }
+        for missing in missing {
+            say(&format!("missing: {missing}"));
+        }
+        say(&format!("{}\ndone in {}", report.display(), duration(start.elapsed().as_secs_f64())));
     }
-    let whole = calibrated.calibration.missing.is_empty();
-    Ok(if whole { Exit::Done } else { Exit::Degraded })
+    Ok(if missing.is_empty() && warnings.is_empty() { Exit::Done } else { Exit::Degraded })
 }

@@ -15,7 +15,7 @@ use tactus_schema::rig::ElementFault;
 
 use super::images::Images;
 use crate::commands::calibrate::{Calibrated, estimate};
-use crate::output::print_table;
+use crate::output::{print_table, say};
 
 /// Poisson's ratio of the covering in the finite elements (rubber hardly changes its volume).
 const POISSON_RATIO: f64 = 0.45;
@@ -297,6 +297,6 @@ pub(super) fn print(rows: &[StudyRow]) {
             inside.into(),
         ]
     });
-    println!();
+    say("");
     print_table(&["quantity", "unit", "paper", "this rig", "truth", "inside"], &cells.collect::<Vec<_>>());
 }

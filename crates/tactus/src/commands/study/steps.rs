@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 use tactus_report::study::StudyRun;
 use tactus_schema::pb::ExitStatus;
 
 use crate::cli::{Common, ExperimentArgs, RunArgs, StudyArgs};
 use crate::commands::run::execute;
 use crate::exit::{Exit, Failure};
-use crate::output::duration;
+use crate::output::{duration, say};
 
 /// Name of the form of `study.json`.
 const SCHEMA: &str = "tactus.study-steps/1";
@@ -25,7 +26,10 @@ pub(super) struct Steps {
     /// What the steps were made with; other steps do not go with them.
     seed: u64,
     points: u32,
-    rig_file: Option<PathBuf>,
+    embedded: bool,
+    rig: Option<String>,
+    /// SHA-256 of the rig file.
+    rig_file: Option<String>,
     taken: Vec<Taken>,
     #[serde(skip)]
     path: PathBuf,
@@ -39,6 +43,8 @@ pub(super) struct Taken {
     pub(super) presses: u32,
     pub(super) duration_s: f64,
     pub(super) embedded: bool,
+    /// What was lost on the way, if anything was.
+    pub(super) degraded: Option<String>,
     pub(super) recording: PathBuf,
 }
 
@@ -65,13 +71,15 @@ impl Taken {
 
 impl Steps {
     /// The steps of the study in the folder, or none yet.
-    pub(super) fn resume(args: &StudyArgs) -> anyhow::Result<Self> {
+    pub(super) fn resume(common: &Common, args: &StudyArgs) -> anyhow::Result<Self> {
         let path = args.out.join("study.json");
         let new = Self {
             schema: SCHEMA.into(),
             seed: args.seed,
             points: args.points,
-            rig_file: args.rig_file.clone(),
+            embedded: args.embedded,
+            rig: common.rig.clone(),
+            rig_file: args.rig_file.as_deref().map(hash).transpose()?,
             taken: Vec::new(),
             path: path.clone(),
         };
@@ -82,10 +90,13 @@ impl Steps {
         let known: Self = serde_json::from_str(&text).with_context(|| {
             format!("{} is no list of a study's steps; give another --out", path.display())
         })?;
-        let same = |steps: &Self| (steps.schema.clone(), steps.seed, steps.points, steps.rig_file.clone());
-        if same(&known) != same(&new) {
+        let with = |steps: &Self| {
+            let Self { schema, seed, points, embedded, rig, rig_file, .. } = steps;
+            (schema.clone(), *seed, *points, *embedded, rig.clone(), rig_file.clone())
+        };
+        if with(&known) != with(&new) {
             let error = format!(
-                "{} is of a study with another seed, rig file or number of points: give another --out, or the same arguments",
+                "{} is of a study with another seed, rig, rig file or number of points: give another --out, or the same arguments and file",
                 path.display()
             );
             return Err(Failure::new(Exit::Usage, error).into());
@@ -119,7 +130,7 @@ impl Steps {
         let known = self.taken.iter().find(|taken| taken.step == step.name && taken.recording.is_file());
         if let Some(known) = known {
             if !common.json {
-                println!("{}: made already, run {}", step.name, known.run_id);
+                say(&format!("{}: made already, run {}", step.name, known.run_id));
             }
             return Ok(known.clone());
         }
@@ -157,16 +168,18 @@ impl Steps {
             presses: summary.presses,
             duration_s: summary.duration_s,
             embedded: summary.embedded,
+            degraded: (summary.exit_status == ExitStatus::Degraded)
+                .then(|| format!("Step {:?} is degraded: {}.", step.name, summary.message)),
             recording: std::path::absolute(&summary.recording)?,
         };
         if !common.json {
             let simulated = if summary.simulated { "SIMULATED, " } else { "" };
-            println!(
+            say(&format!(
                 "{}: {simulated}{} presses, {} of the rig's time",
                 step.name,
                 taken.presses,
                 duration(taken.duration_s)
-            );
+            ));
         }
         self.taken.retain(|known| known.step != step.name);
         self.taken.push(taken.clone());
@@ -181,4 +194,10 @@ impl Steps {
             .with_context(|| beside.display().to_string())?;
         fs::rename(beside, &self.path).with_context(|| self.path.display().to_string())
     }
+}
+
+/// SHA-256 of a file, in hexadecimal.
+fn hash(path: &Path) -> anyhow::Result<String> {
+    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
+    Ok(format!("{:x}", Sha256::digest(bytes)))
 }
