@@ -70,7 +70,8 @@ assets:
     cargo xtask assets
 
 # The finite element model of the covering against scikit-fem, on small meshes: equal reactions, or it fails.
-solid-check: build solid-tools
+solid-check: solid-tools
+    cargo build --quiet --workspace --bin tactus-bench
     {{ tools }}/solid/bin/python bench/peers/fem.py --binary target/debug/tactus-bench --peers scikit-fem --sides rollers \
         --meshes 12x3 16x4 --poisson-ratios 0.3 0.45 0.4999 --rounds 1 --within 1e-10
 
