@@ -1,11 +1,9 @@
 //! Both panels of Fig. 6, in full.
 
-use std::time::Instant;
-
 use anyhow::Result;
 use tactus_calibrate::acuity::{Grid, OFFSETS};
 
-use crate::Growth;
+use crate::{Growth, clock::timed};
 
 /// The panels of one size.
 #[derive(Debug, Clone)]
@@ -57,19 +55,4 @@ impl Acuity {
             },
         ])
     }
-}
-
-/// What the work gives, and the median of its seconds.
-fn timed<T, E>(times: usize, work: impl Fn() -> Result<T, E>) -> Result<(T, f64), E> {
-    let once = || {
-        let started = Instant::now();
-        work().map(|done| (done, started.elapsed().as_secs_f64()))
-    };
-    let (done, first_s) = once()?;
-    let mut took_s = vec![first_s];
-    for _ in 1..times {
-        took_s.push(once()?.1);
-    }
-    took_s.sort_unstable_by(f64::total_cmp);
-    Ok((done, took_s[took_s.len() / 2]))
 }

@@ -4,9 +4,10 @@ use std::{path::PathBuf, time::Instant};
 
 use anyhow::{Context, Result};
 use tactus_calibrate::{Declared, Readings, calibrate};
-use tactus_model::Registration;
 use tactus_record::rows;
 use tactus_schema::Model;
+
+use crate::clock::timed;
 
 /// The times of a calibration, and the images that its spreads were fitted to.
 #[derive(Debug, Clone)]
@@ -62,8 +63,8 @@ impl Calibration {
         Ok(Self {
             presses: readings.presses.len(),
             read_s,
-            whole_s: median(times, || Ok(calibrate(&declared, &readings).map(|_| ())?))?,
-            without_sweeps_s: median(times, || Ok(calibrate(&declared, &without).map(|_| ())?))?,
+            whole_s: timed(times, || calibrate(&declared, &readings))?.1,
+            without_sweeps_s: timed(times, || calibrate(&declared, &without))?.1,
             sweeps: sweeps_of(&declared, &readings, &found)?,
         })
     }
@@ -76,10 +77,7 @@ fn sweeps_of(
 ) -> Result<Vec<Sweep>> {
     let responses = &found.response.as_ref().context("no response was fitted")?.elements;
     let place = found.registration.as_ref().context("no place was found")?;
-    let registration = Registration {
-        origin_mm: place.origin_mm.map(|along| along.value),
-        rotation_deg: place.rotation_deg.map_or(declared.registration.rotation_deg, |angle| angle.value),
-    };
+    let registration = place.registration(declared.registration);
     let surface_mm = place.surface_mm.map_or(0.0, |surface| surface.value);
     let array = declared.model.array();
     let sweep = |spread: &tactus_calibrate::SpreadFit| {
@@ -109,15 +107,4 @@ fn sweeps_of(
         Ok(sweep)
     };
     found.spreads.iter().map(sweep).collect()
-}
-
-fn median(times: usize, mut run: impl FnMut() -> Result<()>) -> Result<f64> {
-    let mut taken = Vec::new();
-    for _ in 0..times.max(1) {
-        let start = Instant::now();
-        run()?;
-        taken.push(start.elapsed().as_secs_f64());
-    }
-    taken.sort_by(f64::total_cmp);
-    Ok(taken[taken.len() / 2])
 }

@@ -1,4 +1,4 @@
-//! The time of an image.
+//! The time of an image, and of any work.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -46,4 +46,19 @@ pub(crate) fn paint(
         }
     }
     Ok((images, started.elapsed()))
+}
+
+/// What the work gives, and the median of its seconds.
+pub(crate) fn timed<T, E>(times: usize, mut work: impl FnMut() -> Result<T, E>) -> Result<(T, f64), E> {
+    let mut once = || {
+        let started = Instant::now();
+        work().map(|done| (done, started.elapsed().as_secs_f64()))
+    };
+    let (done, first_s) = once()?;
+    let mut took_s = vec![first_s];
+    for _ in 1..times {
+        took_s.push(once()?.1);
+    }
+    took_s.sort_unstable_by(f64::total_cmp);
+    Ok((done, took_s[took_s.len() / 2]))
 }

@@ -1,9 +1,11 @@
 //! The finite element model of the covering: the time of one solution, and the reactions.
 
+use std::convert::Infallible;
 use std::hint::black_box;
-use std::time::Instant;
 
 use tactus_solid::fem::{Bricks, Reaction};
+
+use crate::clock::timed;
 
 /// Solutions whose median time counts.
 const RUNS: usize = 5;
@@ -22,14 +24,8 @@ pub struct Fem {
 impl Fem {
     /// Solves a slab, five times over.
     pub fn measure(bricks: Bricks) -> Self {
-        let mut reaction = bricks.under_point();
-        let mut runs_s = Vec::with_capacity(RUNS);
-        for _ in 0..RUNS {
-            let started = Instant::now();
-            reaction = black_box(black_box(bricks).under_point());
-            runs_s.push(started.elapsed().as_secs_f64());
-        }
-        runs_s.sort_by(f64::total_cmp);
-        Self { bricks, solve_s: runs_s[RUNS / 2], reaction }
+        let solve = || Ok::<_, Infallible>(black_box(black_box(bricks).under_point()));
+        let Ok((reaction, solve_s)) = timed(RUNS, solve);
+        Self { bricks, solve_s, reaction }
     }
 }

@@ -2,16 +2,16 @@
 
 mod remarks;
 
-pub(crate) use remarks::number_of;
-
 use serde::Serialize;
 use tactus_model::{Covering, ModelError, Psf, Response};
 
 use crate::{
     Declared, Estimate, Form, Health, Readings, RegistrationFit, ResponseFit, SpreadFit, ThicknessFit,
     faults::examine,
+    order::median,
     registration::{Place, register},
     response::respond,
+    setting::{coverings_mm, same_covering},
     spread::spreads,
     thickness::against_thickness,
 };
@@ -76,21 +76,19 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
 
     let mut place = Place::declared(declared, reference_mm);
     let mut health = examine(declared, readings, &place);
-    let mut sound = health.sound(readings.elements);
+    let sound = health.sound(readings.elements);
     let registration = match register(declared, readings, &sound) {
-        Ok((registration, fitted)) => {
+        Ok((mut registration, fitted)) => {
             place = fitted;
             // Now that the place is known, faults show more clearly.
             health = examine(declared, readings, &place);
-            sound = health.sound(readings.elements);
-            let again = register(declared, readings, &sound);
-            Some(match again {
-                Ok((registration, fitted)) => {
-                    place = fitted;
-                    registration
-                }
-                Err(_) => registration,
-            })
+            let sounder = health.sound(readings.elements);
+            if sounder != sound
+                && let Ok((again, fitted)) = register(declared, readings, &sounder)
+            {
+                (registration, place) = (again, fitted);
+            }
+            Some(registration)
         }
         Err(problem) => {
             missing.push(format!(
@@ -101,7 +99,7 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
     };
     let mut calibration = Calibration {
         data: Data::of(readings, reference_mm),
-        noise_rms_counts: typical(readings.noise_rms_counts.iter().flatten().copied()),
+        noise_rms_counts: median(readings.noise_rms_counts.iter().flatten().copied()),
         baseline_counts: readings
             .rest_counts
             .iter()
@@ -161,12 +159,12 @@ impl Calibration {
     pub fn responses(&self, declared: &Response) -> Option<(Response, [Vec<f64>; 3])> {
         let fitted = self.response.as_ref()?;
         let elements = self.baseline_counts.len();
-        let median = |of: fn(&crate::ElementResponse) -> f64| {
-            typical(fitted.elements.iter().map(of)).unwrap_or_default()
+        let typical = |of: fn(&crate::ElementResponse) -> f64| {
+            median(fitted.elements.iter().map(of)).unwrap_or_default()
         };
         let mut response = Response {
-            sensitivity_counts_per_mm: vec![median(|one| one.sensitivity_counts_per_mm.value); elements],
-            quadratic_per_mm: vec![median(|one| one.quadratic_per_mm.value); elements],
+            sensitivity_counts_per_mm: vec![typical(|one| one.sensitivity_counts_per_mm.value); elements],
+            quadratic_per_mm: vec![typical(|one| one.quadratic_per_mm.value); elements],
             baseline_counts: declared.baseline_counts.clone(),
             reference_indenter: declared.reference_indenter.clone(),
             reference_covering: Covering { thickness_mm: self.data.reference_covering_mm },
@@ -195,16 +193,13 @@ impl Calibration {
 
 impl Data {
     fn of(readings: &Readings, reference_covering_mm: f64) -> Self {
-        let mut coverings_mm: Vec<f64> = readings.presses.iter().map(|press| press.covering_mm).collect();
-        coverings_mm.sort_by(f64::total_cmp);
-        coverings_mm.dedup_by(|next, last| *next - *last < 5e-4);
         Self {
             runs: readings.runs.clone(),
             presses: readings.presses.len(),
             dwells: readings.presses.iter().map(|press| press.dwells.len()).sum(),
             frames: readings.frames,
             frames_left_out: readings.frames_left_out,
-            coverings_mm,
+            coverings_mm: coverings_mm(readings.presses.iter()),
             reference_covering_mm,
         }
     }
@@ -222,7 +217,7 @@ fn referred(
     let known = || readings.presses.iter().filter(|press| declared.indenter(press).is_some());
     let alike = |press: &&crate::Press| {
         let of = |other: &&crate::Press| {
-            other.indenter == press.indenter && (other.covering_mm - press.covering_mm).abs() < 5e-4
+            other.indenter == press.indenter && same_covering(other.covering_mm, press.covering_mm)
         };
         known().filter(of).count()
     };
@@ -247,11 +242,4 @@ fn scatter(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)).sqrt()
-}
-
-/// The middle value; `None` of nothing.
-fn typical(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }

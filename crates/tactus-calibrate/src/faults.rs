@@ -17,6 +17,7 @@ use serde::Serialize;
 use tactus_model::{Contact, Covering};
 
 use crate::{
+    order::{median, quantile},
     readings::{Readings, distinct_places},
     registration::Place,
     setting::{Declared, across, goes_across},
@@ -103,7 +104,7 @@ pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &Place) -
     // Elements that never change would make the others look noisy.
     let varying = readings.noise_rms_counts.iter().zip(&readings.constant_counts);
     let varying = varying.filter(|(_, constant)| constant.is_none()).filter_map(|(noise, _)| *noise);
-    let typical_noise = quantile(varying, 0.5);
+    let typical_noise = median(varying).unwrap_or(0.0);
     let (mut faults, mut not_judged) = (Vec::new(), Vec::new());
     for element in 0..readings.elements {
         let fault = |kind, evidence| Fault { element, kind, evidence };
@@ -199,7 +200,8 @@ impl Trials {
         }
         let pressed: Vec<usize> =
             (0..readings.elements).filter(|element| trials.reach[*element] >= PRESSED).collect();
-        trials.strong_rise = quantile(pressed.iter().map(|element| trials.greatest(*element)[0]), 0.9);
+        trials.strong_rise =
+            quantile(pressed.iter().map(|element| trials.greatest(*element)[0]), 0.9).unwrap_or(0.0);
         let clear = |element: &usize| {
             let noise = readings.noise_rms_counts[*element].unwrap_or(f64::INFINITY);
             let [rise, spread] = trials.greatest(*element);
@@ -268,15 +270,6 @@ impl Trials {
 
 fn distinct(places_mm: &[[f64; 2]]) -> usize {
     distinct_places(places_mm.iter().copied()).len()
-}
-
-/// The value below which this share of the values lies; 0 of nothing.
-fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
-    let place = (values.len() as f64 * share) as usize;
-    values.get(place).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

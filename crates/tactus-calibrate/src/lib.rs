@@ -18,6 +18,7 @@ mod faults;
 #[cfg(test)]
 mod lab;
 mod least_squares;
+mod order;
 mod readings;
 mod registration;
 mod response;

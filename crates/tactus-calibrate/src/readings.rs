@@ -134,9 +134,8 @@ impl Press {
     pub fn deepest(&self) -> Option<&Dwell> {
         self.dwells.iter().min_by(|a, b| a.height_mm.total_cmp(&b.height_mm))
     }
-}
 
-impl Press {
+    /// Number of dwells in which the tip stood still.
     fn held(&self) -> usize {
         self.dwells.iter().filter(|dwell| dwell.held).count()
     }
@@ -315,6 +314,11 @@ pub(crate) fn distinct_places(places_mm: impl IntoIterator<Item = [f64; 2]>) -> 
         }
     }
     places
+}
+
+/// `1 place was`, `2 places were`.
+pub(crate) fn number_of(places: usize) -> String {
+    if places == 1 { "1 place was".into() } else { format!("{places} places were") }
 }
 
 #[cfg(test)]

@@ -22,9 +22,9 @@ use tactus_model::{Covering, ForwardModel, Gradient, Registration};
 
 use crate::{
     Estimate,
-    calibration::number_of,
     least_squares::{Fit, Normal, Reading, minimise},
-    readings::{Dwell, Press, Readings, distinct_places},
+    order::median,
+    readings::{Dwell, Press, Readings, distinct_places, number_of},
     setting::{Declared, Setting, across, goes_across},
 };
 
@@ -70,6 +70,16 @@ pub struct RegistrationFit {
     pub left_out: Vec<(String, i32)>,
     /// Root mean square of the residuals in units of the noise: 1 if the model holds.
     pub residual_in_noise: f64,
+}
+
+impl RegistrationFit {
+    /// Where the sensor lies, with the declared rotation where none was estimated.
+    pub fn registration(&self, declared: Registration) -> Registration {
+        Registration {
+            origin_mm: self.origin_mm.map(|along| along.value),
+            rotation_deg: self.rotation_deg.map_or(declared.rotation_deg, |angle| angle.value),
+        }
+    }
 }
 
 /// What later steps take from a registration.
@@ -253,9 +263,7 @@ impl<'a> Problem<'a> {
         })?;
         let misfits: Vec<f64> =
             costs.iter().map(|(cost, readings)| (cost / f64::from((*readings).max(1))).sqrt()).collect();
-        let mut sorted = misfits.clone();
-        sorted.sort_by(f64::total_cmp);
-        let limit = OUTLYING * sorted[sorted.len() / 2].max(1.0);
+        let limit = OUTLYING * median(misfits.iter().copied())?.max(1.0);
         let worst = misfits.iter().enumerate().max_by(|one, other| one.1.total_cmp(other.1));
         worst.filter(|(_, misfit)| **misfit > limit).map(|(press, _)| press)
     }

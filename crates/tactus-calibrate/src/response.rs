@@ -30,7 +30,7 @@ use crate::{
     setting::Declared,
 };
 
-use fit::{Fitted, Group, fit, heldout};
+use fit::{Fitted, Group, HeldOut, fit, heldout};
 
 /// A press counts as one at an element's centre if the element feels this share of what it would feel there.
 const NEAR: f64 = 0.9;
@@ -172,7 +172,8 @@ pub(crate) fn respond(
     let [_, shared, own] = &fits;
     // Where nothing can be held out, a curvature with its error says more than a straight line without.
     let unheld = if shared.is_some() { Form::SharedQuadratic } else { Form::Linear };
-    let form = chosen(&here).unwrap_or(unheld);
+    let heldout = Form::ALL.map(|form| heldout(form, &here));
+    let form = chosen(&heldout).unwrap_or(unheld);
     let wanted = match form {
         Form::Linear => linear,
         Form::SharedQuadratic => shared.as_ref().unwrap_or(linear),
@@ -206,18 +207,24 @@ pub(crate) fn respond(
             quadratic_per_mm: Estimate::new(k, covariance[(count + index, count + index)]),
         }
     });
-    let trials = fits.iter().flatten().map(|fit| Trial {
-        form: fit.form,
-        rms_counts: fit.rms_counts(&here),
-        heldout_rms_counts: heldout(fit.form, &here)
-            .map(|errors| rms(errors.iter().map(|error| error.counts))),
+    let trials = fits.iter().zip(&heldout).filter_map(|(fit, errors)| {
+        let fit = fit.as_ref()?;
+        Some(Trial {
+            form: fit.form,
+            rms_counts: fit.rms_counts(&here),
+            heldout_rms_counts: errors.as_ref().map(|errors| rms(errors.iter().map(|error| error.counts))),
+        })
     });
     let response = ResponseFit {
         form: wanted.form,
         trials: trials.collect(),
         shared_quadratic_per_mm: shared.as_ref().map(|shared| {
-            let covariance = shared.expanded_covariance() + moved_by(&by_place(shared));
-            Estimate::new(shared.response(0)[1], covariance[(count, count)])
+            let variance = if wanted.form == Form::SharedQuadratic {
+                covariance[(count, count)]
+            } else {
+                (shared.expanded_covariance() + moved_by(&by_place(shared)))[(count, count)]
+            };
+            Estimate::new(shared.response(0)[1], variance)
         }),
         residual_in_noise: wanted.residual_in_noise(),
         elements: responses.collect(),
@@ -263,15 +270,16 @@ fn cross_wired(
     responses.collect()
 }
 
-/// The form with the fewest parameters that no other beats on held-out dwells; `None` if none can be held out.
-fn chosen(groups: &[Group]) -> Option<Form> {
+/// The form with the fewest parameters that no other beats on held-out dwells, by each form's errors on them; `None` if
+/// none can be held out.
+fn chosen(heldout: &[Option<Vec<HeldOut>>; 3]) -> Option<Form> {
     let mut best = Form::Linear;
-    let mut best_errors = heldout(best, groups)?;
-    for form in [Form::SharedQuadratic, Form::OwnQuadratic] {
-        let Some(errors) = heldout(form, groups) else { continue };
+    let mut best_errors = heldout[0].as_ref()?;
+    for (form, errors) in Form::ALL.into_iter().zip(heldout).skip(1) {
+        let Some(errors) = errors else { continue };
         let mut by_element: BTreeMap<usize, f64> = BTreeMap::new();
         let mut by_dwell = Vec::new();
-        for (before, after) in best_errors.iter().zip(&errors) {
+        for (before, after) in best_errors.iter().zip(errors) {
             let gain = before.in_noise.powi(2) - after.in_noise.powi(2);
             *by_element.entry(before.element).or_default() += gain;
             by_dwell.push(gain);

@@ -11,6 +11,9 @@ use crate::readings::{Dwell, Press, Readings};
 /// Presses go across the sensor if these many pitches lie between them: then they tell its rotation.
 const SPAN_LEAST_PITCHES: f64 = 2.0;
 
+/// Thicknesses that differ by less are those of one covering.
+const SAME_COVERING_MM: f64 = 5e-4;
+
 /// What the rig's description says: where a calibration starts, and what it keeps where the data say nothing.
 #[derive(Debug, Clone)]
 pub struct Declared {
@@ -70,7 +73,7 @@ impl Declared {
     /// True if a press is of the kind for which sensitivity is stated, in tool and covering.
     pub(crate) fn is_reference(&self, press: &Press) -> bool {
         let response = self.model.response();
-        (press.covering_mm - response.reference_covering.thickness_mm).abs() < 5e-4
+        same_covering(press.covering_mm, response.reference_covering.thickness_mm)
             && self.indenter(press) == Some(&response.reference_indenter)
     }
 }
@@ -90,6 +93,19 @@ impl Setting {
             depth_mm: self.surface_mm - dwell.height_mm,
         }
     }
+}
+
+/// True if two thicknesses are one covering's.
+pub(crate) fn same_covering(one_mm: f64, other_mm: f64) -> bool {
+    (one_mm - other_mm).abs() < SAME_COVERING_MM
+}
+
+/// The coverings pressed, by thickness.
+pub(crate) fn coverings_mm<'a>(presses: impl Iterator<Item = &'a Press>) -> Vec<f64> {
+    let mut coverings_mm: Vec<f64> = presses.map(|press| press.covering_mm).collect();
+    coverings_mm.sort_by(f64::total_cmp);
+    coverings_mm.dedup_by(|next, last| same_covering(*next, *last));
+    coverings_mm
 }
 
 /// The reference presses of the runs that go across the sensor; where none does, all reference presses.

@@ -20,10 +20,11 @@ use tactus_model::{Contact, Covering, effect};
 
 use crate::{
     Estimate,
+    order::median,
     readings::{Dwell, Press, Readings, distinct_places},
     registration::Place,
     response::{Gains, turned_round},
-    setting::Declared,
+    setting::{Declared, coverings_mm, same_covering},
 };
 
 /// Depths that differ by less belong together.
@@ -124,13 +125,9 @@ struct Group<'a> {
 /// Of each covering, the presses of the run with the most, by depth.
 fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<Group<'a>> {
     let known = |press: &&Press| press.rest.is_some() && declared.indenter(press).is_some();
-    let mut coverings: Vec<f64> =
-        readings.presses.iter().filter(known).map(|press| press.covering_mm).collect();
-    coverings.sort_by(f64::total_cmp);
-    coverings.dedup_by(|next, last| *next - *last < 5e-4);
     let mut groups = Vec::new();
-    for covering_mm in coverings {
-        let under = |press: &&Press| (press.covering_mm - covering_mm).abs() < 5e-4;
+    for covering_mm in coverings_mm(readings.presses.iter().filter(known)) {
+        let under = |press: &&Press| same_covering(press.covering_mm, covering_mm);
         let of_run = |run: usize| {
             readings.presses.iter().filter(move |press| press.run == run).filter(known).filter(under)
         };
@@ -242,9 +239,8 @@ impl<'a> Search<'a> {
         // The median image's sigma is hardly moved by images that are like none.
         let (start_mm, slopes) =
             self.maximise(median_step, self.declared.sigma_mm(self.covering.thickness_mm), STEP_LEAST[0])?;
-        let mut unlike: Vec<f64> = slopes.iter().map(|slope| 1.0 - slope.likeness).collect();
-        unlike.sort_by(f64::total_cmp);
-        let limit = OUTLYING * unlike[unlike.len() / 2].max(1e-9);
+        let unlike = median(slopes.iter().map(|slope| 1.0 - slope.likeness));
+        let limit = OUTLYING * unlike.unwrap_or(f64::INFINITY).max(1e-9);
         let mut likenesses = slopes.iter().map(|slope| slope.likeness);
         let before = self.images.len();
         self.images.retain(|_| likenesses.next().is_some_and(|likeness| 1.0 - likeness <= limit));
@@ -377,9 +373,7 @@ fn step(slopes: &[Slope]) -> f64 {
 
 /// The median of the images' own steps.
 fn median_step(slopes: &[Slope]) -> f64 {
-    let mut steps: Vec<f64> = slopes.iter().map(|slope| slope.by_sigma / slope.curvature).collect();
-    steps.sort_by(f64::total_cmp);
-    steps[steps.len() / 2]
+    median(slopes.iter().map(|slope| slope.by_sigma / slope.curvature)).unwrap_or(f64::NAN)
 }
 
 fn dot(one: &[f64], other: &[f64]) -> f64 {

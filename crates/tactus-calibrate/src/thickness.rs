@@ -12,10 +12,10 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use crate::{Estimate, spread::Spreads};
+use crate::{Estimate, setting::same_covering, spread::Spreads};
 
 /// A scatter that chance reaches in one case in a thousand is no chance.
-const IMPLAUSIBLE: f64 = 1e-3;
+pub(crate) const IMPLAUSIBLE: f64 = 1e-3;
 
 /// Spread of each covering, and against thickness.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -69,7 +69,7 @@ pub(crate) fn against_thickness(spreads: &Spreads) -> Option<ThicknessFit> {
     let mut rows: Vec<usize> = (0..spreads.fits.len()).collect();
     rows.sort_by(|one, other| spreads.fits[*one].covering_mm.total_cmp(&spreads.fits[*other].covering_mm));
     let thickness = |row: &usize| spreads.fits[*row].covering_mm;
-    let alike = |one: &usize, other: &usize| (thickness(one) - thickness(other)).abs() < 5e-4;
+    let alike = |one: &usize, other: &usize| same_covering(thickness(one), thickness(other));
     let coverings: Vec<_> = rows.chunk_by(alike).map(|rows| covering(spreads, rows)).collect();
     let count = coverings.len();
     (count > 0).then(|| ThicknessFit {

@@ -93,16 +93,12 @@ pub fn draw_all(out_dir: &Path, mut progress: impl FnMut(Progress)) -> Result<Ve
         paths.push(path);
         Ok::<_, FigureError>(())
     };
-    let drawings = thread::scope(|scope| {
-        let threads = FIGURES.map(|figure| scope.spawn(figure.draw));
-        let mut drawings = Vec::new();
-        for (figure, thread) in FIGURES.iter().zip(threads) {
-            let drawing = thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
-            write(&format!("figure-{}.svg", figure.number), drawing.sheet.to_string())?;
-            drawings.push(drawing);
-            progress(Progress { title: figure.title, written: drawings.len(), figures: FIGURES.len() });
-        }
-        Ok::<_, FigureError>(drawings)
+    let mut written = 0;
+    let drawings = drawn(&FIGURES.each_ref(), |figure, drawing| {
+        write(&format!("figure-{}.svg", figure.number), drawing.sheet.to_string())?;
+        written += 1;
+        progress(Progress { title: figure.title, written, figures: FIGURES.len() });
+        Ok(())
     })?;
     write("index.html", page::page(&drawings))?;
     Ok(paths)
@@ -115,19 +111,31 @@ pub fn draw_all(out_dir: &Path, mut progress: impl FnMut(Progress)) -> Result<Ve
 /// # Errors
 /// If a figure's model cannot be made, which no shipped one does.
 pub fn finished(numbers: &[&str]) -> Result<Vec<StudyFigure>, FigureError> {
-    let wanted = numbers.iter().filter_map(|number| FIGURES.iter().find(|figure| figure.number == *number));
+    let figure = |number: &&str| FIGURES.iter().find(|figure| figure.number == *number);
+    let wanted: Vec<&PaperFigure> = numbers.iter().filter_map(figure).collect();
+    let drawings = drawn(&wanted, |_, _| Ok(()))?;
+    let finish = |(figure, drawing): (&PaperFigure, Drawing)| StudyFigure {
+        number: figure.number.into(),
+        title: figure.title.into(),
+        caption: drawing.caption,
+        svg: drawing.sheet.to_string(),
+    };
+    Ok(wanted.into_iter().zip(drawings).map(finish).collect())
+}
+
+/// Draws figures side by side, each in a thread of its own, and shows each to `take`, in order.
+fn drawn(
+    figures: &[&PaperFigure],
+    mut take: impl FnMut(&PaperFigure, &Drawing) -> Result<(), FigureError>,
+) -> Result<Vec<Drawing>, FigureError> {
     thread::scope(|scope| {
-        let threads: Vec<_> = wanted.map(|figure| (figure, scope.spawn(figure.draw))).collect();
-        let drawn = threads.into_iter().map(|(figure, thread)| {
+        let threads: Vec<_> = figures.iter().map(|figure| (*figure, scope.spawn(figure.draw))).collect();
+        let drawings = threads.into_iter().map(|(figure, thread)| {
             let drawing = thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
-            Ok(StudyFigure {
-                number: figure.number.into(),
-                title: figure.title.into(),
-                caption: drawing.caption,
-                svg: drawing.sheet.to_string(),
-            })
+            take(figure, &drawing)?;
+            Ok(drawing)
         });
-        drawn.collect()
+        drawings.collect()
     })
 }
 
@@ -187,7 +195,7 @@ fn zero_to_one(image: &[f64]) -> Vec<f32> {
 }
 
 /// A covering's thickness as it is sold.
-fn inches(covering: Covering) -> String {
+pub fn inches(covering: Covering) -> String {
     format!("{:.2} inch", covering.thickness_mm / 25.4)
 }
 

@@ -2,46 +2,51 @@
 
 use super::Calibration;
 use crate::{
-    Declared, Form, Readings, RegistrationFit, ResponseFit, ThicknessFit,
+    Declared, Form, Health, Readings, RegistrationFit, ResponseFit, ThicknessFit,
     faults::{FaultKind, WIRING_PLACES_LEAST},
-    readings::distinct_places,
+    readings::{distinct_places, number_of},
     setting::{across, goes_across},
+    thickness::IMPLAUSIBLE,
 };
 
 /// Residuals of so many times the noise say that the model is not the sensor's.
 const MISFIT: f64 = 1.5;
-/// What chance gives in one case in a thousand is no chance.
-const IMPLAUSIBLE: f64 = 1e-3;
+
+/// What is to be said of a calibration, in its order.
+#[derive(Default)]
+struct Remarks {
+    missing: Vec<String>,
+    warnings: Vec<String>,
+}
 
 impl Calibration {
+    /// Adds what its results, and what it rests on, give to say.
     pub(super) fn remark(&mut self, declared: &Declared, readings: &Readings) {
-        self.remark_data(declared, readings);
-        self.remark_health(declared, readings);
-        if let Some(registration) = self.registration.take() {
-            self.remark_registration(&registration);
-            self.registration = Some(registration);
+        let mut remarks = Remarks::default();
+        remarks.data(declared, readings);
+        remarks.health(&self.health, declared, readings);
+        if let Some(registration) = &self.registration {
+            remarks.registration(registration);
         }
-        if let Some(response) = self.response.take() {
-            self.remark_response(&response, readings.elements);
-            self.response = Some(response);
+        if let Some(response) = &self.response {
+            remarks.response(response, self);
         }
-        match self.thickness.take() {
-            Some(thickness) => {
-                self.remark_thickness(&thickness);
-                self.thickness = Some(thickness);
-            }
-            None if self.response.is_some() && self.spreads.is_empty() => {
-                let places = distinct_places(readings.presses.iter().map(|press| press.place_mm)).len();
-                self.missing.push(format!(
-                    "Point spread: {} pressed; it takes 9 under one covering, between the elements.",
-                    number_of(places)
-                ));
-            }
-            None => {}
+        if let Some(thickness) = &self.thickness {
+            remarks.thickness(thickness);
+        } else if self.response.is_some() && self.spreads.is_empty() {
+            let places = distinct_places(readings.presses.iter().map(|press| press.place_mm)).len();
+            remarks.missing.push(format!(
+                "Point spread: {} pressed; it takes 9 under one covering, between the elements.",
+                number_of(places)
+            ));
         }
+        self.missing.extend(remarks.missing);
+        self.warnings.extend(remarks.warnings);
     }
+}
 
-    fn remark_data(&mut self, declared: &Declared, readings: &Readings) {
+impl Remarks {
+    fn data(&mut self, declared: &Declared, readings: &Readings) {
         let unrested = readings.presses.iter().filter(|press| press.rest.is_none()).count();
         if unrested > 0 {
             self.warnings
@@ -60,7 +65,7 @@ impl Calibration {
         }
     }
 
-    fn remark_health(&mut self, declared: &Declared, readings: &Readings) {
+    fn health(&mut self, health: &Health, declared: &Declared, readings: &Readings) {
         let presses = across(declared, readings);
         let places = distinct_places(presses.iter().map(|press| press.place_mm)).len();
         if places < WIRING_PLACES_LEAST || !goes_across(declared, presses.into_iter()) {
@@ -70,19 +75,19 @@ impl Calibration {
                 number_of(places)
             ));
         }
-        if !self.health.not_judged.is_empty() {
+        if !health.not_judged.is_empty() {
             self.missing.push(format!(
                 "Health of {} elements: no reference press came near them ({}).",
-                self.health.not_judged.len(),
-                listed(&self.health.not_judged)
+                health.not_judged.len(),
+                listed(&health.not_judged)
             ));
         }
-        if self.health.faults.iter().any(|fault| matches!(fault.kind, FaultKind::Noisy { .. })) {
+        if health.faults.iter().any(|fault| matches!(fault.kind, FaultKind::Noisy { .. })) {
             self.warnings.push("Noisy elements are left out of all fits, though they may respond.".into());
         }
     }
 
-    fn remark_registration(&mut self, registration: &RegistrationFit) {
+    fn registration(&mut self, registration: &RegistrationFit) {
         if registration.rotation_deg.is_none() {
             self.missing.push(
                 "Rotation: the presses lie too close together, within two pitches; it is taken as declared."
@@ -116,8 +121,8 @@ impl Calibration {
         }
     }
 
-    fn remark_response(&mut self, response: &ResponseFit, elements: usize) {
-        if self.registration.is_none() {
+    fn response(&mut self, response: &ResponseFit, calibration: &Calibration) {
+        if calibration.registration.is_none() {
             self.warnings.push(
                 "Sensitivities rest on the declared place, surface and spread: as far as these are nominal, they are slopes at \
                  the place that was pressed, not the elements' own."
@@ -142,9 +147,10 @@ impl Calibration {
             ));
         }
         let fitted = |element: usize| response.elements.iter().any(|one| one.element == element);
-        let faulty = |element: usize| self.health.faults.iter().any(|fault| fault.element == element);
-        let without: Vec<usize> =
-            (0..elements).filter(|&element| !fitted(element) && !faulty(element)).collect();
+        let faulty = |element: usize| calibration.health.faults.iter().any(|fault| fault.element == element);
+        let without: Vec<usize> = (0..calibration.baseline_counts.len())
+            .filter(|&element| !fitted(element) && !faulty(element))
+            .collect();
         if !without.is_empty() {
             self.missing.push(format!(
                 "Response of {} elements: they were not pressed at their centres ({}).",
@@ -165,7 +171,7 @@ impl Calibration {
         }
     }
 
-    fn remark_thickness(&mut self, thickness: &ThicknessFit) {
+    fn thickness(&mut self, thickness: &ThicknessFit) {
         if thickness.coverings.len() < 2 {
             self.missing.push(
                 "Spread against thickness: one covering was pressed; it takes two for a line, three for a parabola.".into(),
@@ -199,11 +205,6 @@ impl Calibration {
             ));
         }
     }
-}
-
-/// `1 place was`, `2 places were`.
-pub(crate) fn number_of(places: usize) -> String {
-    if places == 1 { "1 place was".into() } else { format!("{places} places were") }
 }
 
 fn listed(elements: &[usize]) -> String {

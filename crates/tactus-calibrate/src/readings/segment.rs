@@ -3,6 +3,7 @@
 use tactus_model::Phase;
 
 use super::{CLEAR_MM, Dwell, Sample};
+use crate::order::median;
 
 /// A frame is left out if an element is so many robust standard deviations away from its median.
 const OUTLYING: f64 = 10.0;
@@ -67,7 +68,7 @@ impl Segment {
     /// have moved, or moved on.
     pub(super) fn settle(&mut self) -> Option<f64> {
         let elements = self.elements()?;
-        let height_mm = median(&mut self.heights_mm.clone())?;
+        let height_mm = median(self.heights_mm.iter().copied())?;
         let mut still: Vec<usize> = (0..self.heights_mm.len())
             .filter(|frame| (self.heights_mm[*frame] - height_mm).abs() <= STILL_MM)
             .collect();
@@ -93,9 +94,8 @@ impl Segment {
         // Fewer tell no outlier from the rest.
         if frames >= 5 {
             for element in 0..elements {
-                let centre = median(&mut column(element).collect::<Vec<_>>())?;
-                let spread =
-                    median(&mut column(element).map(|count| (count - centre).abs()).collect::<Vec<_>>())?;
+                let centre = median(column(element))?;
+                let spread = median(column(element).map(|count| (count - centre).abs()))?;
                 let reach = OUTLYING * (MAD_TO_SD * spread).max(step_counts);
                 for (sound, count) in sound.iter_mut().zip(column(element)) {
                     *sound &= (count - centre).abs() <= reach;
@@ -132,10 +132,4 @@ impl Segment {
     fn elements(&self) -> Option<usize> {
         self.counts.len().checked_div(self.heights_mm.len()).filter(|elements| *elements > 0)
     }
-}
-
-/// The middle value; the upper of two.
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

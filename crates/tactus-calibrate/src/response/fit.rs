@@ -7,6 +7,7 @@ use super::{DWELLS_LEAST, Form, rms};
 use crate::{
     Estimate,
     least_squares::{self, Normal, Reading, minimise},
+    order::median,
     readings::Press,
     registration::Place,
     setting::Declared,
@@ -82,10 +83,7 @@ impl Fitted {
 
     /// `k` of the median element.
     pub(super) fn typical_curvature(&self) -> f64 {
-        let mut curvatures: Vec<f64> =
-            (0..self.elements.len()).map(|index| self.response(index)[1]).collect();
-        curvatures.sort_by(f64::total_cmp);
-        curvatures.get(curvatures.len() / 2).copied().unwrap_or(0.0)
+        median((0..self.elements.len()).map(|index| self.response(index)[1])).unwrap_or(0.0)
     }
 
     pub(super) fn sensitivity(&self, index: usize) -> Estimate {

@@ -42,8 +42,12 @@ impl SideBySide {
         let contact = Contact { indenter, position_mm, rotation_deg, depth_mm: DEPTH_MM };
         let mut model = vec![0.0; array.elements()];
         uniform(array, Psf::PAPER)?.indentation(&contact, covering, &mut model);
-        let sensor = zero_to_one(&sensor.indentation_mm(&contact, covering));
-        Ok(Self { heading, sensor, model: zero_to_one(&model) })
+        Ok(Self::scaled(heading, &sensor.indentation_mm(&contact, covering), &model))
+    }
+
+    /// Two images, row-major, each scaled from its least to its greatest.
+    pub fn scaled(heading: String, sensor: &[f64], model: &[f64]) -> Self {
+        Self { heading, sensor: zero_to_one(sensor), model: zero_to_one(model) }
     }
 
     /// Largest difference of the two, in percent of their range.

@@ -10,14 +10,14 @@ use std::sync::Arc;
 use anyhow::Context;
 use tactus_calibrate::Readings;
 use tactus_daemon::embedded::SIMULATED_RIG;
-use tactus_model::{Covering, Indenter, Mesh, Registration, Trajectory};
+use tactus_model::{Covering, Indenter, Mesh, Trajectory};
 use tactus_record::rows;
-use tactus_report::figures::{SideBySide, side_by_side};
+use tactus_report::figures::{COVERINGS, SideBySide, inches, side_by_side};
 use tactus_report::study::StudyFigure;
 use tactus_scene::shapes::Scene;
 use toml::{Table, Value};
 
-use super::steps::{COVERINGS_MM, Step, Steps};
+use super::steps::{Step, Steps};
 use crate::cli::{Common, StudyArgs};
 use crate::commands::calibrate::Calibrated;
 
@@ -46,12 +46,11 @@ pub(super) fn take(
     let mut angles = Vec::new();
     for angle_deg in ANGLES_DEG {
         let heading = format!("{angle_deg}\u{b0}");
-        angles.extend(pressed(common, args, steps, calibrated, angle_deg, &[COVERINGS_MM[0]], |_| {
+        angles.extend(pressed(common, args, steps, calibrated, angle_deg, &COVERINGS[..1], |_| {
             heading.clone()
         })?);
     }
-    let inches = |covering_mm: f64| format!("{:.2} inch", covering_mm / 25.4);
-    let coverings = pressed(common, args, steps, calibrated, 0.0, &COVERINGS_MM, inches)?;
+    let coverings = pressed(common, args, steps, calibrated, 0.0, &COVERINGS, inches)?;
     let all = angles.iter().chain(&coverings);
     let worst_percent = all.map(SideBySide::difference_percent).fold(0.0, f64::max);
     let figure = |number: &str, title: &str, contacts: &[SideBySide], caption: &str| StudyFigure {
@@ -90,15 +89,16 @@ fn pressed(
     steps: &mut Steps,
     calibrated: &Calibrated,
     angle_deg: f64,
-    coverings_mm: &[f64],
-    heading: impl Fn(f64) -> String,
+    coverings: &[Covering],
+    heading: impl Fn(Covering) -> String,
 ) -> anyhow::Result<Vec<SideBySide>> {
     let mesh = turned(&Scene::H.mesh(), angle_deg)?;
-    let of = if let [_] = coverings_mm { format!("{angle_deg} degrees") } else { "each covering".into() };
+    let of = if let [_] = coverings { format!("{angle_deg} degrees") } else { "each covering".into() };
+    let thicknesses_mm: Vec<f64> = coverings.iter().map(|covering| covering.thickness_mm).collect();
     let step = Step {
         name: format!("image of the H, {of}"),
         experiment: "image",
-        parameters: vec![format!("depth_mm={DEPTH_MM}"), format!("coverings_mm={coverings_mm:?}")],
+        parameters: vec![format!("depth_mm={DEPTH_MM}"), format!("coverings_mm={thicknesses_mm:?}")],
         rig_file: Some(rig_with(args, &mesh, angle_deg)?),
     };
     let taken = steps.take(common, args, &step)?;
@@ -110,21 +110,12 @@ fn compare(
     calibrated: &Calibrated,
     readings: &Readings,
     mesh: Mesh,
-    heading: impl Fn(f64) -> String,
+    heading: impl Fn(Covering) -> String,
 ) -> anyhow::Result<Vec<SideBySide>> {
     let model = calibrated.model().context("no model was made")?;
-    let (registration, surface_mm) = match &calibrated.calibration.registration {
-        Some(fit) => (
-            Registration {
-                origin_mm: fit.origin_mm.map(|along| along.value),
-                rotation_deg: fit
-                    .rotation_deg
-                    .map_or(calibrated.rig.registration.rotation_deg, |angle| angle.value),
-            },
-            fit.surface_mm.map_or(0.0, |surface| surface.value),
-        ),
-        None => (calibrated.rig.registration, 0.0),
-    };
+    let (declared, fitted) = (calibrated.rig.registration, calibrated.calibration.registration.as_ref());
+    let registration = fitted.map_or(declared, |fit| fit.registration(declared));
+    let surface_mm = fitted.and_then(|fit| fit.surface_mm).map_or(0.0, |surface| surface.value);
     let tool = Indenter::Mesh(Arc::new(mesh));
     let mut compared = Vec::new();
     for press in &readings.presses {
@@ -139,11 +130,7 @@ fn compare(
         let baselines = &model.base.response.baseline_counts;
         let modelled: Vec<f64> =
             image.clean_counts.iter().zip(baselines).map(|(read, rest)| read - rest).collect();
-        compared.push(SideBySide {
-            heading: heading(press.covering_mm),
-            sensor: zero_to_one(&measured),
-            model: zero_to_one(&modelled),
-        });
+        compared.push(SideBySide::scaled(heading(covering), &measured, &modelled));
     }
     Ok(compared)
 }
@@ -174,14 +161,4 @@ fn rig_with(args: &StudyArgs, mesh: &Mesh, angle_deg: f64) -> anyhow::Result<Pat
     let path = args.out.join(format!("rig-with-h-{angle_deg}.toml"));
     fs::write(&path, toml::to_string(&rig)?).with_context(|| path.display().to_string())?;
     Ok(path)
-}
-
-/// Scaled so that the least is 0 and the greatest 1.
-fn zero_to_one(image: &[f64]) -> Vec<f32> {
-    let [least, most] = image.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
-        [least.min(*value), most.max(*value)]
-    });
-    let range = if most > least { most - least } else { 1.0 };
-    #[expect(clippy::cast_possible_truncation, reason = "a colour needs no more digits")]
-    image.iter().map(|value| ((value - least) / range) as f32).collect()
 }

@@ -4,9 +4,11 @@ use std::path::Path;
 
 use anyhow::Context;
 use serde_json::{Value, json};
-use tactus_calibrate::acuity::{DiscretisingSensor, NYQUIST_SIGMA};
-use tactus_calibrate::{Estimate, FaultKind, Form};
+use tactus_calibrate::acuity::NYQUIST_SIGMA;
+use tactus_calibrate::design::Wanted;
+use tactus_calibrate::{Estimate, Fault, FaultKind, Form};
 use tactus_daemon::embedded::{self, Truth};
+use tactus_model::{DIGITACTS_PITCH_MM, Psf};
 use tactus_record::Timeline;
 use tactus_report::figures::Widening;
 use tactus_report::study::{Found, StudyRow};
@@ -20,7 +22,7 @@ use crate::output::{print_table, say};
 /// Poisson's ratio of the covering in the finite elements (rubber hardly changes its volume).
 const POISSON_RATIO: f64 = 0.45;
 /// Force steps of one unit reading for which the acuity is stated: 8 bit.
-const FORCE_STEPS: f64 = 256.0;
+const FORCE_STEPS: u32 = 256;
 
 /// What the rig of a recording hides, if it is a simulated one that says so.
 pub(super) fn truth(recording: &Path) -> anyhow::Result<Option<Truth>> {
@@ -70,28 +72,20 @@ fn registration(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow>
 
 fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
     let calibration = &calibrated.calibration;
-    let faults: Vec<String> = calibration
-        .health
-        .faults
-        .iter()
-        .map(|fault| match fault.kind {
-            FaultKind::Dead => format!("{} dead", fault.element),
-            FaultKind::Stuck { .. } => format!("{} stuck", fault.element),
-            FaultKind::CrossWired { answers_for } => format!("{} answers for {answers_for}", fault.element),
-            FaultKind::Noisy { .. } => format!("{} noisy", fault.element),
-        })
-        .collect();
-    let found = if faults.is_empty() { "none".into() } else { faults.join(", ") };
+    let faults = &calibration.health.faults;
+    let planted = truth.map(planted);
     let mut rows = vec![StudyRow {
         paper: Some("two, answering a neighbour".into()),
-        inside: truth.map(|truth| {
-            calibration.health.faults.len() == truth.faults.len()
-                && calibration.health.faults.iter().all(|fault| {
-                    truth.faults.get(&fault.element).is_some_and(|truth| alike(&fault.kind, truth))
-                })
+        inside: planted.as_ref().map(|planted| {
+            let alike = |(found, (element, kind)): (&Fault, &(usize, FaultKind))| {
+                found.element == *element && alike(found.kind, *kind)
+            };
+            faults.len() == planted.len() && faults.iter().zip(planted).all(alike)
         }),
-        note: truth.map_or_else(String::new, |truth| format!("planted: {}", planted(truth))),
-        ..text("faulty elements", "", found)
+        note: planted
+            .as_ref()
+            .map_or_else(String::new, |planted| format!("planted: {}", in_words(planted.iter().copied()))),
+        ..text("faulty elements", "", in_words(faults.iter().map(|fault| (fault.element, fault.kind))))
     }];
     let Some(fit) = &calibration.response else { return rows };
     rows.push(StudyRow {
@@ -122,28 +116,31 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
     rows
 }
 
-fn alike(found: &FaultKind, truth: &ElementFault) -> bool {
-    match (found, truth) {
-        (FaultKind::Dead, ElementFault::Dead) | (FaultKind::Noisy { .. }, ElementFault::Noisy { .. }) => true,
-        (FaultKind::Stuck { counts }, ElementFault::Stuck { counts: planted }) => {
-            (counts - f64::from(*planted)).abs() < 0.5
-        }
-        (FaultKind::CrossWired { answers_for }, ElementFault::Miswired { answers_for: planted }) => {
-            answers_for == planted
-        }
-        _ => false,
-    }
+/// What is wrong with the rig's elements, in order of the elements, as calibration says it.
+fn planted(truth: &Truth) -> Vec<(usize, FaultKind)> {
+    let kind = |fault: &ElementFault| match *fault {
+        ElementFault::Dead => FaultKind::Dead,
+        ElementFault::Stuck { counts } => FaultKind::Stuck { counts: counts.into() },
+        ElementFault::Noisy { noise_rms_counts } => FaultKind::Noisy { rms_counts: noise_rms_counts },
+        ElementFault::Miswired { answers_for } => FaultKind::CrossWired { answers_for },
+    };
+    truth.faults.iter().map(|(element, fault)| (*element, kind(fault))).collect()
 }
 
-fn planted(truth: &Truth) -> String {
-    let one = |(element, fault): (&usize, &ElementFault)| match fault {
-        ElementFault::Dead => format!("{element} dead"),
-        ElementFault::Stuck { .. } => format!("{element} stuck"),
-        ElementFault::Noisy { .. } => format!("{element} noisy"),
-        ElementFault::Miswired { answers_for } => format!("{element} answers for {answers_for}"),
+/// True if a fault was found for what it is; a noise need not be measured exactly.
+fn alike(found: FaultKind, planted: FaultKind) -> bool {
+    matches!((found, planted), (FaultKind::Noisy { .. }, FaultKind::Noisy { .. })) || found == planted
+}
+
+fn in_words(faults: impl Iterator<Item = (usize, FaultKind)>) -> String {
+    let one = |(element, kind)| match kind {
+        FaultKind::Dead => format!("{element} dead"),
+        FaultKind::Stuck { .. } => format!("{element} stuck"),
+        FaultKind::CrossWired { answers_for } => format!("{element} answers for {answers_for}"),
+        FaultKind::Noisy { .. } => format!("{element} noisy"),
     };
-    let planted: Vec<String> = truth.faults.iter().map(one).collect();
-    if planted.is_empty() { "none".into() } else { planted.join(", ") }
+    let words: Vec<String> = faults.map(one).collect();
+    if words.is_empty() { "none".into() } else { words.join(", ") }
 }
 
 /// What elasticity says of the spread, in bricks, which stand for the paper's unit of thickness in Fig. 3.
@@ -212,24 +209,21 @@ fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
 }
 
 fn acuity() -> anyhow::Result<Vec<StudyRow>> {
-    let sigmas = (10..=60).map(|hundredth| f64::from(hundredth) / 100.0);
-    let located =
-        sigmas.map(|sigma| Ok((sigma, DiscretisingSensor::new(sigma, 1.0 / FORCE_STEPS)?.locations())));
-    let located = located.collect::<anyhow::Result<Vec<_>>>()?;
-    let mut best = (0.0, 0);
-    for one in located {
-        if one.1 > best.1 {
-            best = one;
-        }
-    }
+    let paper = Wanted {
+        pitch_mm: DIGITACTS_PITCH_MM,
+        force_steps: FORCE_STEPS,
+        min_sigma: NYQUIST_SIGMA,
+        psf: Psf::PAPER,
+    };
+    let best = paper.design()?.best_for_locating;
     Ok(vec![
         StudyRow {
             paper: Some("around 0.3".into()),
             note: format!(
                 "Fig. 6a, {FORCE_STEPS} force steps: {} locations in an element; a ridge only where 1/f is whole",
-                best.1
+                best.locations
             ),
-            ..text("spread that locates best", "pitches", format!("{:.2}", best.0))
+            ..text("spread that locates best", "pitches", format!("{:.2}", best.sigma))
         },
         StudyRow {
             paper: Some("1.0".into()),

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use tactus_model::Covering;
+use tactus_report::figures::COVERINGS;
 use tactus_report::study::StudyRun;
 use tactus_schema::pb::ExitStatus;
 
@@ -16,8 +18,6 @@ use crate::output::{duration, say};
 
 /// Name of the form of `study.json`.
 const SCHEMA: &str = "tactus.study-steps/1";
-/// The paper's coverings: 0.04, 0.1, 0.14 and 0.2 inch.
-pub(super) const COVERINGS_MM: [f64; 4] = [1.016, 2.54, 3.556, 5.08];
 
 /// What was done already; kept in `study.json`.
 #[derive(Debug, Serialize, Deserialize)]
@@ -113,14 +113,14 @@ impl Steps {
             rig_file: None,
         };
         let mut steps = vec![plain("corners", "corners"), plain("element-centres", "element-centres")];
-        steps.extend(COVERINGS_MM.map(|covering_mm| Step {
+        steps.extend(COVERINGS.map(|Covering { thickness_mm }| Step {
             parameters: vec![
-                format!("coverings_mm=[{covering_mm}]"),
+                format!("coverings_mm=[{thickness_mm}]"),
                 format!("points={}", args.points),
                 // The paper's grid, whatever the number of points in it.
                 format!("spacing_mm={}", 1.4 / f64::from(args.points - 1)),
             ],
-            ..plain(&format!("sweep, {covering_mm} mm"), "grid-sweep")
+            ..plain(&format!("sweep, {thickness_mm} mm"), "grid-sweep")
         }));
         steps.iter().map(|step| self.take(common, args, step)).collect()
     }
