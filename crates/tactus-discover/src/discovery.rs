@@ -37,12 +37,21 @@ pub struct Discovery {
     pub unexplained: Unexplained,
     /// What to measure next.
     pub next_experiments: Vec<NextExperiment>,
-    /// The recalibrated spread of the grown model.
-    pub psf: Psf,
-    /// The recalibrated response of the grown model.
-    pub response: Response,
+    /// The base model, recalibrated alone.
+    pub recalibrated: Base,
+    /// The base of the grown model, recalibrated jointly with its effects.
+    pub grown: Base,
     /// The effects of the grown model, those that it had before first; an effect may act more than once.
     pub effects: Vec<Effect>,
+}
+
+/// The parameters of a base model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Base {
+    /// Spread against covering thickness.
+    pub psf: Psf,
+    /// How the elements answer.
+    pub response: Response,
 }
 
 /// An effect that the data cannot show.

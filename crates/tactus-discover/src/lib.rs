@@ -1,9 +1,13 @@
 //! What a simulation is missing: finds where it and measured frames disagree, names the effect, adds it to the model,
 //! and shows the gap shrink.
 
+mod discover;
 mod discovery;
+mod frames;
 
+pub use discover::{DiscoverError, Known, Options, Progress, discover, predict};
 pub use discovery::{
-    Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment, NotShown,
-    Point, Round, Split, Step, Unexplained, Verdict,
+    Base, Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment,
+    NotShown, Point, Round, Split, Step, Unexplained, Verdict,
 };
+pub use frames::{Frame, Frames};

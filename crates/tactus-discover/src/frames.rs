@@ -1,0 +1,104 @@
+//! The measured frames, gathered for analysis.
+
+use tactus_model::Phase;
+
+/// One row of the measurement table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame<'a> {
+    /// Run id; the frames of a run come one after the other, in order of time.
+    pub run: &'a str,
+    /// Press index in the run; -1 outside a press.
+    pub press: i32,
+    /// What the stage was doing.
+    pub phase: Phase,
+    /// Time of sampling.
+    pub t_ns: i64,
+    /// Stage position, robot frame.
+    pub position_mm: [f64; 3],
+    /// Thickness of the covering in place.
+    pub covering_mm: f64,
+    /// Id of the tool on the stage.
+    pub indenter: &'a str,
+    /// Temperature, where it was measured.
+    pub temperature_c: Option<f64>,
+    /// Raw counts, row-major, one per element.
+    pub counts: &'a [f32],
+}
+
+/// Frames of one or more runs, column by column.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frames {
+    /// Number of elements.
+    pub(crate) elements: usize,
+    /// Ids of the runs, and where each ends.
+    pub(crate) runs: Vec<(String, usize)>,
+    /// Ids of the tools.
+    pub(crate) indenters: Vec<String>,
+    pub(crate) press: Vec<i32>,
+    pub(crate) phase: Vec<Phase>,
+    /// Time since the run's first frame.
+    pub(crate) t_s: Vec<f64>,
+    pub(crate) position_mm: Vec<[f64; 3]>,
+    pub(crate) covering_mm: Vec<f64>,
+    /// Index of the tool.
+    pub(crate) indenter: Vec<u16>,
+    /// Not a number where it was not measured.
+    pub(crate) temperature_c: Vec<f32>,
+    /// Row-major: frame by frame, element by element.
+    pub(crate) counts: Vec<f32>,
+    first_ns: i64,
+}
+
+impl Frames {
+    /// None yet, of an array of so many elements.
+    pub fn new(elements: usize) -> Self {
+        Self { elements, ..Self::default() }
+    }
+
+    /// Takes the next frame.
+    ///
+    /// # Panics
+    /// If it has not one count per element.
+    pub fn push(&mut self, frame: Frame<'_>) {
+        assert_eq!(frame.counts.len(), self.elements, "one count per element");
+        if self.runs.last().is_none_or(|(run, _)| run != frame.run) {
+            self.first_ns = frame.t_ns;
+            self.runs.push((frame.run.to_owned(), self.len()));
+        }
+        let known = self.indenters.iter().position(|known| known == frame.indenter);
+        let indenter = known.unwrap_or_else(|| {
+            self.indenters.push(frame.indenter.to_owned());
+            self.indenters.len() - 1
+        });
+        self.press.push(frame.press);
+        self.phase.push(frame.phase);
+        self.t_s.push((frame.t_ns - self.first_ns) as f64 * 1e-9);
+        self.position_mm.push(frame.position_mm);
+        self.covering_mm.push(frame.covering_mm);
+        self.indenter.push(u16::try_from(indenter).unwrap_or(u16::MAX));
+        self.temperature_c.push(frame.temperature_c.map_or(f32::NAN, |c| {
+            #[expect(clippy::cast_possible_truncation, reason = "a temperature needs no more digits")]
+            let single = c as f32;
+            single
+        }));
+        self.counts.extend_from_slice(frame.counts);
+        if let Some((_, end)) = self.runs.last_mut() {
+            *end += 1;
+        }
+    }
+
+    /// Number of frames.
+    pub fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// True if there is no frame.
+    pub fn is_empty(&self) -> bool {
+        self.t_s.is_empty()
+    }
+
+    /// The counts of a frame, row-major.
+    pub(crate) fn counts_of(&self, frame: usize) -> &[f32] {
+        &self.counts[frame * self.elements..(frame + 1) * self.elements]
+    }
+}
