@@ -1,10 +1,22 @@
 //! The protocol: recalibrate, test, locate, name, add, and again.
 
 use std::collections::BTreeMap;
+use std::sync::Mutex;
 
 use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Registration, Response};
 
-use crate::{Base, Discovery, Frames};
+use crate::candidates::{Candidate, Hints};
+use crate::covariates::{Feature, Forms, features};
+use crate::discovery::{
+    Base, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, Split, Step, Unexplained, Verdict,
+};
+use crate::fit::{Fitted, Problem};
+use crate::noise::Noise;
+use crate::rows::{HeldOut, Rows, still};
+use crate::score::{Fitting, Score, flipped, p_value, q_values};
+use crate::search::{ALPHA, Search, largest, names, without};
+use crate::sensor::{Parameters, Sensor};
+use crate::{Frames, parallel, spectrum, wiring};
 
 /// What is known before: the model that the data are held against.
 #[derive(Debug, Clone)]
@@ -60,12 +72,292 @@ pub enum DiscoverError {
 /// # Errors
 /// [`DiscoverError`].
 pub fn discover(
-    _known: &Known,
-    _frames: &Frames,
-    _options: Options,
-    _progress: &(dyn Fn(Progress) + Sync),
+    known: &Known,
+    frames: &Frames,
+    options: Options,
+    progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Discovery, DiscoverError> {
-    todo!()
+    let said = Said { progress, share: Mutex::new(0.0) };
+    let mut warnings = Vec::new();
+    let still = still(frames);
+    let heldout = HeldOut::choose(frames, options.seed);
+    if heldout.train_presses < PRESSES_LEAST {
+        return Err(DiscoverError::TooLittle(format!(
+            "{} presses can be fitted; at least {PRESSES_LEAST} are needed, and half as many to hold out",
+            heldout.train_presses
+        )));
+    }
+    let replicated = Noise::of(frames, &still, known.array.step_counts());
+    let noise = match &replicated {
+        Some(noise) => noise.clone(),
+        None => {
+            warnings.push(
+                "no frames repeat each other: the noise is estimated from differences of consecutive frames".into(),
+            );
+            Noise::of_differences(frames, known.array.step_counts())
+        }
+    };
+    said.say("recalibrating the base model", 0.02);
+
+    let whole = Rows::of(frames, &still, false)?;
+    let thin = Rows::of(frames, &still, true)?;
+    let (hints, rows) = {
+        let mut rows = thin;
+        rows.weigh(frames, &noise, &heldout);
+        let problem = Problem::new(Sensor { known, frames, rows: &rows }, &noise);
+        let base = problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, &[], options.threads)?;
+        let of_frames = Sensor { known, frames, rows: &whole }.predict(&base.parameters)?;
+        let residual: Vec<f64> =
+            frames.counts.iter().zip(&of_frames).map(|(counts, of)| f64::from(*counts) - of).collect();
+        let frequencies_hz = spectrum::lines_hz(frames, &residual);
+        let wiring = wiring::pairs(&problem, &base);
+        // A tone is lost in rows of several frames.
+        let rows = if frequencies_hz.is_empty() {
+            rows
+        } else {
+            let mut rows = Rows::of(frames, &still, false)?;
+            rows.weigh(frames, &noise, &heldout);
+            rows
+        };
+        (Hints { frequencies_hz, wiring }, rows)
+    };
+    let problem = Problem::new(Sensor { known, frames, rows: &rows }, &noise);
+    let base = problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, &[], options.threads)?;
+    said.say("scoring the effects", 0.1);
+    let candidates = Candidate::all(&problem, &base.parameters, &base.predicted, &hints)?;
+    let base_gap = problem.heldout_gap(&base.predicted);
+    let search = Search {
+        problem: &problem,
+        candidates: &candidates,
+        options,
+        known_terms: known.effects.len(),
+        base_gap: base_gap.value,
+        progress: &|what| said.say(what, 0.0),
+    };
+    let before = search.locate(&base)?;
+    let (grown, rounds) = search.forward(base.clone())?;
+    let any = rounds.first().map_or(1.0, |round| round.p_value).min(before.p_value);
+    said.say("taking back what does not earn its place", 0.6);
+    let grown = if names(&grown.parameters, search.known_terms).is_empty() { grown } else { search.back(grown)? };
+    let after = search.locate(&grown)?;
+    let grown_gap = problem.heldout_gap(&grown.predicted);
+    let share = if base_gap.value > 0.0 { (grown_gap.value / base_gap.value).clamp(0.0, 1.0) } else { 0.0 };
+    let left = after.p_value <= ALPHA;
+    let mut grown = grown;
+    let found = names(&grown.parameters, search.known_terms);
+    let verdict = match (found.is_empty(), any <= ALPHA) {
+        (true, false) => Verdict::NothingMissing,
+        (true, true) => Verdict::Unexplained,
+        (false, _) if share <= EXPLAINED_SHARE || !left => Verdict::Explained,
+        (false, _) if share <= UNEXPLAINED_SHARE => Verdict::PartlyExplained,
+        (false, _) => Verdict::Unexplained,
+    };
+    if verdict == Verdict::Unexplained {
+        grown = base.clone();
+    }
+    let (level_base, elements_before) = of_frames(&whole, known, frames, &heldout, &noise, &base.parameters)?;
+    let (level_grown, elements_after) = of_frames(&whole, known, frames, &heldout, &noise, &grown.parameters)?;
+    let gap_counts2 = level_base.heldout_rms_counts.powi(2) - noise.rms_counts.powi(2);
+    let closed = level_base.heldout_rms_counts.powi(2) - level_grown.heldout_rms_counts.powi(2);
+    let steps = search.steps(&grown)?;
+    said.say("done", 1.0);
+    Ok(Discovery {
+        seed: options.seed,
+        not_shown: Vec::new(),
+        warnings,
+        split: Split {
+            frames: frames.len(),
+            train_presses: heldout.train_presses,
+            heldout_presses: heldout.presses,
+            heldout_depths_mm: heldout.depths_mm,
+            heldout_coverings_mm: heldout.coverings_mm,
+        },
+        noise_rms_counts: replicated.map(|noise| noise.rms_counts),
+        base: level_base,
+        global: GlobalTest { statistic: before.statistic, p_value: any },
+        gap: before.gap,
+        curves: Vec::new(),
+        elements: elements_before
+            .into_iter()
+            .zip(elements_after)
+            .map(|(before_rms_counts, after_rms_counts)| ElementGap { before_rms_counts, after_rms_counts })
+            .collect(),
+        rounds: rounds.into_iter().map(|tried| tried.round).collect(),
+        steps,
+        final_: Final {
+            level: level_grown,
+            shrink: (any <= ALPHA && gap_counts2 > 0.0).then(|| closed / gap_counts2),
+        },
+        verdict,
+        unexplained: Unexplained {
+            depends_on: if left { after.gap.iter().map(|gap| gap.covariate).collect() } else { Vec::new() },
+            share: if verdict == Verdict::NothingMissing { 0.0 } else { share },
+        },
+        next_experiments: Vec::new(),
+        recalibrated: base_of(known, &base.parameters),
+        effects: grown.parameters.effects()?,
+        grown: base_of(known, &grown.parameters),
+    })
+}
+
+/// Where a model and the data disagree.
+struct Located {
+    statistic: f64,
+    p_value: f64,
+    gap: Vec<Gap>,
+}
+
+impl Search<'_> {
+    /// On what the residual of a model depends.
+    fn locate(&self, at: &Fitted) -> Result<Located, DiscoverError> {
+        let problem = self.problem;
+        let fitting = self.fitting(at)?;
+        let forms = Forms::of(problem, &at.parameters, &at.predicted)?;
+        let features = features(problem, &forms);
+        let elements = problem.sensor.rows.elements;
+        let scored = |feature: &Feature| {
+            let mut column = forms.column(feature, elements);
+            let readings = column.iter().filter(|value| **value != 0.0).count();
+            fitting.free(&mut column);
+            let score = fitting.score(&column);
+            (score, fitting.wanted(&column) / fitting.size(&column).max(f64::MIN_POSITIVE), readings)
+        };
+        let scored = parallel::map(&features, self.options.threads, scored);
+        let mut covariates: Vec<&'static str> = features.iter().map(|feature| feature.covariate).collect();
+        covariates.dedup();
+        let of = |covariate: &str| -> Vec<usize> {
+            (0..features.len()).filter(|index| features[*index].covariate == covariate).collect()
+        };
+        let groups: Vec<Vec<&Score>> =
+            covariates.iter().map(|one| of(one).iter().map(|index| &scored[*index].0).collect()).collect();
+        let under_none = flipped(&groups, FLIPS, self.options.seed ^ 0x10ca_7e);
+        let statistics: Vec<f64> = groups
+            .iter()
+            .map(|group| group.iter().map(|score| score.z.abs()).fold(0.0, f64::max))
+            .collect();
+        let p_values: Vec<f64> =
+            statistics.iter().zip(&under_none).map(|(statistic, none)| p_value(*statistic, none)).collect();
+        let statistic = statistics.iter().copied().fold(0.0, f64::max);
+        let mut gap: Vec<Gap> = Vec::new();
+        for ((covariate, q_value), statistic) in covariates.iter().zip(q_values(&p_values)).zip(&statistics) {
+            let strongest = of(covariate)
+                .into_iter()
+                .max_by(|a, b| scored[*a].0.z.abs().total_cmp(&scored[*b].0.z.abs()));
+            let Some(strongest) = strongest.filter(|_| q_value <= Q_MAX && *statistic > 0.0) else { continue };
+            let (_, z, readings) = &scored[strongest];
+            let feature = &features[strongest];
+            gap.push(Gap {
+                covariate,
+                unit: feature.unit,
+                range: feature.range,
+                effect_size: z.abs() / (*readings as f64).sqrt(),
+                q_value,
+            });
+        }
+        gap.sort_by(|a, b| b.effect_size.total_cmp(&a.effect_size));
+        Ok(Located { statistic, p_value: p_value(statistic, &largest(&under_none)), gap })
+    }
+
+    /// What was added, each name once.
+    fn steps(&self, grown: &Fitted) -> Result<Vec<Step>, DiscoverError> {
+        let names = names(&grown.parameters, self.known_terms);
+        let after = self.problem.heldout_blocks(&grown.predicted);
+        let mut steps = Vec::new();
+        for name in names {
+            let less = without(&grown.parameters, name, self.known_terms);
+            let before = self.problem.fit_from(less, 8, &[], self.options.threads)?;
+            let blocks = self.problem.heldout_blocks(&before.predicted);
+            let gains: Vec<f64> = blocks.iter().zip(&after).map(|(b, a)| b[0] - a[0]).collect();
+            let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(self.known_terms);
+            let estimated = |(term, errors): (&crate::sensor::Term, &Vec<f64>)| {
+                term.definition
+                    .parameters
+                    .iter()
+                    .zip(&term.values)
+                    .zip(errors)
+                    .map(|((known, value), error)| Estimated {
+                        name: known.name,
+                        value: *value,
+                        standard_error: Some(*error).filter(|error| error.is_finite()),
+                    })
+                    .collect()
+            };
+            let p_value = crate::score::sign_flip_p(&gains, FLIPS, self.options.seed);
+            steps.push(Step {
+                effect: name,
+                terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
+                p_value,
+                q_value: p_value,
+                heldout_rms_before_counts: self.problem.heldout_rms_counts(&before.predicted),
+                heldout_rms_after_counts: self.problem.heldout_rms_counts(&grown.predicted),
+                equivalent: Vec::new(),
+            });
+        }
+        Ok(steps)
+    }
+}
+
+/// Presses that are fitted, at least.
+const PRESSES_LEAST: usize = 3;
+const FLIPS: usize = 1999;
+/// Covariates are told with at most this share of false ones among them.
+const Q_MAX: f64 = 0.05;
+/// What is left of the gap at most, for the verdict.
+const EXPLAINED_SHARE: f64 = 0.1;
+const UNEXPLAINED_SHARE: f64 = 0.35;
+
+/// Says how far it has come; the share never falls.
+struct Said<'a> {
+    progress: &'a (dyn Fn(Progress) + Sync),
+    share: Mutex<f64>,
+}
+
+impl Said<'_> {
+    fn say(&self, what: &str, share: f64) {
+        let mut held = self.share.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        // What has no share of its own goes part of the way.
+        *held = if share > 0.0 { held.max(share) } else { *held + 0.01 * (1.0 - *held) };
+        (self.progress)(Progress { what: what.to_owned(), share: *held });
+    }
+}
+
+/// How far a model is from the held-out frames, all together and element by element.
+fn of_frames(
+    whole: &Rows,
+    known: &Known,
+    frames: &Frames,
+    heldout: &HeldOut,
+    noise: &Noise,
+    parameters: &Parameters,
+) -> Result<(Level, Vec<f64>), DiscoverError> {
+    let predicted = Sensor { known, frames, rows: whole }.predict(parameters)?;
+    let elements = frames.elements;
+    let mut squares = vec![0.0; elements];
+    let mut count = 0.0_f64;
+    for (frame, of) in predicted.chunks_exact(elements).enumerate() {
+        if heldout.frames[frame] {
+            count += 1.0;
+            for ((sum, counts), of) in squares.iter_mut().zip(frames.counts_of(frame)).zip(of) {
+                *sum += (f64::from(*counts) - of).powi(2);
+            }
+        }
+    }
+    let count = count.max(1.0);
+    let mean = squares.iter().sum::<f64>() / (count * elements as f64);
+    let level = Level { heldout_rms_counts: mean.sqrt(), heldout_chi2: mean / noise.rms_counts.powi(2) };
+    Ok((level, squares.into_iter().map(|sum| (sum / count).sqrt()).collect()))
+}
+
+fn base_of(known: &Known, parameters: &Parameters) -> Base {
+    let elements = known.array.elements();
+    let runs = parameters.baseline.len().max(1) as f64;
+    let mean = |element: usize| parameters.baseline.iter().map(|run| run[element]).sum::<f64>() / runs;
+    let response = Response {
+        sensitivity_counts_per_mm: parameters.sensitivity.clone(),
+        baseline_counts: (0..elements).map(mean).collect(),
+        ..known.response.clone()
+    };
+    Base { psf: parameters.psf, response, run_baselines_counts: parameters.baseline.clone() }
 }
 
 /// What a model gives for every frame, before noise: frame by frame, element by element, in counts.
@@ -73,10 +365,20 @@ pub fn discover(
 /// # Errors
 /// [`DiscoverError`] if the parameters make no model.
 pub fn predict(
-    _known: &Known,
-    _frames: &Frames,
-    _base: &Base,
-    _effects: &[Effect],
+    known: &Known,
+    frames: &Frames,
+    base: &Base,
+    effects: &[Effect],
 ) -> Result<Vec<f32>, DiscoverError> {
-    todo!()
+    let rows = Rows::of(frames, &still(frames), false)?;
+    let parameters = Parameters {
+        sensitivity: base.response.sensitivity_counts_per_mm.clone(),
+        baseline: base.run_baselines_counts.clone(),
+        psf: base.psf,
+        terms: effects.iter().map(crate::sensor::Term::of).collect(),
+    };
+    let predicted = Sensor { known, frames, rows: &rows }.predict(&parameters)?;
+    #[expect(clippy::cast_possible_truncation, reason = "counts are stored in single precision")]
+    let single = predicted.into_iter().map(|counts| counts as f32).collect();
+    Ok(single)
 }

@@ -50,8 +50,10 @@ pub struct Discovery {
 pub struct Base {
     /// Spread against covering thickness.
     pub psf: Psf,
-    /// How the elements answer.
+    /// How the elements answer; the baselines are the mean over the runs.
     pub response: Response,
+    /// Baselines of each run, one per element, in counts.
+    pub run_baselines_counts: Vec<Vec<f64>>,
 }
 
 /// An effect that the data cannot show.

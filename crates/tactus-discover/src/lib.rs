@@ -2,7 +2,20 @@
 //! and shows the gap shrink.
 
 mod discover;
+mod candidates;
+mod chance;
+mod covariates;
 mod discovery;
+mod fit;
+mod noise;
+mod parallel;
+mod rows;
+mod scale;
+mod score;
+mod search;
+mod sensor;
+mod spectrum;
+mod wiring;
 mod frames;
 
 pub use discover::{DiscoverError, Known, Options, Progress, discover, predict};

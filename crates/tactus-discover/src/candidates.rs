@@ -1,0 +1,219 @@
+//! Every effect of the library as a candidate, with what it would take to start a fit of it.
+
+use nalgebra::{DMatrix, DVector};
+use tactus_model::effect::{Definition, Kind, REGISTRY};
+
+use crate::DiscoverError;
+use crate::fit::{Free, Problem, solve};
+use crate::score::{Fitting, Score};
+use crate::sensor::{Parameters, Term};
+
+/// Values of a shape that spans orders of magnitude, and of any other.
+const VALUES_MANY: usize = 5;
+const VALUES_FEW: usize = 3;
+
+/// An effect of the library, as these data could show it.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub(crate) definition: &'static Definition,
+    /// Parameters that change something by themselves.
+    amplitudes: Vec<usize>,
+    /// Values of the others from which fits start.
+    shapes: Vec<Term>,
+}
+
+/// A candidate at the residual of a model: how much it is wanted.
+#[derive(Debug, Clone)]
+pub(crate) struct Screened {
+    pub(crate) definition: &'static Definition,
+    /// The scores of all its amplitudes at all its shapes.
+    pub(crate) scores: Vec<Score>,
+    /// By how much a first step lessens the cost, at the best shape.
+    pub(crate) promise: f64,
+    /// Where that step ends: a fit's start.
+    pub(crate) start: Term,
+    /// How many standard errors its whole range is apart at the best shape: what these data can show of it.
+    pub(crate) reach: f64,
+}
+
+/// What data suggest of shapes that no grid would find.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Hints {
+    /// Frequencies of lines in the spectrum.
+    pub(crate) frequencies_hz: Vec<f64>,
+    /// Pairs of an element and another for which it may answer.
+    pub(crate) wiring: Vec<[usize; 2]>,
+}
+
+impl Candidate {
+    /// All effects of the library, `declared` being the model without them.
+    pub(crate) fn all(
+        problem: &Problem<'_>,
+        at: &Parameters,
+        predicted: &[f64],
+        hints: &Hints,
+    ) -> Result<Vec<Self>, DiscoverError> {
+        REGISTRY.iter().map(|definition| Self::of(definition, problem, at, predicted, hints)).collect()
+    }
+
+    fn of(
+        definition: &'static Definition,
+        problem: &Problem<'_>,
+        at: &Parameters,
+        predicted: &[f64],
+        hints: &Hints,
+    ) -> Result<Self, DiscoverError> {
+        let mut amplitudes = Vec::new();
+        let mut shapes = vec![Term::neutral(definition)];
+        for (parameter, known) in definition.parameters.iter().enumerate() {
+            if known.kind == Kind::Element {
+                continue;
+            }
+            let acts = known.neutral == 0.0 || {
+                let with = with(at, Term::neutral(definition));
+                let free = Free::Of { term: with.terms.len() - 1, parameter };
+                problem.slope(&with, predicted, free)?.iter().any(|slope| *slope != 0.0)
+            };
+            let range = known.range;
+            if known.name.ends_with("_hz") {
+                shapes = cross(&shapes, parameter, &hints.frequencies_hz);
+            } else if known.name == "duration_s" {
+                shapes = cross(&shapes, parameter, &[problem.duration_s.clamp(range[0], range[1])]);
+            } else if acts {
+                amplitudes.push(parameter);
+            } else {
+                let values = grid(known.name, range, known.neutral, problem.duration_s);
+                shapes = cross(&shapes, parameter, &values);
+            }
+        }
+        if definition.parameters.iter().any(|known| known.kind == Kind::Element) {
+            shapes = hints.wiring.iter().filter_map(|pair| wired(definition, *pair)).collect();
+            amplitudes.retain(|parameter| definition.parameters[*parameter].kind == Kind::Real);
+        }
+        Ok(Self { definition, amplitudes, shapes })
+    }
+
+    /// How much the residual of a model wants this effect.
+    pub(crate) fn screen(
+        &self,
+        fitting: &Fitting<'_>,
+        problem: &Problem<'_>,
+        at: &Parameters,
+        predicted: &[f64],
+    ) -> Result<Screened, DiscoverError> {
+        let mut screened = Screened {
+            definition: self.definition,
+            scores: Vec::new(),
+            promise: 0.0,
+            start: Term::neutral(self.definition),
+            reach: 0.0,
+        };
+        for shape in &self.shapes {
+            let start = with(at, shape.clone());
+            let term = start.terms.len() - 1;
+            let mut columns = Vec::with_capacity(self.amplitudes.len());
+            for parameter in &self.amplitudes {
+                let free = Free::Of { term, parameter: *parameter };
+                let mut column = problem.slope(&start, predicted, free)?;
+                let whole = fitting.size(&column);
+                fitting.free(&mut column);
+                if fitting.size(&column) < 1e-6 * whole {
+                    column.fill(0.0);
+                }
+                screened.scores.push(fitting.score(&column));
+                let [least, most] = self.definition.parameters[*parameter].range;
+                screened.reach = screened.reach.max(fitting.size(&column) * (most - least));
+                columns.push(column);
+            }
+            let (promise, values) = self.first_step(fitting, shape, &columns);
+            if promise > screened.promise {
+                (screened.promise, screened.start) = (promise, values);
+            }
+        }
+        Ok(screened)
+    }
+
+    /// The linear step from nothing, within the ranges: by how much it lessens the cost, and where it ends.
+    fn first_step(&self, fitting: &Fitting<'_>, shape: &Term, columns: &[Vec<f64>]) -> (f64, Term) {
+        let mut active: Vec<usize> = (0..columns.len()).collect();
+        loop {
+            if active.is_empty() {
+                return (0.0, shape.clone());
+            }
+            let count = active.len();
+            let gram = DMatrix::from_fn(count, count, |i, j| {
+                fitting.product(&columns[active[i]], &columns[active[j]])
+            });
+            let right = DVector::from_fn(count, |i, _| fitting.wanted(&columns[active[i]]));
+            let step = solve(&gram, &right, 0.0);
+            let outside = active.iter().zip(step.iter()).position(|(place, step)| {
+                let parameter = self.amplitudes[*place];
+                let range = self.definition.parameters[parameter].range;
+                let value = shape.values[parameter];
+                (*step < 0.0 && value <= range[0]) || (*step > 0.0 && value >= range[1])
+            });
+            if let Some(outside) = outside {
+                active.remove(outside);
+                continue;
+            }
+            let mut start = shape.clone();
+            for (place, step) in active.iter().zip(step.iter()) {
+                let parameter = self.amplitudes[*place];
+                let [least, most] = self.definition.parameters[parameter].range;
+                let value = &mut start.values[parameter];
+                *value = (*value + step).clamp(least + 0.02 * (*value - least), most - 0.02 * (most - *value));
+            }
+            return (step.dot(&right), start);
+        }
+    }
+}
+
+/// A model with one more term.
+pub(crate) fn with(at: &Parameters, term: Term) -> Parameters {
+    let mut with = at.clone();
+    with.terms.push(term);
+    with
+}
+
+fn cross(shapes: &[Term], parameter: usize, values: &[f64]) -> Vec<Term> {
+    let set = |shape: &Term, value: f64| {
+        let mut set = shape.clone();
+        set.values[parameter] = value;
+        set
+    };
+    shapes.iter().flat_map(|shape| values.iter().map(move |value| set(shape, *value))).collect()
+}
+
+/// Values of a shape parameter from which fits start.
+fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> {
+    let [mut least, mut most] = range;
+    if name.ends_with("_s") {
+        // Nothing faster than a frame or slower than the data shows as such.
+        most = most.min(duration_s);
+        least = least.max(0.02).min(most);
+    }
+    let ratio = most / least;
+    if !(least > 0.0 && ratio.is_finite()) {
+        return vec![neutral];
+    }
+    if ratio < 1.0 + 1e-9 {
+        return vec![least];
+    }
+    let count = if ratio > 300.0 { VALUES_MANY } else { VALUES_FEW };
+    // Within the ends: the middles of equal parts.
+    (0..count).map(|k| least * ratio.powf((k as f64 + 0.5) / count as f64)).collect()
+}
+
+fn wired(definition: &'static Definition, pair: [usize; 2]) -> Option<Term> {
+    let mut term = Term::neutral(definition);
+    let places: Vec<usize> = definition
+        .parameters
+        .iter()
+        .enumerate()
+        .filter(|(_, known)| known.kind == Kind::Element)
+        .map(|(place, _)| place)
+        .collect();
+    let [first, second] = <[usize; 2]>::try_from(places).ok()?;
+    (term.values[first], term.values[second]) = (pair[0] as f64, pair[1] as f64);
+    Some(term)
+}

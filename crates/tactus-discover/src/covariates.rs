@@ -1,0 +1,386 @@
+//! On what the residual may depend: covariates of the rows, each in ranges, and the forms that a dependence may take.
+
+use tactus_model::effect::Definition;
+use tactus_model::{Contact, Covering, ForwardModel, Response};
+
+use crate::fit::{Free, Problem};
+use crate::rows::pressing;
+use crate::sensor::{Parameters, Term};
+use crate::candidates::with;
+use crate::{DiscoverError, Known};
+
+/// Depth at which a place's image is looked up where nothing is pressed.
+const LOOK_MM: f64 = 0.3;
+/// A sideways move shorter than this has no direction.
+const ASIDE_MM: f64 = 0.05;
+
+/// What a dependence multiplies: a value for each reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// All elements alike, in counts.
+    Offset,
+    /// The element's own signal.
+    Signal,
+    /// The signal's change along x.
+    AlongX,
+    /// The signal's change along y.
+    AlongY,
+    /// The neighbours' signals.
+    Neighbours,
+    /// What a press at the tip's place would give.
+    Place,
+    /// What a press at the last pressed place would give.
+    LastPlace,
+}
+
+/// A covariate in ranges, with the form of its dependence.
+#[derive(Debug, Clone)]
+pub(crate) struct Feature {
+    pub(crate) covariate: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) form: Form,
+    /// Range of the covariate; the whole of it for one that enters by its value.
+    pub(crate) range: [f64; 2],
+    /// Of each row; or of each reading.
+    pub(crate) factor: Factor,
+}
+
+/// What multiplies a form.
+#[derive(Debug, Clone)]
+pub(crate) enum Factor {
+    Rows(Vec<f64>),
+    Readings(Vec<f64>),
+}
+
+/// The forms at a point, reading by reading.
+#[derive(Debug)]
+pub(crate) struct Forms {
+    signal: Vec<f64>,
+    along: [Vec<f64>; 2],
+    neighbours: Vec<f64>,
+    place: Vec<f64>,
+    last_place: Vec<f64>,
+}
+
+/// Covariates of the rows.
+#[derive(Debug)]
+struct History {
+    since_contact_s: Vec<f64>,
+    since_release_s: Vec<f64>,
+    depth_mm: Vec<f64>,
+    deepest_before_mm: Vec<f64>,
+    upward: Vec<f64>,
+    speed_mm_per_s: Vec<f64>,
+    travel_mm_per_s: Vec<f64>,
+    aside: [Vec<f64>; 2],
+    press: Vec<f64>,
+    place_mm: [Vec<f64>; 2],
+    last_place_mm: Vec<Option<[f64; 2]>>,
+    temperature_c: Vec<f64>,
+}
+
+impl Forms {
+    pub(crate) fn of(
+        problem: &Problem<'_>,
+        at: &Parameters,
+        predicted: &[f64],
+    ) -> Result<Self, DiscoverError> {
+        let slope = |name: &str, parameter: usize| -> Result<Vec<f64>, DiscoverError> {
+            let with = with(at, Term::neutral(Definition::find(name)?));
+            problem.slope(&with, predicted, Free::Of { term: with.terms.len() - 1, parameter })
+        };
+        let rows = problem.sensor.rows;
+        let elements = rows.elements;
+        let signal = predicted
+            .chunks_exact(elements)
+            .zip(&rows.run)
+            .flat_map(|(counts, run)| counts.iter().zip(&at.baseline[*run]).map(|(counts, base)| counts - base))
+            .collect();
+        let history = History::of(problem);
+        let here: Vec<Option<[f64; 2]>> =
+            (0..rows.len()).map(|row| Some([history.place_mm[0][row], history.place_mm[1][row]])).collect();
+        Ok(Self {
+            signal,
+            along: [slope("misregistration", 0)?, slope("misregistration", 1)?],
+            neighbours: slope("crosstalk", 0)?,
+            place: images(problem, at, &here)?,
+            last_place: images(problem, at, &history.last_place_mm)?,
+        })
+    }
+
+    /// A feature's column.
+    pub(crate) fn column(&self, feature: &Feature, elements: usize) -> Vec<f64> {
+        let form = match feature.form {
+            Form::Offset => None,
+            Form::Signal => Some(&self.signal),
+            Form::AlongX => Some(&self.along[0]),
+            Form::AlongY => Some(&self.along[1]),
+            Form::Neighbours => Some(&self.neighbours),
+            Form::Place => Some(&self.place),
+            Form::LastPlace => Some(&self.last_place),
+        };
+        let factor = |reading: usize| match &feature.factor {
+            Factor::Rows(of_row) => of_row[reading / elements],
+            Factor::Readings(of_reading) => of_reading[reading],
+        };
+        (0..self.signal.len()).map(|reading| factor(reading) * form.map_or(1.0, |form| form[reading])).collect()
+    }
+}
+
+/// What a press at each of the places would give, in counts above the baseline; nothing where there is no place.
+fn images(
+    problem: &Problem<'_>,
+    at: &Parameters,
+    places_mm: &[Option<[f64; 2]>],
+) -> Result<Vec<f64>, DiscoverError> {
+    let (known, frames, rows) = (problem.sensor.known, problem.sensor.frames, problem.sensor.rows);
+    let Known { array, response, registration, indenters, .. } = known;
+    let elements = rows.elements;
+    let response = Response {
+        sensitivity_counts_per_mm: at.sensitivity.clone(),
+        baseline_counts: vec![0.0; elements],
+        ..response.clone()
+    };
+    let model = ForwardModel::new(array.clone(), at.psf, response)?;
+    let mut images = vec![0.0; rows.len() * elements];
+    let mut last: Option<([f64; 2], usize)> = None;
+    for (row, place_mm) in places_mm.iter().enumerate() {
+        let Some(place_mm) = *place_mm else { continue };
+        let target = row * elements..(row + 1) * elements;
+        if let Some((_, from)) = last.filter(|(before, _)| *before == place_mm) {
+            images.copy_within(from * elements..(from + 1) * elements, target.start);
+            continue;
+        }
+        let frame = rows.first[row];
+        let tool = &frames.indenters[usize::from(frames.indenter[frame])];
+        let Some(indenter) = indenters.get(tool).cloned() else { continue };
+        let contact = Contact {
+            indenter,
+            position_mm: registration.to_sensor(place_mm),
+            rotation_deg: -registration.rotation_deg,
+            depth_mm: LOOK_MM,
+        };
+        model.image(&contact, Covering { thickness_mm: frames.covering_mm[frame] }, &mut images[target]);
+        last = Some((place_mm, row));
+    }
+    Ok(images)
+}
+
+/// Every feature that the data have.
+pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
+    use Form::{AlongX, AlongY, LastPlace, Neighbours, Offset, Place, Signal};
+    let (rows, frames) = (problem.sensor.rows, problem.sensor.frames);
+    let array = &problem.sensor.known.array;
+    let registration = problem.sensor.known.registration;
+    let history = History::of(problem);
+    let deep: Vec<bool> = history.depth_mm.iter().map(|depth| *depth > 0.0).collect();
+    let free: Vec<bool> = deep.iter().map(|deep| !deep).collect();
+    let every = vec![true; rows.len()];
+    let (signal, offset, along) = ([Signal], [Offset], [AlongX, AlongY]);
+    let mut made = Vec::new();
+    let mut add = |covariate, unit, values: &[f64], among: &[bool], bins: usize, forms: &[Form]| {
+        for range in ranges(values, among, bins) {
+            let within = |(value, among): (&f64, &bool)| {
+                f64::from(u8::from(*among && *value >= range[0] && *value < range[1]))
+            };
+            let factor: Vec<f64> = values.iter().zip(among).map(within).collect();
+            for form in forms {
+                let factor = Factor::Rows(factor.clone());
+                made.push(Feature { covariate, unit, form: *form, range: closed(range, values), factor });
+            }
+        }
+    };
+    add("time", "s", &rows.t_s, &every, 8, &[Offset, Signal]);
+    add("time since contact", "s", &history.since_contact_s, &deep, 6, &signal);
+    add("time since release", "s", &history.since_release_s, &free, 6, &[LastPlace, Offset]);
+    add("depth", "mm", &history.depth_mm, &deep, 8, &signal);
+    add("height above the surface", "mm", &negative(&history.depth_mm), &free, 4, &[Place, Offset]);
+    add("largest past depth", "mm", &history.deepest_before_mm, &deep, 5, &signal);
+    add("direction of motion", "", &history.upward, &deep, 2, &signal);
+    add("direction of approach along x", "", &history.aside[0], &deep, 2, &[Signal, AlongX]);
+    add("direction of approach along y", "", &history.aside[1], &deep, 2, &[Signal, AlongY]);
+    add("speed", "mm/s", &history.speed_mm_per_s, &deep, 5, &signal);
+    add("speed of travel", "mm/s", &history.travel_mm_per_s, &free, 4, &offset);
+    add("press", "", &history.press, &deep, 6, &signal);
+    let place: Vec<[f64; 2]> = history.place_mm[0]
+        .iter()
+        .zip(&history.place_mm[1])
+        .map(|(x, y)| registration.to_sensor([*x, *y]))
+        .collect();
+    let axes = [("place along x", "place in the element along x", array.col_centres_mm()), ("place along y", "place in the element along y", array.row_centres_mm())];
+    for (axis, (on_sensor, in_element, centres)) in axes.into_iter().enumerate() {
+        let values: Vec<f64> = place.iter().map(|place| place[axis]).collect();
+        add(on_sensor, "mm", &values, &deep, 4, &[Signal, along[axis], along[1 - axis]]);
+        let within: Vec<f64> = values.iter().map(|value| value - nearest(centres, *value)).collect();
+        add(in_element, "mm", &within, &deep, 4, &[Signal, along[axis]]);
+    }
+    if history.temperature_c.iter().all(|c| c.is_finite()) {
+        add("temperature", "C", &history.temperature_c, &every, 4, &[Offset, Signal]);
+    }
+    let range = [f64::NEG_INFINITY, f64::INFINITY];
+    made.push(Feature {
+        covariate: "neighbours' signals",
+        unit: "counts",
+        form: Neighbours,
+        range: closed(range, &forms.signal),
+        factor: Factor::Rows(vec![1.0; rows.len()]),
+    });
+    let strong: Vec<bool> = forms.signal.iter().map(|signal| signal.abs() > 0.0).collect();
+    for range in ranges(&forms.signal, &strong, 8) {
+        let within =
+            |signal: &f64| f64::from(u8::from(*signal != 0.0 && *signal >= range[0] && *signal < range[1]));
+        let factor = Factor::Readings(forms.signal.iter().map(within).collect());
+        let range = closed(range, &forms.signal);
+        made.push(Feature { covariate: "signal", unit: "counts", form: Signal, range, factor });
+    }
+    debug_assert!(frames.elements == array.elements());
+    made
+}
+
+/// Ranges of values with as many rows in each, where the values differ at all.
+fn ranges(values: &[f64], among: &[bool], bins: usize) -> Vec<[f64; 2]> {
+    let mut sorted: Vec<f64> =
+        values.iter().zip(among).filter(|(value, among)| **among && value.is_finite()).map(|(v, _)| *v).collect();
+    sorted.sort_by(f64::total_cmp);
+    let (Some(least), Some(most)) = (sorted.first().copied(), sorted.last().copied()) else { return Vec::new() };
+    if most - least <= 1e-9 * most.abs().max(1.0) {
+        return Vec::new();
+    }
+    let mut edges: Vec<f64> = (1..bins).map(|k| sorted[k * sorted.len() / bins]).collect();
+    edges.dedup();
+    edges.retain(|edge| *edge > least);
+    let starts = std::iter::once(f64::NEG_INFINITY).chain(edges.iter().copied());
+    let ends = edges.iter().copied().chain(std::iter::once(f64::INFINITY));
+    starts.zip(ends).map(|(start, end)| [start, end]).collect()
+}
+
+/// A range with the least and greatest value for ends that are open.
+fn closed([start, end]: [f64; 2], values: &[f64]) -> [f64; 2] {
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let least = finite().fold(f64::INFINITY, f64::min);
+    let most = finite().fold(f64::NEG_INFINITY, f64::max);
+    [if start.is_finite() { start } else { least }, if end.is_finite() { end } else { most }]
+}
+
+fn nearest(centres: &[f64], value: f64) -> f64 {
+    centres.iter().copied().min_by(|a, b| (a - value).abs().total_cmp(&(b - value).abs())).unwrap_or(value)
+}
+
+fn negative(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|value| -value).collect()
+}
+
+impl History {
+    /// Of each row, from all the frames before it.
+    fn of(problem: &Problem<'_>) -> Self {
+        let (frames, rows) = (problem.sensor.frames, problem.sensor.rows);
+        let count = rows.len();
+        let empty = || Vec::with_capacity(count);
+        let mut history = Self {
+            since_contact_s: empty(),
+            since_release_s: empty(),
+            depth_mm: empty(),
+            deepest_before_mm: empty(),
+            upward: empty(),
+            speed_mm_per_s: empty(),
+            travel_mm_per_s: empty(),
+            aside: [empty(), empty()],
+            press: empty(),
+            place_mm: [empty(), empty()],
+            last_place_mm: Vec::with_capacity(count),
+            temperature_c: empty(),
+        };
+        let mut state = State::default();
+        let mut next = 0;
+        let mut run = usize::MAX;
+        for row in 0..count {
+            if rows.run[row] != run {
+                run = rows.run[row];
+                state = State::default();
+            }
+            while next < rows.first[row + 1] {
+                state.take(problem, next, rows.t_s[row]);
+                next += 1;
+            }
+            let frame = rows.first[row];
+            let t_s = rows.t_s[row];
+            history.since_contact_s.push(t_s - state.contact_s);
+            history.since_release_s.push(state.release_s.map_or(f64::NAN, |release_s| t_s - release_s));
+            history.depth_mm.push(state.depth_mm);
+            history.deepest_before_mm.push(state.deepest_before_mm);
+            history.upward.push(f64::from(u8::from(state.upward)));
+            history.speed_mm_per_s.push(state.speed_mm_per_s);
+            history.travel_mm_per_s.push(state.travel_mm_per_s);
+            history.aside[0].push(state.aside[0]);
+            history.aside[1].push(state.aside[1]);
+            history.press.push(state.presses);
+            history.place_mm[0].push(frames.position_mm[frame][0]);
+            history.place_mm[1].push(frames.position_mm[frame][1]);
+            history.last_place_mm.push(state.last_place_mm.filter(|_| state.depth_mm <= 0.0));
+            history.temperature_c.push(f64::from(frames.temperature_c[frame]));
+        }
+        history
+    }
+}
+
+/// What a sensor could remember.
+#[derive(Debug, Default)]
+struct State {
+    last: Option<(f64, [f64; 3])>,
+    depth_mm: f64,
+    contact_s: f64,
+    release_s: Option<f64>,
+    upward: bool,
+    speed_mm_per_s: f64,
+    travel_mm_per_s: f64,
+    aside: [f64; 2],
+    presses: f64,
+    press: Option<i32>,
+    deepest_mm: f64,
+    deepest_before_mm: f64,
+    last_place_mm: Option<[f64; 2]>,
+}
+
+impl State {
+    fn take(&mut self, problem: &Problem<'_>, frame: usize, _: f64) {
+        let frames = problem.sensor.frames;
+        let (t_s, at) = (frames.t_s[frame], frames.position_mm[frame]);
+        let depth_mm = -at[2];
+        if let Some((last_s, last)) = self.last {
+            let dt_s = (t_s - last_s).max(1e-6);
+            let fell_mm = last[2] - at[2];
+            if fell_mm.abs() > 1e-3 {
+                self.upward = fell_mm < 0.0;
+                if depth_mm > 0.0 {
+                    self.speed_mm_per_s = fell_mm.abs() / dt_s;
+                }
+            }
+            let aside = [at[0] - last[0], at[1] - last[1]];
+            let far = aside[0].hypot(aside[1]);
+            self.travel_mm_per_s = far.max(fell_mm.abs()) / dt_s;
+            for (held, moved) in self.aside.iter_mut().zip(aside) {
+                if moved.abs() > ASIDE_MM.min(far) && moved.abs() > 1e-3 {
+                    *held = moved.signum();
+                }
+            }
+        }
+        if frames.press[frame] >= 0 && self.press != Some(frames.press[frame]) {
+            self.press = Some(frames.press[frame]);
+            self.presses += 1.0;
+            self.deepest_before_mm = self.deepest_mm;
+        }
+        let touched = self.depth_mm > 0.0;
+        if depth_mm > 0.0 {
+            if !touched {
+                self.contact_s = t_s;
+            }
+            self.deepest_mm = self.deepest_mm.max(depth_mm);
+            self.last_place_mm = Some([at[0], at[1]]);
+        } else if touched {
+            self.release_s = Some(t_s);
+        }
+        self.depth_mm = depth_mm;
+        self.last = Some((t_s, at));
+        debug_assert!(depth_mm <= 0.0 || !pressing(frames.phase[frame]) || depth_mm.is_finite());
+    }
+}

@@ -1,0 +1,131 @@
+//! The noise of readings, from frames that repeat each other.
+//!
+//! Where the tip has rested for a while, readings differ by noise only. With `x(t)` a reading,
+//!
+//! ```text
+//! D(k) = mean (x(t + k) - x(t))^2 / 2 = noise^2 (1 - rho(k))
+//! ```
+//!
+//! so that the plateau of `D` is the variance of a reading and its rise the autocorrelation `rho`; what is slow, such as
+//! a drift, hardly enters a difference over a second. Nothing of this depends on the model.
+
+use crate::Frames;
+
+/// The tip has come to rest if it stood still for so long.
+const SETTLED_S: f64 = 1.0;
+/// Lags of the plateau, in frames: about a second of the paper's sensor.
+const PLATEAU: std::ops::RangeInclusive<usize> = 20..=30;
+/// Fewer pairs of frames tell nothing.
+const PAIRS_LEAST: usize = 20;
+
+/// How readings scatter.
+#[derive(Debug, Clone)]
+pub(crate) struct Noise {
+    /// Standard deviation of one reading: the median over the elements.
+    pub(crate) rms_counts: f64,
+    /// The same of every element.
+    pub(crate) by_element_counts: Vec<f64>,
+    /// Autocorrelation at a lag of 0, 1, ... frames.
+    pub(crate) correlation: Vec<f64>,
+}
+
+impl Noise {
+    /// `None` if no frames repeat each other.
+    pub(crate) fn of(frames: &Frames, still: &[usize], step_counts: f64) -> Option<Self> {
+        let elements = frames.elements;
+        let lags = *PLATEAU.end();
+        let mut squares = vec![0.0_f64; (lags + 1) * elements];
+        let mut pairs = vec![0_usize; lags + 1];
+        let settled = settled(frames, still);
+        for lag in 1..=lags {
+            for frame in lag..frames.len() {
+                if still[frame] < lag || !settled[frame - lag] {
+                    continue;
+                }
+                pairs[lag] += 1;
+                let (now, then) = (frames.counts_of(frame), frames.counts_of(frame - lag));
+                for ((sum, now), then) in squares[lag * elements..].iter_mut().zip(now).zip(then) {
+                    *sum += f64::from(now - then).powi(2) / 2.0;
+                }
+            }
+        }
+        let longest = (1..=lags).rev().find(|lag| pairs[*lag] >= PAIRS_LEAST)?;
+        let plateau: Vec<usize> =
+            if longest >= *PLATEAU.start() { (*PLATEAU.start()..=longest).collect() } else { vec![longest] };
+        // The variance of rounding an even distribution.
+        let rounding = step_counts * step_counts / 12.0;
+        let variance = |element: usize| {
+            let (sum, count) = plateau.iter().fold((0.0, 0), |(sum, count), lag| {
+                (sum + squares[lag * elements + element], count + pairs[*lag])
+            });
+            (sum / count as f64).max(rounding).max(f64::MIN_POSITIVE)
+        };
+        let variances: Vec<f64> = (0..elements).map(variance).collect();
+        let typical = median(&variances);
+        let correlation = (0..=lags)
+            .map(|lag| match lag {
+                0 => 1.0,
+                _ if pairs[lag] < PAIRS_LEAST => 0.0,
+                _ => {
+                    let shares = (0..elements)
+                        .map(|e| squares[lag * elements + e] / pairs[lag] as f64 / variances[e]);
+                    (1.0 - median(&shares.collect::<Vec<_>>())).clamp(0.0, 1.0)
+                }
+            })
+            .collect();
+        Some(Self {
+            rms_counts: typical.sqrt(),
+            by_element_counts: variances.iter().map(|variance| variance.sqrt()).collect(),
+            correlation,
+        })
+    }
+
+    /// From differences of consecutive frames, where none repeat each other: what is quick in the signal enters too.
+    pub(crate) fn of_differences(frames: &Frames, step_counts: f64) -> Self {
+        let elements = frames.elements;
+        let rms = |element: usize| {
+            // Straight lines leave nothing: (x1 - 2 x2 + x3)^2 / 6.
+            let bends: Vec<f64> = (2..frames.len())
+                .map(|frame| {
+                    let [a, b, c] = [frame - 2, frame - 1, frame].map(|one| frames.counts_of(one)[element]);
+                    f64::from(a - 2.0 * b + c).powi(2) / 6.0
+                })
+                .collect();
+            // The median of a squared normal deviate is 0.455 of its mean.
+            (median(&bends) / 0.455).max(step_counts * step_counts / 12.0).max(f64::MIN_POSITIVE).sqrt()
+        };
+        let by_element_counts: Vec<f64> = (0..elements).map(rms).collect();
+        Self { rms_counts: median(&by_element_counts), by_element_counts, correlation: vec![1.0] }
+    }
+
+    /// By how much the variance of a mean of `frames` consecutive readings exceeds that of independent ones.
+    pub(crate) fn inflation(&self, frames: usize) -> f64 {
+        let count = frames as f64;
+        let pairs = self.correlation.iter().enumerate().skip(1).take(frames.saturating_sub(1));
+        1.0 + 2.0 * pairs.map(|(lag, rho)| (1.0 - lag as f64 / count) * rho).sum::<f64>()
+    }
+
+    /// After so many frames readings are independent.
+    pub(crate) fn memory_frames(&self) -> usize {
+        self.correlation.iter().rposition(|rho| *rho > 0.1).unwrap_or(0) + 1
+    }
+}
+
+/// Of every frame, whether the tip had been at rest for a while.
+fn settled(frames: &Frames, still: &[usize]) -> Vec<bool> {
+    (0..frames.len())
+        .map(|frame| frames.t_s[frame] - frames.t_s[frame - still[frame]] >= SETTLED_S)
+        .collect()
+}
+
+/// The middle one, or the mean of the two in the middle; 0 of none.
+pub(crate) fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => 0.0,
+        count if count % 2 == 1 => sorted[middle],
+        _ => f64::midpoint(sorted[middle - 1], sorted[middle]),
+    }
+}

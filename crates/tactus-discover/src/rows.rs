@@ -1,0 +1,300 @@
+//! Frames made fewer: where the tip rests, consecutive frames become one row, their mean.
+//!
+//! Frames in motion stay as they are. Once the tip rests, each row holds more frames than the one before, up to
+//! half a second: what relaxes is followed as closely as it changes.
+
+use tactus_model::{Phase, Trajectory, TrajectoryError};
+
+use crate::chance::Chance;
+use crate::noise::Noise;
+use crate::{DiscoverError, Frames};
+
+/// A tip that moved less did not move.
+const STILL_MM: f64 = 0.001;
+/// A row holds at most this share of the frames since the tip came to rest.
+const GROWTH: f64 = 0.2;
+/// A row holds at most so many frames.
+const FRAMES_MAX: usize = 15;
+/// Readings further apart are taken to be independent; more if their noise says so.
+const BLOCK_S: f64 = 3.0;
+/// A stretch of rest this long is split between fitted and held-out rows.
+const STRETCH_S: f64 = 10.0;
+/// One press in so many is held out.
+const HELDOUT_ONE_IN: usize = 3;
+
+/// Rows in order of time, run by run.
+#[derive(Debug)]
+pub(crate) struct Rows {
+    pub(crate) elements: usize,
+    /// First frame of each row; the last entry is the number of frames.
+    pub(crate) first: Vec<usize>,
+    pub(crate) run: Vec<usize>,
+    /// Mean time of the row's frames.
+    pub(crate) t_s: Vec<f64>,
+    /// Mean counts, row by row.
+    pub(crate) counts: Vec<f64>,
+    /// Inverse variance of a row's mean for a noise of one count; 0 for rows that are left out.
+    pub(crate) weight: Vec<f64>,
+    /// Rows of one block may be dependent; blocks are not.
+    pub(crate) block: Vec<usize>,
+    pub(crate) blocks: usize,
+    /// True for rows that are not fitted.
+    pub(crate) heldout: Vec<bool>,
+    /// The way of the tip in each run.
+    pub(crate) paths: Vec<Trajectory>,
+}
+
+/// What was held out.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct HeldOut {
+    /// Of each frame.
+    pub(crate) frames: Vec<bool>,
+    pub(crate) train_presses: usize,
+    pub(crate) presses: usize,
+    pub(crate) depths_mm: Vec<f64>,
+    pub(crate) coverings_mm: Vec<f64>,
+}
+
+/// Of every frame, how many frames before it the tip stood at the same place, the frame itself not counted.
+pub(crate) fn still(frames: &Frames) -> Vec<usize> {
+    let mut still = vec![0; frames.len()];
+    let mut begin = 0;
+    for (_, end) in &frames.runs {
+        let start = begin;
+        let mut anchor = start;
+        for frame in start..*end {
+            let moved = (0..3).any(|axis| {
+                (frames.position_mm[frame][axis] - frames.position_mm[anchor][axis]).abs() > STILL_MM
+            });
+            if moved || frames.press[frame] != frames.press[anchor] {
+                anchor = frame;
+            }
+            still[frame] = frame - anchor;
+        }
+        begin = *end;
+    }
+    still
+}
+
+impl Rows {
+    /// Rows of at most `frames_max` frames, none weighted yet.
+    pub(crate) fn of(frames: &Frames, still: &[usize], thin: bool) -> Result<Self, DiscoverError> {
+        let elements = frames.elements;
+        let (mut first, mut run, mut t_s, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut begin = 0;
+        let mut paths = Vec::new();
+        for (index, (_, end)) in frames.runs.iter().enumerate() {
+            paths.push(path(frames, begin, *end)?);
+            let mut frame = begin;
+            while frame < *end {
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
+                let most =
+                    if thin { ((GROWTH * still[frame] as f64) as usize).clamp(1, FRAMES_MAX) } else { 1 };
+                let mut next = frame + 1;
+                while next < *end
+                    && next - frame < most
+                    && still[next] > still[next - 1]
+                    && frames.phase[next] == frames.phase[frame]
+                {
+                    next += 1;
+                }
+                first.push(frame);
+                run.push(index);
+                let count = (next - frame) as f64;
+                t_s.push(frames.t_s[frame..next].iter().sum::<f64>() / count);
+                let at = counts.len();
+                counts.resize(at + elements, 0.0);
+                for member in frame..next {
+                    for (sum, one) in counts[at..].iter_mut().zip(frames.counts_of(member)) {
+                        *sum += f64::from(*one) / count;
+                    }
+                }
+                frame = next;
+            }
+            begin = *end;
+        }
+        let rows = run.len();
+        first.push(frames.len());
+        Ok(Self {
+            elements,
+            first,
+            run,
+            t_s,
+            counts,
+            weight: vec![1.0; rows],
+            block: vec![0; rows],
+            blocks: 1,
+            heldout: vec![false; rows],
+            paths,
+        })
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.run.len()
+    }
+
+    /// Frames in a row.
+    pub(crate) fn frames_in(&self, row: usize) -> usize {
+        self.first[row + 1] - self.first[row]
+    }
+
+    /// Weighs rows by their noise, and cuts them into blocks.
+    pub(crate) fn weigh(&mut self, frames: &Frames, noise: &Noise, heldout: &HeldOut) {
+        let interval_s = interval_s(frames);
+        let block_s = BLOCK_S.max(10.0 * noise.memory_frames() as f64 * interval_s);
+        let mut block = 0;
+        let mut began = 0;
+        for row in 0..self.len() {
+            let (frame, start) = (self.first[row], self.first[began]);
+            self.heldout[row] = heldout.frames[frame];
+            let count = self.frames_in(row);
+            self.weight[row] = count as f64 / noise.inflation(count);
+            let other = self.run[row] != self.run[began]
+                || frames.press[frame] != frames.press[start]
+                || heldout.frames[frame] != heldout.frames[start]
+                || self.t_s[row] - self.t_s[began] > block_s;
+            if other {
+                block += 1;
+                began = row;
+            }
+            self.block[row] = block;
+        }
+        self.blocks = block + 1;
+    }
+}
+
+impl HeldOut {
+    /// Holds out one press in three, whole, with the rest that follows it; and of what has several kinds one kind wholly.
+    pub(crate) fn choose(frames: &Frames, seed: u64) -> Self {
+        let mut chance = Chance::new(seed);
+        let presses = Presses::of(frames);
+        let mut out = vec![false; presses.len()];
+        let mut order: Vec<usize> = (0..presses.len()).collect();
+        chance.shuffle(&mut order);
+        let wanted = presses.len() / HELDOUT_ONE_IN;
+        let (mut depths_mm, mut coverings_mm) = (Vec::new(), Vec::new());
+        // A kind in the middle: beyond the fitted range even the truth may look wrong.
+        if let Some(covering_mm) = middle(presses.iter().map(|press| press.covering_mm)) {
+            coverings_mm.push(covering_mm);
+        } else if let Some(depth_mm) = middle(presses.iter().map(|press| press.depth_mm)) {
+            depths_mm.push(depth_mm);
+        }
+        for (out, press) in out.iter_mut().zip(&presses) {
+            *out = coverings_mm.iter().any(|one| same(*one, press.covering_mm))
+                || depths_mm.iter().any(|one| same(*one, press.depth_mm));
+        }
+        for index in order {
+            if out.iter().filter(|out| **out).count() >= wanted {
+                break;
+            }
+            out[index] = true;
+        }
+        let mut of_frame = vec![false; frames.len()];
+        for (press, out) in presses.iter().zip(&out) {
+            of_frame[press.first..press.end].fill(*out);
+        }
+        rests(frames, &presses, &mut chance, &mut of_frame);
+        let held = out.iter().filter(|out| **out).count();
+        Self { frames: of_frame, train_presses: presses.len() - held, presses: held, depths_mm, coverings_mm }
+    }
+}
+
+/// A contact, from its first frame to the one before the next, but no longer than a stretch of rest after it.
+struct Presses {
+    first: usize,
+    end: usize,
+    depth_mm: f64,
+    covering_mm: f64,
+}
+
+impl Presses {
+    fn of(frames: &Frames) -> Vec<Self> {
+        let mut presses: Vec<Self> = Vec::new();
+        let mut begin = 0;
+        for (_, run_end) in &frames.runs {
+            let mut last: Option<i32> = None;
+            let mut left_s = f64::NEG_INFINITY;
+            for frame in begin..*run_end {
+                let press = frames.press[frame];
+                if press >= 0 {
+                    if last != Some(press) {
+                        let covering_mm = frames.covering_mm[frame];
+                        presses.push(Self { first: frame, end: frame + 1, depth_mm: 0.0, covering_mm });
+                        last = Some(press);
+                    }
+                    left_s = frames.t_s[frame];
+                }
+                let belongs = press >= 0 || frames.t_s[frame] - left_s <= STRETCH_S;
+                if let Some(current) = presses.last_mut().filter(|_| last.is_some() && belongs) {
+                    current.end = frame + 1;
+                    current.depth_mm = current.depth_mm.max(-frames.position_mm[frame][2]);
+                }
+            }
+            begin = *run_end;
+        }
+        presses
+    }
+}
+
+/// Holds out one stretch in three of the frames that belong to no press.
+fn rests(frames: &Frames, presses: &[Presses], chance: &mut Chance, out: &mut [bool]) {
+    let mut taken = vec![false; frames.len()];
+    for press in presses {
+        taken[press.first..press.end].fill(true);
+    }
+    let mut stretch: Option<(f64, bool)> = None;
+    let mut run = frames.runs.iter().map(|(_, end)| *end).peekable();
+    for frame in 0..frames.len() {
+        if run.next_if(|end| *end <= frame).is_some() || taken[frame] {
+            stretch = None;
+        }
+        if taken[frame] {
+            continue;
+        }
+        let t_s = frames.t_s[frame];
+        let (_, held) = *match &mut stretch {
+            Some(begun) if t_s - begun.0 <= STRETCH_S => begun,
+            other => other.insert((t_s, chance.below(HELDOUT_ONE_IN) == 0)),
+        };
+        out[frame] = held;
+    }
+}
+
+/// Of at least four different values, one in the middle.
+fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let count = values.len();
+    values.dedup_by(|a, b| same(*a, *b));
+    // Values that scatter are no kinds.
+    (values.len() >= 4 && count >= 4 * values.len()).then(|| values[values.len() / 2])
+}
+
+fn same(one: f64, other: f64) -> bool {
+    (one - other).abs() < 0.005
+}
+
+/// Median time between frames.
+pub(crate) fn interval_s(frames: &Frames) -> f64 {
+    let mut intervals: Vec<f64> =
+        frames.t_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|dt| *dt > 0.0).collect();
+    intervals.sort_by(f64::total_cmp);
+    intervals.get(intervals.len() / 2).copied().unwrap_or(1.0 / 30.0)
+}
+
+fn path(frames: &Frames, begin: usize, end: usize) -> Result<Trajectory, DiscoverError> {
+    let mut last_s = f64::NEG_INFINITY;
+    let points = (begin..end).filter_map(|frame| {
+        let t_s = frames.t_s[frame];
+        let rises = t_s > last_s;
+        last_s = last_s.max(t_s);
+        rises.then_some((t_s, frames.position_mm[frame]))
+    });
+    Trajectory::new(points)
+        .map_err(|problem: TrajectoryError| DiscoverError::TooLittle(format!("the stage's path: {problem}")))
+}
+
+/// True where the tool is in a press at all.
+pub(crate) fn pressing(phase: Phase) -> bool {
+    matches!(phase, Phase::Load | Phase::Hold | Phase::Unload)
+}

@@ -1,0 +1,60 @@
+//! How a fit moves a parameter: along its own scale, or along its logarithm where it spans orders of magnitude.
+
+use tactus_model::effect::Parameter;
+
+/// A range with such a ratio spans orders of magnitude.
+const ORDERS: f64 = 20.0;
+/// Relative step of such a parameter, for derivatives.
+const LOG_STEP: f64 = 0.02;
+/// Step of any other, as a share of its range.
+const STEP: f64 = 1e-3;
+/// A fit moves a parameter at once by at most a factor of so much, or by such a share of its range.
+const LOG_STRIDE_MAX: f64 = 1.5;
+const STRIDE_MAX: f64 = 0.25;
+
+/// The scale of one parameter.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scale {
+    range: [f64; 2],
+    logarithmic: bool,
+    /// A small step, for derivatives.
+    pub(crate) step: f64,
+    stride_max: f64,
+}
+
+impl Scale {
+    /// Of a parameter, in data of such a duration: no frequency is known better than one period over all of it.
+    pub(crate) fn of(parameter: &Parameter, duration_s: f64) -> Self {
+        let range = parameter.range;
+        if parameter.name.ends_with("_hz") {
+            let period_hz = 1.0 / duration_s.max(1.0);
+            return Self { range, logarithmic: false, step: 0.02 * period_hz, stride_max: 0.3 * period_hz };
+        }
+        if range[0] > 0.0 && range[1] / range[0] >= ORDERS {
+            return Self { range, logarithmic: true, step: LOG_STEP, stride_max: LOG_STRIDE_MAX };
+        }
+        let width = range[1] - range[0];
+        Self { range, logarithmic: false, step: STEP * width, stride_max: STRIDE_MAX * width }
+    }
+
+    /// A value moved by a step, within its range.
+    pub(crate) fn forward(&self, value: f64, step: f64) -> f64 {
+        let moved = if self.logarithmic { value * step.exp() } else { value + step };
+        moved.clamp(self.range[0], self.range[1])
+    }
+
+    /// The step from one value to another.
+    pub(crate) fn distance(&self, from: f64, to: f64) -> f64 {
+        if self.logarithmic { (to / from).ln() } else { to - from }
+    }
+
+    /// A step no longer than a fit trusts.
+    pub(crate) fn bounded(&self, step: f64) -> f64 {
+        step.clamp(-self.stride_max, self.stride_max)
+    }
+
+    /// The error of a value whose error along the scale is known.
+    pub(crate) fn error(&self, value: f64, along: f64) -> f64 {
+        if self.logarithmic { value * along } else { along }
+    }
+}

@@ -1,0 +1,215 @@
+//! Is a direction in which the model could change wanted by the residual?
+//!
+//! The score of a direction `f` (a derivative of the prediction, freed of all that is fitted already) is, block by
+//! block of rows,
+//!
+//! ```text
+//! U_b = sum over block b of w r f        V_b = sum over block b of w f^2
+//! z   = sum U_b / sqrt(phi sum V_b)
+//! ```
+//!
+//! Under no effect `U_b` is as likely as `-U_b`, whatever the noise does within a block: so the distribution of the
+//! largest of many `z` comes from flipping the signs of whole blocks, the same for all directions. That keeps the
+//! chance of any false alarm among all of them, however they depend on each other, and under autocorrelated noise.
+//! `phi >= 1` is by how much blocks scatter more than their noise says, by the median: one block with a strong effect
+//! does not hide it. For the same reason a block counts at most three standard deviations in the flipped sums.
+//!
+//! # Source
+//! J. Hemerik, J. J. Goeman and L. Finos, *J. R. Stat. Soc. B* 82 (2020) 841 (sign-flipped scores); P. H. Westfall and
+//! S. S. Young, *Resampling-Based Multiple Testing* (1993), ch. 2 (the largest of many).
+
+use crate::chance::Chance;
+use crate::fit::{Linear, Problem, dot};
+use crate::noise::median;
+
+/// Median of the squared standard normal distribution.
+const MEDIAN_SQUARE: f64 = 0.454_936;
+/// A block counts at most so many standard deviations under flipped signs.
+const CLIP: f64 = 3.0;
+/// Fewer blocks do not tell how they scatter.
+const BLOCKS_LEAST: usize = 8;
+
+/// The score of one direction.
+#[derive(Debug, Clone)]
+pub(crate) struct Score {
+    /// `z`.
+    pub(crate) z: f64,
+    /// Each block's part of it, clipped.
+    parts: Vec<f32>,
+}
+
+/// Directions that are fitted already: all else is freed of them.
+pub(crate) struct Fitting<'a> {
+    problem: &'a Problem<'a>,
+    linear: Linear<'a>,
+    /// Orthonormal under the weights.
+    directions: Vec<Vec<f64>>,
+    /// The residual, freed of gains and baselines, times its weight.
+    weighted_residual: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl<'a> Fitting<'a> {
+    /// What is fitted at a point, and what it leaves. `columns`: derivatives by the free parameters, as they are.
+    pub(crate) fn new(
+        problem: &'a Problem<'a>,
+        linear: Linear<'a>,
+        columns: Vec<Vec<f64>>,
+        predicted: &[f64],
+    ) -> Self {
+        let mut residual: Vec<f64> = problem.residuals(predicted).collect();
+        linear.project(&mut residual);
+        let weights: Vec<f64> = problem.weights().collect();
+        let mut fitting = Self { problem, linear, directions: Vec::new(), weighted_residual: residual, weights };
+        for mut column in columns {
+            let whole = fitting.size(&column);
+            fitting.free(&mut column);
+            let size = fitting.size(&column);
+            // What the others hold already is no direction of its own.
+            if size > 1e-4 * whole && size > 0.0 {
+                for value in &mut column {
+                    *value /= size;
+                }
+                let along = fitting.inner(&column, &fitting.weighted_residual);
+                for (residual, direction) in fitting.weighted_residual.iter_mut().zip(&column) {
+                    *residual -= along * direction;
+                }
+                fitting.directions.push(column);
+            }
+        }
+        for (residual, weight) in fitting.weighted_residual.iter_mut().zip(&fitting.weights) {
+            *residual *= weight;
+        }
+        fitting
+    }
+
+    /// Frees a column of everything that is fitted already.
+    pub(crate) fn free(&self, column: &mut [f64]) {
+        self.linear.project(column);
+        for direction in &self.directions {
+            let along = self.inner(direction, column);
+            for (value, direction) in column.iter_mut().zip(direction) {
+                *value -= along * direction;
+            }
+        }
+    }
+
+    fn inner(&self, one: &[f64], other: &[f64]) -> f64 {
+        one.iter().zip(other).zip(&self.weights).map(|((a, b), w)| a * b * w).sum()
+    }
+
+    /// Length of a column under the weights: in how many standard errors a unit of it is known.
+    pub(crate) fn size(&self, column: &[f64]) -> f64 {
+        self.inner(column, column).sqrt()
+    }
+
+    /// Product of two freed columns, or of one with the residual.
+    pub(crate) fn product(&self, one: &[f64], other: &[f64]) -> f64 {
+        self.inner(one, other)
+    }
+
+    /// How much the residual wants a freed column.
+    pub(crate) fn wanted(&self, column: &[f64]) -> f64 {
+        dot(&self.weighted_residual, column)
+    }
+
+    /// The score of a freed column.
+    pub(crate) fn score(&self, column: &[f64]) -> Score {
+        let rows = self.problem.sensor.rows;
+        let elements = rows.elements;
+        let mut wanted = vec![0.0; rows.blocks];
+        let mut variance = vec![0.0; rows.blocks];
+        for row in 0..rows.len() {
+            if self.problem.train[row] == 0.0 {
+                continue;
+            }
+            let at = row * elements..(row + 1) * elements;
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for ((value, residual), weight) in
+                column[at.clone()].iter().zip(&self.weighted_residual[at.clone()]).zip(&self.weights[at])
+            {
+                sum += value * residual;
+                squares += value * value * weight;
+            }
+            wanted[rows.block[row]] += sum;
+            variance[rows.block[row]] += squares;
+        }
+        let total: f64 = variance.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return Score { z: 0.0, parts: vec![0.0; rows.blocks] };
+        }
+        // Blocks that hardly feel the direction say nothing of its scatter.
+        let scatter: Vec<f64> = wanted
+            .iter()
+            .zip(&variance)
+            .filter(|(_, variance)| **variance > 1e-4 * total)
+            .map(|(wanted, variance)| wanted * wanted / variance)
+            .collect();
+        let excess =
+            if scatter.len() >= BLOCKS_LEAST { (median(&scatter) / MEDIAN_SQUARE).max(1.0) } else { 1.0 };
+        let deviation = (excess * total).sqrt();
+        let parts = wanted.iter().zip(&variance).map(|(wanted, variance)| {
+            let most = CLIP * (excess * variance).sqrt();
+            #[expect(clippy::cast_possible_truncation, reason = "a part of a test's statistic")]
+            let part = (wanted.clamp(-most, most) / deviation) as f32;
+            part
+        });
+        Score { z: wanted.iter().sum::<f64>() / deviation, parts: parts.collect() }
+    }
+}
+
+/// The largest `|z|` of the scores in each of many data sets whose blocks had their signs flipped, for each group.
+pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
+    let blocks = groups.iter().flatten().map(|score| score.parts.len()).max().unwrap_or(0);
+    let mut chance = Chance::new(seed);
+    let mut largest = vec![Vec::with_capacity(flips); groups.len()];
+    let mut signs = vec![1.0_f32; blocks];
+    for _ in 0..flips {
+        for chunk in signs.chunks_mut(64) {
+            let bits = chance.bits();
+            for (place, sign) in chunk.iter_mut().enumerate() {
+                *sign = if bits >> place & 1 == 1 { 1.0 } else { -1.0 };
+            }
+        }
+        for (largest, group) in largest.iter_mut().zip(groups) {
+            let of_group = group.iter().map(|score| {
+                score.parts.iter().zip(&signs).map(|(part, sign)| part * sign).sum::<f32>().abs()
+            });
+            largest.push(f64::from(of_group.fold(0.0, f32::max)));
+        }
+    }
+    largest
+}
+
+/// Share of Monte-Carlo statistics that reach one, the data's own counted as one of them.
+pub(crate) fn p_value(statistic: f64, under_none: &[f64]) -> f64 {
+    let reached = under_none.iter().filter(|other| **other >= statistic).count();
+    (reached + 1) as f64 / (under_none.len() + 1) as f64
+}
+
+/// Chance that gains as large come about by flipping their signs.
+pub(crate) fn sign_flip_p(gains: &[f64], flips: usize, seed: u64) -> f64 {
+    let mut chance = Chance::new(seed);
+    let sum: f64 = gains.iter().sum();
+    let flipped: Vec<f64> = (0..flips)
+        .map(|_| gains.iter().map(|gain| if chance.bits() & 1 == 1 { *gain } else { -gain }).sum())
+        .collect();
+    p_value(sum, &flipped)
+}
+
+/// Adjusts p-values for the false-discovery rate.
+///
+/// # Source
+/// Y. Benjamini and Y. Hochberg, *J. R. Stat. Soc. B* 57 (1995) 289.
+pub(crate) fn q_values(p_values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p_values.len()).collect();
+    order.sort_by(|a, b| p_values[*b].total_cmp(&p_values[*a]));
+    let count = p_values.len();
+    let mut q_values = vec![1.0; count];
+    let mut least = 1.0_f64;
+    for (above, index) in order.into_iter().enumerate() {
+        least = least.min(p_values[index] * count as f64 / (count - above) as f64);
+        q_values[index] = least;
+    }
+    q_values
+}

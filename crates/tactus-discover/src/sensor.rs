@@ -1,0 +1,135 @@
+//! The model at work on the rows: what it gives for each, and how that changes with every parameter.
+
+use tactus_model::effect::Definition;
+use tactus_model::{Covering, Effect, ForwardModel, Indenter, Moment, Pipeline, Psf, Response, Simulator};
+
+use crate::rows::Rows;
+use crate::{DiscoverError, Frames, Known};
+
+/// Parameters of the whole model.
+#[derive(Debug, Clone)]
+pub(crate) struct Parameters {
+    /// Counts per mm, one per element.
+    pub(crate) sensitivity: Vec<f64>,
+    /// Baselines, run by run, one per element.
+    pub(crate) baseline: Vec<Vec<f64>>,
+    pub(crate) psf: Psf,
+    pub(crate) terms: Vec<Term>,
+}
+
+/// An effect in the model, with its values as a fit moves them.
+#[derive(Debug, Clone)]
+pub(crate) struct Term {
+    pub(crate) definition: &'static Definition,
+    pub(crate) values: Vec<f64>,
+}
+
+/// What the rows are of.
+#[derive(Debug)]
+pub(crate) struct Sensor<'a> {
+    pub(crate) known: &'a Known,
+    pub(crate) frames: &'a Frames,
+    pub(crate) rows: &'a Rows,
+}
+
+impl Term {
+    pub(crate) fn neutral(definition: &'static Definition) -> Self {
+        Self { definition, values: definition.parameters.iter().map(|one| one.neutral).collect() }
+    }
+
+    pub(crate) fn effect(&self) -> Result<Effect, DiscoverError> {
+        let names = self.definition.parameters.iter().map(|parameter| parameter.name);
+        Ok(Effect::of(self.definition, names.zip(self.values.iter().copied()))?)
+    }
+
+    pub(crate) fn of(effect: &Effect) -> Self {
+        Self { definition: effect.definition(), values: effect.parameters().map(|(_, value)| value).collect() }
+    }
+}
+
+impl Parameters {
+    /// As declared.
+    pub(crate) fn declared(known: &Known, runs: usize) -> Self {
+        Self {
+            sensitivity: known.response.sensitivity_counts_per_mm.clone(),
+            baseline: vec![known.response.baseline_counts.clone(); runs],
+            psf: known.psf,
+            terms: known.effects.iter().map(Term::of).collect(),
+        }
+    }
+
+    pub(crate) fn effects(&self) -> Result<Vec<Effect>, DiscoverError> {
+        self.terms.iter().map(Term::effect).collect()
+    }
+}
+
+impl Sensor<'_> {
+    /// Counts of every row and element, before noise and converter.
+    pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
+        let Self { known, frames, rows } = self;
+        let effects = parameters.effects()?;
+        let elements = rows.elements;
+        let mut predicted: Vec<f64> = Vec::with_capacity(rows.len() * elements);
+        let mut row = 0;
+        for (run, path) in rows.paths.iter().enumerate() {
+            let mut pipeline: Option<(u16, f64, Pipeline)> = None;
+            while row < rows.len() && rows.run[row] == run {
+                let frame = rows.first[row];
+                let (tool, covering_mm) = (frames.indenter[frame], frames.covering_mm[frame]);
+                let covering = Covering { thickness_mm: covering_mm };
+                if pipeline.as_ref().is_none_or(|(known, ..)| *known != tool) {
+                    let made = self.pipeline(parameters, run, tool, covering, &effects)?;
+                    pipeline = Some((tool, covering_mm, made));
+                }
+                if let Some((_, last_mm, pipeline)) = &mut pipeline {
+                    if last_mm.to_bits() != covering_mm.to_bits() {
+                        pipeline.set_covering(covering);
+                        *last_mm = covering_mm;
+                    }
+                    let temperature_c = Some(f64::from(frames.temperature_c[frame]))
+                        .filter(|temperature_c| temperature_c.is_finite());
+                    predicted.extend(pipeline.step(Moment { t_s: rows.t_s[row], temperature_c }, path));
+                }
+                row += 1;
+            }
+        }
+        let full_scale_counts = known.array.full_scale_counts();
+        let least = if parameters.sensitivity.iter().all(|one| *one >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
+        for counts in &mut predicted {
+            *counts = counts.clamp(least, full_scale_counts);
+        }
+        Ok(predicted)
+    }
+
+    fn pipeline(
+        &self,
+        parameters: &Parameters,
+        run: usize,
+        tool: u16,
+        covering: Covering,
+        effects: &[Effect],
+    ) -> Result<Pipeline, DiscoverError> {
+        let known = self.known;
+        let response = Response {
+            sensitivity_counts_per_mm: parameters.sensitivity.clone(),
+            baseline_counts: parameters.baseline[run].clone(),
+            ..known.response.clone()
+        };
+        let model = ForwardModel::new(known.array.clone(), parameters.psf, response)?;
+        Ok(Pipeline::new(&Simulator {
+            model,
+            registration: known.registration,
+            surface_mm: 0.0,
+            covering,
+            indenter: self.indenter(tool)?,
+            effects: effects.to_vec(),
+            noise_rms_counts: 0.0,
+        })?)
+    }
+
+    fn indenter(&self, tool: u16) -> Result<Indenter, DiscoverError> {
+        let id = &self.frames.indenters[usize::from(tool)];
+        let unknown = || DiscoverError::TooLittle(format!("the rig describes no indenter {id:?}"));
+        self.known.indenters.get(id).cloned().ok_or_else(unknown)
+    }
+}

@@ -1,0 +1,109 @@
+//! Lines in the spectrum of the residual: tones that something adds to the readings.
+
+use crate::noise::median;
+use crate::rows::interval_s;
+use crate::Frames;
+
+/// A line stands out of what is around it by such a factor in power.
+const STANDS_OUT: f64 = 6.0;
+/// What is around a line: so many frequencies each way.
+const AROUND: usize = 40;
+/// Slower than so many periods in the data is a drift, not a tone.
+const PERIODS_LEAST: f64 = 12.0;
+const LINES_MAX: usize = 3;
+
+/// Frequencies of the lines in the residual of the frames without contact, strongest first.
+///
+/// `residual`: frame by frame, element by element.
+pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
+    let interval_s = interval_s(frames);
+    let elements = frames.elements;
+    let mut begin = 0;
+    let mut longest = (0, 0);
+    for (_, end) in &frames.runs {
+        if end - begin > longest.1 - longest.0 {
+            longest = (begin, *end);
+        }
+        begin = *end;
+    }
+    let (begin, end) = longest;
+    if end - begin < 256 {
+        return Vec::new();
+    }
+    let duration_s = frames.t_s[end - 1] - frames.t_s[begin];
+    let slot = |frame: usize| -> usize {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and no more than frames")]
+        let slot = ((frames.t_s[frame] - frames.t_s[begin]) / interval_s).round() as usize;
+        slot
+    };
+    let size = (slot(end - 1) + 1).next_power_of_two().min(1 << 18);
+    let idle: Vec<usize> =
+        (begin..end).filter(|frame| frames.position_mm[*frame][2] > 0.0 && slot(*frame) < size).collect();
+    let mut power = vec![0.0; size / 2];
+    for element in 0..elements {
+        let mut series = vec![[0.0; 2]; size];
+        let values: Vec<f64> = idle.iter().map(|frame| residual[frame * elements + element]).collect();
+        let middle = median(&values);
+        for (frame, value) in idle.iter().zip(&values) {
+            series[slot(*frame)][0] = value - middle;
+        }
+        transform(&mut series);
+        for (power, [re, im]) in power.iter_mut().zip(&series) {
+            *power += re * re + im * im;
+        }
+    }
+    let step_hz = 1.0 / (size as f64 * interval_s);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    let first = ((PERIODS_LEAST / duration_s / step_hz) as usize).max(2);
+    let mut lines: Vec<(f64, f64)> = Vec::new();
+    for peak in first..power.len().saturating_sub(1) {
+        if power[peak] < power[peak - 1] || power[peak] < power[peak + 1] {
+            continue;
+        }
+        let around = &power[peak.saturating_sub(AROUND).max(1)..(peak + AROUND).min(power.len())];
+        let stands_out = power[peak] / median(around).max(f64::MIN_POSITIVE);
+        if stands_out > STANDS_OUT {
+            // The top of a parabola through the logarithms of three.
+            let [left, top, right] =
+                [power[peak - 1], power[peak], power[peak + 1]].map(|p| p.max(f64::MIN_POSITIVE).ln());
+            let bend = left - 2.0 * top + right;
+            let shift = if bend < 0.0 { 0.5 * (left - right) / bend } else { 0.0 };
+            lines.push((power[peak], (peak as f64 + shift) * step_hz));
+        }
+    }
+    lines.sort_by(|a, b| b.0.total_cmp(&a.0));
+    lines.into_iter().take(LINES_MAX).map(|(_, hz)| hz).collect()
+}
+
+/// The discrete Fourier transform, in place; a power of two of points.
+///
+/// # Source
+/// J. W. Cooley and J. W. Tukey, *Math. Comput.* 19 (1965) 297.
+fn transform(series: &mut [[f64; 2]]) {
+    let count = series.len();
+    let bits = count.trailing_zeros();
+    for index in 0..count {
+        let mirrored = index.reverse_bits() >> (usize::BITS - bits);
+        if mirrored > index {
+            series.swap(index, mirrored);
+        }
+    }
+    let mut half = 1;
+    while half < count {
+        let turn = -std::f64::consts::PI / half as f64;
+        let factors: Vec<[f64; 2]> = (0..half).map(|k| [(turn * k as f64).cos(), (turn * k as f64).sin()]).collect();
+        for block in series.chunks_exact_mut(2 * half) {
+            let (low, high) = block.split_at_mut(half);
+            for ((low, high), [cos, sin]) in low.iter_mut().zip(high).zip(&factors) {
+                let turned = [high[0] * cos - high[1] * sin, high[0] * sin + high[1] * cos];
+                *high = [low[0] - turned[0], low[1] - turned[1]];
+                *low = [low[0] + turned[0], low[1] + turned[1]];
+            }
+        }
+        half *= 2;
+    }
+}
+
+#[cfg(test)]
+#[path = "spectrum_tests.rs"]
+mod tests;
