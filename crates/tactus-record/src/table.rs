@@ -8,7 +8,9 @@ mod check;
 mod column;
 mod error;
 mod layout;
+mod part;
 mod read;
+mod residuals;
 mod write;
 
 use std::{collections::BTreeMap, ops::Range, path::Path, sync::Arc};
@@ -19,6 +21,7 @@ use tactus_schema::{
 };
 
 pub use error::TableError;
+pub use residuals::ResidualWriter;
 pub use write::TableWriter;
 
 pub(crate) use check::Checker;

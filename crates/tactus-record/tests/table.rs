@@ -2,10 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs::{self, File},
+    path::PathBuf,
+};
 
-use tactus_record::table::{self, RowView, TableError, TableWriter};
-use tactus_schema::table::Phase;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use tactus_record::table::{self, ResidualWriter, RowView, TableError, TableWriter};
+use tactus_schema::{Rig, table::Phase};
 
 /// A folder that may stand beside the repository, with measured data that is not in it.
 const MEASURED: &str = "../../../shared/data/eflesh-normal-20250401_014340.parquet";
@@ -183,4 +187,31 @@ fn a_measured_table_is_valid() {
     assert_eq!(table.head().rig.array.elements(), 15);
     let first = table.rows().next().unwrap();
     assert_eq!((first.phase, first.press, first.counts[2]), (Phase::Idle, -1, 18822.0));
+}
+
+#[test]
+fn residuals_are_measured_minus_predicted_and_say_of_which_rig() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("residuals.parquet");
+    let table = table::read(folder().join("valid_pyarrow.parquet")).unwrap();
+    let rig = &table.head().rig;
+    let mut writer = ResidualWriter::create(&path, rig, true).unwrap();
+    for row in table.rows() {
+        let below: Vec<f32> = row.counts.iter().map(|counts| counts - 3.0).collect();
+        writer.push(&row, &below, row.counts).unwrap();
+    }
+    assert!(!path.exists(), "it stands there only when it is whole");
+    writer.finish().unwrap();
+    let file = SerializedFileReader::new(File::open(&path).unwrap()).unwrap();
+    let metadata = file.metadata().file_metadata().key_value_metadata().unwrap();
+    let value = |key: &str| metadata.iter().find(|pair| pair.key == key).unwrap().value.clone().unwrap();
+    assert_eq!(Rig::from_json(&value("tactus.rig")).unwrap(), *rig);
+    assert_eq!(value("tactus.simulated"), "true");
+    let rows: Vec<String> = file.get_row_iter(None).unwrap().map(|row| row.unwrap().to_string()).collect();
+    assert_eq!(rows.len(), 6);
+    assert_eq!(
+        rows[2],
+        "{run: \"a\", press: 0, phase: \"hold\", t_ns: 70000000, x_mm: 20.9, y_mm: 15.9, z_mm: -2E-1, \
+         residual_before: [3.0, 3.0, 3.0, 3.0], residual_after: [0E0, 0E0, 0E0, 0E0]}"
+    );
 }

@@ -5,12 +5,13 @@
 //! from anywhere. The same recording always gives the same page.
 //!
 //! [`figures`] draws the paper's figures again from the model; [`calibration`] reports what was measured of a
-//! sensor, [`study`] all of the paper on one rig.
+//! sensor, [`discovery`] what its model was missing, [`study`] all of the paper on one rig.
 //!
 //! - [`fit`] fits polynomials by least squares, with standard errors.
 //! - [`plot`] draws figures and heat images as SVG; it knows nothing of runs.
 
 pub mod calibration;
+pub mod discovery;
 pub mod figures;
 pub mod fit;
 pub mod plot;

@@ -1,5 +1,6 @@
 //! The commands and their arguments.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -68,6 +69,8 @@ enum Command {
     Report(ReportArgs),
     /// Characterise the sensor from recordings or tables: faults, place, responses, point spread.
     Calibrate(CalibrateArgs),
+    /// Find what the model is missing, name it, add it, and show the gap shrink; from recordings or tables.
+    Discover(DiscoverArgs),
     /// Everything in the paper on one rig: runs, calibration, mechanics, acuity, images, one report.
     Study(StudyArgs),
     /// What a sensor reads of a tool: an image, frames along a path, or live on the bus.
@@ -193,6 +196,26 @@ pub(crate) struct CalibrateArgs {
     /// Where model.toml, calibration.json and report.html go.
     #[arg(short, long, value_name = "DIR", default_value = "calibration")]
     pub(crate) out: PathBuf,
+}
+
+/// Arguments of `discover`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DiscoverArgs {
+    /// Recordings and measurement tables of one rig.
+    #[arg(required = true, value_name = "RECORDING|TABLE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// The model that the data are held against, in place of the rig's description; of the same array.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+    /// Where report.html, report.json, model.toml and residuals.parquet go.
+    #[arg(short, long, value_name = "DIR", default_value = "discovery")]
+    pub(crate) out: PathBuf,
+    /// Seed of the split into fitted and held-out presses and of the tests against noise.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// How many threads compute; the result does not depend on it. As many as there are cores if not given.
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<NonZeroUsize>,
 }
 
 /// Arguments of `study`.
@@ -362,6 +385,7 @@ fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
         Command::Recover(args) => commands::files::recover(common, &args),
         Command::Report(args) => commands::files::report(common, &args),
         Command::Calibrate(args) => commands::calibrate::calibrate(common, &args),
+        Command::Discover(args) => commands::discover::discover(common, &args),
         Command::Study(args) => commands::study::study(common, &args),
         Command::Simulate(args) => commands::simulate::simulate(common, &args),
         Command::Design(args) => commands::design::design(common, &args),

@@ -8,5 +8,6 @@ mod connection;
 mod exit;
 mod output;
 mod progress;
+mod sha256;
 
 pub use cli::main;

@@ -1,4 +1,6 @@
-//! The progress of a run on the terminal: presses done, frames, losses, time left.
+//! Progress on the terminal: of a run, with presses done, frames, losses and time left; of a computation.
+
+use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tactus_schema::pb::{RunPhase, RunState};
@@ -49,5 +51,47 @@ impl Progress {
     /// Says something above the bar.
     pub(crate) fn say(&self, line: &str) {
         self.0.suspend(|| eprintln!("{line}"));
+    }
+}
+
+/// The bar of a computation: the share that is done, what is being done, time left; silent where [`Progress`] is.
+#[derive(Debug)]
+pub(crate) struct Computation {
+    bar: ProgressBar,
+    start: Instant,
+}
+
+impl Computation {
+    /// Steps of the bar.
+    const STEPS: u64 = 1000;
+    /// Before that, time left is a guess.
+    const SHARE_MIN: f64 = 0.02;
+
+    pub(crate) fn new(silent: bool) -> Self {
+        let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(Some(Self::STEPS), target);
+        if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/dim} {percent:>3} %  {msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, start: Instant::now() }
+    }
+
+    /// Shows what is being done, and the share of the whole that is done.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to STEPS")]
+    pub(crate) fn show(&self, what: &str, share: f64) {
+        let share = share.clamp(0.0, 1.0);
+        let left = if (Self::SHARE_MIN..1.0).contains(&share) {
+            let left_s = self.start.elapsed().as_secs_f64() * (1.0 - share) / share;
+            format!("  {} left", duration(left_s))
+        } else {
+            String::new()
+        };
+        self.bar.set_position((share * Self::STEPS as f64) as u64);
+        self.bar.set_message(format!("{what}{left}"));
+    }
+
+    /// Takes the bar away.
+    pub(crate) fn clear(&self) {
+        self.bar.finish_and_clear();
     }
 }

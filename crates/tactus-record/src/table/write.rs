@@ -1,28 +1,19 @@
 //! Writes a measurement table.
 
-use std::{
-    fs::{self, File},
-    path::PathBuf,
-    sync::Arc,
-};
+use std::{fs::File, path::PathBuf};
 
 use parquet::{
-    basic::{Compression, ZstdLevel},
-    data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type},
+    data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type},
     errors::ParquetError,
-    file::{
-        metadata::KeyValue,
-        properties::WriterProperties,
-        writer::{SerializedFileWriter, SerializedRowGroupWriter},
-    },
-    schema::{parser::parse_message_type, types::ColumnPath},
+    file::writer::SerializedRowGroupWriter,
 };
 use tactus_schema::{Rig, table::RIG_METADATA_KEY};
 
-use super::{RowView, TableError, check::Checker};
-
-/// Rows of a row group: half an hour of one sensor, some 10 MB in memory.
-const GROUP_ROWS: usize = 65_536;
+use super::{
+    RowView, TableError,
+    check::Checker,
+    part::{GROUP_ROWS, Part, column, text},
+};
 
 /// The contract's columns as Parquet; pyarrow, pandas and polars read `counts` as a list of 32-bit floats.
 const SCHEMA: &str = "
@@ -44,9 +35,7 @@ const SCHEMA: &str = "
 ///
 /// Until [`TableWriter::finish`] the rows stand in a file beside `path` with the ending `.part`.
 pub struct TableWriter {
-    path: PathBuf,
-    part: PathBuf,
-    file: SerializedFileWriter<File>,
+    part: Part,
     checker: Checker,
     rows: u64,
     group: Group,
@@ -63,23 +52,9 @@ impl TableWriter {
             Ok(rig) => rig,
             Err(source) => return Err(TableError::Rig { path, source }),
         };
-        let mut part = path.clone().into_os_string();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let sink = match File::create(&part) {
-            Ok(sink) => sink,
-            Err(source) => return Err(TableError::Io { action: "create", path: part, source }),
-        };
-        let begun = properties().and_then(|properties| {
-            let schema = Arc::new(parse_message_type(SCHEMA)?);
-            SerializedFileWriter::new(sink, schema, Arc::new(properties))
-        });
-        let mut file = match begun {
-            Ok(file) => file,
-            Err(source) => return Err(TableError::Parquet { path: part, source }),
-        };
-        file.append_key_value_metadata(KeyValue::new(RIG_METADATA_KEY.into(), rig_json.to_owned()));
-        Ok(Self { path, part, file, checker: Checker::new(&rig), rows: 0, group: Group::default() })
+        let mut part = Part::create(path, SCHEMA)?;
+        part.metadata(RIG_METADATA_KEY, rig_json.to_owned());
+        Ok(Self { part, checker: Checker::new(&rig), rows: 0, group: Group::default() })
     }
 
     /// Adds a row.
@@ -87,7 +62,7 @@ impl TableWriter {
     /// # Errors
     /// If it breaks the contract or cannot be written.
     pub fn push(&mut self, row: RowView<'_>) -> Result<(), TableError> {
-        self.checker.check(&row).map_err(|fault| fault.at(&self.path, self.rows))?;
+        self.checker.check(&row).map_err(|fault| fault.at(self.part.path(), self.rows))?;
         self.put(row)
     }
 
@@ -100,7 +75,7 @@ impl TableWriter {
 
     /// Adds a pair of file metadata.
     pub fn metadata(&mut self, key: &str, value: String) {
-        self.file.append_key_value_metadata(KeyValue::new(key.into(), value));
+        self.part.metadata(key, value);
     }
 
     /// Closes the table and puts it in its place; the number of rows.
@@ -109,20 +84,13 @@ impl TableWriter {
     /// If it cannot be written.
     pub fn finish(mut self) -> Result<u64, TableError> {
         self.close_group()?;
-        let Self { path, part, file, rows, .. } = self;
-        let file = match file.into_inner() {
-            Ok(file) => file,
-            Err(source) => return Err(TableError::Parquet { path: part, source }),
-        };
-        let placed = file.sync_all().and_then(|()| fs::rename(&part, &path));
-        placed.map_err(|source| TableError::Io { action: "write", path, source })?;
-        Ok(rows)
+        self.part.finish()?;
+        Ok(self.rows)
     }
 
     /// Removes what was written so far.
     pub(crate) fn abandon(self) {
-        // The error at hand says more than one that follows from it.
-        drop(fs::remove_file(&self.part));
+        self.part.abandon();
     }
 
     fn close_group(&mut self) -> Result<(), TableError> {
@@ -130,30 +98,17 @@ impl TableWriter {
             return Ok(());
         }
         let group = std::mem::take(&mut self.group);
-        let written = self.file.next_row_group().and_then(|writer| group.write(writer));
-        written.map_err(|source| TableError::Parquet { path: self.part.clone(), source })
+        self.part.group(|writer| group.write(writer))
     }
 }
 
 impl std::fmt::Debug for TableWriter {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("TableWriter")
-            .field("path", &self.path)
+            .field("path", self.part.path())
             .field("rows", &self.rows)
             .finish_non_exhaustive()
     }
-}
-
-/// Names and indices repeat: dictionaries. Times and positions do not. Counts are whole numbers of a narrow range on
-/// most sensors; where they are not, the writer gives the dictionary up by itself.
-fn properties() -> Result<WriterProperties, ParquetError> {
-    let mut properties = WriterProperties::builder()
-        .set_created_by(concat!("tactus-record ", env!("CARGO_PKG_VERSION")).into())
-        .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?));
-    for column in ["t_ns", "x_mm", "y_mm", "z_mm"] {
-        properties = properties.set_column_dictionary_enabled(ColumnPath::from(column), false);
-    }
-    Ok(properties.build())
 }
 
 /// The columns of the row group in hand.
@@ -189,41 +144,19 @@ impl Group {
         self.counts_repeated.extend((0..row.counts.len()).map(|index| i16::from(index > 0)));
     }
 
-    fn write(&self, mut writer: SerializedRowGroupWriter<'_, File>) -> Result<(), ParquetError> {
+    fn write(&self, writer: &mut SerializedRowGroupWriter<'_, File>) -> Result<(), ParquetError> {
         let [x_mm, y_mm, z_mm] = &self.position_mm;
-        column::<ByteArrayType>(&mut writer, &self.run, None, None)?;
-        column::<Int32Type>(&mut writer, &self.press, None, None)?;
-        column::<ByteArrayType>(&mut writer, &self.phase, None, None)?;
-        column::<Int64Type>(&mut writer, &self.t_ns, None, None)?;
-        column::<DoubleType>(&mut writer, x_mm, None, None)?;
-        column::<DoubleType>(&mut writer, y_mm, None, None)?;
-        column::<DoubleType>(&mut writer, z_mm, None, None)?;
-        column::<DoubleType>(&mut writer, &self.covering_mm, None, None)?;
-        column::<ByteArrayType>(&mut writer, &self.indenter, None, None)?;
-        column::<DoubleType>(&mut writer, &self.temperature_c, Some(&self.temperature_known), None)?;
+        column::<ByteArrayType>(writer, &self.run, None, None)?;
+        column::<Int32Type>(writer, &self.press, None, None)?;
+        column::<ByteArrayType>(writer, &self.phase, None, None)?;
+        column::<Int64Type>(writer, &self.t_ns, None, None)?;
+        column::<DoubleType>(writer, x_mm, None, None)?;
+        column::<DoubleType>(writer, y_mm, None, None)?;
+        column::<DoubleType>(writer, z_mm, None, None)?;
+        column::<DoubleType>(writer, &self.covering_mm, None, None)?;
+        column::<ByteArrayType>(writer, &self.indenter, None, None)?;
+        column::<DoubleType>(writer, &self.temperature_c, Some(&self.temperature_known), None)?;
         let defined = vec![1; self.counts.len()];
-        column::<FloatType>(&mut writer, &self.counts, Some(&defined), Some(&self.counts_repeated))?;
-        writer.close()?;
-        Ok(())
+        column::<FloatType>(writer, &self.counts, Some(&defined), Some(&self.counts_repeated))
     }
-}
-
-/// A text; shares the bytes of the one before if they are equal.
-fn text(before: &[ByteArray], text: &str) -> ByteArray {
-    match before.last() {
-        Some(last) if last.data() == text.as_bytes() => last.clone(),
-        _ => ByteArray::from(text),
-    }
-}
-
-fn column<T: DataType>(
-    writer: &mut SerializedRowGroupWriter<'_, File>,
-    values: &[T::T],
-    defined: Option<&[i16]>,
-    repeated: Option<&[i16]>,
-) -> Result<(), ParquetError> {
-    let missing = || ParquetError::General("the schema has fewer columns than are written".into());
-    let mut column = writer.next_column()?.ok_or_else(missing)?;
-    column.typed::<T>().write_batch(values, defined, repeated)?;
-    column.close()
 }

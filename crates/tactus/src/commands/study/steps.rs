@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use tactus_model::Covering;
 use tactus_report::figures::COVERINGS;
 use tactus_report::study::StudyRun;
@@ -15,6 +14,7 @@ use crate::cli::{Common, ExperimentArgs, RunArgs, StudyArgs};
 use crate::commands::run::execute;
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
+use crate::sha256;
 
 /// Name of the form of `study.json`.
 const SCHEMA: &str = "tactus.study-steps/1";
@@ -79,7 +79,7 @@ impl Steps {
             points: args.points,
             embedded: args.embedded,
             rig: common.rig.clone(),
-            rig_file: args.rig_file.as_deref().map(hash).transpose()?,
+            rig_file: args.rig_file.as_deref().map(sha256::of_file).transpose()?,
             taken: Vec::new(),
             path: path.clone(),
         };
@@ -194,10 +194,4 @@ impl Steps {
             .with_context(|| beside.display().to_string())?;
         fs::rename(beside, &self.path).with_context(|| self.path.display().to_string())
     }
-}
-
-/// SHA-256 of a file, in hexadecimal.
-fn hash(path: &Path) -> anyhow::Result<String> {
-    let bytes = fs::read(path).with_context(|| path.display().to_string())?;
-    Ok(format!("{:x}", Sha256::digest(bytes)))
 }

@@ -1,0 +1,124 @@
+//! A Parquet file in the making.
+
+use std::{
+    fs::{self, File},
+    path::PathBuf,
+    sync::Arc,
+};
+
+use parquet::{
+    basic::{Compression, ZstdLevel},
+    data_type::{ByteArray, DataType},
+    errors::ParquetError,
+    file::{
+        metadata::KeyValue,
+        properties::WriterProperties,
+        writer::{SerializedFileWriter, SerializedRowGroupWriter},
+    },
+    schema::{parser::parse_message_type, types::ColumnPath},
+};
+
+use super::TableError;
+
+/// Rows of a row group: half an hour of one sensor, some 10 MB in memory.
+pub(super) const GROUP_ROWS: usize = 65_536;
+
+/// A Parquet file that stands beside its place, with the ending `.part`, until it is whole.
+pub(super) struct Part {
+    path: PathBuf,
+    beside: PathBuf,
+    file: SerializedFileWriter<File>,
+}
+
+impl Part {
+    /// Begins a file of this schema.
+    pub(super) fn create(path: PathBuf, schema: &str) -> Result<Self, TableError> {
+        let mut beside = path.clone().into_os_string();
+        beside.push(".part");
+        let beside = PathBuf::from(beside);
+        let sink = match File::create(&beside) {
+            Ok(sink) => sink,
+            Err(source) => return Err(TableError::Io { action: "create", path: beside, source }),
+        };
+        let begun = properties().and_then(|properties| {
+            let schema = Arc::new(parse_message_type(schema)?);
+            SerializedFileWriter::new(sink, schema, Arc::new(properties))
+        });
+        match begun {
+            Ok(file) => Ok(Self { path, beside, file }),
+            Err(source) => Err(TableError::Parquet { path: beside, source }),
+        }
+    }
+
+    /// Where it will stand.
+    pub(super) fn path(&self) -> &PathBuf {
+        &self.path
+    }
+
+    /// Adds a pair of file metadata.
+    pub(super) fn metadata(&mut self, key: &str, value: String) {
+        self.file.append_key_value_metadata(KeyValue::new(key.into(), value));
+    }
+
+    /// Adds a row group; `write` gives its columns in the schema's order.
+    pub(super) fn group(
+        &mut self,
+        write: impl FnOnce(&mut SerializedRowGroupWriter<'_, File>) -> Result<(), ParquetError>,
+    ) -> Result<(), TableError> {
+        let written = self.file.next_row_group().and_then(|mut writer| {
+            write(&mut writer)?;
+            writer.close().map(drop)
+        });
+        written.map_err(|source| TableError::Parquet { path: self.beside.clone(), source })
+    }
+
+    /// Closes the file and puts it in its place.
+    pub(super) fn finish(self) -> Result<(), TableError> {
+        let Self { path, beside, file } = self;
+        let file = match file.into_inner() {
+            Ok(file) => file,
+            Err(source) => return Err(TableError::Parquet { path: beside, source }),
+        };
+        let placed = file.sync_all().and_then(|()| fs::rename(&beside, &path));
+        placed.map_err(|source| TableError::Io { action: "write", path, source })
+    }
+
+    /// Removes what was written so far.
+    pub(super) fn abandon(self) {
+        // The error at hand says more than one that follows from it.
+        drop(fs::remove_file(&self.beside));
+    }
+}
+
+/// A text; shares the bytes of the one before if they are equal.
+pub(super) fn text(before: &[ByteArray], text: &str) -> ByteArray {
+    match before.last() {
+        Some(last) if last.data() == text.as_bytes() => last.clone(),
+        _ => ByteArray::from(text),
+    }
+}
+
+/// Writes the next column.
+pub(super) fn column<T: DataType>(
+    writer: &mut SerializedRowGroupWriter<'_, File>,
+    values: &[T::T],
+    defined: Option<&[i16]>,
+    repeated: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    let missing = || ParquetError::General("the schema has fewer columns than are written".into());
+    let mut column = writer.next_column()?.ok_or_else(missing)?;
+    column.typed::<T>().write_batch(values, defined, repeated)?;
+    column.close()
+}
+
+/// Names and indices repeat: dictionaries. Times and positions do not. Counts are whole numbers of a narrow range on
+/// most sensors; where they are not, the writer gives the dictionary up by itself.
+fn properties() -> Result<WriterProperties, ParquetError> {
+    let mut properties = WriterProperties::builder()
+        .set_created_by(concat!("tactus-record ", env!("CARGO_PKG_VERSION")).into())
+        .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?));
+    for column in ["t_ns", "x_mm", "y_mm", "z_mm"] {
+        properties = properties.set_column_dictionary_enabled(ColumnPath::from(column), false);
+    }
+    Ok(properties.build())
+}

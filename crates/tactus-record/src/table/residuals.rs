@@ -1,0 +1,130 @@
+//! Writes what two models leave of each frame.
+
+use std::{fs::File, path::PathBuf};
+
+use parquet::{
+    data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type},
+    errors::ParquetError,
+    file::writer::SerializedRowGroupWriter,
+};
+use tactus_schema::{Rig, table::RIG_METADATA_KEY};
+
+use super::{
+    RowView, TableError,
+    part::{GROUP_ROWS, Part, column, text},
+};
+
+/// Key of the file metadata that is `true` if no physical sensor was read, else `false`.
+const SIMULATED_METADATA_KEY: &str = "tactus.simulated";
+
+const SCHEMA: &str = "
+    message tactus {
+        required binary run (STRING);
+        required int32 press;
+        required binary phase (STRING);
+        required int64 t_ns;
+        required double x_mm;
+        required double y_mm;
+        required double z_mm;
+        required group residual_before (LIST) { repeated group list { required float element; } }
+        required group residual_after (LIST) { repeated group list { required float element; } }
+    }";
+
+/// A table of residuals being written: measured minus predicted, in counts, frame by frame, of a model before and
+/// after something was added to it. The columns beside them are those of the measurement table.
+///
+/// Until [`ResidualWriter::finish`] the rows stand in a file beside `path` with the ending `.part`.
+pub struct ResidualWriter {
+    part: Part,
+    group: Group,
+}
+
+impl ResidualWriter {
+    /// Begins a table of measurements of one rig.
+    ///
+    /// # Errors
+    /// If the file cannot be created.
+    pub fn create(path: impl Into<PathBuf>, rig: &Rig, simulated: bool) -> Result<Self, TableError> {
+        let mut part = Part::create(path.into(), SCHEMA)?;
+        part.metadata(RIG_METADATA_KEY, rig.to_json());
+        part.metadata(SIMULATED_METADATA_KEY, simulated.to_string());
+        Ok(Self { part, group: Group::default() })
+    }
+
+    /// Adds a frame and what either model predicts of it, one value an element.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn push(&mut self, row: &RowView<'_>, before: &[f32], after: &[f32]) -> Result<(), TableError> {
+        self.group.push(row, before, after);
+        if self.group.t_ns.len() >= GROUP_ROWS { self.close_group() } else { Ok(()) }
+    }
+
+    /// Closes the table and puts it in its place.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(mut self) -> Result<(), TableError> {
+        self.close_group()?;
+        self.part.finish()
+    }
+
+    fn close_group(&mut self) -> Result<(), TableError> {
+        if self.group.t_ns.is_empty() {
+            return Ok(());
+        }
+        let group = std::mem::take(&mut self.group);
+        self.part.group(|writer| group.write(writer))
+    }
+}
+
+impl std::fmt::Debug for ResidualWriter {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ResidualWriter").field("path", self.part.path()).finish_non_exhaustive()
+    }
+}
+
+/// The columns of the row group in hand.
+#[derive(Default)]
+struct Group {
+    run: Vec<ByteArray>,
+    press: Vec<i32>,
+    phase: Vec<ByteArray>,
+    t_ns: Vec<i64>,
+    position_mm: [Vec<f64>; 3],
+    /// Of either model.
+    residuals: [Vec<f32>; 2],
+    /// 0 where a frame's list begins.
+    repeated: Vec<i16>,
+}
+
+impl Group {
+    fn push(&mut self, row: &RowView<'_>, before: &[f32], after: &[f32]) {
+        self.run.push(text(&self.run, row.run));
+        self.press.push(row.press);
+        self.phase.push(text(&self.phase, row.phase.name()));
+        self.t_ns.push(row.t_ns);
+        for (column, mm) in self.position_mm.iter_mut().zip(row.position_mm) {
+            column.push(mm);
+        }
+        for (column, predicted) in self.residuals.iter_mut().zip([before, after]) {
+            column.extend(row.counts.iter().zip(predicted).map(|(measured, predicted)| measured - predicted));
+        }
+        self.repeated.extend((0..row.counts.len()).map(|index| i16::from(index > 0)));
+    }
+
+    fn write(&self, writer: &mut SerializedRowGroupWriter<'_, File>) -> Result<(), ParquetError> {
+        column::<ByteArrayType>(writer, &self.run, None, None)?;
+        column::<Int32Type>(writer, &self.press, None, None)?;
+        column::<ByteArrayType>(writer, &self.phase, None, None)?;
+        column::<Int64Type>(writer, &self.t_ns, None, None)?;
+        for column_mm in &self.position_mm {
+            column::<DoubleType>(writer, column_mm, None, None)?;
+        }
+        let defined = vec![1; self.repeated.len()];
+        for residuals in &self.residuals {
+            column::<FloatType>(writer, residuals, Some(&defined), Some(&self.repeated))?;
+        }
+        Ok(())
+    }
+}

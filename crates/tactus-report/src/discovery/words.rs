@@ -1,0 +1,73 @@
+//! A discovery in a sentence or two.
+
+use tactus_discover::{Discovery, Verdict};
+
+use crate::numbers::{chance, digits};
+use crate::plot::number;
+
+/// The verdict in plain words, with the numbers that it rests on.
+pub fn in_words(found: &Discovery) -> String {
+    let before = digits(found.base.heldout_rms_counts, 3);
+    let after = digits(found.final_.level.heldout_rms_counts, 3);
+    let noise = found.noise_rms_counts.map(|rms| digits(rms, 3));
+    let added = list(found.steps.iter().map(|step| step.effect));
+    let noise_is = noise.as_ref().map_or_else(
+        || "how large the noise is, these data do not tell".into(),
+        |noise| format!("the noise is {noise} counts"),
+    );
+    let closed = found.final_.shrink.map_or_else(String::new, |share| {
+        format!(", which closes {} of the gap between model and noise", percent(share))
+    });
+    let falls = format!(
+        "On held-out presses the residual falls from {before} to {after} counts rms{closed}; {noise_is}."
+    );
+    match found.verdict {
+        Verdict::NothingMissing => format!(
+            "Nothing that these data can show is missing from the model: on held-out presses its residual is {before} counts rms, {noise_is}, \
+             and noise alone shows as much structure with a chance of {}.",
+            chance(found.global.p_value)
+        ),
+        Verdict::Explained => format!("The model was missing {added}. {falls}"),
+        Verdict::PartlyExplained => format!(
+            "The model was missing {added}, and something more that no known effect matches. {falls} {}",
+            left(found)
+        ),
+        Verdict::Unexplained => format!(
+            "The model is missing something that no known effect matches: on held-out presses its residual is {before} counts rms, and \
+             {noise_is}. {}",
+            left(found)
+        ),
+    }
+}
+
+/// What is left, and on what it depends.
+fn left(found: &Discovery) -> String {
+    let share = percent(found.unexplained.share);
+    match &found.unexplained.depends_on[..] {
+        [] => format!("What is left, {share} of the gap, depends on no covariate that was looked at."),
+        depends_on => {
+            format!("What is left, {share} of the gap, depends on {}.", list(depends_on.iter().copied()))
+        }
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub(super) fn list<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String {
+    let names: Vec<T> = names.into_iter().collect();
+    let mut text = String::new();
+    for (nth, name) in names.iter().enumerate() {
+        text.push_str(match nth {
+            0 => "",
+            nth if nth + 1 == names.len() => " and ",
+            _ => ", ",
+        });
+        text.push_str(name.as_ref());
+    }
+    text
+}
+
+/// `97 %`, `99.2 %`: one decimal where a whole number would hide what is lacking.
+pub(super) fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    format!("{} %", number(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
+}

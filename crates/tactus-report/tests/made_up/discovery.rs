@@ -1,0 +1,274 @@
+//! Discoveries whose every number is known, as the page is to show them.
+
+use tactus_discover::{
+    Base, Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment,
+    NotShown, Point, Round, Split, Step, Unexplained, Verdict,
+};
+use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
+use tactus_report::discovery::{DataSource, DiscoveryReport};
+
+const NOISE_COUNTS: f64 = 2.0;
+const COVARIATES: [(&str, &str, [f64; 2]); 12] = [
+    ("time", "s", [0.0, 1200.0]),
+    ("time since contact", "s", [0.0, 30.0]),
+    ("time since release", "s", [0.0, 60.0]),
+    ("depth", "mm", [0.0, 0.7]),
+    ("largest past depth", "mm", [0.1, 0.7]),
+    ("speed", "mm/s", [-2.0, 2.0]),
+    ("press", "", [0.0, 120.0]),
+    ("place x", "mm", [0.0, 15.8]),
+    ("place y", "mm", [0.0, 11.8]),
+    ("place in the element x", "mm", [-1.0, 1.0]),
+    ("neighbours' signal", "counts", [0.0, 800.0]),
+    ("temperature", "deg C", [21.0, 24.0]),
+];
+
+/// Two effects were found, one of them twice; a third was known.
+pub(crate) fn explained() -> Discovery {
+    let (hysteresis, miswired) =
+        (["loss_share", "threshold_mm"], ["element", "answers_for", "own_share", "other_share"]);
+    Discovery {
+        seed: 7,
+        not_shown: vec![
+            lacks("gain-drift", "temperature was not measured, and all presses lie within 20 s"),
+            lacks("softening", "no press is followed by a shallower one in the same place"),
+            lacks("imprint", "no press is followed by a shallower one in the same place"),
+        ],
+        warnings: vec!["3 % of the frames are saturated and were left out".into()],
+        split: Split {
+            frames: 36_000,
+            train_presses: 96,
+            heldout_presses: 24,
+            heldout_depths_mm: vec![0.45],
+            heldout_coverings_mm: vec![2.54],
+        },
+        noise_rms_counts: Some(NOISE_COUNTS),
+        base: level(9.35),
+        global: GlobalTest { statistic: 41.2, p_value: 0.000_5 },
+        gap: vec![
+            gap("time since contact", "s", [0.4, 30.0], 3.81, 1e-9),
+            gap("depth", "mm", [0.45, 0.7], 1.24, 0.002_4),
+        ],
+        curves: COVARIATES.iter().enumerate().map(|(nth, covariate)| curve(nth, *covariate)).collect(),
+        elements: (0..48)
+            .map(|element| ElementGap {
+                before_rms_counts: 4.0 + 0.25 * f64::from(element),
+                after_rms_counts: 2.0 + 0.01 * f64::from(element),
+            })
+            .collect(),
+        rounds: rounds(),
+        steps: vec![
+            Step {
+                effect: "hysteresis",
+                terms: vec![vec![
+                    estimated(hysteresis[0], 0.123_4, Some(0.004_1)),
+                    estimated(hysteresis[1], 0.051, Some(0.002)),
+                ]],
+                p_value: 3e-7,
+                q_value: 0.001_7,
+                heldout_rms_before_counts: 9.12,
+                heldout_rms_after_counts: 2.08,
+                equivalent: vec!["backlash"],
+            },
+            Step {
+                effect: "miswired",
+                terms: [[18.0, 19.0], [19.0, 18.0]]
+                    .map(|[element, answers_for]| {
+                        vec![
+                            estimated(miswired[0], element, None),
+                            estimated(miswired[1], answers_for, None),
+                            estimated(miswired[2], 0.01, Some(0.003)),
+                            estimated(miswired[3], 0.97, Some(0.004)),
+                        ]
+                    })
+                    .to_vec(),
+                p_value: 0.000_02,
+                q_value: 0.000_3,
+                heldout_rms_before_counts: 4.31,
+                heldout_rms_after_counts: 2.08,
+                equivalent: vec![],
+            },
+        ],
+        final_: Final { level: level(2.08), shrink: Some(0.996_1) },
+        verdict: Verdict::Explained,
+        unexplained: Unexplained { depends_on: vec![], share: 0.003_9 },
+        next_experiments: vec![NextExperiment {
+            experiment: "diagnose",
+            separates: ["hysteresis".into(), "backlash".into()],
+            expected_z: 11.3,
+        }],
+        recalibrated: base(),
+        grown: base(),
+        effects: vec![
+            Effect::new("misregistration", neutral("misregistration")).unwrap(),
+            Effect::new("hysteresis", [(hysteresis[0], 0.123_4), (hysteresis[1], 0.051)]).unwrap(),
+        ],
+    }
+}
+
+/// The base model is all that there is.
+pub(crate) fn nothing_missing() -> Discovery {
+    let flat = |mut curve: Curve| {
+        for point in &mut curve.points {
+            (point.before, point.after) = (0.1 * point.before, 0.1 * point.before);
+        }
+        curve
+    };
+    let whole = explained();
+    Discovery {
+        not_shown: vec![],
+        warnings: vec![],
+        base: level(2.01),
+        global: GlobalTest { statistic: 2.4, p_value: 0.431 },
+        gap: vec![],
+        curves: whole.curves.into_iter().map(flat).collect(),
+        elements: vec![ElementGap { before_rms_counts: 2.0, after_rms_counts: 2.0 }; 48],
+        rounds: vec![],
+        steps: vec![],
+        final_: Final { level: level(2.01), shrink: None },
+        verdict: Verdict::NothingMissing,
+        unexplained: Unexplained { depends_on: vec![], share: 0.0 },
+        next_experiments: vec![],
+        effects: vec![],
+        ..whole
+    }
+}
+
+/// There is a gap, and no candidate closes it; no frames repeat each other.
+pub(crate) fn unexplained() -> Discovery {
+    let whole = explained();
+    Discovery {
+        noise_rms_counts: None,
+        final_: Final { level: whole.base, shrink: Some(0.0) },
+        rounds: vec![Round { taken: None, ..whole.rounds[0].clone() }],
+        steps: vec![],
+        verdict: Verdict::Unexplained,
+        unexplained: Unexplained { depends_on: vec!["time since contact", "depth"], share: 1.0 },
+        next_experiments: vec![],
+        effects: vec![],
+        ..whole
+    }
+}
+
+/// Nothing is in it, and what can be no number is none.
+pub(crate) fn empty() -> Discovery {
+    let nowhere = Level { heldout_rms_counts: f64::NAN, heldout_chi2: f64::NAN };
+    Discovery {
+        noise_rms_counts: None,
+        split: Split {
+            frames: 0,
+            train_presses: 0,
+            heldout_presses: 0,
+            heldout_depths_mm: vec![],
+            heldout_coverings_mm: vec![],
+        },
+        base: nowhere,
+        global: GlobalTest { statistic: f64::NAN, p_value: f64::NAN },
+        curves: vec![],
+        elements: vec![],
+        final_: Final { level: nowhere, shrink: None },
+        ..nothing_missing()
+    }
+}
+
+pub(crate) fn data() -> Vec<DataSource> {
+    vec![
+        DataSource { id: "diagnose-1".into(), sha256: "4f1c".repeat(16), frames: 20_000, presses: 70 },
+        DataSource { id: "grid-sweep-2".into(), sha256: "90ab".repeat(16), frames: 16_000, presses: 50 },
+    ]
+}
+
+pub(crate) fn report<'a>(
+    array: &'a Array,
+    data: &'a [DataSource],
+    discovery: &'a Discovery,
+) -> DiscoveryReport<'a> {
+    DiscoveryReport { rig: "sim", simulated: true, array, data, notes: &[], discovery }
+}
+
+fn rounds() -> Vec<Round> {
+    vec![
+        Round {
+            with: vec!["misregistration"],
+            candidates: vec![
+                tried("hysteresis", 39.4, 0.000_5, Some((4.31, 0.823))),
+                tried("low-pass", 12.1, 0.000_5, Some((8.77, 0.126))),
+                tried("hardening", 3.2, 0.41, None),
+                tried("crosstalk", 1.1, 1.0, None),
+            ],
+            taken: Some("hysteresis"),
+        },
+        Round {
+            with: vec!["misregistration", "hysteresis"],
+            candidates: vec![
+                tried("miswired", 22.0, 0.000_5, Some((2.08, 0.996))),
+                tried("hardening", 2.2, 0.93, None),
+            ],
+            taken: Some("miswired"),
+        },
+        Round {
+            with: vec!["misregistration", "hysteresis", "miswired"],
+            candidates: vec![tried("hardening", 1.9, 0.97, None)],
+            taken: None,
+        },
+    ]
+}
+
+fn level(rms_counts: f64) -> Level {
+    Level { heldout_rms_counts: rms_counts, heldout_chi2: (rms_counts / NOISE_COUNTS).powi(2) }
+}
+
+fn lacks(effect: &'static str, reason: &str) -> NotShown {
+    NotShown { effect, reason: reason.into() }
+}
+
+fn gap(covariate: &'static str, unit: &'static str, range: [f64; 2], effect_size: f64, q_value: f64) -> Gap {
+    Gap { covariate, unit, range, effect_size, q_value }
+}
+
+fn tried(effect: &'static str, score: f64, p_value: f64, fitted: Option<(f64, f64)>) -> Candidate {
+    Candidate {
+        effect,
+        score,
+        p_value,
+        heldout_rms_counts: fitted.map(|(rms, _)| rms),
+        shrink: fitted.map(|(_, shrink)| shrink),
+    }
+}
+
+fn estimated(name: &'static str, value: f64, standard_error: Option<f64>) -> Estimated {
+    Estimated { name, value, standard_error }
+}
+
+fn curve(nth: usize, (covariate, unit, [from, to]): (&'static str, &'static str, [f64; 2])) -> Curve {
+    let points = (0..16).map(|step| {
+        let share = (f64::from(step) + 0.5) / 16.0;
+        let wave = (3.0 * share + nth as f64).sin();
+        Point {
+            at: from + share * (to - from),
+            before: 0.04 * wave,
+            after: 0.002 * (7.0 * share + nth as f64).cos(),
+            standard_error: 0.002 + 0.001 * share,
+        }
+    });
+    let of = if nth % 3 == 2 { "counts" } else { "share of the signal" };
+    Curve { covariate, unit, of, points: points.collect() }
+}
+
+fn neutral(name: &str) -> Vec<(&'static str, f64)> {
+    let definition = tactus_model::effect::Definition::find(name).unwrap();
+    Effect::neutral(definition).parameters().collect()
+}
+
+fn base() -> Base {
+    Base {
+        psf: Psf::PAPER,
+        response: Response {
+            sensitivity_counts_per_mm: vec![1000.0; 48],
+            baseline_counts: vec![100.0; 48],
+            quadratic_per_mm: vec![0.0; 48],
+            reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
+            reference_covering: Covering { thickness_mm: 1.016 },
+        },
+    }
+}

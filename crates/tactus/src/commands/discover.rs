@@ -1,0 +1,143 @@
+//! `discover`: what a model is missing, as a report, numbers, a grown model and the residuals.
+
+mod measured;
+mod model;
+mod print;
+mod residuals;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::thread;
+
+use anyhow::{Context, bail};
+use tactus_discover::{Discovery, Known, Options};
+use tactus_model::Array;
+use tactus_report::discovery::{DiscoveryReport, discovery_html, discovery_json};
+use tactus_schema::{Model, Rig};
+
+use crate::cli::{Common, DiscoverArgs};
+use crate::exit::{Exit, Failure};
+use crate::output;
+use crate::progress::Computation;
+use measured::Measured;
+
+/// What was found, and what it was found in.
+struct Discovered {
+    measured: Measured,
+    /// What the data were held against.
+    model: Model,
+    known: Known,
+    discovery: Discovery,
+}
+
+pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<Exit> {
+    let progress = Computation::new(common.json);
+    let declared = args.model.as_deref().map(declared).transpose()?;
+    progress.show("reading", 0.0);
+    let measured = Measured::read(&args.files)?;
+    let model = match declared {
+        Some(model) => of_array(model, args.model.as_deref(), &measured.rig.array)?,
+        None => {
+            Model::of_rig(&measured.rig).context("the rig's reference indenter is not among its tools")?
+        }
+    };
+    let known = known(&measured.rig, &model);
+    let threads = args.threads.map_or_else(cores, usize::from);
+    let options = Options { seed: args.seed, threads };
+    let discovery = tactus_discover::discover(&known, &measured.frames, options, &|now| {
+        progress.show(&now.what, now.share);
+    })?;
+    progress.show("writing", 1.0);
+    let discovered = Discovered { measured, model, known, discovery };
+    let paths = discovered.write(&args.out)?;
+    progress.clear();
+    if common.json {
+        output::write(&discovery_json(&discovered.report()))?;
+    } else {
+        print::discovered(&discovered.report(), &paths);
+    }
+    Ok(if discovered.measured.notes.is_empty() { Exit::Done } else { Exit::Degraded })
+}
+
+impl Discovered {
+    /// Writes report, numbers, model and residuals; returns the files.
+    fn write(&self, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        let report = self.report();
+        let grown = model::grown(&self.model, &self.discovery, &self.measured.id());
+        let texts = [
+            ("report.html", discovery_html(&report)),
+            ("report.json", discovery_json(&report)),
+            ("model.toml", grown.to_toml().context("the grown model")?),
+        ];
+        let mut paths = Vec::new();
+        for (name, text) in texts {
+            let path = folder.join(name);
+            fs::write(&path, text).with_context(|| path.display().to_string())?;
+            paths.push(std::path::absolute(path)?);
+        }
+        let path = folder.join("residuals.parquet");
+        residuals::write(self, &path)?;
+        paths.push(std::path::absolute(path)?);
+        Ok(paths)
+    }
+
+    fn report(&self) -> DiscoveryReport<'_> {
+        DiscoveryReport {
+            rig: &self.measured.rig.name,
+            simulated: self.measured.simulated,
+            array: &self.measured.rig.array,
+            data: &self.measured.data,
+            notes: &self.measured.notes,
+            discovery: &self.discovery,
+        }
+    }
+}
+
+/// The model of a file.
+fn declared(path: &Path) -> anyhow::Result<Model> {
+    let text = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
+    let model = Model::from_toml(&text);
+    Ok(model.map_err(|error| Failure::new(Exit::Usage, format!("{}: {error}", path.display())))?)
+}
+
+/// The model, if it is of the array that was measured.
+fn of_array(model: Model, path: Option<&Path>, measured: &Array) -> anyhow::Result<Model> {
+    let declared = &model.base.array;
+    if declared != measured {
+        let path = path.unwrap_or(Path::new("the model")).display();
+        bail!(
+            "{path} is a model of another array than the data: {}, but measured was {}",
+            described(declared),
+            described(measured)
+        );
+    }
+    Ok(model)
+}
+
+fn described(array: &Array) -> String {
+    format!(
+        "{:?} ({} rows of {}, {} mm apart, {} Hz, {} counts at most)",
+        array.name(),
+        array.rows(),
+        array.cols(),
+        array.pitch_mm(),
+        array.rate_hz(),
+        array.full_scale_counts()
+    )
+}
+
+fn known(rig: &Rig, model: &Model) -> Known {
+    Known {
+        array: rig.array.clone(),
+        psf: model.base.psf,
+        response: model.base.response.clone(),
+        registration: rig.registration,
+        indenters: rig.indenters.clone(),
+        effects: model.effects.iter().map(|known| known.effect.clone()).collect(),
+    }
+}
+
+fn cores() -> usize {
+    thread::available_parallelism().map_or(1, usize::from)
+}

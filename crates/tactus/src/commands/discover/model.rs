@@ -1,0 +1,51 @@
+//! The model that a discovery makes.
+
+use tactus_discover::{Discovery, Estimated, Step};
+use tactus_model::Effect;
+use tactus_schema::Model;
+use tactus_schema::model::{Base, Evidence, KnownEffect};
+
+/// The model with what was added to it, base and effects fitted together. What was added has its standard errors and
+/// the runs that show it; what was known before keeps its evidence.
+pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
+    let base = Base::of(before.base.array.clone(), found.grown.psf, found.grown.response.clone());
+    let noise_rms_counts = found.noise_rms_counts.unwrap_or(before.base.noise_rms_counts);
+    let effects = found.effects.iter().enumerate().map(|(nth, effect)| {
+        let added = found.steps.iter().find_map(|step| Some((step, term(step, effect)?)));
+        let Some((step, term)) = added else {
+            let known = before.effects.get(nth).filter(|known| known.effect.name() == effect.name());
+            return KnownEffect {
+                effect: effect.clone(),
+                standard_errors: [].into(),
+                evidence: known.and_then(|known| known.evidence.clone()),
+            };
+        };
+        let errors =
+            term.iter().filter_map(|one| Some((one.name.to_owned(), one.standard_error.filter(finite)?)));
+        KnownEffect {
+            effect: effect.clone(),
+            standard_errors: errors.collect(),
+            evidence: Some(Evidence {
+                data: data.to_owned(),
+                heldout_rms_before_counts: step.heldout_rms_before_counts,
+                heldout_rms_after_counts: step.heldout_rms_after_counts,
+            }),
+        }
+    });
+    Model { effects: effects.collect(), base: Base { noise_rms_counts, ..base } }
+}
+
+/// The term of a step that is this effect.
+fn term<'a>(step: &'a Step, effect: &Effect) -> Option<&'a [Estimated]> {
+    let is = |term: &&Vec<Estimated>| term.iter().all(|one| effect.value(one.name) == Some(one.value));
+    (step.effect == effect.name()).then(|| step.terms.iter().find(is)).flatten().map(Vec::as_slice)
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as a filter gives it")]
+fn finite(error: &f64) -> bool {
+    error.is_finite()
+}
+
+#[cfg(test)]
+#[path = "model_tests.rs"]
+mod tests;

@@ -1,0 +1,110 @@
+//! A discovery for people at the terminal.
+
+use std::path::PathBuf;
+
+use tactus_calibrate::Estimate;
+use tactus_discover::{Estimated, Step};
+use tactus_report::discovery::{DiscoveryReport, in_words, not_shown};
+
+use crate::commands::calibrate::estimate;
+use crate::output::{print_fields, print_table, say};
+
+pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
+    let found = report.discovery;
+    for (reason, effects) in not_shown(found) {
+        say(&format!("cannot be shown: {}: {reason}", effects.join(", ")));
+    }
+    for warning in report.notes.iter().chain(&found.warnings) {
+        say(&format!("warning: {warning}"));
+    }
+    say("");
+    facts(report);
+    if !found.gap.is_empty() {
+        say("");
+        let rows = found.gap.iter().map(|gap| {
+            let [from, to] = gap.range;
+            let range = format!("{from:.3} to {to:.3} {}", gap.unit);
+            vec![gap.covariate.into(), range, format!("{:.2}", gap.effect_size), chance(gap.q_value)]
+        });
+        print_table(&["depends on", "most at", "in noise units", "q"], &rows.collect::<Vec<_>>());
+    }
+    if !found.steps.is_empty() {
+        say("");
+        let rows: Vec<Vec<String>> = found.steps.iter().flat_map(step).collect();
+        print_table(&["added", "parameters", "held-out counts rms", "q", "not told from"], &rows);
+    }
+    say("");
+    say(&in_words(found));
+    if !found.next_experiments.is_empty() {
+        say("");
+    }
+    for next in &found.next_experiments {
+        let [one, other] = &next.separates;
+        let z = next.expected_z;
+        say(&format!("next: tactus run {}  (tells {one} from {other}, z = {z:.1})", next.experiment));
+    }
+    say("");
+    for path in paths {
+        say(&path.display().to_string());
+    }
+}
+
+fn facts(report: &DiscoveryReport<'_>) {
+    let found = report.discovery;
+    let split = &found.split;
+    let noise = found.noise_rms_counts;
+    let level = |counts: f64| match noise {
+        Some(noise) => format!("{counts:.3} counts rms held out, {:.2} times the noise", counts / noise),
+        None => format!("{counts:.3} counts rms held out"),
+    };
+    print_fields(&[
+        ("rig", format!("{}{}", report.rig, if report.simulated { " (SIMULATED)" } else { "" })),
+        (
+            "read",
+            format!(
+                "{} runs, {} frames; {} presses fitted, {} held out",
+                report.data.len(),
+                split.frames,
+                split.train_presses,
+                split.heldout_presses
+            ),
+        ),
+        (
+            "noise",
+            noise.map_or_else(
+                || "not known: no frames repeat each other".into(),
+                |rms| format!("{rms:.3} counts rms"),
+            ),
+        ),
+        ("before", level(found.base.heldout_rms_counts)),
+        ("after", level(found.final_.level.heldout_rms_counts)),
+    ]);
+}
+
+/// A row for each term; what belongs to the whole step stands in the first.
+fn step(step: &Step) -> Vec<Vec<String>> {
+    let of_step = |nth: usize, text: String| if nth == 0 { text } else { String::new() };
+    let rows = step.terms.iter().enumerate().map(|(nth, term)| {
+        let (before, after) = (step.heldout_rms_before_counts, step.heldout_rms_after_counts);
+        vec![
+            of_step(nth, step.effect.into()),
+            term.iter().map(parameter).collect::<Vec<_>>().join(", "),
+            of_step(nth, format!("{before:.3} -> {after:.3}")),
+            of_step(nth, chance(step.q_value)),
+            of_step(nth, step.equivalent.join(", ")),
+        ]
+    });
+    rows.collect()
+}
+
+fn parameter(parameter: &Estimated) -> String {
+    let Estimated { name, value, standard_error } = *parameter;
+    match standard_error {
+        Some(standard_error) => format!("{name} {}", estimate(Estimate { value, standard_error })),
+        None => format!("{name} {value}"),
+    }
+}
+
+fn chance(chance: f64) -> String {
+    if chance < 1e-4 { "< 0.0001".into() } else { format!("{chance:.4}") }
+}

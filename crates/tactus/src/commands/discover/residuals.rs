@@ -1,0 +1,29 @@
+//! What the model leaves of each frame, before and after it grew.
+
+use std::path::Path;
+
+use anyhow::ensure;
+use tactus_discover::predict;
+use tactus_record::{rows, table::ResidualWriter};
+
+use super::Discovered;
+
+/// The frames are read a second time rather than kept.
+pub(super) fn write(discovered: &Discovered, path: &Path) -> anyhow::Result<()> {
+    let Discovered { measured, known, discovery, .. } = discovered;
+    let before = predict(known, &measured.frames, &discovery.recalibrated, &known.effects)?;
+    let after = predict(known, &measured.frames, &discovery.grown, &discovery.effects)?;
+    let elements = measured.rig.array.elements();
+    let mut predicted = before.chunks_exact(elements).zip(after.chunks_exact(elements));
+    let mut table = ResidualWriter::create(path, &measured.rig, measured.simulated)?;
+    let (mut rows, mut written) = (0, Ok(()));
+    rows::visit(&measured.files, |_, row| {
+        rows += 1;
+        if let (Ok(()), Some((before, after))) = (&written, predicted.next()) {
+            written = table.push(&row, before, after);
+        }
+    })?;
+    written?;
+    ensure!(rows == measured.frames.len(), "the files changed while they were read");
+    Ok(table.finish()?)
+}

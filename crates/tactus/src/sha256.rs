@@ -1,0 +1,16 @@
+//! What tells that a file is still the same.
+
+use std::fs::File;
+use std::io;
+use std::path::Path;
+
+use anyhow::Context;
+use sha2::{Digest, Sha256};
+
+/// SHA-256 of a file, in hexadecimal.
+pub(crate) fn of_file(path: &Path) -> anyhow::Result<String> {
+    let mut hash = Sha256::new();
+    let read = File::open(path).and_then(|mut file| io::copy(&mut file, &mut hash));
+    read.with_context(|| path.display().to_string())?;
+    Ok(format!("{:x}", hash.finalize()))
+}
