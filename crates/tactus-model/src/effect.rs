@@ -78,6 +78,7 @@ mod baseline_drift;
 #[cfg(test)]
 pub(crate) mod bench;
 mod crosstalk;
+mod curve;
 mod definition;
 mod depth_dependent_spread;
 mod edge_effect;

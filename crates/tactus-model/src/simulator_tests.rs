@@ -28,7 +28,10 @@ fn the_drawn_noise_comes_upon_the_clean_counts_before_the_converter() {
 
 #[test]
 fn copies_share_nothing_and_every_run_begins_without_a_past() {
-    let one = simulator([effect("relaxation", [("relaxed_share", 0.5), ("time_constant_s", 1.0)])]);
+    let one = simulator([effect(
+        "relaxation",
+        [("relaxed_share", 0.5), ("time_constant_s", 1.0), ("spread_ratio", 1.0)],
+    )]);
     let other = one.clone();
     let hold = Trajectory::new([(0.0, upon(&one, 21, 0.5))]).unwrap();
     let images = |one: &Simulator| -> Vec<Image> { one.run(&hold, 30.0, 60, || 0.0).unwrap().collect() };

@@ -78,8 +78,10 @@ pub(crate) fn still(simulator: &Simulator, tip_mm: [f64; 3]) -> Vec<f64> {
     Pipeline::new(simulator).unwrap().step(Moment::at(0.0), &tip_mm).to_vec()
 }
 
-/// Checks that the derivatives by `known` are those of central differences, and that there are no others.
+/// Checks that the derivatives by `known` are those of central differences, and that there are no others. Not all of
+/// them may be 0.
 pub(crate) fn assert_slopes(effect: &Effect, known: &[&str]) {
+    let mut changes = known.is_empty();
     for (index, (name, value)) in effect.parameters().enumerate() {
         let slope = output(effect, Some(index));
         assert_eq!(slope.is_some(), known.contains(&name), "{name}");
@@ -88,12 +90,13 @@ pub(crate) fn assert_slopes(effect: &Effect, known: &[&str]) {
         let at = |value| output(&effect.with(name, value).unwrap(), None).unwrap();
         let (less, more) = (at(value - step), at(value + step));
         let largest = slope.iter().fold(0.0_f64, |largest, one| largest.max(one.abs()));
-        assert!(largest > 0.0, "{name}");
+        changes |= largest > 0.0;
         for ((slope, less), more) in slope.iter().zip(less).zip(more) {
             let want = (more - less) / (2.0 * step);
-            assert!((slope - want).abs() < 1e-6 * largest, "{name}: {slope} {want}");
+            assert!((slope - want).abs() <= 1e-6 * largest, "{name}: {slope} {want}");
         }
     }
+    assert!(changes);
 }
 
 /// What the effect makes of a short history, or the derivative of its last output by a parameter.

@@ -1,23 +1,33 @@
-use crate::effect::bench::{assert_slopes, effect, simulator, still, upon};
+use super::DEFINITION;
+use crate::effect::bench::{assert_slopes, simulator, still, upon};
 use crate::{Effect, Moment, Pipeline};
 
-fn drift(rate_per_h: f64, rate_per_k: f64) -> Effect {
-    effect("gain-drift", [("rate_per_h", rate_per_h), ("rate_per_k", rate_per_k)])
+/// A gain that grows by 6 % in the first 10 of 60 minutes, and by as much in the last.
+fn drift(rate_per_k: f64) -> Effect {
+    let values = [
+        ("rate_per_k", rate_per_k),
+        ("duration_s", 3600.0),
+        ("gain_01_share", 0.06),
+        ("gain_06_share", 0.06),
+    ];
+    values
+        .into_iter()
+        .fold(Effect::neutral(&DEFINITION), |effect, (name, value)| effect.with(name, value).unwrap())
 }
 
 #[test]
 fn what_stands_above_the_baseline_grows_with_time_and_temperature() {
-    let one = simulator([drift(0.06, -0.01)]);
+    let one = simulator([drift(-0.01)]);
     let tip_mm = upon(&one, 21, 0.4);
     let plain = still(&simulator([]), tip_mm);
     let mut pipeline = Pipeline::new(&one).unwrap();
     for (t_s, temperature_c, gain) in [
         (0.0, None, 1.0),
-        (600.0, None, 1.01),
-        (600.0, Some(21.0), 1.01),
-        (1800.0, Some(24.0), 1.0),
-        (3600.0, Some(19.0), 1.08),
-        (3600.0, None, 1.06),
+        (100.0, None, 1.01),
+        (100.0, Some(21.0), 1.01),
+        (600.0, Some(24.0), 1.03),
+        (3300.0, Some(19.0), 1.05),
+        (7200.0, None, 1.06),
     ] {
         for (got, plain) in pipeline.step(Moment { t_s, temperature_c }, &tip_mm).iter().zip(&plain) {
             let want = 100.0 + (plain - 100.0) * gain;
@@ -28,5 +38,8 @@ fn what_stands_above_the_baseline_grows_with_time_and_temperature() {
 
 #[test]
 fn derivatives_are_those_of_differences() {
-    assert_slopes(&drift(0.5, 0.01), &["rate_per_h", "rate_per_k"]);
+    let known: Vec<_> = DEFINITION.parameters.iter().map(|parameter| parameter.name).collect();
+    for duration_s in [26.0, 60.0, 3600.0] {
+        assert_slopes(&drift(0.01).with("duration_s", duration_s).unwrap(), &known);
+    }
 }

@@ -1,4 +1,9 @@
+use crate::Effect;
 use crate::effect::bench::{THIN, assert_slopes, effect, simulator, still, upon};
+
+fn hard(growth_at_1_mm: f64, exponent: f64) -> Effect {
+    effect("hardening", [("growth_at_1_mm", growth_at_1_mm), ("exponent", exponent)])
+}
 
 /// Equivalent indentation of an element whose response is `s (u + 0.15 u^2)`.
 fn signal_mm(counts: f64, element: usize) -> f64 {
@@ -7,10 +12,10 @@ fn signal_mm(counts: f64, element: usize) -> f64 {
 }
 
 #[test]
-fn the_reference_press_reads_depth_and_its_cube() {
-    let hard = simulator([effect("hardening", [("cubic_per_mm2", 0.8)])]);
+fn an_exponent_of_two_adds_the_cube_of_depth() {
+    let one = simulator([hard(0.8, 2.0)]);
     for depth_mm in [0.2, 0.6, 1.5] {
-        let counts = still(&hard, upon(&hard, 21, depth_mm));
+        let counts = still(&one, upon(&one, 21, depth_mm));
         let reached_mm = THIN.thickness_mm.min(depth_mm);
         let want_mm = reached_mm + 0.8 * reached_mm.powi(3);
         assert!((signal_mm(counts[21], 21) - want_mm).abs() < 1e-9, "at {depth_mm} mm");
@@ -19,7 +24,7 @@ fn the_reference_press_reads_depth_and_its_cube() {
 
 #[test]
 fn all_elements_gain_alike() {
-    let (soft, hard) = (simulator([]), simulator([effect("hardening", [("cubic_per_mm2", 0.8)])]));
+    let (soft, hard) = (simulator([]), simulator([hard(0.8, 2.0)]));
     let tip_mm = upon(&soft, 21, 0.5);
     for (element, (hard, soft)) in still(&hard, tip_mm).iter().zip(still(&soft, tip_mm)).enumerate() {
         let ratio = signal_mm(*hard, element) / signal_mm(soft, element);
@@ -28,6 +33,8 @@ fn all_elements_gain_alike() {
 }
 
 #[test]
-fn the_derivative_is_that_of_differences() {
-    assert_slopes(&effect("hardening", [("cubic_per_mm2", 0.5)]), &["cubic_per_mm2"]);
+fn derivatives_are_those_of_differences() {
+    for exponent in [0.7, 2.0, 4.5] {
+        assert_slopes(&hard(0.5, exponent), &["growth_at_1_mm", "exponent"]);
+    }
 }

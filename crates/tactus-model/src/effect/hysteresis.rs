@@ -1,20 +1,32 @@
 //! `hysteresis`: load and unload differ, at any rate.
 //!
 //! ```text
-//! q_k -> max(u, min(u + r_k, q_k))                         r_k = k threshold / 4,  k = 1 .. 4
-//! u   -> u - loss_share * (mean of q_k - u)                not below 0
+//! q_k -> max((u - s_k threshold) / (1 + s_k growth), min((u + s_k threshold) / (1 - s_k growth), q_k))
+//! u   -> u - loss_share * (mean of q_k - u)                not below 0;  s_k = 1/8, 3/8, 5/8, 1
 //! ```
 //!
-//! Each element has four plays `q_k` that hold on to what was reached. Loading is the base model's; where the load
-//! turns, the response falls `1 + loss_share` times as fast at first, and as fast as the base model's once it has
-//! come back by the threshold, lower by `loss_share` times 5/8 of it. Loading again takes it back up the same way: a
-//! closed loop, however slowly it is gone round. A negative share leaves a rest after release.
+//! Each element has four plays `q_k`, from 0 on, that hold on to what they reached until the signal is further from
+//! it than `s_k (threshold + growth q_k)`: friction that grows with the load. Where the load turns, the response
+//! follows `1 + loss_share` times as fast as the base model's until, one by one, the plays have been crossed. A closed
+//! loop, however slowly it is gone round. A negative share is late instead, and leaves a rest after release.
 //!
-//! Derivatives in closed form, with memory. Cost: four comparisons an element.
+//! Share of other loops that is explained, in presses of 0.1 to 0.6 mm with returns halfway, beyond the best gain,
+//! baseline and quadratic term; before, with four plays evenly spaced that hold only what is greater, and now:
+//!
+//! | loop | before | now |
+//! |---|---|---|
+//! | Bouc-Wen, `z_0` 0.05 mm, `n` 1 and 2 | 0.94, 0.94 | 1.00, 1.00 |
+//! | Bouc-Wen, `z_0` 0.15 mm, `n` 1 and 2 | 0.90, 0.89 | 0.97, 0.96 |
+//! | Prandtl-Ishlinskii, exponential density of 0.03, 0.1 and 0.3 mm | 0.99, 0.96, 0.95 | 0.99, 0.98, 1.00 |
+//! | the same of stops, 0.1 mm | 0.93 | 0.98 |
+//! | Preisach, Gaussian of 0.1 and 0.25 mm, and even density | 0.76, 0.89, 0.88 | 0.79, 0.96, 0.97 |
+//!
+//! Derivatives in closed form, with memory. Cost: eight comparisons an element.
 //!
 //! # Source
 //! The Prandtl-Ishlinskii operator, a weighted sum of plays: M. Brokate and J. Sprekels, *Hysteresis and Phase
-//! Transitions* (1996), chapter 2.
+//! Transitions* (1996), chapter 2; plays between two curves, M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with
+//! Hysteresis* (1989), chapter 1.
 
 use super::{Base, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
@@ -25,39 +37,42 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[
         Parameter::real("loss_share", 0.0, [-1.0, 5.0]),
         Parameter::real("threshold_mm", 0.1, [1e-3, 2.0]),
+        Parameter::real("threshold_growth", 0.1, [0.0, 0.9]),
     ],
     near_twins: &["backlash", "softening", "relaxation", "imprint", "time-lag", "rate-stiffening"],
     shown_by: &["ladder", "repeats"],
     make: Make::Covering(|values| {
-        let [loss_share, threshold_mm] = [values[0], values[1]];
-        Box::new(Hysteresis { loss_share, threshold_mm, plays: Vec::new() })
+        let [loss_share, threshold_mm, growth] = [values[0], values[1], values[2]];
+        Box::new(Hysteresis { loss_share, threshold_mm, growth, plays: Vec::new() })
     }),
 };
 
-/// Thresholds of the plays, as shares of the greatest.
-const THRESHOLD_SHARES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+/// Half the width of each play, as a share of the widest.
+const SHARES: [f64; 4] = [0.125, 0.375, 0.625, 1.0];
 
 #[derive(Debug)]
 struct Hysteresis {
     loss_share: f64,
     threshold_mm: f64,
+    growth: f64,
     /// Of each element.
     plays: Vec<[Play; 4]>,
 }
 
-/// What holds on to a greater signal, and by how much that changes with the threshold.
+/// What holds on to the signal, and by how much that changes with the threshold and its growth.
 #[derive(Debug, Clone, Copy, Default)]
 struct Play {
     held_mm: f64,
     by_threshold: f64,
+    by_growth: f64,
 }
 
 impl OnCovering for Hysteresis {
     fn signal(&mut self, _: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
         self.plays.resize(signal_mm.len(), <[Play; 4]>::default());
         for (u, plays) in signal_mm.iter_mut().zip(&mut self.plays) {
-            for (play, share) in plays.iter_mut().zip(THRESHOLD_SHARES) {
-                play.follow(*u, share, self.threshold_mm);
+            for (play, share) in plays.iter_mut().zip(SHARES) {
+                play.follow(u.max(0.0), share * self.threshold_mm, share * self.growth, share);
             }
             *u = left(*u, self.loss_share * mean(plays.map(|play| play.held_mm - *u)));
         }
@@ -71,7 +86,7 @@ impl OnCovering for Hysteresis {
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
-        if parameter > 1 {
+        if parameter > 2 {
             return false;
         }
         for ((slope, u), plays) in slope_mm.iter_mut().zip(before_mm).zip(&self.plays) {
@@ -79,7 +94,8 @@ impl OnCovering for Hysteresis {
             *slope = match parameter {
                 _ if u - self.loss_share * lost < u.min(0.0) => 0.0,
                 0 => -lost,
-                _ => -self.loss_share * mean(plays.map(|play| play.by_threshold)),
+                1 => -self.loss_share * mean(plays.map(|play| play.by_threshold)),
+                _ => -self.loss_share * mean(plays.map(|play| play.by_growth)),
             };
         }
         true
@@ -91,12 +107,15 @@ impl OnCovering for Hysteresis {
 }
 
 impl Play {
-    fn follow(&mut self, u: f64, share: f64, threshold_mm: f64) {
-        let most_mm = u + share * threshold_mm;
-        if u >= self.held_mm {
-            *self = Self { held_mm: u, by_threshold: 0.0 };
+    fn follow(&mut self, u: f64, threshold_mm: f64, growth: f64, share: f64) {
+        let least_mm = (u - threshold_mm) / (1.0 + growth);
+        let most_mm = (u + threshold_mm) / (1.0 - growth);
+        if self.held_mm < least_mm {
+            let by_threshold = -share / (1.0 + growth);
+            *self = Self { held_mm: least_mm, by_threshold, by_growth: by_threshold * least_mm };
         } else if self.held_mm > most_mm {
-            *self = Self { held_mm: most_mm, by_threshold: share };
+            let by_threshold = share / (1.0 - growth);
+            *self = Self { held_mm: most_mm, by_threshold, by_growth: by_threshold * most_mm };
         }
     }
 }

@@ -2,7 +2,12 @@ use crate::Effect;
 use crate::effect::bench::{assert_slopes, effect, felt_mm};
 
 fn lossy(loss_share: f64, threshold_mm: f64) -> Effect {
-    effect("hysteresis", [("loss_share", loss_share), ("threshold_mm", threshold_mm)])
+    growing(loss_share, threshold_mm, 0.0)
+}
+
+fn growing(loss_share: f64, threshold_mm: f64, growth: f64) -> Effect {
+    let shape = [("loss_share", loss_share), ("threshold_mm", threshold_mm), ("threshold_growth", growth)];
+    effect("hysteresis", shape)
 }
 
 fn assert_near<const N: usize>(got: [f64; N], want: [f64; N]) {
@@ -11,13 +16,28 @@ fn assert_near<const N: usize>(got: [f64; N], want: [f64; N]) {
 }
 
 #[test]
-fn loading_is_the_base_models_and_unloading_is_lower() {
-    // Plays of 0.05, 0.1, 0.15 and 0.2 mm: back by 0.1, what is held on to is 0.05 once and 0.1 three times.
-    let depths = [0.2, 0.5, 0.4, 0.25, 0.0].map(|depth_mm| (depth_mm, depth_mm));
-    let lost = [0.0, 0.0, 0.4 * 0.0875, 0.4 * 0.125, 0.0];
-    assert_near(felt_mm(&lossy(0.4, 0.2), depths), [0.2, 0.5, 0.4 - lost[2], 0.25 - lost[3], 0.0]);
-    // A negative share holds more, and leaves a rest.
-    assert_near(felt_mm(&lossy(-0.4, 0.2), depths), [0.2, 0.5, 0.4 + lost[2], 0.25 + lost[3], 0.05]);
+fn what_is_held_is_a_threshold_behind_and_then_a_threshold_before() {
+    // Plays of 0.05, 0.15, 0.25 and 0.4 mm. At 0.5 mm they hold 0.45, 0.35, 0.25 and 0.1; at 0.2 mm the first has
+    // been crossed and is 0.05 before.
+    let depths = [0.02, 0.5, 0.2, 0.0].map(|depth_mm| (depth_mm, depth_mm));
+    let held = [0.0, 1.15 / 4.0, 0.95 / 4.0];
+    let want = |loss: f64| [0.02, 0.5, 0.2].map(|u| u * (1.0 + loss)).into_iter().zip(held);
+    let [a, b, c] = [0, 1, 2].map(|k| want(0.4).map(|(u, held)| u - 0.4 * held).nth(k).unwrap());
+    assert_near(felt_mm(&lossy(0.4, 0.4), depths), [a, b, c, 0.0]);
+    // A negative share leaves a rest: of what is held, 0.05, 0.15, 0.25 and 0.1 mm.
+    let [.., rest] = felt_mm(&lossy(-0.4, 0.4), depths);
+    assert_near([rest], [0.4 * 0.55 / 4.0]);
+}
+
+#[test]
+fn a_growing_threshold_is_in_proportion_to_what_is_held() {
+    // 0.5 mm is 1 + s/2 times what is held and a threshold of s/5.
+    let [_, up, down] = felt_mm(&growing(0.4, 0.2, 0.5), [(0.0, 0.0), (1.0, 0.5), (2.0, 0.02)]);
+    let shares = [0.125, 0.375, 0.625, 1.0];
+    let held = shares.map(|s: f64| (0.5 - 0.2 * s) / (1.0 + 0.5 * s));
+    assert_near([up], [0.5 - 0.4 * (held.iter().sum::<f64>() / 4.0 - 0.5)]);
+    let held = shares.iter().zip(held).map(|(s, held)| ((0.02 + 0.2 * s) / (1.0 - 0.5 * s)).min(held));
+    assert_near([down], [(0.02 - 0.4 * (held.sum::<f64>() / 4.0 - 0.02)).max(0.0)]);
 }
 
 #[test]
@@ -44,28 +64,29 @@ fn an_inner_loop_leads_back_to_the_outer_one() {
     let [.., inner] =
         felt_mm(&lossy(0.4, 0.2), [(0.0, 0.5), (1.0, 0.35), (2.0, 0.42), (3.0, 0.35), (4.0, 0.2)]);
     assert_near([inner], [outer]);
-    let [.., up] = felt_mm(&lossy(0.4, 0.2), [(0.0, 0.5), (1.0, 0.2), (2.0, 0.5)]);
-    assert_near([up], [0.5]);
+    let [first, _, again] = felt_mm(&lossy(0.4, 0.2), [(0.0, 0.5), (1.0, 0.2), (2.0, 0.5)]);
+    assert_near([again], [first]);
 }
 
 #[test]
 fn a_loop_encloses_the_area_of_its_plays() {
-    // A play's loop between two depths is a parallelogram: its threshold high, and as long as is left of the way.
+    // A play's loop between two depths is a parallelogram: twice its threshold high, and as long as is left of the way.
     const STEPS: usize = 2000;
     let depth_mm = |k: usize| {
         let along = (k % STEPS) as f64 / STEPS as f64;
         if (k / STEPS).is_multiple_of(2) { 0.1 + 0.4 * along } else { 0.5 - 0.4 * along }
     };
     let depths: [_; 4 * STEPS + 1] = std::array::from_fn(|k| (k as f64, depth_mm(k)));
-    let felt = felt_mm(&lossy(0.3, 0.2), depths);
+    let felt = felt_mm(&lossy(0.3, 0.1), depths);
     // Second time round, and past the first half so that the loop is closed.
     let work = |k: usize| 0.5 * (felt[k] + felt[k + 1]) * (depths[k + 1].1 - depths[k].1);
     let area: f64 = (2 * STEPS..4 * STEPS).map(work).sum();
-    let want: f64 = [0.05, 0.1, 0.15, 0.2].iter().map(|r| 0.3 * r * (0.4 - r)).sum::<f64>() / 4.0;
+    let want =
+        [0.0125, 0.0375, 0.0625, 0.1].map(|r: f64| 0.3 * 2.0 * r * (0.4 - 2.0 * r)).iter().sum::<f64>() / 4.0;
     assert!((area - want).abs() < 1e-4 * want, "{area} {want}");
 }
 
 #[test]
 fn derivatives_are_those_of_differences() {
-    assert_slopes(&lossy(0.3, 0.7), &["loss_share", "threshold_mm"]);
+    assert_slopes(&growing(0.3, 0.7, 0.2), &["loss_share", "threshold_mm", "threshold_growth"]);
 }

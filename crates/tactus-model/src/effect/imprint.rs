@@ -1,19 +1,21 @@
 //! `imprint`: a dent stays after release and recovers slowly.
 //!
 //! ```text
-//! m(t) = greatest over the past s of u(s) exp(-(t - s) / recovery)
-//! u   -> max(u, set_share m)
+//! m_k(t) = greatest over the past s of u(s) exp(-(t - s) / tau_k)
+//! u     -> max(u, set_share (m_1 + m_2 + m_3) / 3)             tau = recovery {1 / spread_ratio, 1, spread_ratio}
 //! ```
 //!
-//! The dent is a share of the deepest, each element's own, and recovers exponentially. A tool that stands deeper than
-//! the dent feels nothing of it: readings under load are the base model's.
+//! The dent is a share of the deepest, each element's own, and recovers exponentially with a ratio of 1; with others it
+//! follows power laws and series, as `relaxation` does. A tool that stands deeper than the dent feels nothing of it:
+//! readings under load are the base model's.
 //!
-//! Derivatives in closed form, with memory. Cost: an exponential a moment.
+//! Derivatives in closed form, with memory. Cost: three exponentials a moment.
 //!
 //! # Source
 //! Compression set of rubber, as ISO 815 measures it; the Kelvin-Voigt element's recovery, J. D. Ferry, *Viscoelastic
 //! Properties of Polymers* (1980), chapter 1.
 
+use super::lag::{mean, spread};
 use super::{Base, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
@@ -23,11 +25,13 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[
         Parameter::real("set_share", 0.0, [0.0, 1.0]),
         Parameter::real("recovery_s", 60.0, [0.1, 1e5]),
+        Parameter::real("spread_ratio", 4.0, [1.0, 100.0]),
     ],
     near_twins: &["baseline-drift", "relaxation", "hysteresis", "low-pass"],
     shown_by: &["hold", "repeats"],
     make: Make::Covering(|values| {
-        Box::new(Imprint { set_share: values[0], recovery_s: values[1], dents: Vec::new() })
+        let [set_share, recovery_s, spread_ratio] = [values[0], values[1], values[2]];
+        Box::new(Imprint { set_share, recovery_s, spread_ratio, dents: Vec::new() })
     }),
 };
 
@@ -35,8 +39,9 @@ pub(super) static DEFINITION: Definition = Definition {
 struct Imprint {
     set_share: f64,
     recovery_s: f64,
-    /// Of each element.
-    dents: Vec<Dent>,
+    spread_ratio: f64,
+    /// Of each element, from the fastest to the slowest.
+    dents: Vec<[Dent; 3]>,
 }
 
 /// What is left of the deepest.
@@ -51,11 +56,13 @@ struct Dent {
 
 impl OnCovering for Imprint {
     fn signal(&mut self, now: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
-        self.dents.resize(signal_mm.len(), Dent::default());
-        let left = (-now.dt_s / self.recovery_s).exp();
-        for (u, dent) in signal_mm.iter_mut().zip(&mut self.dents) {
-            dent.follow(*u, now.dt_s, left, self.recovery_s);
-            let set_mm = self.set_share * dent.left_mm;
+        self.dents.resize(signal_mm.len(), <[Dent; 3]>::default());
+        let recoveries = self.recoveries_s().map(|recovery_s| (recovery_s, (-now.dt_s / recovery_s).exp()));
+        for (u, dents) in signal_mm.iter_mut().zip(&mut self.dents) {
+            for (dent, (recovery_s, left)) in dents.iter_mut().zip(recoveries) {
+                dent.follow(*u, now.dt_s, left, recovery_s);
+            }
+            let set_mm = self.set_share * left_mm(dents);
             if set_mm > u.max(0.0) {
                 *u = set_mm;
             }
@@ -70,15 +77,19 @@ impl OnCovering for Imprint {
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
-        if parameter > 1 {
+        if parameter > 2 {
             return false;
         }
-        for ((slope, u), dent) in slope_mm.iter_mut().zip(before_mm).zip(&self.dents) {
-            let set_mm = self.set_share * dent.left_mm;
+        let recoveries_s = self.recoveries_s();
+        for ((slope, u), dents) in slope_mm.iter_mut().zip(before_mm).zip(&self.dents) {
+            // By the logarithm of either recovery.
+            let [short, middle, long] =
+                std::array::from_fn(|k| self.set_share * dents[k].left_mm * dents[k].age_s / recoveries_s[k]);
             *slope = match parameter {
-                _ if set_mm < u.max(0.0) => 0.0,
-                0 => dent.left_mm,
-                _ => set_mm * dent.age_s / self.recovery_s.powi(2),
+                _ if self.set_share * left_mm(dents) < u.max(0.0) => 0.0,
+                0 => left_mm(dents),
+                1 => mean([short, middle, long]) / self.recovery_s,
+                _ => mean([-short, 0.0, long]) / self.spread_ratio,
             };
         }
         true
@@ -87,6 +98,17 @@ impl OnCovering for Imprint {
     fn reset(&mut self) {
         self.dents.clear();
     }
+}
+
+impl Imprint {
+    fn recoveries_s(&self) -> [f64; 3] {
+        spread(self.recovery_s, self.spread_ratio)
+    }
+}
+
+/// What is left of all three.
+fn left_mm(dents: &[Dent; 3]) -> f64 {
+    mean(dents.map(|dent| dent.left_mm))
 }
 
 impl Dent {

@@ -2,7 +2,11 @@ use crate::Effect;
 use crate::effect::bench::{assert_slopes, effect, felt_mm};
 
 fn dented(recovery_s: f64) -> Effect {
-    effect("imprint", [("set_share", 0.1), ("recovery_s", recovery_s)])
+    dented_for(recovery_s, 1.0)
+}
+
+fn dented_for(recovery_s: f64, spread_ratio: f64) -> Effect {
+    effect("imprint", [("set_share", 0.1), ("recovery_s", recovery_s), ("spread_ratio", spread_ratio)])
 }
 
 fn assert_near<const N: usize>(got: [f64; N], want: [f64; N]) {
@@ -32,9 +36,13 @@ fn a_slow_release_leaves_the_same_in_any_number_of_steps() {
 }
 
 #[test]
+fn three_dents_recover_in_equal_shares() {
+    let got = felt_mm(&dented_for(20.0, 4.0), [(0.0, 0.6), (0.0, -1.0), (7.0, -1.0), (90.0, -1.0)]);
+    let left = |t_s: f64| 0.02 * [5.0, 20.0, 80.0].map(|tau_s: f64| (-t_s / tau_s).exp()).iter().sum::<f64>();
+    assert_near(got, [0.6, left(0.0), left(7.0), left(90.0)]);
+}
+
+#[test]
 fn derivatives_are_those_of_differences() {
-    assert_slopes(
-        &effect("imprint", [("set_share", 0.3), ("recovery_s", 5.0)]),
-        &["set_share", "recovery_s"],
-    );
+    assert_slopes(&dented_for(5.0, 1.5), &["set_share", "recovery_s", "spread_ratio"]);
 }

@@ -1,4 +1,4 @@
-//! First-order lag of a list of values, exact for inputs that are straight between moments.
+//! First-order lags of a list of values, exact for inputs that are straight between moments.
 
 /// `q' = (u - q) / tau` for every value, and the derivative of `q` by `tau`.
 ///
@@ -73,6 +73,71 @@ impl Lag {
     pub(super) fn reset(&mut self) {
         *self = Self::new(self.tau_s);
     }
+}
+
+/// The mean of three lags, on a scale of ratios: of `tau / ratio`, `tau` and `tau ratio`.
+#[derive(Debug)]
+pub(super) struct SpreadLag {
+    ratio: f64,
+    lags: [Lag; 3],
+}
+
+impl SpreadLag {
+    /// With a time constant that is not negative, and a ratio of at least 1, at which all three are one.
+    pub(super) fn new(tau_s: f64, ratio: f64) -> Self {
+        Self { ratio, lags: spread(tau_s, ratio).map(Lag::new) }
+    }
+
+    /// As [`Lag::has_begun`].
+    pub(super) fn has_begun(&self) -> bool {
+        self.lags[0].has_begun()
+    }
+
+    /// As [`Lag::begin`].
+    pub(super) fn begin(&mut self, output: &[f64], input: &[f64]) {
+        self.lags.iter_mut().for_each(|lag| lag.begin(output, input));
+    }
+
+    /// As [`Lag::follow`].
+    pub(super) fn follow(&mut self, dt_s: f64, input: &[f64]) {
+        self.lags.iter_mut().for_each(|lag| lag.follow(dt_s, input));
+    }
+
+    /// What has followed, of the value of an index.
+    pub(super) fn output(&self, index: usize) -> f64 {
+        mean(self.lags.each_ref().map(|lag| lag.output[index]))
+    }
+
+    /// Its derivative by the time constant, per s.
+    pub(super) fn by_tau(&self, index: usize) -> f64 {
+        let [short, middle, long] = self.by_each(index);
+        mean([short / self.ratio, middle, long * self.ratio])
+    }
+
+    /// Its derivative by the ratio.
+    pub(super) fn by_ratio(&self, index: usize) -> f64 {
+        let ([short, _, long], tau_s) = (self.by_each(index), self.lags[1].tau_s);
+        mean([-short * tau_s / self.ratio.powi(2), 0.0, long * tau_s])
+    }
+
+    /// As [`Lag::reset`].
+    pub(super) fn reset(&mut self) {
+        self.lags.iter_mut().for_each(Lag::reset);
+    }
+
+    fn by_each(&self, index: usize) -> [f64; 3] {
+        self.lags.each_ref().map(|lag| lag.by_tau[index])
+    }
+}
+
+/// Three times on a scale of ratios.
+pub(super) fn spread(time_s: f64, ratio: f64) -> [f64; 3] {
+    [time_s / ratio, time_s, time_s * ratio]
+}
+
+/// Of three values.
+pub(super) fn mean(values: [f64; 3]) -> f64 {
+    values.iter().sum::<f64>() / 3.0
 }
 
 #[cfg(test)]

@@ -1,10 +1,15 @@
 #![expect(clippy::float_cmp, reason = "these values are exact")]
 
-use crate::effect::bench::{assert_slopes, effect, simulator, upon};
-use crate::{Moment, Pipeline, Simulator, Trajectory};
+use crate::effect::bench::{assert_slopes, felt_mm, simulator, upon};
+use crate::{Effect, Moment, Pipeline, Simulator, Trajectory};
+
+fn relaxing(time_constant_s: f64, spread_ratio: f64) -> Effect {
+    let shape = [("time_constant_s", time_constant_s), ("spread_ratio", spread_ratio)];
+    Effect::new("relaxation", [("relaxed_share", 0.3)].into_iter().chain(shape)).unwrap()
+}
 
 fn creeping() -> Simulator {
-    let mut one = simulator([effect("relaxation", [("relaxed_share", 0.3), ("time_constant_s", 4.0)])]);
+    let mut one = simulator([relaxing(4.0, 1.0)]);
     let mut response = one.model.response().clone();
     response.quadratic_per_mm = vec![0.0; 48];
     response.baseline_counts = vec![0.0; 48];
@@ -53,7 +58,16 @@ fn a_press_reads_the_same_at_any_rate() {
 }
 
 #[test]
+fn three_times_relax_in_equal_shares() {
+    let at = |t_s: f64| {
+        0.5 * (1.0 - 0.1 * [0.5, 2.0, 8.0].map(|tau_s: f64| -(-t_s / tau_s).exp_m1()).iter().sum::<f64>())
+    };
+    let times_s = [0.0, 0.3, 2.0, 20.0];
+    let felt = felt_mm(&relaxing(2.0, 4.0), times_s.map(|t_s| (t_s, 0.5)));
+    assert!(felt.iter().zip(times_s).all(|(got, t_s)| (got - at(t_s)).abs() < 1e-9), "{felt:?}");
+}
+
+#[test]
 fn derivatives_are_those_of_differences() {
-    let names = ["relaxed_share", "time_constant_s"];
-    assert_slopes(&effect("relaxation", [(names[0], 0.3), (names[1], 0.8)]), &names);
+    assert_slopes(&relaxing(0.8, 3.0), &["relaxed_share", "time_constant_s", "spread_ratio"]);
 }

@@ -1,25 +1,39 @@
 use crate::Effect;
 use crate::effect::bench::{assert_slopes, effect, felt_mm};
 
-fn level(inverse_square_ceiling_per_mm2: f64) -> Effect {
-    effect("saturation", [("inverse_square_ceiling_per_mm2", inverse_square_ceiling_per_mm2)])
+fn level(loss_at_1_mm: f64, knee: f64) -> Effect {
+    effect("saturation", [("loss_at_1_mm", loss_at_1_mm), ("knee", knee)])
+}
+
+fn assert_near<const N: usize>(got: [f64; N], want: [f64; N], within: f64) {
+    let near = got.iter().zip(want).all(|(got, want)| (got - want).abs() < within);
+    assert!(near, "{got:?} {want:?}");
 }
 
 #[test]
-fn signals_level_off_at_the_ceiling() {
-    let got = felt_mm(&level(4.0), [(0.0, 0.001), (0.0, 0.25), (0.0, 0.5), (0.0, 1.0)]);
-    // tanh of 1/2, 1 and 2, Abramowitz and Stegun, table 4.15.
-    let want = [0.001, 0.5 * 0.462_117_157, 0.5 * 0.761_594_156, 0.5 * 0.964_027_580];
-    for (got, want) in got.iter().zip(want) {
-        assert!((got - want).abs() < 2e-9, "{got} {want}");
+fn a_knee_of_one_is_the_hyperbola() {
+    // Half is lost at 1 mm: u / (1 + u).
+    let got = felt_mm(&level(0.5, 1.0), [(0.0, 0.25), (0.0, 0.5), (0.0, 1.0)]);
+    assert_near(got, [0.2, 1.0 / 3.0, 0.5], 1e-12);
+}
+
+#[test]
+fn a_sharp_knee_is_a_kink_at_the_ceiling() {
+    let got = felt_mm(&level(0.6, 12.0), [(0.0, 0.1), (0.0, 0.3), (0.0, 0.6), (0.0, 1.0)]);
+    assert_near(got, [0.1, 0.3, 0.4, 0.4], 1e-3);
+    let [least, ..] = got;
+    assert!((least - 0.1).abs() < 1e-8, "small signals are as they were: {least}");
+}
+
+#[test]
+fn a_fit_can_start_from_none() {
+    let [none, some] = [0.0, 1e-6].map(|loss| felt_mm(&level(loss, 2.0), [(0.0, 0.5)]));
+    assert_near([(none[0] - some[0]) / 1e-6], [0.5_f64.powi(3)], 1e-5);
+}
+
+#[test]
+fn derivatives_are_those_of_differences() {
+    for (loss_at_1_mm, knee) in [(0.3, 2.0), (0.7, 1.0), (0.6, 8.0), (0.01, 0.6)] {
+        assert_slopes(&level(loss_at_1_mm, knee), &["loss_at_1_mm", "knee"]);
     }
-    let [deep] = felt_mm(&level(100.0), [(0.0, 1.0)]);
-    assert!(deep < 0.1 && deep > 0.1 * (1.0 - 1e-8), "{deep}");
-}
-
-#[test]
-fn the_derivative_is_that_of_differences() {
-    assert_slopes(&level(1.5), &["inverse_square_ceiling_per_mm2"]);
-    // Where its closed form has no digits left.
-    assert_slopes(&level(0.005), &["inverse_square_ceiling_per_mm2"]);
 }

@@ -1,14 +1,16 @@
 //! `scan-skew`: the elements of a frame are sampled one after another.
 //!
 //! ```text
-//! counts_k(t) -> counts_k(t - (last - k) element_time)          k row-major, of 0 .. last
+//! counts(t) -> counts(t - (last_row - row) row_time - (last_column - column) column_time)
 //! ```
 //!
-//! A frame bears the time of its last element; the first was sampled longest ago. Between moments counts are taken
+//! Elements one by one, row by row, take an `element_time` each if `column_time` is that and `row_time` a row's columns
+//! of it; rows at once have no `column_time`, and columns at once no `row_time`. A frame bears the time of its last
+//! element; the first was sampled longest ago. Between moments counts are taken
 //! to run straight, and what was before the first to be as the first. All elements together are late by half a scan,
 //! which is `time-lag`; what tells them apart is that the first are later than the last.
 //!
-//! Derivative in closed form. Cost: a short history, as long as a scan.
+//! Derivatives in closed form. Cost: a short history, as long as a scan.
 //!
 //! # Source
 //! Sequential sampling of a multiplexed converter: W. Kester (ed.), *The Data Conversion Handbook* (2005).
@@ -16,25 +18,31 @@
 use std::collections::VecDeque;
 
 use super::{Definition, Make, Now, OnReadout, Parameter};
+use crate::Array;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "scan-skew",
     summary: "elements are sampled one after another within a frame",
-    parameters: &[Parameter::real("element_time_s", 0.0, [0.0, 0.01])],
+    parameters: &[
+        Parameter::real("row_time_s", 0.0, [0.0, 0.1]),
+        Parameter::real("column_time_s", 0.0, [0.0, 0.1]),
+    ],
     near_twins: &["time-lag", "low-pass"],
     shown_by: &["rates"],
     make: Make::Readout(|values| {
-        let element_time_s = values[0];
-        Box::new(ScanSkew { element_time_s, history: VecDeque::new(), slope_counts: Vec::new() })
+        let times_s = [values[0], values[1]];
+        Box::new(ScanSkew { times_s, history: VecDeque::new(), slope_counts: [const { Vec::new() }; 2] })
     }),
 };
 
 #[derive(Debug)]
 struct ScanSkew {
-    element_time_s: f64,
+    /// Of a row and of a column.
+    times_s: [f64; 2],
     /// Moments by their age, oldest first.
     history: VecDeque<Past>,
-    slope_counts: Vec<f64>,
+    /// By either time.
+    slope_counts: [Vec<f64>; 2],
 }
 
 #[derive(Debug)]
@@ -50,26 +58,28 @@ impl OnReadout for ScanSkew {
         }
         self.history.push_back(Past { age_s: 0.0, counts: counts.to_vec() });
         // The second oldest is older than any element's age: the oldest is not needed.
-        let last = counts.len().saturating_sub(1);
-        let scan_s = last as f64 * self.element_time_s;
+        let array = now.base.model.array();
+        let scan_s = self.age_s(places_before(0, array));
         while self.history.get(1).is_some_and(|past| past.age_s > scan_s) {
             self.history.pop_front();
         }
-        self.slope_counts.clear();
+        self.slope_counts.iter_mut().for_each(Vec::clear);
         for (element, count) in counts.iter_mut().enumerate() {
-            let places_before = (last - element) as f64;
-            let (then, per_s) = self.at(element, places_before * self.element_time_s);
+            let places = places_before(element, array);
+            let (then, per_s) = self.at(element, self.age_s(places));
             *count = then;
-            self.slope_counts.push(-places_before * per_s);
+            for (slopes, places) in self.slope_counts.iter_mut().zip(places) {
+                slopes.push(-places * per_s);
+            }
         }
     }
 
     fn slope(&self, parameter: usize, slope_counts: &mut [f64]) -> bool {
-        let known = parameter == 0 && !self.slope_counts.is_empty();
-        if known {
-            slope_counts.copy_from_slice(&self.slope_counts);
-        }
-        known
+        let Some(slopes) = self.slope_counts.get(parameter).filter(|slopes| !slopes.is_empty()) else {
+            return false;
+        };
+        slope_counts.copy_from_slice(slopes);
+        true
     }
 
     fn reset(&mut self) {
@@ -78,6 +88,11 @@ impl OnReadout for ScanSkew {
 }
 
 impl ScanSkew {
+    /// How long ago an element was sampled that is so many rows and columns before the last.
+    fn age_s(&self, [rows, columns]: [f64; 2]) -> f64 {
+        rows * self.times_s[0] + columns * self.times_s[1]
+    }
+
     /// What an element had so long ago, and how fast that was changing.
     fn at(&self, element: usize, age_s: f64) -> (f64, f64) {
         let pairs = self.history.iter().zip(self.history.iter().skip(1));
@@ -91,6 +106,12 @@ impl ScanSkew {
         let count = if age_s > newer.age_s { after - per_s * (age_s - newer.age_s) } else { after };
         (count, per_s)
     }
+}
+
+/// How many rows and columns an element comes before the last.
+fn places_before(element: usize, array: &Array) -> [f64; 2] {
+    let (row, column) = (element / array.cols(), element % array.cols());
+    [(array.rows() - 1 - row) as f64, (array.cols() - 1 - column) as f64]
 }
 
 #[cfg(test)]

@@ -1,5 +1,9 @@
 use crate::effect::bench::{assert_slopes, effect, linear, still, upon};
-use crate::{Moment, Pipeline};
+use crate::{Effect, Moment, Pipeline};
+
+fn skew(row_time_s: f64, column_time_s: f64) -> Effect {
+    effect("scan-skew", [("row_time_s", row_time_s), ("column_time_s", column_time_s)])
+}
 
 /// Down upon element 21 within a second, and up again within the next.
 fn depth_mm(t_s: f64) -> f64 {
@@ -8,8 +12,14 @@ fn depth_mm(t_s: f64) -> f64 {
 
 #[test]
 fn every_element_shows_the_instant_of_its_own_sample() {
-    // A scan of 47 steps of 4 ms is longer than a frame of 1/32 s.
-    let one = linear([effect("scan-skew", [("element_time_s", 0.004)])]);
+    // Elements one by one, rows at once and columns at once; a scan is longer than a frame of 1/32 s.
+    for (row_time_s, column_time_s) in [(0.032, 0.004), (0.03, 0.0), (0.0, 0.03)] {
+        every_element_shows(row_time_s, column_time_s);
+    }
+}
+
+fn every_element_shows(row_time_s: f64, column_time_s: f64) {
+    let one = linear([skew(row_time_s, column_time_s)]);
     let mut pipeline = Pipeline::new(&one).unwrap();
     let full = still(&linear([]), upon(&one, 21, 0.5));
     for frame in 0..64 {
@@ -17,7 +27,8 @@ fn every_element_shows_the_instant_of_its_own_sample() {
         let got = pipeline.step(Moment::at(t_s), &upon(&one, 21, depth_mm(t_s)));
         for (element, (got, full)) in got.iter().zip(&full).enumerate() {
             // A flat tool's signal is in proportion to depth.
-            let want = full * depth_mm((t_s - 0.004 * (47 - element) as f64).max(0.0)) / 0.5;
+            let age_s = (5 - element / 8) as f64 * row_time_s + (7 - element % 8) as f64 * column_time_s;
+            let want = full * depth_mm((t_s - age_s).max(0.0)) / 0.5;
             assert!((got - want).abs() < 1e-9, "frame {frame}, element {element}: {got} {want}");
         }
     }
@@ -25,7 +36,7 @@ fn every_element_shows_the_instant_of_its_own_sample() {
 
 #[test]
 fn frames_at_any_rate_show_the_same() {
-    let one = linear([effect("scan-skew", [("element_time_s", 0.004)])]);
+    let one = linear([skew(0.032, 0.004)]);
     let last = |frames: u32| {
         let mut pipeline = Pipeline::new(&one).unwrap();
         for frame in 0..=frames {
@@ -40,6 +51,6 @@ fn frames_at_any_rate_show_the_same() {
 }
 
 #[test]
-fn the_derivative_is_that_of_differences() {
-    assert_slopes(&effect("scan-skew", [("element_time_s", 0.0093)]), &["element_time_s"]);
+fn derivatives_are_those_of_differences() {
+    assert_slopes(&skew(0.0743, 0.0093), &["row_time_s", "column_time_s"]);
 }

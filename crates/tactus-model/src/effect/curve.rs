@@ -1,0 +1,70 @@
+//! A value that wanders in time: straight from knot to knot.
+
+/// A curve through evenly spaced knots that begins at 0, and stays where it is after the last.
+///
+/// ```text
+/// c(t) = (1 - w) c_i + w c_(i+1)          x = K t / duration,  i = floor(x),  w = x - i,  c_0 = 0
+/// ```
+///
+/// It follows any shape that is smooth over a knot's length, and much of one that is not: least squares leave of the
+/// variance of a random walk about its mean 10 % with 6 knots, 7.5 % with 8, 5.3 % with 12 and 3.9 % with 16 (400
+/// walks of 1200 steps; no 16 shapes at all leave less than 3.7 %, by the walk's Karhunen-Loève series).
+#[derive(Debug)]
+pub(super) struct Curve<const K: usize> {
+    duration_s: f64,
+    /// The knots 1 to `K`, in the curve's own unit.
+    knots: [f64; K],
+}
+
+impl<const K: usize> Curve<K> {
+    /// The curve whose knots are these values; those that are missing are 0.
+    pub(super) fn new(duration_s: f64, values: &[f64]) -> Self {
+        let knots = std::array::from_fn(|knot| values.get(knot).copied().unwrap_or_default());
+        Self { duration_s, knots }
+    }
+
+    /// Its value.
+    pub(super) fn at(&self, t_s: f64) -> f64 {
+        let (before, share) = self.place(t_s);
+        (1.0 - share) * self.knot(before) + share * self.knot(before + 1)
+    }
+
+    /// Derivative of its value by the knot of an index, of 0 to `K - 1`.
+    pub(super) fn by_knot(&self, index: usize, t_s: f64) -> f64 {
+        let (before, share) = self.place(t_s);
+        if index == before {
+            share
+        } else if index + 1 == before {
+            1.0 - share
+        } else {
+            0.0
+        }
+    }
+
+    /// Derivative of its value by the duration, per s.
+    pub(super) fn by_duration(&self, t_s: f64) -> f64 {
+        let (before, _) = self.place(t_s);
+        let is_over = before == K;
+        let rise = if is_over { 0.0 } else { self.knot(before + 1) - self.knot(before) };
+        -rise * K as f64 * t_s / self.duration_s.powi(2)
+    }
+
+    /// The knot before, of 0 to `K`, and how far on to the next.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to K; no number is 0"
+    )]
+    fn place(&self, t_s: f64) -> (usize, f64) {
+        let along = (t_s / self.duration_s * K as f64).clamp(0.0, K as f64);
+        (along as usize, along.fract())
+    }
+
+    fn knot(&self, knot: usize) -> f64 {
+        knot.checked_sub(1).and_then(|index| self.knots.get(index)).copied().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+#[path = "curve_tests.rs"]
+mod tests;
