@@ -115,7 +115,7 @@ fn the_verdict_says_what_it_rests_on() {
     assert_eq!(
         in_words(&unexplained()),
         "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms, and how large \
-         the noise is, these data do not tell. What is left, 100.0 % of the gap, depends on time since contact and depth."
+         the noise is, these data do not tell. What is left, 100 % of the gap, depends on time since contact and depth."
     );
     let partly = Discovery {
         verdict: Verdict::PartlyExplained,
@@ -255,6 +255,12 @@ fn figures_draw_what_was_found() {
     assert!(curve.contains("time since contact / s") && curve.contains("residual / share of the signal"));
     let maps = element_maps(&Array::digitacts(), &found.elements, Some(2.0)).to_string();
     assert!(maps.contains("units of the noise") && maps.matches("h1v1h-1z").count() == 96);
+    let flat = nothing_missing();
+    let [curve, map] = [
+        residual_against(&flat.curves[1]).to_string(),
+        element_maps(&Array::digitacts(), &flat.elements, Some(2.0)).to_string(),
+    ];
+    assert!([&curve, &map].iter().all(|figure| figure.contains("base") && !figure.contains("grown")));
     assert!(element_maps(&Array::digitacts(), &found.elements, None).to_string().contains("rms in counts"));
     let levels = levels(&found).to_string();
     for name in

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use tactus_discover::{Discovery, Estimated, Step};
-use tactus_model::effect::Definition;
+use tactus_model::{Effect, effect::Definition};
 
 use super::words::{self, list};
 use crate::{
@@ -20,7 +20,7 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
     for step in &found.steps {
         self::step(f, step)?;
     }
-    let mut known: Vec<&str> = found.effects.iter().map(|effect| effect.name()).collect();
+    let mut known: Vec<&str> = found.effects.iter().map(Effect::name).collect();
     known.retain(|name| found.steps.iter().all(|step| step.effect != *name));
     known.dedup();
     if !known.is_empty() {

@@ -65,10 +65,7 @@ fn unexplained(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     let share = percent(found.unexplained.share);
     writeln!(f, "<section>\n<h2>What stays unexplained</h2>")?;
     if found.unexplained.depends_on.is_empty() {
-        writeln!(
-            f,
-            "<p>Beyond noise nothing is left that depends on any covariate that was looked at ({share} of the gap).</p>"
-        )?;
+        writeln!(f, "<p>Beyond noise nothing is left that depends on any covariate that was looked at.</p>")?;
     } else {
         writeln!(
             f,

@@ -10,43 +10,39 @@ use crate::{
     plot::{Axis, ColourBar, Figure, Heat, Image, Ink, Label, Panel, Scale, Series, Sheet},
 };
 
+/// The models that are compared.
+const BEFORE: &str = "base model";
+const AFTER: &str = "grown model";
 /// Three beside each other on a page.
 const CURVE_PX: [f64; 2] = [344.0, 240.0];
 /// Between two maps.
 const GUTTER_PX: f64 = 40.0;
 /// Room for the names of bars, and for the longest of them.
-const BARS_PX: [f64; 2] = [236.0, 500.0];
+const BARS_PX: [f64; 2] = [290.0, 480.0];
 /// Height of a bar with what is between two.
 const BAR_PX: f64 = 26.0;
 
-/// The mean residual along a covariate before and after, with standard errors.
+/// The mean residual along a covariate with standard errors, of the base model and, where that differs, of the grown one.
 pub fn residual_against(curve: &Curve) -> Figure {
     let x = Axis::new(curve.covariate, curve.unit).tight();
-    let mut figure = Figure::new(
-        format!("Residual against {}", curve.covariate),
-        x,
-        Axis::new("residual", curve.of).from_zero(),
-    )
-    .size_px(CURVE_PX);
+    let y = Axis::new("residual", curve.of).from_zero();
     let ends = [curve.points.first(), curve.points.last()].into_iter().flatten();
-    figure = figure.with(Series::line(ends.map(|end| [end.at, 0.0]).collect()).ink(Ink::Muted).width_px(1.0));
-    let states: [(&str, Ink, fn(&Point) -> f64); 2] =
-        [("before", Ink::Red, |point| point.before), ("after", Ink::Blue, |point| point.after)];
-    for (name, ink, of) in states {
-        let bars = curve.points.iter().map(|point| {
-            let (mean, error) = (of(point), point.standard_error);
-            [point.at, mean - error, mean + error]
-        });
-        let dots = curve.points.iter().map(|point| [point.at, of(point)]).collect();
-        figure = figure
-            .with(Series::bars(bars).ink(ink).width_px(1.2))
-            .with(Series::dots(dots).ink(ink).width_px(4.5).label(name));
+    let zero = Series::line(ends.map(|end| [end.at, 0.0]).collect()).ink(Ink::Muted).width_px(1.0);
+    let [bars, dots] = means(curve, |point| point.before);
+    let figure = Figure::new(format!("Residual against {}", curve.covariate), x, y)
+        .size_px(CURVE_PX)
+        .with(zero)
+        .with(bars.ink(Ink::Red))
+        .with(dots.ink(Ink::Red).label(BEFORE));
+    if curve.points.iter().all(|point| (point.after - point.before).abs() <= 0.0) {
+        return figure;
     }
-    figure
+    let [bars, dots] = means(curve, |point| point.after);
+    figure.with(bars.ink(Ink::Blue)).with(dots.ink(Ink::Blue).label(AFTER))
 }
 
-/// The root mean square residual of each element before and after, on one scale: in units of the noise where that is
-/// known, else in counts.
+/// The root mean square residual of each element, of the base model and, where that differs, of the grown one, on one
+/// scale: in units of the noise where that is known, else in counts.
 pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Option<f64>) -> Sheet {
     let (rows, cols) = (array.rows(), array.cols());
     let unit_counts = noise_rms_counts.unwrap_or(1.0);
@@ -56,16 +52,20 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
     };
     let before = values(|element| element.before_rms_counts);
     let after = values(|element| element.after_rms_counts);
-    let scale = Scale::of(before.iter().chain(&after).map(|value| f64::from(*value)));
+    let greatest = before.iter().chain(&after).map(|value| f64::from(*value)).fold(0.0, f64::max);
+    // Where nothing but noise is left, its ups and downs are no reason for bright colours.
+    let scale = Scale::new(0.0, if noise_rms_counts.is_some() { greatest.max(2.0) } else { greatest });
+    let maps = [(BEFORE, &before), (AFTER, &after)];
+    let maps = if before == after { &maps[..1] } else { &maps[..] };
     let cell_px = (500.0 / cols as f64).min(300.0 / rows as f64).clamp(1.0, 44.0);
     let (width, height) = (cell_px * cols as f64, cell_px * rows as f64);
     let size_px = [(2.0 * width + GUTTER_PX).max(560.0), height + 70.0];
-    let mut sheet = Sheet::new("Residual of the elements before and after", size_px);
-    for (nth, (name, values)) in [("before", &before), ("after", &after)].into_iter().enumerate() {
+    let mut sheet = Sheet::new("Residual of the elements", size_px);
+    for (nth, (name, values)) in maps.iter().enumerate() {
         let x = (width + GUTTER_PX) * nth as f64;
-        sheet.put([x, 12.0], &Label::new(name).heading());
+        sheet.put([x, 12.0], &Label::new(*name).heading());
         let heat = Heat { values, rows, cols };
-        sheet.put([x, 22.0], &Image { heat, cell_px, scale, title: name.into() });
+        sheet.put([x, 22.0], &Image { heat, cell_px, scale, title: (*name).into() });
     }
     let title = if noise_rms_counts.is_some() { "rms in units of the noise" } else { "rms in counts" };
     sheet.put([-12.0, height + 34.0], &ColourBar { scale, title: title.into() });
@@ -74,13 +74,13 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
 
 /// The held-out residual of the base model, of the grown model without each effect, of the grown model, and the noise.
 pub fn levels(found: &Discovery) -> Sheet {
-    let mut bars = vec![Bar::new("base model, recalibrated", found.base.heldout_rms_counts, Ink::Red)];
+    let mut bars = vec![Bar::new(format!("{BEFORE}, recalibrated"), found.base.heldout_rms_counts, Ink::Red)];
     if !found.steps.is_empty() {
         bars.extend(found.steps.iter().map(|step| {
-            let name = format!("grown model without {}", step.effect);
+            let name = format!("{AFTER} without {}", step.effect);
             Bar::new(name, step.heldout_rms_before_counts, Ink::Amber)
         }));
-        bars.push(Bar::new("grown model", found.final_.level.heldout_rms_counts, Ink::Blue));
+        bars.push(Bar::new(AFTER, found.final_.level.heldout_rms_counts, Ink::Blue));
     }
     bars.extend(found.noise_rms_counts.map(|rms| Bar::new("noise", rms, Ink::Muted)));
     let longest = bars.iter().map(|bar| bar.rms_counts).filter(|rms| rms.is_finite()).fold(0.0, f64::max);
@@ -95,6 +95,16 @@ pub fn levels(found: &Discovery) -> Sheet {
         sheet.put([BARS_PX[0] + length_px.max(0.0) + 8.0, y + 4.0], &Label::new(counts));
     }
     sheet
+}
+
+/// Means with their standard errors.
+fn means(curve: &Curve, of: fn(&Point) -> f64) -> [Series; 2] {
+    let bars = curve.points.iter().map(|point| {
+        let (mean, error) = (of(point), point.standard_error);
+        [point.at, mean - error, mean + error]
+    });
+    let dots = curve.points.iter().map(|point| [point.at, of(point)]);
+    [Series::bars(bars).width_px(1.2), Series::dots(dots.collect()).width_px(4.5)]
 }
 
 struct Bar {

@@ -7,7 +7,6 @@ use tactus_discover::Discovery;
 use super::{DiscoveryReport, element_maps, residual_against, words};
 use crate::{
     document::{Column, Table},
-    markup::Text,
     numbers::{chance, digits},
 };
 
@@ -23,9 +22,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
     if !found.curves.is_empty() {
         writeln!(
             f,
-            "<h3>The residual against each covariate</h3>\n<p class=\"lead\">Means over the frames near each place, with their standard errors; \
-             before: the recalibrated base model; after: the grown model. Where the model is right, nothing but noise lies about \
-             zero.</p>\n<div class=\"multiples\">"
+            "<h3>The residual against each covariate</h3>\n<p class=\"lead\">Means over the frames near each place, with their standard errors, of the recalibrated base model and of \
+             the grown one, if it grew. Where a model is right, nothing but noise lies about zero.</p>\n<div class=\"multiples\">"
         )?;
         for curve in &found.curves {
             writeln!(f, "{}", residual_against(curve))?;
