@@ -7,14 +7,32 @@
 #[path = "made_up/discovery.rs"]
 mod made_up;
 
+use std::{env, fs, path::Path};
+
 use made_up::{data, empty, explained, nothing_missing, report, unexplained};
 use serde_json::Value;
 use tactus_discover::{Discovery, Unexplained, Verdict};
 use tactus_model::Array;
-use tactus_report::discovery::{discovery_json, in_words, not_shown};
+use tactus_report::discovery::{
+    DiscoveryReport, discovery_html, discovery_json, element_maps, in_words, levels, not_shown,
+    residual_against,
+};
+
+const HOSTILE: &str = "<img src=x onerror='alert(\"1\")'>";
 
 fn json(discovery: &Discovery) -> Value {
     serde_json::from_str(&discovery_json(&report(&Array::digitacts(), &data(), discovery))).unwrap()
+}
+
+fn html(discovery: &Discovery) -> String {
+    discovery_html(&report(&Array::digitacts(), &data(), discovery))
+}
+
+/// Writes a page to be looked at, if that is asked for.
+fn show(name: &str, html: &str) {
+    if let Ok(dir) = env::var("TACTUS_REPORT_DIR") {
+        fs::write(Path::new(&dir).join(name), html).unwrap();
+    }
 }
 
 #[test]
@@ -27,8 +45,8 @@ fn the_json_has_every_field_of_its_schema_where_it_belongs() {
         ("/data/1/presses", "50"),
         ("/seed", "7"),
         ("/noise_rms_counts", "2.0"),
-        ("/base/heldout_rms_counts", "9.35"),
-        ("/base/heldout_chi2", "21.855625"),
+        ("/base/heldout_rms_counts", "9.36"),
+        ("/base/heldout_chi2", "21.902399999999997"),
         ("/gap/0/where/covariate", "\"time since contact\""),
         ("/gap/0/where/range", "[0.4,30.0]"),
         ("/gap/0/effect_size", "3.81"),
@@ -86,7 +104,7 @@ fn what_is_not_known_is_null_and_the_text_is_always_the_same() {
 fn the_verdict_says_what_it_rests_on() {
     assert_eq!(
         in_words(&explained()),
-        "The model was missing hysteresis and miswired. On held-out presses the residual falls from 9.35 to 2.08 counts rms, which \
+        "The model was missing hysteresis and miswired. On held-out presses the residual falls from 9.36 to 2.08 counts rms, which \
          closes 99.6 % of the gap between model and noise; the noise is 2.00 counts."
     );
     assert_eq!(
@@ -96,8 +114,8 @@ fn the_verdict_says_what_it_rests_on() {
     );
     assert_eq!(
         in_words(&unexplained()),
-        "The model is missing something that no known effect matches: on held-out presses its residual is 9.35 counts rms, and how large \
-         the noise is, these data do not tell. What is left, 100.0 % of the gap, depends on time since contact and depth."
+        "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms, and how large \
+         the noise is, these data do not tell. What is left, 100 % of the gap, depends on time since contact and depth."
     );
     let partly = Discovery {
         verdict: Verdict::PartlyExplained,
@@ -113,4 +131,141 @@ fn effects_that_cannot_be_shown_stand_by_their_reason() {
     let reasons = not_shown(&found);
     assert_eq!(reasons.len(), 2);
     assert_eq!(reasons[1].1, ["softening", "imprint"]);
+}
+
+#[test]
+fn what_cannot_be_shown_comes_first_and_what_it_rests_on_last() {
+    let html = html(&explained());
+    show("discovery.html", &html);
+    let mut from = 0;
+    for text in [
+        "SIMULATED",
+        "No physical sensor was read",
+        "What these data cannot show",
+        "softening, imprint: no press is followed",
+        "To know before using a number",
+        ">explained</span>",
+        "The model was missing hysteresis and miswired.",
+        "Where the gap is",
+        "The residual against each covariate",
+        "The residual of each element",
+        "What was tried",
+        "Round 3: the model has misregistration, hysteresis and miswired",
+        "What was added",
+        "The gap before and after",
+        "What stays unexplained",
+        "What to measure next",
+        "<code>tactus run diagnose</code>",
+        "What this rests on",
+        "no physical sensor was read",
+    ] {
+        let at = html[from..].find(text);
+        from += at.unwrap_or_else(|| panic!("{text:?} is missing or out of order"));
+    }
+    let (array, data, whole) = (Array::digitacts(), data(), explained());
+    let measured = discovery_html(&DiscoveryReport { simulated: false, ..report(&array, &data, &whole) });
+    assert!(!measured.contains("SIMULATED") && !measured.contains("No physical sensor"));
+}
+
+#[test]
+fn the_pages_numbers_are_those_that_were_found() {
+    let html = html(&explained());
+    for text in [
+        "<dd>9.36 <small>4.68 &#215; noise</small></dd>",
+        "<dt>gap closed</dt><dd>99.6 %</dd>",
+        "<dd>96 <small>24 held out</small></dd>",
+        "<td>time since contact</td><td class=\"n\">0.400</td><td class=\"n\">30.0</td><td>s</td><td class=\"n\">3.81</td><td class=\"n\">&lt; 0.001</td>",
+        "<td>hysteresis</td><td class=\"n\">39.4</td><td class=\"n\">&lt; 0.001</td><td class=\"n\">4.31</td><td class=\"n\">82 %</td><td>taken</td>",
+        "Scored only: hardening (3.2, p 0.410) and crosstalk (1.1, p 1.000).",
+        "Load and unload differ, independent of rate.",
+        "<th class=\"n\">loss_share</th><th class=\"n\">threshold_mm</th>",
+        "<td>found</td><td class=\"n\">0.123 \u{b1} 0.004</td><td class=\"n\">0.0510 \u{b1} 0.0020</td>",
+        "<td>can lie</td><td class=\"n\">\u{2212}1 to 5</td><td class=\"n\">0.001 to 2</td>",
+        "<td>found, 2</td><td class=\"n\">19</td><td class=\"n\">18</td>",
+        "cannot tell it from backlash",
+        "The data tell it from every other effect",
+        "and fitted anew with the rest: misregistration.",
+        "<td>grown model</td><td class=\"n\">2.08</td><td class=\"n\">1.04</td><td class=\"n\">1.08</td><td class=\"n\">0.571</td><td class=\"n\">0.286</td>",
+        "whole coverings</th><td>2.54 mm",
+        "<td>grid-sweep-2</td><td class=\"n\">16\u{202f}000</td>",
+    ] {
+        assert!(html.contains(text), "{text}");
+    }
+    assert_eq!(html.matches("<title>Residual against").count(), 12);
+}
+
+#[test]
+fn a_page_of_nothing_says_so() {
+    let html = html(&nothing_missing());
+    show("nothing-missing.html", &html);
+    for text in [
+        "could show every effect",
+        ">nothing-missing</span>",
+        "depends on no covariate",
+        "Nothing: there is no structure",
+        "<p>Nothing.</p>",
+        "No experiment is proposed",
+    ] {
+        assert!(html.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn what_no_effect_matches_has_no_name() {
+    let html = html(&unexplained());
+    show("unexplained.html", &html);
+    for text in [
+        ">unexplained</span>",
+        "<dd>not known</dd>",
+        "depends on time since contact and depth",
+        "None was taken",
+    ] {
+        assert!(html.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn no_page_has_a_number_that_is_none() {
+    for discovery in [explained(), nothing_missing(), unexplained(), empty()] {
+        let html = html(&discovery);
+        assert!(!html.contains("NaN") && !html.contains("inf"), "{:?}", discovery.verdict);
+        assert!(html.ends_with("</main>\n</body>\n</html>\n"));
+    }
+}
+
+#[test]
+fn text_from_outside_is_escaped() {
+    let mut hostile = explained();
+    hostile.not_shown[0].reason = HOSTILE.into();
+    hostile.warnings = vec![HOSTILE.into()];
+    hostile.next_experiments[0].separates = [HOSTILE.into(), HOSTILE.into()];
+    let mut data = data();
+    (data[0].id, data[1].sha256) = (HOSTILE.into(), HOSTILE.into());
+    let (array, notes) = (Array::digitacts(), [HOSTILE.to_owned()]);
+    let report = DiscoveryReport { rig: HOSTILE, notes: &notes, ..report(&array, &data, &hostile) };
+    let html = discovery_html(&report);
+    assert!(!html.contains("<img") && html.contains("&lt;img src=x"));
+    assert_eq!(serde_json::from_str::<Value>(&discovery_json(&report)).unwrap()["rig"], HOSTILE);
+}
+
+#[test]
+fn figures_draw_what_was_found() {
+    let found = explained();
+    let curve = residual_against(&found.curves[1]).to_string();
+    assert!(curve.contains("time since contact / s") && curve.contains("residual / share of the signal"));
+    let maps = element_maps(&Array::digitacts(), &found.elements, Some(2.0)).to_string();
+    assert!(maps.contains("units of the noise") && maps.matches("h1v1h-1z").count() == 96);
+    let flat = nothing_missing();
+    let [curve, map] = [
+        residual_against(&flat.curves[1]).to_string(),
+        element_maps(&Array::digitacts(), &flat.elements, Some(2.0)).to_string(),
+    ];
+    assert!([&curve, &map].iter().all(|figure| figure.contains("base") && !figure.contains("grown")));
+    assert!(element_maps(&Array::digitacts(), &found.elements, None).to_string().contains("rms in counts"));
+    let levels = levels(&found).to_string();
+    for name in
+        ["base model", "without hysteresis", "without miswired", "grown model<", "noise", "9.36", "2.08"]
+    {
+        assert!(levels.contains(name), "{name}");
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use tactus_schema::pb::{RunPhase, RunState};
 
 use crate::output::duration;
@@ -69,7 +69,9 @@ impl Computation {
 
     pub(crate) fn new(silent: bool) -> Self {
         let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = ProgressBar::with_draw_target(Some(Self::STEPS), target);
+        // Also out of the way of an error that ends the computation.
+        let bar =
+            ProgressBar::with_draw_target(Some(Self::STEPS), target).with_finish(ProgressFinish::AndClear);
         if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/dim} {percent:>3} %  {msg}") {
             bar.set_style(style);
         }

@@ -23,6 +23,7 @@ fn the_help_names_every_command() {
         "export",
         "recover",
         "report",
+        "discover",
         "validate",
         "completions",
     ] {

@@ -2,7 +2,7 @@
 
 use tactus_discover::{Discovery, Verdict};
 
-use crate::numbers::{chance, digits};
+use crate::numbers::{digits, short};
 use crate::plot::number;
 
 /// The verdict in plain words, with the numbers that it rests on.
@@ -69,5 +69,10 @@ pub(super) fn list<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String 
 /// `97 %`, `99.2 %`: one decimal where a whole number would hide what is lacking.
 pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
-    format!("{} %", number(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
+    format!("{} %", short(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
+}
+
+/// A chance within a sentence.
+pub(super) fn chance(chance: f64) -> String {
+    if chance < 1e-3 { "less than 0.001".into() } else { number(chance, 3) }
 }

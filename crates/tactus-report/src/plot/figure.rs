@@ -97,7 +97,7 @@ impl Frame {
         let along =
             |axis: usize| figure.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
         Self {
-            x: figure.x.scale(along(0), ((right - left) / 90.0).max(2.0)),
+            x: figure.x.scale(along(0), ((right - left) / 90.0).max(4.0)),
             y: figure.y.scale(along(1), ((bottom - top) / 36.0).max(2.0)),
             left,
             right,

@@ -108,7 +108,7 @@ impl Series {
 
 impl Ink {
     /// Its class in the style sheet.
-    pub(super) fn class(self) -> &'static str {
+    pub(crate) fn class(self) -> &'static str {
         match self {
             Self::Text => "ink",
             Self::Muted => "muted",

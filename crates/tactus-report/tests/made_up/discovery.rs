@@ -43,7 +43,7 @@ pub(crate) fn explained() -> Discovery {
             heldout_coverings_mm: vec![2.54],
         },
         noise_rms_counts: Some(NOISE_COUNTS),
-        base: level(9.35),
+        base: level(9.36),
         global: GlobalTest { statistic: 41.2, p_value: 0.000_5 },
         gap: vec![
             gap("time since contact", "s", [0.4, 30.0], 3.81, 1e-9),

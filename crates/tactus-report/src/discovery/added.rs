@@ -1,0 +1,96 @@
+//! What was added to the model.
+
+use std::fmt;
+
+use tactus_discover::{Discovery, Estimated, Step};
+use tactus_model::{Effect, effect::Definition};
+
+use super::words::{self, list};
+use crate::{
+    document::{Column, Table},
+    markup::Text,
+    numbers::{digits, short, with_error},
+};
+
+pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
+    writeln!(f, "<section>\n<h2>What was added</h2>")?;
+    if found.steps.is_empty() {
+        writeln!(f, "<p>Nothing.</p>")?;
+    }
+    for step in &found.steps {
+        self::step(f, step)?;
+    }
+    let mut known: Vec<&str> = found.effects.iter().map(Effect::name).collect();
+    known.retain(|name| found.steps.iter().all(|step| step.effect != *name));
+    known.dedup();
+    if !known.is_empty() {
+        writeln!(f, "<p>In the model before, and fitted anew with the rest: {}.</p>", Text(list(known)))?;
+    }
+    writeln!(f, "</section>")
+}
+
+fn step(f: &mut fmt::Formatter<'_>, step: &Step) -> fmt::Result {
+    let definition = Definition::find(step.effect).ok();
+    let summary = definition.map_or("", |definition| definition.summary);
+    writeln!(f, "<h3>{}</h3>\n<p>{}.</p>", Text(step.effect), Text(capital(summary)))?;
+    let parameters = step.terms.first().map_or(&[][..], Vec::as_slice);
+    let heads = parameters.iter().map(|parameter| Column::Number(parameter.name));
+    let columns: Vec<Column> = [Column::Name("")].into_iter().chain(heads).collect();
+    let mut table = Table::new(&columns);
+    for (nth, term) in step.terms.iter().enumerate() {
+        let name = if step.terms.len() > 1 { format!("found, {}", nth + 1) } else { "found".into() };
+        table.row([name].into_iter().chain(term.iter().map(value)));
+    }
+    if let Some(definition) = definition {
+        let range = |found: &Estimated| range(definition, found);
+        table.row(["can lie".to_owned()].into_iter().chain(parameters.iter().map(range)));
+    }
+    writeln!(
+        f,
+        "{table}\n<p>On held-out presses the residual is {} counts rms without it, all else fitted anew, and {} with it; noise alone brings such a \
+         gain with a chance of {} (false-discovery rate {} over all that was tried in its round).</p>",
+        digits(step.heldout_rms_before_counts, 3),
+        digits(step.heldout_rms_after_counts, 3),
+        words::chance(step.p_value),
+        words::chance(step.q_value)
+    )?;
+    if step.equivalent.is_empty() {
+        writeln!(f, "<p>The data tell it from every other effect that they can show.</p>")
+    } else {
+        writeln!(
+            f,
+            "<p class=\"warn\">These data cannot tell it from {}: in its place that predicts the held-out presses as well, so that either may be \
+             the cause. It stands in the model as one way to describe what was measured.</p>",
+            Text(either(&step.equivalent))
+        )
+    }
+}
+
+fn value(parameter: &Estimated) -> String {
+    match parameter.standard_error {
+        Some(error) => with_error(parameter.value, error),
+        None => short(parameter.value, 6),
+    }
+}
+
+/// From where to where a parameter that was estimated could have come to lie.
+fn range(definition: &Definition, found: &Estimated) -> String {
+    let parameter = definition.parameters.iter().find(|parameter| parameter.name == found.name);
+    match parameter.filter(|_| found.standard_error.is_some()) {
+        Some(parameter) => parameter.range.map(|end| short(end, 6)).join(" to "),
+        None => String::new(),
+    }
+}
+
+/// `a`, `a or b`, `a, b or c`.
+fn either(names: &[&str]) -> String {
+    match names {
+        [most @ .., last] if !most.is_empty() => format!("{} or {last}", most.join(", ")),
+        names => names.concat(),
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}

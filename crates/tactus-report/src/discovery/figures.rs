@@ -1,0 +1,140 @@
+//! Figures of a discovery.
+
+use std::fmt;
+
+use tactus_discover::{Curve, Discovery, ElementGap, Point};
+use tactus_model::Array;
+
+use crate::{
+    numbers::digits,
+    plot::{Axis, ColourBar, Figure, Heat, Image, Ink, Label, Panel, Scale, Series, Sheet},
+};
+
+/// The models that are compared.
+const BEFORE: &str = "base model";
+const AFTER: &str = "grown model";
+/// Three beside each other on a page.
+const CURVE_PX: [f64; 2] = [344.0, 240.0];
+/// Between two maps.
+const GUTTER_PX: f64 = 40.0;
+/// Room for the names of bars, and for the longest of them.
+const BARS_PX: [f64; 2] = [290.0, 480.0];
+/// Height of a bar with what is between two.
+const BAR_PX: f64 = 26.0;
+
+/// The mean residual along a covariate with standard errors, of the base model and, where that differs, of the grown one.
+pub fn residual_against(curve: &Curve) -> Figure {
+    let x = Axis::new(curve.covariate, curve.unit).tight();
+    let y = Axis::new("residual", curve.of).from_zero();
+    let ends = [curve.points.first(), curve.points.last()].into_iter().flatten();
+    let zero = Series::line(ends.map(|end| [end.at, 0.0]).collect()).ink(Ink::Muted).width_px(1.0);
+    let [bars, dots] = means(curve, |point| point.before);
+    let figure = Figure::new(format!("Residual against {}", curve.covariate), x, y)
+        .size_px(CURVE_PX)
+        .with(zero)
+        .with(bars.ink(Ink::Red))
+        .with(dots.ink(Ink::Red).label(BEFORE));
+    if curve.points.iter().all(|point| (point.after - point.before).abs() <= 0.0) {
+        return figure;
+    }
+    let [bars, dots] = means(curve, |point| point.after);
+    figure.with(bars.ink(Ink::Blue)).with(dots.ink(Ink::Blue).label(AFTER))
+}
+
+/// The root mean square residual of each element, of the base model and, where that differs, of the grown one, on one
+/// scale: in units of the noise where that is known, else in counts.
+pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Option<f64>) -> Sheet {
+    let (rows, cols) = (array.rows(), array.cols());
+    let unit_counts = noise_rms_counts.unwrap_or(1.0);
+    #[expect(clippy::cast_possible_truncation, reason = "a colour needs no more digits")]
+    let values = |of: fn(&ElementGap) -> f64| -> Vec<f32> {
+        elements.iter().map(|element| (of(element) / unit_counts) as f32).collect()
+    };
+    let before = values(|element| element.before_rms_counts);
+    let after = values(|element| element.after_rms_counts);
+    let greatest = before.iter().chain(&after).map(|value| f64::from(*value)).fold(0.0, f64::max);
+    // Where nothing but noise is left, its ups and downs are no reason for bright colours.
+    let scale = Scale::new(0.0, if noise_rms_counts.is_some() { greatest.max(2.0) } else { greatest });
+    let maps = [(BEFORE, &before), (AFTER, &after)];
+    let maps = if before == after { &maps[..1] } else { &maps[..] };
+    let cell_px = (500.0 / cols as f64).min(300.0 / rows as f64).clamp(1.0, 44.0);
+    let (width, height) = (cell_px * cols as f64, cell_px * rows as f64);
+    let size_px = [(2.0 * width + GUTTER_PX).max(560.0), height + 70.0];
+    let mut sheet = Sheet::new("Residual of the elements", size_px);
+    for (nth, (name, values)) in maps.iter().enumerate() {
+        let x = (width + GUTTER_PX) * nth as f64;
+        sheet.put([x, 12.0], &Label::new(*name).heading());
+        let heat = Heat { values, rows, cols };
+        sheet.put([x, 22.0], &Image { heat, cell_px, scale, title: (*name).into() });
+    }
+    let title = if noise_rms_counts.is_some() { "rms in units of the noise" } else { "rms in counts" };
+    sheet.put([-12.0, height + 34.0], &ColourBar { scale, title: title.into() });
+    sheet
+}
+
+/// The held-out residual of the base model, of the grown model without each effect, of the grown model, and the noise.
+pub fn levels(found: &Discovery) -> Sheet {
+    let mut bars = vec![Bar::new(format!("{BEFORE}, recalibrated"), found.base.heldout_rms_counts, Ink::Red)];
+    if !found.steps.is_empty() {
+        bars.extend(found.steps.iter().map(|step| {
+            let name = format!("{AFTER} without {}", step.effect);
+            Bar::new(name, step.heldout_rms_before_counts, Ink::Amber)
+        }));
+        bars.push(Bar::new(AFTER, found.final_.level.heldout_rms_counts, Ink::Blue));
+    }
+    bars.extend(found.noise_rms_counts.map(|rms| Bar::new("noise", rms, Ink::Muted)));
+    let longest = bars.iter().map(|bar| bar.rms_counts).filter(|rms| rms.is_finite()).fold(0.0, f64::max);
+    let size_px = [BARS_PX[0] + BARS_PX[1] + 70.0, BAR_PX * bars.len() as f64];
+    let mut sheet = Sheet::new("Held-out residual, rms in counts", size_px);
+    for (nth, bar) in bars.into_iter().enumerate() {
+        let length_px = if longest > 0.0 { BARS_PX[1] * bar.rms_counts / longest } else { 0.0 };
+        let y = BAR_PX * (nth as f64 + 0.5);
+        sheet.put([BARS_PX[0] - 12.0, y + 4.0], &Label::new(bar.name).right());
+        sheet.put([BARS_PX[0], y], &Stroke { length_px, ink: bar.ink });
+        let counts = digits(bar.rms_counts, 3);
+        sheet.put([BARS_PX[0] + length_px.max(0.0) + 8.0, y + 4.0], &Label::new(counts));
+    }
+    sheet
+}
+
+/// Means with their standard errors.
+fn means(curve: &Curve, of: fn(&Point) -> f64) -> [Series; 2] {
+    let bars = curve.points.iter().map(|point| {
+        let (mean, error) = (of(point), point.standard_error);
+        [point.at, mean - error, mean + error]
+    });
+    let dots = curve.points.iter().map(|point| [point.at, of(point)]);
+    [Series::bars(bars).width_px(1.2), Series::dots(dots.collect()).width_px(4.5)]
+}
+
+struct Bar {
+    name: String,
+    rms_counts: f64,
+    ink: Ink,
+}
+
+impl Bar {
+    fn new(name: impl Into<String>, rms_counts: f64, ink: Ink) -> Self {
+        Self { name: name.into(), rms_counts, ink }
+    }
+}
+
+/// A bar from its origin to the right.
+struct Stroke {
+    length_px: f64,
+    ink: Ink,
+}
+
+impl Panel for Stroke {
+    fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.length_px > 0.0 {
+            write!(
+                f,
+                r#"<path class="line {}" stroke-width="14" d="M0 0h{:.1}"/>"#,
+                self.ink.class(),
+                self.length_px
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,72 @@
+//! What was tried, round by round.
+
+use std::fmt;
+
+use tactus_discover::{Candidate, Discovery, Round};
+
+use super::words::{list, percent};
+use crate::{
+    document::{Column, Table},
+    markup::Text,
+    numbers::{chance, digits},
+};
+
+pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
+    writeln!(f, "<section>\n<h2>What was tried</h2>")?;
+    if found.rounds.is_empty() {
+        return writeln!(f, "<p>Nothing: there is no structure that wants an explanation.</p>\n</section>");
+    }
+    writeln!(
+        f,
+        "<p class=\"lead\">In each round every effect that the data can show is scored on the fitted presses: would the smallest amount of it \
+         lessen the residual? The best are then fitted, together with the base model and what was added before, and compared on presses \
+         that no fit has seen.</p>"
+    )?;
+    for (nth, round) in found.rounds.iter().enumerate() {
+        self::round(f, nth + 1, round)?;
+    }
+    writeln!(f, "</section>")
+}
+
+fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round) -> fmt::Result {
+    let with = if round.with.is_empty() {
+        "the base model alone".into()
+    } else {
+        format!("the model has {}", list(&round.with))
+    };
+    writeln!(f, "<h3>Round {nth}: {}</h3>", Text(with))?;
+    let (fitted, scored): (Vec<&Candidate>, Vec<&Candidate>) =
+        round.candidates.iter().partition(|candidate| candidate.heldout_rms_counts.is_some());
+    if !fitted.is_empty() {
+        let mut table = Table::new(&[
+            Column::Name("effect"),
+            Column::Number("score"),
+            Column::Number("p, corrected"),
+            Column::Number("held out / counts rms"),
+            Column::Number("gap closed"),
+            Column::Name(""),
+        ]);
+        for candidate in fitted {
+            let taken = if round.taken == Some(candidate.effect) { "taken" } else { "" };
+            table.row([
+                candidate.effect,
+                &digits(candidate.score, 3),
+                &chance(candidate.p_value),
+                &candidate.heldout_rms_counts.map_or_else(|| "\u{2013}".into(), |rms| digits(rms, 3)),
+                &candidate.shrink.map_or_else(|| "\u{2013}".into(), percent),
+                taken,
+            ]);
+        }
+        writeln!(f, "{table}")?;
+    }
+    if !scored.is_empty() {
+        let scored = scored.iter().map(|candidate| {
+            format!("{} ({}, p {})", candidate.effect, digits(candidate.score, 2), chance(candidate.p_value))
+        });
+        writeln!(f, "<p class=\"lead\">Scored only: {}.</p>", Text(list(scored)))?;
+    }
+    match round.taken {
+        Some(_) => Ok(()),
+        None => writeln!(f, "<p>None was taken.</p>"),
+    }
+}
