@@ -5,8 +5,9 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
+use tactus_daemon::embedded::SIMULATED_RIG;
 use tactus_e2e::{repository, tactus};
-use tactus_record::{Entry, Message};
+use tactus_record::{Entry, Message, rows};
 use tactus_schema::WallTime;
 use tempfile::TempDir;
 
@@ -103,6 +104,102 @@ fn without_wall_clock(mut message: Message) -> String {
         Message::SensorInfo(_) | Message::Unknown(_) => {}
     }
     format!("{message:?}")
+}
+
+/// A rig that hides nothing but its stage, and a sensor for it in whose place neighbours add a tenth each.
+fn write_truth(folder: &Path) {
+    let faults = "\nmiswired = [{ element = 18, answers_for = 19 }, { element = 22, answers_for = 23 }]";
+    let error = "origin_mm = [0.06, -0.04], rotation_deg = 0.2";
+    assert!(SIMULATED_RIG.contains(faults) && SIMULATED_RIG.contains(error), "the rig file has changed");
+    let rig = SIMULATED_RIG.replace(error, "origin_mm = [0.0, 0.0], rotation_deg = 0.0").replace(faults, "");
+    fs::write(folder.join("rig.toml"), rig).unwrap();
+    let model = fs::read_to_string(repository("config/models/digitacts.toml")).unwrap();
+    let model = model.replace("noise_rms_counts = 2.0", "noise_rms_counts = 0.0");
+    let shares = "{ neighbour_share = 0.1, row_share = 0.0, column_share = 0.0 }";
+    let effect = format!("[[effect]]\nname = \"crosstalk\"\nparameters = {shares}\n");
+    fs::write(folder.join("truth.toml"), format!("{model}\n{effect}")).unwrap();
+}
+
+#[test]
+fn devices_hide_a_model_that_the_recording_shows_and_does_not_tell() {
+    let folder = TempDir::new().unwrap();
+    write_truth(folder.path());
+    let record = |truth: &[&str]| {
+        let args = ["element-centres", "--rig-file", "rig.toml", "--seed", "7", "--no-report"];
+        let summary = run(folder.path(), &[&args, truth].concat());
+        assert_eq!((&summary["simulated"], &summary["presses"]), (&true.into(), &48.into()));
+        folder.path().join(summary["recording"].as_str().unwrap())
+    };
+    let (hidden, plain) = (record(&["--truth", "truth.toml"]), record(&[]));
+
+    // What stands in the recording reads as the model says, to the steps of converter and stage.
+    let deepest = |recording: &Path| {
+        let (_, readings) = rows::readings(&[recording]).unwrap();
+        let press = readings
+            .presses
+            .iter()
+            .find(|press| (press.place_mm[0] - 27.1).abs() + (press.place_mm[1] - 19.9).abs() < 0.01);
+        press.unwrap().deepest().unwrap().counts.clone()
+    };
+    let press = [
+        "--scene",
+        "cylinder",
+        "--x-mm",
+        "7.1",
+        "--y-mm",
+        "4.9",
+        "--depth-mm",
+        "0.6",
+        "--model",
+        "truth.toml",
+    ];
+    let said = tactus(folder.path(), &[&["--json", "simulate"], &press[..]].concat());
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let image: Vec<f64> =
+        serde_json::from_value::<Vec<Vec<f64>>>(said.json()["image"].clone()).unwrap().concat();
+    let read = deepest(&hidden);
+    for (element, (read, want)) in read.iter().zip(&image).enumerate() {
+        assert!((read - want).abs() < 2.0, "element {element}: {read} {want}");
+    }
+    assert!(read[19] - 100.0 > 1.2 * 600.0, "without crosstalk 0.6 mm read 600 counts: {}", read[19]);
+    let plain = deepest(&plain);
+    assert!(
+        plain.iter().zip(&image).any(|(plain, want)| (plain - want).abs() > 50.0),
+        "the rig's own sensor"
+    );
+
+    // The rig's description is in it, but neither the rig file, whose sensor this was not, nor the model.
+    let bytes = fs::read(&hidden).unwrap();
+    let holds = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
+    let attachments: Vec<_> = tactus_record::read(&hidden)
+        .unwrap()
+        .filter_map(|entry| match entry.unwrap() {
+            Entry::Attachment(file) => Some((file.name, String::from_utf8(file.data).unwrap())),
+            Entry::Run(_) | Entry::Message { .. } => None,
+        })
+        .collect();
+    assert!(attachments.iter().any(|(name, _)| name == "rig.json"));
+    assert!(attachments.iter().all(|(name, text)| name != "rig.toml" && !text.contains("crosstalk")));
+    assert!(!holds("crosstalk") && !holds("truth.toml"));
+}
+
+#[test]
+fn a_truth_that_cannot_be_names_its_fault_and_nothing_runs() {
+    let folder = TempDir::new().unwrap();
+    write_truth(folder.path());
+    let model = fs::read_to_string(folder.path().join("truth.toml")).unwrap();
+    let early = "[[effect]]\nname = \"time-lag\"\nparameters = { lag_s = -0.2 }\n";
+    for (text, fault) in [
+        (model.replace("\"digitacts\"", "\"other\""), "\"other\" (6 x 8"),
+        (model.replace("\"crosstalk\"", "\"cross-talk\""), "effect[0]: no effect \"cross-talk\""),
+        (format!("{model}{early}"), "time-lag: lag_s = -0.2 cannot act"),
+    ] {
+        fs::write(folder.path().join("wrong.toml"), text).unwrap();
+        let said = tactus(folder.path(), &["run", "corners", "--embedded", "--truth", "wrong.toml"]);
+        assert_eq!(said.code, Some(2), "{said:?}");
+        assert!(said.err.contains("wrong.toml: ") && said.err.contains(fault), "{said:?}");
+    }
+    assert!(!folder.path().join("runs").exists());
 }
 
 #[test]

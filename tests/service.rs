@@ -73,6 +73,9 @@ fn a_run_started_by_the_cli_is_done_and_recorded() {
         .count();
     assert_eq!(frames as u64, summary["frames"].as_u64().unwrap());
     assert!(Path::new(summary["report"].as_str().unwrap()).is_file());
+    let said = lab.tactus(&["run", &script, "--truth", "model.toml"]);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    assert!(said.err.contains("has devices of its own: add --embedded"), "{said:?}");
 }
 
 #[test]

@@ -8,7 +8,6 @@ use tokio::time::Instant;
 
 use crate::cable::Device;
 use crate::truth::Truth;
-use crate::twin::simulation_of;
 use crate::world::{Shared, World};
 
 pub(crate) fn sim_rig() -> Rig {
@@ -16,9 +15,7 @@ pub(crate) fn sim_rig() -> Rig {
 }
 
 pub(crate) fn world_of(rig: &Rig, seed: u64) -> Shared {
-    let simulation = simulation_of(rig);
-    let truth = Arc::new(Truth::of(rig, &simulation, seed));
-    Shared::new(World::new(truth, rig.covering))
+    Shared::new(World::new(Arc::new(Truth::of_rig(rig, seed)), rig.covering))
 }
 
 /// A device, the world around it, and the present instant.

@@ -19,6 +19,8 @@ use crate::control::RigControl;
 use crate::faults::{Fault, FaultScript};
 use crate::rig::start_devices;
 use crate::terminal::TerminalPort;
+use crate::truth::Truth;
+use crate::truth_file::TruthFile;
 
 /// Virtual sensor and stage that speak real device bytes.
 #[derive(Debug, Parser)]
@@ -42,6 +44,11 @@ struct RigArgs {
     /// The rig file; its `[simulation]` is what the devices hide.
     #[arg(long)]
     config: PathBuf,
+    /// A model file: what the sensor hides, in the place of the rig file's gains, noise and spread.
+    ///
+    /// The service does not know it: its recordings hold its rig file, whose `[simulation]` then is not so.
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
     /// Seed of everything random, in the place of the rig file's.
     #[arg(long)]
     seed: Option<u64>,
@@ -75,13 +82,17 @@ async fn serve(args: RigArgs) -> Result<()> {
         Some(path) => FaultScript::from_toml(&read(path)?).with_context(|| path.display().to_string())?,
         None => FaultScript::default(),
     };
+    let seed = args.seed.unwrap_or_else(|| crate::twin::simulation_of(&rig).seed);
+    let truth = match &args.truth {
+        Some(path) => truth(path, &rig, seed).with_context(|| path.display().to_string())?,
+        None => Truth::of_rig(&rig, seed),
+    };
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
-    let seed = args.seed.unwrap_or_else(|| crate::twin::simulation_of(&rig).seed);
     let sensor_port = open(args.link_dir.as_deref(), "sensor")?;
     let stage_port = open(args.link_dir.as_deref(), "stage")?;
     announce(&sensor_port, &stage_port, args.json)?;
-    let started = start_devices(&rig, seed, Instant::now());
+    let started = start_devices(truth, rig.covering, Instant::now());
     let control = started.control;
     // Dropped at the end, which removes the links.
     let mut devices = JoinSet::new();
@@ -105,6 +116,10 @@ async fn serve(args: RigArgs) -> Result<()> {
     }
     devices.shutdown().await;
     Ok(())
+}
+
+fn truth(path: &Path, rig: &Rig, seed: u64) -> Result<Truth> {
+    Ok(TruthFile::from_toml(&fs::read_to_string(path)?)?.behind(rig, seed)?)
 }
 
 fn open(link_dir: Option<&Path>, device: &str) -> Result<TerminalPort> {

@@ -3,7 +3,7 @@
 //! [`VirtualRig`] runs both in this process, for the production drivers to connect to, in real or virtual
 //! time; the program `tactus-mock` serves the same devices at pseudo-terminals. Behind both stands one
 //! world: where the tip truly is, what it presses, what the elements feel. The devices see no more of it
-//! than real ones would. [`RigControl`] sees all of it, and makes things go wrong ([`faults`]).
+//! than real ones would. What they feel is the rig file's `[simulation]`, or a model in its place ([`TruthFile`]). [`RigControl`] sees all of it, and makes things go wrong ([`faults`]).
 //!
 //! Everything random follows from one seed, so that two runs in virtual time are identical to the byte.
 
@@ -14,6 +14,7 @@ pub mod faults;
 mod bench;
 mod cable;
 mod control;
+mod feel;
 mod kinematics;
 mod motion;
 mod outbox;
@@ -22,10 +23,12 @@ mod sensor;
 mod stage;
 mod terminal;
 mod truth;
+mod truth_file;
 mod twin;
 mod world;
 
 pub use control::RigControl;
 pub use rig::VirtualRig;
 pub use truth::Truth;
+pub use truth_file::{TruthError, TruthFile};
 pub use twin::twin_of;

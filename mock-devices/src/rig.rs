@@ -7,6 +7,7 @@ use futures_util::future::BoxFuture;
 use tactus_device::DeviceError;
 use tactus_device::transport::memory::{self, MemoryConnector};
 use tactus_device::transport::{ByteStream, Connect};
+use tactus_model::Covering;
 use tactus_schema::Rig;
 use tokio::time::Instant;
 
@@ -36,9 +37,17 @@ impl VirtualRig {
     /// # Panics
     /// Outside of a tokio runtime.
     pub fn start(rig: &Rig, seed: u64) -> Self {
+        Self::of(Truth::of_rig(rig, seed), rig.covering)
+    }
+
+    /// As [`start`](Self::start), of any truth; the covering is the one in place.
+    ///
+    /// # Panics
+    /// Outside of a tokio runtime, and of a truth that was not made by its own constructors.
+    pub fn of(truth: Truth, covering: Covering) -> Self {
         let (sensor, sensor_port) = memory::pair("sensor");
         let (stage, stage_port) = memory::pair("stage");
-        let started = start_devices(rig, seed, Instant::now());
+        let started = start_devices(truth, covering, Instant::now());
         // In memory a device never fails.
         tokio::spawn(cable::run(started.sensor, Port::Memory(sensor_port), started.taps.sensor));
         tokio::spawn(cable::run(started.stage, Port::Memory(stage_port), started.taps.stage));
@@ -69,10 +78,8 @@ pub(crate) struct Started {
     pub(crate) control: RigControl,
 }
 
-pub(crate) fn start_devices(rig: &Rig, seed: u64, now: Instant) -> Started {
-    let simulation = crate::twin::simulation_of(rig);
-    let truth = Arc::new(Truth::of(rig, &simulation, seed));
-    let world = Shared::new(World::new(truth, rig.covering));
+pub(crate) fn start_devices(truth: Truth, covering: Covering, now: Instant) -> Started {
+    let world = Shared::new(World::new(Arc::new(truth), covering));
     let (control, taps) = RigControl::new(world.clone(), now);
     let sensor = VirtualSensor::new(world.clone(), now);
     let stage = VirtualStage::new(world, now);

@@ -6,10 +6,14 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_model::{
-    Covering, Effect, EffectError, ForwardModel, Indenter, Readout, Registration, Response, Simulator,
+    Covering, Effect, EffectError, ForwardModel, Indenter, Pipeline, Readout, Registration, Response,
+    Simulator,
 };
 use tactus_schema::Rig;
 use tactus_schema::rig::{ElementFault, SimulatedStage, Simulation};
+
+use crate::feel::Feel;
+use crate::twin::simulation_of;
 
 /// The true sensor, stage and tool behind a rig description; all of it follows from the description and a seed.
 #[derive(Debug, Clone)]
@@ -18,6 +22,8 @@ pub struct Truth {
     pub seed: u64,
     /// The base model with each element's true sensitivity.
     pub model: ForwardModel,
+    /// What the base model lacks, but for the faults.
+    pub effects: Vec<Effect>,
     /// The converter.
     pub readout: Readout,
     /// What is wrong with elements, by index.
@@ -54,6 +60,14 @@ impl Draw {
 }
 
 impl Truth {
+    /// The truth of a rig by its own simulation, or of its twin if it has none.
+    ///
+    /// # Panics
+    /// As [`Truth::of`].
+    pub fn of_rig(rig: &Rig, seed: u64) -> Self {
+        Self::of(rig, &simulation_of(rig), seed)
+    }
+
     /// The truth of a rig whose simulation is `simulation`.
     ///
     /// # Panics
@@ -77,6 +91,7 @@ impl Truth {
         Self {
             seed,
             model,
+            effects: Vec::new(),
             readout: Readout::of(&rig.array),
             faults: simulation.faults.clone(),
             noise_rms_counts: simulation.noise_rms_counts,
@@ -92,10 +107,14 @@ impl Truth {
         }
     }
 
-    /// The sensor as it is under a covering. Stuck and noisy elements are not in it: their faults come after the
-    /// signal, where they are read.
-    pub(crate) fn sensor(&self, covering: Covering) -> Result<Simulator, EffectError> {
-        let effects = self.faults.iter().filter_map(|(element, fault)| match fault {
+    /// What feels, under a covering. Stuck and noisy elements are not in it: their faults come after the signal,
+    /// where they are read.
+    pub(crate) fn feel(&self, covering: Covering) -> Result<Box<dyn Feel>, EffectError> {
+        Ok(Box::new(Pipeline::new(&self.sensor(covering)?)?))
+    }
+
+    fn sensor(&self, covering: Covering) -> Result<Simulator, EffectError> {
+        let faults = self.faults.iter().filter_map(|(element, fault)| match fault {
             ElementFault::Miswired { answers_for } => Some(answers(*element, *answers_for, 1.0)),
             ElementFault::Dead => Some(answers(*element, *element, 0.0)),
             ElementFault::Stuck { .. } | ElementFault::Noisy { .. } => None,
@@ -106,7 +125,7 @@ impl Truth {
             surface_mm: self.surface_mm,
             covering,
             indenter: self.indenter.clone(),
-            effects: effects.collect::<Result<_, _>>()?,
+            effects: self.effects.iter().cloned().map(Ok).chain(faults).collect::<Result<_, _>>()?,
             noise_rms_counts: self.noise_rms_counts,
         })
     }

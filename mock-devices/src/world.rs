@@ -4,10 +4,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::{Covering, EffectError, Moment, Pipeline, Trail};
+use tactus_model::{Covering, Moment, Trail};
 use tactus_schema::rig::{ElementFault, SimulatedStage};
 use tokio::time::Instant;
 
+use crate::feel::Feel;
 use crate::motion::{Motion, Point};
 use crate::truth::{Draw, Truth};
 
@@ -25,8 +26,8 @@ pub(crate) struct World {
     surface_mm: f64,
     deepest_mm: f64,
     noise: ChaCha8Rng,
-    pipeline: Pipeline,
-    /// The pipeline's zero of time, when it was first looked at, and where the tip was since.
+    feel: Box<dyn Feel>,
+    /// The zero of time of what feels, when it was first looked at, and where the tip was since.
     trail: Option<(Instant, Trail)>,
 }
 
@@ -46,19 +47,19 @@ impl World {
     /// believes that this is 0.
     ///
     /// # Panics
-    /// If the truth is not that of a checked rig, whose faulty elements are the array's.
-    #[expect(clippy::expect_used, reason = "a checked rig's faulty elements are the array's")]
+    /// If the truth was not made by its own constructors, which check that effects name elements of the array.
+    #[expect(clippy::expect_used, reason = "a truth's effects name elements of its array")]
     pub(crate) fn new(truth: Arc<Truth>, covering: Covering) -> Self {
         let [x_mm, y_mm, z_mm] = truth.stage.travel_mm;
         let tip_mm = [middle(x_mm), middle(y_mm), z_mm[1] - 0.1 * (z_mm[1] - z_mm[0])];
-        let pipeline = pipeline(&truth, covering).expect("a checked rig makes a pipeline");
+        let feel = truth.feel(covering).expect("a checked truth feels");
         Self {
             motion: Motion::at_rest([0.0; 3], tip_mm, truth.stage.acceleration_mm_per_s2),
             covering,
             surface_mm: truth.surface_mm,
             deepest_mm: truth.surface_mm - tip_mm[2],
             noise: Draw::Noise.rng(truth.seed),
-            pipeline,
+            feel,
             trail: None,
             truth,
         }
@@ -72,9 +73,9 @@ impl World {
     /// One reading of all elements at `at`, into `counts`: noise, saturation, quantisation upon the image there.
     pub(crate) fn sample(&mut self, at: Instant, counts: &mut Vec<u16>) {
         self.look(at);
-        let Self { truth, noise, pipeline, .. } = self;
+        let Self { truth, noise, feel, .. } = self;
         counts.clear();
-        counts.extend(pipeline.counts().iter().enumerate().map(|(element, clean)| {
+        counts.extend(feel.counts().iter().enumerate().map(|(element, clean)| {
             // Drawn for a stuck element too, so that its fault changes no other's noise.
             let deviate: f64 = StandardNormal.sample(noise);
             let noise_rms_counts = match truth.faults.get(&element) {
@@ -82,7 +83,7 @@ impl World {
                 Some(ElementFault::Noisy { noise_rms_counts }) => *noise_rms_counts,
                 Some(ElementFault::Miswired { .. } | ElementFault::Dead) | None => truth.noise_rms_counts,
             };
-            let read = pipeline.read(*clean, noise_rms_counts * deviate);
+            let read = feel.read(*clean, noise_rms_counts * deviate);
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -102,7 +103,7 @@ impl World {
                 *clean
             }
         };
-        self.pipeline.counts().iter().enumerate().map(read).collect()
+        self.feel.counts().iter().enumerate().map(read).collect()
     }
 
     /// Where the tip truly is, in the stage's steps.
@@ -146,20 +147,20 @@ impl World {
     /// Puts another covering in place, its surface where the former one's was.
     pub(crate) fn set_covering_mm(&mut self, thickness_mm: f64) {
         self.covering = Covering { thickness_mm: thickness_mm.max(0.0) };
-        self.pipeline.set_covering(self.covering);
+        self.feel.set_covering(self.covering);
     }
 
     /// Moves the true surface, where the service believes 0.
     pub(crate) fn set_surface_mm(&mut self, surface_mm: f64, now: Instant) {
         self.settle(now);
         self.surface_mm = surface_mm;
-        self.pipeline.set_surface_mm(surface_mm);
+        self.feel.set_surface_mm(surface_mm);
         self.settle(now);
     }
 
     /// Makes the covering answer `stiffness` times as strongly as the model says.
     pub(crate) fn set_stiffness(&mut self, stiffness: f64) {
-        self.pipeline.set_stiffness(stiffness);
+        self.feel.set_stiffness(stiffness);
     }
 
     fn look(&mut self, at: Instant) {
@@ -167,17 +168,13 @@ impl World {
         let (started, trail) = self.trail.get_or_insert_with(|| (at, Trail::new(0.0, tip_mm)));
         let t_s = at.saturating_duration_since(*started).as_secs_f64();
         trail.push(t_s, tip_mm);
-        self.pipeline.step(Moment::at(t_s), trail);
+        self.feel.step(Moment::at(t_s), trail);
     }
 
     fn in_steps(&self, [x, y, z]: Point) -> Point {
         let SimulatedStage { lateral_step_mm, vertical_step_mm, .. } = self.truth.stage;
         [round_to(x, lateral_step_mm), round_to(y, lateral_step_mm), round_to(z, vertical_step_mm)]
     }
-}
-
-fn pipeline(truth: &Truth, covering: Covering) -> Result<Pipeline, EffectError> {
-    Pipeline::new(&truth.sensor(covering)?)
 }
 
 fn round_to(value: f64, step: f64) -> f64 {

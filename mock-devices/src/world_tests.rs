@@ -3,6 +3,7 @@ use std::time::Duration;
 use tactus_schema::Rig;
 
 use super::*;
+use crate::TruthFile;
 use crate::bench::{sim_rig, world_of};
 
 /// Puts the tip at a place at once, as far as depth records go: by a move that has long ended.
@@ -34,6 +35,31 @@ fn a_press_at_an_elements_true_centre_reads_its_true_response() {
     let got = world.image(at)[21];
     // The stage stands within half a step of 3 um of the centre.
     assert!((got - want).abs() < 0.01, "{got} {want}");
+}
+
+#[test]
+fn a_model_in_place_of_the_simulation_gives_gains_noise_and_effects_and_leaves_the_rest_the_rigs() {
+    let rig = sim_rig();
+    let effect = r#"
+        [[effect]]
+        name = "relaxation"
+        parameters = { relaxed_share = 0.5, time_constant_s = 1.0, spread_ratio = 1.0 }"#;
+    let model =
+        include_str!("../../config/models/digitacts.toml").replace("rms_counts = 2.0", "rms_counts = 0.0");
+    let truth = TruthFile::from_toml(&format!("{model}{effect}")).unwrap().behind(&rig, 7).unwrap();
+    let shared = Shared::new(World::new(Arc::new(truth), rig.covering));
+    let mut world = shared.lock();
+    let down_mm = over(&world, 21, -0.5);
+    assert!((world.truth().registration.rotation_deg - 0.2).abs() < 1e-12, "the rig's error stays");
+    let at = put(&mut world, down_mm, Instant::now());
+    let mut counts = Vec::new();
+    for (after_s, want) in
+        [(0, 100.0 + 500.0), (1, 100.0 + 500.0 * (1.0 - 0.5 * (1.0 - (-1.0_f64).exp()))), (60, 350.0)]
+    {
+        world.sample(at + Duration::from_secs(after_s), &mut counts);
+        assert!((f64::from(counts[21]) - want).abs() <= 1.0, "after {after_s} s: {} {want}", counts[21]);
+    }
+    assert!(counts[18] == counts[19] && counts[20] > counts[19], "the rig's element 18 answers for 19");
 }
 
 #[test]

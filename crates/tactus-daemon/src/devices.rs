@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tactus_device::transport::{Connect, serial::SerialConnector, tcp::TcpConnector};
 use tactus_device::{ArrayExpectation, Clock, GrblOptions, GrblStage, WeissSensor};
 use tactus_engine::Devices;
-use tactus_mock::{RigControl, VirtualRig};
+use tactus_mock::{RigControl, Truth, VirtualRig};
 use tactus_schema::Rig;
 use tactus_schema::rig::{SensorProtocol, Service, StageProtocol, Transport};
 
@@ -18,12 +18,12 @@ pub struct Opened {
     pub control: Option<RigControl>,
 }
 
-/// Starts the drivers of a rig, and its virtual devices where the rig says `embedded`; `seed` is theirs.
+/// Starts the drivers of a rig, and its virtual devices where the rig says `embedded`; `truth` is what those hide.
 ///
 /// Devices need not be there yet: drivers wait for them.
-pub fn open(rig: &Rig, service: &Service, seed: u64, clock: Clock) -> Opened {
+pub fn open(rig: &Rig, service: &Service, truth: impl FnOnce() -> Truth, clock: Clock) -> Opened {
     let embedded = [&service.sensor.transport, &service.stage.transport].contains(&&Transport::Embedded);
-    let mut virtual_rig = embedded.then(|| VirtualRig::start(rig, seed));
+    let mut virtual_rig = embedded.then(|| VirtualRig::of(truth(), rig.covering));
     let sensor_link =
         connector(&service.sensor.transport, || virtual_rig.as_mut().map(VirtualRig::sensor_connector));
     let stage_link =

@@ -16,7 +16,7 @@ use crate::recorder::{InPlace, OnThread};
 use crate::twin::{self, Plan, TwinError};
 use crate::{devices, virtual_time};
 
-pub use tactus_mock::Truth;
+pub use tactus_mock::{Truth, TruthError, TruthFile};
 
 /// The rig that needs no hardware, as it is shipped in `config/rigs/sim.toml`.
 pub const SIMULATED_RIG: &str = include_str!("../../../config/rigs/sim.toml");
@@ -56,6 +56,9 @@ pub enum EmbeddedError {
         /// The rig's name.
         rig: String,
     },
+    /// The truth is not one of this rig.
+    #[error(transparent)]
+    Truth(#[from] TruthError),
     /// The script or its parameters.
     #[error(transparent)]
     Script(#[from] ScriptError),
@@ -76,7 +79,8 @@ pub enum EmbeddedError {
 /// What a simulated rig hides from the service, the same in all its runs: what comparisons hold findings against.
 /// The virtual devices are made of this very [`Truth`].
 ///
-/// `None` for a rig that hides nothing: one with physical devices, or a description that came with data.
+/// `None` for a rig that hides nothing: one with physical devices, or a description that came with data. A run with a
+/// [`TruthFile`] hides that instead, and its recording holds no rig file that says otherwise.
 pub fn truth(rig: &Rig) -> Option<Truth> {
     let simulation = rig.simulation.as_ref().filter(|_| rig.simulated)?;
     Some(Truth::of(rig, simulation, simulation.seed))
@@ -85,6 +89,9 @@ pub fn truth(rig: &Rig) -> Option<Truth> {
 /// Dry-runs the experiment on the rig's twin and then runs it on the rig, whose devices must be embedded.
 /// Blocks until it is over.
 ///
+/// With a `truth`, the devices hide that in the place of what the rig file says of the sensor. Neither the dry run nor
+/// the recording knows it: the recording then has the rig's description, but not its file.
+///
 /// `started` gets the engine and the recording's path as soon as the run is about to begin.
 ///
 /// # Errors
@@ -92,6 +99,7 @@ pub fn truth(rig: &Rig) -> Option<Truth> {
 pub fn run(
     rig: &Rig,
     rig_toml: &str,
+    truth: Option<&TruthFile>,
     ask: Ask,
     folder: &Path,
     pace: Pace,
@@ -114,11 +122,16 @@ pub fn run(
         }
     });
     let mut order = order::order(ask, rig, clock.now().wall)?;
+    let hidden = match truth {
+        Some(truth) => truth.behind(rig, order.seed)?,
+        None => Truth::of_rig(rig, order.seed),
+    };
     let plan = twin::dry_run(rig, order.clone())?;
     if !plan.is_possible() {
         return Err(EmbeddedError::NotPossible(Box::new(plan)));
     }
     order.planned = Some(plan.promise());
+    let rig_toml = truth.is_none().then_some(rig_toml);
     let (recording, path) = order::recording(&order, rig, rig_toml, folder, clock.now().wall)?;
     order.recording = path.display().to_string();
     let record: Box<dyn Record> = match pace {
@@ -126,7 +139,7 @@ pub fn run(
         Pace::Real => Box::new(OnThread::start(recording)?),
     };
     runtime.block_on(async {
-        let opened = devices::open(rig, &service, order.seed, clock);
+        let opened = devices::open(rig, &service, || hidden, clock);
         let engine = Engine::start(rig.clone(), opened.devices, clock, Arc::new(Unpublished))?;
         started(&engine, &order);
         match engine.run(order, record).await {

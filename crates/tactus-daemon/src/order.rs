@@ -49,14 +49,15 @@ pub fn order(ask: Ask, rig: &Rig, at: WallTime) -> Result<RunOrder, ScriptError>
     })
 }
 
-/// Opens the recording of an order: `recording.mcap` in a folder of the run's own, made below `folder`.
+/// Opens the recording of an order: `recording.mcap` in a folder of the run's own, made below `folder`. `rig_toml` is the
+/// rig file's text, unless what it says of simulated devices is not so.
 ///
 /// # Errors
 /// [`RecordError`] names the path.
 pub fn recording(
     order: &RunOrder,
     rig: &Rig,
-    rig_toml: &str,
+    rig_toml: Option<&str>,
     folder: &Path,
     started: WallTime,
 ) -> Result<(Recording, PathBuf), RecordError> {

@@ -23,6 +23,7 @@ use clap::Parser;
 use tactus_bus::{Bus, BusConfig, BusError, Calls};
 use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
+use tactus_mock::Truth;
 use tactus_schema::key::Keys;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::timeout;
@@ -118,7 +119,8 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
         warn!("the bus listens or connects beyond this machine, without access control");
     }
     let (bus, calls) = Bus::open(&endpoints, keys).await?;
-    let opened = devices::open(&rig, &rig_service, clock.now().wall.ns().unsigned_abs(), clock);
+    let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
+    let opened = devices::open(&rig, &rig_service, truth, clock);
     let engine = Engine::start(rig, opened.devices, clock, Arc::new(OnBus(bus.publisher())))?;
 
     let Calls { stops, commands } = calls;

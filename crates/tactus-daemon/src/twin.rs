@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tactus_device::Clock;
 use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, Unpublished};
-use tactus_mock::twin_of;
+use tactus_mock::{Truth, twin_of};
 use tactus_schema::rig::Transport;
 use tactus_schema::{Frame, Rig, Stamp, pb};
 use tokio::time::timeout;
@@ -92,7 +92,7 @@ async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
     let Some(service) = twin.service.clone() else {
         return Err(tactus_engine::EngineError::NoService { rig: twin.name }.into());
     };
-    let opened = devices::open(&twin, &service, order.seed, clock);
+    let opened = devices::open(&twin, &service, || Truth::of_rig(&twin, order.seed), clock);
     let engine = Engine::start(twin, opened.devices, clock, std::sync::Arc::new(Unpublished))?;
     match timeout(LONGEST, engine.run(order, Box::new(Unrecorded))).await {
         Ok(Ok(outcome)) => Ok(outcome),

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG};
+use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, Truth};
 use tactus_daemon::order::Ask;
 use tactus_daemon::{devices, experiments};
 use tactus_device::Clock;
@@ -17,7 +17,7 @@ fn run(script: Script, arguments: Arguments, rig_toml: &str) -> Result<(Finished
     let folder = TempDir::new().unwrap();
     let rig = Rig::from_toml(rig_toml).unwrap();
     let ask = Ask { script, arguments, seed: Some(1), who: "test".into() };
-    let finished = embedded::run(&rig, rig_toml, ask, folder.path(), Pace::Virtual, |_, _| {})?;
+    let finished = embedded::run(&rig, rig_toml, None, ask, folder.path(), Pace::Virtual, |_, _| {})?;
     Ok((finished, folder))
 }
 
@@ -63,7 +63,10 @@ fn the_truth_is_the_rig_files_and_the_devices_own() {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
     let of_the_devices = runtime.unwrap().block_on(async {
         let service = rig.service.as_ref().unwrap();
-        devices::open(&rig, service, truth.seed, Clock::paused()).control.unwrap().truth()
+        devices::open(&rig, service, || Truth::of_rig(&rig, truth.seed), Clock::paused())
+            .control
+            .unwrap()
+            .truth()
     });
     assert_eq!(format!("{truth:?}"), format!("{of_the_devices:?}"));
 }

@@ -51,7 +51,7 @@ fn begin(disk: Disk) -> Result<ChannelWriter<Disk>, McapError> {
         experiment: "corners",
         who: "ada",
         rig: &rig,
-        rig_toml: RIG_TOML,
+        rig_toml: Some(RIG_TOML),
         script: Script { name: "corners.star", source: "" },
         versions: &BTreeMap::new(),
         parameters_json: "{}",

@@ -27,8 +27,8 @@ pub struct Header<'a> {
     pub who: &'a str,
     /// The rig it runs on; its name goes into the topics.
     pub rig: &'a Rig,
-    /// The rig file as it was read.
-    pub rig_toml: &'a str,
+    /// The rig file as it was read; none if what it says of simulated devices is not so.
+    pub rig_toml: Option<&'a str>,
     /// The experiment's script.
     pub script: Script<'a>,
     /// Name to version of everything that had a part in it.
@@ -95,7 +95,7 @@ impl Header<'_> {
         }
     }
 
-    pub(crate) fn attachments(&self) -> [Attachment; 5] {
+    pub(crate) fn attachments(&self) -> Vec<Attachment> {
         let attach = |name: &str, media_type: &str, text: String| Attachment {
             name: name.into(),
             media_type: media_type.into(),
@@ -103,13 +103,14 @@ impl Header<'_> {
             data: text.into_bytes(),
         };
         let versions = serde_json::Value::from_iter(self.versions.clone());
-        [
-            attach(RIG_JSON, "application/json", self.rig.to_json()),
-            attach(RIG_TOML, "application/toml", self.rig_toml.into()),
+        let rig_toml = self.rig_toml.map(|text| attach(RIG_TOML, "application/toml", text.into()));
+        let rig_json = attach(RIG_JSON, "application/json", self.rig.to_json());
+        let others = [
             attach(self.script.name, "text/x-starlark", self.script.source.into()),
             attach(VERSIONS_JSON, "application/json", versions.to_string()),
             attach(PARAMETERS_JSON, "application/json", self.parameters_json.into()),
-        ]
+        ];
+        [rig_json].into_iter().chain(rig_toml).chain(others).collect()
     }
 }
 

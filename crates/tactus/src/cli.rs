@@ -112,6 +112,9 @@ pub(crate) struct RunArgs {
     /// The embedded rig's file, in place of the shipped one.
     #[arg(long, value_name = "FILE")]
     pub(crate) rig_file: Option<PathBuf>,
+    /// A model file that the embedded rig's sensor hides, in place of the rig file's gains, noise and spread.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) truth: Option<PathBuf>,
     /// Let the embedded rig run in real time; else nobody waits.
     #[arg(long)]
     pub(crate) real_time: bool,
@@ -230,6 +233,9 @@ pub(crate) struct StudyArgs {
     /// The embedded rig's file, in place of the shipped one.
     #[arg(long, value_name = "FILE")]
     pub(crate) rig_file: Option<PathBuf>,
+    /// A model file that the embedded rig's sensor hides, in place of the rig file's gains, noise and spread.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) truth: Option<PathBuf>,
     /// Seed of the random orders and, on a simulated rig, of its noise.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,

@@ -125,7 +125,7 @@ impl Desk {
         claim.check().map_err(No::failed)?;
         order.planned = Some(plan.promise());
         let (recording, path) =
-            order::recording(&order, &rig, &self.config.rig_toml, &self.config.recordings, now)
+            order::recording(&order, &rig, Some(&self.config.rig_toml), &self.config.recordings, now)
                 .map_err(No::failed)?;
         let path = std::path::absolute(&path).unwrap_or(path);
         info!(run = order.run_id, recording = %path.display(), presses = plan.promise().presses, "run accepted");

@@ -123,7 +123,7 @@ impl Run {
             experiment: &self.plan.experiment,
             who: "ada",
             rig: &self.rig,
-            rig_toml: RIG_TOML,
+            rig_toml: Some(RIG_TOML),
             script: Script { name: "element-centres.star", source: SCRIPT },
             versions: &versions,
             parameters_json: r#"{"dwell_s":0.25}"#,

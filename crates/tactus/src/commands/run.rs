@@ -51,6 +51,13 @@ pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<Summary
     }
     let runtime = connection::runtime()?;
     match runtime.block_on(connection::find(common))? {
+        Some(_) if args.truth.is_some() => {
+            let error = format!(
+                "--truth is what embedded devices hide; the service at {} has devices of its own: add --embedded",
+                common.endpoint
+            );
+            Err(Failure::new(Exit::Usage, error).into())
+        }
         Some(client) => runtime.block_on(served::run(client, common, args, &script, &arguments)),
         None => embedded::run(common, args, script, arguments, &format!("no service at {}", common.endpoint)),
     }

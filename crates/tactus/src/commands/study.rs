@@ -41,7 +41,7 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     calibrate::write(&calibrated, &args.out.join("calibration"))?;
     let truth = rows::truth(&recordings[0])?;
     let mut missing = calibrated.calibration.missing.clone();
-    let images = if truth.is_some() && taken.iter().all(|taken| taken.embedded) {
+    let images = if taken.iter().all(|taken| taken.embedded) {
         images::take(common, args, &mut steps, &calibrated)?
     } else {
         missing.push(

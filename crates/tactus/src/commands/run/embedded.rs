@@ -1,10 +1,12 @@
 //! A run on the embedded simulated rig.
 
+use std::fs;
+use std::path::Path;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use tactus_daemon::config;
-use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG};
+use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, TruthError, TruthFile};
 use tactus_daemon::order::Ask;
 use tactus_engine::{Engine, StopOrder};
 use tactus_plan::{Arguments, Script};
@@ -38,16 +40,19 @@ pub(super) fn run(
             format!("rig {:?} is not simulated: real devices are run by the service, `tactusd`", rig.name);
         return Err(Failure::new(Exit::Usage, error).into());
     }
+    let truth = args.truth.as_deref().map(read_truth).transpose()?;
     let pace = if args.real_time { Pace::Real } else { Pace::Virtual };
     if !common.json {
         let time = if args.real_time { "real time" } else { "virtual time, nobody waits" };
-        println!("SIMULATED: running on the embedded simulated rig {:?} ({why}; {time})", rig.name);
+        let hidden = args.truth.as_ref().map(|path| format!("; it hides {}", path.display()));
+        let hidden = hidden.unwrap_or_default();
+        println!("SIMULATED: running on the embedded simulated rig {:?} ({why}; {time}{hidden})", rig.name);
     }
     let ask = Ask { script, arguments, seed: args.experiment.seed, who: args.who.clone() };
     let simulated = rig.simulated;
     let silent = common.json;
     let mut attending = None;
-    let done = embedded::run(&rig, &rig_toml, ask, &args.out, pace, |engine, _| {
+    let done = embedded::run(&rig, &rig_toml, truth.as_ref(), ask, &args.out, pace, |engine, _| {
         attending = attend(engine.clone(), silent);
     });
     if let Some(attending) = attending {
@@ -61,6 +66,9 @@ pub(super) fn run(
             anyhow::Error::from(Failure::new(exit, format!("nothing was moved: {}", plan.outcome.message)))
         }
         EmbeddedError::Script(error) => Failure::new(Exit::Usage, error).into(),
+        EmbeddedError::Truth(error) => {
+            wrong_truth(args.truth.as_deref().unwrap_or(Path::new("--truth")), &error)
+        }
         error @ EmbeddedError::NotEmbedded { .. } => Failure::new(Exit::Usage, error).into(),
         error @ (EmbeddedError::Rig(_)
         | EmbeddedError::Engine(_)
@@ -82,6 +90,16 @@ pub(super) fn run(
         duration_s: outcome.duration_s,
         recording: std::path::absolute(recording)?,
     })
+}
+
+fn read_truth(path: &Path) -> anyhow::Result<TruthFile> {
+    let text = fs::read_to_string(path)
+        .map_err(|error| Failure::new(Exit::Usage, format!("{}: {error}", path.display())))?;
+    TruthFile::from_toml(&text).map_err(|error| wrong_truth(path, &error))
+}
+
+fn wrong_truth(path: &Path, error: &TruthError) -> anyhow::Error {
+    Failure::new(Exit::Usage, format!("{}: {error}", path.display())).into()
 }
 
 /// Shows the progress and passes Ctrl-C on, from a thread of its own: the run may take this one.

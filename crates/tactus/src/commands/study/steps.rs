@@ -30,6 +30,8 @@ pub(super) struct Steps {
     rig: Option<String>,
     /// SHA-256 of the rig file.
     rig_file: Option<String>,
+    /// SHA-256 of the truth.
+    truth: Option<String>,
     taken: Vec<Taken>,
     #[serde(skip)]
     path: PathBuf,
@@ -80,6 +82,7 @@ impl Steps {
             embedded: args.embedded,
             rig: common.rig.clone(),
             rig_file: args.rig_file.as_deref().map(sha256::of_file).transpose()?,
+            truth: args.truth.as_deref().map(sha256::of_file).transpose()?,
             taken: Vec::new(),
             path: path.clone(),
         };
@@ -91,12 +94,12 @@ impl Steps {
             format!("{} is no list of a study's steps; give another --out", path.display())
         })?;
         let with = |steps: &Self| {
-            let Self { schema, seed, points, embedded, rig, rig_file, .. } = steps;
-            (schema.clone(), *seed, *points, *embedded, rig.clone(), rig_file.clone())
+            let Self { schema, seed, points, embedded, rig, rig_file, truth, .. } = steps;
+            (schema.clone(), *seed, *points, *embedded, rig.clone(), rig_file.clone(), truth.clone())
         };
         if with(&known) != with(&new) {
             let error = format!(
-                "{} is of a study with another seed, rig, rig file or number of points: give another --out, or the same arguments and file",
+                "{} is of a study with another seed, rig, rig file, truth or number of points: give another --out, or the same arguments and file",
                 path.display()
             );
             return Err(Failure::new(Exit::Usage, error).into());
@@ -146,6 +149,7 @@ impl Steps {
                 },
                 embedded: args.embedded,
                 rig_file: rig_file.cloned(),
+                truth: args.truth.clone(),
                 real_time: false,
                 out: args.out.join("runs"),
                 who: args.who.clone(),
