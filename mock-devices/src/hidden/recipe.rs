@@ -1,0 +1,342 @@
+//! From what is asked for to a set.
+
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tactus_model::{Covering, ModelError, Simulator, TrajectoryError};
+use tactus_record::table::TableError;
+
+use super::base::{Base, Climate};
+use super::label::{Dosed, Label};
+use super::noise::{Noise, NoiseKind};
+use super::physics::{CATALOGUE, Definition, Dose};
+use super::plan::{Course, Plan};
+use super::sensor::Sensor;
+use super::separation::separation;
+use super::set::{Row, Run, Set};
+
+/// How to make one set. All of it follows from this.
+#[derive(Debug, Clone)]
+pub struct Recipe {
+    /// Name of the set; its runs are named after it.
+    pub name: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// What the stage does.
+    pub plan: Plan,
+    /// Frames, if not the plan's own number.
+    pub frames: Option<usize>,
+    /// What noise comes upon the readings.
+    pub noise: NoiseKind,
+    /// Which physics.
+    pub content: Content,
+    /// How much of each.
+    pub amount: Amount,
+}
+
+/// Which physics a set has. Without anything asked for: one of the library's effects by chance.
+#[derive(Debug, Clone, Default)]
+pub struct Content {
+    /// These, by id.
+    pub physics: Vec<&'static str>,
+    /// One instance by chance of each of these effects.
+    pub effects: Vec<String>,
+    /// So many further effects of the library, all different; 1 if nothing else is asked for.
+    pub combine: Option<usize>,
+    /// One that the library has nothing like.
+    pub outside: bool,
+    /// None.
+    pub none: bool,
+}
+
+/// How much of each physics.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Amount {
+    /// At this strength.
+    Strength(f64),
+    /// As much as lies this far from the base model, each taken alone (see [`separation`]).
+    Separation(f64),
+}
+
+/// Why a set cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum HiddenError {
+    /// No such physics.
+    #[error("no physics {0:?}; `tactus-mock hidden list` names all of them")]
+    UnknownPhysics(String),
+    /// No physics of that effect.
+    #[error("no physics is an instance of the effect {0:?}; `tactus-mock hidden list` names those that are")]
+    UnknownEffect(String),
+    /// A number is out of its range.
+    #[error("{field} must be {range}, not {value}")]
+    Range {
+        /// Which.
+        field: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it was.
+        value: f64,
+    },
+    /// The base model refused its parameters.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The plan made no trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// The table cannot be written.
+    #[error(transparent)]
+    Table(#[from] TableError),
+}
+
+/// Beyond this strength no rig is: a separation that needs more is not reached.
+const STRENGTH_MAX: f64 = 8.0;
+const STRENGTH_MIN: f64 = 1e-5;
+/// A separation is met within this share of it.
+const CLOSE: f64 = 0.01;
+
+/// What draws random numbers, each from a stream of its own.
+#[derive(Debug, Clone, Copy)]
+enum Draw {
+    Content,
+    Base,
+    Plan,
+    Climate,
+    NoiseKind,
+    Noise,
+}
+
+impl Recipe {
+    /// A bundle of white, coloured or quantised noise with one effect of the library, by chance, at strength 1.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            name: "set-0000".into(),
+            seed,
+            plan: Plan::Bundle,
+            frames: None,
+            noise: NoiseKind::Any,
+            content: Content::default(),
+            amount: Amount::Strength(1.0),
+        }
+    }
+
+    /// Makes the set.
+    ///
+    /// # Errors
+    /// [`HiddenError`] if something is asked for that there is not.
+    pub fn make(&self) -> Result<Set, HiddenError> {
+        self.check()?;
+        let chosen = self.content.choose(&mut self.rng(Draw::Content))?;
+        let noise = Noise::draw(self.noise, &mut self.rng(Draw::NoiseKind));
+        let base = Base::new(self.seed_of(Draw::Base))?;
+        let array = &base.rig.array;
+        let courses = self.plan.courses(
+            array,
+            base.rig.registration,
+            base.rig.covering,
+            self.frames,
+            self.seed_of(Draw::Plan),
+        )?;
+        let climate = Climate::new(self.seed_of(Draw::Climate));
+        let rate_hz = array.rate_hz();
+        let bench = Bench { base: &base, courses: &courses, climate, noise };
+        let clean = bench.clean(&[]);
+        let mut seeds = self.rng(Draw::Content);
+        let mut physics = Vec::new();
+        let mut doses = Vec::new();
+        for definition in chosen {
+            let dose = Dose { physics: definition, strength: 1.0, seed: seeds.random() };
+            let (dose, z, reached) = match self.amount {
+                Amount::Strength(strength) => {
+                    let dose = Dose { strength, ..dose };
+                    (dose, bench.separation(&clean, &[dose]), true)
+                }
+                Amount::Separation(z) => bench.dose(&clean, dose, z),
+            };
+            doses.push(dose);
+            physics.push(Dosed {
+                id: definition.id.into(),
+                effect: definition.effect.map(Into::into),
+                strength: dose.strength,
+                z,
+                reached,
+                seed: dose.seed,
+                parameters: Vec::new(),
+            });
+        }
+        let has_thermometer = self.rng(Draw::Climate).random_bool(0.7);
+        let mut rng = self.rng(Draw::Noise);
+        let mut noise_of = noise.series(&mut rng, array.elements());
+        let mut noise_counts = vec![0.0; array.elements()];
+        let (mut runs, mut counts, mut with) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, course) in courses.iter().enumerate() {
+            let mut sensor = bench.sensor(&doses, index);
+            for (dosed, drawn) in physics.iter_mut().zip(sensor.parameters()) {
+                dosed.parameters.clone_from(drawn);
+            }
+            let mut rows = Vec::with_capacity(course.frames);
+            for (frame, (press, phase)) in course.doing(rate_hz).enumerate() {
+                let t_s = frame as f64 / rate_hz;
+                sensor.step(t_s, &course.trajectory);
+                noise_of(&mut noise_counts);
+                for (clean, noise) in sensor.counts().iter().zip(&noise_counts) {
+                    #[expect(clippy::cast_possible_truncation, reason = "whole counts below 4096")]
+                    counts.push(sensor.read(*clean, *noise) as f32);
+                    with.push(sensor.convert(*clean));
+                }
+                #[expect(clippy::cast_possible_truncation, reason = "a run of some minutes")]
+                let t_ns = (t_s * 1e9).round() as i64;
+                let temperature_c = has_thermometer.then(|| climate.at(t_s));
+                rows.push(Row { press, phase, t_ns, position_mm: course.trajectory.at(t_s), temperature_c });
+            }
+            let id = if courses.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
+            runs.push(Run { id, covering_mm: course.covering.thickness_mm, rows });
+        }
+        let z = separation(&clean, &with, array.elements(), noise.effective_rms_counts(array.step_counts()));
+        let response = base.sensor.model.response();
+        let label = Label {
+            set: self.name.clone(),
+            seed: self.seed,
+            plan: self.plan,
+            frames: runs.iter().map(|run| run.rows.len()).sum(),
+            physics,
+            z,
+            noise,
+            sensitivity_counts_per_mm: response.sensitivity_counts_per_mm.clone(),
+            baseline_counts: response.baseline_counts.clone(),
+            sigma_intercept_mm: base.sensor.model.psf().sigma_intercept_mm,
+            sigma_per_mm: base.sensor.model.psf().sigma_per_mm,
+        };
+        Ok(Set { rig: base.rig, runs, counts, label })
+    }
+
+    fn check(&self) -> Result<(), HiddenError> {
+        let (field, range, value) = match self.amount {
+            Amount::Strength(value) => ("strength", "0 or more", value),
+            Amount::Separation(value) => ("z", "0 or more", value),
+        };
+        if !(value.is_finite() && value >= 0.0) {
+            return Err(HiddenError::Range { field, range, value });
+        }
+        match self.frames {
+            Some(0) => Err(HiddenError::Range { field: "frames", range: "1 or more", value: 0.0 }),
+            _ => Ok(()),
+        }
+    }
+
+    fn rng(&self, draw: Draw) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(draw as u64);
+        rng
+    }
+
+    fn seed_of(&self, draw: Draw) -> u64 {
+        self.rng(draw).random()
+    }
+}
+
+impl Content {
+    /// The physics, in the order of the catalogue.
+    fn choose(&self, rng: &mut ChaCha8Rng) -> Result<Vec<&'static Definition>, HiddenError> {
+        let mut chosen: Vec<&'static Definition> = Vec::new();
+        if self.none {
+            return Ok(chosen);
+        }
+        for id in &self.physics {
+            let found = Definition::find(id).ok_or_else(|| HiddenError::UnknownPhysics((*id).to_owned()))?;
+            chosen.push(found);
+        }
+        for effect in &self.effects {
+            let found = one_of(rng, |definition| definition.effect == Some(effect.as_str()));
+            chosen.push(found.ok_or_else(|| HiddenError::UnknownEffect(effect.clone()))?);
+        }
+        if self.outside {
+            chosen.extend(one_of(rng, |definition| definition.effect.is_none()));
+        }
+        for _ in 0..self.combine.unwrap_or(usize::from(chosen.is_empty())) {
+            let mut effects: Vec<&str> = CATALOGUE.iter().filter_map(|definition| definition.effect).collect();
+            effects.dedup();
+            effects.retain(|effect| chosen.iter().all(|other| other.effect != Some(effect)));
+            if let Some(effect) = effects.choose(rng) {
+                chosen.extend(one_of(rng, |definition| definition.effect == Some(effect)));
+            }
+        }
+        chosen.sort_by_key(|one| CATALOGUE.iter().position(|other| other.id == one.id));
+        Ok(chosen)
+    }
+}
+
+/// What a set is made on.
+struct Bench<'a> {
+    base: &'a Base,
+    courses: &'a [Course],
+    climate: Climate,
+    noise: Noise,
+}
+
+impl Bench<'_> {
+    fn sensor(&self, doses: &[Dose], run: usize) -> Sensor {
+        let covering: Covering = self.courses[run].covering;
+        let base = Simulator { covering, ..self.base.sensor.clone() };
+        Sensor::new(&base, doses, self.climate, run as u64)
+    }
+
+    /// Counts of all frames without noise.
+    fn clean(&self, doses: &[Dose]) -> Vec<f64> {
+        let rate_hz = self.base.rig.array.rate_hz();
+        let mut clean = Vec::new();
+        for (run, course) in self.courses.iter().enumerate() {
+            let mut sensor = self.sensor(doses, run);
+            for frame in 0..course.frames {
+                sensor.step(frame as f64 / rate_hz, &course.trajectory);
+                clean.extend(sensor.counts().iter().map(|count| sensor.convert(*count)));
+            }
+        }
+        clean
+    }
+
+    fn separation(&self, clean: &[f64], doses: &[Dose]) -> f64 {
+        let array = &self.base.rig.array;
+        let sigma_counts = self.noise.effective_rms_counts(array.step_counts());
+        separation(clean, &self.clean(doses), array.elements(), sigma_counts)
+    }
+
+    /// The strength at which a physics lies `wanted` from the base model: the dose, its separation, and whether it is
+    /// the one wanted. Separation grows about in proportion to strength, which makes the first guess of each step.
+    fn dose(&self, clean: &[f64], dose: Dose, wanted: f64) -> (Dose, f64, bool) {
+        let (mut low, mut high) = (STRENGTH_MIN, STRENGTH_MAX);
+        let mut strength: f64 = 1.0;
+        let mut nearest = (Dose { strength: 0.0, ..dose }, 0.0);
+        for _ in 0..24 {
+            let tried = Dose { strength, ..dose };
+            let z = self.separation(clean, &[tried]);
+            if (z - wanted).abs() <= (nearest.1 - wanted).abs() {
+                nearest = (tried, z);
+            }
+            if (z - wanted).abs() <= CLOSE * wanted || low >= 0.999 * high {
+                break;
+            }
+            if z < wanted { low = strength } else { high = strength }
+            let guess = strength * (wanted / z).clamp(0.05, 20.0);
+            let inside = guess > low * 1.001 && guess < high * 0.999;
+            let at_end = strength < STRENGTH_MAX && guess >= STRENGTH_MAX && high >= STRENGTH_MAX;
+            strength = match (inside, at_end) {
+                (true, _) => guess,
+                (false, true) => STRENGTH_MAX,
+                (false, false) => (low * high).sqrt(),
+            };
+        }
+        let (dose, z) = nearest;
+        (dose, z, (z - wanted).abs() <= 2.0 * CLOSE * wanted)
+    }
+}
+
+/// One physics by chance, of those that a condition lets through.
+fn one_of(rng: &mut ChaCha8Rng, is_right: impl Fn(&Definition) -> bool) -> Option<&'static Definition> {
+    let fitting: Vec<&'static Definition> =
+        CATALOGUE.iter().copied().filter(|definition| is_right(definition)).collect();
+    fitting.choose(rng).copied()
+}
+
+#[cfg(test)]
+#[path = "recipe_tests.rs"]
+mod tests;
