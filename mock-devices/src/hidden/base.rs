@@ -3,7 +3,9 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::{Array, Covering, ForwardModel, Indenter, ModelError, Psf, Registration, Response, Simulator};
+use tactus_model::{
+    Array, Covering, ForwardModel, Indenter, ModelError, Psf, Registration, Response, Simulator,
+};
 use tactus_schema::Rig;
 use tactus_schema::rig::SensitivityReference;
 
@@ -46,7 +48,8 @@ impl Base {
             let deviate: f64 = StandardNormal.sample(&mut rng);
             1.0 + 0.1 * deviate.clamp(-3.0, 3.0)
         };
-        let sensitivities = declared.sensitivity_counts_per_mm.iter().map(|declared| declared * gain()).collect();
+        let sensitivities =
+            declared.sensitivity_counts_per_mm.iter().map(|declared| declared * gain()).collect();
         let baseline_counts = (0..array.elements()).map(|_| rng.random_range(80.0..120.0)).collect();
         let response =
             Response { sensitivity_counts_per_mm: sensitivities, baseline_counts, ..declared.clone() };

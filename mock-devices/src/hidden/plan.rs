@@ -219,7 +219,8 @@ impl Stage {
         }
         for _ in 0..3 * parts.ladder_rounds {
             let site_mm = self.site();
-            let depths_mm = [0.13, 0.26, 0.39, 0.52, 0.65, 0.52, 0.39, 0.26, 0.13].map(|share| self.share(share));
+            let depths_mm =
+                [0.13, 0.26, 0.39, 0.52, 0.65, 0.52, 0.39, 0.26, 0.13].map(|share| self.share(share));
             self.press(&Press { dwell_s: 0.25, ..Press::at(site_mm, depths_mm.to_vec()) });
             self.rest(0.6);
         }

@@ -143,12 +143,14 @@ impl Recipe {
         let mut seeds = self.rng(Draw::Content);
         let mut physics = Vec::new();
         let mut doses = Vec::new();
-        for definition in chosen {
+        for &definition in &chosen {
             let dose = Dose { physics: definition, strength: 1.0, seed: seeds.random() };
             let (dose, z, reached) = match self.amount {
                 Amount::Strength(strength) => {
                     let dose = Dose { strength, ..dose };
-                    (dose, bench.separation(&clean, &[dose]), true)
+                    // Of one alone it is that of the set.
+                    let z = if chosen.len() == 1 { 0.0 } else { bench.separation(&clean, &[dose]) };
+                    (dose, z, true)
                 }
                 Amount::Separation(z) => bench.dose(&clean, dose, z),
             };
@@ -192,6 +194,9 @@ impl Recipe {
             runs.push(Run { id, covering_mm: course.covering.thickness_mm, rows });
         }
         let z = separation(&clean, &with, array.elements(), noise.effective_rms_counts(array.step_counts()));
+        if let [only] = &mut physics[..] {
+            only.z = z;
+        }
         let response = base.sensor.model.response();
         let label = Label {
             set: self.name.clone(),
@@ -253,7 +258,8 @@ impl Content {
             chosen.extend(one_of(rng, |definition| definition.effect.is_none()));
         }
         for _ in 0..self.combine.unwrap_or(usize::from(chosen.is_empty())) {
-            let mut effects: Vec<&str> = CATALOGUE.iter().filter_map(|definition| definition.effect).collect();
+            let mut effects: Vec<&str> =
+                CATALOGUE.iter().filter_map(|definition| definition.effect).collect();
             effects.dedup();
             effects.retain(|effect| chosen.iter().all(|other| other.effect != Some(effect)));
             if let Some(effect) = effects.choose(rng) {
@@ -315,7 +321,11 @@ impl Bench<'_> {
             if (z - wanted).abs() <= CLOSE * wanted || low >= 0.999 * high {
                 break;
             }
-            if z < wanted { low = strength } else { high = strength }
+            if z < wanted {
+                low = strength
+            } else {
+                high = strength
+            }
             let guess = strength * (wanted / z).clamp(0.05, 20.0);
             let inside = guess > low * 1.001 && guess < high * 0.999;
             let at_end = strength < STRENGTH_MAX && guess >= STRENGTH_MAX && high >= STRENGTH_MAX;

@@ -4,10 +4,11 @@ mod face;
 
 use std::fmt;
 
-use tactus_model::{Contact, Indenter, Path, Readout, Simulator};
+use tactus_model::{Contact, Covering, Indenter, Path, Readout, Simulator};
 
 use super::base::Climate;
 use super::physics::{Dose, Knobs, Now, Stage, Tool, Touch};
+use face::Face;
 
 /// A virtual sensor with hidden physics: the base model's image of every instant, changed on its way by each dose.
 ///
@@ -16,26 +17,38 @@ use super::physics::{Dose, Knobs, Now, Stage, Tool, Touch};
 /// ```
 ///
 /// Without doses it reads what [`tactus_model::ForwardModel`] does (to 1e-12 of a reading). Steps must go forward in
-/// time; the first is a sensor at rest without a past.
+/// time (one back in time counts as none); the first is a sensor at rest without a past.
 pub struct Sensor {
     base: Simulator,
     readout: Readout,
     climate: Climate,
+    doses: Vec<Dose>,
+    run: u64,
     stages: Vec<Stage>,
+    stiffness: f64,
     parameters: Vec<Vec<(String, f64)>>,
     /// Steps within one asked for are no longer than this.
     longest_step_s: f64,
     last_s: Option<f64>,
     now: Option<Now>,
-    imprint: Imprint,
+    imprint: Option<Imprint>,
     counts: Vec<f64>,
 }
 
-/// The image of a flat tool one mm deep, kept while only its depth changes.
-#[derive(Debug, Default)]
+/// What is kept of a cylinder's image while only its depth changes.
+#[derive(Debug)]
 struct Imprint {
-    of: Option<([f64; 2], Tool, f64)>,
-    indentation_mm: Vec<f64>,
+    point_mm: [f64; 2],
+    tool: Tool,
+    image: Kept,
+}
+
+#[derive(Debug)]
+enum Kept {
+    /// As declared: the base model's own image at this depth, to which others are proportional.
+    Declared { depth_mm: f64, indentation_mm: Vec<f64> },
+    /// Any other.
+    Changed(Face),
 }
 
 /// Physics that needs finer steps gets these.
@@ -64,12 +77,15 @@ impl Sensor {
             base: base.clone(),
             readout: Readout::of(base.model.array()),
             climate,
+            doses: doses.to_vec(),
+            run,
             stages,
             parameters,
             longest_step_s: if is_fine { FINE_STEP_S } else { f64::INFINITY },
             last_s: None,
             now: None,
-            imprint: Imprint { of: None, indentation_mm: vec![0.0; elements] },
+            imprint: None,
+            stiffness: 1.0,
             counts: vec![0.0; elements],
         }
     }
@@ -79,6 +95,27 @@ impl Sensor {
         &self.parameters
     }
 
+    /// Puts another covering in place, which has no past.
+    pub fn set_covering(&mut self, covering: Covering) {
+        self.base.covering = covering;
+        self.imprint = None;
+        for (stage, dose) in self.stages.iter_mut().zip(&self.doses) {
+            if let Stage::Covering(_) | Stage::Tool(_) = stage {
+                *stage = (dose.physics.make)(&mut Knobs::new(dose, &self.base, self.run));
+            }
+        }
+    }
+
+    /// Moves the covering's surface.
+    pub fn set_surface_mm(&mut self, surface_mm: f64) {
+        self.base.surface_mm = surface_mm;
+    }
+
+    /// Makes the covering answer so many times as strongly.
+    pub fn set_stiffness(&mut self, stiffness: f64) {
+        self.stiffness = stiffness;
+    }
+
     /// Goes on to a time, in s; the counts of every element there, row-major, without noise.
     pub fn step(&mut self, t_s: f64, path: &impl Path) -> &[f64] {
         let last_s = self.last_s.unwrap_or(t_s);
@@ -86,7 +123,7 @@ impl Sensor {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to 64")]
         for step in 1..=steps as u32 {
             let at_s = last_s + (t_s - last_s) * f64::from(step) / steps;
-            self.advance(at_s, at_s - self.last_s.unwrap_or(at_s), path);
+            self.advance(at_s, (at_s - self.last_s.unwrap_or(at_s)).max(0.0), path);
             self.last_s = Some(at_s);
         }
         &self.counts
@@ -158,6 +195,7 @@ impl Sensor {
                 on_covering(&now, &mut self.counts);
             }
         }
+        self.counts.iter_mut().for_each(|value| *value *= self.stiffness);
         self.base.model.respond(&mut self.counts);
         self.amplify(&now);
         for stage in &mut self.stages {
@@ -174,8 +212,8 @@ impl Sensor {
         let mut signal: Option<Vec<f64>> = None;
         for stage in &mut self.stages {
             if let Stage::Element(on_element) = stage {
-                let signal =
-                    signal.get_or_insert_with(|| self.counts.iter().zip(baselines).map(|(c, b)| c - b).collect());
+                let signal = signal
+                    .get_or_insert_with(|| self.counts.iter().zip(baselines).map(|(c, b)| c - b).collect());
                 on_element(now, signal);
             }
         }
@@ -205,20 +243,27 @@ impl Sensor {
         };
         // A cylinder goes no deeper than the covering.
         let depth_mm = depth_mm.min(self.base.covering.thickness_mm);
-        let is_flat = tool.lean == [0.0; 2];
-        let image_depth_mm = if is_flat { self.base.covering.thickness_mm / 2.0 } else { depth_mm };
-        if self.imprint.of != Some((point_mm, tool, image_depth_mm)) {
-            if tool == self.tool() {
-                self.exact(point_mm, image_depth_mm);
-            } else {
-                face::indentation(&self.base.model, point_mm, image_depth_mm, &tool, &mut self.counts);
+        let kept = self.imprint.take().filter(|kept| kept.point_mm == point_mm && kept.tool == tool);
+        let imprint =
+            kept.unwrap_or_else(|| Imprint { point_mm, tool, image: self.imprint_of(point_mm, &tool) });
+        match &imprint.image {
+            Kept::Declared { depth_mm: of_depth_mm, indentation_mm } => {
+                for (value, image_mm) in self.counts.iter_mut().zip(indentation_mm) {
+                    *value = image_mm * (depth_mm / of_depth_mm);
+                }
             }
-            self.imprint.indentation_mm.copy_from_slice(&self.counts);
-            self.imprint.of = Some((point_mm, tool, image_depth_mm));
+            Kept::Changed(face) => face.indentation(depth_mm, &mut self.counts),
         }
-        for (value, image_mm) in self.counts.iter_mut().zip(&self.imprint.indentation_mm) {
-            *value = image_mm * (depth_mm / image_depth_mm);
+        self.imprint = Some(imprint);
+    }
+
+    fn imprint_of(&mut self, point_mm: [f64; 2], tool: &Tool) -> Kept {
+        if *tool != self.tool() {
+            return Kept::Changed(Face::new(&self.base.model, point_mm, tool));
         }
+        let depth_mm = self.base.covering.thickness_mm / 2.0;
+        self.exact(point_mm, depth_mm);
+        Kept::Declared { depth_mm, indentation_mm: self.counts.clone() }
     }
 
     fn exact(&mut self, position_mm: [f64; 2], depth_mm: f64) {
@@ -230,7 +275,10 @@ impl Sensor {
 
 impl fmt::Debug for Sensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Sensor").field("parameters", &self.parameters).field("now", &self.now).finish_non_exhaustive()
+        f.debug_struct("Sensor")
+            .field("parameters", &self.parameters)
+            .field("now", &self.now)
+            .finish_non_exhaustive()
     }
 }
 

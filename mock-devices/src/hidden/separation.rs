@@ -1,7 +1,7 @@
 //! How far physics lies from the base model: what an oracle could tell.
 
-/// A recalibration changes an element's gain by no more than this share: a dead element is no matter of calibration.
-const GAIN_CHANGE_MAX: f64 = 0.5;
+/// A recalibration takes no more than this share off an element's gain: a dead element is no matter of calibration.
+const GAIN_LOSS_MAX: f64 = 0.5;
 
 /// Separation in standard deviations of the noise.
 ///
@@ -10,7 +10,7 @@ const GAIN_CHANGE_MAX: f64 = 0.5;
 /// ```
 ///
 /// `C` are the counts without physics, `D` what physics adds to them; per element, `a_e` and `b_e` are the
-/// least-squares offset and gain that recalibration takes up, `|b_e| <= 0.5`. A change of the spread that
+/// least-squares offset and gain that recalibration takes up, `b_e >= -0.5`. A change of the spread that
 /// recalibration would take up too stays in.
 ///
 /// `clean`, `with`: rows of `elements` counts each. `sigma_counts`: of the noise, as it counts in a mean.
@@ -50,7 +50,7 @@ impl Moments {
         if self.clean_clean <= 0.0 {
             return self.change_change;
         }
-        let gain = (self.clean_change / self.clean_clean).clamp(-GAIN_CHANGE_MAX, GAIN_CHANGE_MAX);
+        let gain = (self.clean_change / self.clean_clean).max(-GAIN_LOSS_MAX);
         (self.change_change - 2.0 * gain * self.clean_change + gain * gain * self.clean_clean).max(0.0)
     }
 }

@@ -10,12 +10,13 @@ pub(super) const LADDER: Definition = Definition {
     make: |knobs| {
         let leak = knobs.scaled("leak", 0.05).min(0.9);
         let cols = knobs.sensor.model.array().cols();
+        let reaches: Vec<f64> = (0..cols).map(|apart| leak.powf(apart as f64)).collect();
         Stage::element(move |_, signal| {
             for row in signal.chunks_exact_mut(cols) {
                 let clean = row.to_vec();
                 for (col, value) in row.iter_mut().enumerate() {
                     let others = clean.iter().enumerate().filter(|(other, _)| *other != col);
-                    *value += others.map(|(other, s)| s * leak.powf(other.abs_diff(col) as f64)).sum::<f64>();
+                    *value += others.map(|(other, s)| s * reaches[other.abs_diff(col)]).sum::<f64>();
                 }
             }
         })
@@ -126,7 +127,9 @@ pub(super) const KNEE: Definition = Definition {
     make: |knobs| {
         let beyond = knobs.between("slope_beyond", 0.0, 0.4);
         let knee_counts = knobs.shrinking("knee_counts", 350.0);
-        Stage::Element(Stage::each(move |s| if s > knee_counts { knee_counts + beyond * (s - knee_counts) } else { s }))
+        Stage::Element(Stage::each(move |s| {
+            if s > knee_counts { knee_counts + beyond * (s - knee_counts) } else { s }
+        }))
     },
 };
 

@@ -23,10 +23,8 @@ pub(super) const IMPRINT_TWO_EXPONENTIALS: Definition = Definition {
     about: "after release u' = a u_held (c exp(-t/T1) + (1 - c) exp(-t/T2)): skin and bulk recover each at its pace",
     is_fine: false,
     make: |knobs| {
-        let times_s = vec![
-            knobs.decade("time_constant_1_s", 0.4, 2.0),
-            knobs.decade("time_constant_2_s", 6.0, 30.0),
-        ];
+        let times_s =
+            vec![knobs.decade("time_constant_1_s", 0.4, 2.0), knobs.decade("time_constant_2_s", 6.0, 30.0)];
         let skin = knobs.between("skin_share", 0.3, 0.7);
         let share = knobs.scaled("share", 0.05);
         imprint(times_s, vec![skin, 1.0 - skin], share)

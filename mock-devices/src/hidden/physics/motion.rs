@@ -23,8 +23,10 @@ pub(super) const TURNED_MOUNT: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let middle_mm = knobs.middle_mm();
-        let centre_mm =
-            [middle_mm[0] + knobs.between("off_x_mm", -3.0, 3.0), middle_mm[1] + knobs.between("off_y_mm", -3.0, 3.0)];
+        let centre_mm = [
+            middle_mm[0] + knobs.between("off_x_mm", -3.0, 3.0),
+            middle_mm[1] + knobs.between("off_y_mm", -3.0, 3.0),
+        ];
         let side = knobs.sign("side");
         let (sin, cos) = (side * knobs.scaled("angle_deg", 1.5)).to_radians().sin_cos();
         Stage::touch(move |_, touch| {
@@ -43,8 +45,9 @@ pub(super) const STRETCHED_STAGE: Definition = Definition {
         let centre_mm = knobs.middle_mm();
         let stretch = 1.0 + knobs.sign("side") * knobs.scaled("stretch", 0.015);
         Stage::touch(move |_, touch| {
-            touch.point_mm = [0, 1]
-                .map(|axis| touch.point_mm[axis] + (stretch - 1.0) * (touch.point_mm[axis] - centre_mm[axis]));
+            touch.point_mm = [0, 1].map(|axis| {
+                touch.point_mm[axis] + (stretch - 1.0) * (touch.point_mm[axis] - centre_mm[axis])
+            });
         })
     },
 };
@@ -93,8 +96,10 @@ pub(super) const SLOPING_SURFACE: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let middle_mm = knobs.middle_mm();
-        let found_mm =
-            [middle_mm[0] + knobs.between("off_x_mm", -6.0, 6.0), middle_mm[1] + knobs.between("off_y_mm", -4.0, 4.0)];
+        let found_mm = [
+            middle_mm[0] + knobs.between("off_x_mm", -6.0, 6.0),
+            middle_mm[1] + knobs.between("off_y_mm", -4.0, 4.0),
+        ];
         let uphill = knobs.direction("direction_deg");
         let slope = knobs.scaled("slope", 0.01);
         Stage::touch(move |_, touch| touch.depth_mm += slope * dot(uphill, minus(touch.point_mm, found_mm)))
@@ -123,7 +128,8 @@ pub(super) const LOST_MOTION: Definition = Definition {
         let mut carriage_mm: Option<[f64; 3]> = None;
         Stage::path(move |_, _, tip_mm| {
             let last_mm = carriage_mm.unwrap_or(*tip_mm);
-            *tip_mm = std::array::from_fn(|axis| play(last_mm[axis], tip_mm[axis], play_mm * shares[axis] / 2.0));
+            *tip_mm =
+                std::array::from_fn(|axis| play(last_mm[axis], tip_mm[axis], play_mm * shares[axis] / 2.0));
             carriage_mm = Some(*tip_mm);
         })
     },

@@ -21,7 +21,10 @@ pub(super) const SECOND_ORDER: Definition = Definition {
             if now.dt_s > 0.0 {
                 for pole in &mut poles {
                     pole.follow(now.dt_s, counts);
-                    counts.iter_mut().enumerate().for_each(|(element, count)| *count = pole.at(element).sum());
+                    counts
+                        .iter_mut()
+                        .enumerate()
+                        .for_each(|(element, count)| *count = pole.at(element).sum());
                 }
             }
             counts.iter_mut().zip(&baselines).for_each(|(count, baseline)| *count += baseline);
@@ -111,55 +114,64 @@ pub(super) const HARMONICS: Definition = Definition {
 pub(super) const COARSE_STEPS: Definition = Definition {
     id: "coarse-steps",
     effect: Some("quantisation"),
-    about: "y = q round(x/q), q counts: the converter's low bits are lost",
+    about: "y = q round(x/q), q whole counts: the converter's low bits are lost",
     is_fine: false,
     make: |knobs| {
-        let step_counts = knobs.scaled("step_counts", 16.0);
         let declared = knobs.sensor.model.array().step_counts();
+        let steps = knobs.scaled("step_counts", 16.0).round();
         Stage::converter(move |count| {
-            if step_counts > declared { (count / step_counts).round() * step_counts } else { count }
+            if steps > 1.0 { (count / (steps * declared)).round() * (steps * declared) } else { count }
         })
     },
 };
 
-/// Readings of a while ago, straight between steps.
+/// Readings of a while ago, straight between steps: time, counts, and their integral since the first step.
 #[derive(Debug, Default)]
-struct Past(VecDeque<(f64, Vec<f64>)>);
+struct Past(VecDeque<(f64, Vec<f64>, Vec<f64>)>);
 
 impl Past {
     fn push(&mut self, t_s: f64, counts: &[f64], kept_s: f64) {
-        self.0.push_back((t_s, counts.to_vec()));
-        while self.0.get(1).is_some_and(|(second_s, _)| *second_s <= t_s - kept_s) {
+        let integral = match self.0.back() {
+            Some((last_s, last, integral)) => {
+                let piece = |(element, sum): (usize, &f64)| {
+                    sum + (t_s - last_s) * f64::midpoint(last[element], counts[element])
+                };
+                integral.iter().enumerate().map(piece).collect()
+            }
+            None => vec![0.0; counts.len()],
+        };
+        self.0.push_back((t_s, counts.to_vec(), integral));
+        while self.0.get(1).is_some_and(|(second_s, ..)| *second_s <= t_s - kept_s) {
             self.0.pop_front();
         }
     }
 
     /// Reading of an element at an earlier time; the earliest known before that.
     fn at(&self, t_s: f64, element: usize) -> f64 {
-        let after = self.0.partition_point(|(at_s, _)| *at_s < t_s).min(self.0.len() - 1);
-        let (after_s, later) = &self.0[after];
+        let after = self.after(t_s);
+        let (after_s, later, _) = &self.0[after];
         if after == 0 {
             return later[element];
         }
-        let (before_s, earlier) = &self.0[after - 1];
+        let (before_s, earlier, _) = &self.0[after - 1];
         earlier[element] + (later[element] - earlier[element]) * (t_s - before_s) / (after_s - before_s)
     }
 
     /// Means over the last `window_s`, into `means`.
     fn mean(&self, t_s: f64, window_s: f64, means: &mut [f64]) {
-        if window_s <= 0.0 {
-            return;
-        }
+        let Some((_, _, until)) = self.0.back().filter(|_| window_s > 0.0) else { return };
         let from_s = t_s - window_s;
+        let after = self.after(from_s);
+        let (after_s, later, integral) = &self.0[after];
         for (element, mean) in means.iter_mut().enumerate() {
-            let earliest = self.at(from_s, element);
-            let (mut sum, mut last_s, mut last) = (0.0, from_s, earliest);
-            for (at_s, values) in self.0.iter().filter(|(at_s, _)| *at_s > from_s) {
-                sum += (at_s - last_s) * f64::midpoint(last, values[element]);
-                (last_s, last) = (*at_s, values[element]);
-            }
-            *mean = sum / window_s;
+            let first_piece = (after_s - from_s) * f64::midpoint(self.at(from_s, element), later[element]);
+            *mean = (until[element] - integral[element] + first_piece) / window_s;
         }
+    }
+
+    /// The first step at or after a time.
+    fn after(&self, t_s: f64) -> usize {
+        self.0.partition_point(|(at_s, ..)| *at_s < t_s).min(self.0.len() - 1)
     }
 }
 

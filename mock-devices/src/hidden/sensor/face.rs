@@ -7,54 +7,74 @@ use tactus_model::{Blur, ForwardModel};
 
 use super::Tool;
 
-/// Gauss-Legendre nodes and weights on `[0, 1]`, n = 4, for the square of the radius.
-const RINGS: [(f64, f64); 4] = [
+/// Gauss-Legendre nodes and weights on `[0, 1]` for the square of the radius, n = 2 and n = 4.
+const TWO: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+const FOUR: [(f64, f64); 4] = [
     (0.069_431_844_202_973_7, 0.173_927_422_568_727),
     (0.330_009_478_207_571_9, 0.326_072_577_431_273),
     (0.669_990_521_792_428_1, 0.326_072_577_431_273),
     (0.930_568_155_797_026_3, 0.173_927_422_568_727),
 ];
-/// Evenly spaced points on each ring.
-const POINTS: u32 = 12;
 
-/// Equivalent indentation of every element, mm, overwritten.
+/// A face at a place, ready for any depth.
 ///
 /// ```text
 /// u_e = 1/d_ref sum over points of the face of dA max(0, depth + lean . (p - c) - |lean| D/2) G_x G_y
 /// ```
 ///
-/// Agrees with [`ForwardModel::indentation`] to 1e-8 of the peak where both hold.
-pub(super) fn indentation(
-    model: &ForwardModel,
-    [x_mm, y_mm]: [f64; 2],
-    depth_mm: f64,
-    tool: &Tool,
-    indentation_mm: &mut [f64],
-) {
-    let array = model.array();
-    let radius_mm = tool.diameter_mm / 2.0;
-    let lowered_mm = radius_mm * tool.lean[0].hypot(tool.lean[1]);
-    let [along_x, along_y] = tool.sigma_mm.map(|sigma_mm| Blur { sigma_mm });
-    let scale = PI * radius_mm * radius_mm / model.reference_mm2() / f64::from(POINTS);
-    indentation_mm.fill(0.0);
-    for (share, weight) in RINGS {
-        for point in 0..POINTS {
-            let (sin, cos) = (TAU * (f64::from(point) + 0.5) / f64::from(POINTS)).sin_cos();
-            let [dx, dy] = [cos, sin].map(|by| by * radius_mm * share.sqrt());
-            let stands_mm = depth_mm + tool.lean[0] * dx + tool.lean[1] * dy - lowered_mm;
-            if stands_mm <= 0.0 {
-                continue;
+/// A flat face agrees with [`ForwardModel::indentation`] to 1e-7 of the peak where both hold.
+#[derive(Debug, Clone)]
+pub(super) struct Face(Vec<Point>);
+
+/// A point of the face.
+#[derive(Debug, Clone)]
+struct Point {
+    /// Its share of the face, in units of the reference press.
+    share: f64,
+    /// How far it stands above the face's lowest point.
+    above_mm: f64,
+    /// What of it arrives in each column, and in each row.
+    of_cols: Vec<f64>,
+    of_rows: Vec<f64>,
+}
+
+impl Face {
+    pub(super) fn new(model: &ForwardModel, [x_mm, y_mm]: [f64; 2], tool: &Tool) -> Self {
+        // What leans has a corner where the surface cuts through it.
+        let (rings, points): (&[_], u32) = if tool.lean == [0.0; 2] { (&TWO, 6) } else { (&FOUR, 12) };
+        let array = model.array();
+        let [width_mm, height_mm] = array.element_mm();
+        let radius_mm = tool.diameter_mm / 2.0;
+        let lowered_mm = radius_mm * tool.lean[0].hypot(tool.lean[1]);
+        let face = PI * radius_mm * radius_mm / model.reference_mm2() / f64::from(points);
+        let arrives = |sigma_mm: f64, at_mm: f64, centres: &[f64], size: f64| -> Vec<f64> {
+            let blur = Blur { sigma_mm };
+            centres
+                .iter()
+                .map(|centre| blur.of_point(at_mm, [centre - size / 2.0, centre + size / 2.0]))
+                .collect()
+        };
+        let point = |ring: &(f64, f64), place: u32| {
+            let (sin, cos) = (TAU * (f64::from(place) + 0.5) / f64::from(points)).sin_cos();
+            let [dx, dy] = [cos, sin].map(|by| by * radius_mm * ring.0.sqrt());
+            Point {
+                share: face * ring.1,
+                above_mm: lowered_mm - tool.lean[0] * dx - tool.lean[1] * dy,
+                of_cols: arrives(tool.sigma_mm[0], x_mm + dx, array.col_centres_mm(), width_mm),
+                of_rows: arrives(tool.sigma_mm[1], y_mm + dy, array.row_centres_mm(), height_mm),
             }
-            let share_of = |blur: Blur, at_mm: f64, centres: &[f64], size: f64| -> Vec<f64> {
-                let share = |centre| blur.of_point(at_mm, [centre - size / 2.0, centre + size / 2.0]);
-                centres.iter().copied().map(share).collect()
-            };
-            let [width_mm, height_mm] = array.element_mm();
-            let of_cols = share_of(along_x, x_mm + dx, array.col_centres_mm(), width_mm);
-            let of_rows = share_of(along_y, y_mm + dy, array.row_centres_mm(), height_mm);
-            for (row, of_row) in indentation_mm.chunks_exact_mut(of_cols.len()).zip(&of_rows) {
-                for (value, of_col) in row.iter_mut().zip(&of_cols) {
-                    *value += scale * weight * stands_mm * of_row * of_col;
+        };
+        Self(rings.iter().flat_map(|ring| (0..points).map(move |place| point(ring, place))).collect())
+    }
+
+    /// Equivalent indentation of every element, mm, overwritten.
+    pub(super) fn indentation(&self, depth_mm: f64, indentation_mm: &mut [f64]) {
+        indentation_mm.fill(0.0);
+        for Point { share, above_mm, of_cols, of_rows } in &self.0 {
+            let pressed = share * (depth_mm - above_mm).max(0.0);
+            for (row, of_row) in indentation_mm.chunks_exact_mut(of_cols.len()).zip(of_rows) {
+                for (value, of_col) in row.iter_mut().zip(of_cols) {
+                    *value += pressed * of_row * of_col;
                 }
             }
         }
