@@ -206,7 +206,7 @@ impl Stage {
             // Asked out of contact too, so that it knows of the release.
             let answers_mm = f(now, depth_mm).max(0.0);
             if depth_mm > 0.0 {
-                indentation_mm.iter_mut().for_each(|value| *value *= answers_mm / depth_mm);
+                scale(indentation_mm, answers_mm / depth_mm);
             }
         })
     }
@@ -246,8 +246,8 @@ impl<'a> Knobs<'a> {
 
     /// A parameter that is `at_one / strength`: endless without strength.
     fn shrinking(&mut self, name: &str, at_one: f64) -> f64 {
-        // An endless limit has no place in a JSON label; 1e12 of anything here is as good.
-        self.keep(name, (at_one / self.strength).min(1e12))
+        // An endless limit has no place in a JSON label; 1e30 of anything here is as good.
+        self.keep(name, (at_one / self.strength).min(1e30))
     }
 
     /// A share that is proportional to strength until all of it is taken.
@@ -330,6 +330,20 @@ impl<'a> Knobs<'a> {
 /// What is left of something after a time.
 fn left(dt_s: f64, time_constant_s: f64) -> f64 {
     (-dt_s / time_constant_s).exp()
+}
+
+/// Every value times `by`.
+fn scale(values: &mut [f64], by: f64) {
+    for value in values {
+        *value *= by;
+    }
+}
+
+/// Every value and `by`.
+fn shift(values: &mut [f64], by: f64) {
+    for value in values {
+        *value += by;
+    }
 }
 
 /// `p - q`.

@@ -162,6 +162,7 @@ struct Press {
 
 struct Stage {
     centres_mm: Vec<[f64; 2]>,
+    cols: usize,
     rate_hz: f64,
     registration: Registration,
     covering: Covering,
@@ -179,6 +180,7 @@ impl Stage {
         let [x, y] = registration.to_robot(middle_mm);
         Self {
             centres_mm: (0..array.elements()).filter_map(|element| array.centre_mm(element)).collect(),
+            cols: array.cols(),
             rate_hz: array.rate_hz(),
             registration,
             covering,
@@ -234,13 +236,11 @@ impl Stage {
         }
     }
 
-    /// Every second element's centre and a few places off centre, in random order, at two depths each.
+    /// Every second element's centre, as on a chessboard, and a few places off centre, in random order, at two depths each.
     fn all_over(&mut self, parts: &Parts) {
         let odd = self.rng.random_range(0..2_usize);
-        // The array's columns differ by one from row to row: a chessboard.
-        let cols = self.centres_mm.iter().take_while(|centre| centre[1] == self.centres_mm[0][1]).count();
         let mut sites_mm: Vec<[f64; 2]> = (self.centres_mm.iter().enumerate())
-            .filter(|(element, _)| (element / cols + element % cols) % 2 == odd)
+            .filter(|(element, _)| (element / self.cols + element % self.cols) % 2 == odd)
             .map(|(_, centre_mm)| *centre_mm)
             .collect();
         for _ in 0..4 {

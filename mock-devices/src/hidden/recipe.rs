@@ -98,6 +98,7 @@ const CLOSE: f64 = 0.01;
 #[derive(Debug, Clone, Copy)]
 enum Draw {
     Content,
+    Shape,
     Base,
     Plan,
     Climate,
@@ -140,7 +141,7 @@ impl Recipe {
         let rate_hz = array.rate_hz();
         let bench = Bench { base: &base, courses: &courses, climate, noise };
         let clean = bench.clean(&[]);
-        let mut seeds = self.rng(Draw::Content);
+        let mut seeds = self.rng(Draw::Shape);
         let mut physics = Vec::new();
         let mut doses = Vec::new();
         for &definition in &chosen {
@@ -322,9 +323,9 @@ impl Bench<'_> {
                 break;
             }
             if z < wanted {
-                low = strength
+                low = strength;
             } else {
-                high = strength
+                high = strength;
             }
             let guess = strength * (wanted / z).clamp(0.05, 20.0);
             let inside = guess > low * 1.001 && guess < high * 0.999;

@@ -43,6 +43,14 @@ struct Imprint {
     image: Kept,
 }
 
+impl Imprint {
+    /// True if it is of this place and tool, to the bit: what is kept is not for a place nearby.
+    fn touches(&self, point_mm: [f64; 2], tool: &Tool) -> bool {
+        let is_same = |one: [f64; 2], other: [f64; 2]| one.map(f64::to_bits) == other.map(f64::to_bits);
+        is_same(self.point_mm, point_mm) && self.tool == *tool
+    }
+}
+
 #[derive(Debug)]
 enum Kept {
     /// As declared: the base model's own image at this depth, to which others are proportional.
@@ -243,7 +251,7 @@ impl Sensor {
         };
         // A cylinder goes no deeper than the covering.
         let depth_mm = depth_mm.min(self.base.covering.thickness_mm);
-        let kept = self.imprint.take().filter(|kept| kept.point_mm == point_mm && kept.tool == tool);
+        let kept = self.imprint.take().filter(|kept| kept.touches(point_mm, &tool));
         let imprint =
             kept.unwrap_or_else(|| Imprint { point_mm, tool, image: self.imprint_of(point_mm, &tool) });
         match &imprint.image {

@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Definition, Stage, left};
+use super::{Definition, Stage, left, shift};
 
 pub(super) const COMMON_WALK: Definition = Definition {
     id: "drift-common-walk",
@@ -15,7 +15,7 @@ pub(super) const COMMON_WALK: Definition = Definition {
         let (mut rng, mut offset) = (knobs.chance(), 0.0);
         Stage::readout(move |now, counts| {
             offset += now.dt_s.sqrt() * normal(&mut rng);
-            counts.iter_mut().for_each(|count| *count += counts_per_root_s * offset);
+            shift(counts, counts_per_root_s * offset);
         })
     },
 };

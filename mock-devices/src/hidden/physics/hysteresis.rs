@@ -63,10 +63,8 @@ pub(super) const BOUC_WEN: Definition = Definition {
                 (z_mm, last_mm) = (0.0, 0.0);
                 return 0.0;
             }
-            // Small steps of depth: the law has no time in it.
-            const STEPS: u32 = 16;
-            let dx = (depth_mm - last_mm) / f64::from(STEPS);
-            for _ in 0..STEPS {
+            let dx = (depth_mm - last_mm) / f64::from(SMALL_STEPS);
+            for _ in 0..SMALL_STEPS {
                 z_mm += dx - (b * dx.abs() * z_mm + g * dx * z_mm.abs());
             }
             last_mm = depth_mm;
@@ -74,6 +72,9 @@ pub(super) const BOUC_WEN: Definition = Definition {
         })
     },
 };
+
+/// Bouc-Wen's law is integrated in so many steps of depth; it has no time in it.
+const SMALL_STEPS: u32 = 16;
 
 /// Relays in `[0, 1]`, switching on above `a` and off below `b <= a`, as many as `exp(-(a - b)/kappa)`; all on is 1.
 ///
@@ -93,14 +94,14 @@ impl Preisach {
 
     /// Goes on to an input and gives the share of relays that are on.
     pub(super) fn follow(&mut self, input: f64) -> f64 {
-        let is_rising_now = self.turns.len() % 2 == 0;
+        let is_rising_now = self.turns.len().is_multiple_of(2);
         if (input > self.input && !is_rising_now) || (input < self.input && is_rising_now) {
             self.turns.push(self.input);
         }
         self.input = input;
         // An excursion beyond the turn before last wipes both out.
         loop {
-            let is_rising = self.turns.len() % 2 == 0;
+            let is_rising = self.turns.len().is_multiple_of(2);
             let outdone = match self.turns.len() {
                 0 => false,
                 1 => input <= 0.0,

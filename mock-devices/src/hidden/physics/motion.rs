@@ -81,7 +81,7 @@ pub(super) const DEAD_BAND: Definition = Definition {
     about: "depth' = depth - c (1 - exp(-depth/c)): a loose skin that must be taken up before anything presses",
     is_fine: false,
     make: |knobs| {
-        let band_mm = knobs.scaled("band_mm", 0.06).max(1e-12);
+        let band_mm = knobs.scaled("band_mm", 0.06).max(1e-18);
         Stage::touch(move |_, touch| {
             let taken_mm = band_mm * (1.0 - left(touch.depth_mm.max(0.0), band_mm));
             touch.depth_mm -= taken_mm;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Definition, Knobs, Now, Stage, dot, left, minus};
+use super::{Definition, Knobs, Now, Stage, dot, left, minus, scale};
 
 pub(super) const SUPPLY_DROOP: Definition = Definition {
     id: "supply-droop",
@@ -14,7 +14,7 @@ pub(super) const SUPPLY_DROOP: Definition = Definition {
         let scale_counts = knobs.between("scale_counts", 5000.0, 9000.0);
         Stage::element(move |_, signal| {
             let by = (1.0 - droop * (signal.iter().sum::<f64>() / scale_counts).powi(2)).max(0.0);
-            signal.iter_mut().for_each(|s| *s *= by);
+            scale(signal, by);
         })
     },
 };

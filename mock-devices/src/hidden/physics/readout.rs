@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use super::relaxation::Branches;
-use super::{Definition, Stage};
+use super::{Definition, Stage, shift};
 
 pub(super) const SECOND_ORDER: Definition = Definition {
     id: "low-pass-second-order",
@@ -105,7 +105,7 @@ pub(super) const HARMONICS: Definition = Definition {
             for (row, of_row) in counts.chunks_exact_mut(cols).enumerate() {
                 let angle = TAU * frequency_hz * now.t_s + step * row as f64;
                 let tone = amplitude_counts * (angle.sin() + harmonic * (2.0 * angle).sin());
-                of_row.iter_mut().for_each(|count| *count += tone);
+                shift(of_row, tone);
             }
         })
     },

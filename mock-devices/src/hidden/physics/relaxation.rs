@@ -71,7 +71,7 @@ impl Branches {
             values.resize(input.len(), 0.0);
             if dt_s > 0.0 {
                 let kept = left(dt_s, *time_s);
-                let lag = time_s / dt_s * (1.0 - kept);
+                let lag = -(-dt_s / time_s).exp_m1() * time_s / dt_s;
                 for ((value, last), input) in values.iter_mut().zip(&self.last).zip(input) {
                     *value = kept * (*value - last) + input - (input - last) * lag;
                 }
@@ -97,12 +97,18 @@ fn relaxing(times_s: Vec<f64>, weights: Vec<f64>) -> Stage {
     })
 }
 
-/// Time constants and weights of exponentials that add up to `(1 + t/T)^-b`:
-/// its Laplace mixture `1/Gamma(b) integral s^(b-1) exp(-s) exp(-s t/T) ds`, in equal steps of `ln s`.
+/// Time constants and weights of exponentials that add up to `(1 + t/T)^-b`: its Laplace mixture
+/// `1/Gamma(b) integral s^(b-1) exp(-s) exp(-s t/T) ds`, in equal steps of `ln s`. What is slower than the slowest
+/// step, `integral s^(b-1) ds = s^b/b` below it, stands for ever.
 pub(super) fn power_law(exponent: f64, time_s: f64) -> (Vec<f64>, Vec<f64>) {
-    let rates = (-14..=5).map(|step| (0.75 * f64::from(step)).exp());
-    let (times_s, weights): (Vec<f64>, Vec<f64>) =
-        rates.map(|rate| (time_s / rate, rate.powf(exponent) * (-rate).exp())).unzip();
+    const STEP: f64 = 0.75;
+    let rate_of = |step: f64| (STEP * step).exp();
+    let (mut times_s, mut weights): (Vec<f64>, Vec<f64>) = (-14..=5)
+        .map(|step| rate_of(f64::from(step)))
+        .map(|rate| (time_s / rate, STEP * rate.powf(exponent) * (-rate).exp()))
+        .unzip();
+    times_s.push(1e12);
+    weights.push(rate_of(-14.5).powf(exponent) / exponent);
     let all: f64 = weights.iter().sum();
     (times_s, weights.into_iter().map(|weight| weight / all).collect())
 }

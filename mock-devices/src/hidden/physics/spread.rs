@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use tactus_solid::layered::{Base, Layer};
 
-use super::{Definition, Knobs, Stage, left, minus};
+use super::{Definition, Knobs, Stage, left, minus, scale};
 
 pub(super) const LAYERED_TAIL: Definition = Definition {
     id: "layered-tail",
@@ -101,7 +101,7 @@ pub(super) const SOFT_EDGE: Definition = Definition {
                 (at_mm - extent_mm[axis][0]).min(extent_mm[axis][1] - at_mm)
             };
             let by = 1.0 + change * left(to_edge_mm(0).min(to_edge_mm(1)).max(0.0), length_mm);
-            indentation_mm.iter_mut().for_each(|value| *value *= by);
+            scale(indentation_mm, by);
         })
     },
 };
@@ -117,7 +117,7 @@ pub(super) const SEAM: Definition = Definition {
         let seam_mm = knobs.middle_mm()[0];
         Stage::covering(move |now, indentation_mm| {
             let by = 1.0 - loss * (1.0 - (now.touch.point_mm[0] - seam_mm).abs() / width_mm).max(0.0);
-            indentation_mm.iter_mut().for_each(|value| *value *= by);
+            scale(indentation_mm, by);
         })
     },
 };
@@ -133,7 +133,7 @@ fn tail(knobs: &mut Knobs<'_>, per_mm2: impl Fn(f64) -> f64) -> Stage {
     let centres_mm = knobs.centres_mm();
     let [width_mm, height_mm] = knobs.sensor.model.array().element_mm();
     let face_mm2 = super::super::sensor::diameter_mm(&knobs.sensor.indenter).powi(2) * PI / 4.0;
-    let scale = face_mm2 * width_mm * height_mm / knobs.sensor.model.reference_mm2();
+    let per_mm = face_mm2 * width_mm * height_mm / knobs.sensor.model.reference_mm2();
     let thickness_mm = knobs.sensor.covering.thickness_mm;
     Stage::covering(move |now, indentation_mm| {
         let depth_mm = now.touch.depth_mm.clamp(0.0, thickness_mm);
@@ -147,7 +147,7 @@ fn tail(knobs: &mut Knobs<'_>, per_mm2: impl Fn(f64) -> f64) -> Stage {
             let before = place as usize;
             let between = place - place.floor();
             let kernel = table[before] + between * (table[before + 1] - table[before]);
-            *value += weight * (depth_mm * scale * kernel - *value);
+            *value += weight * (depth_mm * per_mm * kernel - *value);
         }
     })
 }

@@ -40,12 +40,13 @@ struct Point {
 
 impl Face {
     pub(super) fn new(model: &ForwardModel, [x_mm, y_mm]: [f64; 2], tool: &Tool) -> Self {
+        let steepness = tool.lean[0].hypot(tool.lean[1]);
         // What leans has a corner where the surface cuts through it.
-        let (rings, points): (&[_], u32) = if tool.lean == [0.0; 2] { (&TWO, 6) } else { (&FOUR, 12) };
+        let (rings, points): (&[_], u32) = if steepness > 0.0 { (&FOUR, 12) } else { (&TWO, 6) };
         let array = model.array();
         let [width_mm, height_mm] = array.element_mm();
         let radius_mm = tool.diameter_mm / 2.0;
-        let lowered_mm = radius_mm * tool.lean[0].hypot(tool.lean[1]);
+        let lowered_mm = radius_mm * steepness;
         let face = PI * radius_mm * radius_mm / model.reference_mm2() / f64::from(points);
         let arrives = |sigma_mm: f64, at_mm: f64, centres: &[f64], size: f64| -> Vec<f64> {
             let blur = Blur { sigma_mm };
