@@ -45,5 +45,5 @@ pub use physics::{CATALOGUE, Definition, Dose};
 pub use plan::Plan;
 pub use recipe::{Amount, Content, HiddenError, Recipe};
 pub use sensor::Sensor;
-pub use separation::separation;
+pub use separation::Separation;
 pub use set::{Row, Run, Set};

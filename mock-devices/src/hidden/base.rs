@@ -85,6 +85,17 @@ impl Base {
     }
 }
 
+impl Base {
+    /// The same sensor under a spread so many times as wide.
+    pub(crate) fn spread_by(&self, by: f64) -> Result<Self, ModelError> {
+        let model = &self.sensor.model;
+        let Psf { sigma_intercept_mm, sigma_per_mm } = model.psf();
+        let psf = Psf { sigma_intercept_mm: by * sigma_intercept_mm, sigma_per_mm: by * sigma_per_mm };
+        let model = ForwardModel::new(model.array().clone(), psf, model.response().clone())?;
+        Ok(Self { rig: self.rig.clone(), sensor: Simulator { model, ..self.sensor.clone() } })
+    }
+}
+
 impl Climate {
     /// The climate of a seed.
     pub fn new(seed: u64) -> Self {

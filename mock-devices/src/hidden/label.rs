@@ -1,12 +1,14 @@
 //! What is in a set: kept apart from it.
 
-use serde::Serialize;
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
 
 use super::noise::Noise;
 use super::plan::Plan;
 
 /// The truth of a set.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Label {
     /// Name of the set, and of its runs.
     pub set: String,
@@ -18,8 +20,11 @@ pub struct Label {
     pub frames: usize,
     /// The physics that is in it.
     pub physics: Vec<Dosed>,
-    /// Separation of all of it together (see [`separation`](super::separation)); 0 without physics.
+    /// Separation of all of it together from the recalibrated base model (see [`Separation`](super::Separation)); 0
+    /// without physics.
     pub z: f64,
+    /// The same after the spread was recalibrated too.
+    pub z_beyond_spread: f64,
     /// The noise.
     pub noise: Noise,
     /// True sensitivities, counts per mm.
@@ -33,7 +38,7 @@ pub struct Label {
 }
 
 /// One physics of a set.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Dosed {
     /// Its id in the catalogue.
     pub id: String,
@@ -43,12 +48,14 @@ pub struct Dosed {
     pub strength: f64,
     /// Its separation alone.
     pub z: f64,
+    /// The same after the spread was recalibrated too.
+    pub z_beyond_spread: f64,
     /// False if no strength gives the separation that was asked for; then the nearest is in it.
     pub reached: bool,
     /// Seed of its shape.
     pub seed: u64,
     /// What was drawn, by name.
-    pub parameters: Vec<(String, f64)>,
+    pub parameters: BTreeMap<String, f64>,
 }
 
 impl Label {

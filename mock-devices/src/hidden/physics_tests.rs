@@ -5,7 +5,7 @@ use tactus_model::effect::REGISTRY;
 use super::super::base::{Base, Climate};
 use super::super::plan::Plan;
 use super::super::sensor::Sensor;
-use super::super::separation::separation;
+use super::super::separation::Separation;
 use super::hysteresis::Preisach;
 use super::motion::play;
 use super::relaxation::{Branches, power_law};
@@ -59,7 +59,7 @@ fn every_physics_is_the_base_model_at_no_strength_and_differs_at_full_strength()
         }
         let with = at(1.0, 1);
         assert!(with.iter().all(|count| count.is_finite()), "{}", physics.id);
-        let z = separation(&clean, &with, 48, 1.0);
+        let z = Separation::new(&clean, &with, &clean, 48, 1.0).z;
         assert!(z > 3.0, "{}: {z}", physics.id);
     }
 }

@@ -3,11 +3,11 @@
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tactus_model::{Array, Covering, Phase, Registration, Trajectory, TrajectoryError};
 
 /// An experiment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Plan {
     /// All that shows effects, within some 200 s: presses all over at two depths each, repeats, ladders, rates,

@@ -3,8 +3,9 @@
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tactus_model::{Covering, ModelError, Simulator, TrajectoryError};
+use tactus_model::{ModelError, Simulator, TrajectoryError};
 use tactus_record::table::TableError;
+use tactus_schema::Rig;
 
 use super::base::{Base, Climate};
 use super::label::{Dosed, Label};
@@ -12,7 +13,7 @@ use super::noise::{Noise, NoiseKind};
 use super::physics::{CATALOGUE, Definition, Dose};
 use super::plan::{Course, Plan};
 use super::sensor::Sensor;
-use super::separation::separation;
+use super::separation::Separation;
 use super::set::{Row, Run, Set};
 
 /// How to make one set. All of it follows from this.
@@ -54,7 +55,7 @@ pub struct Content {
 pub enum Amount {
     /// At this strength.
     Strength(f64),
-    /// As much as lies this far from the base model, each taken alone (see [`separation`]).
+    /// As much as lies this far from the base model, each taken alone (see [`Separation`]).
     Separation(f64),
 }
 
@@ -102,6 +103,7 @@ enum Draw {
     Base,
     Plan,
     Climate,
+    Thermometer,
     NoiseKind,
     Noise,
 }
@@ -127,78 +129,22 @@ impl Recipe {
     pub fn make(&self) -> Result<Set, HiddenError> {
         self.check()?;
         let chosen = self.content.choose(&mut self.rng(Draw::Content))?;
-        let noise = Noise::draw(self.noise, &mut self.rng(Draw::NoiseKind));
         let base = Base::new(self.seed_of(Draw::Base))?;
-        let array = &base.rig.array;
-        let courses = self.plan.courses(
-            array,
-            base.rig.registration,
-            base.rig.covering,
-            self.frames,
-            self.seed_of(Draw::Plan),
-        )?;
+        let Rig { array, registration, covering, .. } = &base.rig;
+        let courses =
+            self.plan.courses(array, *registration, *covering, self.frames, self.seed_of(Draw::Plan))?;
         let climate = Climate::new(self.seed_of(Draw::Climate));
-        let rate_hz = array.rate_hz();
-        let bench = Bench { base: &base, courses: &courses, climate, noise };
-        let clean = bench.clean(&[]);
-        let mut seeds = self.rng(Draw::Shape);
-        let mut physics = Vec::new();
-        let mut doses = Vec::new();
-        for &definition in &chosen {
-            let dose = Dose { physics: definition, strength: 1.0, seed: seeds.random() };
-            let (dose, z, reached) = match self.amount {
-                Amount::Strength(strength) => {
-                    let dose = Dose { strength, ..dose };
-                    // Of one alone it is that of the set.
-                    let z = if chosen.len() == 1 { 0.0 } else { bench.separation(&clean, &[dose]) };
-                    (dose, z, true)
-                }
-                Amount::Separation(z) => bench.dose(&clean, dose, z),
-            };
-            doses.push(dose);
-            physics.push(Dosed {
-                id: definition.id.into(),
-                effect: definition.effect.map(Into::into),
-                strength: dose.strength,
-                z,
-                reached,
-                seed: dose.seed,
-                parameters: Vec::new(),
-            });
-        }
-        let has_thermometer = self.rng(Draw::Climate).random_bool(0.7);
-        let mut rng = self.rng(Draw::Noise);
-        let mut noise_of = noise.series(&mut rng, array.elements());
-        let mut noise_counts = vec![0.0; array.elements()];
-        let (mut runs, mut counts, mut with) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, course) in courses.iter().enumerate() {
-            let mut sensor = bench.sensor(&doses, index);
-            for (dosed, drawn) in physics.iter_mut().zip(sensor.parameters()) {
-                dosed.parameters.clone_from(drawn);
-            }
-            let mut rows = Vec::with_capacity(course.frames);
-            for (frame, (press, phase)) in course.doing(rate_hz).enumerate() {
-                let t_s = frame as f64 / rate_hz;
-                sensor.step(t_s, &course.trajectory);
-                noise_of(&mut noise_counts);
-                for (clean, noise) in sensor.counts().iter().zip(&noise_counts) {
-                    #[expect(clippy::cast_possible_truncation, reason = "whole counts below 4096")]
-                    counts.push(sensor.read(*clean, *noise) as f32);
-                    with.push(sensor.convert(*clean));
-                }
-                #[expect(clippy::cast_possible_truncation, reason = "a run of some minutes")]
-                let t_ns = (t_s * 1e9).round() as i64;
-                let temperature_c = has_thermometer.then(|| climate.at(t_s));
-                rows.push(Row { press, phase, t_ns, position_mm: course.trajectory.at(t_s), temperature_c });
-            }
-            let id = if courses.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
-            runs.push(Run { id, covering_mm: course.covering.thickness_mm, rows });
-        }
-        let z = separation(&clean, &with, array.elements(), noise.effective_rms_counts(array.step_counts()));
+        let noise = Noise::draw(self.noise, &mut self.rng(Draw::NoiseKind));
+        let bench = Bench::new(&base, courses, climate, noise);
+        let (doses, mut physics) = self.doses(&chosen, &bench);
+        let Readings { runs, counts, clean } = self.read(&bench, &doses);
+        let Separation { z, z_beyond_spread } = bench.separation_of(&clean);
+        // Of one alone it is that of the set.
         if let [only] = &mut physics[..] {
-            only.z = z;
+            (only.z, only.z_beyond_spread) = (z, z_beyond_spread);
         }
         let response = base.sensor.model.response();
+        let psf = base.sensor.model.psf();
         let label = Label {
             set: self.name.clone(),
             seed: self.seed,
@@ -206,13 +152,74 @@ impl Recipe {
             frames: runs.iter().map(|run| run.rows.len()).sum(),
             physics,
             z,
+            z_beyond_spread,
             noise,
             sensitivity_counts_per_mm: response.sensitivity_counts_per_mm.clone(),
             baseline_counts: response.baseline_counts.clone(),
-            sigma_intercept_mm: base.sensor.model.psf().sigma_intercept_mm,
-            sigma_per_mm: base.sensor.model.psf().sigma_per_mm,
+            sigma_intercept_mm: psf.sigma_intercept_mm,
+            sigma_per_mm: psf.sigma_per_mm,
         };
         Ok(Set { rig: base.rig, runs, counts, label })
+    }
+
+    /// How much of each physics, and what the label says of it.
+    fn doses(&self, chosen: &[&'static Definition], bench: &Bench<'_>) -> (Vec<Dose>, Vec<Dosed>) {
+        let mut seeds = self.rng(Draw::Shape);
+        let dose_of = |physics: &&'static Definition| {
+            let dose = Dose { physics, strength: 1.0, seed: seeds.random() };
+            let (dose, separation, reached) = match self.amount {
+                Amount::Strength(strength) => {
+                    let dose = Dose { strength, ..dose };
+                    let is_alone = chosen.len() == 1;
+                    (dose, if is_alone { Separation::default() } else { bench.separation(dose) }, true)
+                }
+                Amount::Separation(z) => bench.dose(dose, z),
+            };
+            let dosed = Dosed {
+                id: physics.id.into(),
+                effect: physics.effect.map(Into::into),
+                strength: dose.strength,
+                z: separation.z,
+                z_beyond_spread: separation.z_beyond_spread,
+                reached,
+                seed: dose.seed,
+                parameters: bench.sensor(bench.base, &[dose], 0).parameters().concat().into_iter().collect(),
+            };
+            (dose, dosed)
+        };
+        chosen.iter().map(dose_of).unzip()
+    }
+
+    /// What the sensor reads in all runs.
+    fn read(&self, bench: &Bench<'_>, doses: &[Dose]) -> Readings {
+        let array = &bench.base.rig.array;
+        let has_thermometer = self.rng(Draw::Thermometer).random_bool(0.7);
+        let mut rng = self.rng(Draw::Noise);
+        let mut noise_of = bench.noise.series(&mut rng, array.elements());
+        let mut noise_counts = vec![0.0; array.elements()];
+        let mut readings = Readings::default();
+        for (index, course) in bench.courses.iter().enumerate() {
+            let mut sensor = bench.sensor(bench.base, doses, index);
+            let mut rows = Vec::with_capacity(course.frames);
+            for (frame, (press, phase)) in course.doing(array.rate_hz()).enumerate() {
+                let t_s = frame as f64 / array.rate_hz();
+                sensor.step(t_s, &course.trajectory);
+                noise_of(&mut noise_counts);
+                for (clean, noise) in sensor.counts().iter().zip(&noise_counts) {
+                    #[expect(clippy::cast_possible_truncation, reason = "whole counts below 4096")]
+                    readings.counts.push(sensor.read(*clean, *noise) as f32);
+                    readings.clean.push(sensor.convert(*clean));
+                }
+                #[expect(clippy::cast_possible_truncation, reason = "a run of some minutes")]
+                let t_ns = (t_s * 1e9).round() as i64;
+                let temperature_c = sensor.temperature_c().filter(|_| has_thermometer);
+                rows.push(Row { press, phase, t_ns, position_mm: course.trajectory.at(t_s), temperature_c });
+            }
+            let id =
+                if bench.courses.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
+            readings.runs.push(Run { id, covering_mm: course.covering.thickness_mm, rows });
+        }
+        readings
     }
 
     fn check(&self) -> Result<(), HiddenError> {
@@ -261,6 +268,7 @@ impl Content {
         for _ in 0..self.combine.unwrap_or(usize::from(chosen.is_empty())) {
             let mut effects: Vec<&str> =
                 CATALOGUE.iter().filter_map(|definition| definition.effect).collect();
+            effects.sort_unstable();
             effects.dedup();
             effects.retain(|effect| chosen.iter().all(|other| other.effect != Some(effect)));
             if let Some(effect) = effects.choose(rng) {
@@ -272,52 +280,80 @@ impl Content {
     }
 }
 
+/// What is read of a sensor.
+#[derive(Debug, Default)]
+struct Readings {
+    runs: Vec<Run>,
+    counts: Vec<f32>,
+    /// The same without noise and before whole steps.
+    clean: Vec<f64>,
+}
+
 /// What a set is made on.
 struct Bench<'a> {
     base: &'a Base,
-    courses: &'a [Course],
+    courses: Vec<Course>,
     climate: Climate,
     noise: Noise,
+    /// Counts of all frames, without physics and noise.
+    clean: Vec<f64>,
+    /// The same under a spread that is wider by [`WIDER`].
+    wider: Vec<f64>,
 }
 
-impl Bench<'_> {
-    fn sensor(&self, doses: &[Dose], run: usize) -> Sensor {
-        let covering: Covering = self.courses[run].covering;
-        let base = Simulator { covering, ..self.base.sensor.clone() };
-        Sensor::new(&base, doses, self.climate, run as u64)
+/// The spread of [`Bench::wider`], as a multiple of the true one.
+const WIDER: f64 = 1.001;
+
+impl<'a> Bench<'a> {
+    fn new(base: &'a Base, courses: Vec<Course>, climate: Climate, noise: Noise) -> Self {
+        let mut bench = Self { base, courses, climate, noise, clean: Vec::new(), wider: Vec::new() };
+        bench.clean = bench.counts(base, &[]);
+        bench.wider =
+            base.spread_by(WIDER).map_or_else(|_| bench.clean.clone(), |wider| bench.counts(&wider, &[]));
+        bench
+    }
+
+    fn sensor(&self, base: &Base, doses: &[Dose], run: usize) -> Sensor {
+        let covering = self.courses[run].covering;
+        Sensor::new(&Simulator { covering, ..base.sensor.clone() }, doses, self.climate, run as u64)
     }
 
     /// Counts of all frames without noise.
-    fn clean(&self, doses: &[Dose]) -> Vec<f64> {
-        let rate_hz = self.base.rig.array.rate_hz();
-        let mut clean = Vec::new();
+    fn counts(&self, base: &Base, doses: &[Dose]) -> Vec<f64> {
+        let rate_hz = base.rig.array.rate_hz();
+        let mut counts = Vec::new();
         for (run, course) in self.courses.iter().enumerate() {
-            let mut sensor = self.sensor(doses, run);
+            let mut sensor = self.sensor(base, doses, run);
             for frame in 0..course.frames {
                 sensor.step(frame as f64 / rate_hz, &course.trajectory);
-                clean.extend(sensor.counts().iter().map(|count| sensor.convert(*count)));
+                counts.extend(sensor.counts().iter().map(|count| sensor.convert(*count)));
             }
         }
-        clean
+        counts
     }
 
-    fn separation(&self, clean: &[f64], doses: &[Dose]) -> f64 {
+    fn separation(&self, dose: Dose) -> Separation {
+        self.separation_of(&self.counts(self.base, &[dose]))
+    }
+
+    fn separation_of(&self, with: &[f64]) -> Separation {
         let array = &self.base.rig.array;
         let sigma_counts = self.noise.effective_rms_counts(array.step_counts());
-        separation(clean, &self.clean(doses), array.elements(), sigma_counts)
+        Separation::new(&self.clean, with, &self.wider, array.elements(), sigma_counts)
     }
 
     /// The strength at which a physics lies `wanted` from the base model: the dose, its separation, and whether it is
     /// the one wanted. Separation grows about in proportion to strength, which makes the first guess of each step.
-    fn dose(&self, clean: &[f64], dose: Dose, wanted: f64) -> (Dose, f64, bool) {
+    fn dose(&self, dose: Dose, wanted: f64) -> (Dose, Separation, bool) {
         let (mut low, mut high) = (STRENGTH_MIN, STRENGTH_MAX);
         let mut strength: f64 = 1.0;
-        let mut nearest = (Dose { strength: 0.0, ..dose }, 0.0);
+        let mut nearest = (Dose { strength: 0.0, ..dose }, Separation::default());
         for _ in 0..24 {
             let tried = Dose { strength, ..dose };
-            let z = self.separation(clean, &[tried]);
-            if (z - wanted).abs() <= (nearest.1 - wanted).abs() {
-                nearest = (tried, z);
+            let separation = self.separation(tried);
+            let z = separation.z;
+            if (z - wanted).abs() <= (nearest.1.z - wanted).abs() {
+                nearest = (tried, separation);
             }
             if (z - wanted).abs() <= CLOSE * wanted || low >= 0.999 * high {
                 break;
@@ -328,16 +364,16 @@ impl Bench<'_> {
                 high = strength;
             }
             let guess = strength * (wanted / z).clamp(0.05, 20.0);
-            let inside = guess > low * 1.001 && guess < high * 0.999;
-            let at_end = strength < STRENGTH_MAX && guess >= STRENGTH_MAX && high >= STRENGTH_MAX;
-            strength = match (inside, at_end) {
-                (true, _) => guess,
-                (false, true) => STRENGTH_MAX,
-                (false, false) => (low * high).sqrt(),
+            strength = if guess > low * 1.001 && guess < high * 0.999 {
+                guess
+            } else if guess >= STRENGTH_MAX && high >= STRENGTH_MAX {
+                STRENGTH_MAX
+            } else {
+                (low * high).sqrt()
             };
         }
-        let (dose, z) = nearest;
-        (dose, z, (z - wanted).abs() <= 2.0 * CLOSE * wanted)
+        let (dose, separation) = nearest;
+        (dose, separation, (separation.z - wanted).abs() <= 2.0 * CLOSE * wanted)
     }
 }
 

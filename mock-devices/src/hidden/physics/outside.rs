@@ -96,7 +96,7 @@ pub(super) const RINGING: Definition = Definition {
     id: "ringing",
     effect: None,
     about: "depth' = depth + a v exp(-t/T) sin(2 pi f t) since the last stop: the column swings after every move",
-    is_fine: false,
+    is_fine: true,
     make: |knobs| {
         let frequency_hz = knobs.between("frequency_hz", 3.0, 9.0);
         let time_s = knobs.between("time_constant_s", 0.2, 0.6);
