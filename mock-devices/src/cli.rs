@@ -1,4 +1,4 @@
-//! The program `tactus-mock`: a virtual rig at pseudo-terminals.
+//! The program `tactus-mock`: a virtual rig at pseudo-terminals; test data with hidden physics.
 
 use std::fs;
 use std::io::{self, BufRead, IsTerminal, Write};
@@ -17,6 +17,7 @@ use tokio::time::Instant;
 use crate::cable::{self, Port};
 use crate::control::RigControl;
 use crate::faults::{Fault, FaultScript};
+use crate::hidden::cli::HiddenArgs;
 use crate::rig::start_devices;
 use crate::terminal::TerminalPort;
 use crate::truth::Truth;
@@ -37,6 +38,8 @@ enum Command {
     /// It then reads faults from standard input, one a line such as `sensor stall 2s`, answers each with
     /// `ok` or `error: ...`, and runs until it is terminated.
     Rig(RigArgs),
+    /// Test data for discovery: measurement tables with physics in them that the base model does not know.
+    Hidden(HiddenArgs),
 }
 
 #[derive(Debug, Args)]
@@ -69,7 +72,10 @@ impl Cli {
     /// # Errors
     /// With the file and the place that are wrong, or what the system refused.
     pub fn run(self) -> Result<()> {
-        let Command::Rig(args) = self.command;
+        let args = match self.command {
+            Command::Rig(args) => args,
+            Command::Hidden(args) => return args.run(),
+        };
         tracing_subscriber::fmt().with_writer(io::stderr).with_ansi(io::stderr().is_terminal()).init();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         runtime.block_on(serve(args))

@@ -5,10 +5,13 @@
 //! world: where the tip truly is, what it presses, what the elements feel. The devices see no more of it
 //! than real ones would. What they feel is the rig file's `[simulation]`, or a model in its place ([`TruthFile`]). [`RigControl`] sees all of it, and makes things go wrong ([`faults`]).
 //!
+//! [`hidden`] makes test data for discovery: sensors with physics that the base model does not know.
+//!
 //! Everything random follows from one seed, so that two runs in virtual time are identical to the byte.
 
 pub mod cli;
 pub mod faults;
+pub mod hidden;
 
 #[cfg(test)]
 mod bench;

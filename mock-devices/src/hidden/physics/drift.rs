@@ -1,0 +1,112 @@
+//! Readout: zero and gain that wander.
+
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::{Definition, Stage, left, shift};
+
+pub(super) const COMMON_WALK: Definition = Definition {
+    id: "drift-common-walk",
+    effect: Some("baseline-drift"),
+    about: "b' = b + W(t), W one Wiener process for all elements: the reference voltage wanders",
+    is_fine: false,
+    make: |knobs| {
+        let counts_per_root_s = knobs.scaled("counts_per_root_s", 0.5);
+        let (mut rng, mut offset) = (knobs.chance(), 0.0);
+        Stage::readout(move |now, counts| {
+            offset += now.dt_s.sqrt() * normal(&mut rng);
+            shift(counts, counts_per_root_s * offset);
+        })
+    },
+};
+
+pub(super) const ORNSTEIN_UHLENBECK: Definition = Definition {
+    id: "drift-ornstein-uhlenbeck",
+    effect: Some("baseline-drift"),
+    about: "db = -b dt/T + noise, each element for itself: leakage currents (Uhlenbeck and Ornstein 1930)",
+    is_fine: false,
+    make: |knobs| {
+        let time_s = knobs.decade("time_constant_s", 15.0, 60.0);
+        let rms_counts = knobs.scaled("rms_counts", 3.0);
+        let mut rng = knobs.chance();
+        let mut offsets: Vec<f64> = (0..knobs.elements()).map(|_| normal(&mut rng)).collect();
+        Stage::readout(move |now, counts| {
+            let kept = left(now.dt_s, time_s);
+            let fresh = (1.0 - kept * kept).sqrt();
+            for (count, offset) in counts.iter_mut().zip(&mut offsets) {
+                *offset = kept * *offset + fresh * normal(&mut rng);
+                *count += rms_counts * *offset;
+            }
+        })
+    },
+};
+
+pub(super) const WARM_UP: Definition = Definition {
+    id: "drift-warm-up",
+    effect: Some("baseline-drift"),
+    about: "b' = b + A_e (1 - exp(-t/T)), A_e of one sign: the electronics warm up after they were switched on",
+    is_fine: false,
+    make: |knobs| {
+        let time_s = knobs.decade("time_constant_s", 25.0, 120.0);
+        let rise_counts = knobs.sign("side") * knobs.scaled("rise_counts", 10.0);
+        let shares = knobs.per_element(0.5, 1.5);
+        Stage::readout(move |now, counts| {
+            let warm = 1.0 - left(now.t_s, time_s);
+            counts.iter_mut().zip(&shares).for_each(|(count, share)| *count += rise_counts * share * warm);
+        })
+    },
+};
+
+pub(super) const GAIN_WARM_UP: Definition = Definition {
+    id: "gain-warm-up",
+    effect: Some("gain-drift"),
+    about: "s' = s (1 + a (1 - exp(-t/T))): the excitation's amplitude settles after it was switched on",
+    is_fine: false,
+    make: |knobs| {
+        let time_s = knobs.decade("time_constant_s", 25.0, 120.0);
+        let change = knobs.sign("side") * knobs.scaled("change", 0.05);
+        gain(knobs.baselines_counts(), move |t_s, _, _| change * (1.0 - left(t_s, time_s)))
+    },
+};
+
+pub(super) const GAIN_WALK: Definition = Definition {
+    id: "gain-walk",
+    effect: Some("gain-drift"),
+    about: "s' = s (1 + W(t)), W one Wiener process for all elements: the excitation's amplitude wanders",
+    is_fine: false,
+    make: |knobs| {
+        let per_root_s = knobs.scaled("per_root_s", 0.004);
+        let (mut rng, mut offset) = (knobs.chance(), 0.0);
+        gain(knobs.baselines_counts(), move |_, dt_s, _| {
+            offset += dt_s.sqrt() * normal(&mut rng);
+            per_root_s * offset
+        })
+    },
+};
+
+pub(super) const GAIN_TEMPERATURE: Definition = Definition {
+    id: "gain-temperature",
+    effect: Some("gain-drift"),
+    about: "s' = s (1 + a (T - T_0)): the covering's permittivity changes with temperature",
+    is_fine: false,
+    make: |knobs| {
+        let per_k = knobs.sign("side") * knobs.scaled("per_k", 0.02);
+        let mut first_c = None;
+        gain(knobs.baselines_counts(), move |_, _, temperature_c| {
+            per_k * (temperature_c - *first_c.get_or_insert(temperature_c))
+        })
+    },
+};
+
+/// A gain of all elements: one plus what `excess` says of the time, the step and the temperature.
+fn gain(baselines: Vec<f64>, mut excess: impl FnMut(f64, f64, f64) -> f64 + Send + 'static) -> Stage {
+    Stage::readout(move |now, counts| {
+        let by = excess(now.t_s, now.dt_s, now.temperature_c);
+        counts.iter_mut().zip(&baselines).for_each(|(count, baseline)| *count += by * (*count - baseline));
+    })
+}
+
+/// A deviate of the standard normal distribution.
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}

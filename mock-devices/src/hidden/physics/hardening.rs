@@ -1,0 +1,36 @@
+//! Covering: response that grows faster than depth.
+
+use super::{Definition, Stage};
+
+pub(super) const EXPONENTIAL: Definition = Definition {
+    id: "hardening-exponential",
+    effect: Some("hardening"),
+    about: "depth' = (exp(b depth) - 1)/b: an exponential elastic law of soft tissue (Fung 1967)",
+    is_fine: false,
+    make: |knobs| {
+        let by_mm = knobs.scaled("rate_per_mm", 0.6).max(1e-12);
+        Stage::depth(move |_, depth_mm| (by_mm * depth_mm).exp_m1() / by_mm)
+    },
+};
+
+pub(super) const POWER: Definition = Definition {
+    id: "hardening-power",
+    effect: Some("hardening"),
+    about: "u' = u + a u^1.5: a Hertz-like term of every element's own indentation",
+    is_fine: false,
+    make: |knobs| {
+        let share = knobs.scaled("share_per_mm_0_5", 0.4);
+        Stage::Covering(Stage::each(move |u_mm| u_mm + share * u_mm.max(0.0).powf(1.5)))
+    },
+};
+
+pub(super) const QUADRATIC: Definition = Definition {
+    id: "hardening-quadratic",
+    effect: Some("hardening"),
+    about: "u' = u + k u^2: the paper's quadratic response at large depths (Sec. 2.2)",
+    is_fine: false,
+    make: |knobs| {
+        let quadratic_per_mm = knobs.scaled("quadratic_per_mm", 0.4);
+        Stage::Covering(Stage::each(move |u_mm| u_mm + quadratic_per_mm * u_mm * u_mm))
+    },
+};

@@ -1,0 +1,39 @@
+//! Covering: response that depends on the speed of loading.
+
+use super::{Definition, Stage};
+
+pub(super) const POWER: Definition = Definition {
+    id: "rate-power",
+    effect: Some("rate-stiffening"),
+    about: "u' = u (1 + a (v/v0)^n) while going in, v0 = 1 mm/s: a power-law dashpot beside the spring (Cowper-Symonds)",
+    is_fine: false,
+    make: |knobs| {
+        let exponent = knobs.between("exponent", 0.25, 0.6);
+        let share = knobs.scaled("share_at_1_mm_per_s", 0.12);
+        Stage::depth(move |now, depth_mm| {
+            let inward_mm_per_s = (-now.velocity_mm_per_s[2]).max(0.0);
+            depth_mm * (1.0 + share * inward_mm_per_s.powf(exponent))
+        })
+    },
+};
+
+pub(super) const LOGARITHMIC: Definition = Definition {
+    id: "rate-logarithmic",
+    effect: Some("rate-stiffening"),
+    about: "u' = u (1 + a ln(1 + v/v0)), v the speed at which this depth was reached: Johnson-Cook's rate law",
+    is_fine: false,
+    make: |knobs| {
+        let scale_mm_per_s = knobs.decade("scale_mm_per_s", 0.05, 0.5);
+        let share = knobs.scaled("share", 0.05);
+        let mut loaded_mm_per_s = 0.0;
+        Stage::depth(move |now, depth_mm| {
+            let inward_mm_per_s = -now.velocity_mm_per_s[2];
+            if depth_mm <= 0.0 {
+                loaded_mm_per_s = 0.0;
+            } else if inward_mm_per_s > 0.0 {
+                loaded_mm_per_s = inward_mm_per_s;
+            }
+            depth_mm * (1.0 + share * (loaded_mm_per_s / scale_mm_per_s).ln_1p())
+        })
+    },
+};

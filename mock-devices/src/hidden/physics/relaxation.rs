@@ -1,0 +1,114 @@
+//! Covering: response that changes while depth is held.
+
+use super::{Definition, Stage, left};
+
+pub(super) const PRONY: Definition = Definition {
+    id: "relaxation-prony",
+    effect: Some("relaxation"),
+    about: "u' = integral of E(t - s) du(s), E = 1 - sum g_i (1 - exp(-t/T_i)): generalised Maxwell, three branches",
+    is_fine: false,
+    make: |knobs| {
+        let times_s = vec![
+            knobs.decade("time_constant_1_s", 0.15, 0.6),
+            knobs.decade("time_constant_2_s", 0.8, 4.0),
+            knobs.decade("time_constant_3_s", 5.0, 25.0),
+        ];
+        let parts = ["part_1", "part_2", "part_3"].map(|name| knobs.between(name, 0.5, 1.5));
+        let share = knobs.share("relaxed_share", 0.15);
+        let all: f64 = parts.iter().sum();
+        relaxing(times_s, parts.map(|part| share * part / all).to_vec())
+    },
+};
+
+pub(super) const POWER_LAW: Definition = Definition {
+    id: "relaxation-power-law",
+    effect: Some("relaxation"),
+    about: "E(t) = 1 - g + g (1 + t/T)^-b: power-law relaxation of a fractional element (Laplace mixture of exponentials)",
+    is_fine: false,
+    make: |knobs| {
+        let exponent = knobs.between("exponent", 0.15, 0.5);
+        let time_s = knobs.decade("time_constant_s", 0.05, 0.3);
+        let share = knobs.share("relaxed_share", 0.2);
+        let (times_s, weights) = power_law(exponent, time_s);
+        relaxing(times_s, weights.into_iter().map(|weight| share * weight).collect())
+    },
+};
+
+pub(super) const LOGARITHMIC: Definition = Definition {
+    id: "creep-logarithmic",
+    effect: Some("relaxation"),
+    about: "u' = u (1 + a log10(1 + t_c/T)), t_c the time in contact: logarithmic creep, signal grows at held depth",
+    is_fine: false,
+    make: |knobs| {
+        let time_s = knobs.decade("time_constant_s", 0.1, 1.0);
+        let by_decade = knobs.scaled("per_decade", 0.05);
+        let mut in_contact_s = 0.0;
+        Stage::depth(move |now, depth_mm| {
+            in_contact_s = if depth_mm > 0.0 { in_contact_s + now.dt_s } else { 0.0 };
+            depth_mm * (1.0 + by_decade * (1.0 + in_contact_s / time_s).log10())
+        })
+    },
+};
+
+/// Parallel branches that each follow their input with a time constant; exact while the input is a straight line.
+#[derive(Debug)]
+pub(super) struct Branches {
+    times_s: Vec<f64>,
+    /// One list per branch, one value per element.
+    values: Vec<Vec<f64>>,
+    last: Vec<f64>,
+}
+
+impl Branches {
+    pub(super) fn new(times_s: Vec<f64>) -> Self {
+        Self { values: vec![Vec::new(); times_s.len()], times_s, last: Vec::new() }
+    }
+
+    /// Goes on to an input. At the first one all branches stand at rest, at 0.
+    pub(super) fn follow(&mut self, dt_s: f64, input: &[f64]) {
+        self.last.resize(input.len(), 0.0);
+        for (time_s, values) in self.times_s.iter().zip(&mut self.values) {
+            values.resize(input.len(), 0.0);
+            if dt_s > 0.0 {
+                let kept = left(dt_s, *time_s);
+                let lag = -(-dt_s / time_s).exp_m1() * time_s / dt_s;
+                for ((value, last), input) in values.iter_mut().zip(&self.last).zip(input) {
+                    *value = kept * (*value - last) + input - (input - last) * lag;
+                }
+            }
+        }
+        self.last.copy_from_slice(input);
+    }
+
+    /// Value of each branch at an element.
+    pub(super) fn at(&self, element: usize) -> impl Iterator<Item = f64> {
+        self.values.iter().map(move |values| values[element])
+    }
+}
+
+/// `u - sum of weight times branch`: the stress of a relaxing solid.
+fn relaxing(times_s: Vec<f64>, weights: Vec<f64>) -> Stage {
+    let mut branches = Branches::new(times_s);
+    Stage::covering(move |now, indentation_mm| {
+        branches.follow(now.dt_s, indentation_mm);
+        for (element, value) in indentation_mm.iter_mut().enumerate() {
+            *value -= branches.at(element).zip(&weights).map(|(branch, weight)| weight * branch).sum::<f64>();
+        }
+    })
+}
+
+/// Time constants and weights of exponentials that add up to `(1 + t/T)^-b`: its Laplace mixture
+/// `1/Gamma(b) integral s^(b-1) exp(-s) exp(-s t/T) ds`, in equal steps of `ln s`. What is slower than the slowest
+/// step, `integral s^(b-1) ds = s^b/b` below it, stands for ever.
+pub(super) fn power_law(exponent: f64, time_s: f64) -> (Vec<f64>, Vec<f64>) {
+    const STEP: f64 = 0.75;
+    let rate_of = |step: f64| (STEP * step).exp();
+    let (mut times_s, mut weights): (Vec<f64>, Vec<f64>) = (-14..=5)
+        .map(|step| rate_of(f64::from(step)))
+        .map(|rate| (time_s / rate, STEP * rate.powf(exponent) * (-rate).exp()))
+        .unzip();
+    times_s.push(1e12);
+    weights.push(rate_of(-14.5).powf(exponent) / exponent);
+    let all: f64 = weights.iter().sum();
+    (times_s, weights.into_iter().map(|weight| weight / all).collect())
+}
