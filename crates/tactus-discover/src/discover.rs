@@ -104,9 +104,9 @@ pub fn discover(
     let (hints, rows) = {
         let mut rows = thin;
         rows.weigh(frames, &noise, &heldout);
-        let problem = Problem::new(Sensor { known, frames, rows: &rows }, &noise);
+        let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
         let base = problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, &[], options.threads)?;
-        let of_frames = Sensor { known, frames, rows: &whole }.predict(&base.parameters)?;
+        let of_frames = Sensor::new(known, frames, &whole).predict(&base.parameters)?;
         let residual: Vec<f64> =
             frames.counts.iter().zip(&of_frames).map(|(counts, of)| f64::from(*counts) - of).collect();
         let frequencies_hz = spectrum::lines_hz(frames, &residual);
@@ -121,7 +121,7 @@ pub fn discover(
         };
         (Hints { frequencies_hz, wiring }, rows)
     };
-    let problem = Problem::new(Sensor { known, frames, rows: &rows }, &noise);
+    let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
     let base = problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, &[], options.threads)?;
     said.say("scoring the effects", 0.1);
     let candidates = Candidate::all(&problem, &base.parameters, &base.predicted, &hints)?;
@@ -330,7 +330,7 @@ fn of_frames(
     noise: &Noise,
     parameters: &Parameters,
 ) -> Result<(Level, Vec<f64>), DiscoverError> {
-    let predicted = Sensor { known, frames, rows: whole }.predict(parameters)?;
+    let predicted = Sensor::new(known, frames, whole).predict(parameters)?;
     let elements = frames.elements;
     let mut squares = vec![0.0; elements];
     let mut count = 0.0_f64;
@@ -377,7 +377,7 @@ pub fn predict(
         psf: base.psf,
         terms: effects.iter().map(crate::sensor::Term::of).collect(),
     };
-    let predicted = Sensor { known, frames, rows: &rows }.predict(&parameters)?;
+    let predicted = Sensor::new(known, frames, &rows).predict(&parameters)?;
     #[expect(clippy::cast_possible_truncation, reason = "counts are stored in single precision")]
     let single = predicted.into_iter().map(|counts| counts as f32).collect();
     Ok(single)

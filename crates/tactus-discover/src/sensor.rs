@@ -1,7 +1,9 @@
 //! The model at work on the rows: what it gives for each, and how that changes with every parameter.
 
+use std::sync::Arc;
+
 use tactus_model::effect::Definition;
-use tactus_model::{Covering, Effect, ForwardModel, Indenter, Moment, Pipeline, Psf, Response, Simulator};
+use tactus_model::{Covering, Effect, ForwardModel, Images, Indenter, Moment, Pipeline, Psf, Response, Simulator};
 
 use crate::rows::Rows;
 use crate::{DiscoverError, Frames, Known};
@@ -30,7 +32,12 @@ pub(crate) struct Sensor<'a> {
     pub(crate) known: &'a Known,
     pub(crate) frames: &'a Frames,
     pub(crate) rows: &'a Rows,
+    /// Images of presses, shared by all predictions.
+    pub(crate) images: Arc<Images>,
 }
+
+/// Images that are kept at most: some 250 MB of the paper's array.
+const IMAGES_MAX: usize = 600_000;
 
 impl Term {
     pub(crate) fn neutral(definition: &'static Definition) -> Self {
@@ -63,10 +70,16 @@ impl Parameters {
     }
 }
 
-impl Sensor<'_> {
+impl<'a> Sensor<'a> {
+    pub(crate) fn new(known: &'a Known, frames: &'a Frames, rows: &'a Rows) -> Self {
+        // As many numbers, whatever the array.
+        let images = Arc::new(Images::new(IMAGES_MAX * 48 / rows.elements.max(1)));
+        Self { known, frames, rows, images }
+    }
+
     /// Counts of every row and element, before noise and converter.
     pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
-        let Self { known, frames, rows } = self;
+        let Self { known, frames, rows, .. } = self;
         let effects = parameters.effects()?;
         let elements = rows.elements;
         let mut predicted: Vec<f64> = Vec::with_capacity(rows.len() * elements);
@@ -116,7 +129,7 @@ impl Sensor<'_> {
             ..known.response.clone()
         };
         let model = ForwardModel::new(known.array.clone(), parameters.psf, response)?;
-        Ok(Pipeline::new(&Simulator {
+        let mut pipeline = Pipeline::new(&Simulator {
             model,
             registration: known.registration,
             surface_mm: 0.0,
@@ -124,7 +137,9 @@ impl Sensor<'_> {
             indenter: self.indenter(tool)?,
             effects: effects.to_vec(),
             noise_rms_counts: 0.0,
-        })?)
+        })?;
+        pipeline.share(Arc::clone(&self.images));
+        Ok(pipeline)
     }
 
     fn indenter(&self, tool: u16) -> Result<Indenter, DiscoverError> {

@@ -1,10 +1,12 @@
 //! The pipeline in time: from where the tip is to what every element reads.
 
+use std::sync::Arc;
+
 use crate::effect::{
     Base, Effect, EffectError, Make, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Place, Press,
 };
 use crate::{
-    Contact, Covering, ForwardModel, Indenter, Path, Readout, Registration, Simulator, Stamp, StampError,
+    Contact, Covering, ForwardModel, Images, Indenter, Path, Readout, Registration, Simulator, Stamp, StampError,
 };
 
 /// An instant at which the elements are read.
@@ -44,6 +46,7 @@ pub struct Pipeline {
     last_s: Option<f64>,
     pressed: Pressed,
     stamp: Option<Stamp>,
+    images: Option<Arc<Images>>,
     felt_mm: Vec<f64>,
     counts: Vec<f64>,
 }
@@ -67,6 +70,13 @@ struct Pressed {
     presses: Vec<Press>,
     reached_mm: Vec<f64>,
     of_one_mm: Vec<f64>,
+}
+
+/// What spares the pipeline the computing of images.
+#[derive(Debug, Clone, Copy)]
+struct Ready<'a> {
+    stamp: Option<&'a Stamp>,
+    images: Option<&'a Images>,
 }
 
 impl Moment {
@@ -107,6 +117,7 @@ impl Pipeline {
                 of_one_mm: vec![0.0; elements],
             },
             stamp: None,
+            images: None,
             felt_mm: vec![0.0; elements],
             counts: vec![0.0; elements],
             indenter,
@@ -134,7 +145,8 @@ impl Pipeline {
         for effect in &mut self.stages.motion {
             effect.place(now, &mut place);
         }
-        self.pressed.press(&place, &self.indenter, base, &self.stages, self.stamp.as_ref());
+        let ready = Ready { stamp: self.stamp.as_ref(), images: self.images.as_deref() };
+        self.pressed.press(&place, &self.indenter, base, &self.stages, ready);
 
         for (felt, reached) in self.felt_mm.iter_mut().zip(&self.pressed.reached_mm) {
             *felt = self.stiffness * reached;
@@ -201,6 +213,12 @@ impl Pipeline {
         Ok(())
     }
 
+    /// Looks images up, and leaves them, in a memory that is shared with other pipelines of the same array and the same
+    /// reference press.
+    pub fn share(&mut self, images: Arc<Images>) {
+        self.images = Some(images);
+    }
+
     /// Puts another covering in place.
     pub fn set_covering(&mut self, covering: Covering) {
         self.covering = covering;
@@ -243,7 +261,7 @@ impl Pressed {
         indenter: &Indenter,
         base: Base<'_>,
         stages: &Stages,
-        stamp: Option<&Stamp>,
+        Ready { stamp, images }: Ready<'_>,
     ) {
         let contact = place.contact(indenter.clone());
         let at = (contact.position_mm, contact.rotation_deg, contact.depth_mm);
@@ -273,7 +291,11 @@ impl Pressed {
         for press in self.presses.iter().filter(|press| press.contact.depth_mm > 0.0) {
             let stamped = stamp.is_some_and(|stamp| press.stamped(stamp, base, &mut self.of_one_mm));
             if !stamped {
-                press.indentation(base, &mut self.of_one_mm);
+                let compute = |image_mm: &mut [f64]| press.indentation(base, image_mm);
+                match images {
+                    Some(images) => images.recall(base, press, &mut self.of_one_mm, compute),
+                    None => compute(&mut self.of_one_mm),
+                }
             }
             for (reached, of_one) in self.reached_mm.iter_mut().zip(&self.of_one_mm) {
                 *reached += press.weight * of_one;

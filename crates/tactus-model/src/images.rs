@@ -1,0 +1,82 @@
+//! Images that were computed before.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::effect::{Base, Press};
+use crate::{Contact, Indenter};
+
+/// A memory of what presses give, shared by [`Pipeline`](crate::Pipeline)s of one array and one reference press that
+/// follow the same path with other effects: most effects leave the contact and its spread as they are.
+///
+/// What is remembered is what would be computed, to the bit. Meshes are not remembered.
+#[derive(Debug)]
+pub struct Images {
+    held: Mutex<HashMap<Key, Arc<[f64]>>>,
+    most: usize,
+}
+
+/// All on which an image depends, bit by bit.
+type Key = [u64; 14];
+
+impl Images {
+    /// A memory of at most so many images; when it is full it begins anew.
+    pub fn new(most: usize) -> Self {
+        Self { held: Mutex::new(HashMap::new()), most }
+    }
+
+    /// The image of a press, remembered or computed by `compute`.
+    pub(crate) fn recall(
+        &self,
+        base: Base<'_>,
+        press: &Press,
+        image_mm: &mut [f64],
+        compute: impl FnOnce(&mut [f64]),
+    ) {
+        let Some(key) = key(base, press) else { return compute(image_mm) };
+        let known = self.held.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        if let Some(known) = known.filter(|known| known.len() == image_mm.len()) {
+            image_mm.copy_from_slice(&known);
+            return;
+        }
+        compute(image_mm);
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        if held.len() >= self.most {
+            held.clear();
+        }
+        held.insert(key, Arc::from(&*image_mm));
+    }
+}
+
+fn key(base: Base<'_>, press: &Press) -> Option<Key> {
+    let Press { weight: _, contact, lean, sigma_mm } = press;
+    let Contact { indenter, position_mm: [x, y], rotation_deg, depth_mm } = contact;
+    let (shape, [size, other]) = match indenter {
+        Indenter::Cylinder { diameter_mm } => (0, [*diameter_mm, 0.0]),
+        Indenter::Sphere { diameter_mm } => (1, [*diameter_mm, 0.0]),
+        Indenter::Cone { diameter_mm, apex_deg } => (2, [*diameter_mm, *apex_deg]),
+        Indenter::Box { size_mm } => (3, *size_mm),
+        Indenter::Mesh(_) => return None,
+    };
+    let psf = base.model.psf();
+    let numbers = [
+        size,
+        other,
+        *x,
+        *y,
+        *rotation_deg,
+        *depth_mm,
+        lean[0],
+        lean[1],
+        sigma_mm[0],
+        sigma_mm[1],
+        psf.sigma_intercept_mm,
+        psf.sigma_per_mm,
+        base.covering.thickness_mm,
+    ];
+    let mut key = [shape; 14];
+    for (bits, number) in key[1..].iter_mut().zip(numbers) {
+        *bits = number.to_bits();
+    }
+    Some(key)
+}
