@@ -62,6 +62,9 @@ struct MakeArgs {
     /// As much of each physics as an oracle tells from the base model by this many standard deviations.
     #[arg(long, conflicts_with = "strength")]
     z: Option<f64>,
+    /// As `--z`, after the spread was recalibrated too.
+    #[arg(long, conflicts_with_all = ["strength", "z"])]
+    z_beyond_spread: Option<f64>,
     /// Strength of each physics: 1 is what a bad rig has.
     #[arg(long, default_value_t = 1.0)]
     strength: f64,
@@ -135,7 +138,7 @@ impl MakeArgs {
             frames: self.frames,
             noise: self.noise,
             content,
-            amount: self.z.map_or(Amount::Strength(self.strength), Amount::Separation),
+            amount: self.amount(),
         };
         let set = recipe.make()?;
         set.write(self.out.join(format!("{name}.parquet")))?;
@@ -143,6 +146,14 @@ impl MakeArgs {
         fs::write(&sealed, serde_json::to_string_pretty(&set.label)?)
             .with_context(|| sealed.display().to_string())?;
         warn_of_unreached(&set.label)
+    }
+
+    fn amount(&self) -> Amount {
+        match (self.z, self.z_beyond_spread) {
+            (Some(z), _) => Amount::Separation(z),
+            (None, Some(z)) => Amount::BeyondSpread(z),
+            (None, None) => Amount::Strength(self.strength),
+        }
     }
 
     fn content(&self) -> Result<Content> {

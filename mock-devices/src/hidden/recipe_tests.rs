@@ -78,6 +78,18 @@ fn a_separation_out_of_reach_is_said_to_be() {
     let content = Content { physics: vec!["dead-element"], ..Content::default() };
     let set = Recipe { amount: Amount::Separation(1e7), ..short(content) }.make().unwrap();
     assert!(!set.label.physics[0].reached);
+    assert!(set.label.physics[0].strength > 0.0);
+}
+
+#[test]
+fn a_tool_of_another_size_is_another_spread_and_a_slow_readout_is_not() {
+    let left = |id| {
+        let content = Content { physics: vec![id], ..Content::default() };
+        let label = Recipe { amount: Amount::Strength(0.3), ..short(content) }.make().unwrap().label;
+        label.z_beyond_spread / label.z
+    };
+    assert!(left("worn-tool") < 0.05, "{}", left("worn-tool"));
+    assert!(left("low-pass-second-order") > 0.99);
 }
 
 #[test]
