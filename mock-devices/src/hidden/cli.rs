@@ -109,7 +109,6 @@ impl MakeArgs {
         for folder in [&self.out, &self.sealed] {
             fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         }
-        let content = self.content()?;
         let next = AtomicUsize::new(0);
         let work = || -> Result<()> {
             loop {
@@ -117,7 +116,7 @@ impl MakeArgs {
                 if index >= self.count {
                     return Ok(());
                 }
-                self.make(index, content.clone())?;
+                self.make(index)?;
             }
         };
         let threads = thread::available_parallelism().map_or(1, usize::from).min(self.count.max(1));
@@ -129,7 +128,7 @@ impl MakeArgs {
         })
     }
 
-    fn make(&self, index: usize, content: Content) -> Result<()> {
+    fn make(&self, index: usize) -> Result<()> {
         let name = format!("set-{index:04}");
         let recipe = Recipe {
             name: name.clone(),
@@ -137,7 +136,7 @@ impl MakeArgs {
             plan: self.plan,
             frames: self.frames,
             noise: self.noise,
-            content,
+            content: self.content(),
             amount: self.amount(),
         };
         let set = recipe.make()?;
@@ -156,14 +155,14 @@ impl MakeArgs {
         }
     }
 
-    fn content(&self) -> Result<Content> {
-        let mut physics = Vec::new();
-        for id in &self.physics {
-            let found = Definition::find(id).ok_or_else(|| super::HiddenError::UnknownPhysics(id.clone()))?;
-            physics.push(found.id);
+    fn content(&self) -> Content {
+        Content {
+            physics: self.physics.clone(),
+            effects: self.effect.clone(),
+            combine: self.combine,
+            outside: self.outside,
+            none: self.none,
         }
-        let Self { effect, combine, outside, none, .. } = self;
-        Ok(Content { physics, effects: effect.clone(), combine: *combine, outside: *outside, none: *none })
     }
 }
 

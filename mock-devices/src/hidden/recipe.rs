@@ -4,7 +4,6 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tactus_model::{ModelError, Simulator, TrajectoryError};
-use tactus_record::table::TableError;
 use tactus_schema::Rig;
 
 use super::base::{Base, Climate};
@@ -39,7 +38,7 @@ pub struct Recipe {
 #[derive(Debug, Clone, Default)]
 pub struct Content {
     /// These, by id.
-    pub physics: Vec<&'static str>,
+    pub physics: Vec<String>,
     /// One instance by chance of each of these effects.
     pub effects: Vec<String>,
     /// So many further effects of the library, all different; 1 if nothing else is asked for.
@@ -86,9 +85,6 @@ pub enum HiddenError {
     /// The plan made no trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
-    /// The table cannot be written.
-    #[error(transparent)]
-    Table(#[from] TableError),
 }
 
 /// Beyond this strength no rig is: a separation that needs more is not reached.
@@ -260,7 +256,7 @@ impl Content {
             return Ok(chosen);
         }
         for id in &self.physics {
-            let found = Definition::find(id).ok_or_else(|| HiddenError::UnknownPhysics((*id).to_owned()))?;
+            let found = Definition::find(id).ok_or_else(|| HiddenError::UnknownPhysics(id.clone()))?;
             chosen.push(found);
         }
         for effect in &self.effects {
