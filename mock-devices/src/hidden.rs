@@ -16,7 +16,7 @@
 //!     plan: Plan::Bundle,
 //!     frames: Some(600),
 //!     noise: NoiseKind::White,
-//!     content: Content { physics: vec!["relaxation-prony"], ..Content::default() },
+//!     content: Content { physics: vec!["relaxation-prony".into()], ..Content::default() },
 //!     ..Recipe::new(7)
 //! };
 //! let set = recipe.make()?;

@@ -62,6 +62,9 @@ struct MakeArgs {
     /// As much of each physics as an oracle tells from the base model by this many standard deviations.
     #[arg(long, conflicts_with = "strength")]
     z: Option<f64>,
+    /// As `--z`, after the spread was recalibrated too.
+    #[arg(long, conflicts_with_all = ["strength", "z"])]
+    z_beyond_spread: Option<f64>,
     /// Strength of each physics: 1 is what a bad rig has.
     #[arg(long, default_value_t = 1.0)]
     strength: f64,
@@ -106,7 +109,6 @@ impl MakeArgs {
         for folder in [&self.out, &self.sealed] {
             fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         }
-        let content = self.content()?;
         let next = AtomicUsize::new(0);
         let work = || -> Result<()> {
             loop {
@@ -114,7 +116,7 @@ impl MakeArgs {
                 if index >= self.count {
                     return Ok(());
                 }
-                self.make(index, content.clone())?;
+                self.make(index)?;
             }
         };
         let threads = thread::available_parallelism().map_or(1, usize::from).min(self.count.max(1));
@@ -126,7 +128,7 @@ impl MakeArgs {
         })
     }
 
-    fn make(&self, index: usize, content: Content) -> Result<()> {
+    fn make(&self, index: usize) -> Result<()> {
         let name = format!("set-{index:04}");
         let recipe = Recipe {
             name: name.clone(),
@@ -134,8 +136,8 @@ impl MakeArgs {
             plan: self.plan,
             frames: self.frames,
             noise: self.noise,
-            content,
-            amount: self.z.map_or(Amount::Strength(self.strength), Amount::Separation),
+            content: self.content(),
+            amount: self.amount(),
         };
         let set = recipe.make()?;
         set.write(self.out.join(format!("{name}.parquet")))?;
@@ -145,14 +147,22 @@ impl MakeArgs {
         warn_of_unreached(&set.label)
     }
 
-    fn content(&self) -> Result<Content> {
-        let mut physics = Vec::new();
-        for id in &self.physics {
-            let found = Definition::find(id).ok_or_else(|| super::HiddenError::UnknownPhysics(id.clone()))?;
-            physics.push(found.id);
+    fn amount(&self) -> Amount {
+        match (self.z, self.z_beyond_spread) {
+            (Some(z), _) => Amount::Separation(z),
+            (None, Some(z)) => Amount::BeyondSpread(z),
+            (None, None) => Amount::Strength(self.strength),
         }
-        let Self { effect, combine, outside, none, .. } = self;
-        Ok(Content { physics, effects: effect.clone(), combine: *combine, outside: *outside, none: *none })
+    }
+
+    fn content(&self) -> Content {
+        Content {
+            physics: self.physics.clone(),
+            effects: self.effect.clone(),
+            combine: self.combine,
+            outside: self.outside,
+            none: self.none,
+        }
     }
 }
 

@@ -1,6 +1,5 @@
 //! The catalogue: every physics, its knobs, and what it does at its stage.
 
-mod bulge;
 mod contact;
 mod drift;
 mod element;
@@ -14,6 +13,7 @@ mod readout;
 mod relaxation;
 mod spread;
 
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tactus_model::{Path, Simulator};
@@ -110,7 +110,7 @@ pub static CATALOGUE: &[&Definition] = &[
     &outside::PROXIMITY,
     &outside::GROUNDING,
     &outside::ELECTRODE_TEXTURE,
-    &bulge::BULGE,
+    &outside::BULGE,
 ];
 
 impl Definition {
@@ -277,6 +277,17 @@ impl<'a> Knobs<'a> {
     fn direction(&mut self, name: &str) -> [f64; 2] {
         let (sin, cos) = self.between(name, 0.0, 360.0).to_radians().sin_cos();
         [cos, sin]
+    }
+
+    /// Different elements of the array.
+    fn several(&mut self, name: &str, count: usize) -> Vec<usize> {
+        let mut elements: Vec<usize> = (0..self.elements()).collect();
+        elements.shuffle(&mut self.shape);
+        elements.truncate(count);
+        for (place, element) in elements.iter().enumerate() {
+            self.keep(&format!("{name}_{place}"), *element as f64);
+        }
+        elements
     }
 
     /// An element of the array.

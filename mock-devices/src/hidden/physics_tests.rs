@@ -107,6 +107,20 @@ fn a_held_step_relaxes_as_a_prony_series() {
 }
 
 #[test]
+fn a_relaxing_covering_never_pulls_and_its_next_press_is_weaker() {
+    let base = Base::new(2).unwrap();
+    let (mut sensor, _) = sensor(&base, "relaxation-power-law", 1.0);
+    let path = |t_s: f64| above(&base, if t_s.rem_euclid(5.0) > 1.0 { -0.5 } else { 1.0 });
+    let mut at = |t_s: f64| indentation_mm(&base, sensor.step(t_s, &path));
+    assert!(at(0.0).abs() < 1e-12);
+    let (first_mm, held_mm) = (at(1.001), at(4.9));
+    let released_mm = at(5.5);
+    let second_mm = at(6.001);
+    assert!(released_mm.abs() < 1e-12);
+    assert!(held_mm < second_mm && second_mm < first_mm, "{first_mm} {held_mm} {second_mm}");
+}
+
+#[test]
 fn a_branch_follows_a_ramp_exactly() {
     // dq/dt = (k t - q)/T from rest: q = k (t - T (1 - exp(-t/T))).
     let mut branch = Branches::new(vec![0.7]);

@@ -4,7 +4,6 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tactus_model::{ModelError, Simulator, TrajectoryError};
-use tactus_record::table::TableError;
 use tactus_schema::Rig;
 
 use super::base::{Base, Climate};
@@ -39,7 +38,7 @@ pub struct Recipe {
 #[derive(Debug, Clone, Default)]
 pub struct Content {
     /// These, by id.
-    pub physics: Vec<&'static str>,
+    pub physics: Vec<String>,
     /// One instance by chance of each of these effects.
     pub effects: Vec<String>,
     /// So many further effects of the library, all different; 1 if nothing else is asked for.
@@ -55,8 +54,10 @@ pub struct Content {
 pub enum Amount {
     /// At this strength.
     Strength(f64),
-    /// As much as lies this far from the base model, each taken alone (see [`Separation`]).
+    /// As much as lies this far from the base model, each taken alone: [`Separation::z`].
     Separation(f64),
+    /// The same after the spread was recalibrated too: [`Separation::z_beyond_spread`].
+    BeyondSpread(f64),
 }
 
 /// Why a set cannot be made.
@@ -84,14 +85,12 @@ pub enum HiddenError {
     /// The plan made no trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
-    /// The table cannot be written.
-    #[error(transparent)]
-    Table(#[from] TableError),
 }
 
 /// Beyond this strength no rig is: a separation that needs more is not reached.
 const STRENGTH_MAX: f64 = 8.0;
 const STRENGTH_MIN: f64 = 1e-5;
+const TRIALS_MAX: usize = 24;
 /// A separation is met within this share of it.
 const CLOSE: f64 = 0.01;
 
@@ -173,7 +172,8 @@ impl Recipe {
                     let is_alone = chosen.len() == 1;
                     (dose, if is_alone { Separation::default() } else { bench.separation(dose) }, true)
                 }
-                Amount::Separation(z) => bench.dose(dose, z),
+                Amount::Separation(z) => bench.dose(dose, z, |separation| separation.z),
+                Amount::BeyondSpread(z) => bench.dose(dose, z, |separation| separation.z_beyond_spread),
             };
             let dosed = Dosed {
                 id: physics.id.into(),
@@ -225,9 +225,10 @@ impl Recipe {
     fn check(&self) -> Result<(), HiddenError> {
         let (field, range, value) = match self.amount {
             Amount::Strength(value) => ("strength", "0 or more", value),
-            Amount::Separation(value) => ("z", "0 or more", value),
+            Amount::Separation(value) | Amount::BeyondSpread(value) => ("z", "above 0", value),
         };
-        if !(value.is_finite() && value >= 0.0) {
+        let is_zero_right = matches!(self.amount, Amount::Strength(_));
+        if !(value.is_finite() && (value > 0.0 || (is_zero_right && value >= 0.0))) {
             return Err(HiddenError::Range { field, range, value });
         }
         match self.frames {
@@ -255,7 +256,7 @@ impl Content {
             return Ok(chosen);
         }
         for id in &self.physics {
-            let found = Definition::find(id).ok_or_else(|| HiddenError::UnknownPhysics((*id).to_owned()))?;
+            let found = Definition::find(id).ok_or_else(|| HiddenError::UnknownPhysics(id.clone()))?;
             chosen.push(found);
         }
         for effect in &self.effects {
@@ -343,19 +344,22 @@ impl<'a> Bench<'a> {
     }
 
     /// The strength at which a physics lies `wanted` from the base model: the dose, its separation, and whether it is
-    /// the one wanted. Separation grows about in proportion to strength, which makes the first guess of each step.
-    fn dose(&self, dose: Dose, wanted: f64) -> (Dose, Separation, bool) {
+    /// the one wanted. Where it cannot be (an element is dead or it is not), the nearest that is any.
+    ///
+    /// Separation grows about in proportion to strength, which makes the first guess of each step.
+    fn dose(&self, dose: Dose, wanted: f64, z_of: fn(&Separation) -> f64) -> (Dose, Separation, bool) {
         let (mut low, mut high) = (STRENGTH_MIN, STRENGTH_MAX);
         let mut strength: f64 = 1.0;
-        let mut nearest = (Dose { strength: 0.0, ..dose }, Separation::default());
-        for _ in 0..24 {
+        let mut nearest = (dose, Separation::default(), f64::INFINITY);
+        for _ in 0..TRIALS_MAX {
             let tried = Dose { strength, ..dose };
             let separation = self.separation(tried);
-            let z = separation.z;
-            if (z - wanted).abs() <= (nearest.1.z - wanted).abs() {
-                nearest = (tried, separation);
+            let z = z_of(&separation);
+            let off = (z / wanted).ln().abs();
+            if off < nearest.2 {
+                nearest = (tried, separation, off);
             }
-            if (z - wanted).abs() <= CLOSE * wanted || low >= 0.999 * high {
+            if off <= CLOSE || low >= 0.999 * high {
                 break;
             }
             if z < wanted {
@@ -372,8 +376,8 @@ impl<'a> Bench<'a> {
                 (low * high).sqrt()
             };
         }
-        let (dose, separation) = nearest;
-        (dose, separation, (separation.z - wanted).abs() <= 2.0 * CLOSE * wanted)
+        let (dose, separation, off) = nearest;
+        (dose, separation, off <= 2.0 * CLOSE)
     }
 }
 

@@ -66,7 +66,7 @@ fn a_separation_asked_for_is_met() {
     for id in
         ["relaxation-prony", "saturation-knee", "cocked-tool", "supply-droop", "low-pass-moving-average"]
     {
-        let content = Content { physics: vec![id], ..Content::default() };
+        let content = Content { physics: vec![id.into()], ..Content::default() };
         let set = Recipe { amount: Amount::Separation(20.0), ..short(content) }.make().unwrap();
         assert!(set.label.physics[0].reached, "{id}");
         assert!((set.label.z - 20.0).abs() < 0.5, "{id}: {}", set.label.z);
@@ -75,16 +75,28 @@ fn a_separation_asked_for_is_met() {
 
 #[test]
 fn a_separation_out_of_reach_is_said_to_be() {
-    let content = Content { physics: vec!["dead-element"], ..Content::default() };
+    let content = Content { physics: vec!["dead-element".into()], ..Content::default() };
     let set = Recipe { amount: Amount::Separation(1e7), ..short(content) }.make().unwrap();
     assert!(!set.label.physics[0].reached);
+    assert!(set.label.physics[0].strength > 0.0);
+}
+
+#[test]
+fn a_tool_of_another_size_is_another_spread_and_a_slow_readout_is_not() {
+    let left = |id: &str| {
+        let content = Content { physics: vec![id.into()], ..Content::default() };
+        let label = Recipe { amount: Amount::Strength(0.3), ..short(content) }.make().unwrap().label;
+        label.z_beyond_spread / label.z
+    };
+    assert!(left("worn-tool") < 0.05, "{}", left("worn-tool"));
+    assert!(left("low-pass-second-order") > 0.99);
 }
 
 #[test]
 fn what_is_not_there_is_refused() {
     let of_effect = |effect: &str| Content { effects: vec![effect.into()], ..Content::default() };
     assert!(matches!(short(of_effect("magic")).make(), Err(HiddenError::UnknownEffect(_))));
-    let of_physics = Content { physics: vec!["magic"], ..Content::default() };
+    let of_physics = Content { physics: vec!["magic".into()], ..Content::default() };
     assert!(matches!(short(of_physics).make(), Err(HiddenError::UnknownPhysics(_))));
     let negative = Recipe { amount: Amount::Strength(-1.0), ..short(Content::default()) };
     assert!(matches!(negative.make(), Err(HiddenError::Range { field: "strength", .. })));
@@ -96,7 +108,7 @@ fn the_table_is_whole_and_says_nothing_of_the_label() {
     let path = folder.path().join("set.parquet");
     for plan in [Plan::Bundle, Plan::Paper] {
         for physics in CATALOGUE.iter().step_by(13) {
-            let content = Content { physics: vec![physics.id], ..Content::default() };
+            let content = Content { physics: vec![physics.id.into()], ..Content::default() };
             let set = Recipe { plan, frames: Some(600), ..short(content) }.make().unwrap();
             set.write(&path).unwrap();
             let bytes = fs::read(&path).unwrap();
@@ -118,7 +130,7 @@ fn the_table_is_whole_and_says_nothing_of_the_label() {
 fn tables_with_and_without_physics_differ_in_their_counts_alone() {
     let set = |content| short(content).make().unwrap();
     let none = set(Content { none: true, ..Content::default() });
-    let some = set(Content { physics: vec!["late-frames"], ..Content::default() });
+    let some = set(Content { physics: vec!["late-frames".into()], ..Content::default() });
     assert_eq!(none.rig, some.rig);
     assert_eq!(none.runs[0].rows, some.runs[0].rows);
     assert_ne!(none.counts, some.counts);

@@ -1,4 +1,4 @@
-use tactus_model::Contact;
+use tactus_model::{Contact, Trail};
 
 use super::super::base::Base;
 use super::super::physics::Definition;
@@ -81,4 +81,26 @@ fn the_converter_takes_noise_before_it_rounds() {
         ["104", "96"]
     );
     assert!((sensor.read(5000.0, 0.0) - 4095.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_virtual_device_can_hold_it_and_give_it_its_trail() {
+    let base = Base::new(5).unwrap();
+    let doses = ["low-pass-second-order", "lost-motion", "drift-common-walk"].map(|id| Dose {
+        physics: Definition::find(id).unwrap(),
+        strength: 1.0,
+        seed: 1,
+    });
+    let mut sensor = Sensor::new(&base.sensor, &doses, Climate::new(5), 0);
+    let [x, y] = base.rig.registration.to_robot([2.9, 4.9]);
+    let mut trail = Trail::new(0.0, [x, y, 1.0]);
+    // Devices look whenever they like, also twice at one time; another thread may do it.
+    let counts = std::thread::spawn(move || {
+        for t_s in [0.0, 0.01, 0.01, 0.2, 30.0] {
+            trail.push(t_s, [x, y, 0.5 - 0.1 * f64::min(t_s, 10.0)]);
+            sensor.step(t_s, &trail);
+        }
+        sensor.counts().to_vec()
+    });
+    assert!(counts.join().unwrap()[17] > 300.0);
 }

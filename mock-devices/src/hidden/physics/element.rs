@@ -74,12 +74,13 @@ pub(super) const COLUMN_SUM: Definition = Definition {
 pub(super) const DEAD: Definition = Definition {
     id: "dead-element",
     effect: Some("miswired"),
-    about: "s' = (1 - a) s of one element, a = 1 at strength 1: its trace is broken",
+    about: "s' = 0 of one element, of two above strength 1, ...: broken traces",
     is_fine: false,
     make: |knobs| {
-        let element = knobs.which("element");
-        let lost = knobs.share("lost", 1.0);
-        Stage::element(move |_, signal| signal[element] *= 1.0 - lost)
+        let count = knobs.scaled("elements", 1.0).ceil();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a strength, rounded up")]
+        let dead = knobs.several("element", count as usize);
+        Stage::element(move |_, signal| dead.iter().for_each(|element| signal[*element] = 0.0))
     },
 };
 

@@ -118,7 +118,8 @@ pub(super) const COARSE_STEPS: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let declared = knobs.sensor.model.array().step_counts();
-        let steps = knobs.scaled("step_counts", 16.0).round();
+        let steps = (16.0 * knobs.strength).round();
+        knobs.keep("step_counts", steps * declared);
         Stage::converter(move |count| {
             if steps > 1.0 { (count / (steps * declared)).round() * (steps * declared) } else { count }
         })

@@ -86,13 +86,18 @@ impl Branches {
     }
 }
 
-/// `u - sum of weight times branch`: the stress of a relaxing solid.
+/// `u - sum of weight times branch`, the stress of a relaxing solid, as far as it presses: a tool does not pull, and
+/// one that is gone presses nothing, but what the solid has forgotten by then is missing in the next press.
 fn relaxing(times_s: Vec<f64>, weights: Vec<f64>) -> Stage {
     let mut branches = Branches::new(times_s);
     Stage::covering(move |now, indentation_mm| {
         branches.follow(now.dt_s, indentation_mm);
+        if now.touch.depth_mm <= 0.0 {
+            return;
+        }
         for (element, value) in indentation_mm.iter_mut().enumerate() {
-            *value -= branches.at(element).zip(&weights).map(|(branch, weight)| weight * branch).sum::<f64>();
+            let relaxed = branches.at(element).zip(&weights).map(|(branch, weight)| weight * branch);
+            *value = (*value - relaxed.sum::<f64>()).max(0.0);
         }
     })
 }
