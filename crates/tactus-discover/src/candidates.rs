@@ -161,7 +161,8 @@ impl Candidate {
                 let parameter = self.amplitudes[*place];
                 let [least, most] = self.definition.parameters[parameter].range;
                 let value = &mut start.values[parameter];
-                *value = (*value + step).clamp(least + 0.02 * (*value - least), most - 0.02 * (most - *value));
+                *value =
+                    (*value + step).clamp(least + 0.02 * (*value - least), most - 0.02 * (most - *value));
             }
             return (step.dot(&right), start);
         }

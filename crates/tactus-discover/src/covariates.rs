@@ -3,10 +3,10 @@
 use tactus_model::effect::Definition;
 use tactus_model::{Contact, Covering, ForwardModel, Response};
 
+use crate::candidates::with;
 use crate::fit::{Free, Problem};
 use crate::rows::pressing;
 use crate::sensor::{Parameters, Term};
-use crate::candidates::with;
 use crate::{DiscoverError, Known};
 
 /// Depth at which a place's image is looked up where nothing is pressed.
@@ -94,7 +94,9 @@ impl Forms {
         let signal = predicted
             .chunks_exact(elements)
             .zip(&rows.run)
-            .flat_map(|(counts, run)| counts.iter().zip(&at.baseline[*run]).map(|(counts, base)| counts - base))
+            .flat_map(|(counts, run)| {
+                counts.iter().zip(&at.baseline[*run]).map(|(counts, base)| counts - base)
+            })
             .collect();
         let history = History::of(problem);
         let here: Vec<Option<[f64; 2]>> =
@@ -123,7 +125,9 @@ impl Forms {
             Factor::Rows(of_row) => of_row[reading / elements],
             Factor::Readings(of_reading) => of_reading[reading],
         };
-        (0..self.signal.len()).map(|reading| factor(reading) * form.map_or(1.0, |form| form[reading])).collect()
+        (0..self.signal.len())
+            .map(|reading| factor(reading) * form.map_or(1.0, |form| form[reading]))
+            .collect()
     }
 }
 
@@ -207,7 +211,10 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
         .zip(&history.place_mm[1])
         .map(|(x, y)| registration.to_sensor([*x, *y]))
         .collect();
-    let axes = [("place along x", "place in the element along x", array.col_centres_mm()), ("place along y", "place in the element along y", array.row_centres_mm())];
+    let axes = [
+        ("place along x", "place in the element along x", array.col_centres_mm()),
+        ("place along y", "place in the element along y", array.row_centres_mm()),
+    ];
     for (axis, (on_sensor, in_element, centres)) in axes.into_iter().enumerate() {
         let values: Vec<f64> = place.iter().map(|place| place[axis]).collect();
         add(on_sensor, "mm", &values, &deep, 4, &[Signal, along[axis], along[1 - axis]]);
@@ -239,10 +246,16 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
 
 /// Ranges of values with as many rows in each, where the values differ at all.
 fn ranges(values: &[f64], among: &[bool], bins: usize) -> Vec<[f64; 2]> {
-    let mut sorted: Vec<f64> =
-        values.iter().zip(among).filter(|(value, among)| **among && value.is_finite()).map(|(v, _)| *v).collect();
+    let mut sorted: Vec<f64> = values
+        .iter()
+        .zip(among)
+        .filter(|(value, among)| **among && value.is_finite())
+        .map(|(v, _)| *v)
+        .collect();
     sorted.sort_by(f64::total_cmp);
-    let (Some(least), Some(most)) = (sorted.first().copied(), sorted.last().copied()) else { return Vec::new() };
+    let (Some(least), Some(most)) = (sorted.first().copied(), sorted.last().copied()) else {
+        return Vec::new();
+    };
     if most - least <= 1e-9 * most.abs().max(1.0) {
         return Vec::new();
     }

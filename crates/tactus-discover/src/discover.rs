@@ -92,7 +92,8 @@ pub fn discover(
         Some(noise) => noise.clone(),
         None => {
             warnings.push(
-                "no frames repeat each other: the noise is estimated from differences of consecutive frames".into(),
+                "no frames repeat each other: the noise is estimated from differences of consecutive frames"
+                    .into(),
             );
             Noise::of_differences(frames, known.array.step_counts())
         }
@@ -105,7 +106,8 @@ pub fn discover(
         let mut rows = thin;
         rows.weigh(frames, &noise, &heldout);
         let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
-        let base = problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, &[], options.threads)?;
+        let base =
+            problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, &[], options.threads)?;
         let of_frames = Sensor::new(known, frames, &whole).predict(&base.parameters)?;
         let residual: Vec<f64> =
             frames.counts.iter().zip(&of_frames).map(|(counts, of)| f64::from(*counts) - of).collect();
@@ -138,7 +140,8 @@ pub fn discover(
     let (grown, rounds) = search.forward(base.clone())?;
     let any = rounds.first().map_or(1.0, |round| round.p_value).min(before.p_value);
     said.say("taking back what does not earn its place", 0.6);
-    let grown = if names(&grown.parameters, search.known_terms).is_empty() { grown } else { search.back(grown)? };
+    let grown =
+        if names(&grown.parameters, search.known_terms).is_empty() { grown } else { search.back(grown)? };
     let after = search.locate(&grown)?;
     let grown_gap = problem.heldout_gap(&grown.predicted);
     let share = if base_gap.value > 0.0 { (grown_gap.value / base_gap.value).clamp(0.0, 1.0) } else { 0.0 };
@@ -156,7 +159,8 @@ pub fn discover(
         grown = base.clone();
     }
     let (level_base, elements_before) = of_frames(&whole, known, frames, &heldout, &noise, &base.parameters)?;
-    let (level_grown, elements_after) = of_frames(&whole, known, frames, &heldout, &noise, &grown.parameters)?;
+    let (level_grown, elements_after) =
+        of_frames(&whole, known, frames, &heldout, &noise, &grown.parameters)?;
     let gap_counts2 = level_base.heldout_rms_counts.powi(2) - noise.rms_counts.powi(2);
     let closed = level_base.heldout_rms_counts.powi(2) - level_grown.heldout_rms_counts.powi(2);
     let steps = search.steps(&grown)?;
@@ -172,6 +176,7 @@ pub fn discover(
             heldout_depths_mm: heldout.depths_mm,
             heldout_coverings_mm: heldout.coverings_mm,
         },
+        heldout_frames: heldout.frames.clone(),
         noise_rms_counts: replicated.map(|noise| noise.rms_counts),
         base: level_base,
         global: GlobalTest { statistic: before.statistic, p_value: any },
@@ -231,10 +236,8 @@ impl Search<'_> {
         let groups: Vec<Vec<&Score>> =
             covariates.iter().map(|one| of(one).iter().map(|index| &scored[*index].0).collect()).collect();
         let under_none = flipped(&groups, FLIPS, self.options.seed ^ 0x10ca_7e);
-        let statistics: Vec<f64> = groups
-            .iter()
-            .map(|group| group.iter().map(|score| score.z.abs()).fold(0.0, f64::max))
-            .collect();
+        let statistics: Vec<f64> =
+            groups.iter().map(|group| group.iter().map(|score| score.z.abs()).fold(0.0, f64::max)).collect();
         let p_values: Vec<f64> =
             statistics.iter().zip(&under_none).map(|(statistic, none)| p_value(*statistic, none)).collect();
         let statistic = statistics.iter().copied().fold(0.0, f64::max);
@@ -243,7 +246,9 @@ impl Search<'_> {
             let strongest = of(covariate)
                 .into_iter()
                 .max_by(|a, b| scored[*a].0.z.abs().total_cmp(&scored[*b].0.z.abs()));
-            let Some(strongest) = strongest.filter(|_| q_value <= Q_MAX && *statistic > 0.0) else { continue };
+            let Some(strongest) = strongest.filter(|_| q_value <= Q_MAX && *statistic > 0.0) else {
+                continue;
+            };
             let (_, z, readings) = &scored[strongest];
             let feature = &features[strongest];
             gap.push(Gap {

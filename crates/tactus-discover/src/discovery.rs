@@ -13,6 +13,8 @@ pub struct Discovery {
     pub warnings: Vec<String>,
     /// Which presses were fitted and which were held out.
     pub split: Split,
+    /// Of each frame, in the order in which they were given, whether it was held out.
+    pub heldout_frames: Vec<bool>,
     /// Standard deviation of one reading, from frames that repeat each other; none where no frames do.
     pub noise_rms_counts: Option<f64>,
     /// The base model after its own recalibration, on the held-out presses.
@@ -240,6 +242,10 @@ pub struct Unexplained {
 pub struct NextExperiment {
     /// Name of the experiment, as `tactus run` takes it.
     pub experiment: &'static str,
+    /// Its parameters, each with its value as `tactus run --param` takes it.
+    pub parameters: Vec<(&'static str, String)>,
+    /// How long it takes on the rig, roughly.
+    pub duration_s: f64,
     /// The explanations.
     pub separates: [String; 2],
     /// By how many standard errors they would differ.

@@ -16,9 +16,9 @@ use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::Kind;
 
 use crate::noise::{Noise, median};
-use crate::{DiscoverError, parallel};
 use crate::scale::Scale;
 use crate::sensor::{Parameters, Sensor, Term};
+use crate::{DiscoverError, parallel};
 
 /// Recalibration moves an element's gain within these, as ratios to what is typical of the array: an element beyond is
 /// not an element of another gain.
@@ -133,7 +133,10 @@ impl<'a> Problem<'a> {
 
     /// Weighted sum of squared residuals of the fitted rows.
     pub(crate) fn cost(&self, predicted: &[f64]) -> f64 {
-        self.residuals(predicted).zip(self.weights()).map(|(residual, weight)| weight * residual * residual).sum()
+        self.residuals(predicted)
+            .zip(self.weights())
+            .map(|(residual, weight)| weight * residual * residual)
+            .sum()
     }
 
     /// Weighted squared residuals of the rows that are held out, block by block, and the readings in each.
@@ -160,7 +163,8 @@ impl<'a> Problem<'a> {
         let of_rows = rows.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
         for (row, (counts, predicted)) in of_rows.filter(|(row, _)| rows.heldout[*row]) {
             let frames = rows.frames_in(row) as f64;
-            sum += frames * counts.iter().zip(predicted).map(|(counts, of)| (counts - of).powi(2)).sum::<f64>();
+            sum +=
+                frames * counts.iter().zip(predicted).map(|(counts, of)| (counts - of).powi(2)).sum::<f64>();
             readings += frames * elements as f64;
         }
         if readings > 0.0 { (sum / readings).sqrt() } else { 0.0 }
@@ -494,7 +498,9 @@ impl Linear<'_> {
         // The mean that is left in each run, less what the gains' change has moved it by.
         let of_runs = means.chunks_exact(elements).zip(self.by_gain_means.chunks_exact(elements));
         for (baseline, (means, by_gain)) in parameters.baseline.iter_mut().zip(of_runs) {
-            for (((baseline, mean), by_gain), taken) in baseline.iter_mut().zip(means).zip(by_gain).zip(&taken) {
+            for (((baseline, mean), by_gain), taken) in
+                baseline.iter_mut().zip(means).zip(by_gain).zip(&taken)
+            {
                 *baseline += mean - taken * by_gain;
             }
         }

@@ -1,12 +1,13 @@
 //! What a simulation is missing: finds where it and measured frames disagree, names the effect, adds it to the model,
 //! and shows the gap shrink.
 
-mod discover;
 mod candidates;
 mod chance;
 mod covariates;
+mod discover;
 mod discovery;
 mod fit;
+mod frames;
 mod noise;
 mod parallel;
 mod rows;
@@ -16,7 +17,6 @@ mod search;
 mod sensor;
 mod spectrum;
 mod wiring;
-mod frames;
 
 pub use discover::{DiscoverError, Known, Options, Progress, discover, predict};
 pub use discovery::{

@@ -67,8 +67,8 @@ impl Noise {
                 0 => 1.0,
                 _ if pairs[lag] < PAIRS_LEAST => 0.0,
                 _ => {
-                    let shares = (0..elements)
-                        .map(|e| squares[lag * elements + e] / pairs[lag] as f64 / variances[e]);
+                    let shares =
+                        (0..elements).map(|e| squares[lag * elements + e] / pairs[lag] as f64 / variances[e]);
                     (1.0 - median(&shares.collect::<Vec<_>>())).clamp(0.0, 1.0)
                 }
             })
@@ -113,9 +113,7 @@ impl Noise {
 
 /// Of every frame, whether the tip had been at rest for a while.
 fn settled(frames: &Frames, still: &[usize]) -> Vec<bool> {
-    (0..frames.len())
-        .map(|frame| frames.t_s[frame] - frames.t_s[frame - still[frame]] >= SETTLED_S)
-        .collect()
+    (0..frames.len()).map(|frame| frames.t_s[frame] - frames.t_s[frame - still[frame]] >= SETTLED_S).collect()
 }
 
 /// The middle one, or the mean of the two in the middle; 0 of none.

@@ -60,7 +60,8 @@ impl<'a> Fitting<'a> {
         let mut residual: Vec<f64> = problem.residuals(predicted).collect();
         linear.project(&mut residual);
         let weights: Vec<f64> = problem.weights().collect();
-        let mut fitting = Self { problem, linear, directions: Vec::new(), weighted_residual: residual, weights };
+        let mut fitting =
+            Self { problem, linear, directions: Vec::new(), weighted_residual: residual, weights };
         for mut column in columns {
             let whole = fitting.size(&column);
             fitting.free(&mut column);

@@ -58,9 +58,8 @@ pub(crate) struct Tried {
 impl Search<'_> {
     /// Scores of all candidates at a model.
     pub(crate) fn screen(&self, fitting: &Fitting<'_>, at: &Fitted) -> Result<Vec<Screened>, DiscoverError> {
-        let screen = |candidate: &Candidate| {
-            candidate.screen(fitting, self.problem, &at.parameters, &at.predicted)
-        };
+        let screen =
+            |candidate: &Candidate| candidate.screen(fitting, self.problem, &at.parameters, &at.predicted);
         parallel::map(self.candidates, self.options.threads, screen).into_iter().collect()
     }
 
@@ -119,7 +118,8 @@ impl Search<'_> {
         fits.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
         for (name, fitted) in &fits {
             if let Some(one) = tried.iter_mut().find(|one| one.effect == *name) {
-                let share = self.problem.heldout_gap(&fitted.predicted).value / self.base_gap.max(f64::MIN_POSITIVE);
+                let share =
+                    self.problem.heldout_gap(&fitted.predicted).value / self.base_gap.max(f64::MIN_POSITIVE);
                 one.shrink = (self.base_gap > 0.0).then_some(1.0 - share);
                 one.heldout_rms_counts = Some(self.problem.heldout_rms_counts(&fitted.predicted));
             }
@@ -162,9 +162,10 @@ impl Search<'_> {
         if gain <= self.penalty() {
             return None;
         }
-        let again = tried.fits.iter().find(|(name, fitted)| {
-            names.contains(name) && at.cost - fitted.cost > AGAIN_SHARE * gain
-        });
+        let again = tried
+            .fits
+            .iter()
+            .find(|(name, fitted)| names.contains(name) && at.cost - fitted.cost > AGAIN_SHARE * gain);
         let (name, fitted) = again.map_or((best_name, best), |(name, fitted)| (name, fitted));
         Some((name, fitted.clone()))
     }
@@ -188,8 +189,12 @@ impl Search<'_> {
             let fits: Vec<Fitted> =
                 parallel::map(&names, self.options.threads, without).into_iter().collect::<Result<_, _>>()?;
             let here = self.problem.heldout_gap(&at.predicted);
-            let ratios = fits.iter().map(|fitted| self.problem.heldout_gap(&fitted.predicted).value / here.value.max(here.error));
-            let Some((least, ratio)) = ratios.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(at) };
+            let ratios = fits
+                .iter()
+                .map(|fitted| self.problem.heldout_gap(&fitted.predicted).value / here.value.max(here.error));
+            let Some((least, ratio)) = ratios.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else {
+                return Ok(at);
+            };
             if ratio >= EARNS {
                 return Ok(at);
             }

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use tactus_model::effect::Definition;
-use tactus_model::{Covering, Effect, ForwardModel, Images, Indenter, Moment, Pipeline, Psf, Response, Simulator};
+use tactus_model::{
+    Covering, Effect, ForwardModel, Images, Indenter, Moment, Pipeline, Psf, Response, Simulator,
+};
 
 use crate::rows::Rows;
 use crate::{DiscoverError, Frames, Known};
@@ -50,7 +52,10 @@ impl Term {
     }
 
     pub(crate) fn of(effect: &Effect) -> Self {
-        Self { definition: effect.definition(), values: effect.parameters().map(|(_, value)| value).collect() }
+        Self {
+            definition: effect.definition(),
+            values: effect.parameters().map(|(_, value)| value).collect(),
+        }
     }
 }
 
@@ -107,7 +112,8 @@ impl<'a> Sensor<'a> {
             }
         }
         let full_scale_counts = known.array.full_scale_counts();
-        let least = if parameters.sensitivity.iter().all(|one| *one >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
+        let least =
+            if parameters.sensitivity.iter().all(|one| *one >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
         for counts in &mut predicted {
             *counts = counts.clamp(least, full_scale_counts);
         }

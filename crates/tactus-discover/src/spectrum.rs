@@ -1,8 +1,8 @@
 //! Lines in the spectrum of the residual: tones that something adds to the readings.
 
+use crate::Frames;
 use crate::noise::median;
 use crate::rows::interval_s;
-use crate::Frames;
 
 /// A line stands out of what is around it by such a factor in power.
 const STANDS_OUT: f64 = 6.0;
@@ -32,7 +32,11 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
     }
     let duration_s = frames.t_s[end - 1] - frames.t_s[begin];
     let slot = |frame: usize| -> usize {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and no more than frames")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not negative, and no more than frames"
+        )]
         let slot = ((frames.t_s[frame] - frames.t_s[begin]) / interval_s).round() as usize;
         slot
     };
@@ -91,7 +95,8 @@ fn transform(series: &mut [[f64; 2]]) {
     let mut half = 1;
     while half < count {
         let turn = -std::f64::consts::PI / half as f64;
-        let factors: Vec<[f64; 2]> = (0..half).map(|k| [(turn * k as f64).cos(), (turn * k as f64).sin()]).collect();
+        let factors: Vec<[f64; 2]> =
+            (0..half).map(|k| [(turn * k as f64).cos(), (turn * k as f64).sin()]).collect();
         for block in series.chunks_exact_mut(2 * half) {
             let (low, high) = block.split_at_mut(half);
             for ((low, high), [cos, sin]) in low.iter_mut().zip(high).zip(&factors) {

@@ -19,9 +19,9 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
         .zip(&rows.run)
         .flat_map(|(counts, run)| {
             let gains = counts.iter().zip(&fitted.parameters.baseline[*run]);
-            gains.zip(&fitted.parameters.sensitivity).map(|((counts, baseline), gain)| {
-                if *gain == 0.0 { 0.0 } else { (counts - baseline) / gain }
-            })
+            gains
+                .zip(&fitted.parameters.sensitivity)
+                .map(|((counts, baseline), gain)| if *gain == 0.0 { 0.0 } else { (counts - baseline) / gain })
         })
         .collect();
     let mut found: Vec<(f64, [usize; 2])> = Vec::new();

@@ -6,7 +6,8 @@ use crate::effect::{
     Base, Effect, EffectError, Make, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Place, Press,
 };
 use crate::{
-    Contact, Covering, ForwardModel, Images, Indenter, Path, Readout, Registration, Simulator, Stamp, StampError,
+    Contact, Covering, ForwardModel, Images, Indenter, Path, Readout, Registration, Simulator, Stamp,
+    StampError,
 };
 
 /// An instant at which the elements are read.

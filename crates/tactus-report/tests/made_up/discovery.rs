@@ -42,6 +42,7 @@ pub(crate) fn explained() -> Discovery {
             heldout_depths_mm: vec![0.45],
             heldout_coverings_mm: vec![2.54],
         },
+        heldout_frames: vec![false; 36_000],
         noise_rms_counts: Some(NOISE_COUNTS),
         base: level(9.36),
         global: GlobalTest { statistic: 41.2, p_value: 0.000_5 },
@@ -94,6 +95,8 @@ pub(crate) fn explained() -> Discovery {
         unexplained: Unexplained { depends_on: vec![], share: 0.003_9 },
         next_experiments: vec![NextExperiment {
             experiment: "diagnose",
+            parameters: vec![("parts", "[\"approach\"]".into())],
+            duration_s: 60.0,
             separates: ["hysteresis".into(), "backlash".into()],
             expected_z: 11.3,
         }],
@@ -270,5 +273,6 @@ fn base() -> Base {
             reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
             reference_covering: Covering { thickness_mm: 1.016 },
         },
+        run_baselines_counts: vec![vec![100.0; 48]],
     }
 }

@@ -37,7 +37,11 @@ fn found(model: &Model) -> Discovery {
             .to_vec()
     };
     let level = Level { heldout_rms_counts: 2.0, heldout_chi2: 1.0 };
-    let base = tactus_discover::Base { psf: model.base.psf, response: model.base.response.clone() };
+    let base = tactus_discover::Base {
+        psf: model.base.psf,
+        response: model.base.response.clone(),
+        run_baselines_counts: vec![model.base.response.baseline_counts.clone()],
+    };
     let mut grown = base.clone();
     grown.psf.sigma_intercept_mm = 2.3;
     Discovery {
@@ -51,6 +55,7 @@ fn found(model: &Model) -> Discovery {
             heldout_depths_mm: Vec::new(),
             heldout_coverings_mm: Vec::new(),
         },
+        heldout_frames: vec![false; 10],
         noise_rms_counts: Some(2.0),
         base: level,
         global: GlobalTest { statistic: 9.0, p_value: 0.001 },
