@@ -115,7 +115,7 @@ fn write_truth(folder: &Path) {
     fs::write(folder.join("rig.toml"), rig).unwrap();
     let model = fs::read_to_string(repository("config/models/digitacts.toml")).unwrap();
     let model = model.replace("noise_rms_counts = 2.0", "noise_rms_counts = 0.0");
-    let shares = "{ neighbour_share = 0.1, row_share = 0.0, column_share = 0.0 }";
+    let shares = "{ neighbour_share = 0.1, diagonal_share = 0.0, row_neighbour_share = 0.0, row_share = 0.0, column_share = 0.0 }";
     let effect = format!("[[effect]]\nname = \"crosstalk\"\nparameters = {shares}\n");
     fs::write(folder.join("truth.toml"), format!("{model}\n{effect}")).unwrap();
 }

@@ -120,11 +120,11 @@ impl Candidate {
                 if fitting.size(&column) < 1e-6 * whole {
                     column.fill(0.0);
                 }
-                screened.scores.push(fitting.score(&column));
                 let [least, most] = self.definition.parameters[*parameter].range;
                 screened.reach = screened.reach.max(fitting.size(&column) * (most - least));
                 columns.push(column);
             }
+            screened.scores.push(fitting.score(&columns));
             let (promise, values) = self.first_step(fitting, shape, &columns);
             if promise > screened.promise {
                 (screened.promise, screened.start) = (promise, values);

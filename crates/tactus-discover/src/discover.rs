@@ -138,7 +138,8 @@ pub fn discover(
     };
     let before = search.locate(&base)?;
     let (grown, rounds) = search.forward(base.clone())?;
-    let any = rounds.first().map_or(1.0, |round| round.p_value).min(before.p_value);
+    // Two tests, each at half the chance.
+    let any = (2.0 * rounds.first().map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
     said.say("taking back what does not earn its place", 0.6);
     let grown =
         if names(&grown.parameters, search.known_terms).is_empty() { grown } else { search.back(grown)? };
@@ -224,8 +225,8 @@ impl Search<'_> {
             let mut column = forms.column(feature, elements);
             let readings = column.iter().filter(|value| **value != 0.0).count();
             fitting.free(&mut column);
-            let score = fitting.score(&column);
-            (score, fitting.wanted(&column) / fitting.size(&column).max(f64::MIN_POSITIVE), readings)
+            let z = fitting.wanted(&column) / fitting.size(&column).max(f64::MIN_POSITIVE);
+            (fitting.score(&[column]), z, readings)
         };
         let scored = parallel::map(&features, self.options.threads, scored);
         let mut covariates: Vec<&'static str> = features.iter().map(|feature| feature.covariate).collect();
@@ -237,7 +238,7 @@ impl Search<'_> {
             covariates.iter().map(|one| of(one).iter().map(|index| &scored[*index].0).collect()).collect();
         let under_none = flipped(&groups, FLIPS, self.options.seed ^ 0x10ca_7e);
         let statistics: Vec<f64> =
-            groups.iter().map(|group| group.iter().map(|score| score.z.abs()).fold(0.0, f64::max)).collect();
+            groups.iter().map(|group| group.iter().map(|score| score.z).fold(0.0, f64::max)).collect();
         let p_values: Vec<f64> =
             statistics.iter().zip(&under_none).map(|(statistic, none)| p_value(*statistic, none)).collect();
         let statistic = statistics.iter().copied().fold(0.0, f64::max);
@@ -245,7 +246,7 @@ impl Search<'_> {
         for ((covariate, q_value), statistic) in covariates.iter().zip(q_values(&p_values)).zip(&statistics) {
             let strongest = of(covariate)
                 .into_iter()
-                .max_by(|a, b| scored[*a].0.z.abs().total_cmp(&scored[*b].0.z.abs()));
+                .max_by(|a, b| scored[*a].0.z.total_cmp(&scored[*b].0.z));
             let Some(strongest) = strongest.filter(|_| q_value <= Q_MAX && *statistic > 0.0) else {
                 continue;
             };

@@ -11,8 +11,12 @@
 //! Under no effect `U_b` is as likely as `-U_b`, whatever the noise does within a block: so the distribution of the
 //! largest of many `z` comes from flipping the signs of whole blocks, the same for all directions. That keeps the
 //! chance of any false alarm among all of them, however they depend on each other, and under autocorrelated noise.
-//! `phi >= 1` is by how much blocks scatter more than their noise says, by the median: one block with a strong effect
-//! does not hide it. For the same reason a block counts at most three standard deviations in the flipped sums.
+//! `phi >= 1` is by how much blocks scatter about what they have in common more than their noise says, by the median: an
+//! effect hides itself neither in one block nor in all. For the same reason a block counts at most three standard
+//! deviations in the flipped sums.
+//!
+//! Several directions of one effect, orthonormal under the weights, are taken together: the sum of their squares, which is
+//! chi-square, on the scale of a normal deviate by the cube root of Wilson and Hilferty.
 //!
 //! # Source
 //! J. Hemerik, J. J. Goeman and L. Finos, *J. R. Stat. Soc. B* 82 (2020) 841 (sign-flipped scores); P. H. Westfall and
@@ -29,13 +33,13 @@ const CLIP: f64 = 3.0;
 /// Fewer blocks do not tell how they scatter.
 const BLOCKS_LEAST: usize = 8;
 
-/// The score of one direction.
+/// The score of one direction, or of several that are orthonormal together.
 #[derive(Debug, Clone)]
 pub(crate) struct Score {
-    /// `z`.
+    /// On the scale of the standard normal distribution, not negative.
     pub(crate) z: f64,
-    /// Each block's part of it, clipped.
-    parts: Vec<f32>,
+    /// Each block's part of each direction's, clipped.
+    parts: Vec<Vec<f32>>,
 }
 
 /// Directions that are fitted already: all else is freed of them.
@@ -114,8 +118,30 @@ impl<'a> Fitting<'a> {
         dot(&self.weighted_residual, column)
     }
 
-    /// The score of a freed column.
-    pub(crate) fn score(&self, column: &[f64]) -> Score {
+    /// The score of freed columns together.
+    pub(crate) fn score(&self, columns: &[Vec<f64>]) -> Score {
+        let mut independent: Vec<Vec<f64>> = Vec::new();
+        for column in columns {
+            let mut column = column.clone();
+            let whole = self.size(&column);
+            for other in &independent {
+                let along = self.inner(other, &column);
+                for (value, other) in column.iter_mut().zip(other) {
+                    *value -= along * other;
+                }
+            }
+            let size = self.size(&column);
+            if size > 1e-3 * whole && size > 0.0 {
+                column.iter_mut().for_each(|value| *value /= size);
+                independent.push(column);
+            }
+        }
+        let scores: Vec<(f64, Vec<f32>)> = independent.iter().map(|column| self.score_of(column)).collect();
+        let squares: f64 = scores.iter().map(|(z, _)| z * z).sum();
+        Score { z: deviate(squares, scores.len()), parts: scores.into_iter().map(|(_, parts)| parts).collect() }
+    }
+
+    fn score_of(&self, column: &[f64]) -> (f64, Vec<f32>) {
         let rows = self.problem.sensor.rows;
         let elements = rows.elements;
         let mut wanted = vec![0.0; rows.blocks];
@@ -137,14 +163,15 @@ impl<'a> Fitting<'a> {
         }
         let total: f64 = variance.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
-            return Score { z: 0.0, parts: vec![0.0; rows.blocks] };
+            return (0.0, vec![0.0; rows.blocks]);
         }
+        let common = wanted.iter().sum::<f64>() / total;
         // Blocks that hardly feel the direction say nothing of its scatter.
         let scatter: Vec<f64> = wanted
             .iter()
             .zip(&variance)
             .filter(|(_, variance)| **variance > 1e-4 * total)
-            .map(|(wanted, variance)| wanted * wanted / variance)
+            .map(|(wanted, variance)| (wanted - common * variance).powi(2) / variance)
             .collect();
         let excess =
             if scatter.len() >= BLOCKS_LEAST { (median(&scatter) / MEDIAN_SQUARE).max(1.0) } else { 1.0 };
@@ -155,13 +182,25 @@ impl<'a> Fitting<'a> {
             let part = (wanted.clamp(-most, most) / deviation) as f32;
             part
         });
-        Score { z: wanted.iter().sum::<f64>() / deviation, parts: parts.collect() }
+        (wanted.iter().sum::<f64>() / deviation, parts.collect())
     }
 }
 
-/// The largest `|z|` of the scores in each of many data sets whose blocks had their signs flipped, for each group.
+/// A chi-square number on the scale of a standard normal deviate, not negative.
+///
+/// # Source
+/// E. B. Wilson and M. M. Hilferty, *Proc. Natl. Acad. Sci.* 17 (1931) 684.
+fn deviate(chi_square: f64, freedom: usize) -> f64 {
+    if freedom == 0 {
+        return 0.0;
+    }
+    let spread = 2.0 / (9.0 * freedom as f64);
+    (((chi_square / freedom as f64).cbrt() - (1.0 - spread)) / spread.sqrt()).max(0.0)
+}
+
+/// The largest of the scores in each of many data sets whose blocks had their signs flipped, for each group.
 pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
-    let blocks = groups.iter().flatten().map(|score| score.parts.len()).max().unwrap_or(0);
+    let blocks = groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
     let mut chance = Chance::new(seed);
     let mut largest = vec![Vec::with_capacity(flips); groups.len()];
     let mut signs = vec![1.0_f32; blocks];
@@ -174,9 +213,13 @@ pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Ve
         }
         for (largest, group) in largest.iter_mut().zip(groups) {
             let of_group = group.iter().map(|score| {
-                score.parts.iter().zip(&signs).map(|(part, sign)| part * sign).sum::<f32>().abs()
+                let square = |parts: &Vec<f32>| {
+                    let sum: f32 = parts.iter().zip(&signs).map(|(part, sign)| part * sign).sum();
+                    f64::from(sum * sum)
+                };
+                deviate(score.parts.iter().map(square).sum(), score.parts.len())
             });
-            largest.push(f64::from(of_group.fold(0.0, f32::max)));
+            largest.push(of_group.fold(0.0, f64::max));
         }
     }
     largest

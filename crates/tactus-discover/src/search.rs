@@ -10,7 +10,7 @@ use tactus_model::effect::Definition;
 
 use crate::candidates::{Candidate, Screened, with};
 use crate::discovery;
-use crate::fit::{Fitted, Free, Problem};
+use crate::fit::{Fitted, Problem};
 use crate::parallel;
 use crate::score::{Fitting, Score, flipped, p_value};
 use crate::sensor::{Parameters, Term};
@@ -21,7 +21,7 @@ const FLIPS: usize = 1999;
 /// Chance of adding anything to a model that lacks nothing.
 pub(crate) const ALPHA: f64 = 0.01;
 /// So many candidates of a round are fitted.
-const FITTED_MAX: usize = 6;
+const FITTED_MAX: usize = 8;
 /// Terms that a model may gain.
 const TERMS_MAX: usize = 7;
 /// Different effects that a model may gain.
@@ -95,7 +95,7 @@ impl Search<'_> {
         let groups: Vec<Vec<&Score>> = screened.iter().map(|one| one.scores.iter().collect()).collect();
         let under_none = flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1));
         let largest = largest(&under_none);
-        let statistic = |one: &Screened| one.scores.iter().map(|score| score.z.abs()).fold(0.0, f64::max);
+        let statistic = |one: &Screened| one.scores.iter().map(|score| score.z).fold(0.0, f64::max);
         let mut tried: Vec<discovery::Candidate> = screened
             .iter()
             .map(|one| discovery::Candidate {
@@ -109,9 +109,10 @@ impl Search<'_> {
         let p_value = tried.iter().map(|one| one.p_value).fold(1.0, f64::min);
         let mut order: Vec<usize> = (0..screened.len()).collect();
         order.sort_by(|a, b| screened[*b].promise.total_cmp(&screened[*a].promise));
-        order.retain(|one| tried[*one].p_value <= ALPHA && screened[*one].promise > 0.0);
+        let wanted = 2.0 * p_value <= ALPHA;
+        order.retain(|one| wanted && screened[*one].promise > self.penalty());
         let best = order.first().map_or(0.0, |one| screened[*one].promise);
-        order.retain(|one| screened[*one].promise > 0.02 * best);
+        order.retain(|one| screened[*one].promise > 0.05 * best);
         order.truncate(FITTED_MAX);
         let starts: Vec<Term> = order.iter().map(|one| screened[*one].start.clone()).collect();
         let mut fits = self.fits(at, &starts)?;
@@ -136,11 +137,10 @@ impl Search<'_> {
         at: &Fitted,
         starts: &[Term],
     ) -> Result<Vec<(&'static str, Fitted)>, DiscoverError> {
-        let once: Vec<Free> = self.problem.free(&at.parameters);
         let fit = |start: &Term| {
             (self.progress)(&format!("fitting {}", start.definition.name));
             let started = with(&at.parameters, start.clone());
-            let fitted = self.problem.fit_from(started, TRIAL_ROUNDS, &once, 1)?;
+            let fitted = self.problem.fit_from(started, TRIAL_ROUNDS, &[], 1)?;
             Ok((start.definition.name, fitted))
         };
         parallel::map(starts, self.options.threads, fit).into_iter().collect()

@@ -1,10 +1,15 @@
 //! `crosstalk`: part of other elements' signals is added to an element's own.
 //!
 //! ```text
-//! u_e -> u_e + neighbour_share * (sum over the up to four nearest)
-//!            + row_share       * (sum over the others of its row)
-//!            + column_share    * (sum over the others of its column)
+//! u_e -> u_e + neighbour_share     * (sum over the up to four nearest)
+//!            + diagonal_share      * (sum over the up to four across its corners)
+//!            + row_neighbour_share * (sum over the up to two beside it in its row)
+//!            + row_share           * (sum over the others of its row)
+//!            + column_share        * (sum over the others of its column)
 //! ```
+//!
+//! Along a row that leaks from column to column, neighbours answer most and the rest of the row less: the two shares of
+//! a row together follow such a ladder.
 //!
 //! # Source
 //! Row-column addressing: charge that leaks between the lines of a capacitive matrix, and stray capacitance
@@ -17,18 +22,20 @@ pub(super) static DEFINITION: Definition = Definition {
     summary: "part of the signal of the neighbours, the row or the column is added",
     parameters: &[
         Parameter::real("neighbour_share", 0.0, [-0.5, 0.5]),
+        Parameter::real("diagonal_share", 0.0, [-0.5, 0.5]),
+        Parameter::real("row_neighbour_share", 0.0, [-0.5, 0.5]),
         Parameter::real("row_share", 0.0, [-0.5, 0.5]),
         Parameter::real("column_share", 0.0, [-0.5, 0.5]),
     ],
     near_twins: &["heavy-tail", "miswired", "anisotropic-spread", "sigma_intercept_mm"],
     shown_by: &["element-centres", "grid-sweep"],
-    make: Make::Element(|values| Box::new(Crosstalk { shares: [values[0], values[1], values[2]] })),
+    make: Make::Element(|values| Box::new(Crosstalk { shares: std::array::from_fn(|share| values[share]) })),
 };
 
-/// Shares of the neighbours, of the row and of the column.
+/// Shares in the order of the parameters.
 #[derive(Debug)]
 struct Crosstalk {
-    shares: [f64; 3],
+    shares: [f64; SUMS.len()],
 }
 
 impl OnElement for Crosstalk {
@@ -62,20 +69,23 @@ impl OnElement for Crosstalk {
 type Sum = fn(usize, &[f64]) -> Vec<f64>;
 
 /// In the order of the shares.
-const SUMS: [Sum; 3] = [of_neighbours, of_rows, of_columns];
+const SUMS: [Sum; 5] = [
+    |cols, values| of_near(cols, values, &[[0, -1], [0, 1], [-1, 0], [1, 0]]),
+    |cols, values| of_near(cols, values, &[[-1, -1], [-1, 1], [1, -1], [1, 1]]),
+    |cols, values| of_near(cols, values, &[[0, -1], [0, 1]]),
+    of_rows,
+    of_columns,
+];
 
-fn of_neighbours(cols: usize, values: &[f64]) -> Vec<f64> {
-    let value =
-        |is_there: bool, index: usize| if is_there { values.get(index).copied().unwrap_or(0.0) } else { 0.0 };
-    (0..values.len())
-        .map(|index| {
-            let col = index % cols;
-            value(col > 0, index.wrapping_sub(1))
-                + value(col + 1 < cols, index + 1)
-                + value(true, index.wrapping_sub(cols))
-                + value(true, index + cols)
-        })
-        .collect()
+/// Sum over those that stand so many rows and columns away, as far as there are any.
+fn of_near(cols: usize, values: &[f64], places: &[[isize; 2]]) -> Vec<f64> {
+    let rows = values.len() / cols;
+    let at = |index: usize, [down, along]: [isize; 2]| {
+        let row = (index / cols).checked_add_signed(down).filter(|row| *row < rows)?;
+        let col = (index % cols).checked_add_signed(along).filter(|col| *col < cols)?;
+        values.get(row * cols + col)
+    };
+    (0..values.len()).map(|index| places.iter().filter_map(|place| at(index, *place)).sum()).collect()
 }
 
 fn of_rows(cols: usize, values: &[f64]) -> Vec<f64> {
