@@ -43,7 +43,7 @@ fn a_model_in_place_of_the_simulation_gives_gains_noise_and_effects_and_leaves_t
     let effect = r#"
         [[effect]]
         name = "relaxation"
-        parameters = { relaxed_share = 0.5, time_constant_s = 1.0, spread_ratio = 1.0 }"#;
+        parameters = { relaxed_share = 0.5, time_constant_s = 1.0, spread_ratio = 1.0, after_release = 0.0, recovery_ratio = 1.0 }"#;
     let model =
         include_str!("../../config/models/digitacts.toml").replace("rms_counts = 2.0", "rms_counts = 0.0");
     let truth = TruthFile::from_toml(&format!("{model}{effect}")).unwrap().behind(&rig, 7).unwrap();

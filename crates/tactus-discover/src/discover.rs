@@ -6,17 +6,17 @@ use std::sync::Mutex;
 use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Registration, Response};
 
 use crate::candidates::{Candidate, Hints};
-use crate::covariates::{Feature, Forms, features};
+use crate::covariates::{Feature, Form, Forms, features};
 use crate::discovery::{
-    Base, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, Split, Step, Unexplained, Verdict,
+    Base, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, Point, Split, Step, Unexplained, Verdict,
 };
 use crate::fit::{Fitted, Problem};
 use crate::noise::Noise;
 use crate::rows::{HeldOut, Rows, still};
-use crate::score::{Fitting, Score, flipped, p_value, q_values};
+use crate::score::{Score, flipped, p_value, q_values};
 use crate::search::{ALPHA, Search, largest, names, without};
 use crate::sensor::{Parameters, Sensor};
-use crate::{Frames, parallel, spectrum, wiring};
+use crate::{Frames, lattice, not_shown, parallel, spectrum, wiring};
 
 /// What is known before: the model that the data are held against.
 #[derive(Debug, Clone)]
@@ -87,7 +87,9 @@ pub fn discover(
             heldout.train_presses
         )));
     }
-    let replicated = Noise::of(frames, &still, known.array.step_counts());
+    let lattice = lattice::wider_step(frames, known.array.step_counts());
+    let step_counts = lattice.map_or(known.array.step_counts(), |(step_counts, _)| step_counts);
+    let replicated = Noise::of(frames, &still, step_counts);
     let noise = match &replicated {
         Some(noise) => noise.clone(),
         None => {
@@ -95,19 +97,19 @@ pub fn discover(
                 "no frames repeat each other: the noise is estimated from differences of consecutive frames"
                     .into(),
             );
-            Noise::of_differences(frames, known.array.step_counts())
+            Noise::of_differences(frames, step_counts)
         }
     };
     said.say("recalibrating the base model", 0.02);
 
-    let whole = Rows::of(frames, &still, false)?;
-    let thin = Rows::of(frames, &still, true)?;
+    let whole = Rows::of(frames, false)?;
+    let thin = Rows::of(frames, true)?;
     let (hints, rows) = {
         let mut rows = thin;
         rows.weigh(frames, &noise, &heldout);
         let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
         let base =
-            problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, &[], options.threads)?;
+            problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, options.threads)?;
         let of_frames = Sensor::new(known, frames, &whole).predict(&base.parameters)?;
         let residual: Vec<f64> =
             frames.counts.iter().zip(&of_frames).map(|(counts, of)| f64::from(*counts) - of).collect();
@@ -117,14 +119,14 @@ pub fn discover(
         let rows = if frequencies_hz.is_empty() {
             rows
         } else {
-            let mut rows = Rows::of(frames, &still, false)?;
+            let mut rows = Rows::of(frames, false)?;
             rows.weigh(frames, &noise, &heldout);
             rows
         };
         (Hints { frequencies_hz, wiring }, rows)
     };
     let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
-    let base = problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, &[], options.threads)?;
+    let base = problem.fit_from(Parameters::declared(known, rows.paths.len()), 12, options.threads)?;
     said.say("scoring the effects", 0.1);
     let candidates = Candidate::all(&problem, &base.parameters, &base.predicted, &hints)?;
     let base_gap = problem.heldout_gap(&base.predicted);
@@ -134,41 +136,73 @@ pub fn discover(
         options,
         known_terms: known.effects.len(),
         base_gap: base_gap.value,
+        base_cost: base.cost,
         progress: &|what| said.say(what, 0.0),
     };
     let before = search.locate(&base)?;
     let (grown, rounds) = search.forward(base.clone())?;
     // Two tests, each at half the chance.
-    let any = (2.0 * rounds.first().map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
+    let first = rounds.first();
+    let any = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
+    let not_shown = first.map_or_else(Vec::new, |round| {
+        not_shown::not_shown(&problem, &round.screened, replicated.is_some())
+    });
     said.say("taking back what does not earn its place", 0.6);
-    let grown =
-        if names(&grown.parameters, search.known_terms).is_empty() { grown } else { search.back(grown)? };
+    let mut grown = search.back(grown)?;
+    let mut equivalent = BTreeMap::new();
+    if !names(&grown.parameters, search.known_terms).is_empty() {
+        said.say("trying every other effect in each one's place", 0.7);
+        (grown, equivalent) = search.exchange(grown)?;
+        grown = search.back(grown)?;
+    }
+    said.say("what is left", 0.9);
     let after = search.locate(&grown)?;
     let grown_gap = problem.heldout_gap(&grown.predicted);
-    let share = if base_gap.value > 0.0 { (grown_gap.value / base_gap.value).clamp(0.0, 1.0) } else { 0.0 };
+    let [closed, _] = problem.heldout_gain(&base, &grown);
+    // What is left beyond the doubt about the noise, of what there was.
+    let sure = (grown_gap.value - SURE_Z * grown_gap.error).max(0.0);
+    let share = if closed + sure > 0.0 { (sure / (closed + sure)).clamp(0.0, 1.0) } else { 1.0 };
     let left = after.p_value <= ALPHA;
-    let mut grown = grown;
-    let found = names(&grown.parameters, search.known_terms);
-    let verdict = match (found.is_empty(), any <= ALPHA) {
-        (true, false) => Verdict::NothingMissing,
-        (true, true) => Verdict::Unexplained,
-        (false, _) if share <= EXPLAINED_SHARE || !left => Verdict::Explained,
-        (false, _) if share <= UNEXPLAINED_SHARE => Verdict::PartlyExplained,
-        (false, _) => Verdict::Unexplained,
-    };
-    if verdict == Verdict::Unexplained {
+    if share > UNEXPLAINED_SHARE {
+        // A model that leaves so much is none of what it is named after.
         grown = base.clone();
     }
-    let (level_base, elements_before) = of_frames(&whole, known, frames, &heldout, &noise, &base.parameters)?;
-    let (level_grown, elements_after) =
+    let found = !names(&grown.parameters, search.known_terms).is_empty();
+    let verdict = match (found || lattice.is_some(), any <= ALPHA) {
+        (false, false) => Verdict::NothingMissing,
+        (false, true) => Verdict::Unexplained,
+        (true, _) if share <= EXPLAINED_SHARE || !left => Verdict::Explained,
+        (true, _) => Verdict::PartlyExplained,
+    };
+    let (level_base, elements_before, _) = of_frames(&whole, known, frames, &heldout, &noise, &base.parameters)?;
+    let (level_grown, elements_after, residual) =
         of_frames(&whole, known, frames, &heldout, &noise, &grown.parameters)?;
-    let gap_counts2 = level_base.heldout_rms_counts.powi(2) - noise.rms_counts.powi(2);
+    // A tone looks like noise until it is known.
+    let floor = Noise::of_residual(frames, &residual, &still, step_counts)
+        .map_or(noise.rms_counts, |noise| noise.rms_counts.min(replicated.as_ref().map_or(noise.rms_counts, |raw| raw.rms_counts)));
+    let in_noise = |level: Level| Level { heldout_chi2: (level.heldout_rms_counts / floor).powi(2), ..level };
+    let (level_base, level_grown) = (in_noise(level_base), in_noise(level_grown));
+    let gap_counts2 = level_base.heldout_rms_counts.powi(2) - floor.powi(2);
     let closed = level_base.heldout_rms_counts.powi(2) - level_grown.heldout_rms_counts.powi(2);
-    let steps = search.steps(&grown)?;
+    let curves = search.curves(&base, &grown)?;
+    let mut steps = search.steps(&grown, &equivalent)?;
+    let mut effects = grown.parameters.effects()?;
+    if let Some((step_counts, p_value)) = lattice {
+        effects.push(Effect::new("quantisation", [("step_counts", step_counts)])?);
+        steps.push(Step {
+            effect: "quantisation",
+            terms: vec![vec![Estimated { name: "step_counts", value: step_counts, standard_error: None }]],
+            p_value,
+            q_value: p_value,
+            heldout_rms_before_counts: level_grown.heldout_rms_counts,
+            heldout_rms_after_counts: level_grown.heldout_rms_counts,
+            equivalent: Vec::new(),
+        });
+    }
     said.say("done", 1.0);
     Ok(Discovery {
         seed: options.seed,
-        not_shown: Vec::new(),
+        not_shown,
         warnings,
         split: Split {
             frames: frames.len(),
@@ -178,11 +212,11 @@ pub fn discover(
             heldout_coverings_mm: heldout.coverings_mm,
         },
         heldout_frames: heldout.frames.clone(),
-        noise_rms_counts: replicated.map(|noise| noise.rms_counts),
+        noise_rms_counts: replicated.map(|_| floor),
         base: level_base,
         global: GlobalTest { statistic: before.statistic, p_value: any },
         gap: before.gap,
-        curves: Vec::new(),
+        curves,
         elements: elements_before
             .into_iter()
             .zip(elements_after)
@@ -196,12 +230,16 @@ pub fn discover(
         },
         verdict,
         unexplained: Unexplained {
-            depends_on: if left { after.gap.iter().map(|gap| gap.covariate).collect() } else { Vec::new() },
-            share: if verdict == Verdict::NothingMissing { 0.0 } else { share },
+            depends_on: if left && any <= ALPHA { after.gap.iter().map(|gap| gap.covariate).collect() } else { Vec::new() },
+            share: match verdict {
+                Verdict::NothingMissing => 0.0,
+                Verdict::Unexplained => 1.0,
+                Verdict::Explained | Verdict::PartlyExplained => share,
+            },
         },
         next_experiments: Vec::new(),
         recalibrated: base_of(known, &base.parameters),
-        effects: grown.parameters.effects()?,
+        effects,
         grown: base_of(known, &grown.parameters),
     })
 }
@@ -264,14 +302,46 @@ impl Search<'_> {
         Ok(Located { statistic, p_value: p_value(statistic, &largest(&under_none)), gap })
     }
 
+    /// The residual against each covariate, before and after.
+    fn curves(&self, base: &Fitted, grown: &Fitted) -> Result<Vec<Curve>, DiscoverError> {
+        let problem = self.problem;
+        let forms = Forms::of(problem, &base.parameters, &base.predicted)?;
+        let features = features(problem, &forms);
+        let mut curves: Vec<Curve> = Vec::new();
+        for feature in features.iter().filter(|one| matches!(one.form, Form::Signal | Form::Offset)) {
+            let column = forms.column(feature, problem.sensor.rows.elements);
+            let Some([before, standard_error]) = problem.share(&column, &base.predicted) else { continue };
+            let Some([after, _]) = problem.share(&column, &grown.predicted) else { continue };
+            let at = f64::midpoint(feature.range[0], feature.range[1]);
+            let of = if feature.form == Form::Signal { "share of the signal" } else { "counts" };
+            let point = Point { at, before, after, standard_error };
+            let same = |curve: &&mut Curve| curve.covariate == feature.covariate && curve.of == of;
+            match curves.iter_mut().find(same) {
+                Some(curve) => curve.points.push(point),
+                None => curves.push(Curve {
+                    covariate: feature.covariate,
+                    unit: feature.unit,
+                    of,
+                    points: vec![point],
+                }),
+            }
+        }
+        curves.retain(|curve| curve.points.len() > 1);
+        Ok(curves)
+    }
+
     /// What was added, each name once.
-    fn steps(&self, grown: &Fitted) -> Result<Vec<Step>, DiscoverError> {
+    fn steps(
+        &self,
+        grown: &Fitted,
+        equivalent: &BTreeMap<&'static str, Vec<&'static str>>,
+    ) -> Result<Vec<Step>, DiscoverError> {
         let names = names(&grown.parameters, self.known_terms);
         let after = self.problem.heldout_blocks(&grown.predicted);
         let mut steps = Vec::new();
         for name in names {
             let less = without(&grown.parameters, name, self.known_terms);
-            let before = self.problem.fit_from(less, 8, &[], self.options.threads)?;
+            let before = self.problem.fit_from(less, 8, self.options.threads)?;
             let blocks = self.problem.heldout_blocks(&before.predicted);
             let gains: Vec<f64> = blocks.iter().zip(&after).map(|(b, a)| b[0] - a[0]).collect();
             let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(self.known_terms);
@@ -296,8 +366,12 @@ impl Search<'_> {
                 q_value: p_value,
                 heldout_rms_before_counts: self.problem.heldout_rms_counts(&before.predicted),
                 heldout_rms_after_counts: self.problem.heldout_rms_counts(&grown.predicted),
-                equivalent: Vec::new(),
+                equivalent: equivalent.get(name).cloned().unwrap_or_default(),
             });
+        }
+        let p_values: Vec<f64> = steps.iter().map(|step| step.p_value).collect();
+        for (step, q_value) in steps.iter_mut().zip(q_values(&p_values)) {
+            step.q_value = q_value;
         }
         Ok(steps)
     }
@@ -311,6 +385,8 @@ const Q_MAX: f64 = 0.05;
 /// What is left of the gap at most, for the verdict.
 const EXPLAINED_SHARE: f64 = 0.1;
 const UNEXPLAINED_SHARE: f64 = 0.35;
+/// The noise is known to so many standard errors.
+const SURE_Z: f64 = 2.0;
 
 /// Says how far it has come; the share never falls.
 struct Said<'a> {
@@ -335,7 +411,7 @@ fn of_frames(
     heldout: &HeldOut,
     noise: &Noise,
     parameters: &Parameters,
-) -> Result<(Level, Vec<f64>), DiscoverError> {
+) -> Result<(Level, Vec<f64>, Vec<f32>), DiscoverError> {
     let predicted = Sensor::new(known, frames, whole).predict(parameters)?;
     let elements = frames.elements;
     let mut squares = vec![0.0; elements];
@@ -351,7 +427,9 @@ fn of_frames(
     let count = count.max(1.0);
     let mean = squares.iter().sum::<f64>() / (count * elements as f64);
     let level = Level { heldout_rms_counts: mean.sqrt(), heldout_chi2: mean / noise.rms_counts.powi(2) };
-    Ok((level, squares.into_iter().map(|sum| (sum / count).sqrt()).collect()))
+    #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
+    let residual = frames.counts.iter().zip(&predicted).map(|(counts, of)| counts - *of as f32).collect();
+    Ok((level, squares.into_iter().map(|sum| (sum / count).sqrt()).collect(), residual))
 }
 
 fn base_of(known: &Known, parameters: &Parameters) -> Base {
@@ -376,7 +454,7 @@ pub fn predict(
     base: &Base,
     effects: &[Effect],
 ) -> Result<Vec<f32>, DiscoverError> {
-    let rows = Rows::of(frames, &still(frames), false)?;
+    let rows = Rows::of(frames, false)?;
     let parameters = Parameters {
         sensitivity: base.response.sensitivity_counts_per_mm.clone(),
         baseline: base.run_baselines_counts.clone(),

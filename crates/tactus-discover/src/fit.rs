@@ -29,6 +29,9 @@ const GAIN_ERROR_MAX: f64 = 0.3;
 const COST_LEAST: f64 = 0.05;
 const COST_SHARE_LEAST: f64 = 1e-4;
 
+/// An effect with more parameters has many.
+const PARAMETERS_MANY: usize = 6;
+
 /// How far a model is from the held-out rows beyond their noise, in units of the noise's variance, summed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HeldOutGap {
@@ -151,6 +154,50 @@ impl<'a> Problem<'a> {
             let [total, readings] = &mut blocks[rows.block[row]];
             *total += rows.weight[row] * sum;
             *readings += elements as f64;
+        }
+        blocks
+    }
+
+    /// By how much the held-out rows are nearer to one model than to another, and the error of that, by whole blocks.
+    pub(crate) fn heldout_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
+        let (less, more) = (self.heldout_blocks(&less.predicted), self.heldout_blocks(&more.predicted));
+        let gains: Vec<f64> = less.iter().zip(&more).map(|(less, more)| less[0] - more[0]).collect();
+        let sum: f64 = gains.iter().sum();
+        let held = less.iter().filter(|[_, readings]| *readings > 0.0).count().max(1) as f64;
+        let scatter: f64 = gains.iter().map(|gain| gain * gain).sum::<f64>() - sum * sum / held;
+        // A gain in one block only is no less of one: its noise is that of the difference of two predictions.
+        let noise = 4.0 * sum.abs();
+        [sum, scatter.max(0.0).min(noise).sqrt()]
+    }
+
+    /// How much of a column the residual of all rows holds, and the standard error of that, by whole blocks.
+    pub(crate) fn share(&self, column: &[f64], predicted: &[f64]) -> Option<[f64; 2]> {
+        let rows = self.sensor.rows;
+        let mut blocks = vec![[0.0; 2]; rows.blocks];
+        for (index, ((value, counts), of)) in column.iter().zip(&rows.counts).zip(predicted).enumerate() {
+            if *value != 0.0 {
+                let (row, element) = (index / rows.elements, index % rows.elements);
+                let weighted = rows.weight[row] * self.element_weight[element] * value;
+                let [along, squares] = &mut blocks[rows.block[row]];
+                *along += weighted * (counts - of);
+                *squares += weighted * value;
+            }
+        }
+        let squares: f64 = blocks.iter().map(|[_, squares]| squares).sum();
+        let share = blocks.iter().map(|[along, _]| along).sum::<f64>() / squares;
+        let scatter: f64 = blocks.iter().map(|[along, squares]| (along - share * squares).powi(2)).sum();
+        (squares > 0.0).then(|| [share, scatter.sqrt() / squares])
+    }
+
+    /// Weighted squared residuals of all rows, fitted and held out, block by block.
+    pub(crate) fn blocks(&self, predicted: &[f64]) -> Vec<f64> {
+        let rows = self.sensor.rows;
+        let mut blocks = vec![0.0; rows.blocks];
+        let of_rows = rows.counts.chunks_exact(rows.elements).zip(predicted.chunks_exact(rows.elements));
+        for (row, (counts, predicted)) in of_rows.enumerate() {
+            let squares = counts.iter().zip(predicted).zip(&self.element_weight);
+            let sum: f64 = squares.map(|((counts, of), weight)| weight * (counts - of).powi(2)).sum();
+            blocks[rows.block[row]] += rows.weight[row] * sum;
         }
         blocks
     }
@@ -298,13 +345,12 @@ impl<'a> Problem<'a> {
         parallel::map(&free, threads, |one| self.slope(at, predicted, *one)).into_iter().collect()
     }
 
-    /// The best parameters near a start, in at most so many rounds; the derivatives by the parameters in `once` are
-    /// taken once.
+    /// The best parameters near a start, in at most so many rounds. Derivatives by the parameters of effects that have
+    /// many, such as the knots of a curve, are taken once: the counts are nearly linear in them.
     pub(crate) fn fit_from(
         &self,
         start: Parameters,
         rounds: usize,
-        once: &[Free],
         threads: usize,
     ) -> Result<Fitted, DiscoverError> {
         let free = self.free(&start);
@@ -327,7 +373,7 @@ impl<'a> Problem<'a> {
             let columns: Vec<Vec<f64>> =
                 parallel::map(&places, threads, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             for ((kept, column), one) in kept.iter_mut().zip(&columns).zip(&free) {
-                if once.contains(one) {
+                if matches!(one, Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY) {
                     kept.get_or_insert_with(|| column.clone());
                 }
             }

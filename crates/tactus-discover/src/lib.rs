@@ -3,12 +3,15 @@
 
 mod candidates;
 mod chance;
+mod contacts;
 mod covariates;
 mod discover;
 mod discovery;
 mod fit;
 mod frames;
+mod lattice;
 mod noise;
+mod not_shown;
 mod parallel;
 mod rows;
 mod scale;

@@ -32,6 +32,16 @@ pub(crate) struct Noise {
 impl Noise {
     /// `None` if no frames repeat each other.
     pub(crate) fn of(frames: &Frames, still: &[usize], step_counts: f64) -> Option<Self> {
+        Self::of_residual(frames, &frames.counts, still, step_counts)
+    }
+
+    /// The same of what a model leaves of the frames, frame by frame, element by element.
+    pub(crate) fn of_residual(
+        frames: &Frames,
+        residual: &[f32],
+        still: &[usize],
+        step_counts: f64,
+    ) -> Option<Self> {
         let elements = frames.elements;
         let lags = *PLATEAU.end();
         let mut squares = vec![0.0_f64; (lags + 1) * elements];
@@ -43,7 +53,8 @@ impl Noise {
                     continue;
                 }
                 pairs[lag] += 1;
-                let (now, then) = (frames.counts_of(frame), frames.counts_of(frame - lag));
+                let of = |frame: usize| &residual[frame * elements..(frame + 1) * elements];
+                let (now, then) = (of(frame), of(frame - lag));
                 for ((sum, now), then) in squares[lag * elements..].iter_mut().zip(now).zip(then) {
                     *sum += f64::from(now - then).powi(2) / 2.0;
                 }

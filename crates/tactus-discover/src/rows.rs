@@ -11,8 +11,10 @@ use crate::{DiscoverError, Frames};
 
 /// A tip that moved less did not move.
 const STILL_MM: f64 = 0.001;
+/// A tip so high above the surface changes nothing, wherever it moves.
+const CLEAR_MM: f64 = 0.25;
 /// A row holds at most this share of the frames since the tip came to rest.
-const GROWTH: f64 = 0.2;
+const GROWTH: f64 = 0.25;
 /// A row holds at most so many frames.
 const FRAMES_MAX: usize = 15;
 /// Readings further apart are taken to be independent; more if their noise says so.
@@ -57,6 +59,11 @@ pub(crate) struct HeldOut {
 
 /// Of every frame, how many frames before it the tip stood at the same place, the frame itself not counted.
 pub(crate) fn still(frames: &Frames) -> Vec<usize> {
+    unchanged(frames, f64::INFINITY)
+}
+
+/// As [`still`], moves above a height not counted.
+fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
     let mut still = vec![0; frames.len()];
     let mut begin = 0;
     for (_, end) in &frames.runs {
@@ -66,7 +73,8 @@ pub(crate) fn still(frames: &Frames) -> Vec<usize> {
             let moved = (0..3).any(|axis| {
                 (frames.position_mm[frame][axis] - frames.position_mm[anchor][axis]).abs() > STILL_MM
             });
-            if moved || frames.press[frame] != frames.press[anchor] {
+            let clear = [frame, anchor].iter().all(|one| frames.position_mm[*one][2] > clear_mm);
+            if (moved && !clear) || frames.press[frame] != frames.press[anchor] {
                 anchor = frame;
             }
             still[frame] = frame - anchor;
@@ -77,8 +85,9 @@ pub(crate) fn still(frames: &Frames) -> Vec<usize> {
 }
 
 impl Rows {
-    /// Rows of at most `frames_max` frames, none weighted yet.
-    pub(crate) fn of(frames: &Frames, still: &[usize], thin: bool) -> Result<Self, DiscoverError> {
+    /// Rows of several frames where that loses nothing (`thin`), or of one each; none weighted yet.
+    pub(crate) fn of(frames: &Frames, thin: bool) -> Result<Self, DiscoverError> {
+        let unchanged = unchanged(frames, CLEAR_MM);
         let elements = frames.elements;
         let (mut first, mut run, mut t_s, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut begin = 0;
@@ -89,12 +98,12 @@ impl Rows {
             while frame < *end {
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
                 let most =
-                    if thin { ((GROWTH * still[frame] as f64) as usize).clamp(1, FRAMES_MAX) } else { 1 };
+                    if thin { ((GROWTH * unchanged[frame] as f64) as usize).clamp(1, FRAMES_MAX) } else { 1 };
                 let mut next = frame + 1;
                 while next < *end
                     && next - frame < most
-                    && still[next] > still[next - 1]
-                    && frames.phase[next] == frames.phase[frame]
+                    && unchanged[next] > unchanged[next - 1]
+                    && pressing(frames.phase[next]) == pressing(frames.phase[frame])
                 {
                     next += 1;
                 }

@@ -6,6 +6,8 @@
 //! is a simpler explanation than another effect. Back: each effect must earn its place against the model without it, and
 //! against every other effect in its place.
 
+use std::collections::BTreeMap;
+
 use tactus_model::effect::Definition;
 
 use crate::candidates::{Candidate, Screened, with};
@@ -21,7 +23,7 @@ const FLIPS: usize = 1999;
 /// Chance of adding anything to a model that lacks nothing.
 pub(crate) const ALPHA: f64 = 0.01;
 /// So many candidates of a round are fitted.
-const FITTED_MAX: usize = 8;
+const FITTED_MAX: usize = 7;
 /// Terms that a model may gain.
 const TERMS_MAX: usize = 7;
 /// Different effects that a model may gain.
@@ -30,9 +32,28 @@ const NAMES_MAX: usize = 4;
 /// this much better.
 const AGAIN_SHARE: f64 = 0.5;
 /// Rounds of a fit that compares candidates.
-const TRIAL_ROUNDS: usize = 7;
-/// Without it the gap on held-out presses must be so many times as large, for an effect to stay.
-const EARNS: f64 = 1.6;
+const TRIAL_ROUNDS: usize = 5;
+/// Rounds after which those far behind are given up, what that is, and how many go on.
+const FIRST_ROUNDS: usize = 2;
+const BEHIND_SHARE: f64 = 0.4;
+const FINISHED_MAX: usize = 4;
+/// A term that gains less than this share of what all before it have gained polishes their form; it is not taken.
+const GAIN_SHARE_LEAST: f64 = 0.01;
+/// Rounds of a fit of a model that is taken.
+const POLISH_ROUNDS: usize = 8;
+/// What a term must lessen the cost by at least.
+const PENALTY: f64 = 10.0;
+/// Rivals of an effect that are fitted in its place, at most, and what their first step must promise.
+const RIVALS_MAX: usize = 5;
+const RIVAL_SHARE: f64 = 0.15;
+const EXCHANGES_MAX: usize = 3;
+/// Two models are not told apart by fewer standard errors than this, or where one closes so much of what the other does.
+const INSEPARABLE_Z: f64 = 2.0;
+const INSEPARABLE_SHARE: f64 = 0.97;
+/// An effect stays if the held-out presses are further off without it by so many standard errors, and by such a share
+/// of what the whole model leaves of them.
+const EARNS_Z: f64 = 2.0;
+const EARNS_SHARE: f64 = 0.6;
 
 /// The search's tools.
 pub(crate) struct Search<'a> {
@@ -43,12 +64,16 @@ pub(crate) struct Search<'a> {
     pub(crate) known_terms: usize,
     /// How far the base model is from the held-out presses.
     pub(crate) base_gap: f64,
+    /// The cost of the base model.
+    pub(crate) base_cost: f64,
     pub(crate) progress: &'a (dyn Fn(&str) + Sync),
 }
 
 /// A round: what was tried, and what came of it.
 pub(crate) struct Tried {
     pub(crate) round: discovery::Round,
+    /// How every candidate was scored.
+    pub(crate) screened: Vec<Screened>,
     /// Fits that were made, best first.
     pub(crate) fits: Vec<(&'static str, Fitted)>,
     /// Chance of so large a score of any candidate if nothing were missing.
@@ -79,7 +104,7 @@ impl Search<'_> {
             let mut tried = tried;
             tried.round.taken = Some(taken);
             rounds.push(tried);
-            at = self.problem.fit_from(fitted.parameters, 8, &[], self.options.threads)?;
+            at = self.problem.fit_from(fitted.parameters, POLISH_ROUNDS, self.options.threads)?;
             if at.parameters.terms.len() - self.known_terms >= TERMS_MAX {
                 break;
             }
@@ -110,7 +135,7 @@ impl Search<'_> {
         let mut order: Vec<usize> = (0..screened.len()).collect();
         order.sort_by(|a, b| screened[*b].promise.total_cmp(&screened[*a].promise));
         let wanted = 2.0 * p_value <= ALPHA;
-        order.retain(|one| wanted && screened[*one].promise > self.penalty());
+        order.retain(|one| wanted && screened[*one].promise > PENALTY);
         let best = order.first().map_or(0.0, |one| screened[*one].promise);
         order.retain(|one| screened[*one].promise > 0.05 * best);
         order.truncate(FITTED_MAX);
@@ -128,10 +153,10 @@ impl Search<'_> {
         let place = |name: &str| fits.iter().position(|(fitted, _)| *fitted == name).unwrap_or(usize::MAX);
         tried.sort_by(|a, b| place(a.effect).cmp(&place(b.effect)).then(b.score.total_cmp(&a.score)));
         let names = names(&at.parameters, self.known_terms);
-        Ok(Tried { round: discovery::Round { with: names, candidates: tried, taken: None }, fits, p_value })
+        Ok(Tried { round: discovery::Round { with: names, candidates: tried, taken: None }, screened, fits, p_value })
     }
 
-    /// Fits of a model with each of the terms.
+    /// Fits of a model with each of the terms: all of them in few rounds, and then the best of them to the end.
     pub(crate) fn fits(
         &self,
         at: &Fitted,
@@ -140,10 +165,18 @@ impl Search<'_> {
         let fit = |start: &Term| {
             (self.progress)(&format!("fitting {}", start.definition.name));
             let started = with(&at.parameters, start.clone());
-            let fitted = self.problem.fit_from(started, TRIAL_ROUNDS, &[], 1)?;
-            Ok((start.definition.name, fitted))
+            Ok((start.definition.name, self.problem.fit_from(started, FIRST_ROUNDS, 1)?))
         };
-        parallel::map(starts, self.options.threads, fit).into_iter().collect()
+        let mut fits: Vec<(&'static str, Fitted)> =
+            parallel::map(starts, self.options.threads, fit).into_iter().collect::<Result<_, DiscoverError>>()?;
+        fits.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        let best = fits.first().map_or(0.0, |(_, best)| at.cost - best.cost);
+        fits.retain(|(_, fitted)| at.cost - fitted.cost > BEHIND_SHARE * best);
+        fits.truncate(FINISHED_MAX);
+        let finish = |(name, fitted): &(&'static str, Fitted)| {
+            Ok((*name, self.problem.fit_from(fitted.parameters.clone(), TRIAL_ROUNDS, 1)?))
+        };
+        parallel::map(&fits, self.options.threads, finish).into_iter().collect()
     }
 
     /// The model's tangent space and residual.
@@ -159,7 +192,7 @@ impl Search<'_> {
         let allowed = |name: &&'static str| names.contains(name) || names.len() < NAMES_MAX;
         let (best_name, best) = tried.fits.iter().find(|(name, _)| allowed(name))?;
         let gain = at.cost - best.cost;
-        if gain <= self.penalty() {
+        if gain <= PENALTY || gain < GAIN_SHARE_LEAST * (self.base_cost - at.cost) {
             return None;
         }
         let again = tried
@@ -170,9 +203,49 @@ impl Search<'_> {
         Some((name, fitted.clone()))
     }
 
-    /// What a term must lessen the cost by at least.
-    fn penalty(&self) -> f64 {
-        10.0
+    /// Puts in each effect's place what serves better, and tells what serves as well.
+    pub(crate) fn exchange(
+        &self,
+        mut at: Fitted,
+    ) -> Result<(Fitted, BTreeMap<&'static str, Vec<&'static str>>), DiscoverError> {
+        let mut exchanged = 0;
+        'again: loop {
+            let mut equivalent = BTreeMap::new();
+            let names = names(&at.parameters, self.known_terms);
+            for name in &names {
+                let less = without(&at.parameters, name, self.known_terms);
+                let less = self.problem.fit_from(less, TRIAL_ROUNDS, self.options.threads)?;
+                let fitting = self.fitting(&less)?;
+                let mut rivals = self.screen(&fitting, &less)?;
+                rivals.retain(|one| !names.contains(&one.definition.name) && one.promise > PENALTY);
+                rivals.sort_by(|a, b| b.promise.total_cmp(&a.promise));
+                // What cannot take up a good part of the gap in a first step is no rival, however far it goes.
+                rivals.retain(|one| one.promise > RIVAL_SHARE * (less.cost - at.cost));
+                rivals.truncate(RIVALS_MAX);
+                let starts: Vec<Term> = rivals.into_iter().map(|one| one.start).collect();
+                let fits = self.fits(&less, &starts)?;
+                let best = fits.iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+                if let Some((_, best)) = best.filter(|(_, best)| best.cost < at.cost - PENALTY && exchanged < EXCHANGES_MAX) {
+                    exchanged += 1;
+                    at = self.problem.fit_from(best.parameters.clone(), POLISH_ROUNDS, self.options.threads)?;
+                    continue 'again;
+                }
+                let same = fits.iter().filter(|(_, rival)| self.serves_as_well(&less, rival, &at));
+                equivalent.insert(*name, same.map(|(rival, _)| *rival).collect());
+            }
+            return Ok((at, equivalent));
+        }
+    }
+
+    /// True if the data cannot tell a rival from what is in the model: block by block it is hardly worse, or it closes
+    /// nearly all of the gap that the other does, so that the form of either may be what differs.
+    fn serves_as_well(&self, less: &Fitted, rival: &Fitted, at: &Fitted) -> bool {
+        let (of_rival, of_model) = (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
+        let worse: Vec<f64> = of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect();
+        let sum: f64 = worse.iter().sum();
+        let mean = sum / worse.len().max(1) as f64;
+        let scatter = worse.iter().map(|one| (one - mean).powi(2)).sum::<f64>().sqrt();
+        sum < INSEPARABLE_Z * scatter || less.cost - rival.cost > INSEPARABLE_SHARE * (less.cost - at.cost)
     }
 
     /// Takes back what does not earn its place, and puts in its place what serves better.
@@ -184,22 +257,24 @@ impl Search<'_> {
             }
             let without = |name: &&'static str| {
                 (self.progress)(&format!("without {name}"));
-                self.problem.fit_from(without(&at.parameters, name, self.known_terms), TRIAL_ROUNDS, &[], 1)
+                self.problem.fit_from(without(&at.parameters, name, self.known_terms), TRIAL_ROUNDS, 1)
             };
             let fits: Vec<Fitted> =
                 parallel::map(&names, self.options.threads, without).into_iter().collect::<Result<_, _>>()?;
-            let here = self.problem.heldout_gap(&at.predicted);
-            let ratios = fits
-                .iter()
-                .map(|fitted| self.problem.heldout_gap(&fitted.predicted).value / here.value.max(here.error));
-            let Some((least, ratio)) = ratios.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else {
+            let gap = self.problem.heldout_gap(&at.predicted);
+            let worth = |less: &Fitted| {
+                let [gain, error] = self.problem.heldout_gain(less, &at);
+                // Beyond noise, and as much again as a part of what the whole model leaves.
+                (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(gain / (EARNS_SHARE * gap.value.max(gap.error)))
+            };
+            let Some((least, worth)) = fits.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else {
                 return Ok(at);
             };
-            if ratio >= EARNS {
+            if worth >= 1.0 {
                 return Ok(at);
             }
             let Some(simpler) = fits.into_iter().nth(least) else { return Ok(at) };
-            at = self.problem.fit_from(simpler.parameters, 8, &[], self.options.threads)?;
+            at = self.problem.fit_from(simpler.parameters, POLISH_ROUNDS, self.options.threads)?;
         }
     }
 }

@@ -38,8 +38,8 @@ pub(crate) struct Sensor<'a> {
     pub(crate) images: Arc<Images>,
 }
 
-/// Images that are kept at most: some 250 MB of the paper's array.
-const IMAGES_MAX: usize = 600_000;
+/// Images that are kept at most: some 130 MB of the paper's array.
+const IMAGES_MAX: usize = 200_000;
 
 impl Term {
     pub(crate) fn neutral(definition: &'static Definition) -> Self {

@@ -20,7 +20,7 @@ use crate::{Covering, ForwardModel, Indenter, Moment, Pipeline, Registration, Tr
 ///     surface_mm: 0.0,
 ///     covering,
 ///     indenter,
-///     effects: vec![Effect::new("relaxation", [("relaxed_share", 0.2), ("time_constant_s", 5.0), ("spread_ratio", 1.0)])?],
+///     effects: vec![Effect::new("relaxation", [("relaxed_share", 0.2), ("time_constant_s", 5.0), ("spread_ratio", 1.0), ("after_release", 0.0), ("recovery_ratio", 1.0)])?],
 ///     noise_rms_counts: 0.0,
 /// };
 /// // Down to 0.5 mm upon element 17 within half a second, and held there.

@@ -5,7 +5,7 @@ const DIGITACTS: &str = include_str!("../../../config/models/digitacts.toml");
 const GROWN: &str = r#"
 [[effect]]
 name = "relaxation"
-parameters = { relaxed_share = 0.12, time_constant_s = 8.1, spread_ratio = 1 }
+parameters = { relaxed_share = 0.12, time_constant_s = 8.1, spread_ratio = 1, after_release = 0, recovery_ratio = 1 }
 standard_errors = { relaxed_share = 0.004 }
 evidence = { data = "4f1c", heldout_rms_before_counts = 9.3, heldout_rms_after_counts = 2.2 }
 

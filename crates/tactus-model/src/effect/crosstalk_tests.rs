@@ -5,7 +5,7 @@ const NAMES: [&str; 5] =
     ["neighbour_share", "diagonal_share", "row_neighbour_share", "row_share", "column_share"];
 
 fn crossed(shares: [f64; 5], signal: &[f64]) -> Vec<f64> {
-    let effect = effect("crosstalk", NAMES.into_iter().zip(shares));
+    let effect = effect("crosstalk", std::array::from_fn::<_, 5, _>(|k| (NAMES[k], shares[k])));
     let Make::Element(make) = effect.definition().make else { panic!("an effect of the elements") };
     let (model, mut out) = (model(), signal.to_vec());
     let base = Base { model: &model, covering: crate::effect::bench::THIN };
@@ -53,5 +53,5 @@ fn a_signal_shows_in_its_row_and_its_column() {
 #[test]
 fn derivatives_are_those_of_differences() {
     let shares = [0.1, 0.03, -0.04, 0.02, -0.03];
-    assert_slopes(&effect("crosstalk", NAMES.into_iter().zip(shares)), &NAMES);
+    assert_slopes(&effect("crosstalk", std::array::from_fn::<_, 5, _>(|k| (NAMES[k], shares[k]))), &NAMES);
 }

@@ -27,23 +27,28 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[
         Parameter::real("growth_at_1_mm", 0.0, [0.0, 20.0]),
         Parameter::real("exponent", 2.0, [0.25, 6.0]),
+        Parameter::real("own_share", 0.0, [0.0, 1.0]),
     ],
     near_twins: &["saturation", "surface-offset", "depth-dependent-spread", "quadratic_per_mm"],
     shown_by: &["ladder", "element-centres"],
-    make: Make::Covering(|values| Box::new(Hardening { growth_at_1_mm: values[0], exponent: values[1] })),
+    make: Make::Covering(|values| {
+        let [growth_at_1_mm, exponent, own_share] = [values[0], values[1], values[2]];
+        Box::new(Hardening { growth_at_1_mm, exponent, own_share })
+    }),
 };
 
 #[derive(Debug)]
 struct Hardening {
     growth_at_1_mm: f64,
     exponent: f64,
+    own_share: f64,
 }
 
 impl OnCovering for Hardening {
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
-        let factor = 1.0 + self.growth_at_1_mm * depth_mm(now.base, contact).powf(self.exponent);
+        let depth_mm = depth_mm(now.base, contact);
         for u in signal_mm {
-            *u *= factor;
+            *u *= 1.0 + self.growth_at_1_mm * self.argument_mm(depth_mm, *u).powf(self.exponent);
         }
     }
 
@@ -55,18 +60,28 @@ impl OnCovering for Hardening {
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
+        if parameter > 2 {
+            return false;
+        }
         let depth_mm = depth_mm(base, contact);
-        let power = depth_mm.powf(self.exponent);
-        let by = match parameter {
-            0 => power,
-            1 if depth_mm > 0.0 => self.growth_at_1_mm * power * depth_mm.ln(),
-            1 => 0.0,
-            _ => return false,
-        };
         for (slope, u) in slope_mm.iter_mut().zip(before_mm) {
-            *slope = u * by;
+            let argument_mm = self.argument_mm(depth_mm, *u);
+            let power = argument_mm.powf(self.exponent);
+            *slope = u * match parameter {
+                0 => power,
+                _ if argument_mm == 0.0 => 0.0,
+                1 => self.growth_at_1_mm * power * argument_mm.ln(),
+                _ => self.growth_at_1_mm * self.exponent * power / argument_mm * (u.max(0.0) - depth_mm),
+            };
         }
         true
+    }
+}
+
+impl Hardening {
+    /// What the covering hardens with.
+    fn argument_mm(&self, depth_mm: f64, u: f64) -> f64 {
+        (1.0 - self.own_share) * depth_mm + self.own_share * u.max(0.0)
     }
 }
 

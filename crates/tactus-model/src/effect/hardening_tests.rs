@@ -2,7 +2,7 @@ use crate::Effect;
 use crate::effect::bench::{THIN, assert_slopes, effect, simulator, still, upon};
 
 fn hard(growth_at_1_mm: f64, exponent: f64) -> Effect {
-    effect("hardening", [("growth_at_1_mm", growth_at_1_mm), ("exponent", exponent)])
+    effect("hardening", [("growth_at_1_mm", growth_at_1_mm), ("exponent", exponent), ("own_share", 0.0)])
 }
 
 /// Equivalent indentation of an element whose response is `s (u + 0.15 u^2)`.
@@ -33,8 +33,20 @@ fn all_elements_gain_alike() {
 }
 
 #[test]
+fn an_element_may_gain_by_its_own_signal() {
+    let own = hard(0.8, 1.0).with("own_share", 1.0).unwrap();
+    let (soft, hard) = (simulator([]), simulator([own]));
+    let tip_mm = upon(&soft, 21, 0.5);
+    for (element, (hard, soft)) in still(&hard, tip_mm).iter().zip(still(&soft, tip_mm)).enumerate() {
+        let u = signal_mm(soft, element);
+        assert!((signal_mm(*hard, element) - u * (1.0 + 0.8 * u)).abs() < 1e-9, "element {element}");
+    }
+}
+
+#[test]
 fn derivatives_are_those_of_differences() {
     for exponent in [0.7, 2.0, 4.5] {
-        assert_slopes(&hard(0.5, exponent), &["growth_at_1_mm", "exponent"]);
+        let between = hard(0.5, exponent).with("own_share", 0.3).unwrap();
+        assert_slopes(&between, &["growth_at_1_mm", "exponent", "own_share"]);
     }
 }

@@ -38,12 +38,13 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("loss_share", 0.0, [-1.0, 5.0]),
         Parameter::real("threshold_mm", 0.1, [1e-3, 2.0]),
         Parameter::real("threshold_growth", 0.1, [0.0, 0.9]),
+        Parameter::real("by_depth", 0.0, [0.0, 1.0]),
     ],
     near_twins: &["backlash", "softening", "relaxation", "imprint", "time-lag", "rate-stiffening"],
     shown_by: &["ladder", "repeats"],
     make: Make::Covering(|values| {
-        let [loss_share, threshold_mm, growth] = [values[0], values[1], values[2]];
-        Box::new(Hysteresis { loss_share, threshold_mm, growth, plays: Vec::new() })
+        let [loss_share, threshold_mm, growth, by_depth] = [values[0], values[1], values[2], values[3]];
+        Box::new(Hysteresis { loss_share, threshold_mm, growth, by_depth, plays: Vec::new() })
     }),
 };
 
@@ -55,6 +56,7 @@ struct Hysteresis {
     loss_share: f64,
     threshold_mm: f64,
     growth: f64,
+    by_depth: f64,
     /// Of each element.
     plays: Vec<[Play; 4]>,
 }
@@ -68,34 +70,41 @@ struct Play {
 }
 
 impl OnCovering for Hysteresis {
-    fn signal(&mut self, _: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
+    fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
         self.plays.resize(signal_mm.len(), <[Play; 4]>::default());
+        let [by_depth, by_own] = [self.by_depth, 1.0 - self.by_depth];
+        let depth_mm = contact.depth_mm.clamp(0.0, now.base.covering.thickness_mm);
         for (u, plays) in signal_mm.iter_mut().zip(&mut self.plays) {
+            let load_mm = by_own * u.max(0.0) + by_depth * depth_mm;
             for (play, share) in plays.iter_mut().zip(SHARES) {
-                play.follow(u.max(0.0), share * self.threshold_mm, share * self.growth, share);
+                play.follow(load_mm, share * self.threshold_mm, share * self.growth, share);
             }
-            *u = left(*u, self.loss_share * mean(plays.map(|play| play.held_mm - *u)));
+            let lost = self.loss_share * mean(plays.map(|play| play.held_mm - load_mm));
+            *u = left(*u, of_own(self.by_depth, *u, load_mm) * lost);
         }
     }
 
     fn slope(
         &self,
         parameter: usize,
-        _: Base<'_>,
-        _: &Contact,
+        base: Base<'_>,
+        contact: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
         if parameter > 2 {
             return false;
         }
+        let depth_mm = contact.depth_mm.clamp(0.0, base.covering.thickness_mm);
         for ((slope, u), plays) in slope_mm.iter_mut().zip(before_mm).zip(&self.plays) {
-            let lost = mean(plays.map(|play| play.held_mm - u));
+            let load_mm = (1.0 - self.by_depth) * u.max(0.0) + self.by_depth * depth_mm;
+            let of_own = of_own(self.by_depth, *u, load_mm);
+            let lost = of_own * mean(plays.map(|play| play.held_mm - load_mm));
             *slope = match parameter {
                 _ if u - self.loss_share * lost < u.min(0.0) => 0.0,
                 0 => -lost,
-                1 => -self.loss_share * mean(plays.map(|play| play.by_threshold)),
-                _ => -self.loss_share * mean(plays.map(|play| play.by_growth)),
+                1 => -self.loss_share * of_own * mean(plays.map(|play| play.by_threshold)),
+                _ => -self.loss_share * of_own * mean(plays.map(|play| play.by_growth)),
             };
         }
         true
@@ -103,6 +112,17 @@ impl OnCovering for Hysteresis {
 
     fn reset(&mut self) {
         self.plays.clear();
+    }
+}
+
+/// The element's share of a loss in the load.
+fn of_own(by_depth: f64, u: f64, load_mm: f64) -> f64 {
+    if by_depth == 0.0 {
+        1.0
+    } else if load_mm > 0.0 {
+        u / load_mm
+    } else {
+        0.0
     }
 }
 

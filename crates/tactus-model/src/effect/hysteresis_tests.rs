@@ -6,7 +6,12 @@ fn lossy(loss_share: f64, threshold_mm: f64) -> Effect {
 }
 
 fn growing(loss_share: f64, threshold_mm: f64, growth: f64) -> Effect {
-    let shape = [("loss_share", loss_share), ("threshold_mm", threshold_mm), ("threshold_growth", growth)];
+    let shape = [
+        ("loss_share", loss_share),
+        ("threshold_mm", threshold_mm),
+        ("threshold_growth", growth),
+        ("by_depth", 0.0),
+    ];
     effect("hysteresis", shape)
 }
 

@@ -5,9 +5,11 @@
 //!                                                       tau = time_constant {1 / spread_ratio, 1, spread_ratio}
 //! ```
 //!
-//! and not below 0, since a covering does not pull: what is left of `q` after a release shows in the next press.
-//! A step to `u` and a hold give, with a ratio of 1, `u (1 - relaxed_share (1 - exp(-t / time_constant)))`: the
-//! response at once is the base model's. A negative share creeps upwards, and leaves a rest after release.
+//! and, while the tool touches, not below 0, since a covering does not pull. Once it has left, `after_release` of the
+//! change still shows: nothing of it where the covering is no longer felt, so that it shows in the next press only; all of
+//! it in a linear solid. Without contact it recovers `recovery_ratio` times as fast as it relaxes: where that is large,
+//! each press begins anew. A step to `u` and a hold give, with a ratio of 1, `u (1 - relaxed_share (1 - exp(-t / time_constant)))`: the
+//! response at once is the base model's. A negative share creeps upwards.
 //!
 //! Three times spread on a scale of ratios follow what relaxes in no single one. Share of the fall that is explained
 //! under a depth held from 0.03 to 60 s, the gain free, frames at 30 Hz (without spread, and with):
@@ -37,6 +39,8 @@ pub(super) static DEFINITION: Definition = Definition {
         Parameter::real("relaxed_share", 0.0, [-5.0, 1.0]),
         Parameter::real("time_constant_s", 10.0, [1e-3, 1e5]),
         Parameter::real("spread_ratio", 4.0, [1.0, 100.0]),
+        Parameter::real("after_release", 0.5, [0.0, 1.0]),
+        Parameter::real("recovery_ratio", 1.5, [1.0, 1000.0]),
     ],
     near_twins: &[
         "low-pass",
@@ -49,7 +53,12 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     shown_by: &["hold", "rates", "repeats"],
     make: Make::Covering(|values| {
-        Box::new(Relaxation { relaxed_share: values[0], relaxed: SpreadLag::new(values[1], values[2]) })
+        Box::new(Relaxation {
+            relaxed_share: values[0],
+            relaxed: SpreadLag::new(values[1], values[2]),
+            after_release: values[3],
+            recovery_ratio: values[4],
+        })
     }),
 };
 
@@ -57,17 +66,25 @@ pub(super) static DEFINITION: Definition = Definition {
 struct Relaxation {
     relaxed_share: f64,
     relaxed: SpreadLag,
+    after_release: f64,
+    recovery_ratio: f64,
 }
 
 impl OnCovering for Relaxation {
-    fn signal(&mut self, now: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
+    fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
+        let haste = if contact.depth_mm > 0.0 { 1.0 } else { self.recovery_ratio };
         if self.relaxed.has_begun() {
-            self.relaxed.follow(now.dt_s, signal_mm);
+            self.relaxed.follow(haste * now.dt_s, signal_mm);
         } else {
             self.relaxed.begin(&vec![0.0; signal_mm.len()], signal_mm);
         }
         for (element, u) in signal_mm.iter_mut().enumerate() {
-            *u = self.left(*u, self.relaxed.output(element)).unwrap_or(u.min(0.0));
+            let lost = self.relaxed_share * self.relaxed.output(element);
+            *u = if contact.depth_mm > 0.0 {
+                self.left(*u, self.relaxed.output(element)).unwrap_or(u.min(0.0))
+            } else {
+                *u - self.after_release * lost
+            };
         }
     }
 
@@ -75,19 +92,24 @@ impl OnCovering for Relaxation {
         &self,
         parameter: usize,
         _: Base<'_>,
-        _: &Contact,
+        contact: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
-        let (factor, by): (f64, fn(&SpreadLag, usize) -> f64) = match parameter {
-            0 => (-1.0, SpreadLag::output),
-            1 => (-self.relaxed_share, SpreadLag::by_tau),
-            2 => (-self.relaxed_share, SpreadLag::by_ratio),
-            _ => return false,
-        };
+        let touches = contact.depth_mm > 0.0;
+        let shows = if touches { 1.0 } else { self.after_release };
         for (element, (slope, u)) in slope_mm.iter_mut().zip(before_mm).enumerate() {
-            let left = self.left(*u, self.relaxed.output(element));
-            *slope = left.map_or(0.0, |_| factor * by(&self.relaxed, element));
+            let relaxed = &self.relaxed;
+            let of_all = match parameter {
+                0 => -relaxed.output(element),
+                1 => -self.relaxed_share * relaxed.by_tau(element),
+                2 => -self.relaxed_share * relaxed.by_ratio(element),
+                3 if touches => 0.0,
+                3 => -self.relaxed_share * relaxed.output(element) / shows.max(f64::MIN_POSITIVE),
+                _ => return false,
+            };
+            let pulls = touches && self.left(*u, relaxed.output(element)).is_none();
+            *slope = if pulls { 0.0 } else { shows * of_all };
         }
         true
     }

@@ -5,7 +5,7 @@ use crate::{Effect, Moment, Pipeline, Simulator, Trajectory};
 
 fn relaxing(time_constant_s: f64, spread_ratio: f64) -> Effect {
     let shape = [("time_constant_s", time_constant_s), ("spread_ratio", spread_ratio)];
-    Effect::new("relaxation", [("relaxed_share", 0.3)].into_iter().chain(shape)).unwrap()
+    Effect::new("relaxation", [("relaxed_share", 0.3), ("after_release", 0.0), ("recovery_ratio", 1.0)].into_iter().chain(shape)).unwrap()
 }
 
 fn creeping() -> Simulator {
@@ -34,6 +34,21 @@ fn a_step_that_is_held_falls_exponentially_and_comes_back() {
     assert!((again - at_once * (1.0 - 0.3 * (-0.5_f64).exp())).abs() < 1e-7, "{again}");
     pipeline.reset();
     assert!((pipeline.step(Moment::at(0.0), &down)[21] - at_once).abs() < 1e-12, "the past is forgotten");
+}
+
+#[test]
+fn a_linear_solid_shows_what_it_has_forgotten_after_release() {
+    let mut one = creeping();
+    one.effects = vec![relaxing(4.0, 1.0).with("after_release", 1.0).unwrap()];
+    let (up, down) = (upon(&one, 21, -0.5), upon(&one, 21, 0.5));
+    let mut pipeline = Pipeline::new(&one).unwrap();
+    let at_once = pipeline.step(Moment::at(0.0), &down)[21];
+    pipeline.step(Moment::at(400.0), &down);
+    // Let go at once after a long hold: all that had relaxed is missing, and comes back with the time constant.
+    let released = pipeline.step(Moment::at(400.0), &up)[21];
+    assert!((released + 0.3 * at_once).abs() < 1e-9, "{released}");
+    let later = pipeline.step(Moment::at(404.0), &up)[21];
+    assert!((later + 0.3 * at_once * (-1.0_f64).exp()).abs() < 1e-9, "{later}");
 }
 
 #[test]
@@ -69,5 +84,6 @@ fn three_times_relax_in_equal_shares() {
 
 #[test]
 fn derivatives_are_those_of_differences() {
-    assert_slopes(&relaxing(0.8, 3.0), &["relaxed_share", "time_constant_s", "spread_ratio"]);
+    let shown = relaxing(0.8, 3.0).with("after_release", 0.4).unwrap();
+    assert_slopes(&shown, &["relaxed_share", "time_constant_s", "spread_ratio", "after_release"]);
 }

@@ -1,0 +1,42 @@
+//! Is the converter coarser than declared? Its readings then stand on a lattice of wider steps.
+//!
+//! Means do not show it, and neither do residuals where noise dithers: the readings themselves do. With `n` different
+//! readings, all of them on a lattice `q` declared steps wide by chance has a probability of `(1 / q)^(n - 2)`.
+
+use std::collections::BTreeSet;
+
+use crate::Frames;
+
+/// Fewer different readings may stand on a lattice by chance.
+const READINGS_LEAST: usize = 20;
+/// A lattice must be wider than declared by such a factor.
+const WIDER: f64 = 1.4;
+/// A reading stands on a lattice if it is off by no more than this share of a step.
+const OFF_MAX: f64 = 0.02;
+
+/// The step of the readings in counts, if it is wider than declared, and the chance of that.
+pub(crate) fn wider_step(frames: &Frames, declared_counts: f64) -> Option<(f64, f64)> {
+    let different: BTreeSet<u32> = frames.counts.iter().map(|counts| counts.to_bits()).collect();
+    let mut readings: Vec<f64> = different.into_iter().map(|bits| f64::from(f32::from_bits(bits))).collect();
+    readings.sort_by(f64::total_cmp);
+    if readings.len() < READINGS_LEAST {
+        return None;
+    }
+    let step = readings.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+    if step < WIDER * declared_counts.max(f64::MIN_POSITIVE) {
+        return None;
+    }
+    // The full scale need not be a whole number of steps.
+    let off = readings[..readings.len() - 1].iter().filter(|reading| {
+        let steps = (*reading - readings[0]) / step;
+        (steps - steps.round()).abs() > OFF_MAX
+    });
+    (off.count() == 0).then(|| {
+        let chance = (declared_counts / step).max(1e-3).powi(readings.len().min(200) as i32 - 2);
+        (step, chance.max(f64::MIN_POSITIVE))
+    })
+}
+
+#[cfg(test)]
+#[path = "lattice_tests.rs"]
+mod tests;

@@ -1,0 +1,41 @@
+use tactus_model::Phase;
+
+use super::wider_step;
+use crate::{Frame, Frames};
+
+fn readings(counts: impl Iterator<Item = f32>) -> Frames {
+    let mut frames = Frames::new(1);
+    for (index, counts) in counts.enumerate() {
+        frames.push(Frame {
+            run: "a",
+            press: -1,
+            phase: Phase::Idle,
+            t_ns: index as i64 * 33_000_000,
+            position_mm: [0.0; 3],
+            covering_mm: 1.0,
+            indenter: "cyl1",
+            temperature_c: None,
+            counts: &[counts],
+        });
+    }
+    frames
+}
+
+#[test]
+fn readings_on_a_wider_lattice_are_told() {
+    let (step, chance) = wider_step(&readings((0..40_i16).map(|k| 100.0 + 4.0 * f32::from(k))), 1.0).unwrap();
+    assert!((step - 4.0).abs() < 1e-6 && chance < 1e-9, "{step} {chance}");
+}
+
+#[test]
+fn readings_on_the_declared_lattice_are_not() {
+    assert!(wider_step(&readings((0..40_i16).map(|k| 100.0 + f32::from(k))), 1.0).is_none());
+    // One reading between two steps is enough against it.
+    let odd = (0..40_i16).map(|k| 100.0 + 4.0 * f32::from(k)).chain([107.0]);
+    assert!(wider_step(&readings(odd), 1.0).is_none());
+}
+
+#[test]
+fn few_readings_tell_nothing() {
+    assert!(wider_step(&readings((0..9_i16).map(|k| 4.0 * f32::from(k))), 1.0).is_none());
+}
