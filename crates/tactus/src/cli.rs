@@ -112,7 +112,8 @@ pub(crate) struct RunArgs {
     /// The embedded rig's file, in place of the shipped one.
     #[arg(long, value_name = "FILE")]
     pub(crate) rig_file: Option<PathBuf>,
-    /// A model file that the embedded rig's sensor hides, in place of the rig file's gains, noise and spread.
+    /// What the embedded rig's sensor hides: a model file, in place of the rig file's gains, noise and spread, or a
+    /// file of hidden physics.
     #[arg(long, value_name = "FILE")]
     pub(crate) truth: Option<PathBuf>,
     /// Let the embedded rig run in real time; else nobody waits.
@@ -233,7 +234,8 @@ pub(crate) struct StudyArgs {
     /// The embedded rig's file, in place of the shipped one.
     #[arg(long, value_name = "FILE")]
     pub(crate) rig_file: Option<PathBuf>,
-    /// A model file that the embedded rig's sensor hides, in place of the rig file's gains, noise and spread.
+    /// What the embedded rig's sensor hides: a model file, in place of the rig file's gains, noise and spread, or a
+    /// file of hidden physics.
     #[arg(long, value_name = "FILE")]
     pub(crate) truth: Option<PathBuf>,
     /// Seed of the random orders and, on a simulated rig, of its noise.
