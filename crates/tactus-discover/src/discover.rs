@@ -11,6 +11,7 @@ use crate::discovery::{
     Base, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, Split, Step, Unexplained, Verdict,
 };
 use crate::fit::{Fitted, Problem};
+use crate::next::{Explanation, Setting};
 use crate::noise::Noise;
 use crate::rows::{HeldOut, Rows, still};
 use crate::score::{Fitting, Score, flipped, p_value, q_values};
@@ -163,7 +164,15 @@ pub fn discover(
         of_frames(&whole, known, frames, &heldout, &noise, &grown.parameters)?;
     let gap_counts2 = level_base.heldout_rms_counts.powi(2) - noise.rms_counts.powi(2);
     let closed = level_base.heldout_rms_counts.powi(2) - level_grown.heldout_rms_counts.powi(2);
-    let steps = search.steps(&grown)?;
+    let mut steps = search.steps(&grown)?;
+    said.say("planning what to measure next", 0.9);
+    let twins = search.twins(&grown)?;
+    for step in &mut steps {
+        step.equivalent = twins.iter().filter(|one| one.effect == step.effect).map(|one| one.twin).collect();
+    }
+    let pairs: Vec<[Explanation; 2]> = twins.into_iter().map(|one| one.explanations).collect();
+    let next_experiments =
+        Setting { known, frames, noise: &noise, threads: options.threads }.propose(&pairs)?;
     said.say("done", 1.0);
     Ok(Discovery {
         seed: options.seed,
@@ -198,7 +207,7 @@ pub fn discover(
             depends_on: if left { after.gap.iter().map(|gap| gap.covariate).collect() } else { Vec::new() },
             share: if verdict == Verdict::NothingMissing { 0.0 } else { share },
         },
-        next_experiments: Vec::new(),
+        next_experiments,
         recalibrated: base_of(known, &base.parameters),
         effects: grown.parameters.effects()?,
         grown: base_of(known, &grown.parameters),

@@ -8,6 +8,7 @@ mod discover;
 mod discovery;
 mod fit;
 mod frames;
+mod next;
 mod noise;
 mod parallel;
 mod rows;
@@ -16,6 +17,7 @@ mod score;
 mod search;
 mod sensor;
 mod spectrum;
+mod twins;
 mod wiring;
 
 pub use discover::{DiscoverError, Known, Options, Progress, discover, predict};
