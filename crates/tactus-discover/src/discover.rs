@@ -14,7 +14,7 @@ use crate::fit::{Fitted, Problem};
 use crate::next::{Explanation, Setting};
 use crate::noise::Noise;
 use crate::rows::{HeldOut, Rows, still};
-use crate::score::{Fitting, Score, flipped, p_value, q_values};
+use crate::score::{Score, flipped, p_value, q_values};
 use crate::search::{ALPHA, Search, largest, names, without};
 use crate::sensor::{Parameters, Sensor};
 use crate::{Frames, parallel, spectrum, wiring};
