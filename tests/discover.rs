@@ -116,7 +116,8 @@ fn hide(folder: &Path, physics: &str) {
     let mut rig: toml::Table = toml::from_str(&text).unwrap();
     let simulation = rig["simulation"].as_table_mut().unwrap();
     simulation.remove("miswired");
-    simulation.remove("registration_error");
+    let nowhere: toml::Table = toml::from_str("origin_mm = [0.0, 0.0]\nrotation_deg = 0.0").unwrap();
+    simulation.insert("registration_error".into(), nowhere.into());
     simulation.insert("quadratic_per_mm".into(), 0.0.into());
     fs::write(folder.join("rig.toml"), toml::to_string(&rig).unwrap()).unwrap();
     let hidden = format!("schema = \"tactus.hidden/1\"\n[[physics]]\nid = \"{physics}\"\nseed = 7\n");
@@ -133,7 +134,7 @@ fn diagnosed(folder: &Path, truth: &[&str], seed: &str) -> String {
 
 fn counts(recording: &str) -> Vec<f32> {
     let mut counts = Vec::new();
-    rows::visit(&[recording.into()], |_, row| counts.extend_from_slice(row.counts)).unwrap();
+    rows::visit(&[Path::new(recording)], |_, row| counts.extend_from_slice(row.counts)).unwrap();
     counts
 }
 

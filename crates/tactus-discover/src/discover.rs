@@ -8,7 +8,8 @@ use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Regist
 use crate::candidates::{Candidate, Hints};
 use crate::covariates::{Feature, Forms, features};
 use crate::discovery::{
-    Base, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, Split, Step, Unexplained, Verdict,
+    Base, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NotShown, Split, Step,
+    Unexplained, Verdict,
 };
 use crate::fit::{Fitted, Problem};
 use crate::next::{Explanation, Setting};
@@ -171,12 +172,14 @@ pub fn discover(
         step.equivalent = twins.iter().filter(|one| one.effect == step.effect).map(|one| one.twin).collect();
     }
     let pairs: Vec<[Explanation; 2]> = twins.into_iter().map(|one| one.explanations).collect();
-    let next_experiments =
-        Setting { known, frames, noise: &noise, threads: options.threads }.propose(&pairs)?;
+    let not_shown: Vec<NotShown> = Vec::new();
+    let setting = Setting { known, frames, noise: &noise, threads: options.threads };
+    let mut next_experiments = setting.propose(&pairs)?;
+    next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
     said.say("done", 1.0);
     Ok(Discovery {
         seed: options.seed,
-        not_shown: Vec::new(),
+        not_shown,
         warnings,
         split: Split {
             frames: frames.len(),

@@ -60,7 +60,8 @@ impl Setting<'_> {
         let mut proposals = Vec::new();
         for pair in pairs {
             let separates = pair.each_ref().map(|one| one.name.clone());
-            proposals.extend(self.best(&bench.designs(), separates, |design| self.separation(design, pair))?);
+            proposals
+                .extend(self.best(&bench.designs(), &separates, |design| self.separation(design, pair))?);
         }
         Ok(proposals)
     }
@@ -81,7 +82,7 @@ impl Setting<'_> {
                 .filter(|design| definition.shown_by.contains(&design.name))
                 .collect();
             let separates = [(*effect).to_owned(), "nothing".to_owned()];
-            let best = self.best(&designs, separates, |design| self.visibility(design, definition, at))?;
+            let best = self.best(&designs, &separates, |design| self.visibility(design, definition, at))?;
             proposals.extend(best.into_iter().take(1));
         }
         Ok(proposals)
@@ -90,7 +91,7 @@ impl Setting<'_> {
     fn best(
         self,
         designs: &[Design],
-        separates: [String; 2],
+        separates: &[String; 2],
         z: impl Fn(&Design) -> Result<f64, DiscoverError> + Sync,
     ) -> Result<Vec<NextExperiment>, DiscoverError> {
         let mut found = Vec::new();
