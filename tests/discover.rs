@@ -1,9 +1,12 @@
-//! Discovery on the command line: what it refuses.
+//! Discovery on the command line: what it refuses, and that what it finds is so on a new run.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::fs;
+use std::path::Path;
 
+use serde_json::Value;
 use tactus_e2e::{Said, repository, tactus};
+use tactus_record::rows;
 use tempfile::TempDir;
 
 /// Discovers in an empty folder, where nothing may be left behind.
@@ -67,4 +70,122 @@ fn what_is_no_model_is_refused_before_anything_is_read() {
 #[test]
 fn no_threads_are_too_few() {
     assert_eq!(refused(&["nowhere.mcap"], &["--threads", "0"]).code, Some(2));
+}
+
+#[test]
+fn too_few_presses_are_refused_with_what_to_do() {
+    let folder = TempDir::new().unwrap();
+    let script = "\"\"\"One press.\"\"\"\ndef run(rig):\n    press(8.1, 5.9, [0.3])\n";
+    fs::write(folder.path().join("one.star"), script).unwrap();
+    let said = tactus(folder.path(), &["--json", "run", "one.star", "--embedded", "--no-report"]);
+    let recording = said.json()["recording"].as_str().unwrap().to_owned();
+    let said = tactus(folder.path(), &["discover", &recording]);
+    assert_eq!(said.code, Some(1), "{said:?}");
+    assert!(
+        said.err.contains("presses can be fitted; at least") && said.err.contains("tactus run diagnose"),
+        "{said:?}"
+    );
+    assert!(!folder.path().join("discovery").exists());
+}
+
+#[test]
+fn experiments_on_another_rig_than_the_datas_are_refused_with_both_named() {
+    let rig = repository("config/rigs/sim.toml");
+    let active = ["--active", "--rig-file", rig.to_str().unwrap()];
+    let said = refused_aloud(&[&table("valid_pyarrow.parquet")], &active);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    assert!(said.err.contains("the data are of rig ") && said.err.contains("rig \"sim\""), "{said:?}");
+    assert!(
+        said.out.starts_with("SIMULATED: experiments run on the embedded simulated rig \"sim\""),
+        "{said:?}"
+    );
+    assert_eq!(refused(&["nowhere.mcap"], &["--embedded"]).code, Some(2), "without --active");
+}
+
+/// As `refused`, after a first line.
+fn refused_aloud(files: &[&str], more: &[&str]) -> Said {
+    let folder = TempDir::new().unwrap();
+    let said = tactus(folder.path(), &[&["discover"], files, more].concat());
+    assert!(!folder.path().join("discovery").exists(), "{said:?}");
+    said
+}
+
+/// A rig that hides nothing but what a test has it hide, and a file that has it hide physics of strength 1.
+fn hide(folder: &Path, physics: &str) {
+    let text = fs::read_to_string(repository("config/rigs/sim.toml")).unwrap();
+    let mut rig: toml::Table = toml::from_str(&text).unwrap();
+    let simulation = rig["simulation"].as_table_mut().unwrap();
+    simulation.remove("miswired");
+    let nowhere: toml::Table = toml::from_str("origin_mm = [0.0, 0.0]\nrotation_deg = 0.0").unwrap();
+    simulation.insert("registration_error".into(), nowhere.into());
+    simulation.insert("quadratic_per_mm".into(), 0.0.into());
+    fs::write(folder.join("rig.toml"), toml::to_string(&rig).unwrap()).unwrap();
+    let hidden = format!("schema = \"tactus.hidden/1\"\n[[physics]]\nid = \"{physics}\"\nseed = 7\n");
+    fs::write(folder.join("hidden.toml"), hidden).unwrap();
+}
+
+/// A short diagnosis of the rig; its recording.
+fn diagnosed(folder: &Path, truth: &[&str], seed: &str) -> String {
+    let run = ["--json", "run", "diagnose", "--embedded", "--no-report", "--rig-file", "rig.toml"];
+    let said = tactus(folder, &[&run[..], &["-p", "scale=0.1", "--seed", seed], truth].concat());
+    assert_eq!(said.code, Some(0), "{said:?}");
+    said.json()["recording"].as_str().unwrap().to_owned()
+}
+
+fn counts(recording: &str) -> Vec<f32> {
+    let mut counts = Vec::new();
+    rows::visit(&[Path::new(recording)], |_, row| counts.extend_from_slice(row.counts)).unwrap();
+    counts
+}
+
+/// Root mean square of the differences between two runs of one seed, whose noise is the same.
+fn gap_counts(one: &str, other: &str) -> f64 {
+    let (one, other) = (counts(one), counts(other));
+    assert_eq!(one.len(), other.len());
+    let squares: f64 = one.iter().zip(&other).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    (squares / one.len() as f64).sqrt()
+}
+
+/// Hidden physics, a diagnosis, a discovery; then the same experiment with another seed on the rig that hides it, on
+/// the rig without it, and on one that hides the grown model.
+fn is_named_and_closed(physics: &str, effect: &str, times_smaller: f64) {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    hide(folder, physics);
+    let first = diagnosed(folder, &["--truth", "hidden.toml"], "1");
+    let said = tactus(folder, &["--json", "discover", &first]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let found = said.json();
+    let names: Vec<&Value> = found["steps"].as_array().unwrap().iter().map(|step| &step["effect"]).collect();
+    assert!(names.contains(&&Value::from(effect)), "{physics}: {names:?}");
+    let new = diagnosed(folder, &["--truth", "hidden.toml"], "2");
+    let without = gap_counts(&new, &diagnosed(folder, &[], "2"));
+    let grown = gap_counts(&new, &diagnosed(folder, &["--truth", "discovery/model.toml"], "2"));
+    assert!(
+        without > times_smaller * grown,
+        "{physics}: {without} counts without, {grown} with the grown model"
+    );
+}
+
+#[test]
+fn a_relaxing_covering_is_named_and_the_grown_model_closes_the_gap_on_a_new_run() {
+    is_named_and_closed("relaxation-prony", "relaxation", 3.0);
+}
+
+#[test]
+fn a_sloping_surface_is_named_and_the_grown_model_closes_the_gap_on_a_new_run() {
+    is_named_and_closed("sloping-surface", "surface-tilt", 2.0);
+}
+
+#[test]
+fn the_same_data_and_seed_give_the_same_report() {
+    let folder = TempDir::new().unwrap();
+    hide(folder.path(), "hum-sine");
+    let recording = diagnosed(folder.path(), &["--truth", "hidden.toml"], "1");
+    let [one, other] = [("one", "1"), ("other", "2")].map(|(out, threads)| {
+        let said = tactus(folder.path(), &["discover", &recording, "--out", out, "--threads", threads]);
+        assert_eq!(said.code, Some(0), "{said:?}");
+        fs::read(folder.path().join(out).join("report.json")).unwrap()
+    });
+    assert_eq!(one, other);
 }

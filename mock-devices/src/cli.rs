@@ -47,7 +47,8 @@ struct RigArgs {
     /// The rig file; its `[simulation]` is what the devices hide.
     #[arg(long)]
     config: PathBuf,
-    /// A model file: what the sensor hides, in the place of the rig file's gains, noise and spread.
+    /// What the sensor hides: a model file, in the place of the rig file's gains, noise and spread, or a file of
+    /// hidden physics that comes upon them.
     ///
     /// The service does not know it: its recordings hold its rig file, whose `[simulation]` then is not so.
     #[arg(long, value_name = "FILE")]

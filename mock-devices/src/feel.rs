@@ -4,6 +4,8 @@ use std::fmt::Debug;
 
 use tactus_model::{Covering, Moment, Pipeline, Trail};
 
+use crate::hidden::Sensor;
+
 /// A sensor in time, as the world asks it.
 pub(crate) trait Feel: Debug + Send {
     /// Counts of every element at a moment, row-major, before noise and converter.
@@ -28,6 +30,32 @@ pub(crate) trait Feel: Debug + Send {
 impl Feel for Pipeline {
     fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64] {
         self.step(moment, trail)
+    }
+
+    fn counts(&self) -> &[f64] {
+        self.counts()
+    }
+
+    fn read(&self, counts: f64, noise_counts: f64) -> f64 {
+        self.read(counts, noise_counts)
+    }
+
+    fn set_covering(&mut self, covering: Covering) {
+        self.set_covering(covering);
+    }
+
+    fn set_surface_mm(&mut self, surface_mm: f64) {
+        self.set_surface_mm(surface_mm);
+    }
+
+    fn set_stiffness(&mut self, stiffness: f64) {
+        self.set_stiffness(stiffness);
+    }
+}
+
+impl Feel for Sensor {
+    fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64] {
+        self.step(moment.t_s, trail)
     }
 
     fn counts(&self) -> &[f64] {

@@ -43,6 +43,7 @@ pub use label::{Dosed, Label};
 pub use noise::{Noise, NoiseKind};
 pub use physics::{CATALOGUE, Definition, Dose};
 pub use plan::Plan;
+pub(crate) use recipe::STRENGTH_MAX;
 pub use recipe::{Amount, Content, HiddenError, Recipe};
 pub use sensor::Sensor;
 pub use separation::Separation;

@@ -3,7 +3,8 @@
 //! [`VirtualRig`] runs both in this process, for the production drivers to connect to, in real or virtual
 //! time; the program `tactus-mock` serves the same devices at pseudo-terminals. Behind both stands one
 //! world: where the tip truly is, what it presses, what the elements feel. The devices see no more of it
-//! than real ones would. What they feel is the rig file's `[simulation]`, or a model in its place ([`TruthFile`]). [`RigControl`] sees all of it, and makes things go wrong ([`faults`]).
+//! than real ones would. What they feel is the rig file's `[simulation]`, or a model or hidden
+//! physics in its place ([`TruthFile`]). [`RigControl`] sees all of it, and makes things go wrong ([`faults`]).
 //!
 //! [`hidden`] makes test data for discovery: sensors with physics that the base model does not know.
 //!
@@ -33,5 +34,5 @@ mod world;
 pub use control::RigControl;
 pub use rig::VirtualRig;
 pub use truth::Truth;
-pub use truth_file::{TruthError, TruthFile};
+pub use truth_file::{HIDDEN_SCHEMA, TruthError, TruthFile};
 pub use twin::twin_of;

@@ -13,6 +13,7 @@ use tactus_schema::Rig;
 use tactus_schema::rig::{ElementFault, SimulatedStage, Simulation};
 
 use crate::feel::Feel;
+use crate::hidden::{Climate, Dose, Sensor};
 use crate::twin::simulation_of;
 
 /// The true sensor, stage and tool behind a rig description; all of it follows from the description and a seed.
@@ -24,6 +25,8 @@ pub struct Truth {
     pub model: ForwardModel,
     /// What the base model lacks, but for the faults.
     pub effects: Vec<Effect>,
+    /// Physics in other forms than the library's, in the place of effects.
+    pub physics: Vec<Dose>,
     /// The converter.
     pub readout: Readout,
     /// What is wrong with elements, by index.
@@ -92,6 +95,7 @@ impl Truth {
             seed,
             model,
             effects: Vec::new(),
+            physics: Vec::new(),
             readout: Readout::of(&rig.array),
             faults: simulation.faults.clone(),
             noise_rms_counts: simulation.noise_rms_counts,
@@ -110,15 +114,26 @@ impl Truth {
     /// What feels, under a covering. Stuck and noisy elements are not in it: their faults come after the signal,
     /// where they are read.
     pub(crate) fn feel(&self, covering: Covering) -> Result<Box<dyn Feel>, EffectError> {
-        Ok(Box::new(Pipeline::new(&self.sensor(covering)?)?))
+        let sensor = self.sensor(covering)?;
+        if self.physics.is_empty() {
+            return Ok(Box::new(Pipeline::new(&sensor)?));
+        }
+        let mut sensor = Sensor::new(&sensor, &self.physics, Climate::new(self.seed), self.seed);
+        sensor.wire(self.wiring().collect());
+        Ok(Box::new(sensor))
+    }
+
+    /// Elements that do not answer for themselves: which, for which other, and with what share of its signal.
+    fn wiring(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        self.faults.iter().filter_map(|(element, fault)| match fault {
+            ElementFault::Miswired { answers_for } => Some((*element, *answers_for, 1.0)),
+            ElementFault::Dead => Some((*element, *element, 0.0)),
+            ElementFault::Stuck { .. } | ElementFault::Noisy { .. } => None,
+        })
     }
 
     fn sensor(&self, covering: Covering) -> Result<Simulator, EffectError> {
-        let faults = self.faults.iter().filter_map(|(element, fault)| match fault {
-            ElementFault::Miswired { answers_for } => Some(answers(*element, *answers_for, 1.0)),
-            ElementFault::Dead => Some(answers(*element, *element, 0.0)),
-            ElementFault::Stuck { .. } | ElementFault::Noisy { .. } => None,
-        });
+        let faults = self.wiring().map(|(element, answers_for, share)| answers(element, answers_for, share));
         Ok(Simulator {
             model: self.model.clone(),
             registration: self.registration,

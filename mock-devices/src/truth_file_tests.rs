@@ -1,3 +1,5 @@
+use tactus_model::{Covering, Moment, Trail};
+
 use super::*;
 use crate::bench::sim_rig;
 
@@ -61,4 +63,49 @@ fn a_file_that_is_no_model_names_its_fault() {
     assert!(
         refused(&with("[[effect]]\nname = \"creep\"\nparameters = {}")).starts_with("effect[0]: no effect")
     );
+}
+
+const RELAXING: &str = include_str!("../../config/hidden/relaxing-covering.toml");
+
+#[test]
+fn hidden_physics_comes_upon_the_rigs_own_simulation() {
+    let rig = sim_rig();
+    let (own, truth) =
+        (Truth::of_rig(&rig, 1), TruthFile::from_toml(RELAXING).unwrap().behind(&rig, 1).unwrap());
+    let [Dose { physics, strength, seed }] = truth.physics[..] else { panic!("one physics") };
+    assert_eq!((physics.id, strength, seed), ("relaxation-prony", 1.0, 7));
+    assert_eq!(truth.model.response(), own.model.response());
+    let kept =
+        |truth: &Truth| (truth.registration, truth.surface_mm, truth.noise_rms_counts, truth.faults.clone());
+    assert_eq!(kept(&truth), kept(&own));
+}
+
+#[test]
+fn physics_of_no_strength_reads_what_the_rigs_own_simulation_does() {
+    let rig = sim_rig();
+    let none = TruthFile::from_toml(&RELAXING.replace("strength = 1.0", "strength = 0.0")).unwrap();
+    let [own, none] = [Truth::of_rig(&rig, 1), none.behind(&rig, 1).unwrap()]
+        .map(|truth| pressed(&truth, rig.covering, &rig.registration.to_robot([5.0, 5.0])));
+    assert!(own.iter().zip(&none).all(|(own, none)| (own - none).abs() < 1e-9), "{own:?} {none:?}");
+    assert!(own.iter().any(|counts| *counts > 150.0), "pressed: {own:?}");
+}
+
+/// Counts while the tip stands half a millimetre deep, where two elements answer for their neighbours.
+fn pressed(truth: &Truth, covering: Covering, [x_mm, y_mm]: &[f64; 2]) -> Vec<f64> {
+    let mut feel = truth.feel(covering).unwrap();
+    feel.step(Moment::at(0.0), &Trail::new(0.0, [*x_mm, *y_mm, -0.5])).to_vec()
+}
+
+#[test]
+fn wrong_physics_is_refused_with_the_entry_and_what_would_be_right() {
+    let wrong = |from: &str, to: &str| refused(&RELAXING.replace(from, to));
+    assert_eq!(
+        wrong("relaxation-prony", "magic"),
+        "physics[0].id: no physics \"magic\"; `tactus-mock hidden list` names all of them"
+    );
+    assert_eq!(
+        wrong("strength = 1.0", "strength = -1.0"),
+        "physics[0].strength: must be from 0 to 8, not -1"
+    );
+    assert!(wrong("seed = 7", "sead = 7").contains("sead"));
 }

@@ -8,9 +8,15 @@ use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Regist
 use crate::candidates::{Candidate, Hints};
 use crate::covariates::{Feature, Form, Forms, features};
 use crate::discovery::{
+<<<<<<< HEAD
     Base, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, Point, Split, Step, Unexplained, Verdict,
+=======
+    Base, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NotShown, Split, Step,
+    Unexplained, Verdict,
+>>>>>>> active
 };
 use crate::fit::{Fitted, Problem};
+use crate::next::{Explanation, Setting};
 use crate::noise::Noise;
 use crate::rows::{HeldOut, Rows, still};
 use crate::score::{Score, flipped, p_value, q_values};
@@ -184,6 +190,7 @@ pub fn discover(
     let (level_base, level_grown) = (in_noise(level_base), in_noise(level_grown));
     let gap_counts2 = level_base.heldout_rms_counts.powi(2) - floor.powi(2);
     let closed = level_base.heldout_rms_counts.powi(2) - level_grown.heldout_rms_counts.powi(2);
+<<<<<<< HEAD
     let curves = search.curves(&base, &grown)?;
     let mut steps = search.steps(&grown, &equivalent)?;
     let mut effects = grown.parameters.effects()?;
@@ -199,6 +206,19 @@ pub fn discover(
             equivalent: Vec::new(),
         });
     }
+=======
+    let mut steps = search.steps(&grown)?;
+    said.say("planning what to measure next", 0.9);
+    let twins = search.twins(&grown)?;
+    for step in &mut steps {
+        step.equivalent = twins.iter().filter(|one| one.effect == step.effect).map(|one| one.twin).collect();
+    }
+    let pairs: Vec<[Explanation; 2]> = twins.into_iter().map(|one| one.explanations).collect();
+    let not_shown: Vec<NotShown> = Vec::new();
+    let setting = Setting { known, frames, noise: &noise, threads: options.threads };
+    let mut next_experiments = setting.propose(&pairs)?;
+    next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
+>>>>>>> active
     said.say("done", 1.0);
     Ok(Discovery {
         seed: options.seed,
@@ -237,7 +257,7 @@ pub fn discover(
                 Verdict::Explained | Verdict::PartlyExplained => share,
             },
         },
-        next_experiments: Vec::new(),
+        next_experiments,
         recalibrated: base_of(known, &base.parameters),
         effects,
         grown: base_of(known, &grown.parameters),

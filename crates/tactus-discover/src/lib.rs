@@ -10,6 +10,7 @@ mod discovery;
 mod fit;
 mod frames;
 mod lattice;
+mod next;
 mod noise;
 mod not_shown;
 mod parallel;
@@ -19,6 +20,7 @@ mod score;
 mod search;
 mod sensor;
 mod spectrum;
+mod twins;
 mod wiring;
 
 pub use discover::{DiscoverError, Known, Options, Progress, discover, predict};

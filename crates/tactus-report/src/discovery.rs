@@ -4,6 +4,7 @@
 //! sentence or two, [`not_shown`] what the data cannot show. Figures are functions of their own, as in
 //! [`calibration`](crate::calibration).
 
+mod active;
 mod added;
 mod after;
 mod basis;
@@ -26,6 +27,7 @@ use crate::{
     plot::number,
 };
 
+pub use active::{ActiveRun, Undecided, command};
 pub use figures::{element_maps, levels, residual_against};
 pub use json::discovery_json;
 pub use words::in_words;
@@ -43,6 +45,8 @@ pub struct DiscoveryReport<'a> {
     pub data: &'a [DataSource],
     /// What is to be said of the files that were read; a sentence each.
     pub notes: &'a [String],
+    /// What was measured on the way to decide between explanations, in order; its recordings are among the data.
+    pub active: &'a [ActiveRun],
     /// What was found.
     pub discovery: &'a Discovery,
 }
@@ -73,6 +77,7 @@ pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
         gap::section(f, report)?;
         tried::section(f, report.discovery)?;
         added::section(f, report.discovery)?;
+        active::section(f, report.active)?;
         after::sections(f, report.discovery)?;
         basis::section(f, report)
     });

@@ -155,7 +155,7 @@ fn what_cannot_be_shown_comes_first_and_what_it_rests_on_last() {
         "The gap before and after",
         "What stays unexplained",
         "What to measure next",
-        "<code>tactus run diagnose</code>",
+        "<code>tactus run diagnose -p parts=approach</code>",
         "What this rests on",
         "no physical sensor was read",
     ] {

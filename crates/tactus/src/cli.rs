@@ -112,7 +112,8 @@ pub(crate) struct RunArgs {
     /// The embedded rig's file, in place of the shipped one.
     #[arg(long, value_name = "FILE")]
     pub(crate) rig_file: Option<PathBuf>,
-    /// A model file that the embedded rig's sensor hides, in place of the rig file's gains, noise and spread.
+    /// What the embedded rig's sensor hides: a model file, in place of the rig file's gains, noise and spread, or a
+    /// file of hidden physics.
     #[arg(long, value_name = "FILE")]
     pub(crate) truth: Option<PathBuf>,
     /// Let the embedded rig run in real time; else nobody waits.
@@ -205,7 +206,7 @@ pub(crate) struct CalibrateArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DiscoverArgs {
     /// Recordings and measurement tables of one rig.
-    #[arg(required = true, value_name = "RECORDING|TABLE")]
+    #[arg(required_unless_present = "active", value_name = "RECORDING|TABLE")]
     pub(crate) files: Vec<PathBuf>,
     /// The model that the data are held against, in place of the rig's description; of the same array.
     #[arg(long, value_name = "FILE")]
@@ -219,6 +220,28 @@ pub(crate) struct DiscoverArgs {
     /// How many threads compute; the result does not depend on it. As many as there are cores if not given.
     #[arg(long, value_name = "N")]
     pub(crate) threads: Option<NonZeroUsize>,
+    /// Run what tells undecided explanations apart on the rig, and go on with its recording; without a service, on the
+    /// embedded simulated rig. Without files it begins with `diagnose`.
+    #[arg(long)]
+    pub(crate) active: bool,
+    /// How often to look at what is undecided and to run experiments.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "active")]
+    pub(crate) rounds: u32,
+    /// Time that the experiments may take on the rig, in all, in minutes.
+    #[arg(long, value_name = "M", default_value_t = 30.0, requires = "active")]
+    pub(crate) budget_min: f64,
+    /// Use the embedded simulated rig even if a service is there.
+    #[arg(long, requires = "active")]
+    pub(crate) embedded: bool,
+    /// The embedded rig's file, in place of the shipped one.
+    #[arg(long, value_name = "FILE", requires = "active")]
+    pub(crate) rig_file: Option<PathBuf>,
+    /// What the embedded rig's sensor hides: a model file or a file of hidden physics, as of `run`.
+    #[arg(long, value_name = "FILE", requires = "active")]
+    pub(crate) truth: Option<PathBuf>,
+    /// Who runs the experiments, for the recordings.
+    #[arg(long, env = "USER", default_value = "unknown")]
+    pub(crate) who: String,
 }
 
 /// Arguments of `study`.
@@ -233,7 +256,8 @@ pub(crate) struct StudyArgs {
     /// The embedded rig's file, in place of the shipped one.
     #[arg(long, value_name = "FILE")]
     pub(crate) rig_file: Option<PathBuf>,
-    /// A model file that the embedded rig's sensor hides, in place of the rig file's gains, noise and spread.
+    /// What the embedded rig's sensor hides: a model file, in place of the rig file's gains, noise and spread, or a
+    /// file of hidden physics.
     #[arg(long, value_name = "FILE")]
     pub(crate) truth: Option<PathBuf>,
     /// Seed of the random orders and, on a simulated rig, of its noise.

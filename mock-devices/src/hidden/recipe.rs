@@ -88,7 +88,7 @@ pub enum HiddenError {
 }
 
 /// Beyond this strength no rig is: a separation that needs more is not reached.
-const STRENGTH_MAX: f64 = 8.0;
+pub(crate) const STRENGTH_MAX: f64 = 8.0;
 const STRENGTH_MIN: f64 = 1e-5;
 const TRIALS_MAX: usize = 24;
 /// A separation is met within this share of it.

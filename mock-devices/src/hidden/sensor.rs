@@ -103,6 +103,16 @@ impl Sensor {
         &self.parameters
     }
 
+    /// Makes elements answer for others: which, for which, and with what share of its indentation.
+    pub(crate) fn wire(&mut self, wiring: Vec<(usize, usize, f64)>) {
+        self.stages.push(Stage::Covering(Box::new(move |_, indentation_mm| {
+            let felt_mm = indentation_mm.to_vec();
+            for (element, answers_for, share) in &wiring {
+                indentation_mm[*element] = share * felt_mm[*answers_for];
+            }
+        })));
+    }
+
     /// Puts another covering in place, which has no past.
     pub fn set_covering(&mut self, covering: Covering) {
         self.base.covering = covering;

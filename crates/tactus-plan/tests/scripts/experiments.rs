@@ -161,6 +161,40 @@ fn a_scaled_diagnosis_is_short() {
 }
 
 #[test]
+fn diagnose_makes_only_the_parts_that_are_asked_for() {
+    let mut rig = FakeRig::new();
+    let result = run("diagnose", DIAGNOSE, &["parts=rests, hold", "scale=0.1"], 5, &mut rig).result;
+    let made: Vec<&str> = result.as_object().unwrap().keys().map(String::as_str).collect();
+    assert_eq!(made, ["hold", "rests"]);
+    for part in ["wide", "depths", "rests", "reversals"] {
+        let mut rig = FakeRig::new();
+        let result = run("diagnose", DIAGNOSE, &[&format!("parts={part}")], 5, &mut rig).result;
+        assert!(!result[part].is_null(), "{part}: {result}");
+        let minutes = rig.elapsed_s / 60.0;
+        assert!((1.0..6.0).contains(&minutes), "{part}: {minutes} minutes");
+        let extent_mm = rig.view().extent_mm;
+        for at in places(&rig) {
+            let inside = |mm: f64, [least, most]: [f64; 2]| (least..=most).contains(&mm);
+            assert!(inside(at.x_mm, extent_mm[0]) && inside(at.y_mm, extent_mm[1]), "{part}: {at:?}");
+        }
+    }
+}
+
+#[test]
+fn a_part_that_is_not_is_refused_with_those_that_are() {
+    let script = Script::parse("diagnose", DIAGNOSE).unwrap();
+    let mut arguments = Arguments::default();
+    arguments.set("parts=hold,rest").unwrap();
+    let mut rig = FakeRig::new();
+    let refused = execute(&script, &arguments, &rig.view(), 1, &Limits::default(), &mut rig).unwrap_err();
+    assert!(
+        refused.to_string().contains("parts: there is no rest - there is: [\"drift\", \"repeats\","),
+        "{refused}"
+    );
+    assert!(rig.calls.is_empty());
+}
+
+#[test]
 fn every_experiment_documents_itself_and_its_parameters() {
     for (name, source) in [
         ("element-centres", ELEMENT_CENTRES),

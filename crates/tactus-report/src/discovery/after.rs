@@ -5,13 +5,14 @@ use std::fmt;
 use tactus_discover::{Discovery, Level};
 
 use super::{
+    active::command,
     figures::levels,
     words::{list, percent},
 };
 use crate::{
     document::{Column, Table},
     markup::Text,
-    numbers::digits,
+    numbers::{digits, duration},
 };
 
 pub(super) fn sections(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
@@ -87,11 +88,12 @@ fn next(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
         let [one, other] = &next.separates;
         writeln!(
             f,
-            "<li>To tell {} from {}, which would then differ by {} standard errors:<br><code>tactus run {}</code></li>",
+            "<li>To tell {} from {}, which would then differ by {} standard errors:<br><code>{}</code> ({})</li>",
             Text(one),
             Text(other),
             digits(next.expected_z, 2),
-            Text(next.experiment)
+            Text(command(next.experiment, &next.parameters)),
+            duration(next.duration_s)
         )?;
     }
     writeln!(

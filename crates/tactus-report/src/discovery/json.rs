@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use tactus_discover::{Candidate, Estimated, Level, Point, Step};
 
-use super::{DiscoveryReport, in_words};
+use super::{DiscoveryReport, active, in_words};
 
 /// Name of the form of `report.json`.
 const SCHEMA: &str = "tactus.discovery/1";
@@ -46,7 +46,11 @@ pub fn discovery_json(report: &DiscoveryReport<'_>) -> String {
     });
     let next = found.next_experiments.iter().map(|next| {
         json!({
-            "experiment": next.experiment, "separates": next.separates, "expected_z": next.expected_z,
+            "experiment": next.experiment,
+            "parameters": active::named(&next.parameters),
+            "duration_s": next.duration_s,
+            "separates": next.separates,
+            "expected_z": next.expected_z,
         })
     });
     let not_shown = found.not_shown.iter().map(|one| json!({ "effect": one.effect, "reason": one.reason }));
@@ -82,6 +86,7 @@ pub fn discovery_json(report: &DiscoveryReport<'_>) -> String {
         "verdict_text": in_words(found),
         "unexplained": { "depends_on": found.unexplained.depends_on, "share": found.unexplained.share },
         "next_experiments": next.collect::<Vec<_>>(),
+        "active": active::json(report.active),
     });
     format!("{written:#}\n")
 }

@@ -95,7 +95,7 @@ pub(crate) fn explained() -> Discovery {
         unexplained: Unexplained { depends_on: vec![], share: 0.003_9 },
         next_experiments: vec![NextExperiment {
             experiment: "diagnose",
-            parameters: vec![("parts", "[\"approach\"]".into())],
+            parameters: vec![("parts", "approach".into())],
             duration_s: 60.0,
             separates: ["hysteresis".into(), "backlash".into()],
             expected_z: 11.3,
@@ -186,7 +186,7 @@ pub(crate) fn report<'a>(
     data: &'a [DataSource],
     discovery: &'a Discovery,
 ) -> DiscoveryReport<'a> {
-    DiscoveryReport { rig: "sim", simulated: true, array, data, notes: &[], discovery }
+    DiscoveryReport { rig: "sim", simulated: true, array, data, notes: &[], active: &[], discovery }
 }
 
 fn rounds() -> Vec<Round> {

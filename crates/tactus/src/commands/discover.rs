@@ -1,5 +1,6 @@
 //! `discover`: what a model is missing, as a report, numbers, a grown model and the residuals.
 
+mod active;
 mod measured;
 mod model;
 mod print;
@@ -9,10 +10,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread;
 
-use anyhow::{Context, bail};
-use tactus_discover::{Discovery, Known, Options};
+use anyhow::{Context, anyhow, bail};
+use tactus_discover::{DiscoverError, Discovery, Known, Options};
 use tactus_model::Array;
-use tactus_report::discovery::{DiscoveryReport, discovery_html, discovery_json};
+use tactus_report::discovery::{ActiveRun, DiscoveryReport, discovery_html, discovery_json};
 use tactus_schema::{Model, Rig};
 
 use crate::cli::{Common, DiscoverArgs};
@@ -28,13 +29,48 @@ struct Discovered {
     model: Model,
     known: Known,
     discovery: Discovery,
+    /// What was run on the way.
+    active: Vec<ActiveRun>,
 }
 
 pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<Exit> {
     let progress = Computation::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
+    let analyse =
+        |files: &[PathBuf], of: Option<&str>| analysed(args, declared.clone(), files, of, &progress);
+    let discovered = if args.active {
+        active::discover(common, args, &progress, analyse)?
+    } else {
+        analyse(&args.files, None)?
+    };
+    progress.show("writing", 1.0);
+    let paths = discovered.write(&args.out)?;
+    progress.clear();
+    if common.json {
+        output::write(&discovery_json(&discovered.report()))?;
+    } else {
+        print::discovered(&discovered.report(), &paths);
+    }
+    Ok(if discovered.measured.notes.is_empty() { Exit::Done } else { Exit::Degraded })
+}
+
+/// The whole protocol on some files, which must be of the rig `of` if that is given.
+fn analysed(
+    args: &DiscoverArgs,
+    declared: Option<Model>,
+    files: &[PathBuf],
+    of: Option<&str>,
+    progress: &Computation,
+) -> anyhow::Result<Discovered> {
     progress.show("reading", 0.0);
-    let measured = Measured::read(&args.files)?;
+    let measured = Measured::read(files)?;
+    if let Some(live) = of.filter(|live| *live != measured.rig.name) {
+        let error = format!(
+            "the data are of rig {:?}, but experiments would run on rig {live:?}: name the rig of the data with --rig or --rig-file",
+            measured.rig.name
+        );
+        return Err(Failure::new(Exit::Usage, error).into());
+    }
     let model = match declared {
         Some(model) => of_array(model, args.model.as_deref(), &measured.rig.array)?,
         None => {
@@ -44,19 +80,16 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     let known = known(&measured.rig, &model);
     let threads = args.threads.map_or_else(cores, usize::from);
     let options = Options { seed: args.seed, threads };
-    let discovery = tactus_discover::discover(&known, &measured.frames, options, &|now| {
+    let found = tactus_discover::discover(&known, &measured.frames, options, &|now| {
         progress.show(&now.what, now.share);
+    });
+    let discovery = found.map_err(|error| match error {
+        DiscoverError::TooLittle(_) => {
+            anyhow!("{error}; `tactus run diagnose` measures enough, and may be given beside these data")
+        }
+        DiscoverError::Model(_) | DiscoverError::Effect(_) => error.into(),
     })?;
-    progress.show("writing", 1.0);
-    let discovered = Discovered { measured, model, known, discovery };
-    let paths = discovered.write(&args.out)?;
-    progress.clear();
-    if common.json {
-        output::write(&discovery_json(&discovered.report()))?;
-    } else {
-        print::discovered(&discovered.report(), &paths);
-    }
-    Ok(if discovered.measured.notes.is_empty() { Exit::Done } else { Exit::Degraded })
+    Ok(Discovered { measured, model, known, discovery, active: Vec::new() })
 }
 
 impl Discovered {
@@ -89,6 +122,7 @@ impl Discovered {
             array: &self.measured.rig.array,
             data: &self.measured.data,
             notes: &self.measured.notes,
+            active: &self.active,
             discovery: &self.discovery,
         }
     }

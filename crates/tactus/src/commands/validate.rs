@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use serde_json::json;
 use tactus_daemon::config::{self, Config};
-use tactus_daemon::embedded::SIMULATED_RIG;
+use tactus_daemon::embedded::{HIDDEN_SCHEMA, SIMULATED_RIG, TruthFile};
 use tactus_daemon::experiments;
 use tactus_plan::RigView;
 use tactus_record::Completeness;
@@ -63,7 +63,15 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             let (name, rows, cols) = (base.array.name(), base.array.rows(), base.array.cols());
             Ok(format!("model of {name:?}, {rows} x {cols} elements, {} effects", effects.len()))
         }
-        Some(other) => bail!("schema {other:?} is unknown; there is: {}, {}", rig::SCHEMA, model::SCHEMA),
+        Some(HIDDEN_SCHEMA) => {
+            TruthFile::from_toml(&text)?;
+            Ok("hidden physics for a simulated rig".into())
+        }
+        Some(other) => bail!(
+            "schema {other:?} is unknown; there is: {}, {}, {HIDDEN_SCHEMA}",
+            rig::SCHEMA,
+            model::SCHEMA
+        ),
         None => Ok(format!("a service's configuration for rig {:?}", Config::load(file)?.rig.name)),
     }
 }

@@ -48,4 +48,4 @@ fn finite(error: &f64) -> bool {
 
 #[cfg(test)]
 #[path = "model_tests.rs"]
-mod tests;
+pub(super) mod tests;

@@ -6,7 +6,7 @@ use super::*;
 const RELAXATION: [(&str, f64); 5] =
     [("relaxed_share", 0.12), ("time_constant_s", 8.1), ("spread_ratio", 4.0), ("after_release", 0.0), ("recovery_ratio", 1.0)];
 
-fn before() -> Model {
+pub(crate) fn before() -> Model {
     let rig = Rig::from_toml(include_str!("../../../../../config/rigs/sim.toml")).unwrap();
     let mut model = Model::of_rig(&rig).unwrap();
     model.base.noise_rms_counts = 1.5;
@@ -27,7 +27,7 @@ fn miswired(element: f64, answers_for: f64) -> [(&'static str, f64); 4] {
 }
 
 /// Two elements were found to be miswired, and what was known changed a little.
-fn found(model: &Model) -> Discovery {
+pub(crate) fn found(model: &Model) -> Discovery {
     let term = |parameters: [(&'static str, f64); 4]| {
         parameters
             .map(|(name, value)| Estimated {

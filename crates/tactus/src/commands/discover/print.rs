@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use tactus_calibrate::Estimate;
 use tactus_discover::{Estimated, Step};
-use tactus_report::discovery::{DiscoveryReport, in_words, not_shown};
+use tactus_report::discovery::{DiscoveryReport, Undecided, command, in_words, not_shown};
 
 use crate::commands::calibrate::estimate;
-use crate::output::{print_fields, print_table, say};
+use crate::output::{duration, print_fields, print_table, say};
 
 pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
     let found = report.discovery;
@@ -35,13 +35,21 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
     }
     say("");
     say(&in_words(found));
+    for run in report.active {
+        let [before, after] = [&run.before, &run.after].map(|undecided| Undecided::in_words(undecided));
+        say(&format!("{}: {before} -> {after}", command(&run.experiment, &run.parameters)));
+    }
     if !found.next_experiments.is_empty() {
         say("");
     }
     for next in &found.next_experiments {
         let [one, other] = &next.separates;
         let z = next.expected_z;
-        say(&format!("next: tactus run {}  (tells {one} from {other}, z = {z:.1})", next.experiment));
+        let command = command(next.experiment, &next.parameters);
+        say(&format!(
+            "next: {command}  (tells {one} from {other}, z = {z:.1}; {})",
+            duration(next.duration_s)
+        ));
     }
     say("");
     for path in paths {

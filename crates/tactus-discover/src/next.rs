@@ -1,0 +1,216 @@
+//! The next experiment: which one would tell two explanations apart that the data cannot.
+//!
+//! Each explanation predicts the frames of every experiment that the rig could make ([`design`]). What their difference
+//! is to be worth is what a fit of the wrong one cannot take up, with its gains, baselines, spread and effects free:
+//!
+//! ```text
+//! z = sqrt(sum of (d / noise)^2)        d = difference of the predictions, freed of the tangent space of the wrong one
+//! ```
+//!
+//! the smaller of the two, since nobody knows which is wrong. Only the new frames bind that fit: `z` is what the experiment
+//! tells by itself, and with the old data it tells no less.
+//!
+//! # Source
+//! Designs that discriminate between models: A. C. Atkinson and V. V. Fedorov, *Biometrika* 62 (1975) 57 (T-optimality).
+
+mod design;
+
+use tactus_model::effect::{Definition, Kind};
+
+use crate::discovery::{NextExperiment, NotShown};
+use crate::fit::{Free, Problem};
+use crate::noise::Noise;
+use crate::rows::{HeldOut, Rows, still};
+use crate::score::Fitting;
+use crate::sensor::{Parameters, Sensor, Term};
+use crate::{DiscoverError, Frames, Known, parallel};
+use design::{Bench, Design};
+
+/// A model that may be what the data show.
+#[derive(Debug, Clone)]
+pub(crate) struct Explanation {
+    /// Names of its effects.
+    pub(crate) name: String,
+    pub(crate) parameters: Parameters,
+}
+
+/// An experiment that is expected to do better than this decides.
+const DECIDES_Z: f64 = 8.0;
+/// One that does worse is not proposed.
+const WORTH_Z: f64 = 2.0;
+/// Proposals for one question.
+const PROPOSALS_MAX: usize = 3;
+/// An effect that was not shown is taken to move the largest signal of an experiment by this share of it.
+const SMALL_SHARE: f64 = 0.02;
+
+/// What else a proposal rests on.
+#[derive(Clone, Copy)]
+pub(crate) struct Setting<'a> {
+    pub(crate) known: &'a Known,
+    /// The data: no design goes deeper, or loads faster, than they did.
+    pub(crate) frames: &'a Frames,
+    pub(crate) noise: &'a Noise,
+    pub(crate) threads: usize,
+}
+
+impl Setting<'_> {
+    /// For each pair the experiments that tell it apart: those that decide first, the shortest before the others.
+    pub(crate) fn propose(self, pairs: &[[Explanation; 2]]) -> Result<Vec<NextExperiment>, DiscoverError> {
+        let bench = Bench::of(self.known, self.frames);
+        let mut proposals = Vec::new();
+        for pair in pairs {
+            let separates = pair.each_ref().map(|one| one.name.clone());
+            proposals
+                .extend(self.best(&bench.designs(), &separates, |design| self.separation(design, pair))?);
+        }
+        Ok(proposals)
+    }
+
+    /// For each effect that the data cannot show the experiments that would show it, were it small.
+    pub(crate) fn show(
+        self,
+        not_shown: &[NotShown],
+        at: &Parameters,
+    ) -> Result<Vec<NextExperiment>, DiscoverError> {
+        let bench = Bench::of(self.known, self.frames);
+        let mut proposals = Vec::new();
+        for NotShown { effect, .. } in not_shown {
+            let definition = Definition::find(effect)?;
+            let designs: Vec<Design> = bench
+                .designs()
+                .into_iter()
+                .filter(|design| definition.shown_by.contains(&design.name))
+                .collect();
+            let separates = [(*effect).to_owned(), "nothing".to_owned()];
+            let best = self.best(&designs, &separates, |design| self.visibility(design, definition, at))?;
+            proposals.extend(best.into_iter().take(1));
+        }
+        Ok(proposals)
+    }
+
+    fn best(
+        self,
+        designs: &[Design],
+        separates: &[String; 2],
+        z: impl Fn(&Design) -> Result<f64, DiscoverError> + Sync,
+    ) -> Result<Vec<NextExperiment>, DiscoverError> {
+        let mut found = Vec::new();
+        for (design, z) in designs.iter().zip(parallel::map(designs, self.threads, z)) {
+            found.push((design, z?));
+        }
+        found.retain(|(_, z)| *z >= WORTH_Z);
+        found.sort_by(|(one, one_z), (other, other_z)| {
+            let (one_decides, other_decides) = (*one_z >= DECIDES_Z, *other_z >= DECIDES_Z);
+            other_decides.cmp(&one_decides).then(if one_decides {
+                one.duration_s.total_cmp(&other.duration_s)
+            } else {
+                other_z.total_cmp(one_z)
+            })
+        });
+        // The long form of what is proposed in its short one tells nothing new.
+        let mut names: Vec<&str> = Vec::new();
+        found.retain(|(design, _)| {
+            !names.contains(&design.name) && {
+                names.push(design.name);
+                true
+            }
+        });
+        let proposals = found.into_iter().take(PROPOSALS_MAX).map(|(design, expected_z)| NextExperiment {
+            experiment: design.experiment,
+            parameters: design.parameters.clone(),
+            duration_s: design.duration_s,
+            separates: separates.clone(),
+            expected_z,
+        });
+        Ok(proposals.collect())
+    }
+
+    fn separation(self, design: &Design, pair: &[Explanation; 2]) -> Result<f64, DiscoverError> {
+        self.on(design, |problem| {
+            let at = pair.each_ref().map(|one| once(&one.parameters));
+            let [one, other] = [problem.predict(&at[0])?, problem.predict(&at[1])?];
+            let wrong = |at: &Parameters, predicted: &[f64], right: &[f64]| {
+                let mut difference: Vec<f64> = right.iter().zip(predicted).map(|(a, b)| a - b).collect();
+                let fitting = fitting(problem, at, predicted)?;
+                fitting.free(&mut difference);
+                Ok::<f64, DiscoverError>(fitting.size(&difference))
+            };
+            Ok(wrong(&at[0], &one, &other)?.min(wrong(&at[1], &other, &one)?))
+        })
+    }
+
+    /// How far a small effect lies from the model without it, the least of its own parameters.
+    fn visibility(
+        self,
+        design: &Design,
+        definition: &'static Definition,
+        at: &Parameters,
+    ) -> Result<f64, DiscoverError> {
+        self.on(design, |problem| {
+            let at = once(at);
+            let predicted = problem.predict(&at)?;
+            let fitting = fitting(problem, &at, &predicted)?;
+            let signal = largest(&predicted, &at.baseline[0]);
+            let mut with = at.clone();
+            with.terms.push(Term::neutral(definition));
+            let term = with.terms.len() - 1;
+            let mut best = 0.0_f64;
+            for (parameter, known) in definition.parameters.iter().enumerate() {
+                if known.kind == Kind::Element {
+                    continue;
+                }
+                let mut column = problem.slope(&with, &predicted, Free::Of { term, parameter })?;
+                let reach = column.iter().map(|slope| slope.abs()).fold(0.0, f64::max);
+                if reach > 0.0 {
+                    fitting.free(&mut column);
+                    best = best.max(fitting.size(&column) * SMALL_SHARE * signal / reach);
+                }
+            }
+            Ok(best)
+        })
+    }
+
+    /// Does something with a model of the design's frames.
+    fn on<R>(
+        self,
+        design: &Design,
+        work: impl FnOnce(&Problem<'_>) -> Result<R, DiscoverError>,
+    ) -> Result<R, DiscoverError> {
+        let frames = &design.frames;
+        let mut rows = Rows::of(frames, &still(frames), true)?;
+        let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
+        rows.weigh(frames, self.noise, &all);
+        work(&Problem::new(Sensor::new(self.known, frames, &rows), self.noise))
+    }
+}
+
+/// What a fit of a model takes up.
+fn fitting<'a>(
+    problem: &'a Problem<'a>,
+    at: &Parameters,
+    predicted: &[f64],
+) -> Result<Fitting<'a>, DiscoverError> {
+    let linear = problem.linear(at, predicted)?;
+    Ok(Fitting::new(problem, linear, problem.columns(at, predicted, 1)?, predicted))
+}
+
+/// The same model for a run of its own.
+fn once(of_runs: &Parameters) -> Parameters {
+    let runs = of_runs.baseline.len().max(1) as f64;
+    let elements = of_runs.sensitivity.len();
+    let mean =
+        (0..elements).map(|element| of_runs.baseline.iter().map(|run| run[element]).sum::<f64>() / runs);
+    Parameters { baseline: vec![mean.collect()], ..of_runs.clone() }
+}
+
+fn largest(predicted: &[f64], baseline: &[f64]) -> f64 {
+    predicted
+        .iter()
+        .zip(baseline.iter().cycle())
+        .map(|(counts, zero)| (counts - zero).abs())
+        .fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+#[path = "next_tests.rs"]
+mod tests;

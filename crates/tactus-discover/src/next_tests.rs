@@ -1,0 +1,179 @@
+use tactus_model::{Array, Covering, Indenter, Phase, Psf, Registration, Response};
+
+use super::*;
+use crate::Frame;
+
+fn known() -> Known {
+    let array = Array::digitacts();
+    Known {
+        response: Response {
+            reference_covering: Covering { thickness_mm: 1.016 },
+            ..Response::uniform(array.elements(), 1000.0, 100.0)
+        },
+        array,
+        psf: Psf::PAPER,
+        registration: Registration { origin_mm: [20.0, 15.0], rotation_deg: 0.0 },
+        indenters: [("cyl1".to_owned(), Indenter::Cylinder { diameter_mm: 1.0 })].into(),
+        effects: Vec::new(),
+    }
+}
+
+/// One press to 0.6 mm at 1 mm/s, under the paper's thinnest covering.
+fn measured() -> Frames {
+    let mut frames = Frames::new(48);
+    for frame in 0..30 {
+        let t_s = f64::from(frame) / 30.0;
+        frames.push(Frame {
+            run: "r",
+            press: 0,
+            phase: Phase::Load,
+            t_ns: i64::from(frame) * 33_333_333,
+            position_mm: [25.0, 20.0, (0.3 - t_s).max(-0.6)],
+            covering_mm: 1.016,
+            indenter: "cyl1",
+            temperature_c: None,
+            counts: &[100.0; 48],
+        });
+    }
+    frames
+}
+
+fn noise() -> Noise {
+    Noise { rms_counts: 2.0, by_element_counts: vec![2.0; 48], correlation: vec![1.0] }
+}
+
+fn explanation(known: &Known, name: &str, values: &[(&str, f64)]) -> Explanation {
+    let mut parameters = Parameters::declared(known, 1);
+    let mut term = Term::neutral(Definition::find(name).unwrap());
+    for (parameter, value) in values {
+        let place = term.definition.parameters.iter().position(|one| one.name == *parameter).unwrap();
+        term.values[place] = *value;
+    }
+    parameters.terms.push(term);
+    Explanation { name: name.to_owned(), parameters }
+}
+
+/// An explanation of the paper's experiment, and another fitted to what it predicts there: twins on that.
+fn twins(known: &Known, [right, wrong]: [(&str, &[(&str, f64)]); 2]) -> [Explanation; 2] {
+    let (frames, noise) = (measured(), noise());
+    let [right, wrong] = [right, wrong].map(|(name, values)| explanation(known, name, values));
+    let designs = Bench::of(known, &frames).designs();
+    let frames = &designs.iter().find(|design| design.name == "element-centres").unwrap().frames;
+    let mut rows = Rows::of(frames, &still(frames), true).unwrap();
+    let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
+    rows.weigh(frames, &noise, &all);
+    rows.counts = Sensor::new(known, frames, &rows).predict(&right.parameters).unwrap();
+    let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
+    let fitted = problem.fit_from(wrong.parameters, 8, &[], 2).unwrap();
+    [right, Explanation { parameters: fitted.parameters, name: wrong.name }]
+}
+
+/// What each of the named designs tells of twins.
+fn separations<const N: usize>(of: [(&str, &[(&str, f64)]); 2], names: [&str; N]) -> [f64; N] {
+    let (known, frames, noise) = (known(), measured(), noise());
+    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: 2 };
+    let pair = twins(&known, of);
+    let designs = Bench::of(&known, &frames).designs();
+    names.map(|name| {
+        let design = designs.iter().find(|design| design.name == name).unwrap();
+        setting.separation(design, &pair).unwrap()
+    })
+}
+
+#[test]
+fn relaxation_and_imprint_are_told_apart_by_rests_and_not_by_quick_presses() {
+    let [rests, hold, repeats, approach] = separations(
+        [
+            ("imprint", &[("set_share", 0.05), ("recovery_s", 5.0)]),
+            ("relaxation", &[("relaxed_share", 0.05), ("time_constant_s", 5.0)]),
+        ],
+        ["rests", "hold", "repeats", "approach"],
+    );
+    assert!(rests.min(hold) > 1.5 * repeats.max(approach));
+    assert!(rests > DECIDES_Z);
+}
+
+#[test]
+fn misregistration_and_tilt_are_told_apart_by_light_and_deep_presses() {
+    let [depths, drift] = separations(
+        [("misregistration", &[("offset_x_mm", 0.05)]), ("surface-tilt", &[("slope_x_mm_per_mm", 0.002)])],
+        ["depths", "drift"],
+    );
+    assert!(depths > DECIDES_Z && drift < WORTH_Z);
+}
+
+#[test]
+fn a_heavy_tail_and_crosstalk_are_told_apart_by_presses_all_over() {
+    let [wide, rates, drift] = separations(
+        [("heavy-tail", &[("tail_share", 0.05)]), ("crosstalk", &[("neighbour_share", 0.02)])],
+        ["wide", "rates", "drift"],
+    );
+    assert!(wide > DECIDES_Z && wide > rates && drift < WORTH_Z);
+}
+
+#[test]
+fn lost_motion_and_hysteresis_are_told_apart_by_reversals() {
+    let [reversals, repeats, tilt] = separations(
+        [
+            ("backlash", &[("play_z_mm", 0.03)]),
+            ("hysteresis", &[("loss_share", 0.1), ("threshold_mm", 0.03)]),
+        ],
+        ["reversals", "repeats", "tilt"],
+    );
+    assert!(reversals > DECIDES_Z && reversals > repeats.max(tilt));
+}
+
+#[test]
+fn proposals_that_decide_come_first_and_the_shortest_of_them_before_the_others() {
+    let (known, frames, noise) = (known(), measured(), noise());
+    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: 2 };
+    let pair = [
+        explanation(&known, "misregistration", &[("offset_x_mm", 0.1)]),
+        explanation(&known, "surface-tilt", &[("slope_x_mm_per_mm", 0.002)]),
+    ];
+    let proposals = setting.propose(&[pair]).unwrap();
+    assert!(!proposals.is_empty() && proposals.len() <= PROPOSALS_MAX);
+    assert_eq!(proposals[0].separates, ["misregistration", "surface-tilt"]);
+    let deciding: Vec<f64> =
+        proposals.iter().filter(|one| one.expected_z >= DECIDES_Z).map(|one| one.duration_s).collect();
+    assert!(!deciding.is_empty() && deciding.is_sorted(), "{proposals:?}");
+}
+
+#[test]
+fn nothing_is_proposed_between_an_explanation_and_itself() {
+    let (known, frames, noise) = (known(), measured(), noise());
+    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: 2 };
+    let one = explanation(&known, "relaxation", &[("relaxed_share", 0.1)]);
+    assert_eq!(setting.propose(&[[one.clone(), one]]).unwrap(), []);
+}
+
+#[test]
+fn what_the_data_cannot_show_is_shown_by_an_experiment_of_its_own() {
+    let (known, frames, noise) = (known(), measured(), noise());
+    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: 2 };
+    let not_shown = [NotShown { effect: "relaxation", reason: "no depth was held".into() }];
+    let proposals = setting.show(&not_shown, &Parameters::declared(&known, 1)).unwrap();
+    let [one] = &proposals[..] else { panic!("one proposal: {proposals:?}") };
+    assert_eq!(
+        (one.experiment, one.separates.clone()),
+        ("diagnose", ["relaxation".into(), "nothing".into()])
+    );
+}
+
+#[test]
+fn no_design_goes_deeper_or_loads_faster_than_the_data_did() {
+    let (known, frames) = (known(), measured());
+    for design in Bench::of(&known, &frames).designs() {
+        let deepest_mm = design.frames.position_mm.iter().map(|at| -at[2]).fold(0.0, f64::max);
+        assert!(deepest_mm < 0.6 * 1.06, "{}: {deepest_mm}", design.name);
+        if design.name == "rates" {
+            assert!(design.parameters.contains(&("speeds_mm_per_s", "[0.1,0.2,0.5,1.0]".into())));
+        }
+        assert!(
+            design.duration_s > 10.0 && design.duration_s < 900.0,
+            "{}: {}",
+            design.name,
+            design.duration_s
+        );
+    }
+}

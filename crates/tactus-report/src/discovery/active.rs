@@ -1,0 +1,112 @@
+//! Experiments that were chosen and run to decide between explanations.
+
+use std::fmt;
+
+use serde_json::{Value, json};
+
+use super::words::list;
+use crate::{
+    document::{Column, Table},
+    numbers::digits,
+};
+
+/// An experiment that was run because of what an analysis could not decide, and what the next one could not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActiveRun {
+    /// Name of the experiment.
+    pub experiment: String,
+    /// Its parameters and their values.
+    pub parameters: Vec<(&'static str, String)>,
+    /// Run id of its recording.
+    pub recording: String,
+    /// How long it took on the rig.
+    pub duration_s: f64,
+    /// What it was to tell apart.
+    pub separates: [String; 2],
+    /// By how many standard errors, if that could be foreseen.
+    pub expected_z: Option<f64>,
+    /// The effects that had been added before, each with those that could not be told from it.
+    pub before: Vec<Undecided>,
+    /// The same with this experiment among the data.
+    pub after: Vec<Undecided>,
+}
+
+/// An effect, and those that the data cannot tell from it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Undecided {
+    /// The effect that was added.
+    pub effect: &'static str,
+    /// What would do as well.
+    pub equivalent: Vec<&'static str>,
+}
+
+impl Undecided {
+    /// Such as `relaxation` or `relaxation or imprint`.
+    pub fn in_words(undecided: &[Self]) -> String {
+        if undecided.is_empty() {
+            return "nothing".into();
+        }
+        let either = |one: &Self| [&[one.effect][..], &one.equivalent].concat().join(" or ");
+        undecided.iter().map(either).collect::<Vec<_>>().join("; ")
+    }
+
+    fn json(&self) -> Value {
+        json!({ "effect": self.effect, "equivalent": self.equivalent })
+    }
+}
+
+/// What to type to run an experiment.
+pub fn command(experiment: &str, parameters: &[(&'static str, String)]) -> String {
+    let parameters = parameters.iter().map(|(name, value)| {
+        let is_plain = value.chars().all(|c| c.is_ascii_alphanumeric() || ".,_-".contains(c));
+        if is_plain { format!(" -p {name}={value}") } else { format!(" -p '{name}={value}'") }
+    });
+    format!("tactus run {experiment}{}", parameters.collect::<String>())
+}
+
+/// Parameters as an object of texts.
+pub(super) fn named(parameters: &[(&'static str, String)]) -> Value {
+    parameters.iter().map(|(name, value)| ((*name).to_owned(), Value::from(value.as_str()))).collect()
+}
+
+pub(super) fn json(runs: &[ActiveRun]) -> Vec<Value> {
+    let run = |run: &ActiveRun| {
+        json!({
+            "experiment": run.experiment,
+            "parameters": named(&run.parameters),
+            "recording": run.recording,
+            "duration_s": run.duration_s,
+            "separates": run.separates,
+            "expected_z": run.expected_z,
+            "before_equivalent": run.before.iter().map(Undecided::json).collect::<Vec<_>>(),
+            "after_equivalent": run.after.iter().map(Undecided::json).collect::<Vec<_>>(),
+        })
+    };
+    runs.iter().map(run).collect()
+}
+
+pub(super) fn section(f: &mut fmt::Formatter<'_>, runs: &[ActiveRun]) -> fmt::Result {
+    if runs.is_empty() {
+        return Ok(());
+    }
+    writeln!(f, "<section>\n<h2>What was measured to decide</h2>")?;
+    let mut table = Table::new(&[
+        Column::Name("experiment"),
+        Column::Name("to tell apart"),
+        Column::Number("expected, standard errors"),
+        Column::Number("took, s"),
+        Column::Name("explained before by"),
+        Column::Name("and after by"),
+    ]);
+    for run in runs {
+        table.row([
+            command(&run.experiment, &run.parameters),
+            list(&run.separates),
+            run.expected_z.map_or_else(String::new, |z| digits(z, 2)),
+            format!("{:.0}", run.duration_s),
+            Undecided::in_words(&run.before),
+            Undecided::in_words(&run.after),
+        ]);
+    }
+    writeln!(f, "{table}\n<p>All these recordings are among the data of this report.</p>\n</section>")
+}

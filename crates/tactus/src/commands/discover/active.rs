@@ -1,0 +1,218 @@
+//! `discover --active`: runs what tells undecided explanations apart, and looks again.
+
+use std::path::PathBuf;
+
+use anyhow::bail;
+use tactus_daemon::config;
+use tactus_daemon::embedded::SIMULATED_RIG;
+use tactus_discover::{Discovery, NextExperiment, Verdict};
+use tactus_report::discovery::{ActiveRun, Undecided, command};
+use tactus_schema::Rig;
+use tactus_schema::pb::ExitStatus;
+
+use super::Discovered;
+use crate::cli::{Common, DiscoverArgs, ExperimentArgs, RunArgs};
+use crate::commands::run::{Summary, execute};
+use crate::connection;
+use crate::exit::{Exit, Failure};
+use crate::output::{duration, say};
+use crate::progress::Computation;
+
+/// Where experiments run.
+struct Lab<'a> {
+    common: &'a Common,
+    args: &'a DiscoverArgs,
+    embedded: bool,
+    rig: String,
+    /// What is left of the rig's time.
+    budget_s: f64,
+    /// Experiments so far.
+    runs: u64,
+}
+
+/// An experiment that was chosen.
+#[derive(Debug, Clone, PartialEq)]
+struct Chosen {
+    experiment: &'static str,
+    parameters: Vec<(&'static str, String)>,
+    duration_s: f64,
+    separates: [String; 2],
+    expected_z: Option<f64>,
+}
+
+pub(super) fn discover(
+    common: &Common,
+    args: &DiscoverArgs,
+    progress: &Computation,
+    analyse: impl Fn(&[PathBuf], Option<&str>) -> anyhow::Result<Discovered>,
+) -> anyhow::Result<Discovered> {
+    let mut lab = Lab::find(common, args)?;
+    let mut files = args.files.clone();
+    if files.is_empty() {
+        files.push(lab.run(&Chosen::diagnose((lab.budget_s / 2.0 / DIAGNOSE_S).min(1.0)))?.recording);
+    }
+    let mut discovered = analyse(&files, Some(&lab.rig))?;
+    let mut active: Vec<ActiveRun> = Vec::new();
+    for _ in 0..args.rounds {
+        let chosen = choose(&discovered.discovery, lab.budget_s, &active);
+        if chosen.is_empty() {
+            break;
+        }
+        progress.clear();
+        let before = undecided(&discovered.discovery);
+        let mut round = Vec::new();
+        for chosen in chosen {
+            let summary = lab.run(&chosen)?;
+            round.push(ActiveRun {
+                experiment: chosen.experiment.to_owned(),
+                parameters: chosen.parameters,
+                recording: summary.run_id,
+                duration_s: summary.duration_s,
+                separates: chosen.separates,
+                expected_z: chosen.expected_z,
+                before: before.clone(),
+                after: Vec::new(),
+            });
+            files.push(summary.recording);
+        }
+        discovered = analyse(&files, Some(&lab.rig))?;
+        let after = undecided(&discovered.discovery);
+        active.extend(round.into_iter().map(|run| ActiveRun { after: after.clone(), ..run }));
+    }
+    Ok(Discovered { active, ..discovered })
+}
+
+/// For each pair that is undecided the best experiment that there is time for; if something is unexplained, `diagnose`.
+fn choose(found: &Discovery, budget_s: f64, done: &[ActiveRun]) -> Vec<Chosen> {
+    let mut chosen: Vec<Chosen> = Vec::new();
+    let mut left_s = budget_s;
+    let mut answered: Vec<&[String; 2]> = Vec::new();
+    let is_done = |one: &Chosen| {
+        done.iter().any(|run| run.experiment == one.experiment && run.parameters == one.parameters)
+    };
+    for next in found.next_experiments.iter().filter(|next| next.separates[1] != "nothing") {
+        let one = Chosen::of(next);
+        if answered.contains(&&next.separates) || is_done(&one) || one.duration_s > left_s {
+            continue;
+        }
+        answered.push(&next.separates);
+        if !chosen
+            .iter()
+            .any(|other| other.experiment == one.experiment && other.parameters == one.parameters)
+        {
+            left_s -= one.duration_s;
+            chosen.push(one);
+        }
+    }
+    let unexplained = matches!(found.verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    if chosen.is_empty() && unexplained {
+        let scale = (budget_s / DIAGNOSE_S).min(1.0);
+        let one = Chosen::diagnose((100.0 * scale).floor() / 100.0);
+        if scale >= 0.1 && done.iter().all(|run| run.experiment != one.experiment) {
+            chosen.push(one);
+        }
+    }
+    chosen
+}
+
+/// What `diagnose` takes at full length, roughly.
+const DIAGNOSE_S: f64 = 1100.0;
+
+impl Chosen {
+    fn of(next: &NextExperiment) -> Self {
+        Self {
+            experiment: next.experiment,
+            parameters: next.parameters.clone(),
+            duration_s: next.duration_s,
+            separates: next.separates.clone(),
+            expected_z: Some(next.expected_z),
+        }
+    }
+
+    fn diagnose(scale: f64) -> Self {
+        let parameters = if scale < 1.0 { vec![("scale", scale.to_string())] } else { Vec::new() };
+        Self {
+            experiment: "diagnose",
+            parameters,
+            duration_s: scale * DIAGNOSE_S,
+            separates: ["what is missing".into(), "noise".into()],
+            expected_z: None,
+        }
+    }
+}
+
+fn undecided(found: &Discovery) -> Vec<Undecided> {
+    let of =
+        |step: &tactus_discover::Step| Undecided { effect: step.effect, equivalent: step.equivalent.clone() };
+    found.steps.iter().map(of).collect()
+}
+
+impl<'a> Lab<'a> {
+    /// The service's rig, or the embedded one; says which.
+    fn find(common: &'a Common, args: &'a DiscoverArgs) -> anyhow::Result<Self> {
+        if !(args.budget_min > 0.0 && args.budget_min.is_finite()) {
+            let error = format!("--budget-min must be above 0, not {}", args.budget_min);
+            return Err(Failure::new(Exit::Usage, error).into());
+        }
+        let asked = args.embedded || args.rig_file.is_some();
+        let served = if asked {
+            None
+        } else {
+            let client = connection::runtime()?.block_on(connection::find(common))?;
+            client.map(|client| client.rig().to_owned())
+        };
+        let (rig, first_line) = if let Some(rig) = &served {
+            let line = format!("experiments run on the service at {} (rig {rig:?})", common.endpoint);
+            (rig.clone(), line)
+        } else {
+            let rig = match &args.rig_file {
+                Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.0,
+                None => Rig::from_toml(SIMULATED_RIG)?,
+            };
+            let why = if asked { "as asked".into() } else { format!("no service at {}", common.endpoint) };
+            let line =
+                format!("SIMULATED: experiments run on the embedded simulated rig {:?} ({why})", rig.name);
+            (rig.name, line)
+        };
+        if !common.json {
+            say(&first_line);
+        }
+        let embedded = served.is_none();
+        Ok(Self { common, args, embedded, rig, budget_s: 60.0 * args.budget_min, runs: 0 })
+    }
+
+    fn run(&mut self, chosen: &Chosen) -> anyhow::Result<Summary> {
+        let command = command(chosen.experiment, &chosen.parameters);
+        if !self.common.json {
+            let [one, other] = &chosen.separates;
+            say(&format!("{command}: to tell {one} from {other}, {}", duration(chosen.duration_s)));
+        }
+        let parameters = chosen.parameters.iter().map(|(name, value)| format!("{name}={value}"));
+        let args = RunArgs {
+            experiment: ExperimentArgs {
+                experiment: chosen.experiment.into(),
+                parameters: parameters.collect(),
+                seed: Some(self.args.seed.wrapping_add(self.runs)),
+            },
+            embedded: self.embedded,
+            rig_file: self.args.rig_file.clone(),
+            truth: self.args.truth.clone(),
+            real_time: false,
+            out: self.args.out.join("runs"),
+            who: self.args.who.clone(),
+            no_report: true,
+        };
+        // The run's own first line would stand before every experiment.
+        let summary = execute(&Common { json: true, ..self.common.clone() }, &args)?;
+        if !matches!(summary.exit_status, ExitStatus::Done | ExitStatus::Degraded) {
+            bail!(Failure::new(Exit::of_run(summary.exit_status), format!("{command}: {}", summary.message)));
+        }
+        self.runs += 1;
+        self.budget_s -= summary.duration_s;
+        Ok(summary)
+    }
+}
+
+#[cfg(test)]
+#[path = "active_tests.rs"]
+mod tests;
