@@ -1,0 +1,254 @@
+//! The evidence as text.
+
+use std::fmt::{self, Write};
+
+use super::campaign::Campaign;
+use super::outcome::Outcome;
+use super::rate::Rate;
+use super::score::{Band, OutsideScore, Scores, Several, Shrink};
+
+/// Between these lines a document is written anew.
+const MARKS: [&str; 2] = ["<!-- evidence: begin -->", "<!-- evidence: end -->"];
+
+/// Puts a text between the marks of a document; `None` if it has none.
+pub fn into_document(document: &str, text: &str) -> Option<String> {
+    let [begin, end] = MARKS;
+    let (before, rest) = document.split_once(begin)?;
+    let (_, after) = rest.split_once(end)?;
+    Some(format!("{before}{begin}\n\n{}\n\n{end}{after}", text.trim()))
+}
+
+/// The generated part of `docs/discovery-evidence.md`.
+pub fn document(scores: &Scores) -> String {
+    fmt::from_fn(|f| {
+        targets(f, scores)?;
+        false_alarms(f, scores)?;
+        names(f, scores)?;
+        several(f, scores)?;
+        outside(f, scores)
+    })
+    .to_string()
+}
+
+/// One line for each set that was not named exactly: what was in it, what was said.
+pub fn misses(outcomes: &[Outcome]) -> String {
+    let mut text = String::new();
+    for set in outcomes {
+        let is_right = match set.campaign {
+            Campaign::FalseAlarms => !set.is_detected() && !set.has_failed(),
+            Campaign::Names | Campaign::Pairs | Campaign::Triples => set.is_exact(),
+            Campaign::Outside => set.verdict == "unexplained",
+        };
+        if is_right {
+            continue;
+        }
+        let truths: Vec<String> = set
+            .truths
+            .iter()
+            .map(|truth| {
+                format!("{} [{}] z {:.1}", truth.effect.as_deref().unwrap_or("-"), truth.physics, truth.z)
+            })
+            .collect();
+        let named: Vec<String> = set
+            .named
+            .iter()
+            .map(|named| match &named.equivalent[..] {
+                [] => named.effect.clone(),
+                others => format!("{} (or {})", named.effect, others.join(", ")),
+            })
+            .collect();
+        let shrink = set.shrink.map_or_else(|| "-".into(), |shrink| format!("{shrink:.3}"));
+        // Writing to a string does not fail.
+        _ = writeln!(
+            text,
+            "{:<44} noise {:.2} phi {:.1} | {} -> {} | {} | shrink {shrink} | taken on the way: {}",
+            set.id,
+            set.noise[0],
+            set.noise[1],
+            truths.join(" + "),
+            named.join(" + "),
+            set.verdict,
+            set.taken.join(", ")
+        );
+    }
+    text
+}
+
+/// A target, and how far it is missed.
+struct Target<'a> {
+    what: &'a str,
+    wanted: f64,
+    is_most: bool,
+    seen: Option<f64>,
+    of: usize,
+    interval: Option<[f64; 2]>,
+}
+
+fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    let rate = |what: &'static str, wanted: f64, is_most: bool, rate: Rate| Target {
+        what,
+        wanted,
+        is_most,
+        seen: (rate.of > 0).then_some(rate.share),
+        of: rate.of,
+        interval: Some(rate.interval),
+    };
+    let shrink = |what: &'static str, wanted: f64, of: usize, seen: Option<f64>| Target {
+        what,
+        wanted,
+        is_most: false,
+        seen,
+        of,
+        interval: None,
+    };
+    let mut rows = Vec::new();
+    if let Some(all) = scores.false_alarms.get("all") {
+        rows.push(rate("false alarms", 0.028, true, *all));
+    }
+    if let Some(band) = scores.bands.iter().find(|band| band.name == "16 and more") {
+        rows.push(rate("one effect, z 16 and more: named exactly", 0.95, false, band.exact));
+        rows.push(rate("one effect, z 16 and more: in the reported set", 0.95, false, band.in_set));
+        rows.push(shrink("shrink, median", 0.95, band.shrink.of, band.shrink.median));
+        rows.push(shrink("shrink, fifth percentile", 0.8, band.shrink.of, band.shrink.fifth));
+    }
+    rows.push(rate("two effects: both named", 0.85, false, scores.pairs.named));
+    rows.push(rate("three effects: all named", 0.7, false, scores.triples.named));
+    if let Some(all) = scores.outside.get("all") {
+        rows.push(rate("outside the library: \"unexplained\"", 0.9, false, all.unexplained));
+        rows.push(rate("outside the library: a wrong name", 0.05, true, all.wrong));
+    }
+    writeln!(f, "## Against the targets\n")?;
+    writeln!(f, "| what | target | seen | 95 % interval | sets | missed by |\n|---|---|---|---|---|---|")?;
+    for Target { what, wanted, is_most, seen, of, interval } in rows {
+        let bound = if is_most { "at most" } else { "at least" };
+        let missed = seen.map_or_else(
+            || "-".into(),
+            |seen| {
+                let by = if is_most { seen - wanted } else { wanted - seen };
+                if by > 0.0 { format!("**{:.1} points**", 100.0 * by) } else { "met".into() }
+            },
+        );
+        let seen = seen.map_or_else(|| "-".into(), percent);
+        let interval = interval.map_or_else(|| "-".into(), ends);
+        writeln!(f, "| {what} | {bound} {} | {seen} | {interval} | {of} | {missed} |", percent(wanted))?;
+    }
+    if let Some([median, most]) = scores.seconds {
+        let total: usize = scores.sets.values().sum();
+        writeln!(
+            f,
+            "\n{total} sets, each discovered in on one thread in {median:.1} s (median; 95 % within {most:.1} s). Runs that made no report: {}.",
+            scores.failed.len()
+        )?;
+    }
+    writeln!(f)
+}
+
+fn false_alarms(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    writeln!(
+        f,
+        "## Nothing is missing\n\n| noise | sets | false alarms | share | 95 % interval |\n|---|---|---|---|---|"
+    )?;
+    for (noise, rate) in &scores.false_alarms {
+        writeln!(
+            f,
+            "| {noise} | {} | {} | {} | {} |",
+            rate.of,
+            rate.hits,
+            percent(rate.share),
+            ends(rate.interval)
+        )?;
+    }
+    writeln!(f)
+}
+
+const BAND_HEAD: &str = "sets | detected | exact, of detected | in the reported set, of detected | a wrong name | shrink: median, fifth percentile (sets) | to the effect's own fit |\n|---|---|---|---|---|---|---|---|";
+
+fn names(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    writeln!(f, "## One effect\n\n| z | {BAND_HEAD}")?;
+    for band in &scores.bands {
+        band_row(f, &band.name, band)?;
+    }
+    writeln!(f, "\nBy effect, z 16 and more:\n\n| effect | {BAND_HEAD}")?;
+    for row in &scores.effects {
+        band_row(f, &row.effect, &row.band)?;
+    }
+    writeln!(
+        f,
+        "\n![Truth against name](images/discovery-confusion.svg)\n\n![Power](images/discovery-power.svg)\n"
+    )
+}
+
+fn band_row(f: &mut fmt::Formatter<'_>, name: &str, band: &Band) -> fmt::Result {
+    let Band { detected, exact, in_set, wrong, shrink, shrink_to_own_fit, .. } = band;
+    writeln!(
+        f,
+        "| {name} | {} | {} | {} | {} | {} | {} | {} |",
+        detected.of,
+        percent(detected.share),
+        percent(exact.share),
+        percent(in_set.share),
+        percent(wrong.share),
+        shrunk(shrink),
+        shrunk(shrink_to_own_fit),
+    )
+}
+
+fn several(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    writeln!(
+        f,
+        "## Several effects\n\n| | sets | all named | and nothing else | all in reported sets | a wrong name | shrink |\n|---|---|---|---|---|---|---|"
+    )?;
+    for (name, several) in [("two", &scores.pairs), ("three", &scores.triples)] {
+        let Several { named, exact, in_set, wrong, shrink } = several;
+        writeln!(
+            f,
+            "| {name} | {} | {} ({}) | {} | {} | {} | {} |",
+            named.of,
+            percent(named.share),
+            ends(named.interval),
+            percent(exact.share),
+            percent(in_set.share),
+            percent(wrong.share),
+            shrunk(shrink)
+        )?;
+    }
+    writeln!(f)
+}
+
+fn outside(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    writeln!(
+        f,
+        "## Outside the library\n\n| physics | sets | unexplained | any name | partly explained | not seen |\n|---|---|---|---|---|---|"
+    )?;
+    for (physics, OutsideScore { unexplained, wrong, partly, missed }) in &scores.outside {
+        writeln!(
+            f,
+            "| {physics} | {} | {} | {} | {} | {} |",
+            unexplained.of,
+            percent(unexplained.share),
+            percent(wrong.share),
+            percent(partly.share),
+            percent(missed.share)
+        )?;
+    }
+    Ok(())
+}
+
+fn percent(share: f64) -> String {
+    if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "-".into() }
+}
+
+fn ends([least, most]: [f64; 2]) -> String {
+    format!("{:.1} to {:.1} %", 100.0 * least, 100.0 * most)
+}
+
+fn shrunk(shrink: &Shrink) -> String {
+    match (shrink.median, shrink.fifth) {
+        (Some(median), Some(fifth)) => format!("{median:.3}, {fifth:.3} ({})", shrink.of),
+        (None, _) | (_, None) => "-".into(),
+    }
+}
+
+#[cfg(test)]
+#[path = "document_tests.rs"]
+mod tests;
