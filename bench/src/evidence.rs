@@ -5,6 +5,7 @@
 //! else. [`read`] alone opens labels, and holds them against the reports; [`Scores`] counts, [`document`] and
 //! [`pictures`] tell.
 
+mod ablation;
 mod campaign;
 mod document;
 mod outcome;
@@ -12,9 +13,11 @@ mod picture;
 mod rate;
 mod run;
 mod score;
+mod timing;
 
+pub use ablation::{Ablation, ablations};
 pub use campaign::{Campaign, Planned, Sizes, campaigns};
-pub use document::{document, into_document, misses};
+pub use document::{Costs, document, into_document, misses};
 pub use outcome::{Named, Outcome, Truth, read};
 pub use picture::pictures;
 pub use rate::{Rate, normal_share, quantile};
@@ -23,3 +26,4 @@ pub use score::{
     Band, Cell, EffectScore, ORACLE_LEVEL, OutsideScore, PowerPoint, Scores, Several, Shrink, Z_DETECTABLE,
     Z_SEPARATE,
 };
+pub use timing::{Cost, Timing};

@@ -8,8 +8,8 @@ use std::thread;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use tactus_bench::evidence::{
-    Campaign, Outcome, Places, Planned, Scores, Sizes, Workflow, campaigns, document, into_document, misses,
-    pictures, read, run,
+    Ablation, Campaign, Costs, Outcome, Places, Planned, Scores, Sizes, Timing, Workflow, ablations,
+    campaigns, document, into_document, misses, pictures, read, run,
 };
 
 #[derive(Debug, Args)]
@@ -24,6 +24,24 @@ enum Part {
     Run(RunArgs),
     /// Scores what has been run.
     Score(WhichArgs),
+    /// Time and memory of `tactus discover` from 9,000 to 144,000 frames, as JSON.
+    Time(TimeArgs),
+}
+
+#[derive(Debug, Args)]
+struct TimeArgs {
+    /// The program that discovers.
+    #[arg(long, default_value = "target/release/tactus")]
+    tactus: PathBuf,
+    /// Frames of the sets, several with commas.
+    #[arg(long, value_delimiter = ',', default_values_t = [9_000, 36_000, 144_000])]
+    frames: Vec<usize>,
+    /// The median of so many.
+    #[arg(long, default_value_t = 3)]
+    runs: usize,
+    /// Sets and reports.
+    #[arg(long, default_value = "target/evidence/time")]
+    work: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -70,6 +88,12 @@ struct WhichArgs {
     /// Labels: for the scorer only.
     #[arg(long, default_value = "target/evidence/sealed")]
     sealed: PathBuf,
+    /// A work folder with others' reports in `peers`, of the same sealed labels.
+    #[arg(long)]
+    ablation: Option<PathBuf>,
+    /// What discovery costs: a JSON object of `ours`, from `time`, and `peers`.
+    #[arg(long)]
+    costs: Option<PathBuf>,
     /// Write the tables between the marks of this document.
     #[arg(long)]
     document: Option<PathBuf>,
@@ -81,6 +105,7 @@ struct WhichArgs {
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Size {
     Whole,
+    Ablation,
     Glance,
     Slice,
 }
@@ -106,7 +131,16 @@ impl EvidenceArgs {
         match self.part {
             Part::Run(args) => args.run(),
             Part::Score(which) => which.score().map(drop),
+            Part::Time(args) => args.run(),
         }
+    }
+}
+
+impl TimeArgs {
+    fn run(self) -> Result<()> {
+        let timing = Timing::measure(&self.tactus, &self.work, &self.frames, self.runs)?;
+        println!("{}", serde_json::to_string_pretty(&timing)?);
+        Ok(())
     }
 }
 
@@ -132,6 +166,7 @@ impl WhichArgs {
     fn sets(&self) -> Vec<Planned> {
         let mut sizes = match self.size {
             Size::Whole => Sizes::whole(),
+            Size::Ablation => Sizes::ablation(),
             Size::Glance => Sizes::glance(),
             Size::Slice => Sizes::slice(),
         };
@@ -145,10 +180,24 @@ impl WhichArgs {
         Places { work: self.work.clone(), sealed: self.sealed.clone() }
     }
 
+    fn ablations(&self) -> Result<Vec<Ablation>> {
+        let Some(work) = &self.ablation else { return Ok(Vec::new()) };
+        let sizes = Sizes::ablation();
+        let sets = Campaign::ALL.into_iter().flat_map(|campaign| campaigns(campaign, &sizes, self.seed));
+        let sets: Vec<Planned> = sets.collect();
+        ablations(&sets, &Places { work: work.clone(), sealed: self.sealed.clone() })
+    }
+
+    fn costs(&self) -> Result<Option<Costs>> {
+        let Some(path) = &self.costs else { return Ok(None) };
+        let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        Ok(Some(serde_json::from_str(&text).with_context(|| path.display().to_string())?))
+    }
+
     fn score(&self) -> Result<Vec<Outcome>> {
         let outcomes = read(&self.sets(), &self.places())?;
         let scores = Scores::new(&outcomes);
-        let text = document(&scores);
+        let text = document(&scores, &self.ablations()?, self.costs()?.as_ref());
         println!("{text}");
         write(&self.work.join("evidence.json"), &serde_json::to_string_pretty(&scores)?)?;
         write(&self.work.join("evidence.md"), &text)?;

@@ -113,6 +113,18 @@ impl Sizes {
         }
     }
 
+    /// What other ways are tried on: every physics strong and as on a bad rig, once.
+    pub fn ablation() -> Self {
+        Self {
+            false_alarms: 45,
+            strengths: vec![1.0],
+            pairs: 20,
+            triples: 0,
+            outside_strengths: vec![1.0],
+            ..Self::glance()
+        }
+    }
+
     /// What CI runs: a few of everything but triples, strong.
     pub fn slice() -> Self {
         Self {

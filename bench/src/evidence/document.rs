@@ -1,11 +1,16 @@
 //! The evidence as text.
 
+use std::collections::BTreeMap;
 use std::fmt::{self, Write};
 
+use serde::Deserialize;
+
+use super::ablation::Ablation;
 use super::campaign::Campaign;
 use super::outcome::Outcome;
 use super::rate::Rate;
 use super::score::{Band, OutsideScore, Scores, Several, Shrink};
+use super::timing::Timing;
 
 /// Between these lines a document is written anew.
 const MARKS: [&str; 2] = ["<!-- evidence: begin -->", "<!-- evidence: end -->"];
@@ -18,14 +23,40 @@ pub fn into_document(document: &str, text: &str) -> Option<String> {
     Some(format!("{before}{begin}\n\n{}\n\n{end}{after}", text.trim()))
 }
 
+/// What discovery costs, beside its peers.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Costs {
+    /// Ours.
+    pub ours: Timing,
+    /// The others', on one of the tables.
+    pub peers: Option<Peers>,
+}
+
+/// What `bench/peers/discovery.py time` tells.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Peers {
+    versions: BTreeMap<String, String>,
+    rows: Vec<Peer>,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Peer {
+    who: String,
+    does: String,
+    seconds: Option<f64>,
+    peak_mib: f64,
+}
+
 /// The generated part of `docs/discovery-evidence.md`.
-pub fn document(scores: &Scores) -> String {
+pub fn document(scores: &Scores, ablations: &[Ablation], costs: Option<&Costs>) -> String {
     fmt::from_fn(|f| {
         targets(f, scores)?;
         false_alarms(f, scores)?;
         names(f, scores)?;
         several(f, scores)?;
-        outside(f, scores)
+        outside(f, scores)?;
+        ways(f, ablations)?;
+        costs.map_or(Ok(()), |costs| time(f, costs))
     })
     .to_string()
 }
@@ -230,6 +261,77 @@ fn outside(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
             percent(partly.share),
             percent(missed.share)
         )?;
+    }
+    Ok(())
+}
+
+fn ways(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
+    if ablations.len() < 2 {
+        return Ok(());
+    }
+    writeln!(
+        f,
+        "\n## Other ways, on the same sets\n\n| way | false alarms | exact, of all | in the reported set | a wrong name | both of two | outside: unexplained | outside: any name | shrink | shrink on deeper presses than any fitted | s a set |\n|---|---|---|---|---|---|---|---|---|---|---|"
+    )?;
+    for way in ablations {
+        writeln!(
+            f,
+            "| {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} | {} | {:.1} |",
+            way.method,
+            way.false_alarms.hits,
+            way.false_alarms.of,
+            way.exact.hits,
+            way.exact.of,
+            way.in_set.hits,
+            way.in_set.of,
+            way.wrong.hits,
+            way.wrong.of,
+            way.pairs.hits,
+            way.pairs.of,
+            way.unexplained.hits,
+            way.unexplained.of,
+            way.outside_named.hits,
+            way.outside_named.of,
+            shrunk(&way.shrink),
+            shrunk(&way.deeper_shrink),
+            way.seconds.unwrap_or(f64::NAN),
+        )?;
+    }
+    Ok(())
+}
+
+fn time(f: &mut fmt::Formatter<'_>, Costs { ours, peers }: &Costs) -> fmt::Result {
+    writeln!(
+        f,
+        "\n## Time and memory\n\n| who | frames of 48 elements | s | peak, MiB | does |\n|---|---|---|---|---|"
+    )?;
+    for cost in &ours.rows {
+        writeln!(
+            f,
+            "| tactus discover, {} cores | {} | {:.1} | {:.0} | names one of 26 effects, or none |",
+            ours.cores, cost.frames, cost.seconds, cost.peak_mib
+        )?;
+    }
+    for Peer { who, does, seconds, peak_mib } in peers.iter().flat_map(|peers| &peers.rows) {
+        let seconds = seconds.map_or_else(|| "failed".into(), |seconds| format!("{seconds:.1}"));
+        writeln!(f, "| {who}, one core | 36000 | {seconds} | {peak_mib:.0} | {does} |")?;
+    }
+    writeln!(f, "\ntime ~ frames^{:.2}.", ours.exponent)?;
+    if let Some(Peers { versions, .. }) = peers {
+        let versions: Vec<String> =
+            versions.iter().map(|(what, version)| format!("{what} {version}")).collect();
+        writeln!(
+            f,
+            "Peers: {}; their time is that of the work after the residual of the base model is there.",
+            versions.join(", ")
+        )?;
+    }
+    let asked = ours.rows.iter().find(|cost| cost.frames == 36_000);
+    for (what, seen, most) in
+        asked.iter().flat_map(|cost| [("s", cost.seconds, 60.0), ("MiB", cost.peak_mib, 1024.0)])
+    {
+        let verdict = if seen < most { "met".into() } else { format!("missed by {:.0}", seen - most) };
+        writeln!(f, "36,000 frames: {seen:.1} {what} of at most {most} {what}: {verdict}.")?;
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ fn only_what_stands_between_the_marks_is_written_anew() {
 fn a_missed_target_says_by_how_much() {
     let right = set(&[Some("backlash")], &[("backlash", &[])], "explained");
     let wrong = set(&[Some("backlash")], &[("imprint", &[])], "explained");
-    let text = document(&Scores::new(&[right.clone(), right, wrong.clone(), wrong]));
+    let text = document(&Scores::new(&[right.clone(), right, wrong.clone(), wrong]), &[], None);
     let line = text.lines().find(|line| line.contains("named exactly")).unwrap_or_default();
     assert!(line.contains("| 50.0 % |") && line.ends_with("| **45.0 points** |"), "{line}");
     let none = text.lines().find(|line| line.contains("both named")).unwrap_or_default();

@@ -28,8 +28,10 @@ pub struct Outcome {
     pub verdict: String,
     /// Share of the gap that was closed on held-out presses.
     pub shrink: Option<f64>,
-    /// How far off the shrink may be because the noise is known from so many readings only.
-    pub shrink_error: f64,
+    /// The same on presses deeper than any that was fitted, if that was asked.
+    pub deeper_shrink: Option<f64>,
+    /// Relative standard error of the gap itself.
+    pub gap_error: f64,
     /// Shrink of the first effect's own fit in the first round, if it was fitted.
     pub alone_shrink: Option<f64>,
     /// Wall time.
@@ -158,6 +160,7 @@ struct Candidate {
 #[derive(Debug, Deserialize)]
 struct Last {
     shrink: Option<f64>,
+    deeper_shrink: Option<f64>,
 }
 
 /// The outcomes of those sets that have been run.
@@ -194,9 +197,10 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<Report>) -> O
         truths: label.physics.iter().map(truth).collect(),
         noise: [label.noise.rms_counts, label.noise.phi],
         shrink: report.as_ref().and_then(|report| report.last.shrink),
-        shrink_error: report
+        deeper_shrink: report.as_ref().and_then(|report| report.last.deeper_shrink),
+        gap_error: report
             .as_ref()
-            .map_or(f64::INFINITY, |report| shrink_error(report, readings, label.noise.phi)),
+            .map_or(f64::INFINITY, |report| gap_error(report, readings, label.noise.phi)),
         alone_shrink,
         taken: report
             .iter()
@@ -211,7 +215,7 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<Report>) -> O
 
 /// Relative standard error of the gap, `sqrt(2 (1 + phi^2) / (n (1 - phi^2))) / (chi2 - 1)`: a mean of the squares of `n`
 /// readings is known no better.
-fn shrink_error(report: &Report, elements: f64, phi: f64) -> f64 {
+fn gap_error(report: &Report, elements: f64, phi: f64) -> f64 {
     let Split { frames, train_presses, heldout_presses } = report.split;
     let share = heldout_presses as f64 / (train_presses + heldout_presses) as f64;
     let readings = frames as f64 * share * elements;

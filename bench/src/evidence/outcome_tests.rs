@@ -24,7 +24,8 @@ pub(crate) fn set(truths: &[Option<&str>], names: &[(&str, &[&str])], verdict: &
         taken: Vec::new(),
         verdict: verdict.into(),
         shrink: Some(0.9),
-        shrink_error: 0.01,
+        deeper_shrink: None,
+        gap_error: 0.01,
         alone_shrink: None,
         seconds: 1.0,
     }
@@ -106,7 +107,7 @@ fn labels_and_reports_are_read_from_files() -> Result<()> {
     // 48,000 readings held out, a gap of half the noise's power.
     let phi = label.noise.phi;
     let error = (2.0 * (1.0 + phi * phi) / (48_000.0 * (1.0 - phi * phi))).sqrt() / 0.5;
-    assert!((outcome.shrink_error - error).abs() < 1e-12);
+    assert!((outcome.gap_error - error).abs() < 1e-12);
 
     fs::remove_file(places.report(&id))?;
     let set = Planned { id, campaign: Campaign::Names, recipe: Recipe::new(3) };

@@ -17,7 +17,7 @@ pub const ORACLE_LEVEL: f64 = 0.028;
 /// The `1 - ORACLE_LEVEL` quantile of the normal distribution.
 const ORACLE_QUANTILE: f64 = 1.911;
 /// A shrink counts where the gap is known within this share.
-const SHRINK_ERROR_MAX: f64 = 0.1;
+pub(super) const SHRINK_ERROR_MAX: f64 = 0.1;
 /// Bands of separation beyond the spread.
 const BANDS: [(&str, [f64; 2]); 5] = [
     ("all", [0.0, f64::INFINITY]),
@@ -184,7 +184,7 @@ impl Scores {
 impl Band {
     fn new(name: &str, sets: &[&Outcome]) -> Self {
         let detected: Vec<&Outcome> = sets.iter().copied().filter(|set| set.is_detected()).collect();
-        let known = || sets.iter().filter(|set| set.names_all() && set.shrink_error <= SHRINK_ERROR_MAX);
+        let known = || sets.iter().filter(|set| set.names_all() && set.gap_error <= SHRINK_ERROR_MAX);
         Self {
             name: name.into(),
             detected: Rate::new(detected.len(), sets.len()),
@@ -200,7 +200,7 @@ impl Band {
 }
 
 impl Shrink {
-    fn new(shrinks: impl Iterator<Item = f64>) -> Self {
+    pub(super) fn new(shrinks: impl Iterator<Item = f64>) -> Self {
         let shrinks: Vec<f64> = shrinks.collect();
         let of = shrinks.len();
         Self { of, median: quantile(shrinks.clone(), 0.5), fifth: quantile(shrinks, 0.05) }
@@ -209,7 +209,7 @@ impl Shrink {
 
 impl Several {
     fn new(sets: &[&Outcome]) -> Self {
-        let known = sets.iter().filter(|set| set.shrink_error <= SHRINK_ERROR_MAX);
+        let known = sets.iter().filter(|set| set.gap_error <= SHRINK_ERROR_MAX);
         Self {
             named: Rate::of(sets, |set| set.names_all()),
             exact: Rate::of(sets, |set| set.is_exact()),
