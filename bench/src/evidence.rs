@@ -21,7 +21,7 @@ pub use document::{Costs, document, into_document, misses};
 pub use outcome::{Named, Outcome, Truth, read};
 pub use picture::pictures;
 pub use rate::{Rate, normal_share, quantile};
-pub use run::{Places, Progress, Ran, RunError, Workflow, run};
+pub use run::{Places, Progress, Ran, Workflow, run};
 pub use score::{
     Band, Cell, EffectScore, ORACLE_LEVEL, OutsideScore, PowerPoint, Scores, Several, Shrink, Z_DETECTABLE,
     Z_SEPARATE,

@@ -317,6 +317,12 @@ fn time(f: &mut fmt::Formatter<'_>, Costs { ours, peers }: &Costs) -> fmt::Resul
         writeln!(f, "| {who}, one core | 36000 | {seconds} | {peak_mib:.0} | {does} |")?;
     }
     writeln!(f, "\ntime ~ frames^{:.2}.", ours.exponent)?;
+    for frames in &ours.left_out {
+        writeln!(
+            f,
+            "{frames} frames were left out: by the growth of the memory, this machine has not enough."
+        )?;
+    }
     if let Some(Peers { versions, .. }) = peers {
         let versions: Vec<String> =
             versions.iter().map(|(what, version)| format!("{what} {version}")).collect();

@@ -14,11 +14,11 @@ fn named(names: &[(&str, &[&str])]) -> Vec<Named> {
 /// A set of such effects, in which these were named.
 pub(crate) fn set(truths: &[Option<&str>], names: &[(&str, &[&str])], verdict: &str) -> Outcome {
     let truth =
-        |effect: &Option<&str>| Truth { physics: "made-up".into(), effect: effect.map(Into::into), z: 40.0 };
+        |effect: Option<&str>| Truth { physics: "made-up".into(), effect: effect.map(Into::into), z: 40.0 };
     Outcome {
         id: "names/made-up".into(),
         campaign: Campaign::Names,
-        truths: truths.iter().map(truth).collect(),
+        truths: truths.iter().copied().map(truth).collect(),
         noise: [1.0, 0.0],
         named: named(names),
         taken: Vec::new(),

@@ -29,6 +29,8 @@ fn confusion(cells: &[Cell]) -> Sheet {
     let size = [NAMES_PX + CELL_PX * columns.len() as f64 + 60.0, HEADS_PX + CELL_PX * rows.len() as f64];
     let mut sheet = Sheet::new("What was in the sets, and what was named", size);
     sheet.put([0.0, HEADS_PX - 12.0], &Label::new("in the set").heading());
+    let beside = NAMES_PX + CELL_PX * columns.len() as f64 + 8.0;
+    sheet.put([beside, HEADS_PX - 12.0], &Label::new("sets").heading());
     for (column, name) in columns.iter().enumerate() {
         let x = NAMES_PX + CELL_PX * (column as f64 + 0.65);
         sheet.put([x, HEADS_PX - 8.0], &Slanted(name));
@@ -37,10 +39,7 @@ fn confusion(cells: &[Cell]) -> Sheet {
         let y = HEADS_PX + CELL_PX * row as f64;
         let of: usize = cells.iter().filter(|cell| cell.truth == *truth).map(|cell| cell.count).sum();
         sheet.put([NAMES_PX - 8.0, y + 17.0], &Label::new(*truth).right());
-        sheet.put(
-            [NAMES_PX + CELL_PX * columns.len() as f64 + 8.0, y + 17.0],
-            &Label::new(format!("{of} sets")).muted(),
-        );
+        sheet.put([beside, y + 17.0], &Label::new(of.to_string()).muted());
         for (column, named) in columns.iter().enumerate() {
             let found = cells.iter().find(|cell| cell.truth == *truth && cell.named == *named);
             let share = found.map_or(0.0, |cell| cell.count as f64 / of as f64);
@@ -53,6 +52,9 @@ fn confusion(cells: &[Cell]) -> Sheet {
 
 const PANEL_PX: [f64; 2] = [280.0, 190.0];
 const ACROSS: usize = 4;
+
+/// Of `lg(z / Z_DETECTABLE)`; what lies beyond is left out.
+const PLACES: [f64; 2] = [-0.5, 2.0];
 
 /// One panel an effect: share detected and share named against separation, beside the oracle's.
 fn power(effects: &BTreeMap<String, Vec<PowerPoint>>) -> Sheet {
@@ -71,6 +73,9 @@ fn power(effects: &BTreeMap<String, Vec<PowerPoint>>) -> Sheet {
 
 fn power_of(effect: &str, points: &[PowerPoint]) -> Figure {
     let place = |z: f64| (z / Z_DETECTABLE).log10();
+    let points: Vec<&PowerPoint> =
+        points.iter().filter(|point| (PLACES[0]..PLACES[1]).contains(&place(point.z))).collect();
+    let points = &points;
     let line = |of: fn(&PowerPoint) -> f64| points.iter().map(|point| [place(point.z), of(point)]).collect();
     let bars = |of: fn(&PowerPoint) -> Rate, aside: f64| {
         let bars = points.iter().map(move |point| {
@@ -80,12 +85,12 @@ fn power_of(effect: &str, points: &[PowerPoint]) -> Figure {
         Series::bars(bars).opacity(0.4)
     };
     let curve = (0..=60).map(|step| {
-        let place = -0.5 + 2.0 * f64::from(step) / 60.0;
+        let place = PLACES[0] + (PLACES[1] - PLACES[0]) * f64::from(step) / 60.0;
         [place, oracle(Z_DETECTABLE * 10_f64.powf(place))]
     });
     Figure::new(
         format!("Power, {effect}"),
-        Axis::new("lg(z / 4)", "").spanning([-0.5, 1.5]),
+        Axis::new("lg(z / 4)", "").spanning(PLACES),
         Axis::new("share", "").spanning([0.0, 1.0]),
     )
     .size_px(PANEL_PX)

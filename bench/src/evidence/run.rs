@@ -1,7 +1,7 @@
 //! Making sets and having the real binary discover.
 
+use std::fmt::Write;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
@@ -9,10 +9,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Instant;
 
+use anyhow::{Context, Result, anyhow, ensure};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use tactus_mock::hidden::HiddenError;
-use tactus_record::table::TableError;
 
 use super::campaign::Planned;
 
@@ -66,55 +65,6 @@ pub struct Ran {
     pub said: String,
 }
 
-/// Why sets cannot be made or discovered in.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// A set cannot be made.
-    #[error("{id}: {source}")]
-    Make {
-        /// Which.
-        id: String,
-        /// Why.
-        source: HiddenError,
-    },
-    /// A table cannot be written.
-    #[error("{}: {source}", path.display())]
-    Table {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: TableError,
-    },
-    /// A file cannot be read or written, or a program not started.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// A label or a result cannot be written.
-    #[error("{}: {source}", path.display())]
-    Json {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: serde_json::Error,
-    },
-    /// Results of another program lie where this one's would go.
-    #[error(
-        "{} is the work of another build of `tactus`; give another folder, or remove that one",
-        path.display()
-    )]
-    OtherBuild {
-        /// The result.
-        path: PathBuf,
-    },
-    /// A thread panicked.
-    #[error("a worker panicked")]
-    Panicked,
-}
-
 impl Places {
     /// A set's report, as `tactus discover` wrote it.
     pub fn report(&self, id: &str) -> PathBuf {
@@ -140,13 +90,14 @@ impl Places {
 /// Makes every set, seals its label, and has the program discover in its table; what is done already is left as it is.
 ///
 /// # Errors
-/// [`RunError`]. A run of the program that fails is a result, not an error.
+/// If a set cannot be made, a file not written or the program not started, or if the results of another build lie there. A run
+/// of the program that fails is a result, not an error.
 pub fn run(
     sets: &[Planned],
     places: &Places,
     workflow: &Workflow,
     progress: &(dyn Fn(Progress<'_>) + Sync),
-) -> Result<(), RunError> {
+) -> Result<()> {
     let program = digest(&workflow.tactus)?;
     let mut open = Vec::new();
     for set in sets {
@@ -158,10 +109,10 @@ pub fn run(
     let started = Instant::now();
     let next = AtomicUsize::new(0);
     let done = Mutex::new(0_usize);
-    let work = || -> Result<(), RunError> {
+    let work = || -> Result<()> {
         while let Some(set) = open.get(next.fetch_add(1, Ordering::Relaxed)) {
             one(set, places, workflow, &program)?;
-            let mut done = done.lock().map_err(|_| RunError::Panicked)?;
+            let mut done = done.lock().map_err(|_| anyhow!("a worker panicked"))?;
             *done += 1;
             let per_set_s = started.elapsed().as_secs_f64() / *done as f64;
             progress(Progress {
@@ -175,35 +126,37 @@ pub fn run(
     };
     thread::scope(|scope| {
         let workers: Vec<_> = (0..workflow.jobs.max(1)).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().try_for_each(|worker| worker.join().map_err(|_| RunError::Panicked)?)
+        workers.into_iter().try_for_each(|worker| worker.join().map_err(|_| anyhow!("a worker panicked"))?)
     })
 }
 
-fn is_done(set: &Planned, places: &Places, program: &str, wants_tables: bool) -> Result<bool, RunError> {
+fn is_done(set: &Planned, places: &Places, program: &str, wants_tables: bool) -> Result<bool> {
     let path = places.ran(&set.id);
     if !path.exists() || !places.label(&set.id).exists() {
         return Ok(false);
     }
-    let text = fs::read_to_string(&path).map_err(file(&path))?;
-    let ran: Ran = serde_json::from_str(&text).map_err(json(&path))?;
-    if ran.program != program {
-        return Err(RunError::OtherBuild { path });
-    }
+    let text = fs::read_to_string(&path).with_context(|| at(&path))?;
+    let ran: Ran = serde_json::from_str(&text).with_context(|| at(&path))?;
+    ensure!(
+        ran.program == program,
+        "{} is the work of another build of `tactus`; give another folder, or remove that one",
+        path.display()
+    );
     Ok(!wants_tables
         || !places.report(&set.id).exists()
         || places.tables(&set.id).iter().all(|table| table.exists()))
 }
 
-fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Result<(), RunError> {
-    let made = set.recipe.make().map_err(|source| RunError::Make { id: set.id.clone(), source })?;
+fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Result<()> {
+    let made = set.recipe.make().with_context(|| set.id.clone())?;
     let label = places.label(&set.id);
-    write(&label, &serde_json::to_string_pretty(&made.label).map_err(json(&label))?)?;
+    write(&label, &serde_json::to_string_pretty(&made.label).with_context(|| at(&label))?)?;
 
     // The program sees a number, not the set's name.
     let folder = places.work.join("now").join(format!("{:016x}", set.recipe.seed));
-    fs::create_dir_all(&folder).map_err(file(&folder))?;
+    fs::create_dir_all(&folder).with_context(|| at(&folder))?;
     let table = folder.join("set.parquet");
-    made.write(&table).map_err(|source| RunError::Table { path: table.clone(), source })?;
+    made.write(&table).with_context(|| at(&table))?;
     drop(made);
     let out = folder.join("out");
     let started = Instant::now();
@@ -215,7 +168,7 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
         .arg(&out)
         .arg(&table)
         .output()
-        .map_err(file(&workflow.tactus))?;
+        .with_context(|| at(&workflow.tactus))?;
     let seconds = started.elapsed().as_secs_f64();
     let found = out.join("report.json");
     let said = if found.exists() {
@@ -231,35 +184,33 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
     };
     let ran = Ran { program: program.into(), seconds, exit: output.status.code(), said };
     let path = places.ran(&set.id);
-    write(&path, &serde_json::to_string_pretty(&ran).map_err(json(&path))?)?;
-    fs::remove_dir_all(&folder).map_err(file(&folder))
+    write(&path, &serde_json::to_string_pretty(&ran).with_context(|| at(&path))?)?;
+    fs::remove_dir_all(&folder).with_context(|| at(&folder))
 }
 
-fn digest(program: &Path) -> Result<String, RunError> {
-    let bytes = fs::read(program).map_err(file(program))?;
-    Ok(Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect())
+fn digest(program: &Path) -> Result<String> {
+    let bytes = fs::read(program).with_context(|| at(program))?;
+    let mut digits = String::new();
+    for byte in Sha256::digest(bytes) {
+        write!(digits, "{byte:02x}")?;
+    }
+    Ok(digits)
 }
 
-fn moved(from: &Path, to: &Path) -> Result<(), RunError> {
+fn moved(from: &Path, to: &Path) -> Result<()> {
     with_folder(to)?;
-    fs::rename(from, to).map_err(file(from))
+    fs::rename(from, to).with_context(|| at(from))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), RunError> {
+fn write(path: &Path, text: &str) -> Result<()> {
     with_folder(path)?;
-    fs::write(path, text).map_err(file(path))
+    fs::write(path, text).with_context(|| at(path))
 }
 
-fn with_folder(path: &Path) -> Result<(), RunError> {
-    path.parent().map_or(Ok(()), |folder| fs::create_dir_all(folder).map_err(file(folder)))
+fn with_folder(path: &Path) -> Result<()> {
+    path.parent().map_or(Ok(()), |folder| fs::create_dir_all(folder).with_context(|| at(folder)))
 }
 
-fn file(path: &Path) -> impl Fn(io::Error) -> RunError {
-    let path = path.to_path_buf();
-    move |source| RunError::File { path: path.clone(), source }
-}
-
-fn json(path: &Path) -> impl Fn(serde_json::Error) -> RunError {
-    let path = path.to_path_buf();
-    move |source| RunError::Json { path: path.clone(), source }
+fn at(path: &Path) -> String {
+    path.display().to_string()
 }

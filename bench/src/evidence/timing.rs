@@ -20,6 +20,8 @@ pub struct Timing {
     pub cores: usize,
     /// One row a size.
     pub rows: Vec<Cost>,
+    /// Sizes that were not run: by the growth of those before, this machine's memory would not have been enough.
+    pub left_out: Vec<usize>,
     /// `p` of the time `~ frames^p`.
     pub exponent: f64,
 }
@@ -45,8 +47,13 @@ impl Timing {
     /// # Errors
     /// If a set cannot be made or the program fails.
     pub fn measure(tactus: &Path, folder: &Path, sizes: &[usize], runs: usize) -> Result<Self> {
-        let mut rows = Vec::new();
+        let (mut rows, mut left_out) = (Vec::<Cost>::new(), Vec::new());
         for frames in sizes {
+            let wanted_mib = rows.last().map(|last| last.peak_mib * *frames as f64 / last.frames as f64);
+            if wanted_mib.zip(available_mib()).is_some_and(|(wanted, available)| wanted > 0.8 * available) {
+                left_out.push(*frames);
+                continue;
+            }
             let content = Content { physics: PHYSICS.map(Into::into).into(), ..Content::default() };
             let recipe = Recipe { plan: Plan::Diagnose, frames: Some(*frames), content, ..Recipe::new(1) };
             // Laid out as the peers look for it.
@@ -67,7 +74,7 @@ impl Timing {
         }
         let points = rows.iter().map(|cost| [cost.frames as f64, cost.seconds]).collect();
         let exponent = Growth { what: "discover".into(), size_of: "frames", points }.exponent();
-        Ok(Self { cores: thread::available_parallelism().map_or(1, usize::from), rows, exponent })
+        Ok(Self { cores: thread::available_parallelism().map_or(1, usize::from), rows, left_out, exponent })
     }
 }
 
@@ -85,8 +92,8 @@ fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
     let mut peak_kib = 0.0_f64;
     loop {
         // Gone in the last moment before the process is waited for; what was read before stays.
-        let kib = fs::read_to_string(&status).ok().and_then(|text| high_water_kib(&text));
-        peak_kib = peak_kib.max(kib.unwrap_or(0.0));
+        let most_kib = fs::read_to_string(&status).ok().and_then(|text| kib(&text, "VmHWM:"));
+        peak_kib = peak_kib.max(most_kib.unwrap_or(0.0));
         if let Some(exit) = child.try_wait()? {
             ensure!(exit.success(), "{} {} failed: {exit}", tactus.display(), table.display());
             return Ok((started.elapsed().as_secs_f64(), peak_kib / 1024.0));
@@ -95,9 +102,14 @@ fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
     }
 }
 
-/// `VmHWM` of a process's status.
-fn high_water_kib(status: &str) -> Option<f64> {
-    status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?.parse().ok()
+/// Memory that programs may still take.
+fn available_mib() -> Option<f64> {
+    Some(kib(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")? / 1024.0)
+}
+
+/// A line of the kernel's, such as `VmHWM:   231596 kB`.
+fn kib(lines: &str, name: &str) -> Option<f64> {
+    lines.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]
