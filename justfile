@@ -119,16 +119,19 @@ bench-discovery: bench-peers-tools
         json.dump({who: json.load(open(f"{at}{who}.json")) for who in ("ours", "peers")}, open(f"{at}costs.json", "w"), indent=1)'
     cat target/evidence/costs.json
 
-# What discovery finds and names in some 1,500 sets with hidden physics, beside other ways to go about it: docs/discovery-evidence.md. Long:
-# two hours on two cores; it goes on where it was cut off, and says how long it still takes.
+# Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes.
+# What discovery finds and names of hidden physics, beside other ways to go about it: docs/discovery-evidence.md.
 discovery-evidence: bench-discovery
     target/release/tactus-bench evidence run
     target/release/tactus-bench evidence run --size ablation --keep-tables --work target/evidence/ablation
     {{ tools }}/peers/bin/python bench/peers/discovery.py report --work target/evidence/ablation
+    # Forward selection of effects by BIC alone, in builds that have it.
+    if target/release/tactus discover --ablation bic --help >/dev/null 2>&1; then \
+        target/release/tactus-bench evidence run --size ablation --work target/evidence/ablation/peers/bic --with=--ablation --with=bic; fi
     target/release/tactus-bench evidence score --ablation target/evidence/ablation --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
 
-# The part of it that CI runs, always the same 46 sets: it fails if discovery has become worse. About two minutes on two cores.
+# The part of it that CI runs, always the same 46 sets, some two minutes on two cores: it fails if discovery has become worse.
 discovery-evidence-slice:
     cargo build --release --package tactus --package tactus-bench
     rm -rf target/evidence/slice

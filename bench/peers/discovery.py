@@ -321,7 +321,7 @@ def timed(folder, name):
     take("scikit-learn gradient boosting", "100 trees on all readings, twice; names nothing", black_box)
     take("scikit-learn Gaussian process", "fitted to 1,000 of the readings, predicts all; names nothing", gaussian_process)
     versions = {"python": platform.python_version(), "numpy": np.__version__, "scikit-learn": sklearn.__version__, "pysindy": pysindy.__version__}
-    return {"versions": versions, "rows": rows}
+    return {"versions": versions, "frames": len(Data(folder, name).t), "rows": rows}
 
 
 def write(path, value):

@@ -36,6 +36,7 @@ pub struct Costs {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Peers {
     versions: BTreeMap<String, String>,
+    frames: usize,
     rows: Vec<Peer>,
 }
 
@@ -312,9 +313,10 @@ fn time(f: &mut fmt::Formatter<'_>, Costs { ours, peers }: &Costs) -> fmt::Resul
             ours.cores, cost.frames, cost.seconds, cost.peak_mib
         )?;
     }
-    for Peer { who, does, seconds, peak_mib } in peers.iter().flat_map(|peers| &peers.rows) {
+    let rows = peers.iter().flat_map(|peers| peers.rows.iter().map(|row| (peers.frames, row)));
+    for (frames, Peer { who, does, seconds, peak_mib }) in rows {
         let seconds = seconds.map_or_else(|| "failed".into(), |seconds| format!("{seconds:.1}"));
-        writeln!(f, "| {who}, one core | 36000 | {seconds} | {peak_mib:.0} | {does} |")?;
+        writeln!(f, "| {who}, one core | {frames} | {seconds} | {peak_mib:.0} | {does} |")?;
     }
     writeln!(f, "\ntime ~ frames^{:.2}.", ours.exponent)?;
     for frames in &ours.left_out {

@@ -65,6 +65,9 @@ pub struct Ran {
     pub said: String,
 }
 
+/// Exit code of a program that was called wrongly.
+const USAGE: i32 = 2;
+
 impl Places {
     /// A set's report, as `tactus discover` wrote it.
     pub fn report(&self, id: &str) -> PathBuf {
@@ -170,6 +173,9 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
         .output()
         .with_context(|| at(&workflow.tactus))?;
     let seconds = started.elapsed().as_secs_f64();
+    let told = || String::from_utf8_lossy(&output.stderr).into_owned();
+    // A wrong argument says nothing of any set.
+    ensure!(output.status.code() != Some(USAGE), "{}: {}", at(&workflow.tactus), told());
     let found = out.join("report.json");
     let said = if found.exists() {
         moved(&found, &places.report(&set.id))?;
@@ -180,7 +186,7 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
         }
         String::new()
     } else {
-        String::from_utf8_lossy(&output.stderr).into_owned()
+        told()
     };
     let ran = Ran { program: program.into(), seconds, exit: output.status.code(), said };
     let path = places.ran(&set.id);
