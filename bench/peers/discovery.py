@@ -21,10 +21,11 @@ os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS
 
 import argparse
 import json
+import multiprocessing
 import platform
-import resource
 import time
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -76,21 +77,27 @@ def main():
     if args.part == "time":
         print(json.dumps(timed(args.work, args.name), indent=1))
         return
-    methods = {"black-box": black_box, "sparse": sparse}
     ids = sorted(str(path.relative_to(args.work / "residuals"))[:-8] for path in (args.work / "residuals").rglob("*.parquet"))
-    for done, name in enumerate(ids, 1):
-        data = None
-        for method, work in methods.items():
-            ran = args.work / "peers" / method / "ran" / f"{name}.json"
-            if ran.exists():
-                continue
-            data = data or Data(args.work, name)
-            started = time.perf_counter()
-            report = work(data)
-            seconds = time.perf_counter() - started
-            write(args.work / "peers" / method / "reports" / f"{name}.json", report)
-            write(ran, {"program": method, "seconds": seconds, "exit": 0, "said": ""})
-        print(f"{done}/{len(ids)} {name}", flush=True)
+    with multiprocessing.Pool() as pool:
+        for done, name in enumerate(pool.imap_unordered(partial(reported, args.work), ids), 1):
+            print(f"{done}/{len(ids)} {name}", flush=True)
+
+
+def reported(folder, name):
+    """Writes everyone's report of a set; what is done already is left as it is."""
+    warnings.filterwarnings("ignore")
+    data = None
+    for method, work in (("black-box", black_box), ("sparse", sparse)):
+        ran = folder / "peers" / method / "ran" / f"{name}.json"
+        if ran.exists():
+            continue
+        data = data or Data(folder, name)
+        started = time.perf_counter()
+        report = work(data)
+        seconds = time.perf_counter() - started
+        write(folder / "peers" / method / "reports" / f"{name}.json", report)
+        write(ran, {"program": method, "seconds": seconds, "exit": 0, "said": ""})
+    return name
 
 
 def arguments():

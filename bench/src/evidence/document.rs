@@ -165,10 +165,12 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         writeln!(f, "| {what} | {bound} {} | {seen} | {interval} | {of} | {missed} |", percent(wanted))?;
     }
     if let Some([median, most]) = scores.seconds {
-        let total: usize = scores.sets.values().sum();
+        let sets = scores.sets.iter().map(|(campaign, count)| format!("{count} {}", campaign.name()));
+        let sets: Vec<String> = sets.collect();
         writeln!(
             f,
-            "\n{total} sets, each discovered in on one thread in {median:.1} s (median; 95 % within {most:.1} s). Runs that made no report: {}.",
+            "\nSets: {}. Each was discovered in on one thread in {median:.1} s (median; 95 % within {most:.1} s). Runs that made no report: {}.",
+            sets.join(", "),
             scores.failed.len()
         )?;
     }
