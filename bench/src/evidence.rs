@@ -1,9 +1,9 @@
 //! How well `tactus discover` finds and names what is hidden in data.
 //!
-//! A *campaign* is a list of sets, each made from its own seed ([`campaigns`]). [`run`] makes them, seals their labels
+//! A *campaign* is a list of sets, each made from its own seed ([`campaigns()`]). [`run()`] makes them, seals their labels
 //! in a folder of their own, and has the real binary discover, which is given a measurement table and nothing
-//! else. [`read`] alone opens labels, and holds them against the reports; [`Scores`] counts, [`document`] and
-//! [`pictures`] tell.
+//! else. [`read()`] alone opens labels, and holds them against the reports; [`Scores`] counts, [`document()`] and
+//! [`pictures()`] tell.
 
 mod ablation;
 mod campaign;
