@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd python solid-check gpu
+ci: fmt lint docs deny test validate systemd python solid-check discovery-evidence-slice gpu
 
 # The README's second command.
 test:
@@ -108,6 +108,35 @@ bench-acuity *arguments: bench-peers-tools
 bench-calibration *arguments: bench-peers-tools
     cargo build --release --package tactus --package tactus-bench
     {{ tools }}/peers/bin/python bench/peers/calibration.py {{ arguments }}
+
+# Time and memory of `tactus discover` from 9,000 to 144,000 frames; PySINDy, gradient boosting and a Gaussian process on 36,000.
+bench-discovery: bench-peers-tools
+    cargo build --release --package tactus --package tactus-bench
+    mkdir -p target/evidence
+    target/release/tactus-bench evidence time --work target/evidence/time > target/evidence/ours.json
+    {{ tools }}/peers/bin/python bench/peers/discovery.py time --work target/evidence/time --name 36000 > target/evidence/peers.json
+    {{ tools }}/peers/bin/python -c 'import json; at = "target/evidence/"; \
+        json.dump({who: json.load(open(f"{at}{who}.json")) for who in ("ours", "peers")}, open(f"{at}costs.json", "w"), indent=1)'
+    cat target/evidence/costs.json
+
+# Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes.
+# What discovery finds and names of hidden physics, beside other ways to go about it: docs/discovery-evidence.md.
+discovery-evidence: bench-discovery
+    target/release/tactus-bench evidence run
+    target/release/tactus-bench evidence run --size ablation --keep-tables --work target/evidence/ablation
+    {{ tools }}/peers/bin/python bench/peers/discovery.py report --work target/evidence/ablation
+    # Forward selection of effects by BIC alone, in builds that have it.
+    if target/release/tactus discover --ablation bic --help >/dev/null 2>&1; then \
+        target/release/tactus-bench evidence run --size ablation --work target/evidence/ablation/peers/bic --with=--ablation --with=bic; fi
+    target/release/tactus-bench evidence score --ablation target/evidence/ablation --costs target/evidence/costs.json \
+        --document docs/discovery-evidence.md --images docs/images
+
+# The part of it that CI runs, always the same 46 sets, some two minutes on two cores: it fails if discovery has become worse.
+discovery-evidence-slice:
+    cargo build --release --package tactus --package tactus-bench
+    rm -rf target/evidence/slice
+    target/release/tactus-bench evidence run --size slice --check \
+        --work target/evidence/slice/work --sealed target/evidence/slice/sealed
 
 # A virtual environment with the peers.
 bench-peers-tools:

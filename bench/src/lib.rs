@@ -2,7 +2,9 @@
 //!
 //! What measures the forward model (`tactus-bench --help`, the criterion bench) presses the same [`Tool`]s at the
 //! same [`Pose`]s on the same arrays, along one [`Way`] from pose to image or another. [`Fem`] is the finite element
-//! model of the covering.
+//! model of the covering. [`evidence`] is another matter: how well discovery finds and names what is hidden in data.
+
+pub mod evidence;
 
 mod acuity;
 mod calibration;

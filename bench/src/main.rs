@@ -1,10 +1,13 @@
 //! `tactus-bench`: what `just bench` and `just bench-peers` run beside criterion.
 #![expect(clippy::print_stdout, reason = "standard output is this program's interface")]
 
+mod evidence_command;
+
 use std::{path::PathBuf, time::Duration};
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
+use evidence_command::EvidenceArgs;
 use serde_json::json;
 use tactus_bench::{
     Acuity, COVERING, Calibration, Fem, Forward, Growth, Kernel, Limits, Painter, Pose, Sweep, Tool, Way,
@@ -97,6 +100,8 @@ enum Part {
     Growth,
     /// What of this machine's arithmetic and bandwidth the kernels use.
     Limits,
+    /// How well `tactus discover` finds and names what is hidden in data.
+    Evidence(EvidenceArgs),
 }
 
 fn main() -> Result<()> {
@@ -114,6 +119,7 @@ fn main() -> Result<()> {
         }
         Part::Growth => growth(&Growth::measure()?),
         Part::Limits => limits(&Limits::measure()?),
+        Part::Evidence(args) => args.run()?,
     }
     Ok(())
 }

@@ -1,0 +1,29 @@
+//! How well `tactus discover` finds and names what is hidden in data.
+//!
+//! A *campaign* is a list of sets, each made from its own seed ([`campaigns()`]). [`run()`] makes them, seals their labels
+//! in a folder of their own, and has the real binary discover, which is given a measurement table and nothing
+//! else. [`read()`] alone opens labels, and holds them against the reports; [`Scores`] counts, [`document()`] and
+//! [`pictures()`] tell.
+
+mod ablation;
+mod campaign;
+mod document;
+mod outcome;
+mod picture;
+mod rate;
+mod run;
+mod score;
+mod timing;
+
+pub use ablation::{Ablation, ablations};
+pub use campaign::{Campaign, Planned, Sizes, campaigns};
+pub use document::{Costs, document, into_document, misses};
+pub use outcome::{Named, Outcome, Truth, read};
+pub use picture::pictures;
+pub use rate::{Rate, normal_share, quantile};
+pub use run::{Places, Progress, Ran, Workflow, run};
+pub use score::{
+    Band, Cell, EffectScore, ORACLE_LEVEL, OutsideScore, PowerPoint, Scores, Several, Shrink, Z_DETECTABLE,
+    Z_SEPARATE,
+};
+pub use timing::{Cost, Timing};

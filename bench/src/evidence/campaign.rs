@@ -1,0 +1,242 @@
+//! Which sets there are.
+
+use serde::{Deserialize, Serialize};
+use tactus_mock::hidden::{Amount, CATALOGUE, Content, Definition, NoiseKind, Recipe};
+
+/// What a set is made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Campaign {
+    /// Nothing is hidden: whatever is found is a false alarm.
+    FalseAlarms,
+    /// One physics of the library's effects.
+    Names,
+    /// Two.
+    Pairs,
+    /// Three.
+    Triples,
+    /// One that the library has nothing like.
+    Outside,
+}
+
+/// How many sets of each kind, and how strong.
+#[derive(Debug, Clone)]
+pub struct Sizes {
+    /// Sets without physics, in equal parts white, coloured and quantised.
+    pub false_alarms: usize,
+    /// Physics of the library's effects.
+    pub physics: Vec<&'static Definition>,
+    /// Separations beyond the spread, of each physics.
+    pub separations: Vec<f64>,
+    /// Strengths beside them; 1 is a bad rig.
+    pub strengths: Vec<f64>,
+    /// Sets of each physics and separation or strength.
+    pub name_seeds: usize,
+    /// Sets of two effects.
+    pub pairs: usize,
+    /// Sets of three.
+    pub triples: usize,
+    /// Physics outside the library.
+    pub outside: Vec<&'static Definition>,
+    /// Their separations.
+    pub outside_separations: Vec<f64>,
+    /// Their strengths.
+    pub outside_strengths: Vec<f64>,
+    /// Sets of each.
+    pub outside_seeds: usize,
+    /// Frames of a set, if not the plan's own number.
+    pub frames: Option<usize>,
+}
+
+/// A set: how to make it.
+#[derive(Debug, Clone)]
+pub struct Planned {
+    /// Says what is in it, so it is for the scorer only: `names/relaxation-prony-z8-0`.
+    pub id: String,
+    /// What it is made for.
+    pub campaign: Campaign,
+    /// How to make it.
+    pub recipe: Recipe,
+}
+
+/// Separation of each effect in sets of several, evenly on a logarithmic scale.
+const SEVERAL_Z: [f64; 2] = [20.0, 60.0];
+
+impl Campaign {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::FalseAlarms, Self::Names, Self::Pairs, Self::Triples, Self::Outside];
+
+    /// Its folder.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::FalseAlarms => "false-alarms",
+            Self::Names => "names",
+            Self::Pairs => "pairs",
+            Self::Triples => "triples",
+            Self::Outside => "outside",
+        }
+    }
+}
+
+impl Sizes {
+    /// The sizes that the evidence rests on.
+    pub fn whole() -> Self {
+        Self {
+            false_alarms: 501,
+            physics: within().collect(),
+            separations: vec![2.0, 4.0, 8.0, 16.0, 40.0],
+            strengths: vec![0.3, 1.0],
+            name_seeds: 2,
+            pairs: 100,
+            triples: 60,
+            outside: outside().collect(),
+            outside_separations: vec![15.0, 40.0],
+            outside_strengths: vec![1.0],
+            outside_seeds: 3,
+            frames: None,
+        }
+    }
+
+    /// A look at everything: every physics once, strong; a tenth of the rest.
+    pub fn glance() -> Self {
+        Self {
+            false_alarms: 48,
+            separations: vec![40.0],
+            strengths: Vec::new(),
+            name_seeds: 1,
+            pairs: 12,
+            triples: 6,
+            outside_separations: vec![40.0],
+            outside_strengths: Vec::new(),
+            outside_seeds: 1,
+            ..Self::whole()
+        }
+    }
+
+    /// What other ways are tried on: every physics strong and as on a bad rig, once.
+    pub fn ablation() -> Self {
+        Self {
+            false_alarms: 45,
+            strengths: vec![1.0],
+            pairs: 20,
+            triples: 0,
+            outside_strengths: vec![1.0],
+            ..Self::glance()
+        }
+    }
+
+    /// What CI runs: a few of everything but triples, strong.
+    pub fn slice() -> Self {
+        Self {
+            false_alarms: 12,
+            physics: one_of_each().take(24).collect(),
+            strengths: Vec::new(),
+            pairs: 4,
+            triples: 0,
+            outside: outside().take(6).collect(),
+            ..Self::glance()
+        }
+    }
+}
+
+/// The sets of a campaign. A set's seed follows from its id and `seed`: it is the same set whatever the sizes.
+pub fn campaigns(campaign: Campaign, sizes: &Sizes, seed: u64) -> Vec<Planned> {
+    let planned = |name: String, noise: NoiseKind, content: Content, amount: fn(f64) -> Amount, of: f64| {
+        let id = format!("{}/{name}", campaign.name());
+        let recipe = Recipe {
+            // The run's id in the table, which must tell nothing.
+            name: "set".into(),
+            noise,
+            content,
+            amount: amount(of),
+            frames: sizes.frames,
+            ..Recipe::new(seed_of(&id, seed))
+        };
+        Planned { id, campaign, recipe }
+    };
+    let doses = |physics: &[&'static Definition], separations: &[f64], strengths: &[f64], seeds: usize| {
+        let amounts = separations.iter().map(|z| ("z", *z, Amount::BeyondSpread as fn(f64) -> Amount));
+        let amounts: Vec<_> =
+            amounts.chain(strengths.iter().map(|s| ("s", *s, Amount::Strength as _))).collect();
+        let mut sets = Vec::new();
+        for physics in physics {
+            for (letter, of, amount) in &amounts {
+                for index in 0..seeds {
+                    let name = format!("{}-{letter}{of}-{index}", physics.id);
+                    sets.push(planned(name, NoiseKind::Any, alone(physics), *amount, *of));
+                }
+            }
+        }
+        sets
+    };
+    let several = |effects: usize, count: usize| {
+        let set = |index: usize| {
+            let name = format!("{index:03}");
+            let share = uniform(seed_of(&format!("z of {name}"), seed));
+            let z = SEVERAL_Z[0] * (SEVERAL_Z[1] / SEVERAL_Z[0]).powf(share);
+            let content = Content { combine: Some(effects), ..Content::default() };
+            planned(name, NoiseKind::Any, content, Amount::BeyondSpread, z)
+        };
+        (0..count).map(set).collect()
+    };
+    match campaign {
+        Campaign::FalseAlarms => {
+            let kinds = [NoiseKind::White, NoiseKind::Coloured, NoiseKind::Quantised];
+            let names = ["white", "coloured", "quantised"];
+            let set = |index: usize| {
+                let kind = index % kinds.len();
+                let content = Content { none: true, ..Content::default() };
+                let name = format!("{}-{:03}", names[kind], index / kinds.len());
+                planned(name, kinds[kind], content, Amount::Strength, 0.0)
+            };
+            (0..sizes.false_alarms).map(set).collect()
+        }
+        Campaign::Names => doses(&sizes.physics, &sizes.separations, &sizes.strengths, sizes.name_seeds),
+        Campaign::Pairs => several(2, sizes.pairs),
+        Campaign::Triples => several(3, sizes.triples),
+        Campaign::Outside => {
+            doses(&sizes.outside, &sizes.outside_separations, &sizes.outside_strengths, sizes.outside_seeds)
+        }
+    }
+}
+
+fn alone(physics: &Definition) -> Content {
+    Content { physics: vec![physics.id.into()], ..Content::default() }
+}
+
+fn within() -> impl Iterator<Item = &'static Definition> {
+    CATALOGUE.iter().copied().filter(|definition| definition.effect.is_some())
+}
+
+fn outside() -> impl Iterator<Item = &'static Definition> {
+    CATALOGUE.iter().copied().filter(|definition| definition.effect.is_none())
+}
+
+/// The first physics of each effect.
+fn one_of_each() -> impl Iterator<Item = &'static Definition> {
+    let mut seen = Vec::new();
+    within().filter(move |definition| {
+        let is_new = !seen.contains(&definition.effect);
+        seen.push(definition.effect);
+        is_new
+    })
+}
+
+/// A seed of its own for every name: FNV-1a, well mixed (`SplitMix64`).
+fn seed_of(name: &str, seed: u64) -> u64 {
+    let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64 ^ seed, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    let mixed = (hash ^ (hash >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    mixed ^ (mixed >> 31)
+}
+
+/// In `[0, 1)`.
+fn uniform(seed: u64) -> f64 {
+    (seed >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+#[cfg(test)]
+#[path = "campaign_tests.rs"]
+mod tests;

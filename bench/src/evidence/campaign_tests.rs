@@ -1,0 +1,44 @@
+use std::collections::BTreeSet;
+
+use super::*;
+
+fn all(sizes: &Sizes) -> Vec<Planned> {
+    Campaign::ALL.into_iter().flat_map(|campaign| campaigns(campaign, sizes, 1)).collect()
+}
+
+#[test]
+fn the_whole_has_what_the_evidence_asks_for() {
+    let sets = all(&Sizes::whole());
+    let count = |campaign| sets.iter().filter(|set| set.campaign == campaign).count();
+    assert!(count(Campaign::FalseAlarms) >= 500);
+    assert_eq!(count(Campaign::Names), within().count() * 7 * 2);
+    assert_eq!((count(Campaign::Pairs), count(Campaign::Triples)), (100, 60));
+    assert_eq!(count(Campaign::Outside), outside().count() * 3 * 3);
+}
+
+#[test]
+fn no_two_sets_share_an_id_or_a_seed() {
+    let sets = all(&Sizes::whole());
+    let ids: BTreeSet<&str> = sets.iter().map(|set| set.id.as_str()).collect();
+    let seeds: BTreeSet<u64> = sets.iter().map(|set| set.recipe.seed).collect();
+    assert_eq!((ids.len(), seeds.len()), (sets.len(), sets.len()));
+}
+
+#[test]
+fn a_set_is_the_same_in_a_small_campaign_and_in_the_whole() {
+    let whole = all(&Sizes::whole());
+    for set in all(&Sizes::slice()) {
+        let twin = whole.iter().find(|other| other.id == set.id);
+        assert_eq!(twin.map(|twin| twin.recipe.seed), Some(set.recipe.seed), "{}", set.id);
+    }
+}
+
+#[test]
+fn the_table_is_not_told_what_is_in_it() {
+    assert!(all(&Sizes::whole()).iter().all(|set| set.recipe.name == "set"));
+}
+
+#[test]
+fn the_slice_is_as_small_as_ci_can_bear() {
+    assert_eq!(all(&Sizes::slice()).len(), 12 + 24 + 4 + 6);
+}

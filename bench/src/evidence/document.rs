@@ -1,0 +1,366 @@
+//! The evidence as text.
+
+use std::collections::BTreeMap;
+use std::fmt::{self, Write};
+
+use serde::Deserialize;
+
+use super::ablation::Ablation;
+use super::campaign::Campaign;
+use super::outcome::Outcome;
+use super::rate::Rate;
+use super::score::{Band, OutsideScore, Scores, Several, Shrink};
+use super::timing::Timing;
+
+/// Between these lines a document is written anew.
+const MARKS: [&str; 2] = ["<!-- evidence: begin -->", "<!-- evidence: end -->"];
+
+/// Puts a text between the marks of a document; `None` if it has none.
+pub fn into_document(document: &str, text: &str) -> Option<String> {
+    let [begin, end] = MARKS;
+    let (before, rest) = document.split_once(begin)?;
+    let (_, after) = rest.split_once(end)?;
+    Some(format!("{before}{begin}\n\n{}\n\n{end}{after}", text.trim()))
+}
+
+/// What discovery costs, beside its peers.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Costs {
+    /// Ours.
+    pub ours: Timing,
+    /// The others', on one of the tables.
+    pub peers: Option<Peers>,
+}
+
+/// What `bench/peers/discovery.py time` tells.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Peers {
+    versions: BTreeMap<String, String>,
+    frames: usize,
+    rows: Vec<Peer>,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Peer {
+    who: String,
+    does: String,
+    seconds: Option<f64>,
+    peak_mib: f64,
+}
+
+/// The generated part of `docs/discovery-evidence.md`.
+pub fn document(scores: &Scores, ablations: &[Ablation], costs: Option<&Costs>) -> String {
+    fmt::from_fn(|f| {
+        targets(f, scores)?;
+        false_alarms(f, scores)?;
+        names(f, scores)?;
+        several(f, scores)?;
+        outside(f, scores)?;
+        ways(f, ablations)?;
+        costs.map_or(Ok(()), |costs| time(f, costs))
+    })
+    .to_string()
+}
+
+/// One line for each set that was not named exactly: what was in it, what was said.
+pub fn misses(outcomes: &[Outcome]) -> String {
+    let mut text = String::new();
+    for set in outcomes {
+        let is_right = match set.campaign {
+            Campaign::FalseAlarms => !set.is_detected() && !set.has_failed(),
+            Campaign::Names | Campaign::Pairs | Campaign::Triples => set.is_exact(),
+            Campaign::Outside => set.verdict == "unexplained",
+        };
+        if is_right {
+            continue;
+        }
+        let truths: Vec<String> = set
+            .truths
+            .iter()
+            .map(|truth| {
+                format!("{} [{}] z {:.1}", truth.effect.as_deref().unwrap_or("-"), truth.physics, truth.z)
+            })
+            .collect();
+        let named: Vec<String> = set
+            .named
+            .iter()
+            .map(|named| match &named.equivalent[..] {
+                [] => named.effect.clone(),
+                others => format!("{} (or {})", named.effect, others.join(", ")),
+            })
+            .collect();
+        let shrink = set.shrink.map_or_else(|| "-".into(), |shrink| format!("{shrink:.3}"));
+        // Writing to a string does not fail.
+        _ = writeln!(
+            text,
+            "{:<44} noise {:.2} phi {:.1} | {} -> {} | {} | shrink {shrink} | taken on the way: {}",
+            set.id,
+            set.noise[0],
+            set.noise[1],
+            truths.join(" + "),
+            named.join(" + "),
+            set.verdict,
+            set.taken.join(", ")
+        );
+    }
+    text
+}
+
+/// A target, and how far it is missed.
+struct Target<'a> {
+    what: &'a str,
+    wanted: f64,
+    is_most: bool,
+    seen: Option<f64>,
+    of: usize,
+    interval: Option<[f64; 2]>,
+}
+
+fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    let rate = |what: &'static str, wanted: f64, is_most: bool, rate: Rate| Target {
+        what,
+        wanted,
+        is_most,
+        seen: (rate.of > 0).then_some(rate.share),
+        of: rate.of,
+        interval: Some(rate.interval),
+    };
+    let shrink = |what: &'static str, wanted: f64, of: usize, seen: Option<f64>| Target {
+        what,
+        wanted,
+        is_most: false,
+        seen,
+        of,
+        interval: None,
+    };
+    let mut rows = Vec::new();
+    if let Some(all) = scores.false_alarms.get("all") {
+        rows.push(rate("false alarms", 0.028, true, *all));
+    }
+    if let Some(band) = scores.bands.iter().find(|band| band.name == "16 and more") {
+        rows.push(rate("one effect, z 16 and more: named exactly", 0.95, false, band.exact));
+        rows.push(rate("one effect, z 16 and more: in the reported set", 0.95, false, band.in_set));
+        rows.push(shrink("shrink, median", 0.95, band.shrink.of, band.shrink.median));
+        rows.push(shrink("shrink, fifth percentile", 0.8, band.shrink.of, band.shrink.fifth));
+    }
+    rows.push(rate("two effects: both named", 0.85, false, scores.pairs.named));
+    rows.push(rate("three effects: all named", 0.7, false, scores.triples.named));
+    if let Some(all) = scores.outside.get("all") {
+        rows.push(rate("outside the library: \"unexplained\"", 0.9, false, all.unexplained));
+        rows.push(rate("outside the library: a wrong name", 0.05, true, all.wrong));
+    }
+    writeln!(f, "## Against the targets\n")?;
+    writeln!(f, "| what | target | seen | 95 % interval | sets | missed by |\n|---|---|---|---|---|---|")?;
+    for Target { what, wanted, is_most, seen, of, interval } in rows {
+        let bound = if is_most { "at most" } else { "at least" };
+        let missed = seen.map_or_else(
+            || "-".into(),
+            |seen| {
+                let by = if is_most { seen - wanted } else { wanted - seen };
+                if by > 0.0 { format!("**{:.1} points**", 100.0 * by) } else { "met".into() }
+            },
+        );
+        let seen = seen.map_or_else(|| "-".into(), percent);
+        let interval = interval.map_or_else(|| "-".into(), ends);
+        writeln!(f, "| {what} | {bound} {} | {seen} | {interval} | {of} | {missed} |", percent(wanted))?;
+    }
+    if let Some([median, most]) = scores.seconds {
+        let sets = scores.sets.iter().map(|(campaign, count)| format!("{count} {}", campaign.name()));
+        let sets: Vec<String> = sets.collect();
+        writeln!(
+            f,
+            "\nSets: {}. Each was discovered in on one thread in {median:.1} s (median; 95 % within {most:.1} s). Runs that made no report: {}.",
+            sets.join(", "),
+            scores.failed.len()
+        )?;
+    }
+    writeln!(f)
+}
+
+fn false_alarms(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    writeln!(
+        f,
+        "## Nothing is missing\n\n| noise | sets | false alarms | share | 95 % interval |\n|---|---|---|---|---|"
+    )?;
+    for (noise, rate) in &scores.false_alarms {
+        writeln!(
+            f,
+            "| {noise} | {} | {} | {} | {} |",
+            rate.of,
+            rate.hits,
+            percent(rate.share),
+            ends(rate.interval)
+        )?;
+    }
+    writeln!(f)
+}
+
+const BAND_HEAD: &str = "sets | detected | exact, of detected | in the reported set, of detected | a wrong name | shrink: median, fifth percentile (sets) | to the effect's own fit |\n|---|---|---|---|---|---|---|---|";
+
+fn names(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    writeln!(f, "## One effect\n\n| z | {BAND_HEAD}")?;
+    for band in &scores.bands {
+        band_row(f, &band.name, band)?;
+    }
+    writeln!(f, "\nBy effect, z 16 and more:\n\n| effect | {BAND_HEAD}")?;
+    for row in &scores.effects {
+        band_row(f, &row.effect, &row.band)?;
+    }
+    writeln!(
+        f,
+        "\n![Truth against name](images/discovery-confusion.svg)\n\n![Power](images/discovery-power.svg)\n"
+    )
+}
+
+fn band_row(f: &mut fmt::Formatter<'_>, name: &str, band: &Band) -> fmt::Result {
+    let Band { detected, exact, in_set, wrong, shrink, shrink_to_own_fit, .. } = band;
+    writeln!(
+        f,
+        "| {name} | {} | {} | {} | {} | {} | {} | {} |",
+        detected.of,
+        percent(detected.share),
+        percent(exact.share),
+        percent(in_set.share),
+        percent(wrong.share),
+        shrunk(shrink),
+        shrunk(shrink_to_own_fit),
+    )
+}
+
+fn several(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    writeln!(
+        f,
+        "## Several effects\n\n| | sets | all named | and nothing else | all in reported sets | a wrong name | shrink |\n|---|---|---|---|---|---|---|"
+    )?;
+    for (name, several) in [("two", &scores.pairs), ("three", &scores.triples)] {
+        let Several { named, exact, in_set, wrong, shrink } = several;
+        writeln!(
+            f,
+            "| {name} | {} | {} ({}) | {} | {} | {} | {} |",
+            named.of,
+            percent(named.share),
+            ends(named.interval),
+            percent(exact.share),
+            percent(in_set.share),
+            percent(wrong.share),
+            shrunk(shrink)
+        )?;
+    }
+    writeln!(f)
+}
+
+fn outside(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
+    writeln!(
+        f,
+        "## Outside the library\n\n| physics | sets | unexplained | any name | partly explained | not seen |\n|---|---|---|---|---|---|"
+    )?;
+    for (physics, OutsideScore { unexplained, wrong, partly, missed }) in &scores.outside {
+        writeln!(
+            f,
+            "| {physics} | {} | {} | {} | {} | {} |",
+            unexplained.of,
+            percent(unexplained.share),
+            percent(wrong.share),
+            percent(partly.share),
+            percent(missed.share)
+        )?;
+    }
+    Ok(())
+}
+
+fn ways(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
+    if ablations.len() < 2 {
+        return Ok(());
+    }
+    writeln!(
+        f,
+        "\n## Other ways, on the same sets\n\n| way | false alarms | exact, of all | in the reported set | a wrong name | both of two | outside: unexplained | outside: any name | shrink | shrink on deeper presses than any fitted | s a set |\n|---|---|---|---|---|---|---|---|---|---|---|"
+    )?;
+    for way in ablations {
+        writeln!(
+            f,
+            "| {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} | {} | {:.1} |",
+            way.method,
+            way.false_alarms.hits,
+            way.false_alarms.of,
+            way.exact.hits,
+            way.exact.of,
+            way.in_set.hits,
+            way.in_set.of,
+            way.wrong.hits,
+            way.wrong.of,
+            way.pairs.hits,
+            way.pairs.of,
+            way.unexplained.hits,
+            way.unexplained.of,
+            way.outside_named.hits,
+            way.outside_named.of,
+            shrunk(&way.shrink),
+            shrunk(&way.deeper_shrink),
+            way.seconds.unwrap_or(f64::NAN),
+        )?;
+    }
+    Ok(())
+}
+
+fn time(f: &mut fmt::Formatter<'_>, Costs { ours, peers }: &Costs) -> fmt::Result {
+    writeln!(
+        f,
+        "\n## Time and memory\n\n| who | frames of 48 elements | s | peak, MiB | does |\n|---|---|---|---|---|"
+    )?;
+    for cost in &ours.rows {
+        writeln!(
+            f,
+            "| tactus discover, {} cores | {} | {:.1} | {:.0} | names one of 26 effects, or none |",
+            ours.cores, cost.frames, cost.seconds, cost.peak_mib
+        )?;
+    }
+    let rows = peers.iter().flat_map(|peers| peers.rows.iter().map(|row| (peers.frames, row)));
+    for (frames, Peer { who, does, seconds, peak_mib }) in rows {
+        let seconds = seconds.map_or_else(|| "failed".into(), |seconds| format!("{seconds:.1}"));
+        writeln!(f, "| {who}, one core | {frames} | {seconds} | {peak_mib:.0} | {does} |")?;
+    }
+    writeln!(f, "\ntime ~ frames^{:.2}.", ours.exponent)?;
+    for frames in &ours.left_out {
+        writeln!(
+            f,
+            "{frames} frames were left out: by the growth of the memory, this machine has not enough."
+        )?;
+    }
+    if let Some(Peers { versions, .. }) = peers {
+        let versions: Vec<String> =
+            versions.iter().map(|(what, version)| format!("{what} {version}")).collect();
+        writeln!(
+            f,
+            "Peers: {}; their time is that of the work after the residual of the base model is there.",
+            versions.join(", ")
+        )?;
+    }
+    let asked = ours.rows.iter().find(|cost| cost.frames == 36_000);
+    for (what, seen, most) in
+        asked.iter().flat_map(|cost| [("s", cost.seconds, 60.0), ("MiB", cost.peak_mib, 1024.0)])
+    {
+        let verdict = if seen < most { "met".into() } else { format!("missed by {:.0}", seen - most) };
+        writeln!(f, "36,000 frames: {seen:.1} {what} of at most {most} {what}: {verdict}.")?;
+    }
+    Ok(())
+}
+
+fn percent(share: f64) -> String {
+    if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "-".into() }
+}
+
+fn ends([least, most]: [f64; 2]) -> String {
+    format!("{:.1} to {:.1} %", 100.0 * least, 100.0 * most)
+}
+
+fn shrunk(shrink: &Shrink) -> String {
+    match (shrink.median, shrink.fifth) {
+        (Some(median), Some(fifth)) => format!("{median:.3}, {fifth:.3} ({})", shrink.of),
+        (None, _) | (_, None) => "-".into(),
+    }
+}
+
+#[cfg(test)]
+#[path = "document_tests.rs"]
+mod tests;

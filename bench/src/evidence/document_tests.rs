@@ -1,0 +1,32 @@
+use super::super::outcome::tests::set;
+use super::*;
+
+#[test]
+fn only_what_stands_between_the_marks_is_written_anew() {
+    let [begin, end] = MARKS;
+    let document = format!("before\n{begin}\nold\n{end}\nafter\n");
+    let Some(after) = into_document(&document, "new\n") else { panic!("it has marks") };
+    assert_eq!(after, format!("before\n{begin}\n\nnew\n\n{end}\nafter\n"));
+    assert_eq!(into_document(&after, "new"), Some(after.clone()));
+    assert_eq!(into_document("no marks", "new"), None);
+}
+
+#[test]
+fn a_missed_target_says_by_how_much() {
+    let right = set(&[Some("backlash")], &[("backlash", &[])], "explained");
+    let wrong = set(&[Some("backlash")], &[("imprint", &[])], "explained");
+    let text = document(&Scores::new(&[right.clone(), right, wrong.clone(), wrong]), &[], None);
+    let line = text.lines().find(|line| line.contains("named exactly")).unwrap_or_default();
+    assert!(line.contains("| 50.0 % |") && line.ends_with("| **45.0 points** |"), "{line}");
+    let none = text.lines().find(|line| line.contains("both named")).unwrap_or_default();
+    assert!(none.contains("| - |") && none.ends_with("| - |"), "{none}");
+}
+
+#[test]
+fn a_miss_tells_truth_and_name() {
+    let right = set(&[Some("backlash")], &[("backlash", &[])], "explained");
+    let twin = set(&[Some("backlash")], &[("hysteresis", &["backlash"])], "explained");
+    let text = misses(&[right, twin]);
+    assert_eq!(text.lines().count(), 1, "{text}");
+    assert!(text.contains("backlash [made-up] z 40.0 -> hysteresis (or backlash) | explained"), "{text}");
+}

@@ -1,0 +1,234 @@
+//! A set's truth beside what was found: the one place where labels are opened.
+
+use std::fs;
+
+use anyhow::{Context, Result};
+use serde::{Deserialize, de::DeserializeOwned};
+use tactus_mock::hidden::Label;
+
+use super::campaign::{Campaign, Planned};
+use super::run::{Places, Ran};
+
+/// A set's truth, and what was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The set.
+    pub id: String,
+    /// What it was made for.
+    pub campaign: Campaign,
+    /// What is in it.
+    pub truths: Vec<Truth>,
+    /// Noise: standard deviation in counts, and correlation from reading to reading.
+    pub noise: [f64; 2],
+    /// What was named; none if no report was made.
+    pub named: Vec<Named>,
+    /// What each round of the search took, whatever was taken back in the end.
+    pub taken: Vec<String>,
+    /// The verdict; `failed` if no report was made.
+    pub verdict: String,
+    /// Share of the gap that was closed on held-out presses.
+    pub shrink: Option<f64>,
+    /// The same on presses deeper than any that was fitted, if that was asked.
+    pub deeper_shrink: Option<f64>,
+    /// Relative standard error of the gap itself.
+    pub gap_error: f64,
+    /// Shrink of the first effect's own fit in the first round, if it was fitted.
+    pub alone_shrink: Option<f64>,
+    /// Wall time.
+    pub seconds: f64,
+}
+
+/// What is in a set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// The physics.
+    pub physics: String,
+    /// The library's effect that it is an instance of; none outside the library.
+    pub effect: Option<String>,
+    /// Separation from the base model, gain, offset and spread recalibrated.
+    pub z: f64,
+}
+
+/// What was named.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct Named {
+    /// The effect.
+    pub effect: String,
+    /// Effects that are said to be as likely.
+    pub equivalent: Vec<String>,
+}
+
+impl Outcome {
+    /// Whether anything is said to be missing.
+    pub fn is_detected(&self) -> bool {
+        !self.has_failed() && (self.verdict != "nothing-missing" || !self.named.is_empty())
+    }
+
+    /// Whether the program made no report.
+    pub fn has_failed(&self) -> bool {
+        self.verdict == "failed"
+    }
+
+    /// Whether every true effect is named.
+    pub fn names_all(&self) -> bool {
+        self.truths
+            .iter()
+            .all(|truth| self.named.iter().any(|named| truth.effect.as_ref() == Some(&named.effect)))
+    }
+
+    /// Whether the true effects are named, and nothing else.
+    pub fn is_exact(&self) -> bool {
+        self.names_all() && self.named.len() == self.truths.len()
+    }
+
+    /// Whether every true effect is named or in a named one's set of equivalents, each in one of its own.
+    pub fn holds_all(&self) -> bool {
+        let effects: Vec<&str> = self.truths.iter().filter_map(|truth| truth.effect.as_deref()).collect();
+        effects.len() == self.truths.len() && matches(&effects, &self.named)
+    }
+
+    /// Named effects that are not in the set, nor equivalent to one that is.
+    pub fn wrong_names(&self) -> Vec<&str> {
+        let is_true = |named: &&Named| {
+            self.truths.iter().filter_map(|truth| truth.effect.as_deref()).any(|effect| named.may_be(effect))
+        };
+        self.named.iter().filter(|named| !is_true(named)).map(|named| named.effect.as_str()).collect()
+    }
+
+    /// Separation of the weakest truth; none without.
+    pub fn z(&self) -> f64 {
+        self.truths.iter().map(|truth| truth.z).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Named {
+    fn may_be(&self, effect: &str) -> bool {
+        self.effect == effect || self.equivalent.iter().any(|other| other == effect)
+    }
+}
+
+/// Whether each effect finds a name of its own.
+fn matches(effects: &[&str], named: &[Named]) -> bool {
+    let Some((first, rest)) = effects.split_first() else { return true };
+    (0..named.len()).filter(|index| named[*index].may_be(first)).any(|index| {
+        let others: Vec<Named> = named
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != index)
+            .map(|(_, one)| one.clone())
+            .collect();
+        matches(rest, &others)
+    })
+}
+
+/// What this reads of `report.json`.
+#[derive(Debug, Deserialize)]
+struct Report {
+    split: Split,
+    base: Level,
+    rounds: Vec<Round>,
+    steps: Vec<Named>,
+    #[serde(rename = "final")]
+    last: Last,
+    verdict: String,
+}
+
+#[derive(Debug, Deserialize)]
+struct Split {
+    frames: usize,
+    train_presses: usize,
+    heldout_presses: usize,
+}
+
+#[derive(Debug, Deserialize)]
+struct Level {
+    heldout_chi2: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Round {
+    candidates: Vec<Candidate>,
+    taken: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Candidate {
+    effect: String,
+    shrink: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Last {
+    shrink: Option<f64>,
+    deeper_shrink: Option<f64>,
+}
+
+/// The outcomes of those sets that have been run.
+///
+/// # Errors
+/// If a label or a report cannot be read.
+pub fn read(sets: &[Planned], places: &Places) -> Result<Vec<Outcome>> {
+    sets.iter().filter(|set| places.ran(&set.id).exists()).map(|set| one(set, places)).collect()
+}
+
+fn one(set: &Planned, places: &Places) -> Result<Outcome> {
+    let label: Label = parsed(&places.label(&set.id))?;
+    let ran: Ran = parsed(&places.ran(&set.id))?;
+    let report = places.report(&set.id);
+    let report: Option<Report> = report.exists().then(|| parsed(&report)).transpose()?;
+    Ok(outcome(set, &label, &ran, report))
+}
+
+fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<Report>) -> Outcome {
+    let truth = |dosed: &tactus_mock::hidden::Dosed| Truth {
+        physics: dosed.id.clone(),
+        effect: dosed.effect.clone(),
+        z: dosed.z_beyond_spread,
+    };
+    let first_effect = label.physics.first().and_then(|dosed| dosed.effect.as_deref());
+    let alone_shrink = report.as_ref().and_then(|report| {
+        let candidates = &report.rounds.first()?.candidates;
+        candidates.iter().find(|one| Some(one.effect.as_str()) == first_effect)?.shrink
+    });
+    let readings = label.baseline_counts.len() as f64;
+    Outcome {
+        id: set.id.clone(),
+        campaign: set.campaign,
+        truths: label.physics.iter().map(truth).collect(),
+        noise: [label.noise.rms_counts, label.noise.phi],
+        shrink: report.as_ref().and_then(|report| report.last.shrink),
+        deeper_shrink: report.as_ref().and_then(|report| report.last.deeper_shrink),
+        gap_error: report
+            .as_ref()
+            .map_or(f64::INFINITY, |report| gap_error(report, readings, label.noise.phi)),
+        alone_shrink,
+        taken: report
+            .iter()
+            .flat_map(|report| &report.rounds)
+            .filter_map(|round| round.taken.clone())
+            .collect(),
+        seconds: ran.seconds,
+        verdict: report.as_ref().map_or_else(|| "failed".into(), |report| report.verdict.clone()),
+        named: report.map_or_else(Vec::new, |report| report.steps),
+    }
+}
+
+/// Relative standard error of the gap, `sqrt(2 (1 + phi^2) / (n (1 - phi^2))) / (chi2 - 1)`: a mean of the squares of `n`
+/// readings is known no better.
+fn gap_error(report: &Report, elements: f64, phi: f64) -> f64 {
+    let Split { frames, train_presses, heldout_presses } = report.split;
+    let share = heldout_presses as f64 / (train_presses + heldout_presses) as f64;
+    let readings = frames as f64 * share * elements;
+    let error = (2.0 * (1.0 + phi * phi) / (readings * (1.0 - phi * phi))).sqrt();
+    let gap = report.base.heldout_chi2.unwrap_or(1.0) - 1.0;
+    if gap > 0.0 { error / gap } else { f64::INFINITY }
+}
+
+fn parsed<T: DeserializeOwned>(path: &std::path::Path) -> Result<T> {
+    let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    serde_json::from_str(&text).with_context(|| path.display().to_string())
+}
+
+#[cfg(test)]
+#[path = "outcome_tests.rs"]
+pub(super) mod tests;

@@ -1,0 +1,323 @@
+//! From outcomes to shares.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::campaign::Campaign;
+use super::outcome::Outcome;
+use super::rate::{Rate, normal_share, quantile};
+
+/// The smallest separation that is called detectable.
+pub const Z_DETECTABLE: f64 = 4.0;
+/// The separation from which on an exact name is asked for.
+pub const Z_SEPARATE: f64 = 16.0;
+/// Level of the oracle's test: the share of false alarms that is allowed.
+pub const ORACLE_LEVEL: f64 = 0.028;
+/// The `1 - ORACLE_LEVEL` quantile of the normal distribution.
+const ORACLE_QUANTILE: f64 = 1.911;
+/// A shrink counts where the gap is known within this share.
+pub(super) const SHRINK_ERROR_MAX: f64 = 0.1;
+/// Bands of separation beyond the spread.
+const BANDS: [(&str, [f64; 2]); 5] = [
+    ("all", [0.0, f64::INFINITY]),
+    ("below 4", [0.0, 3.9]),
+    ("4 to 16", [3.9, 15.5]),
+    ("16 and more", [15.5, f64::INFINITY]),
+    ("100 and more", [100.0, f64::INFINITY]),
+];
+
+/// Everything that is counted.
+#[derive(Debug, Clone, Serialize)]
+pub struct Scores {
+    /// Sets of each campaign.
+    pub sets: BTreeMap<Campaign, usize>,
+    /// Sets of which no report was made; they count as misses.
+    pub failed: Vec<String>,
+    /// False alarms by noise: `all`, `white`, `coloured`, `quantised`.
+    pub false_alarms: BTreeMap<String, Rate>,
+    /// Sets of one effect, by separation.
+    pub bands: Vec<Band>,
+    /// Sets of one effect, by effect, from [`Z_SEPARATE`] on.
+    pub effects: Vec<EffectScore>,
+    /// Power of each effect.
+    pub power: BTreeMap<String, Vec<PowerPoint>>,
+    /// Truth against name, sets of one effect from [`Z_SEPARATE`] on, outside and without.
+    pub confusion: Vec<Cell>,
+    /// Sets of two.
+    pub pairs: Several,
+    /// Sets of three.
+    pub triples: Several,
+    /// Outside the library: `all` and by physics.
+    pub outside: BTreeMap<String, OutsideScore>,
+    /// Seconds of a set on one thread: median and 95th percentile.
+    pub seconds: Option<[f64; 2]>,
+}
+
+/// Sets of one effect within a range of separations.
+#[derive(Debug, Clone, Serialize)]
+pub struct Band {
+    /// Which.
+    pub name: String,
+    /// Something is said to be missing.
+    pub detected: Rate,
+    /// The effect and nothing else is named, of those detected.
+    pub exact: Rate,
+    /// The effect is named or in a set of equivalents, of those detected.
+    pub in_set: Rate,
+    /// An effect is named that is not there, nor equivalent to one that is; of all.
+    pub wrong: Rate,
+    /// Shrink, where the effect is named and the gap is known within a tenth.
+    pub shrink: Shrink,
+    /// The same against that of the true effect's own fit.
+    pub shrink_to_own_fit: Shrink,
+}
+
+/// How much of gaps is closed.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Shrink {
+    /// Sets.
+    pub of: usize,
+    /// Median.
+    pub median: Option<f64>,
+    /// Fifth percentile.
+    pub fifth: Option<f64>,
+}
+
+/// One effect.
+#[derive(Debug, Clone, Serialize)]
+pub struct EffectScore {
+    /// Its name.
+    pub effect: String,
+    /// How its sets fared.
+    #[serde(flatten)]
+    pub band: Band,
+}
+
+/// Detection at one strength.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct PowerPoint {
+    /// Geometric mean of the separations.
+    pub z: f64,
+    /// Something is said to be missing.
+    pub detected: Rate,
+    /// The effect and nothing else is named.
+    pub exact: Rate,
+    /// Power of a one-sided normal test at [`ORACLE_LEVEL`] that knows the effect.
+    pub oracle: f64,
+}
+
+/// How often a truth was given a name.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cell {
+    /// Effect in the set; `outside the library` or `nothing`.
+    pub truth: String,
+    /// The one that was named; `nothing`, `unexplained` or `several`.
+    pub named: String,
+    /// Sets.
+    pub count: usize,
+}
+
+/// Sets of several effects.
+#[derive(Debug, Clone, Serialize)]
+pub struct Several {
+    /// All are named, whatever else is.
+    pub named: Rate,
+    /// All are named, and nothing else.
+    pub exact: Rate,
+    /// All are named or in sets of equivalents, each in one of its own.
+    pub in_set: Rate,
+    /// An effect is named that is not there, nor equivalent to one that is.
+    pub wrong: Rate,
+    /// Shrink, where the gap is known within a tenth.
+    pub shrink: Shrink,
+}
+
+/// Sets outside the library.
+#[derive(Debug, Clone, Serialize)]
+pub struct OutsideScore {
+    /// The verdict is `unexplained`.
+    pub unexplained: Rate,
+    /// Any effect is named.
+    pub wrong: Rate,
+    /// The verdict is `partly-explained`.
+    pub partly: Rate,
+    /// Nothing is said to be missing.
+    pub missed: Rate,
+}
+
+impl Scores {
+    /// Counts.
+    pub fn new(outcomes: &[Outcome]) -> Self {
+        let of = |campaign: Campaign| -> Vec<&Outcome> {
+            outcomes.iter().filter(|outcome| outcome.campaign == campaign).collect()
+        };
+        let [false_alarms, names, pairs, triples, outside] = Campaign::ALL.map(of);
+        let mut sets = BTreeMap::new();
+        for outcome in outcomes {
+            *sets.entry(outcome.campaign).or_default() += 1;
+        }
+        let seconds: Vec<f64> = outcomes.iter().map(|outcome| outcome.seconds).collect();
+        let failed = outcomes.iter().filter(|outcome| outcome.has_failed()).map(|outcome| outcome.id.clone());
+        let bands = BANDS.iter().map(|(name, range)| Band::new(name, &within(&names, *range)));
+        let separate = within(&names, BANDS[3].1);
+        let effect = |(effect, sets): (String, Vec<&Outcome>)| {
+            let band = Band::new("", &sets);
+            EffectScore { effect, band }
+        };
+        Self {
+            sets,
+            failed: failed.collect(),
+            false_alarms: by_noise(&false_alarms),
+            bands: bands.collect(),
+            effects: by_effect(&separate).into_iter().map(effect).collect(),
+            power: by_effect(&names).into_iter().map(|(effect, sets)| (effect, power(&sets))).collect(),
+            confusion: confusion(&[&separate[..], &outside[..], &false_alarms[..]].concat()),
+            pairs: Several::new(&pairs),
+            triples: Several::new(&triples),
+            outside: by_physics(&outside),
+            seconds: quantile(seconds.clone(), 0.5).zip(quantile(seconds, 0.95)).map(|(a, b)| [a, b]),
+        }
+    }
+}
+
+impl Band {
+    fn new(name: &str, sets: &[&Outcome]) -> Self {
+        let detected: Vec<&Outcome> = sets.iter().copied().filter(|set| set.is_detected()).collect();
+        let known = || sets.iter().filter(|set| set.names_all() && set.gap_error <= SHRINK_ERROR_MAX);
+        Self {
+            name: name.into(),
+            detected: Rate::new(detected.len(), sets.len()),
+            exact: Rate::of(&detected, |set| set.is_exact()),
+            in_set: Rate::of(&detected, |set| set.holds_all()),
+            wrong: Rate::of(sets, |set| !set.wrong_names().is_empty()),
+            shrink: Shrink::new(known().filter_map(|set| set.shrink)),
+            shrink_to_own_fit: Shrink::new(
+                known().filter_map(|set| Some(set.shrink? / set.alone_shrink.filter(|alone| *alone > 0.0)?)),
+            ),
+        }
+    }
+}
+
+impl Shrink {
+    pub(super) fn new(shrinks: impl Iterator<Item = f64>) -> Self {
+        let shrinks: Vec<f64> = shrinks.collect();
+        let of = shrinks.len();
+        Self { of, median: quantile(shrinks.clone(), 0.5), fifth: quantile(shrinks, 0.05) }
+    }
+}
+
+impl Several {
+    fn new(sets: &[&Outcome]) -> Self {
+        let known = sets.iter().filter(|set| set.gap_error <= SHRINK_ERROR_MAX);
+        Self {
+            named: Rate::of(sets, |set| set.names_all()),
+            exact: Rate::of(sets, |set| set.is_exact()),
+            in_set: Rate::of(sets, |set| set.holds_all()),
+            wrong: Rate::of(sets, |set| !set.wrong_names().is_empty()),
+            shrink: Shrink::new(known.filter_map(|set| set.shrink)),
+        }
+    }
+}
+
+impl OutsideScore {
+    fn new(sets: &[&Outcome]) -> Self {
+        Self {
+            unexplained: Rate::of(sets, |set| set.verdict == "unexplained"),
+            wrong: Rate::of(sets, |set| !set.named.is_empty()),
+            partly: Rate::of(sets, |set| set.verdict == "partly-explained"),
+            missed: Rate::of(sets, |set| !set.is_detected()),
+        }
+    }
+}
+
+/// The power of a test that knows what it looks for.
+pub(super) fn oracle(z: f64) -> f64 {
+    normal_share(z - ORACLE_QUANTILE)
+}
+
+fn within<'a>(sets: &[&'a Outcome], [least, most]: [f64; 2]) -> Vec<&'a Outcome> {
+    sets.iter().copied().filter(|set| (least..most).contains(&set.z())).collect()
+}
+
+/// What is in a set, in a word or two.
+fn truth(set: &Outcome) -> String {
+    match set.truths.first() {
+        None => "nothing".into(),
+        Some(truth) => truth.effect.clone().unwrap_or_else(|| "outside the library".into()),
+    }
+}
+
+/// What was said of it.
+fn said(set: &Outcome) -> String {
+    match &set.named[..] {
+        [] if set.is_detected() => "unexplained".into(),
+        [] => "nothing".into(),
+        [only] => only.effect.clone(),
+        [_, _, ..] => "several".into(),
+    }
+}
+
+fn by_effect<'a>(sets: &[&'a Outcome]) -> BTreeMap<String, Vec<&'a Outcome>> {
+    let mut groups: BTreeMap<String, Vec<&Outcome>> = BTreeMap::new();
+    for set in sets {
+        groups.entry(truth(set)).or_default().push(set);
+    }
+    groups
+}
+
+fn by_noise(sets: &[&Outcome]) -> BTreeMap<String, Rate> {
+    let mut groups: BTreeMap<String, Vec<&Outcome>> = BTreeMap::new();
+    for set in sets {
+        let kind = set.id.split(['/', '-']).find(|part| ["white", "coloured", "quantised"].contains(part));
+        for group in ["all", kind.unwrap_or("other")] {
+            groups.entry(group.into()).or_default().push(set);
+        }
+    }
+    // A set of which no report was made is no evidence of calmness.
+    let is_alarm = |set: &&Outcome| set.is_detected() || set.has_failed();
+    groups.into_iter().map(|(kind, sets)| (kind, Rate::of(&sets, is_alarm))).collect()
+}
+
+fn by_physics(sets: &[&Outcome]) -> BTreeMap<String, OutsideScore> {
+    let mut groups: BTreeMap<String, Vec<&Outcome>> = BTreeMap::new();
+    for set in sets {
+        let physics = set.truths.iter().map(|truth| truth.physics.as_str());
+        for group in ["all"].into_iter().chain(physics) {
+            groups.entry(group.into()).or_default().push(set);
+        }
+    }
+    groups.into_iter().map(|(physics, sets)| (physics, OutsideScore::new(&sets))).collect()
+}
+
+/// One point for each power of two of the separation.
+#[expect(clippy::cast_possible_truncation, reason = "a small power")]
+fn power(sets: &[&Outcome]) -> Vec<PowerPoint> {
+    let mut groups: BTreeMap<i32, Vec<&Outcome>> = BTreeMap::new();
+    for set in sets.iter().filter(|set| set.z() > 0.0) {
+        groups.entry(set.z().log2().round() as i32).or_default().push(set);
+    }
+    let point = |sets: Vec<&Outcome>| {
+        let count = sets.len() as f64;
+        let z = (sets.iter().map(|set| set.z().ln()).sum::<f64>() / count).exp();
+        PowerPoint {
+            z,
+            detected: Rate::of(&sets, |set| set.is_detected()),
+            exact: Rate::of(&sets, |set| set.is_exact()),
+            oracle: sets.iter().map(|set| oracle(set.z())).sum::<f64>() / count,
+        }
+    };
+    groups.into_values().map(point).collect()
+}
+
+fn confusion(sets: &[&Outcome]) -> Vec<Cell> {
+    let mut counts: BTreeMap<(String, String), usize> = BTreeMap::new();
+    for set in sets {
+        *counts.entry((truth(set), said(set))).or_default() += 1;
+    }
+    counts.into_iter().map(|((truth, named), count)| Cell { truth, named, count }).collect()
+}
+
+#[cfg(test)]
+#[path = "score_tests.rs"]
+mod tests;

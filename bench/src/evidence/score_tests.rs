@@ -1,0 +1,89 @@
+use super::super::outcome::tests::set;
+use super::*;
+
+fn of(campaign: Campaign, id: &str, outcome: Outcome) -> Outcome {
+    Outcome { campaign, id: id.into(), ..outcome }
+}
+
+fn at(z: f64, mut outcome: Outcome) -> Outcome {
+    outcome.truths.iter_mut().for_each(|truth| truth.z = z);
+    outcome
+}
+
+#[test]
+fn any_verdict_but_nothing_missing_is_a_false_alarm() {
+    let sets = [
+        of(Campaign::FalseAlarms, "false-alarms/white-000", set(&[], &[], "nothing-missing")),
+        of(Campaign::FalseAlarms, "false-alarms/white-001", set(&[], &[], "unexplained")),
+        of(Campaign::FalseAlarms, "false-alarms/coloured-000", set(&[], &[("imprint", &[])], "explained")),
+        of(Campaign::FalseAlarms, "false-alarms/quantised-000", set(&[], &[], "failed")),
+    ];
+    let scores = Scores::new(&sets);
+    let hits = |noise: &str| (scores.false_alarms[noise].hits, scores.false_alarms[noise].of);
+    assert_eq!((hits("all"), hits("white"), hits("coloured")), ((3, 4), (1, 2), (1, 1)));
+    assert_eq!(scores.failed, ["false-alarms/quantised-000"]);
+}
+
+#[test]
+fn names_count_among_the_detected_and_wrong_ones_among_all() {
+    let effect = [Some("backlash")];
+    let sets = [
+        set(&effect, &[("backlash", &[])], "explained"),
+        set(&effect, &[("hysteresis", &["backlash"])], "explained"),
+        set(&effect, &[("imprint", &[])], "explained"),
+        set(&effect, &[], "nothing-missing"),
+        at(5.0, set(&effect, &[], "unexplained")),
+    ];
+    let scores = Scores::new(&sets);
+    let Some(band) = scores.bands.iter().find(|band| band.name == "16 and more") else { panic!("a band") };
+    assert_eq!((band.detected.hits, band.detected.of), (3, 4));
+    assert_eq!((band.exact.hits, band.exact.of), (1, 3));
+    assert_eq!((band.in_set.hits, band.wrong.hits, band.wrong.of), (2, 1, 4));
+    assert_eq!(scores.bands[0].detected.of, 5);
+    let cell = |named: &str| scores.confusion.iter().find(|cell| cell.named == named).map(|cell| cell.count);
+    assert_eq!((cell("backlash"), cell("nothing"), cell("unexplained")), (Some(1), Some(1), None));
+}
+
+#[test]
+fn a_shrink_counts_only_where_the_gap_is_known() {
+    let known = set(&[Some("backlash")], &[("backlash", &[])], "explained");
+    let unknown = Outcome { shrink: Some(-3.0), gap_error: 0.4, ..known.clone() };
+    let own = Outcome { alone_shrink: Some(0.6), ..known.clone() };
+    let band = &Scores::new(&[known, unknown, own]).bands[0];
+    assert_eq!((band.shrink.of, band.shrink.median), (2, Some(0.9)));
+    assert_eq!(band.shrink_to_own_fit.of, 1);
+    assert!(band.shrink_to_own_fit.median.is_some_and(|median| (median - 1.5).abs() < 1e-12));
+}
+
+#[test]
+fn power_is_told_by_the_powers_of_two_of_the_separation() {
+    let sets = [2.0, 2.01, 8.0].map(|z| at(z, set(&[Some("backlash")], &[], "nothing-missing")));
+    let power = &Scores::new(&sets).power["backlash"];
+    assert_eq!(power.iter().map(|point| point.detected.of).collect::<Vec<_>>(), [2, 1]);
+    assert!((power[1].z - 8.0).abs() < 1e-9);
+}
+
+/// At no separation it says so as often as it may by chance, at its quantile every other time.
+#[test]
+fn the_oracle_is_the_normal_test_at_its_level() {
+    assert!((oracle(0.0) - ORACLE_LEVEL).abs() < 1e-4);
+    assert!((oracle(ORACLE_QUANTILE) - 0.5).abs() < 1e-12);
+    assert!(oracle(Z_DETECTABLE) > 0.98);
+}
+
+#[test]
+fn outside_the_library_the_verdict_counts() {
+    let outside = |verdict: &str, names: &[(&str, &[&str])]| {
+        of(Campaign::Outside, "outside/x", set(&[None], names, verdict))
+    };
+    let sets = [
+        outside("unexplained", &[]),
+        outside("partly-explained", &[("backlash", &[])]),
+        outside("nothing-missing", &[]),
+        outside("unexplained", &[]),
+    ];
+    let scores = Scores::new(&sets);
+    let all = &scores.outside["all"];
+    assert_eq!((all.unexplained.hits, all.wrong.hits, all.partly.hits, all.missed.hits), (2, 1, 1, 1));
+    assert_eq!(scores.outside["made-up"].unexplained.of, 4);
+}

@@ -1,0 +1,117 @@
+//! What discovery costs.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use tactus_mock::hidden::{Content, Plan, Recipe};
+
+use super::rate::quantile;
+use crate::Growth;
+
+/// Time and memory of `tactus discover` at several sizes, on all cores.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// Cores of the machine.
+    pub cores: usize,
+    /// One row a size.
+    pub rows: Vec<Cost>,
+    /// Sizes that were not run: by the growth of those before, this machine's memory would not have been enough.
+    pub left_out: Vec<usize>,
+    /// `p` of the time `~ frames^p`.
+    pub exponent: f64,
+}
+
+/// One size.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Frames of 48 elements.
+    pub frames: usize,
+    /// Median of the runs, from start to files written.
+    pub seconds: f64,
+    /// Greatest resident memory of any run.
+    pub peak_mib: f64,
+}
+
+/// Two effects of a bad rig, so that the search goes several rounds.
+const PHYSICS: [&str; 2] = ["relaxation-prony", "shifted-mount"];
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
+
+impl Timing {
+    /// Makes a set of each size in a folder, by the plan of the `diagnose` experiment, and discovers in it so many times.
+    ///
+    /// # Errors
+    /// If a set cannot be made or the program fails.
+    pub fn measure(tactus: &Path, folder: &Path, sizes: &[usize], runs: usize) -> Result<Self> {
+        let (mut rows, mut left_out) = (Vec::<Cost>::new(), Vec::new());
+        for frames in sizes {
+            let wanted_mib = rows.last().map(|last| last.peak_mib * *frames as f64 / last.frames as f64);
+            if wanted_mib.zip(available_mib()).is_some_and(|(wanted, available)| wanted > 0.8 * available) {
+                left_out.push(*frames);
+                continue;
+            }
+            let content = Content { physics: PHYSICS.map(Into::into).into(), ..Content::default() };
+            let recipe = Recipe { plan: Plan::Diagnose, frames: Some(*frames), content, ..Recipe::new(1) };
+            // Laid out as the peers look for it.
+            let place = |part: &str, ending: &str| folder.join(part).join(format!("{frames}.{ending}"));
+            let table = place("sets", "parquet");
+            for part in ["sets", "residuals", "reports"] {
+                let part = folder.join(part);
+                fs::create_dir_all(&part).with_context(|| part.display().to_string())?;
+            }
+            recipe.make()?.write(&table)?;
+            let out = folder.join(format!("out-{frames}"));
+            let costs = (0..runs).map(|_| cost(tactus, &table, &out)).collect::<Result<Vec<_>>>()?;
+            fs::rename(out.join("residuals.parquet"), place("residuals", "parquet"))?;
+            fs::rename(out.join("report.json"), place("reports", "json"))?;
+            let seconds = quantile(costs.iter().map(|cost| cost.0).collect(), 0.5).unwrap_or(f64::NAN);
+            let peak_mib = costs.iter().map(|cost| cost.1).fold(0.0, f64::max);
+            rows.push(Cost { frames: *frames, seconds, peak_mib });
+        }
+        let points = rows.iter().map(|cost| [cost.frames as f64, cost.seconds]).collect();
+        let exponent = Growth { what: "discover".into(), size_of: "frames", points }.exponent();
+        Ok(Self { cores: thread::available_parallelism().map_or(1, usize::from), rows, left_out, exponent })
+    }
+}
+
+/// Seconds of a run, and its greatest resident memory in MiB.
+fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
+    let started = Instant::now();
+    let mut child = Command::new(tactus)
+        .args(["--json", "discover", "--out"])
+        .arg(out)
+        .arg(table)
+        .stdout(Stdio::null())
+        .spawn()
+        .with_context(|| tactus.display().to_string())?;
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak_kib = 0.0_f64;
+    loop {
+        // Gone in the last moment before the process is waited for; what was read before stays.
+        let most_kib = fs::read_to_string(&status).ok().and_then(|text| kib(&text, "VmHWM:"));
+        peak_kib = peak_kib.max(most_kib.unwrap_or(0.0));
+        if let Some(exit) = child.try_wait()? {
+            ensure!(exit.success(), "{} {} failed: {exit}", tactus.display(), table.display());
+            return Ok((started.elapsed().as_secs_f64(), peak_kib / 1024.0));
+        }
+        thread::sleep(LOOK_AGAIN);
+    }
+}
+
+/// Memory that programs may still take.
+fn available_mib() -> Option<f64> {
+    Some(kib(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")? / 1024.0)
+}
+
+/// A line of the kernel's, such as `VmHWM:   231596 kB`.
+fn kib(lines: &str, name: &str) -> Option<f64> {
+    lines.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
+}
+
+#[cfg(test)]
+#[path = "timing_tests.rs"]
+mod tests;

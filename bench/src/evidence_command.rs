@@ -1,0 +1,245 @@
+//! `tactus-bench evidence`.
+
+use std::fs;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::thread;
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, Subcommand, ValueEnum};
+use tactus_bench::evidence::{
+    Ablation, Campaign, Costs, Outcome, Places, Planned, Scores, Sizes, Timing, Workflow, ablations,
+    campaigns, document, into_document, misses, pictures, read, run,
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct EvidenceArgs {
+    #[command(subcommand)]
+    part: Part,
+}
+
+#[derive(Debug, Subcommand)]
+enum Part {
+    /// Makes sets and has `tactus` discover in them; goes on where it was left off. Then scores.
+    Run(RunArgs),
+    /// Scores what has been run.
+    Score(WhichArgs),
+    /// Time and memory of `tactus discover` from 9,000 to 144,000 frames, as JSON.
+    Time(TimeArgs),
+}
+
+#[derive(Debug, Args)]
+struct TimeArgs {
+    /// The program that discovers.
+    #[arg(long, default_value = "target/release/tactus")]
+    tactus: PathBuf,
+    /// Frames of the sets, several with commas.
+    #[arg(long, value_delimiter = ',', default_values_t = [9_000, 36_000, 144_000])]
+    frames: Vec<usize>,
+    /// The median of so many.
+    #[arg(long, default_value_t = 3)]
+    runs: usize,
+    /// Sets and reports.
+    #[arg(long, default_value = "target/evidence/time")]
+    work: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    #[command(flatten)]
+    which: WhichArgs,
+    /// The program that discovers.
+    #[arg(long, default_value = "target/release/tactus")]
+    tactus: PathBuf,
+    /// Sets at once; as many as there are cores if not given.
+    #[arg(long)]
+    jobs: Option<NonZeroUsize>,
+    /// A further argument of `tactus discover`; may be given several times.
+    #[arg(long = "with", allow_hyphen_values = true)]
+    more: Vec<String>,
+    /// Keep the tables of measurements and residuals, for the peers.
+    #[arg(long)]
+    keep_tables: bool,
+    /// Fail if a slice's result is worse than it must be.
+    #[arg(long)]
+    check: bool,
+}
+
+#[derive(Debug, Args)]
+struct WhichArgs {
+    /// How much: the whole, a glance of some hundred sets, or the slice that CI runs.
+    #[arg(long, value_enum, default_value = "whole")]
+    size: Size,
+    /// Campaigns, several with commas; all if not given.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    campaign: Vec<Campaign>,
+    /// Only sets whose id has this in it.
+    #[arg(long)]
+    only: Option<String>,
+    /// Seed of all sets, and of every discovery.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Frames of a set, if not some 6,000.
+    #[arg(long)]
+    frames: Option<usize>,
+    /// Reports and results.
+    #[arg(long, default_value = "target/evidence/work")]
+    work: PathBuf,
+    /// Labels: for the scorer only.
+    #[arg(long, default_value = "target/evidence/sealed")]
+    sealed: PathBuf,
+    /// A work folder with others' reports in `peers`, of the same sealed labels.
+    #[arg(long)]
+    ablation: Option<PathBuf>,
+    /// What discovery costs: a JSON object of `ours`, from `time`, and `peers`.
+    #[arg(long)]
+    costs: Option<PathBuf>,
+    /// Write the tables between the marks of this document.
+    #[arg(long)]
+    document: Option<PathBuf>,
+    /// Write the pictures into this folder.
+    #[arg(long)]
+    images: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Size {
+    Whole,
+    Ablation,
+    Glance,
+    Slice,
+}
+
+/// What the slice must reach, of 12 sets without effect, 24 of one, 4 of two and 6 outside. Each bound is where a workflow that meets
+/// its targets falls by bad luck less than once in a hundred slices, if its sets were drawn anew; they are not: the slice is always
+/// the same.
+struct Bounds {
+    /// 2.8 % of 12 are 0.3; two or more come by luck in 4 % of draws, but the slice is fixed.
+    false_alarms_most: usize,
+    /// 95 % of 24 are 22.8; 20 or fewer come by luck in 0.6 %.
+    exact_least: usize,
+    /// 85 % of 4 are 3.4; one or none come by luck in 1.2 %.
+    pairs_least: usize,
+    /// 5 % of 34 are 1.7; five or more come by luck in 2 %.
+    wrong_most: usize,
+}
+
+const BOUNDS: Bounds = Bounds { false_alarms_most: 1, exact_least: 20, pairs_least: 2, wrong_most: 4 };
+
+impl EvidenceArgs {
+    pub(crate) fn run(self) -> Result<()> {
+        match self.part {
+            Part::Run(args) => args.run(),
+            Part::Score(which) => which.score().map(drop),
+            Part::Time(args) => args.run(),
+        }
+    }
+}
+
+impl TimeArgs {
+    fn run(self) -> Result<()> {
+        let timing = Timing::measure(&self.tactus, &self.work, &self.frames, self.runs)?;
+        println!("{}", serde_json::to_string_pretty(&timing)?);
+        Ok(())
+    }
+}
+
+impl RunArgs {
+    fn run(self) -> Result<()> {
+        let sets = self.which.sets();
+        let workflow = Workflow {
+            tactus: self.tactus,
+            more: self.more,
+            seed: self.which.seed,
+            jobs: self.jobs.or_else(|| thread::available_parallelism().ok()).map_or(1, usize::from),
+            keeps_tables: self.keep_tables,
+        };
+        run(&sets, &self.which.places(), &workflow, &|now| {
+            println!("{}/{} {}, {:.0} min left", now.done, now.total, now.id, now.left_s / 60.0);
+        })?;
+        let outcomes = self.which.score()?;
+        if self.check { BOUNDS.check(&outcomes) } else { Ok(()) }
+    }
+}
+
+impl WhichArgs {
+    fn sets(&self) -> Vec<Planned> {
+        let mut sizes = match self.size {
+            Size::Whole => Sizes::whole(),
+            Size::Ablation => Sizes::ablation(),
+            Size::Glance => Sizes::glance(),
+            Size::Slice => Sizes::slice(),
+        };
+        sizes.frames = self.frames;
+        let chosen = if self.campaign.is_empty() { &Campaign::ALL[..] } else { &self.campaign };
+        let sets = chosen.iter().flat_map(|campaign| campaigns(*campaign, &sizes, self.seed));
+        sets.filter(|set| self.only.as_ref().is_none_or(|part| set.id.contains(part))).collect()
+    }
+
+    fn places(&self) -> Places {
+        Places { work: self.work.clone(), sealed: self.sealed.clone() }
+    }
+
+    fn ablations(&self) -> Result<Vec<Ablation>> {
+        let Some(work) = &self.ablation else { return Ok(Vec::new()) };
+        let sizes = Sizes::ablation();
+        let sets = Campaign::ALL.into_iter().flat_map(|campaign| campaigns(campaign, &sizes, self.seed));
+        let sets: Vec<Planned> = sets.collect();
+        ablations(&sets, &Places { work: work.clone(), sealed: self.sealed.clone() })
+    }
+
+    fn costs(&self) -> Result<Option<Costs>> {
+        let Some(path) = &self.costs else { return Ok(None) };
+        let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        Ok(Some(serde_json::from_str(&text).with_context(|| path.display().to_string())?))
+    }
+
+    fn score(&self) -> Result<Vec<Outcome>> {
+        let outcomes = read(&self.sets(), &self.places())?;
+        let scores = Scores::new(&outcomes);
+        let text = document(&scores, &self.ablations()?, self.costs()?.as_ref());
+        println!("{text}");
+        write(&self.work.join("evidence.json"), &serde_json::to_string_pretty(&scores)?)?;
+        write(&self.work.join("evidence.md"), &text)?;
+        write(&self.work.join("misses.txt"), &misses(&outcomes))?;
+        if let Some(path) = &self.document {
+            let before = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+            let after = into_document(&before, &text);
+            write(path, &after.with_context(|| format!("{} has no marks", path.display()))?)?;
+        }
+        if let Some(folder) = &self.images {
+            for (name, picture) in pictures(&scores) {
+                write(&folder.join(name), &picture)?;
+            }
+        }
+        Ok(outcomes)
+    }
+}
+
+impl Bounds {
+    fn check(&self, outcomes: &[Outcome]) -> Result<()> {
+        let count = |campaign, is_so: fn(&Outcome) -> bool| {
+            outcomes.iter().filter(|set| set.campaign == campaign && is_so(set)).count()
+        };
+        let false_alarms = count(Campaign::FalseAlarms, |set| set.is_detected() || set.has_failed());
+        let exact = count(Campaign::Names, Outcome::is_exact);
+        let pairs = count(Campaign::Pairs, Outcome::names_all);
+        let is_wrong = |set: &Outcome| !set.wrong_names().is_empty();
+        let wrong = count(Campaign::Names, is_wrong)
+            + count(Campaign::Pairs, is_wrong)
+            + count(Campaign::Outside, is_wrong);
+        println!("false alarms {false_alarms}, exact {exact}, pairs {pairs}, sets with a wrong name {wrong}");
+        ensure!(false_alarms <= self.false_alarms_most, "at most {} false alarms", self.false_alarms_most);
+        ensure!(exact >= self.exact_least, "at least {} named exactly", self.exact_least);
+        ensure!(pairs >= self.pairs_least, "at least {} pairs with both named", self.pairs_least);
+        ensure!(wrong <= self.wrong_most, "at most {} sets with a wrong name", self.wrong_most);
+        Ok(())
+    }
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    }
+    fs::write(path, text).with_context(|| path.display().to_string())
+}
