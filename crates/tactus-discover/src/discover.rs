@@ -8,19 +8,14 @@ use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Regist
 use crate::candidates::{Candidate, Hints};
 use crate::covariates::{Feature, Form, Forms, features};
 use crate::discovery::{
-<<<<<<< HEAD
     Base, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, Point, Split, Step, Unexplained, Verdict,
-=======
-    Base, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NotShown, Split, Step,
-    Unexplained, Verdict,
->>>>>>> active
 };
 use crate::fit::{Fitted, Problem};
 use crate::next::{Explanation, Setting};
 use crate::noise::Noise;
 use crate::rows::{HeldOut, Rows, still};
 use crate::score::{Score, flipped, p_value, q_values};
-use crate::search::{ALPHA, Search, largest, names, without};
+use crate::search::{ALPHA, Equivalent, Search, largest, names, without};
 use crate::sensor::{Parameters, Sensor};
 use crate::{Frames, lattice, not_shown, parallel, spectrum, wiring};
 
@@ -155,7 +150,7 @@ pub fn discover(
     });
     said.say("taking back what does not earn its place", 0.6);
     let mut grown = search.back(grown)?;
-    let mut equivalent = BTreeMap::new();
+    let mut equivalent = Equivalent::new();
     if !names(&grown.parameters, search.known_terms).is_empty() {
         said.say("trying every other effect in each one's place", 0.7);
         (grown, equivalent) = search.exchange(grown)?;
@@ -190,7 +185,6 @@ pub fn discover(
     let (level_base, level_grown) = (in_noise(level_base), in_noise(level_grown));
     let gap_counts2 = level_base.heldout_rms_counts.powi(2) - floor.powi(2);
     let closed = level_base.heldout_rms_counts.powi(2) - level_grown.heldout_rms_counts.powi(2);
-<<<<<<< HEAD
     let curves = search.curves(&base, &grown)?;
     let mut steps = search.steps(&grown, &equivalent)?;
     let mut effects = grown.parameters.effects()?;
@@ -206,19 +200,21 @@ pub fn discover(
             equivalent: Vec::new(),
         });
     }
-=======
-    let mut steps = search.steps(&grown)?;
-    said.say("planning what to measure next", 0.9);
-    let twins = search.twins(&grown)?;
-    for step in &mut steps {
-        step.equivalent = twins.iter().filter(|one| one.effect == step.effect).map(|one| one.twin).collect();
-    }
-    let pairs: Vec<[Explanation; 2]> = twins.into_iter().map(|one| one.explanations).collect();
-    let not_shown: Vec<NotShown> = Vec::new();
+    said.say("planning what to measure next", 0.95);
+    let explained = |name: &str, fitted: &Fitted| Explanation {
+        name: name.to_owned(),
+        parameters: fitted.parameters.clone(),
+    };
+    let pairs: Vec<[Explanation; 2]> = equivalent
+        .iter()
+        .filter(|_| found)
+        .flat_map(|(name, rivals)| {
+            rivals.iter().map(|(rival, fitted)| [explained(name, &grown), explained(rival, fitted)])
+        })
+        .collect();
     let setting = Setting { known, frames, noise: &noise, threads: options.threads };
     let mut next_experiments = setting.propose(&pairs)?;
     next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
->>>>>>> active
     said.say("done", 1.0);
     Ok(Discovery {
         seed: options.seed,
@@ -354,7 +350,7 @@ impl Search<'_> {
     fn steps(
         &self,
         grown: &Fitted,
-        equivalent: &BTreeMap<&'static str, Vec<&'static str>>,
+        equivalent: &Equivalent,
     ) -> Result<Vec<Step>, DiscoverError> {
         let names = names(&grown.parameters, self.known_terms);
         let after = self.problem.heldout_blocks(&grown.predicted);
@@ -386,7 +382,7 @@ impl Search<'_> {
                 q_value: p_value,
                 heldout_rms_before_counts: self.problem.heldout_rms_counts(&before.predicted),
                 heldout_rms_after_counts: self.problem.heldout_rms_counts(&grown.predicted),
-                equivalent: equivalent.get(name).cloned().unwrap_or_default(),
+                equivalent: equivalent.get(name).into_iter().flatten().map(|(rival, _)| *rival).collect(),
             });
         }
         let p_values: Vec<f64> = steps.iter().map(|step| step.p_value).collect();

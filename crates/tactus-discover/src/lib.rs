@@ -20,7 +20,6 @@ mod score;
 mod search;
 mod sensor;
 mod spectrum;
-mod twins;
 mod wiring;
 
 pub use discover::{DiscoverError, Known, Options, Progress, discover, predict};

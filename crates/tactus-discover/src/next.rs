@@ -177,7 +177,7 @@ impl Setting<'_> {
         work: impl FnOnce(&Problem<'_>) -> Result<R, DiscoverError>,
     ) -> Result<R, DiscoverError> {
         let frames = &design.frames;
-        let mut rows = Rows::of(frames, &still(frames), true)?;
+        let mut rows = Rows::of(frames, true)?;
         let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
         rows.weigh(frames, self.noise, &all);
         work(&Problem::new(Sensor::new(self.known, frames, &rows), self.noise))

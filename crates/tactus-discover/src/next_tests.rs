@@ -59,7 +59,7 @@ fn twins(known: &Known, [right, wrong]: [(&str, &[(&str, f64)]); 2]) -> [Explana
     let [right, wrong] = [right, wrong].map(|(name, values)| explanation(known, name, values));
     let designs = Bench::of(known, &frames).designs();
     let frames = &designs.iter().find(|design| design.name == "element-centres").unwrap().frames;
-    let mut rows = Rows::of(frames, &still(frames), true).unwrap();
+    let mut rows = Rows::of(frames, true).unwrap();
     let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
     rows.weigh(frames, &noise, &all);
     rows.counts = Sensor::new(known, frames, &rows).predict(&right.parameters).unwrap();

@@ -69,6 +69,9 @@ pub(crate) struct Search<'a> {
     pub(crate) progress: &'a (dyn Fn(&str) + Sync),
 }
 
+/// For each effect that was added, others that serve as well in its place, and the models with them.
+pub(crate) type Equivalent = BTreeMap<&'static str, Vec<(&'static str, Fitted)>>;
+
 /// A round: what was tried, and what came of it.
 pub(crate) struct Tried {
     pub(crate) round: discovery::Round,
@@ -207,10 +210,10 @@ impl Search<'_> {
     pub(crate) fn exchange(
         &self,
         mut at: Fitted,
-    ) -> Result<(Fitted, BTreeMap<&'static str, Vec<&'static str>>), DiscoverError> {
+    ) -> Result<(Fitted, Equivalent), DiscoverError> {
         let mut exchanged = 0;
         'again: loop {
-            let mut equivalent = BTreeMap::new();
+            let mut equivalent = Equivalent::new();
             let names = names(&at.parameters, self.known_terms);
             for name in &names {
                 let less = without(&at.parameters, name, self.known_terms);
@@ -230,8 +233,8 @@ impl Search<'_> {
                     at = self.problem.fit_from(best.parameters.clone(), POLISH_ROUNDS, self.options.threads)?;
                     continue 'again;
                 }
-                let same = fits.iter().filter(|(_, rival)| self.serves_as_well(&less, rival, &at));
-                equivalent.insert(*name, same.map(|(rival, _)| *rival).collect());
+                let same = fits.into_iter().filter(|(_, rival)| self.serves_as_well(&less, rival, &at));
+                equivalent.insert(*name, same.collect());
             }
             return Ok((at, equivalent));
         }
