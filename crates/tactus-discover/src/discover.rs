@@ -161,10 +161,10 @@ pub fn discover(
     let grown_gap = problem.heldout_gap(&grown.predicted);
     let [closed, _] = problem.heldout_gain(&base, &grown);
     // What is left beyond the doubt about the noise, of what there was.
-    let sure = (grown_gap.value - SURE_Z * grown_gap.error).max(0.0);
+    let sure = grown_gap.sure();
     let share = if closed + sure > 0.0 { (sure / (closed + sure)).clamp(0.0, 1.0) } else { 1.0 };
     let left = after.p_value <= ALPHA;
-    if share > UNEXPLAINED_SHARE {
+    if left && (share > UNEXPLAINED_SHARE || after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic)) {
         // A model that leaves so much is none of what it is named after.
         grown = base.clone();
     }
@@ -401,8 +401,9 @@ const Q_MAX: f64 = 0.05;
 /// What is left of the gap at most, for the verdict.
 const EXPLAINED_SHARE: f64 = 0.1;
 const UNEXPLAINED_SHARE: f64 = 0.35;
-/// The noise is known to so many standard errors.
-const SURE_Z: f64 = 2.0;
+/// What is left withdraws all names if it depends on a covariate so clearly, and so much of how clearly it did at first.
+const LEFT_Z: f64 = 4.7;
+const LEFT_SHARE: f64 = 0.35;
 
 /// Says how far it has come; the share never falls.
 struct Said<'a> {

@@ -23,6 +23,8 @@ use crate::{DiscoverError, parallel};
 /// Recalibration moves an element's gain within these, as ratios to what is typical of the array: an element beyond is
 /// not an element of another gain.
 const GAIN_RATIOS: [f64; 2] = [0.25, 4.0];
+/// So near to an end a gain is at it.
+const PIN_MARGIN: f64 = 0.02;
 /// An element whose reading tells its gain worse than this share keeps its declared gain.
 const GAIN_ERROR_MAX: f64 = 0.3;
 /// A fit ends when a step promises to lessen the cost by less than this.
@@ -84,6 +86,16 @@ pub(crate) struct Linear<'a> {
     by_gain_means: Vec<f64>,
     /// Of every element, the weighted sum of squares of that; 0 where the gain is not free.
     by_gain_squares: Vec<f64>,
+}
+
+/// The noise is known to so many standard errors.
+const SURE_Z: f64 = 2.0;
+
+impl HeldOutGap {
+    /// What is left beyond the doubt about the noise.
+    pub(crate) fn sure(self) -> f64 {
+        (self.value - SURE_Z * self.error).max(0.0)
+    }
 }
 
 impl<'a> Problem<'a> {
@@ -299,12 +311,28 @@ impl<'a> Problem<'a> {
         for ((slope, weight), element) in by_gain.iter().zip(self.weights()).zip((0..elements).cycle()) {
             by_gain_squares[element] += weight * slope * slope;
         }
-        for squares in &mut by_gain_squares {
-            if *squares * GAIN_ERROR_MAX * GAIN_ERROR_MAX < 1.0 {
+        let pinned = self.pinned(at);
+        for (squares, pinned) in by_gain_squares.iter_mut().zip(&pinned) {
+            if *pinned || *squares * GAIN_ERROR_MAX * GAIN_ERROR_MAX < 1.0 {
                 *squares = 0.0;
             }
         }
         Ok(Linear { problem: self, by_gain, by_gain_means, by_gain_squares })
+    }
+
+    /// Elements whose gain has come to the end of what recalibration may give it: there it stays, for an effect to explain.
+    fn pinned(&self, at: &Parameters) -> Vec<bool> {
+        let declared = &self.sensor.known.response.sensitivity_counts_per_mm;
+        let ratios: Vec<f64> =
+            at.sensitivity.iter().zip(declared).map(|(now, declared)| now / declared).collect();
+        let typical = median(&ratios);
+        ratios
+            .iter()
+            .map(|ratio| {
+                let share = ratio / typical;
+                share <= GAIN_RATIOS[0] * (1.0 + PIN_MARGIN) || share >= GAIN_RATIOS[1] * (1.0 - PIN_MARGIN)
+            })
+            .collect()
     }
 
     /// Takes the mean over the fitted rows of each run off each element; returns the means, run by run.
@@ -527,8 +555,9 @@ impl Linear<'_> {
             .map(|(((now, declared), share), _)| now * (1.0 + share) / declared)
             .collect();
         let typical = if ratios.is_empty() { 1.0 } else { median(&ratios) };
+        let pinned = self.problem.pinned(parameters);
         let mut taken = vec![0.0; elements];
-        for element in 0..elements {
+        for element in (0..elements).filter(|element| !pinned[*element]) {
             let now = parameters.sensitivity[element];
             let bounds = GAIN_RATIOS.map(|ratio| ratio * typical * declared[element]);
             let (least, most) = (bounds[0].min(bounds[1]), bounds[0].max(bounds[1]));

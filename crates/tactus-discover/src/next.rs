@@ -20,7 +20,7 @@ use tactus_model::effect::{Definition, Kind};
 use crate::discovery::{NextExperiment, NotShown};
 use crate::fit::{Free, Problem};
 use crate::noise::Noise;
-use crate::rows::{HeldOut, Rows, still};
+use crate::rows::{HeldOut, Rows};
 use crate::score::Fitting;
 use crate::sensor::{Parameters, Sensor, Term};
 use crate::{DiscoverError, Frames, Known, parallel};

@@ -64,7 +64,7 @@ fn twins(known: &Known, [right, wrong]: [(&str, &[(&str, f64)]); 2]) -> [Explana
     rows.weigh(frames, &noise, &all);
     rows.counts = Sensor::new(known, frames, &rows).predict(&right.parameters).unwrap();
     let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
-    let fitted = problem.fit_from(wrong.parameters, 8, &[], 2).unwrap();
+    let fitted = problem.fit_from(wrong.parameters, 8, 2).unwrap();
     [right, Explanation { parameters: fitted.parameters, name: wrong.name }]
 }
 

@@ -41,15 +41,16 @@ const FINISHED_MAX: usize = 4;
 const GAIN_SHARE_LEAST: f64 = 0.01;
 /// Rounds of a fit of a model that is taken.
 const POLISH_ROUNDS: usize = 8;
-/// What a term must lessen the cost by at least.
+/// What a term must lessen the cost by at least, and each of its parameters.
 const PENALTY: f64 = 10.0;
+const PENALTY_EACH: f64 = 6.0;
 /// Rivals of an effect that are fitted in its place, at most, and what their first step must promise.
 const RIVALS_MAX: usize = 5;
 const RIVAL_SHARE: f64 = 0.15;
 const EXCHANGES_MAX: usize = 3;
 /// Two models are not told apart by fewer standard errors than this, or where one closes so much of what the other does.
-const INSEPARABLE_Z: f64 = 2.0;
-const INSEPARABLE_SHARE: f64 = 0.97;
+const INSEPARABLE_Z: f64 = 3.0;
+const INSEPARABLE_SHARE: f64 = 0.9;
 /// An effect stays if the held-out presses are further off without it by so many standard errors, and by such a share
 /// of what the whole model leaves of them.
 const EARNS_Z: f64 = 2.0;
@@ -144,7 +145,7 @@ impl Search<'_> {
         order.truncate(FITTED_MAX);
         let starts: Vec<Term> = order.iter().map(|one| screened[*one].start.clone()).collect();
         let mut fits = self.fits(at, &starts)?;
-        fits.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
         for (name, fitted) in &fits {
             if let Some(one) = tried.iter_mut().find(|one| one.effect == *name) {
                 let share =
@@ -172,7 +173,7 @@ impl Search<'_> {
         };
         let mut fits: Vec<(&'static str, Fitted)> =
             parallel::map(starts, self.options.threads, fit).into_iter().collect::<Result<_, DiscoverError>>()?;
-        fits.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
         let best = fits.first().map_or(0.0, |(_, best)| at.cost - best.cost);
         fits.retain(|(_, fitted)| at.cost - fitted.cost > BEHIND_SHARE * best);
         fits.truncate(FINISHED_MAX);
@@ -194,14 +195,14 @@ impl Search<'_> {
         let names = names(&at.parameters, self.known_terms);
         let allowed = |name: &&'static str| names.contains(name) || names.len() < NAMES_MAX;
         let (best_name, best) = tried.fits.iter().find(|(name, _)| allowed(name))?;
-        let gain = at.cost - best.cost;
+        let gain = charged(at) - charged(best);
         if gain <= PENALTY || gain < GAIN_SHARE_LEAST * (self.base_cost - at.cost) {
             return None;
         }
         let again = tried
             .fits
             .iter()
-            .find(|(name, fitted)| names.contains(name) && at.cost - fitted.cost > AGAIN_SHARE * gain);
+            .find(|(name, fitted)| names.contains(name) && charged(at) - charged(fitted) > AGAIN_SHARE * gain);
         let (name, fitted) = again.map_or((best_name, best), |(name, fitted)| (name, fitted));
         Some((name, fitted.clone()))
     }
@@ -227,8 +228,8 @@ impl Search<'_> {
                 rivals.truncate(RIVALS_MAX);
                 let starts: Vec<Term> = rivals.into_iter().map(|one| one.start).collect();
                 let fits = self.fits(&less, &starts)?;
-                let best = fits.iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-                if let Some((_, best)) = best.filter(|(_, best)| best.cost < at.cost - PENALTY && exchanged < EXCHANGES_MAX) {
+                let best = fits.iter().min_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
+                if let Some((_, best)) = best.filter(|(_, best)| charged(best) < charged(&at) - PENALTY && exchanged < EXCHANGES_MAX) {
                     exchanged += 1;
                     at = self.problem.fit_from(best.parameters.clone(), POLISH_ROUNDS, self.options.threads)?;
                     continue 'again;
@@ -268,7 +269,8 @@ impl Search<'_> {
             let worth = |less: &Fitted| {
                 let [gain, error] = self.problem.heldout_gain(less, &at);
                 // Beyond noise, and as much again as a part of what the whole model leaves.
-                (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(gain / (EARNS_SHARE * gap.value.max(gap.error)))
+                let left = EARNS_SHARE * gap.sure();
+                (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(if left > 0.0 { gain / left } else { f64::INFINITY })
             };
             let Some((least, worth)) = fits.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else {
                 return Ok(at);
@@ -280,6 +282,12 @@ impl Search<'_> {
             at = self.problem.fit_from(simpler.parameters, POLISH_ROUNDS, self.options.threads)?;
         }
     }
+}
+
+/// The cost of a model, its parameters charged for.
+fn charged(fitted: &Fitted) -> f64 {
+    let parameters: usize = fitted.parameters.terms.iter().map(|term| term.values.len()).sum();
+    fitted.cost + PENALTY_EACH * parameters as f64
 }
 
 /// The effects that were added, each once, in order.

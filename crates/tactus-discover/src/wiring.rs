@@ -1,9 +1,9 @@
-//! Which elements may answer for another: those whose reading follows another's signal better than their own.
+//! Which elements may answer for another: those whose reading follows another's signal beside their own.
 
 use crate::fit::{Fitted, Problem};
 
-/// A pair is worth a try if the other's signal explains so much more of an element's variance than its own.
-const LEAD_LEAST: f64 = 0.02;
+/// A pair is worth a try if the other's signal lessens the cost of the element's reading by so much.
+const GAIN_LEAST: f64 = 20.0;
 /// So many pairs at most.
 const PAIRS_MAX: usize = 4;
 /// An element that answers with less than this share of the typical gain may be dead.
@@ -24,40 +24,77 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
                 .map(|((counts, baseline), gain)| if *gain == 0.0 { 0.0 } else { (counts - baseline) / gain })
         })
         .collect();
+    let sums = Sums::of(problem, &signal);
     let mut found: Vec<(f64, [usize; 2])> = Vec::new();
     let declared = &problem.sensor.known.response.sensitivity_counts_per_mm;
     for element in 0..elements {
-        let own = correlation(problem, &signal, element, element);
-        let best = (0..elements)
-            .filter(|other| *other != element)
-            .map(|other| (correlation(problem, &signal, element, other), other))
+        let others = (0..elements).filter(|other| *other != element);
+        let best = others
+            .map(|other| (sums.gain(element, other), other))
             .max_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((best, other)) = best.filter(|(best, _)| *best > own + LEAD_LEAST) {
-            found.push((best - own, [element, other]));
+        if let Some((gain, other)) = best.filter(|(gain, _)| *gain > GAIN_LEAST) {
+            found.push((gain, [element, other]));
         }
         let ratio = fitted.parameters.sensitivity[element] / declared[element];
-        if ratio.abs() < DEAD_SHARE && own < 0.5 {
-            found.push((1.0 - own, [element, element]));
+        if ratio.abs() < DEAD_SHARE {
+            found.push((f64::INFINITY, [element, element]));
         }
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().take(PAIRS_MAX).map(|(_, pair)| pair).collect()
 }
 
-/// Share of the variance of an element's reading that another's signal explains, in the fitted rows.
-fn correlation(problem: &Problem<'_>, signal: &[f64], element: usize, other: usize) -> f64 {
-    let rows = problem.sensor.rows;
-    let elements = rows.elements;
-    let (mut w, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for (row, weight) in problem.train.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-        let (of_signal, of_counts) = (signal[row * elements + other], rows.counts[row * elements + element]);
-        w += weight;
-        x += weight * of_signal;
-        y += weight * of_counts;
-        xx += weight * of_signal * of_signal;
-        xy += weight * of_signal * of_counts;
-        yy += weight * of_counts * of_counts;
+/// Moments of the signals and of the readings in the fitted rows, centred and weighted.
+struct Sums {
+    elements: usize,
+    /// Of two elements' signals.
+    signals: Vec<f64>,
+    /// Of an element's reading with another's signal, reading by reading.
+    readings: Vec<f64>,
+}
+
+impl Sums {
+    fn of(problem: &Problem<'_>, signal: &[f64]) -> Self {
+        let rows = problem.sensor.rows;
+        let elements = rows.elements;
+        let total: f64 = problem.train.iter().sum();
+        let mean = |values: &[f64]| -> Vec<f64> {
+            let mut mean = vec![0.0; elements];
+            for (values, weight) in values.chunks_exact(elements).zip(&problem.train) {
+                mean.iter_mut().zip(values).for_each(|(mean, value)| *mean += weight * value / total);
+            }
+            mean
+        };
+        let (mean_signal, mean_counts) = (mean(signal), mean(&rows.counts));
+        let mut sums =
+            Self { elements, signals: vec![0.0; elements * elements], readings: vec![0.0; elements * elements] };
+        let of_rows = signal.chunks_exact(elements).zip(rows.counts.chunks_exact(elements));
+        for ((signal, counts), weight) in of_rows.zip(&problem.train).filter(|(_, weight)| **weight > 0.0) {
+            let centred: Vec<f64> = signal.iter().zip(&mean_signal).map(|(one, mean)| one - mean).collect();
+            for element in 0..elements {
+                let of_signal = weight * centred[element];
+                let of_counts =
+                    weight * (counts[element] - mean_counts[element]) * problem.element_weight[element].sqrt();
+                let at = element * elements..(element + 1) * elements;
+                for ((signals, readings), other) in
+                    sums.signals[at.clone()].iter_mut().zip(&mut sums.readings[at]).zip(&centred)
+                {
+                    *signals += of_signal * other;
+                    *readings += of_counts * other;
+                }
+            }
+        }
+        sums
     }
-    let (covariance, of_x, of_y) = (xy - x * y / w, xx - x * x / w, yy - y * y / w);
-    if of_x > 0.0 && of_y > 0.0 { covariance * covariance / (of_x * of_y) } else { 0.0 }
+
+    /// By how much another's signal, beside its own, lessens the cost of an element's reading.
+    fn gain(&self, element: usize, other: usize) -> f64 {
+        let at = |one: usize, other: usize| one * self.elements + other;
+        let own = self.signals[at(element, element)];
+        let across = self.signals[at(element, other)];
+        let left = self.signals[at(other, other)] - if own > 0.0 { across * across / own } else { 0.0 };
+        let reading = self.readings[at(element, other)]
+            - if own > 0.0 { across / own * self.readings[at(element, element)] } else { 0.0 };
+        if left > 1e-9 * self.signals[at(other, other)] { reading * reading / left } else { 0.0 }
+    }
 }

@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! m_k(t) = greatest over the past s of u(s) exp(-(t - s) / tau_k)
-//! u     -> max(u, set_share (m_1 + m_2 + m_3) / 3)             tau = recovery {1 / spread_ratio, 1, spread_ratio}
+//! u     -> u + set_share mean(m_k - u)                         tau = recovery {1 / spread_ratio, 1, spread_ratio}
 //! ```
 //!
 //! The dent is a share of the deepest, each element's own, and recovers exponentially with a ratio of 1; with others it
-//! follows power laws and series, as `relaxation` does. A tool that stands deeper than the dent feels nothing of it:
-//! readings under load are the base model's.
+//! follows power laws and series, as `relaxation` does. It adds to what presses less than it did; a press that goes as
+//! deep as the one before feels nothing of it, since `m_k` is then `u`.
 //!
 //! Derivatives in closed form, with memory. Cost: three exponentials a moment.
 //!
@@ -62,10 +62,7 @@ impl OnCovering for Imprint {
             for (dent, (recovery_s, left)) in dents.iter_mut().zip(recoveries) {
                 dent.follow(*u, now.dt_s, left, recovery_s);
             }
-            let set_mm = self.set_share * left_mm(dents);
-            if set_mm > u.max(0.0) {
-                *u = set_mm;
-            }
+            *u += self.set_share * (left_mm(dents) - u.max(0.0));
         }
     }
 
@@ -86,8 +83,7 @@ impl OnCovering for Imprint {
             let [short, middle, long] =
                 std::array::from_fn(|k| self.set_share * dents[k].left_mm * dents[k].age_s / recoveries_s[k]);
             *slope = match parameter {
-                _ if self.set_share * left_mm(dents) < u.max(0.0) => 0.0,
-                0 => left_mm(dents),
+                0 => left_mm(dents) - u.max(0.0),
                 1 => mean([short, middle, long]) / self.recovery_s,
                 _ => mean([-short, 0.0, long]) / self.spread_ratio,
             };
