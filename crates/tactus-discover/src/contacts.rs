@@ -43,7 +43,8 @@ impl<'a> Contacts<'a> {
             .spans
             .iter()
             .flat_map(|[first, end]| {
-                let rests = (*first..*end).filter(|frame| self.still[*frame] == 3).map(|frame| self.depth_mm(frame));
+                let rests =
+                    (*first..*end).filter(|frame| self.still[*frame] == 3).map(|frame| self.depth_mm(frame));
                 rests.chain([(*first..*end).map(|frame| self.depth_mm(frame)).fold(0.0, f64::max)])
             })
             .filter(|depth_mm| *depth_mm > 0.0)
@@ -53,18 +54,21 @@ impl<'a> Contacts<'a> {
     }
 
     pub(crate) fn distinct_places(&self) -> usize {
-        self.places_mm().fold(Vec::<[f64; 2]>::new(), |mut known, place| {
-            if known.iter().all(|other| far(*other, place)) {
-                known.push(place);
-            }
-            known
-        })
-        .len()
+        self.places_mm()
+            .fold(Vec::<[f64; 2]>::new(), |mut known, place| {
+                if known.iter().all(|other| far(*other, place)) {
+                    known.push(place);
+                }
+                known
+            })
+            .len()
     }
 
     pub(crate) fn longest_hold_s(&self) -> f64 {
         let holds = self.spans.iter().flat_map(|[first, end]| *first..*end);
-        holds.map(|frame| self.frames.t_s[frame] - self.frames.t_s[frame - self.still[frame]]).fold(0.0, f64::max)
+        holds
+            .map(|frame| self.frames.t_s[frame] - self.frames.t_s[frame - self.still[frame]])
+            .fold(0.0, f64::max)
     }
 
     /// Longest time without contact after one.
@@ -87,15 +91,18 @@ impl<'a> Contacts<'a> {
 
     /// Speeds of going in.
     pub(crate) fn distinct_speeds(&self) -> usize {
-        let mut speeds: Vec<f64> = self.spans.iter().filter_map(|[first, end]| self.speed_mm_per_s(*first, *end)).collect();
+        let mut speeds: Vec<f64> =
+            self.spans.iter().filter_map(|[first, end]| self.speed_mm_per_s(*first, *end)).collect();
         speeds.sort_by(f64::total_cmp);
         distinct(&speeds, |a, b| b / a > SAME_SPEED_RATIO)
     }
 
     /// True if one place was reached from different sides.
     pub(crate) fn approaches(&self) -> bool {
-        let from: Vec<([f64; 2], [bool; 2])> = self.spans.iter().filter_map(|[first, _]| self.from(*first)).collect();
-        from.iter().any(|(place, sides)| from.iter().any(|(other, others)| !far(*place, *other) && sides != others))
+        let from: Vec<([f64; 2], [bool; 2])> =
+            self.spans.iter().filter_map(|[first, _]| self.from(*first)).collect();
+        from.iter()
+            .any(|(place, sides)| from.iter().any(|(other, others)| !far(*place, *other) && sides != others))
     }
 
     /// True if one place was pressed again.
@@ -105,7 +112,11 @@ impl<'a> Contacts<'a> {
 
     /// Frames in contact whose tip moves.
     pub(crate) fn frames_in_motion(&self) -> usize {
-        self.spans.iter().flat_map(|[first, end]| *first..*end).filter(|frame| self.still[*frame] == 0).count()
+        self.spans
+            .iter()
+            .flat_map(|[first, end]| *first..*end)
+            .filter(|frame| self.still[*frame] == 0)
+            .count()
     }
 
     fn depth_mm(&self, frame: usize) -> f64 {

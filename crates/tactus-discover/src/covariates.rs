@@ -151,7 +151,9 @@ fn images(
     for (row, place_mm) in places_mm.iter().enumerate() {
         let Some(place_mm) = *place_mm else { continue };
         let target = row * elements..(row + 1) * elements;
-        if let Some((_, from)) = last.filter(|(before, _)| *before == place_mm) {
+        if let Some((_, from)) =
+            last.filter(|(before, _)| before.map(f64::to_bits) == place_mm.map(f64::to_bits))
+        {
             images.copy_within(from * elements..(from + 1) * elements, target.start);
             continue;
         }

@@ -15,6 +15,7 @@
 use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::Kind;
 
+use crate::contacts::Contacts;
 use crate::noise::{Noise, median};
 use crate::scale::Scale;
 use crate::sensor::{Parameters, Sensor, Term};
@@ -110,14 +111,11 @@ impl<'a> Problem<'a> {
         let mut coverings_mm = frames.covering_mm.clone();
         coverings_mm.sort_by(f64::total_cmp);
         coverings_mm.dedup();
-        let places = frames.position_mm.iter().map(|at| at.map(|mm| (mm * 20.0).round() as i64));
-        let pressed: std::collections::BTreeSet<[i64; 2]> =
-            places.filter(|at| at[2] < 0).map(|[x, y, _]| [x, y]).collect();
         Self {
             element_weight,
             train,
             coverings: coverings_mm.len(),
-            spread_free: pressed.len() > 1,
+            spread_free: Contacts::of(frames).distinct_places() > 1,
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
             sensor,
         }
@@ -280,7 +278,8 @@ impl<'a> Problem<'a> {
             Free::Of { term, parameter } => {
                 let scale = self.scale(at, term, parameter);
                 let value = at.terms[term].values[parameter];
-                let step = if scale.forward(value, scale.step) == value { -scale.step } else { scale.step };
+                let at_the_end = scale.distance(value, scale.forward(value, scale.step)) < 0.5 * scale.step;
+                let step = if at_the_end { -scale.step } else { scale.step };
                 moved.terms[term].values[parameter] = scale.forward(value, step);
                 // Towards a bound the step may be cut short.
                 scale.distance(value, moved.terms[term].values[parameter])

@@ -32,7 +32,7 @@ pub(crate) fn wider_step(frames: &Frames, declared_counts: f64) -> Option<(f64, 
         (steps - steps.round()).abs() > OFF_MAX
     });
     (off.count() == 0).then(|| {
-        let chance = (declared_counts / step).max(1e-3).powi(readings.len().min(200) as i32 - 2);
+        let chance = (declared_counts / step).max(1e-3).powf(readings.len() as f64 - 2.0);
         (step, chance.max(f64::MIN_POSITIVE))
     })
 }

@@ -5,12 +5,12 @@ use crate::{Frame, Frames};
 
 fn readings(counts: impl Iterator<Item = f32>) -> Frames {
     let mut frames = Frames::new(1);
-    for (index, counts) in counts.enumerate() {
+    for (t_ns, counts) in (0..).step_by(33_000_000).zip(counts) {
         frames.push(Frame {
             run: "a",
             press: -1,
             phase: Phase::Idle,
-            t_ns: index as i64 * 33_000_000,
+            t_ns,
             position_mm: [0.0; 3],
             covering_mm: 1.0,
             indenter: "cyl1",

@@ -69,7 +69,7 @@ fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
     for (_, end) in &frames.runs {
         let start = begin;
         let mut anchor = start;
-        for frame in start..*end {
+        for (frame, still) in still.iter_mut().enumerate().take(*end).skip(start) {
             let moved = (0..3).any(|axis| {
                 (frames.position_mm[frame][axis] - frames.position_mm[anchor][axis]).abs() > STILL_MM
             });
@@ -77,7 +77,7 @@ fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
             if (moved && !clear) || frames.press[frame] != frames.press[anchor] {
                 anchor = frame;
             }
-            still[frame] = frame - anchor;
+            *still = frame - anchor;
         }
         begin = *end;
     }

@@ -132,13 +132,18 @@ impl<'a> Fitting<'a> {
             }
             let size = self.size(&column);
             if size > 1e-3 * whole && size > 0.0 {
-                column.iter_mut().for_each(|value| *value /= size);
+                for value in &mut column {
+                    *value /= size;
+                }
                 independent.push(column);
             }
         }
         let scores: Vec<(f64, Vec<f32>)> = independent.iter().map(|column| self.score_of(column)).collect();
         let squares: f64 = scores.iter().map(|(z, _)| z * z).sum();
-        Score { z: deviate(squares, scores.len()), parts: scores.into_iter().map(|(_, parts)| parts).collect() }
+        Score {
+            z: deviate(squares, scores.len()),
+            parts: scores.into_iter().map(|(_, parts)| parts).collect(),
+        }
     }
 
     fn score_of(&self, column: &[f64]) -> (f64, Vec<f32>) {
@@ -200,7 +205,8 @@ fn deviate(chi_square: f64, freedom: usize) -> f64 {
 
 /// The largest of the scores in each of many data sets whose blocks had their signs flipped, for each group.
 pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
-    let blocks = groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
+    let blocks =
+        groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
     let mut chance = Chance::new(seed);
     let mut largest = vec![Vec::with_capacity(flips); groups.len()];
     let mut signs = vec![1.0_f32; blocks];
@@ -223,6 +229,12 @@ pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Ve
         }
     }
     largest
+}
+
+/// The largest of all groups in each flipped data set.
+pub(crate) fn largest(groups: &[Vec<f64>]) -> Vec<f64> {
+    let flips = groups.first().map_or(0, Vec::len);
+    (0..flips).map(|flip| groups.iter().map(|group| group[flip]).fold(0.0, f64::max)).collect()
 }
 
 /// Share of Monte-Carlo statistics that reach one, the data's own counted as one of them.

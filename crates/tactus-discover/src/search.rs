@@ -14,12 +14,12 @@ use crate::candidates::{Candidate, Screened, with};
 use crate::discovery;
 use crate::fit::{Fitted, Problem};
 use crate::parallel;
-use crate::score::{Fitting, Score, flipped, p_value};
+use crate::score::{Fitting, Score, flipped, largest, p_value};
 use crate::sensor::{Parameters, Term};
 use crate::{DiscoverError, Options};
 
 /// Sign-flipped data sets of a test.
-const FLIPS: usize = 1999;
+pub(crate) const FLIPS: usize = 1999;
 /// Chance of adding anything to a model that lacks nothing.
 pub(crate) const ALPHA: f64 = 0.01;
 /// So many candidates of a round are fitted.
@@ -96,16 +96,12 @@ impl Search<'_> {
     pub(crate) fn forward(&self, mut at: Fitted) -> Result<(Fitted, Vec<Tried>), DiscoverError> {
         let mut rounds = Vec::new();
         loop {
-            let tried = self.round(&at, rounds.len())?;
-            let (taken, fitted) = match self.take(&at, &tried) {
-                Some(taken) => taken,
-                None => {
-                    rounds.push(tried);
-                    break;
-                }
+            let mut tried = self.round(&at, rounds.len())?;
+            let Some((taken, fitted)) = self.take(&at, &tried) else {
+                rounds.push(tried);
+                break;
             };
             (self.progress)(&format!("round {}: adding {taken}", rounds.len() + 1));
-            let mut tried = tried;
             tried.round.taken = Some(taken);
             rounds.push(tried);
             at = self.problem.fit_from(fitted.parameters, POLISH_ROUNDS, self.options.threads)?;
@@ -157,7 +153,12 @@ impl Search<'_> {
         let place = |name: &str| fits.iter().position(|(fitted, _)| *fitted == name).unwrap_or(usize::MAX);
         tried.sort_by(|a, b| place(a.effect).cmp(&place(b.effect)).then(b.score.total_cmp(&a.score)));
         let names = names(&at.parameters, self.known_terms);
-        Ok(Tried { round: discovery::Round { with: names, candidates: tried, taken: None }, screened, fits, p_value })
+        Ok(Tried {
+            round: discovery::Round { with: names, candidates: tried, taken: None },
+            screened,
+            fits,
+            p_value,
+        })
     }
 
     /// Fits of a model with each of the terms: all of them in few rounds, and then the best of them to the end.
@@ -171,8 +172,9 @@ impl Search<'_> {
             let started = with(&at.parameters, start.clone());
             Ok((start.definition.name, self.problem.fit_from(started, FIRST_ROUNDS, 1)?))
         };
-        let mut fits: Vec<(&'static str, Fitted)> =
-            parallel::map(starts, self.options.threads, fit).into_iter().collect::<Result<_, DiscoverError>>()?;
+        let mut fits: Vec<(&'static str, Fitted)> = parallel::map(starts, self.options.threads, fit)
+            .into_iter()
+            .collect::<Result<_, DiscoverError>>()?;
         fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
         let best = fits.first().map_or(0.0, |(_, best)| at.cost - best.cost);
         fits.retain(|(_, fitted)| at.cost - fitted.cost > BEHIND_SHARE * best);
@@ -199,19 +201,15 @@ impl Search<'_> {
         if gain <= PENALTY || gain < GAIN_SHARE_LEAST * (self.base_cost - at.cost) {
             return None;
         }
-        let again = tried
-            .fits
-            .iter()
-            .find(|(name, fitted)| names.contains(name) && charged(at) - charged(fitted) > AGAIN_SHARE * gain);
+        let again = tried.fits.iter().find(|(name, fitted)| {
+            names.contains(name) && charged(at) - charged(fitted) > AGAIN_SHARE * gain
+        });
         let (name, fitted) = again.map_or((best_name, best), |(name, fitted)| (name, fitted));
         Some((name, fitted.clone()))
     }
 
     /// Puts in each effect's place what serves better, and tells what serves as well.
-    pub(crate) fn exchange(
-        &self,
-        mut at: Fitted,
-    ) -> Result<(Fitted, Equivalent), DiscoverError> {
+    pub(crate) fn exchange(&self, mut at: Fitted) -> Result<(Fitted, Equivalent), DiscoverError> {
         let mut exchanged = 0;
         'again: loop {
             let mut equivalent = Equivalent::new();
@@ -229,9 +227,15 @@ impl Search<'_> {
                 let starts: Vec<Term> = rivals.into_iter().map(|one| one.start).collect();
                 let fits = self.fits(&less, &starts)?;
                 let best = fits.iter().min_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
-                if let Some((_, best)) = best.filter(|(_, best)| charged(best) < charged(&at) - PENALTY && exchanged < EXCHANGES_MAX) {
+                if let Some((_, best)) = best
+                    .filter(|(_, best)| charged(best) < charged(&at) - PENALTY && exchanged < EXCHANGES_MAX)
+                {
                     exchanged += 1;
-                    at = self.problem.fit_from(best.parameters.clone(), POLISH_ROUNDS, self.options.threads)?;
+                    at = self.problem.fit_from(
+                        best.parameters.clone(),
+                        POLISH_ROUNDS,
+                        self.options.threads,
+                    )?;
                     continue 'again;
                 }
                 let same = fits.into_iter().filter(|(_, rival)| self.serves_as_well(&less, rival, &at));
@@ -244,7 +248,8 @@ impl Search<'_> {
     /// True if the data cannot tell a rival from what is in the model: block by block it is hardly worse, or it closes
     /// nearly all of the gap that the other does, so that the form of either may be what differs.
     fn serves_as_well(&self, less: &Fitted, rival: &Fitted, at: &Fitted) -> bool {
-        let (of_rival, of_model) = (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
+        let (of_rival, of_model) =
+            (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
         let worse: Vec<f64> = of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect();
         let sum: f64 = worse.iter().sum();
         let mean = sum / worse.len().max(1) as f64;
@@ -270,9 +275,14 @@ impl Search<'_> {
                 let [gain, error] = self.problem.heldout_gain(less, &at);
                 // Beyond noise, and as much again as a part of what the whole model leaves.
                 let left = EARNS_SHARE * gap.sure();
-                (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(if left > 0.0 { gain / left } else { f64::INFINITY })
+                (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(if left > 0.0 {
+                    gain / left
+                } else {
+                    f64::INFINITY
+                })
             };
-            let Some((least, worth)) = fits.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else {
+            let Some((least, worth)) = fits.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+            else {
                 return Ok(at);
             };
             if worth >= 1.0 {
@@ -311,10 +321,4 @@ pub(crate) fn without(parameters: &Parameters, name: &str, known_terms: usize) -
         index <= known_terms || term.definition.name != name
     });
     less
-}
-
-/// The largest of all groups in each flipped data set.
-pub(crate) fn largest(groups: &[Vec<f64>]) -> Vec<f64> {
-    let flips = groups.first().map_or(0, Vec::len);
-    (0..flips).map(|flip| groups.iter().map(|group| group[flip]).fold(0.0, f64::max)).collect()
 }

@@ -27,15 +27,13 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
     let sums = Sums::of(problem, &signal);
     let mut found: Vec<(f64, [usize; 2])> = Vec::new();
     let declared = &problem.sensor.known.response.sensitivity_counts_per_mm;
-    for element in 0..elements {
+    for (element, declared) in declared.iter().enumerate() {
         let others = (0..elements).filter(|other| *other != element);
-        let best = others
-            .map(|other| (sums.gain(element, other), other))
-            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let best = others.map(|other| (sums.gain(element, other), other)).max_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((gain, other)) = best.filter(|(gain, _)| *gain > GAIN_LEAST) {
             found.push((gain, [element, other]));
         }
-        let ratio = fitted.parameters.sensitivity[element] / declared[element];
+        let ratio = fitted.parameters.sensitivity[element] / declared;
         if ratio.abs() < DEAD_SHARE {
             found.push((f64::INFINITY, [element, element]));
         }
@@ -66,15 +64,19 @@ impl Sums {
             mean
         };
         let (mean_signal, mean_counts) = (mean(signal), mean(&rows.counts));
-        let mut sums =
-            Self { elements, signals: vec![0.0; elements * elements], readings: vec![0.0; elements * elements] };
+        let mut sums = Self {
+            elements,
+            signals: vec![0.0; elements * elements],
+            readings: vec![0.0; elements * elements],
+        };
         let of_rows = signal.chunks_exact(elements).zip(rows.counts.chunks_exact(elements));
         for ((signal, counts), weight) in of_rows.zip(&problem.train).filter(|(_, weight)| **weight > 0.0) {
             let centred: Vec<f64> = signal.iter().zip(&mean_signal).map(|(one, mean)| one - mean).collect();
             for element in 0..elements {
                 let of_signal = weight * centred[element];
-                let of_counts =
-                    weight * (counts[element] - mean_counts[element]) * problem.element_weight[element].sqrt();
+                let of_counts = weight
+                    * (counts[element] - mean_counts[element])
+                    * problem.element_weight[element].sqrt();
                 let at = element * elements..(element + 1) * elements;
                 for ((signals, readings), other) in
                     sums.signals[at.clone()].iter_mut().zip(&mut sums.readings[at]).zip(&centred)

@@ -40,7 +40,16 @@ fn without_effects_counts_are_the_base_models_to_the_bit() {
 fn a_hastened_pipeline_reads_the_same_but_for_the_stamps_error() {
     for effects in [
         vec![],
-        vec![effect("relaxation", [("relaxed_share", 0.3), ("time_constant_s", 0.5), ("spread_ratio", 1.0), ("after_release", 0.0), ("recovery_ratio", 1.0)])],
+        vec![effect(
+            "relaxation",
+            [
+                ("relaxed_share", 0.3),
+                ("time_constant_s", 0.5),
+                ("spread_ratio", 1.0),
+                ("after_release", 0.0),
+                ("recovery_ratio", 1.0),
+            ],
+        )],
     ] {
         let simulator = simulator(effects);
         let way = way(&simulator);
@@ -156,7 +165,13 @@ fn a_path_that_is_late_is_asked_for_an_earlier_instant() {
 fn time_that_goes_back_stands_still() {
     let creeping = simulator([effect(
         "relaxation",
-        [("relaxed_share", 0.3), ("time_constant_s", 1.0), ("spread_ratio", 1.0), ("after_release", 0.0), ("recovery_ratio", 1.0)],
+        [
+            ("relaxed_share", 0.3),
+            ("time_constant_s", 1.0),
+            ("spread_ratio", 1.0),
+            ("after_release", 0.0),
+            ("recovery_ratio", 1.0),
+        ],
     )]);
     let tip_mm = upon(&creeping, 21, 0.5);
     let (mut straight, mut back) = (Pipeline::new(&creeping).unwrap(), Pipeline::new(&creeping).unwrap());

@@ -30,7 +30,13 @@ fn the_drawn_noise_comes_upon_the_clean_counts_before_the_converter() {
 fn copies_share_nothing_and_every_run_begins_without_a_past() {
     let one = simulator([effect(
         "relaxation",
-        [("relaxed_share", 0.5), ("time_constant_s", 1.0), ("spread_ratio", 1.0), ("after_release", 0.0), ("recovery_ratio", 1.0)],
+        [
+            ("relaxed_share", 0.5),
+            ("time_constant_s", 1.0),
+            ("spread_ratio", 1.0),
+            ("after_release", 0.0),
+            ("recovery_ratio", 1.0),
+        ],
     )]);
     let other = one.clone();
     let hold = Trajectory::new([(0.0, upon(&one, 21, 0.5))]).unwrap();

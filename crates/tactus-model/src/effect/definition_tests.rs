@@ -95,9 +95,17 @@ fn a_value_out_of_its_range_is_refused() {
 
 #[test]
 fn parameters_come_in_any_order_and_are_found_by_name() {
-    let effect =
-        Effect::new("relaxation", [("time_constant_s", 8.0), ("spread_ratio", 1.0), ("after_release", 0.0), ("recovery_ratio", 1.0), ("relaxed_share", 0.1)])
-            .unwrap();
+    let effect = Effect::new(
+        "relaxation",
+        [
+            ("time_constant_s", 8.0),
+            ("spread_ratio", 1.0),
+            ("after_release", 0.0),
+            ("recovery_ratio", 1.0),
+            ("relaxed_share", 0.1),
+        ],
+    )
+    .unwrap();
     assert_eq!(effect.value("relaxed_share"), Some(0.1));
     assert_eq!(effect.value("time_constant_s"), Some(8.0));
     assert_eq!(effect.value("time_constant"), None);

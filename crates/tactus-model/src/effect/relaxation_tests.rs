@@ -5,7 +5,11 @@ use crate::{Effect, Moment, Pipeline, Simulator, Trajectory};
 
 fn relaxing(time_constant_s: f64, spread_ratio: f64) -> Effect {
     let shape = [("time_constant_s", time_constant_s), ("spread_ratio", spread_ratio)];
-    Effect::new("relaxation", [("relaxed_share", 0.3), ("after_release", 0.0), ("recovery_ratio", 1.0)].into_iter().chain(shape)).unwrap()
+    Effect::new(
+        "relaxation",
+        [("relaxed_share", 0.3), ("after_release", 0.0), ("recovery_ratio", 1.0)].into_iter().chain(shape),
+    )
+    .unwrap()
 }
 
 fn creeping() -> Simulator {

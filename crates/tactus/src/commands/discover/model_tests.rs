@@ -3,8 +3,13 @@ use tactus_schema::Rig;
 
 use super::*;
 
-const RELAXATION: [(&str, f64); 5] =
-    [("relaxed_share", 0.12), ("time_constant_s", 8.1), ("spread_ratio", 4.0), ("after_release", 0.0), ("recovery_ratio", 1.0)];
+const RELAXATION: [(&str, f64); 5] = [
+    ("relaxed_share", 0.12),
+    ("time_constant_s", 8.1),
+    ("spread_ratio", 4.0),
+    ("after_release", 0.0),
+    ("recovery_ratio", 1.0),
+];
 
 pub(crate) fn before() -> Model {
     let rig = Rig::from_toml(include_str!("../../../../../config/rigs/sim.toml")).unwrap();
@@ -80,7 +85,17 @@ pub(crate) fn found(model: &Model) -> Discovery {
         recalibrated: base,
         grown,
         effects: vec![
-            Effect::new("relaxation", [("relaxed_share", 0.11), ("time_constant_s", 7.0), ("spread_ratio", 4.0), ("after_release", 0.0), ("recovery_ratio", 1.0)]).unwrap(),
+            Effect::new(
+                "relaxation",
+                [
+                    ("relaxed_share", 0.11),
+                    ("time_constant_s", 7.0),
+                    ("spread_ratio", 4.0),
+                    ("after_release", 0.0),
+                    ("recovery_ratio", 1.0),
+                ],
+            )
+            .unwrap(),
             Effect::new("miswired", miswired(18.0, 19.0)).unwrap(),
             Effect::new("miswired", miswired(19.0, 18.0)).unwrap(),
         ],

@@ -1,0 +1,108 @@
+//! What a search starts from: the split, the noise, the rows, and hints of what no grid would find.
+
+use crate::candidates::Hints;
+use crate::fit::Problem;
+use crate::noise::Noise;
+use crate::rows::{HeldOut, Rows, still};
+use crate::sensor::{Parameters, Sensor};
+use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum, wiring};
+
+/// Presses that are fitted, at least.
+const PRESSES_LEAST: usize = 3;
+/// Rounds of the base model's own fit.
+pub(crate) const BASE_ROUNDS: usize = 12;
+
+/// Data made ready.
+pub(crate) struct Prepared<'a> {
+    pub(crate) known: &'a Known,
+    pub(crate) frames: &'a Frames,
+    pub(crate) heldout: HeldOut,
+    pub(crate) still: Vec<usize>,
+    pub(crate) noise: Noise,
+    /// True if frames repeat each other, so that the noise is known.
+    pub(crate) replicates: bool,
+    /// Step of the converter: as declared, or wider.
+    pub(crate) step_counts: f64,
+    /// The wider step, if it is one, and the chance of that.
+    pub(crate) lattice: Option<(f64, f64)>,
+    /// Every frame for itself.
+    pub(crate) whole: Rows,
+    pub(crate) rows: Rows,
+    pub(crate) hints: Hints,
+    pub(crate) warnings: Vec<String>,
+}
+
+impl<'a> Prepared<'a> {
+    pub(crate) fn new(known: &'a Known, frames: &'a Frames, options: Options) -> Result<Self, DiscoverError> {
+        let heldout = HeldOut::choose(frames, options.seed);
+        if heldout.train_presses < PRESSES_LEAST {
+            return Err(DiscoverError::TooLittle(format!(
+                "{} presses can be fitted; at least {PRESSES_LEAST} are needed, and half as many to hold out",
+                heldout.train_presses
+            )));
+        }
+        let still = still(frames);
+        let lattice = lattice::wider_step(frames, known.array.step_counts());
+        let step_counts = lattice.map_or(known.array.step_counts(), |(step_counts, _)| step_counts);
+        let replicated = Noise::of(frames, &still, step_counts);
+        let mut warnings = Vec::new();
+        if replicated.is_none() {
+            warnings.push(
+                "no frames repeat each other: the noise is estimated from differences of consecutive frames"
+                    .to_owned(),
+            );
+        }
+        let replicates = replicated.is_some();
+        let noise = replicated.unwrap_or_else(|| Noise::of_differences(frames, step_counts));
+
+        let whole = Rows::of(frames, false)?;
+        let mut rows = Rows::of(frames, true)?;
+        rows.weigh(frames, &noise, &heldout);
+        let hints = hints(known, frames, &noise, &whole, &rows, options)?;
+        if !hints.frequencies_hz.is_empty() {
+            // A tone is lost in rows of several frames.
+            rows = Rows::of(frames, false)?;
+            rows.weigh(frames, &noise, &heldout);
+        }
+        Ok(Self {
+            known,
+            frames,
+            heldout,
+            still,
+            noise,
+            replicates,
+            step_counts,
+            lattice,
+            whole,
+            rows,
+            hints,
+            warnings,
+        })
+    }
+
+    /// The fit of its rows.
+    pub(crate) fn problem(&self) -> Problem<'_> {
+        Problem::new(Sensor::new(self.known, self.frames, &self.rows), &self.noise)
+    }
+}
+
+/// What the recalibrated base model leaves suggests.
+fn hints(
+    known: &Known,
+    frames: &Frames,
+    noise: &Noise,
+    whole: &Rows,
+    rows: &Rows,
+    options: Options,
+) -> Result<Hints, DiscoverError> {
+    let problem = Problem::new(Sensor::new(known, frames, rows), noise);
+    let declared = Parameters::declared(known, rows.paths.len());
+    let base = problem.fit_from(declared, BASE_ROUNDS, options.threads)?;
+    let predicted = Sensor::new(known, frames, whole).predict(&base.parameters)?;
+    let residual: Vec<f64> =
+        frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
+    Ok(Hints {
+        frequencies_hz: spectrum::lines_hz(frames, &residual),
+        wiring: wiring::pairs(&problem, &base),
+    })
+}

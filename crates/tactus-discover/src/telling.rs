@@ -1,0 +1,260 @@
+//! From a search to what is told of it.
+
+use tactus_model::{Effect, Response};
+
+use crate::discovery::{
+    Base, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, Split, Step, Unexplained, Verdict,
+};
+use crate::fit::Fitted;
+use crate::locate::Located;
+use crate::next::{Explanation, Setting};
+use crate::noise::Noise;
+use crate::prepare::Prepared;
+use crate::score::{q_values, sign_flip_p};
+use crate::search::{ALPHA, Equivalent, FLIPS, Search, Tried, names, without};
+use crate::sensor::{Parameters, Sensor, Term};
+use crate::{DiscoverError, Options, not_shown};
+
+/// What is left of the gap at most, for the verdict.
+const EXPLAINED_SHARE: f64 = 0.1;
+/// What is left withdraws all names if it is more than this share of the gap and depends on any covariate,
+const UNEXPLAINED_SHARE: f64 = 0.35;
+/// or if it depends on one so clearly, and by so much of how clearly it did at first.
+const LEFT_Z: f64 = 4.7;
+const LEFT_SHARE: f64 = 0.35;
+/// Rounds of the fits without each effect.
+const ROUNDS: usize = 8;
+
+/// What a search found.
+pub(crate) struct Found {
+    pub(crate) base: Fitted,
+    pub(crate) grown: Fitted,
+    pub(crate) rounds: Vec<Tried>,
+    pub(crate) equivalent: Equivalent,
+    /// Where the base model is off, and where the grown one still is.
+    pub(crate) before: Located,
+    pub(crate) after: Located,
+}
+
+/// A model against the held-out frames.
+struct Held {
+    level: Level,
+    /// Root mean square of each element.
+    elements_rms_counts: Vec<f64>,
+    /// Of all frames, frame by frame, element by element.
+    residual: Vec<f32>,
+}
+
+/// Tells what was found.
+pub(crate) fn tell(
+    prepared: &Prepared<'_>,
+    search: &Search<'_>,
+    found: Found,
+    options: Options,
+) -> Result<Discovery, DiscoverError> {
+    let Prepared { known, frames, heldout, lattice, .. } = prepared;
+    let Found { base, mut grown, rounds, equivalent, before, after } = found;
+    // Two tests, each at half the chance.
+    let first = rounds.first();
+    let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
+    let share = search.share_left(&base, &grown);
+    let left = after.p_value <= ALPHA;
+    if left && (share > UNEXPLAINED_SHARE || after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic)) {
+        // A model that leaves so much is none of what it is named after.
+        grown = base.clone();
+    }
+    let named = !names(&grown.parameters, search.known_terms).is_empty();
+    let verdict = match (named || lattice.is_some(), p_value <= ALPHA) {
+        (false, false) => Verdict::NothingMissing,
+        (false, true) => Verdict::Unexplained,
+        (true, _) if share <= EXPLAINED_SHARE || !left => Verdict::Explained,
+        (true, _) => Verdict::PartlyExplained,
+    };
+
+    let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
+    let floor = prepared.floor_counts(&of_grown);
+    let in_noise = |level: Level| Level { heldout_chi2: (level.heldout_rms_counts / floor).powi(2), ..level };
+    let squares = |held: &Held| held.level.heldout_rms_counts.powi(2);
+    let (gap, closed) = (squares(&of_base) - floor.powi(2), squares(&of_base) - squares(&of_grown));
+
+    let not_shown = first.map_or_else(Vec::new, |round| {
+        not_shown::not_shown(search.problem, &round.screened, prepared.replicates)
+    });
+    let mut steps = search.steps(&grown, &equivalent)?;
+    let mut effects = grown.parameters.effects()?;
+    if let Some((step_counts, p_value)) = lattice {
+        effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);
+        steps.push(coarse(*step_counts, *p_value, of_grown.level.heldout_rms_counts));
+    }
+    let explained = |name: &str, fitted: &Fitted| Explanation {
+        name: name.to_owned(),
+        parameters: fitted.parameters.clone(),
+    };
+    let pairs: Vec<[Explanation; 2]> = equivalent
+        .iter()
+        .filter(|_| named)
+        .flat_map(|(name, rivals)| {
+            rivals.iter().map(|(rival, fitted)| [explained(name, &grown), explained(rival, fitted)])
+        })
+        .collect();
+    let setting = Setting { known, frames, noise: &prepared.noise, threads: options.threads };
+    let mut next_experiments = setting.propose(&pairs)?;
+    next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
+
+    let elements = of_base.elements_rms_counts.iter().zip(&of_grown.elements_rms_counts);
+    Ok(Discovery {
+        seed: options.seed,
+        not_shown,
+        warnings: prepared.warnings.clone(),
+        split: Split {
+            frames: frames.len(),
+            train_presses: heldout.train_presses,
+            heldout_presses: heldout.presses,
+            heldout_depths_mm: heldout.depths_mm.clone(),
+            heldout_coverings_mm: heldout.coverings_mm.clone(),
+        },
+        heldout_frames: heldout.frames.clone(),
+        noise_rms_counts: prepared.replicates.then_some(floor),
+        base: in_noise(of_base.level),
+        global: GlobalTest { statistic: before.statistic, p_value },
+        gap: before.gap,
+        curves: search.curves(&base, &grown)?,
+        elements: elements
+            .map(|(before, after)| ElementGap { before_rms_counts: *before, after_rms_counts: *after })
+            .collect(),
+        rounds: rounds.into_iter().map(|tried| tried.round).collect(),
+        steps,
+        final_: Final {
+            level: in_noise(of_grown.level),
+            shrink: (p_value <= ALPHA && gap > 0.0).then(|| closed / gap),
+        },
+        verdict,
+        unexplained: Unexplained {
+            depends_on: if left && verdict != Verdict::NothingMissing {
+                after.gap.iter().map(|gap| gap.covariate).collect()
+            } else {
+                Vec::new()
+            },
+            share: match verdict {
+                Verdict::NothingMissing => 0.0,
+                Verdict::Unexplained => 1.0,
+                Verdict::Explained | Verdict::PartlyExplained => share,
+            },
+        },
+        next_experiments,
+        recalibrated: base_of(prepared, &base.parameters),
+        effects,
+        grown: base_of(prepared, &grown.parameters),
+    })
+}
+
+/// A converter that is coarser than declared: what was added where its readings say so.
+fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> Step {
+    Step {
+        effect: "quantisation",
+        terms: vec![vec![Estimated { name: "step_counts", value: step_counts, standard_error: None }]],
+        p_value,
+        q_value: p_value,
+        // No mean changes by it.
+        heldout_rms_before_counts: heldout_rms_counts,
+        heldout_rms_after_counts: heldout_rms_counts,
+        equivalent: Vec::new(),
+    }
+}
+
+fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> Base {
+    let elements = parameters.sensitivity.len();
+    let runs = parameters.baseline.len().max(1) as f64;
+    let mean = |element: usize| parameters.baseline.iter().map(|run| run[element]).sum::<f64>() / runs;
+    let response = Response {
+        sensitivity_counts_per_mm: parameters.sensitivity.clone(),
+        baseline_counts: (0..elements).map(mean).collect(),
+        ..prepared.known.response.clone()
+    };
+    Base { psf: parameters.psf, response, run_baselines_counts: parameters.baseline.clone() }
+}
+
+impl Prepared<'_> {
+    /// How far a model is from the held-out frames, all together and element by element.
+    fn held(&self, parameters: &Parameters) -> Result<Held, DiscoverError> {
+        let Self { known, frames, heldout, noise, whole, .. } = self;
+        let predicted = Sensor::new(known, frames, whole).predict(parameters)?;
+        let elements = frames.elements;
+        let mut squares = vec![0.0; elements];
+        let mut count = 0.0_f64;
+        for (frame, of) in
+            predicted.chunks_exact(elements).enumerate().filter(|(frame, _)| heldout.frames[*frame])
+        {
+            count += 1.0;
+            for ((sum, counts), of) in squares.iter_mut().zip(frames.counts_of(frame)).zip(of) {
+                *sum += (f64::from(*counts) - of).powi(2);
+            }
+        }
+        let count = count.max(1.0);
+        let mean = squares.iter().sum::<f64>() / (count * elements as f64);
+        #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
+        let residual = frames.counts.iter().zip(&predicted).map(|(counts, of)| counts - *of as f32).collect();
+        Ok(Held {
+            level: Level { heldout_rms_counts: mean.sqrt(), heldout_chi2: mean / noise.rms_counts.powi(2) },
+            elements_rms_counts: squares.into_iter().map(|sum| (sum / count).sqrt()).collect(),
+            residual,
+        })
+    }
+
+    /// The noise once the model is known: a tone looks like noise until then.
+    fn floor_counts(&self, grown: &Held) -> f64 {
+        let left = Noise::of_residual(self.frames, &grown.residual, &self.still, self.step_counts);
+        left.map_or(self.noise.rms_counts, |left| left.rms_counts.min(self.noise.rms_counts))
+    }
+}
+
+impl Search<'_> {
+    /// What is left beyond the doubt about the noise, as a share of what there was.
+    fn share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
+        let left = self.problem.heldout_gap(&grown.predicted).sure();
+        let [closed, _] = self.problem.heldout_gain(base, grown);
+        if closed + left > 0.0 { (left / (closed + left)).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    /// What was added, each name once.
+    pub(crate) fn steps(&self, grown: &Fitted, equivalent: &Equivalent) -> Result<Vec<Step>, DiscoverError> {
+        let names = names(&grown.parameters, self.known_terms);
+        let after = self.problem.heldout_blocks(&grown.predicted);
+        let mut steps = Vec::new();
+        for name in names {
+            let less = without(&grown.parameters, name, self.known_terms);
+            let before = self.problem.fit_from(less, ROUNDS, self.options.threads)?;
+            let blocks = self.problem.heldout_blocks(&before.predicted);
+            let gains: Vec<f64> = blocks.iter().zip(&after).map(|(b, a)| b[0] - a[0]).collect();
+            let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(self.known_terms);
+            let estimated = |(term, errors): (&Term, &Vec<f64>)| {
+                term.definition
+                    .parameters
+                    .iter()
+                    .zip(&term.values)
+                    .zip(errors)
+                    .map(|((known, value), error)| Estimated {
+                        name: known.name,
+                        value: *value,
+                        standard_error: Some(*error).filter(|error| error.is_finite()),
+                    })
+                    .collect()
+            };
+            let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
+            steps.push(Step {
+                effect: name,
+                terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
+                p_value,
+                q_value: p_value,
+                heldout_rms_before_counts: self.problem.heldout_rms_counts(&before.predicted),
+                heldout_rms_after_counts: self.problem.heldout_rms_counts(&grown.predicted),
+                equivalent: equivalent.get(name).into_iter().flatten().map(|(rival, _)| *rival).collect(),
+            });
+        }
+        let p_values: Vec<f64> = steps.iter().map(|step| step.p_value).collect();
+        for (step, q_value) in steps.iter_mut().zip(q_values(&p_values)) {
+            step.q_value = q_value;
+        }
+        Ok(steps)
+    }
+}
