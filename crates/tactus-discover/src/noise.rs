@@ -138,3 +138,7 @@ pub(crate) fn median(values: &[f64]) -> f64 {
         _ => f64::midpoint(sorted[middle - 1], sorted[middle]),
     }
 }
+
+#[cfg(test)]
+#[path = "noise_tests.rs"]
+mod tests;

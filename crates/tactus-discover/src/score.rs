@@ -269,3 +269,7 @@ pub(crate) fn q_values(p_values: &[f64]) -> Vec<f64> {
     }
     q_values
 }
+
+#[cfg(test)]
+#[path = "score_tests.rs"]
+mod tests;

@@ -1,0 +1,66 @@
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use tactus_model::Phase;
+
+use super::Noise;
+use crate::rows::still;
+use crate::{Frame, Frames};
+
+/// A tip at rest under first-order autoregressive noise of standard deviation 3, beside a slow ramp.
+fn resting(phi: f64) -> Frames {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut frames = Frames::new(4);
+    let mut noise = [0.0; 4];
+    for (index, t_ns) in (0..6000).zip((0..).step_by(33_333_333)) {
+        for noise in &mut noise {
+            let fresh: f64 = StandardNormal.sample(&mut rng);
+            *noise = phi * *noise + 3.0 * (1.0 - phi * phi).sqrt() * fresh;
+        }
+        let ramp = 0.002 * f64::from(index);
+        #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
+        let counts = noise.map(|noise| (100.0 + ramp + noise) as f32);
+        frames.push(Frame {
+            run: "a",
+            press: -1,
+            phase: Phase::Idle,
+            t_ns,
+            position_mm: [0.0, 0.0, 2.0],
+            covering_mm: 1.0,
+            indenter: "cyl1",
+            temperature_c: None,
+            counts: &counts,
+        });
+    }
+    frames
+}
+
+#[test]
+fn the_noise_is_that_of_a_reading_however_it_hangs_together() {
+    for phi in [0.0, 0.5, 0.8] {
+        let frames = resting(phi);
+        let noise = Noise::of(&frames, &still(&frames), 0.01).unwrap();
+        assert!((noise.rms_counts - 3.0).abs() < 0.1, "{phi}: {}", noise.rms_counts);
+        assert!((noise.correlation[1] - phi).abs() < 0.05, "{phi}: {:?}", noise.correlation);
+    }
+}
+
+#[test]
+fn a_mean_of_many_readings_is_as_uncertain_as_its_correlation_makes_it() {
+    let frames = resting(0.5);
+    let noise = Noise::of(&frames, &still(&frames), 0.01).unwrap();
+    // Closed form: 1 + 2 phi/(1 - phi) - 2 phi (1 - phi^n) / (n (1 - phi)^2).
+    let want = 1.0 + 2.0 - 2.0 * 0.5 * (1.0 - 0.5_f64.powi(10)) / (10.0 * 0.25);
+    assert!((noise.inflation(10) - want).abs() < 0.2, "{} {want}", noise.inflation(10));
+}
+
+#[test]
+fn frames_that_never_repeat_tell_no_noise() {
+    let mut frames = resting(0.0);
+    for (index, at) in (0_u32..).zip(&mut frames.position_mm) {
+        at[0] = f64::from(index);
+    }
+    assert!(Noise::of(&frames, &still(&frames), 0.01).is_none());
+    let noise = Noise::of_differences(&frames, 0.01);
+    assert!((noise.rms_counts - 3.0).abs() < 0.3, "{}", noise.rms_counts);
+}

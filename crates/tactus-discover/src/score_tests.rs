@@ -1,0 +1,36 @@
+use super::{deviate, p_value, q_values, sign_flip_p};
+
+#[test]
+fn q_values_are_those_of_the_published_example() {
+    // Benjamini and Hochberg (1995), Sec. 3.2: 15 p-values, of which the procedure rejects the first four at 0.05.
+    let p_values = [
+        0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262, 0.5719,
+        0.6528, 0.7590, 1.0,
+    ];
+    let q_values = q_values(&p_values);
+    let rejected = q_values.iter().filter(|q| **q <= 0.05).count();
+    assert_eq!(rejected, 4, "{q_values:?}");
+    assert!((q_values[3] - 0.0095 * 15.0 / 4.0).abs() < 1e-12);
+    assert!(q_values.windows(2).all(|pair| pair[0] <= pair[1]));
+}
+
+#[test]
+fn a_chi_square_number_becomes_a_normal_deviate() {
+    // Upper 1 % points of chi-square (Abramowitz and Stegun, table 26.8); the normal's is 2.326.
+    for (freedom, chi_square) in [(4, 13.277), (10, 23.209), (30, 50.892)] {
+        assert!((deviate(chi_square, freedom) - 2.326).abs() < 0.02, "{freedom}");
+    }
+}
+
+#[test]
+fn a_statistic_that_none_reaches_has_the_least_p_value_that_so_many_can_show() {
+    assert!((p_value(5.0, &[1.0, 2.0, 3.0]) - 0.25).abs() < 1e-12);
+    assert!((p_value(2.0, &[1.0, 2.0, 3.0]) - 0.75).abs() < 1e-12);
+}
+
+#[test]
+fn gains_of_one_sign_are_no_chance_and_gains_of_both_are() {
+    assert!(sign_flip_p(&[1.0; 12], 1999, 1) < 0.005);
+    let both: Vec<f64> = (0..12).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+    assert!(sign_flip_p(&both, 1999, 1) > 0.3);
+}
