@@ -258,7 +258,8 @@ fn ranges(values: &[f64], among: &[bool], bins: usize) -> Vec<[f64; 2]> {
     let (Some(least), Some(most)) = (sorted.first().copied(), sorted.last().copied()) else {
         return Vec::new();
     };
-    if most - least <= 1e-9 * most.abs().max(1.0) {
+    // A stage that holds a place is never still to the last digit.
+    if most - least <= 1e-3 * most.abs().max(1.0) {
         return Vec::new();
     }
     let mut edges: Vec<f64> = (1..bins).map(|k| sorted[k * sorted.len() / bins]).collect();

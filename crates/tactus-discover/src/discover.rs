@@ -11,7 +11,7 @@ use crate::rows::Rows;
 use crate::search::{Equivalent, Search, names};
 use crate::sensor::{Parameters, Sensor, Term};
 use crate::telling::{Found, tell};
-use crate::{Base, Discovery, Frames};
+use crate::{Base, Discovery, Frames, not_shown};
 
 /// What is known before: the model that the data are held against.
 #[derive(Debug, Clone)]
@@ -79,7 +79,9 @@ pub fn discover(
     let declared = Parameters::declared(known, prepared.rows.paths.len());
     let base = problem.fit_from(declared, BASE_ROUNDS, options.threads)?;
     said.say("scoring the effects", 0.1);
-    let candidates = Candidate::all(&problem, &base.parameters, &base.predicted, &prepared.hints)?;
+    let lacking = not_shown::lacking(&problem, prepared.replicates);
+    let mut candidates = Candidate::all(&problem, &base.parameters, &base.predicted, &prepared.hints)?;
+    candidates.retain(|one| lacking.iter().all(|lacking| lacking.effect != one.definition.name));
     let search = Search {
         problem: &problem,
         candidates: &candidates,
@@ -102,7 +104,8 @@ pub fn discover(
     said.say("what is left", 0.9);
     let after = search.locate(&grown)?;
     said.say("planning what to measure next", 0.95);
-    let told = tell(&prepared, &search, Found { base, grown, rounds, equivalent, before, after }, options)?;
+    let told =
+        tell(&prepared, &search, Found { lacking, base, grown, rounds, equivalent, before, after }, options)?;
     said.say("done", 1.0);
     Ok(told)
 }

@@ -91,8 +91,15 @@ pub(crate) struct Linear<'a> {
 
 /// The noise is known to so many standard errors.
 const SURE_Z: f64 = 2.0;
+/// A gap of so many standard errors is known within a few percent.
+const LARGE_Z: f64 = 20.0;
 
 impl HeldOutGap {
+    /// True if the doubt about the noise is a small part of it.
+    pub(crate) fn is_large(self) -> bool {
+        self.value > LARGE_Z * self.error
+    }
+
     /// What is left beyond the doubt about the noise.
     pub(crate) fn sure(self) -> f64 {
         (self.value - SURE_Z * self.error).max(0.0)

@@ -1,6 +1,7 @@
 //! Which effects these data cannot show, whatever their size, and what they lack for it.
 
 use tactus_model::Phase;
+use tactus_model::effect::REGISTRY;
 
 use crate::candidates::Screened;
 use crate::contacts::Contacts;
@@ -10,26 +11,34 @@ use crate::fit::Problem;
 /// An effect is out of sight if the whole of its range would be seen with no more than so many standard errors.
 const REACH_LEAST: f64 = 15.0;
 
-/// Effects that the data cannot show: those that need what the data do not hold, and those that would hardly change
-/// anything even at the end of their range.
-pub(crate) fn not_shown(problem: &Problem<'_>, screened: &[Screened], replicates: bool) -> Vec<NotShown> {
+/// Effects that need what the data do not hold; no candidates, however well they may seem to fit.
+pub(crate) fn lacking(problem: &Problem<'_>, replicates: bool) -> Vec<NotShown> {
     let frames = problem.sensor.frames;
     let contacts = Contacts::of(frames);
     let unloads = frames.phase.contains(&Phase::Unload) || contacts.falls_in_contact();
-    screened
+    REGISTRY
         .iter()
-        .filter_map(|one| {
-            let effect = one.definition.name;
-            let lacking = lacks(effect, &contacts, unloads, replicates, problem.duration_s).map(str::to_owned);
-            let out_of_sight = (one.reach < REACH_LEAST && !LATTICE.contains(&effect)).then(|| {
-                format!(
-                    "nothing in these data changes with it beyond what recalibration takes up; {} would show it",
-                    one.definition.shown_by.join(" or ")
-                )
-            });
-            lacking.or(out_of_sight).map(|reason| NotShown { effect, reason })
+        .filter_map(|definition| {
+            let effect = definition.name;
+            let reason = lacks(effect, &contacts, unloads, replicates, problem.duration_s)?;
+            Some(NotShown { effect, reason: reason.to_owned() })
         })
         .collect()
+}
+
+/// Effects that would hardly change anything in these data even at the end of their range.
+pub(crate) fn out_of_sight(screened: &[Screened]) -> Vec<NotShown> {
+    let unseen = screened
+        .iter()
+        .filter(|one| one.reach < REACH_LEAST && !LATTICE.contains(&one.definition.name))
+        .map(|one| NotShown {
+            effect: one.definition.name,
+            reason: format!(
+                "nothing in these data changes with it beyond what recalibration takes up; {} would show it",
+                one.definition.shown_by.join(" or ")
+            ),
+        });
+    unseen.collect()
 }
 
 /// Fewer frames in motion are the ends of moves.

@@ -3,7 +3,8 @@
 use tactus_model::{Effect, Response};
 
 use crate::discovery::{
-    Base, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, Split, Step, Unexplained, Verdict,
+    Base, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, NotShown, Split, Step, Unexplained,
+    Verdict,
 };
 use crate::fit::Fitted;
 use crate::locate::Located;
@@ -27,6 +28,8 @@ const ROUNDS: usize = 8;
 
 /// What a search found.
 pub(crate) struct Found {
+    /// Effects that were no candidates.
+    pub(crate) lacking: Vec<NotShown>,
     pub(crate) base: Fitted,
     pub(crate) grown: Fitted,
     pub(crate) rounds: Vec<Tried>,
@@ -53,13 +56,16 @@ pub(crate) fn tell(
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { known, frames, heldout, lattice, .. } = prepared;
-    let Found { base, mut grown, rounds, equivalent, before, after } = found;
+    let Found { lacking, base, mut grown, rounds, equivalent, before, after } = found;
     // Two tests, each at half the chance.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
     let share = search.share_left(&base, &grown);
     let left = after.p_value <= ALPHA;
-    if left && (share > UNEXPLAINED_SHARE || after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic)) {
+    // A small gap is known by what depends on what only; a large one by how much of it is left.
+    let clear = after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic);
+    let large = search.problem.heldout_gap(&base.predicted).is_large();
+    if left && (share > UNEXPLAINED_SHARE || (clear && !large)) {
         // A model that leaves so much is none of what it is named after.
         grown = base.clone();
     }
@@ -77,9 +83,8 @@ pub(crate) fn tell(
     let squares = |held: &Held| held.level.heldout_rms_counts.powi(2);
     let (gap, closed) = (squares(&of_base) - floor.powi(2), squares(&of_base) - squares(&of_grown));
 
-    let not_shown = first.map_or_else(Vec::new, |round| {
-        not_shown::not_shown(search.problem, &round.screened, prepared.replicates)
-    });
+    let mut not_shown = lacking;
+    not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.screened)));
     let mut steps = search.steps(&grown, &equivalent)?;
     let mut effects = grown.parameters.effects()?;
     if let Some((step_counts, p_value)) = lattice {
