@@ -12,7 +12,7 @@
 //! largest of many `z` comes from flipping the signs of whole blocks, the same for all directions. That keeps the
 //! chance of any false alarm among all of them, however they depend on each other, and under autocorrelated noise.
 //! `phi >= 1` is by how much blocks scatter about what they have in common more than their noise says, by the median: an
-//! effect hides itself neither in one block nor in all. For the same reason a block counts at most three standard
+//! effect hides itself neither in one block nor in all. For the same reason a block counts at most four standard
 //! deviations in the flipped sums.
 //!
 //! Several directions of one effect, orthonormal under the weights, are taken together: the sum of their squares, which is
@@ -29,9 +29,10 @@ use crate::noise::median;
 /// Median of the squared standard normal distribution.
 const MEDIAN_SQUARE: f64 = 0.454_936;
 /// A block counts at most so many standard deviations under flipped signs.
-const CLIP: f64 = 3.0;
-/// Fewer blocks do not tell how they scatter.
+const CLIP: f64 = 4.0;
+/// Fewer blocks do not tell how they scatter; they are taken to scatter so much more than their noise says.
 const BLOCKS_LEAST: usize = 8;
+const EXCESS_OF_FEW: f64 = 1.5;
 
 /// The score of one direction, or of several that are orthonormal together.
 #[derive(Debug, Clone)]
@@ -178,8 +179,11 @@ impl<'a> Fitting<'a> {
             .filter(|(_, variance)| **variance > 1e-4 * total)
             .map(|(wanted, variance)| (wanted - common * variance).powi(2) / variance)
             .collect();
-        let excess =
-            if scatter.len() >= BLOCKS_LEAST { (median(&scatter) / MEDIAN_SQUARE).max(1.0) } else { 1.0 };
+        let excess = if scatter.len() >= BLOCKS_LEAST {
+            (median(&scatter) / MEDIAN_SQUARE).max(1.0)
+        } else {
+            EXCESS_OF_FEW
+        };
         let deviation = (excess * total).sqrt();
         let parts = wanted.iter().zip(&variance).map(|(wanted, variance)| {
             let most = CLIP * (excess * variance).sqrt();

@@ -21,7 +21,7 @@ use crate::{DiscoverError, Options};
 /// Sign-flipped data sets of a test.
 pub(crate) const FLIPS: usize = 1999;
 /// Chance of adding anything to a model that lacks nothing.
-pub(crate) const ALPHA: f64 = 0.01;
+pub(crate) const ALPHA: f64 = 0.005;
 /// So many candidates of a round are fitted.
 const FITTED_MAX: usize = 7;
 /// Terms that a model may gain.

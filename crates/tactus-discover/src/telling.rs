@@ -18,11 +18,11 @@ use crate::{DiscoverError, Options, not_shown};
 
 /// What is left of the gap at most, for the verdict.
 const EXPLAINED_SHARE: f64 = 0.1;
-/// What is left withdraws all names if it is more than this share of the gap and depends on any covariate,
+/// What is left withdraws all names if it depends on any covariate and is more than this share of a gap that is well known,
 const UNEXPLAINED_SHARE: f64 = 0.35;
-/// or if it depends on one so clearly, and by so much of how clearly it did at first.
-const LEFT_Z: f64 = 4.7;
-const LEFT_SHARE: f64 = 0.35;
+/// or, of one that is not, depends on one so clearly, and by so much of how clearly it did at first.
+const LEFT_Z: f64 = 5.2;
+const LEFT_SHARE: f64 = 0.45;
 /// Rounds of the fits without each effect.
 const ROUNDS: usize = 8;
 
@@ -65,7 +65,7 @@ pub(crate) fn tell(
     // A small gap is known by what depends on what only; a large one by how much of it is left.
     let clear = after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic);
     let large = search.problem.heldout_gap(&base.predicted).is_large();
-    if left && (share > UNEXPLAINED_SHARE || (clear && !large)) {
+    if left && if large { share > UNEXPLAINED_SHARE } else { clear } {
         // A model that leaves so much is none of what it is named after.
         grown = base.clone();
     }

@@ -1,9 +1,12 @@
 //! Which elements may answer for another: those whose reading follows another's signal beside their own.
 
 use crate::fit::{Fitted, Problem};
+use crate::noise::median;
 
-/// A pair is worth a try if the other's signal lessens the cost of the element's reading by so much.
-const GAIN_LEAST: f64 = 20.0;
+/// A pair is worth a try if the other's signal lessens the cost of the element's reading by so much,
+const GAIN_LEAST: f64 = 30.0;
+/// And by so many times what is typical of the elements.
+const STANDS_OUT: f64 = 6.0;
 /// So many pairs at most.
 const PAIRS_MAX: usize = 4;
 /// An element that answers with less than this share of the typical gain may be dead.
@@ -30,14 +33,15 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
     for (element, declared) in declared.iter().enumerate() {
         let others = (0..elements).filter(|other| *other != element);
         let best = others.map(|other| (sums.gain(element, other), other)).max_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((gain, other)) = best.filter(|(gain, _)| *gain > GAIN_LEAST) {
-            found.push((gain, [element, other]));
-        }
+        found.extend(best.map(|(gain, other)| (gain, [element, other])));
         let ratio = fitted.parameters.sensitivity[element] / declared;
         if ratio.abs() < DEAD_SHARE {
             found.push((f64::INFINITY, [element, element]));
         }
     }
+    // The best of many pairs gains something by noise too, and more where noise hangs together: as much as most do.
+    let typical = median(&found.iter().map(|(gain, _)| *gain).collect::<Vec<_>>());
+    found.retain(|(gain, _)| *gain > GAIN_LEAST.max(STANDS_OUT * typical));
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().take(PAIRS_MAX).map(|(_, pair)| pair).collect()
 }
