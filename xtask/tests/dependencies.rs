@@ -39,8 +39,8 @@ const NEVER: [(&str, &[&str]); 7] = [
     ("tactus-plan", &["tokio"]),
 ];
 
-/// Only the apps embed virtual devices.
-const MAY_USE_MOCK: [&str; 2] = ["tactus-daemon", "tactus-e2e"];
+/// Only the apps embed virtual devices; benchmarks measure on their hidden physics.
+const MAY_USE_MOCK: [&str; 3] = ["tactus-daemon", "tactus-e2e", "tactus-bench"];
 
 fn metadata() -> Metadata {
     MetadataCommand::new()

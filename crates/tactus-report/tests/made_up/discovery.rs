@@ -104,7 +104,10 @@ pub(crate) fn explained() -> Discovery {
         grown: base(),
         effects: vec![
             Effect::new("misregistration", neutral("misregistration")).unwrap(),
-            Effect::new("hysteresis", [(hysteresis[0], 0.123_4), (hysteresis[1], 0.051)]).unwrap(),
+            Effect::new("hysteresis", neutral("hysteresis"))
+                .and_then(|effect| effect.with(hysteresis[0], 0.123_4))
+                .and_then(|effect| effect.with(hysteresis[1], 0.051))
+                .unwrap(),
         ],
     }
 }
