@@ -131,7 +131,8 @@ pub(crate) fn tell(
         steps,
         final_: Final {
             level: in_noise(of_grown.level),
-            shrink: (p_value <= ALPHA && gap > 0.0).then(|| closed / gap),
+            // Noise may make what is left look smaller than noise.
+            shrink: (p_value <= ALPHA && gap > 0.0).then(|| (closed / gap).min(1.0)),
         },
         verdict,
         unexplained: Unexplained {

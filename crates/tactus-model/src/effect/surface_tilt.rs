@@ -1,11 +1,11 @@
 //! `surface-tilt`: the covering's surface is a sloping plane.
 //!
 //! ```text
-//! depth = surface + slope_x (x - x_c) + slope_y (y - y_c) - z
+//! depth = surface + slope_x (x - x_c - touched_x) + slope_y (y - y_c - touched_y) - z
 //! ```
 //!
-//! `x, y` in the sensor frame, `x_c, y_c` the middle of the active area, where a tilt changes nothing: height is
-//! then a matter of `surface-offset` alone.
+//! `x, y` in the sensor frame, `x_c, y_c` the middle of the active area, and `touched` from there the place at which the
+//! surface's height was found, where a tilt changes nothing. Only that place's distance along the slope matters.
 //!
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
@@ -18,26 +18,41 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[
         Parameter::real("slope_x_mm_per_mm", 0.0, [-0.2, 0.2]),
         Parameter::real("slope_y_mm_per_mm", 0.0, [-0.2, 0.2]),
+        Parameter::real("touched_x_mm", 0.0, [-50.0, 50.0]),
+        Parameter::real("touched_y_mm", 0.0, [-50.0, 50.0]),
     ],
     near_twins: &["misregistration", "gain-drift", "indenter-tilt", "edge-effect"],
     shown_by: &["tilt", "element-centres"],
-    make: Make::Motion(|values| Box::new(SurfaceTilt { slope_mm_per_mm: [values[0], values[1]] })),
+    make: Make::Motion(|values| {
+        let (slope_mm_per_mm, touched_mm) = ([values[0], values[1]], [values[2], values[3]]);
+        Box::new(SurfaceTilt { slope_mm_per_mm, touched_mm })
+    }),
 };
 
 #[derive(Debug)]
 struct SurfaceTilt {
     slope_mm_per_mm: [f64; 2],
+    /// From the middle.
+    touched_mm: [f64; 2],
 }
 
 impl OnMotion for SurfaceTilt {
     fn place(&mut self, now: Now<'_>, place: &mut Place) {
-        for (slope, distance_mm) in self.slope_mm_per_mm.iter().zip(from_middle_mm(now.base, place)) {
-            place.surface_mm += slope * distance_mm;
+        let from_middle_mm = from_middle_mm(now.base, place);
+        for ((slope, from_mm), touched_mm) in
+            self.slope_mm_per_mm.iter().zip(from_middle_mm).zip(self.touched_mm)
+        {
+            place.surface_mm += slope * (from_mm - touched_mm);
         }
     }
 
     fn slope(&self, parameter: usize, base: Base<'_>, before: &Place) -> Option<Shift> {
-        let depth_mm = *from_middle_mm(base, before).get(parameter)?;
+        let from_middle_mm = from_middle_mm(base, before);
+        let depth_mm = match parameter {
+            0 | 1 => from_middle_mm[parameter] - self.touched_mm[parameter],
+            2 | 3 => -self.slope_mm_per_mm[parameter - 2],
+            _ => return None,
+        };
         Some(Shift { depth_mm, ..Shift::default() })
     }
 }

@@ -1,11 +1,17 @@
+use crate::Effect;
 use crate::effect::bench::{assert_slopes, effect, simulator, still, upon};
 
+fn sloping(slope: [f64; 2], touched_mm: [f64; 2]) -> Effect {
+    let names = ["slope_x_mm_per_mm", "slope_y_mm_per_mm", "touched_x_mm", "touched_y_mm"];
+    let values = [slope[0], slope[1], touched_mm[0], touched_mm[1]];
+    effect("surface-tilt", std::array::from_fn::<_, 4, _>(|k| (names[k], values[k])))
+}
+
 #[test]
-fn depth_changes_in_proportion_to_the_distance_from_the_middle() {
-    let sloping =
-        simulator([effect("surface-tilt", [("slope_x_mm_per_mm", 0.01), ("slope_y_mm_per_mm", -0.02)])]);
+fn depth_changes_in_proportion_to_the_distance_from_where_the_surface_was_touched() {
+    let sloping = simulator([sloping([0.01, -0.02], [1.0, 0.5])]);
     // Column 5 and row 4 stand at 11.1 and 8.9 mm, the middle at 8.1 and 5.9 mm.
-    let rise_mm = 0.01 * (11.1 - 8.1) - 0.02 * (8.9 - 5.9);
+    let rise_mm = 0.01 * (11.1 - 8.1 - 1.0) - 0.02 * (8.9 - 5.9 - 0.5);
     let (got, want) =
         (still(&sloping, upon(&sloping, 37, 0.4)), still(&simulator([]), upon(&sloping, 37, 0.4 + rise_mm)));
     for (got, want) in got.iter().zip(want) {
@@ -15,6 +21,6 @@ fn depth_changes_in_proportion_to_the_distance_from_the_middle() {
 
 #[test]
 fn derivatives_are_those_of_differences() {
-    let names = ["slope_x_mm_per_mm", "slope_y_mm_per_mm"];
-    assert_slopes(&effect("surface-tilt", [(names[0], 0.02), (names[1], -0.01)]), &names);
+    let names = ["slope_x_mm_per_mm", "slope_y_mm_per_mm", "touched_x_mm", "touched_y_mm"];
+    assert_slopes(&sloping([0.02, -0.01], [3.0, -2.0]), &names);
 }
