@@ -185,6 +185,8 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     let (signal, offset, along) = ([Signal], [Offset], [AlongX, AlongY]);
     let mut made = Vec::new();
     let mut add = |covariate, unit, values: &[f64], among: &[bool], bins: usize, forms: &[Form]| {
+        let kept: Vec<f64> =
+            values.iter().zip(among).filter(|(_, among)| **among).map(|(one, _)| *one).collect();
         for range in ranges(values, among, bins) {
             let within = |(value, among): (&f64, &bool)| {
                 f64::from(u8::from(*among && *value >= range[0] && *value < range[1]))
@@ -192,7 +194,7 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
             let factor: Vec<f64> = values.iter().zip(among).map(within).collect();
             for form in forms {
                 let factor = Factor::Rows(factor.clone());
-                made.push(Feature { covariate, unit, form: *form, range: closed(range, values), factor });
+                made.push(Feature { covariate, unit, form: *form, range: closed(range, &kept), factor });
             }
         }
     };
