@@ -54,7 +54,7 @@ const INSEPARABLE_SHARE: f64 = 0.9;
 /// An effect stays if the held-out presses are further off without it by so many standard errors, and by such a share
 /// of what the whole model leaves of them.
 const EARNS_Z: f64 = 2.0;
-const EARNS_SHARE: f64 = 0.6;
+const EARNS_SHARE: f64 = 0.3;
 
 /// The search's tools.
 pub(crate) struct Search<'a> {
