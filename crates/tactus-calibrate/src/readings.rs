@@ -306,7 +306,7 @@ impl Noise {
 }
 
 /// Places at least 50 um apart that were pressed, in order.
-pub(crate) fn distinct_places(places_mm: impl IntoIterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+pub fn distinct_places(places_mm: impl IntoIterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
     let mut places: Vec<[f64; 2]> = Vec::new();
     for [x, y] in places_mm {
         if places.iter().all(|[other_x, other_y]| (x - other_x).hypot(y - other_y) > 0.05) {

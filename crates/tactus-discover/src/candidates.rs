@@ -142,7 +142,7 @@ impl Candidate {
             }
             let count = active.len();
             let gram = DMatrix::from_fn(count, count, |i, j| {
-                fitting.product(&columns[active[i]], &columns[active[j]])
+                fitting.inner(&columns[active[i]], &columns[active[j]])
             });
             let right = DVector::from_fn(count, |i, _| fitting.wanted(&columns[active[i]]));
             let step = solve(&gram, &right, 0.0);

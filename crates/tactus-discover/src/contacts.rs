@@ -54,14 +54,7 @@ impl<'a> Contacts<'a> {
     }
 
     pub(crate) fn distinct_places(&self) -> usize {
-        self.places_mm()
-            .fold(Vec::<[f64; 2]>::new(), |mut known, place| {
-                if known.iter().all(|other| far(*other, place)) {
-                    known.push(place);
-                }
-                known
-            })
-            .len()
+        tactus_calibrate::distinct_places(self.places_mm()).len()
     }
 
     pub(crate) fn longest_hold_s(&self) -> f64 {

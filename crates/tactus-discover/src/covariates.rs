@@ -5,9 +5,8 @@ use tactus_model::{Contact, Covering, ForwardModel, Response};
 
 use crate::candidates::with;
 use crate::fit::{Free, Problem};
-use crate::rows::pressing;
 use crate::sensor::{Parameters, Term};
-use crate::{DiscoverError, Known};
+use crate::{DiscoverError, Frames, Known};
 
 /// Depth at which a place's image is looked up where nothing is pressed.
 const LOOK_MM: f64 = 0.3;
@@ -60,6 +59,7 @@ pub(crate) struct Forms {
     neighbours: Vec<f64>,
     place: Vec<f64>,
     last_place: Vec<f64>,
+    history: History,
 }
 
 /// Covariates of the rows.
@@ -107,6 +107,7 @@ impl Forms {
             neighbours: slope("crosstalk", 0)?,
             place: images(problem, at, &here)?,
             last_place: images(problem, at, &history.last_place_mm)?,
+            history,
         })
     }
 
@@ -175,10 +176,10 @@ fn images(
 /// Every feature that the data have.
 pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     use Form::{AlongX, AlongY, LastPlace, Neighbours, Offset, Place, Signal};
-    let (rows, frames) = (problem.sensor.rows, problem.sensor.frames);
+    let rows = problem.sensor.rows;
     let array = &problem.sensor.known.array;
     let registration = problem.sensor.known.registration;
-    let history = History::of(problem);
+    let history = &forms.history;
     let deep: Vec<bool> = history.depth_mm.iter().map(|depth| *depth > 0.0).collect();
     let free: Vec<bool> = deep.iter().map(|deep| !deep).collect();
     let every = vec![true; rows.len()];
@@ -244,7 +245,6 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
         let range = closed(range, &forms.signal);
         made.push(Feature { covariate: "signal", unit: "counts", form: Signal, range, factor });
     }
-    debug_assert!(frames.elements == array.elements());
     made
 }
 
@@ -317,7 +317,7 @@ impl History {
                 state = State::default();
             }
             while next < rows.first[row + 1] {
-                state.take(problem, next, rows.t_s[row]);
+                state.take(frames, next);
                 next += 1;
             }
             let frame = rows.first[row];
@@ -360,8 +360,7 @@ struct State {
 }
 
 impl State {
-    fn take(&mut self, problem: &Problem<'_>, frame: usize, _: f64) {
-        let frames = problem.sensor.frames;
+    fn take(&mut self, frames: &Frames, frame: usize) {
         let (t_s, at) = (frames.t_s[frame], frames.position_mm[frame]);
         let depth_mm = -at[2];
         if let Some((last_s, last)) = self.last {
@@ -399,6 +398,5 @@ impl State {
         }
         self.depth_mm = depth_mm;
         self.last = Some((t_s, at));
-        debug_assert!(depth_mm <= 0.0 || !pressing(frames.phase[frame]) || depth_mm.is_finite());
     }
 }

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Registration, Response};
 
 use crate::candidates::Candidate;
-use crate::prepare::{BASE_ROUNDS, Prepared};
+use crate::prepare::Prepared;
 use crate::rows::Rows;
 use crate::search::{Equivalent, Search, names};
 use crate::sensor::{Parameters, Sensor, Term};
@@ -76,8 +76,7 @@ pub fn discover(
     said.say("recalibrating the base model", 0.02);
     let prepared = Prepared::new(known, frames, options)?;
     let problem = prepared.problem();
-    let declared = Parameters::declared(known, prepared.rows.paths.len());
-    let base = problem.fit_from(declared, BASE_ROUNDS, options.threads)?;
+    let base = prepared.base.clone();
     said.say("scoring the effects", 0.1);
     let lacking = not_shown::lacking(&problem, prepared.replicates);
     let mut candidates = Candidate::all(&problem, &base.parameters, &base.predicted, &prepared.hints)?;

@@ -16,32 +16,18 @@ use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::Kind;
 
 use crate::contacts::Contacts;
-use crate::noise::{Noise, median};
+use crate::linear::Linear;
+use crate::noise::Noise;
 use crate::scale::Scale;
 use crate::sensor::{Parameters, Sensor, Term};
 use crate::{DiscoverError, parallel};
 
-/// Recalibration moves an element's gain within these, as ratios to what is typical of the array: an element beyond is
-/// not an element of another gain.
-const GAIN_RATIOS: [f64; 2] = [0.25, 4.0];
-/// So near to an end a gain is at it.
-const PIN_MARGIN: f64 = 0.02;
-/// An element whose reading tells its gain worse than this share keeps its declared gain.
-const GAIN_ERROR_MAX: f64 = 0.3;
 /// A fit ends when a step promises to lessen the cost by less than this.
 const COST_LEAST: f64 = 0.05;
 const COST_SHARE_LEAST: f64 = 1e-4;
 
 /// An effect with more parameters has many.
 const PARAMETERS_MANY: usize = 6;
-
-/// How far a model is from the held-out rows beyond their noise, in units of the noise's variance, summed.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct HeldOutGap {
-    pub(crate) value: f64,
-    /// Its standard error, by whole blocks.
-    pub(crate) error: f64,
-}
 
 /// What is to be fitted, and how readings weigh.
 #[derive(Debug)]
@@ -76,34 +62,6 @@ pub(crate) enum Free {
     SigmaIntercept,
     SigmaSlope,
     Of { term: usize, parameter: usize },
-}
-
-/// Derivatives at a point, freed of gains and baselines.
-pub(crate) struct Linear<'a> {
-    problem: &'a Problem<'a>,
-    /// Of the counts by each element's relative gain, centred in each run.
-    by_gain: Vec<f64>,
-    /// Its means before it was centred, run by run.
-    by_gain_means: Vec<f64>,
-    /// Of every element, the weighted sum of squares of that; 0 where the gain is not free.
-    by_gain_squares: Vec<f64>,
-}
-
-/// The noise is known to so many standard errors.
-const SURE_Z: f64 = 2.0;
-/// A gap of so many standard errors is known within a few percent.
-const LARGE_Z: f64 = 20.0;
-
-impl HeldOutGap {
-    /// True if the doubt about the noise is a small part of it.
-    pub(crate) fn is_large(self) -> bool {
-        self.value > LARGE_Z * self.error
-    }
-
-    /// What is left beyond the doubt about the noise.
-    pub(crate) fn sure(self) -> f64 {
-        (self.value - SURE_Z * self.error).max(0.0)
-    }
 }
 
 impl<'a> Problem<'a> {
@@ -157,90 +115,6 @@ impl<'a> Problem<'a> {
             .zip(self.weights())
             .map(|(residual, weight)| weight * residual * residual)
             .sum()
-    }
-
-    /// Weighted squared residuals of the rows that are held out, block by block, and the readings in each.
-    pub(crate) fn heldout_blocks(&self, predicted: &[f64]) -> Vec<[f64; 2]> {
-        let rows = self.sensor.rows;
-        let elements = rows.elements;
-        let mut blocks = vec![[0.0; 2]; rows.blocks];
-        let of_rows = rows.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
-        for (row, (counts, predicted)) in of_rows.filter(|(row, _)| rows.heldout[*row]) {
-            let squares = counts.iter().zip(predicted).zip(&self.element_weight);
-            let sum: f64 = squares.map(|((counts, of), weight)| weight * (counts - of).powi(2)).sum();
-            let [total, readings] = &mut blocks[rows.block[row]];
-            *total += rows.weight[row] * sum;
-            *readings += elements as f64;
-        }
-        blocks
-    }
-
-    /// By how much the held-out rows are nearer to one model than to another, and the error of that, by whole blocks.
-    pub(crate) fn heldout_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
-        let (less, more) = (self.heldout_blocks(&less.predicted), self.heldout_blocks(&more.predicted));
-        let gains: Vec<f64> = less.iter().zip(&more).map(|(less, more)| less[0] - more[0]).collect();
-        let sum: f64 = gains.iter().sum();
-        let held = less.iter().filter(|[_, readings]| *readings > 0.0).count().max(1) as f64;
-        let scatter: f64 = gains.iter().map(|gain| gain * gain).sum::<f64>() - sum * sum / held;
-        // A gain in one block only is no less of one: its noise is that of the difference of two predictions.
-        let noise = 4.0 * sum.abs();
-        [sum, scatter.max(0.0).min(noise).sqrt()]
-    }
-
-    /// How much of a column the residual of all rows holds, and the standard error of that, by whole blocks.
-    pub(crate) fn share(&self, column: &[f64], predicted: &[f64]) -> Option<[f64; 2]> {
-        let rows = self.sensor.rows;
-        let mut blocks = vec![[0.0; 2]; rows.blocks];
-        for (index, ((value, counts), of)) in column.iter().zip(&rows.counts).zip(predicted).enumerate() {
-            if *value != 0.0 {
-                let (row, element) = (index / rows.elements, index % rows.elements);
-                let weighted = rows.weight[row] * self.element_weight[element] * value;
-                let [along, squares] = &mut blocks[rows.block[row]];
-                *along += weighted * (counts - of);
-                *squares += weighted * value;
-            }
-        }
-        let squares: f64 = blocks.iter().map(|[_, squares]| squares).sum();
-        let share = blocks.iter().map(|[along, _]| along).sum::<f64>() / squares;
-        let scatter: f64 = blocks.iter().map(|[along, squares]| (along - share * squares).powi(2)).sum();
-        (squares > 0.0).then(|| [share, scatter.sqrt() / squares])
-    }
-
-    /// Weighted squared residuals of all rows, fitted and held out, block by block.
-    pub(crate) fn blocks(&self, predicted: &[f64]) -> Vec<f64> {
-        let rows = self.sensor.rows;
-        let mut blocks = vec![0.0; rows.blocks];
-        let of_rows = rows.counts.chunks_exact(rows.elements).zip(predicted.chunks_exact(rows.elements));
-        for (row, (counts, predicted)) in of_rows.enumerate() {
-            let squares = counts.iter().zip(predicted).zip(&self.element_weight);
-            let sum: f64 = squares.map(|((counts, of), weight)| weight * (counts - of).powi(2)).sum();
-            blocks[rows.block[row]] += rows.weight[row] * sum;
-        }
-        blocks
-    }
-
-    /// Root mean square of the residuals of the rows that are held out, each weighed by its frames.
-    pub(crate) fn heldout_rms_counts(&self, predicted: &[f64]) -> f64 {
-        let rows = self.sensor.rows;
-        let elements = rows.elements;
-        let (mut sum, mut readings) = (0.0, 0.0);
-        let of_rows = rows.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
-        for (row, (counts, predicted)) in of_rows.filter(|(row, _)| rows.heldout[*row]) {
-            let frames = rows.frames_in(row) as f64;
-            sum +=
-                frames * counts.iter().zip(predicted).map(|(counts, of)| (counts - of).powi(2)).sum::<f64>();
-            readings += frames * elements as f64;
-        }
-        if readings > 0.0 { (sum / readings).sqrt() } else { 0.0 }
-    }
-
-    /// How far a model is from the rows that are held out.
-    pub(crate) fn heldout_gap(&self, predicted: &[f64]) -> HeldOutGap {
-        let blocks = self.heldout_blocks(predicted);
-        let value = blocks.iter().map(|[squares, readings]| squares - readings).sum();
-        // Of noise alone: what the model misses is no uncertainty.
-        let variance: f64 = blocks.iter().map(|[_, readings]| 2.0 * readings).sum();
-        HeldOutGap { value, error: variance.sqrt() }
     }
 
     pub(crate) fn residuals<'b>(&'b self, predicted: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
@@ -298,74 +172,6 @@ impl<'a> Problem<'a> {
     fn scale(&self, at: &Parameters, term: usize, parameter: usize) -> Scale {
         let known = &at.terms[term].definition.parameters[parameter];
         Scale::of(known, self.duration_s)
-    }
-
-    /// Derivatives at a point.
-    pub(crate) fn linear(&'a self, at: &Parameters, predicted: &[f64]) -> Result<Linear<'a>, DiscoverError> {
-        let mut more = at.clone();
-        let share = 1e-3;
-        for sensitivity in &mut more.sensitivity {
-            *sensitivity *= 1.0 + share;
-        }
-        let mut by_gain = self.predict(&more)?;
-        for (slope, predicted) in by_gain.iter_mut().zip(predicted) {
-            *slope = (*slope - predicted) / share;
-        }
-        let elements = self.sensor.rows.elements;
-        let by_gain_means = self.centre(&mut by_gain);
-        let mut by_gain_squares = vec![0.0; elements];
-        for ((slope, weight), element) in by_gain.iter().zip(self.weights()).zip((0..elements).cycle()) {
-            by_gain_squares[element] += weight * slope * slope;
-        }
-        let pinned = self.pinned(at);
-        for (squares, pinned) in by_gain_squares.iter_mut().zip(&pinned) {
-            if *pinned || *squares * GAIN_ERROR_MAX * GAIN_ERROR_MAX < 1.0 {
-                *squares = 0.0;
-            }
-        }
-        Ok(Linear { problem: self, by_gain, by_gain_means, by_gain_squares })
-    }
-
-    /// Elements whose gain has come to the end of what recalibration may give it: there it stays, for an effect to explain.
-    fn pinned(&self, at: &Parameters) -> Vec<bool> {
-        let declared = &self.sensor.known.response.sensitivity_counts_per_mm;
-        let ratios: Vec<f64> =
-            at.sensitivity.iter().zip(declared).map(|(now, declared)| now / declared).collect();
-        let typical = median(&ratios);
-        ratios
-            .iter()
-            .map(|ratio| {
-                let share = ratio / typical;
-                share <= GAIN_RATIOS[0] * (1.0 + PIN_MARGIN) || share >= GAIN_RATIOS[1] * (1.0 - PIN_MARGIN)
-            })
-            .collect()
-    }
-
-    /// Takes the mean over the fitted rows of each run off each element; returns the means, run by run.
-    fn centre(&self, column: &mut [f64]) -> Vec<f64> {
-        let rows = self.sensor.rows;
-        let elements = rows.elements;
-        let runs = rows.paths.len();
-        let mut sums = vec![0.0; runs * elements];
-        let mut totals = vec![0.0; runs];
-        for (row, values) in column.chunks_exact(elements).enumerate() {
-            let (run, weight) = (rows.run[row], self.train[row]);
-            totals[run] += weight;
-            for (sum, value) in sums[run * elements..].iter_mut().zip(values) {
-                *sum += weight * value;
-            }
-        }
-        for (sums, total) in sums.chunks_exact_mut(elements).zip(&totals) {
-            for sum in sums {
-                *sum = if *total > 0.0 { *sum / total } else { 0.0 };
-            }
-        }
-        for (row, values) in column.chunks_exact_mut(elements).enumerate() {
-            for (value, mean) in values.iter_mut().zip(&sums[rows.run[row] * elements..]) {
-                *value -= mean;
-            }
-        }
-        sums
     }
 
     /// Derivatives of every reading by each free parameter.
@@ -508,83 +314,6 @@ impl<'a> Problem<'a> {
             }
         }
         errors
-    }
-}
-
-impl Linear<'_> {
-    /// Frees a column, row by row and element by element, of what gains and baselines can take up.
-    pub(crate) fn project(&self, column: &mut [f64]) {
-        self.problem.centre(column);
-        let elements = self.by_gain_squares.len();
-        let shares = self.shares(column);
-        for (values, slopes) in column.chunks_exact_mut(elements).zip(self.by_gain.chunks_exact(elements)) {
-            for ((value, slope), share) in values.iter_mut().zip(slopes).zip(&shares) {
-                *value -= share * slope;
-            }
-        }
-    }
-
-    /// The relative change of each gain that best takes up a column.
-    fn shares(&self, column: &[f64]) -> Vec<f64> {
-        let elements = self.by_gain_squares.len();
-        let mut sums = vec![0.0; elements];
-        let rows = column.chunks_exact(elements).zip(self.by_gain.chunks_exact(elements));
-        for ((values, slopes), weight) in rows.zip(&self.problem.train) {
-            if *weight > 0.0 {
-                for ((sum, value), slope) in sums.iter_mut().zip(values).zip(slopes) {
-                    *sum += weight * value * slope;
-                }
-            }
-        }
-        for ((sum, squares), weight) in
-            sums.iter_mut().zip(&self.by_gain_squares).zip(&self.problem.element_weight)
-        {
-            *sum = if *squares > 0.0 { *sum * weight / squares } else { 0.0 };
-        }
-        sums
-    }
-
-    /// Moves gains and baselines so that they take up what is left.
-    fn take_up(&self, left: &[f64], parameters: &mut Parameters) {
-        let elements = self.by_gain_squares.len();
-        let mut centred = left.to_vec();
-        let means = self.problem.centre(&mut centred);
-        let shares = self.shares(&centred);
-        let declared = &self.problem.sensor.known.response.sensitivity_counts_per_mm;
-        let ratios: Vec<f64> = parameters
-            .sensitivity
-            .iter()
-            .zip(declared)
-            .zip(&shares)
-            .zip(&self.by_gain_squares)
-            .filter(|(((_, declared), _), squares)| **squares > 0.0 && **declared != 0.0)
-            .map(|(((now, declared), share), _)| now * (1.0 + share) / declared)
-            .collect();
-        let typical = if ratios.is_empty() { 1.0 } else { median(&ratios) };
-        let pinned = self.problem.pinned(parameters);
-        let mut taken = vec![0.0; elements];
-        for element in (0..elements).filter(|element| !pinned[*element]) {
-            let now = parameters.sensitivity[element];
-            let bounds = GAIN_RATIOS.map(|ratio| ratio * typical * declared[element]);
-            let (least, most) = (bounds[0].min(bounds[1]), bounds[0].max(bounds[1]));
-            let wanted = if self.by_gain_squares[element] > 0.0 {
-                now * (1.0 + shares[element])
-            } else {
-                typical * declared[element]
-            };
-            let next = if least < most { wanted.clamp(least, most) } else { wanted };
-            taken[element] = if now == 0.0 { 0.0 } else { next / now - 1.0 };
-            parameters.sensitivity[element] = next;
-        }
-        // The mean that is left in each run, less what the gains' change has moved it by.
-        let of_runs = means.chunks_exact(elements).zip(self.by_gain_means.chunks_exact(elements));
-        for (baseline, (means, by_gain)) in parameters.baseline.iter_mut().zip(of_runs) {
-            for (((baseline, mean), by_gain), taken) in
-                baseline.iter_mut().zip(means).zip(by_gain).zip(&taken)
-            {
-                *baseline += mean - taken * by_gain;
-            }
-        }
     }
 }
 

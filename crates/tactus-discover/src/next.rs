@@ -131,7 +131,7 @@ impl Setting<'_> {
             let [one, other] = [problem.predict(&at[0])?, problem.predict(&at[1])?];
             let wrong = |at: &Parameters, predicted: &[f64], right: &[f64]| {
                 let mut difference: Vec<f64> = right.iter().zip(predicted).map(|(a, b)| a - b).collect();
-                let fitting = fitting(problem, at, predicted)?;
+                let fitting = Fitting::at(problem, at, predicted, 1)?;
                 fitting.free(&mut difference);
                 Ok::<f64, DiscoverError>(fitting.size(&difference))
             };
@@ -149,7 +149,7 @@ impl Setting<'_> {
         self.on(design, |problem| {
             let at = once(at);
             let predicted = problem.predict(&at)?;
-            let fitting = fitting(problem, &at, &predicted)?;
+            let fitting = Fitting::at(problem, &at, &predicted, 1)?;
             let signal = largest(&predicted, &at.baseline[0]);
             let mut with = at.clone();
             with.terms.push(Term::neutral(definition));
@@ -184,23 +184,9 @@ impl Setting<'_> {
     }
 }
 
-/// What a fit of a model takes up.
-fn fitting<'a>(
-    problem: &'a Problem<'a>,
-    at: &Parameters,
-    predicted: &[f64],
-) -> Result<Fitting<'a>, DiscoverError> {
-    let linear = problem.linear(at, predicted)?;
-    Ok(Fitting::new(problem, linear, problem.columns(at, predicted, 1)?, predicted))
-}
-
 /// The same model for a run of its own.
 fn once(of_runs: &Parameters) -> Parameters {
-    let runs = of_runs.baseline.len().max(1) as f64;
-    let elements = of_runs.sensitivity.len();
-    let mean =
-        (0..elements).map(|element| of_runs.baseline.iter().map(|run| run[element]).sum::<f64>() / runs);
-    Parameters { baseline: vec![mean.collect()], ..of_runs.clone() }
+    Parameters { baseline: vec![of_runs.mean_baseline()], ..of_runs.clone() }
 }
 
 fn largest(predicted: &[f64], baseline: &[f64]) -> f64 {

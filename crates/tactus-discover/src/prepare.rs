@@ -1,7 +1,7 @@
 //! What a search starts from: the split, the noise, the rows, and hints of what no grid would find.
 
 use crate::candidates::Hints;
-use crate::fit::Problem;
+use crate::fit::{Fitted, Problem};
 use crate::noise::Noise;
 use crate::rows::{HeldOut, Rows, still};
 use crate::sensor::{Parameters, Sensor};
@@ -10,7 +10,7 @@ use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum, wiring};
 /// Presses that are fitted, at least.
 const PRESSES_LEAST: usize = 3;
 /// Rounds of the base model's own fit.
-pub(crate) const BASE_ROUNDS: usize = 12;
+const BASE_ROUNDS: usize = 12;
 
 /// Data made ready.
 pub(crate) struct Prepared<'a> {
@@ -28,6 +28,8 @@ pub(crate) struct Prepared<'a> {
     /// Every frame for itself.
     pub(crate) whole: Rows,
     pub(crate) rows: Rows,
+    /// The base model, recalibrated on the rows.
+    pub(crate) base: Fitted,
     pub(crate) hints: Hints,
     pub(crate) warnings: Vec<String>,
 }
@@ -58,11 +60,12 @@ impl<'a> Prepared<'a> {
         let whole = Rows::of(frames, false)?;
         let mut rows = Rows::of(frames, true)?;
         rows.weigh(frames, &noise, &heldout);
-        let hints = hints(known, frames, &noise, &whole, &rows, options)?;
+        let (mut base, hints) = hints(known, frames, &noise, &whole, &rows, options)?;
         if !hints.frequencies_hz.is_empty() {
             // A tone is lost in rows of several frames.
             rows = Rows::of(frames, false)?;
             rows.weigh(frames, &noise, &heldout);
+            base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise), options)?;
         }
         Ok(Self {
             known,
@@ -75,6 +78,7 @@ impl<'a> Prepared<'a> {
             lattice,
             whole,
             rows,
+            base,
             hints,
             warnings,
         })
@@ -86,7 +90,13 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// What the recalibrated base model leaves suggests.
+/// The base model, recalibrated.
+fn recalibrated(problem: &Problem<'_>, options: Options) -> Result<Fitted, DiscoverError> {
+    let Sensor { known, rows, .. } = problem.sensor;
+    problem.fit_from(Parameters::declared(known, rows.paths.len()), BASE_ROUNDS, options.threads)
+}
+
+/// The recalibrated base model, and what it leaves suggests.
 fn hints(
     known: &Known,
     frames: &Frames,
@@ -94,15 +104,13 @@ fn hints(
     whole: &Rows,
     rows: &Rows,
     options: Options,
-) -> Result<Hints, DiscoverError> {
+) -> Result<(Fitted, Hints), DiscoverError> {
     let problem = Problem::new(Sensor::new(known, frames, rows), noise);
-    let declared = Parameters::declared(known, rows.paths.len());
-    let base = problem.fit_from(declared, BASE_ROUNDS, options.threads)?;
+    let base = recalibrated(&problem, options)?;
     let predicted = Sensor::new(known, frames, whole).predict(&base.parameters)?;
     let residual: Vec<f64> =
         frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
-    Ok(Hints {
-        frequencies_hz: spectrum::lines_hz(frames, &residual),
-        wiring: wiring::pairs(&problem, &base),
-    })
+    let frequencies_hz = spectrum::lines_hz(frames, &residual);
+    let wiring = wiring::pairs(&problem, &base);
+    Ok((base, Hints { frequencies_hz, wiring }))
 }

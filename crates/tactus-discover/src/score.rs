@@ -22,9 +22,12 @@
 //! J. Hemerik, J. J. Goeman and L. Finos, *J. R. Stat. Soc. B* 82 (2020) 841 (sign-flipped scores); P. H. Westfall and
 //! S. S. Young, *Resampling-Based Multiple Testing* (1993), ch. 2 (the largest of many).
 
+use crate::DiscoverError;
 use crate::chance::Chance;
-use crate::fit::{Linear, Problem, dot};
+use crate::fit::{Problem, dot};
+use crate::linear::Linear;
 use crate::noise::median;
+use crate::sensor::Parameters;
 
 /// Median of the squared standard normal distribution.
 const MEDIAN_SQUARE: f64 = 0.454_936;
@@ -55,13 +58,15 @@ pub(crate) struct Fitting<'a> {
 }
 
 impl<'a> Fitting<'a> {
-    /// What is fitted at a point, and what it leaves. `columns`: derivatives by the free parameters, as they are.
-    pub(crate) fn new(
+    /// All that is free at a point, and what it leaves.
+    pub(crate) fn at(
         problem: &'a Problem<'a>,
-        linear: Linear<'a>,
-        columns: Vec<Vec<f64>>,
+        parameters: &Parameters,
         predicted: &[f64],
-    ) -> Self {
+        threads: usize,
+    ) -> Result<Self, DiscoverError> {
+        let linear = problem.linear(parameters, predicted)?;
+        let columns = problem.columns(parameters, predicted, threads)?;
         let mut residual: Vec<f64> = problem.residuals(predicted).collect();
         linear.project(&mut residual);
         let weights: Vec<f64> = problem.weights().collect();
@@ -73,45 +78,39 @@ impl<'a> Fitting<'a> {
             let size = fitting.size(&column);
             // What the others hold already is no direction of its own.
             if size > 1e-4 * whole && size > 0.0 {
-                for value in &mut column {
-                    *value /= size;
-                }
+                shorten(&mut column, size);
                 let along = fitting.inner(&column, &fitting.weighted_residual);
-                for (residual, direction) in fitting.weighted_residual.iter_mut().zip(&column) {
-                    *residual -= along * direction;
-                }
+                take_off(&mut fitting.weighted_residual, along, &column);
                 fitting.directions.push(column);
             }
         }
         for (residual, weight) in fitting.weighted_residual.iter_mut().zip(&fitting.weights) {
             *residual *= weight;
         }
-        fitting
+        Ok(fitting)
     }
 
     /// Frees a column of everything that is fitted already.
     pub(crate) fn free(&self, column: &mut [f64]) {
         self.linear.project(column);
-        for direction in &self.directions {
-            let along = self.inner(direction, column);
-            for (value, direction) in column.iter_mut().zip(direction) {
-                *value -= along * direction;
-            }
+        self.free_of(column, &self.directions);
+    }
+
+    /// Frees a column of orthonormal others.
+    fn free_of(&self, column: &mut [f64], directions: &[Vec<f64>]) {
+        for direction in directions {
+            take_off(column, self.inner(direction, column), direction);
         }
     }
 
-    fn inner(&self, one: &[f64], other: &[f64]) -> f64 {
+    /// Product of two columns under the weights.
+    pub(crate) fn inner(&self, one: &[f64], other: &[f64]) -> f64 {
         one.iter().zip(other).zip(&self.weights).map(|((a, b), w)| a * b * w).sum()
     }
 
     /// Length of a column under the weights: in how many standard errors a unit of it is known.
     pub(crate) fn size(&self, column: &[f64]) -> f64 {
         self.inner(column, column).sqrt()
-    }
-
-    /// Product of two freed columns, or of one with the residual.
-    pub(crate) fn product(&self, one: &[f64], other: &[f64]) -> f64 {
-        self.inner(one, other)
     }
 
     /// How much the residual wants a freed column.
@@ -125,17 +124,10 @@ impl<'a> Fitting<'a> {
         for column in columns {
             let mut column = column.clone();
             let whole = self.size(&column);
-            for other in &independent {
-                let along = self.inner(other, &column);
-                for (value, other) in column.iter_mut().zip(other) {
-                    *value -= along * other;
-                }
-            }
+            self.free_of(&mut column, &independent);
             let size = self.size(&column);
             if size > 1e-3 * whole && size > 0.0 {
-                for value in &mut column {
-                    *value /= size;
-                }
+                shorten(&mut column, size);
                 independent.push(column);
             }
         }
@@ -192,6 +184,20 @@ impl<'a> Fitting<'a> {
             part
         });
         (wanted.iter().sum::<f64>() / deviation, parts.collect())
+    }
+}
+
+/// Takes so much of a direction off a column.
+fn take_off(column: &mut [f64], along: f64, direction: &[f64]) {
+    for (value, direction) in column.iter_mut().zip(direction) {
+        *value -= along * direction;
+    }
+}
+
+/// Brings a column of this size to a size of one.
+fn shorten(column: &mut [f64], size: f64) {
+    for value in column {
+        *value /= size;
     }
 }
 

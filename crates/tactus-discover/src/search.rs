@@ -40,7 +40,7 @@ const FINISHED_MAX: usize = 4;
 /// A term that gains less than this share of what all before it have gained polishes their form; it is not taken.
 const GAIN_SHARE_LEAST: f64 = 0.01;
 /// Rounds of a fit of a model that is taken.
-const POLISH_ROUNDS: usize = 8;
+pub(crate) const POLISH_ROUNDS: usize = 8;
 /// What a term must lessen the cost by at least, and each of its parameters.
 const PENALTY: f64 = 10.0;
 const PENALTY_EACH: f64 = 6.0;
@@ -187,10 +187,7 @@ impl Search<'_> {
 
     /// The model's tangent space and residual.
     pub(crate) fn fitting(&self, at: &Fitted) -> Result<Fitting<'_>, DiscoverError> {
-        let problem = self.problem;
-        let linear = problem.linear(&at.parameters, &at.predicted)?;
-        let columns = problem.columns(&at.parameters, &at.predicted, self.options.threads)?;
-        Ok(Fitting::new(problem, linear, columns, &at.predicted))
+        Fitting::at(self.problem, &at.parameters, &at.predicted, self.options.threads)
     }
 
     fn take(&self, at: &Fitted, tried: &Tried) -> Option<(&'static str, Fitted)> {

@@ -70,6 +70,13 @@ impl Parameters {
         }
     }
 
+    /// Baselines of the elements, the mean over the runs.
+    pub(crate) fn mean_baseline(&self) -> Vec<f64> {
+        let runs = self.baseline.len().max(1) as f64;
+        let mean = |element: usize| self.baseline.iter().map(|run| run[element]).sum::<f64>() / runs;
+        (0..self.sensitivity.len()).map(mean).collect()
+    }
+
     pub(crate) fn effects(&self) -> Result<Vec<Effect>, DiscoverError> {
         self.terms.iter().map(Term::effect).collect()
     }

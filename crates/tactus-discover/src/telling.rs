@@ -12,7 +12,7 @@ use crate::next::{Explanation, Setting};
 use crate::noise::Noise;
 use crate::prepare::Prepared;
 use crate::score::{q_values, sign_flip_p};
-use crate::search::{ALPHA, Equivalent, FLIPS, Search, Tried, names, without};
+use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Search, Tried, names, without};
 use crate::sensor::{Parameters, Sensor, Term};
 use crate::{DiscoverError, Options, not_shown};
 
@@ -23,8 +23,6 @@ const UNEXPLAINED_SHARE: f64 = 0.35;
 /// or, of one that is not, depends on one so clearly, and by so much of how clearly it did at first.
 const LEFT_Z: f64 = 5.2;
 const LEFT_SHARE: f64 = 0.45;
-/// Rounds of the fits without each effect.
-const ROUNDS: usize = 8;
 
 /// What a search found.
 pub(crate) struct Found {
@@ -169,12 +167,9 @@ fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> Step {
 }
 
 fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> Base {
-    let elements = parameters.sensitivity.len();
-    let runs = parameters.baseline.len().max(1) as f64;
-    let mean = |element: usize| parameters.baseline.iter().map(|run| run[element]).sum::<f64>() / runs;
     let response = Response {
         sensitivity_counts_per_mm: parameters.sensitivity.clone(),
-        baseline_counts: (0..elements).map(mean).collect(),
+        baseline_counts: parameters.mean_baseline(),
         ..prepared.known.response.clone()
     };
     Base { psf: parameters.psf, response, run_baselines_counts: parameters.baseline.clone() }
@@ -225,13 +220,11 @@ impl Search<'_> {
     /// What was added, each name once.
     pub(crate) fn steps(&self, grown: &Fitted, equivalent: &Equivalent) -> Result<Vec<Step>, DiscoverError> {
         let names = names(&grown.parameters, self.known_terms);
-        let after = self.problem.heldout_blocks(&grown.predicted);
         let mut steps = Vec::new();
         for name in names {
             let less = without(&grown.parameters, name, self.known_terms);
-            let before = self.problem.fit_from(less, ROUNDS, self.options.threads)?;
-            let blocks = self.problem.heldout_blocks(&before.predicted);
-            let gains: Vec<f64> = blocks.iter().zip(&after).map(|(b, a)| b[0] - a[0]).collect();
+            let before = self.problem.fit_from(less, POLISH_ROUNDS, self.options.threads)?;
+            let gains = self.problem.heldout_gains(&before.predicted, &grown.predicted);
             let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(self.known_terms);
             let estimated = |(term, errors): (&Term, &Vec<f64>)| {
                 term.definition

@@ -17,9 +17,9 @@ use tactus_calibrate::Calibration;
 use tactus_model::{Array, Psf, Registration};
 
 use crate::{
-    document::{SIMULATED, document, notes},
+    document::{document, notes, sensor_header},
     markup::Text,
-    numbers::{count, digits, plural, short},
+    numbers::{count, digits, short},
     plot::Sheet,
 };
 
@@ -52,7 +52,7 @@ pub struct CalibrationReport<'a> {
 /// All text from outside is escaped; nothing is loaded.
 pub fn calibration_html(report: &CalibrationReport<'_>) -> String {
     let page = fmt::from_fn(|f| {
-        header(f, report)?;
+        sensor_header(f, "Calibration", "Rig", report.rig, report.array, report.simulated)?;
         basis(f, report)?;
         remarks(f, report)?;
         sections(f, report, Figures::Here)
@@ -147,31 +147,6 @@ pub(crate) fn remarks(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>
     }
     Ok(())
 }
-
-fn header(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) -> fmt::Result {
-    writeln!(f, "<header>\n<div class=\"headline\"><h1>Calibration</h1>")?;
-    if report.simulated {
-        writeln!(f, "{SIMULATED}")?;
-    }
-    let array = report.array;
-    writeln!(
-        f,
-        "</div>\n<p class=\"under\">Rig {} &#183; {}, {} of {} elements, {} mm apart</p>",
-        Text(report.rig),
-        Text(array.name()),
-        plural(array.rows() as u64, "row"),
-        array.cols(),
-        short(array.pitch_mm(), 3),
-    )?;
-    if report.simulated {
-        writeln!(f, "{UNREAL}")?;
-    }
-    writeln!(f, "</header>")
-}
-
-/// The same as the badge, in words.
-pub(crate) const UNREAL: &str = "<p class=\"message warn\"><strong>No physical sensor was read: everything on this page is about \
-                                 a simulated one.</strong></p>";
 
 /// A figure among the text of its section.
 fn figure(f: &mut fmt::Formatter<'_>, drawing: &Drawing) -> fmt::Result {

@@ -20,10 +20,9 @@ use tactus_discover::{Discovery, Verdict};
 use tactus_model::Array;
 
 use crate::{
-    calibration::UNREAL,
-    document::{SIMULATED, document, notes},
+    document::{document, notes, sensor_header},
     markup::Text,
-    numbers::{digits, plural, short},
+    numbers::digits,
     plot::number,
 };
 
@@ -71,7 +70,8 @@ pub struct DataSource {
 /// outside is escaped; nothing is loaded.
 pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
     let page = fmt::from_fn(|f| {
-        header(f, report)?;
+        let about = "What the model of a sensor is missing &#183; rig";
+        sensor_header(f, "Discovery", about, report.rig, report.array, report.simulated)?;
         remarks(f, report)?;
         verdict(f, report.discovery)?;
         gap::section(f, report)?;
@@ -94,27 +94,6 @@ pub fn not_shown(found: &Discovery) -> Vec<(&str, Vec<&'static str>)> {
         }
     }
     reasons
-}
-
-fn header(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {
-    writeln!(f, "<header>\n<div class=\"headline\"><h1>Discovery</h1>")?;
-    if report.simulated {
-        writeln!(f, "{SIMULATED}")?;
-    }
-    let array = report.array;
-    writeln!(
-        f,
-        "</div>\n<p class=\"under\">What the model of a sensor is missing &#183; rig {} &#183; {}, {} of {} elements, {} mm apart</p>",
-        Text(report.rig),
-        Text(array.name()),
-        plural(array.rows() as u64, "row"),
-        array.cols(),
-        short(array.pitch_mm(), 3),
-    )?;
-    if report.simulated {
-        writeln!(f, "{UNREAL}")?;
-    }
-    writeln!(f, "</header>")
 }
 
 /// What to know before anything that was found.

@@ -2,11 +2,49 @@
 
 use std::fmt;
 
-use crate::{markup::Text, plot};
+use tactus_model::Array;
+
+use crate::{
+    markup::Text,
+    numbers::{plural, short},
+    plot,
+};
 
 /// Said of whatever no physical sensor was read for.
 pub(crate) const SIMULATED: &str =
     "<span class=\"badge warn\" title=\"No physical sensor was read.\">SIMULATED</span>";
+
+/// The same as the badge, in words.
+pub(crate) const UNREAL: &str = "<p class=\"message warn\"><strong>No physical sensor was read: everything on this page is about \
+                                 a simulated one.</strong></p>";
+
+/// The head of a page about one sensor: what it is, `about` before the rig's name (markup), and which array.
+pub(crate) fn sensor_header(
+    f: &mut fmt::Formatter<'_>,
+    title: &str,
+    about: &str,
+    rig: &str,
+    array: &Array,
+    simulated: bool,
+) -> fmt::Result {
+    writeln!(f, "<header>\n<div class=\"headline\"><h1>{title}</h1>")?;
+    if simulated {
+        writeln!(f, "{SIMULATED}")?;
+    }
+    writeln!(
+        f,
+        "</div>\n<p class=\"under\">{about} {} &#183; {}, {} of {} elements, {} mm apart</p>",
+        Text(rig),
+        Text(array.name()),
+        plural(array.rows() as u64, "row"),
+        array.cols(),
+        short(array.pitch_mm(), 3),
+    )?;
+    if simulated {
+        writeln!(f, "{UNREAL}")?;
+    }
+    writeln!(f, "</header>")
+}
 
 /// A page of markup under a title, which is escaped.
 pub(crate) fn document(title: impl fmt::Display, body: impl fmt::Display) -> String {

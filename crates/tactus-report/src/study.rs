@@ -8,8 +8,8 @@ use std::fmt;
 use tactus_calibrate::Estimate;
 
 use crate::{
-    calibration::{self, CalibrationReport, Drawing, Figures, UNREAL},
-    document::{Column, SIMULATED, Table, document, notes},
+    calibration::{self, CalibrationReport, Drawing, Figures},
+    document::{Column, SIMULATED, Table, UNREAL, document, notes},
     markup::Text,
     numbers::{count, duration, estimate, interval, plural, short},
 };

@@ -8,7 +8,7 @@ use std::{
 
 use parquet::{
     basic::{Compression, ZstdLevel},
-    data_type::{ByteArray, DataType},
+    data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int32Type, Int64Type},
     errors::ParquetError,
     file::{
         metadata::KeyValue,
@@ -18,7 +18,7 @@ use parquet::{
     schema::{parser::parse_message_type, types::ColumnPath},
 };
 
-use super::TableError;
+use super::{RowView, TableError};
 
 /// Rows of a row group: half an hour of one sensor, some 10 MB in memory.
 pub(super) const GROUP_ROWS: usize = 65_536;
@@ -88,6 +88,49 @@ impl Part {
         // The error at hand says more than one that follows from it.
         drop(fs::remove_file(&self.beside));
     }
+}
+
+/// The columns with which every table of frames begins, of a row group in hand: from the run to the position.
+#[derive(Default)]
+pub(super) struct FrameColumns {
+    run: Vec<ByteArray>,
+    press: Vec<i32>,
+    phase: Vec<ByteArray>,
+    t_ns: Vec<i64>,
+    position_mm: [Vec<f64>; 3],
+}
+
+impl FrameColumns {
+    /// Rows so far.
+    pub(super) fn rows(&self) -> usize {
+        self.t_ns.len()
+    }
+
+    pub(super) fn push(&mut self, row: &RowView<'_>) {
+        self.run.push(text(&self.run, row.run));
+        self.press.push(row.press);
+        self.phase.push(text(&self.phase, row.phase.name()));
+        self.t_ns.push(row.t_ns);
+        for (column, mm) in self.position_mm.iter_mut().zip(row.position_mm) {
+            column.push(mm);
+        }
+    }
+
+    pub(super) fn write(&self, writer: &mut SerializedRowGroupWriter<'_, File>) -> Result<(), ParquetError> {
+        column::<ByteArrayType>(writer, &self.run, None, None)?;
+        column::<Int32Type>(writer, &self.press, None, None)?;
+        column::<ByteArrayType>(writer, &self.phase, None, None)?;
+        column::<Int64Type>(writer, &self.t_ns, None, None)?;
+        for column_mm in &self.position_mm {
+            column::<DoubleType>(writer, column_mm, None, None)?;
+        }
+        Ok(())
+    }
+}
+
+/// Where the lists of a frame's elements begin: 0 at the first of each.
+pub(super) fn repetition(elements: usize) -> impl Iterator<Item = i16> {
+    (0..elements).map(|index| i16::from(index > 0))
 }
 
 /// A text; shares the bytes of the one before if they are equal.

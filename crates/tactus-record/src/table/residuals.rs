@@ -2,16 +2,12 @@
 
 use std::{fs::File, path::PathBuf};
 
-use parquet::{
-    data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type},
-    errors::ParquetError,
-    file::writer::SerializedRowGroupWriter,
-};
+use parquet::{data_type::FloatType, errors::ParquetError, file::writer::SerializedRowGroupWriter};
 use tactus_schema::{Rig, table::RIG_METADATA_KEY};
 
 use super::{
     RowView, TableError,
-    part::{GROUP_ROWS, Part, column, text},
+    part::{FrameColumns, GROUP_ROWS, Part, column, repetition},
 };
 
 /// Key of the file metadata that is `true` if no physical sensor was read, else `false`.
@@ -57,7 +53,7 @@ impl ResidualWriter {
     /// If it cannot be written.
     pub fn push(&mut self, row: &RowView<'_>, before: &[f32], after: &[f32]) -> Result<(), TableError> {
         self.group.push(row, before, after);
-        if self.group.t_ns.len() >= GROUP_ROWS { self.close_group() } else { Ok(()) }
+        if self.group.frames.rows() >= GROUP_ROWS { self.close_group() } else { Ok(()) }
     }
 
     /// Closes the table and puts it in its place.
@@ -70,7 +66,7 @@ impl ResidualWriter {
     }
 
     fn close_group(&mut self) -> Result<(), TableError> {
-        if self.group.t_ns.is_empty() {
+        if self.group.frames.rows() == 0 {
             return Ok(());
         }
         let group = std::mem::take(&mut self.group);
@@ -87,11 +83,7 @@ impl std::fmt::Debug for ResidualWriter {
 /// The columns of the row group in hand.
 #[derive(Default)]
 struct Group {
-    run: Vec<ByteArray>,
-    press: Vec<i32>,
-    phase: Vec<ByteArray>,
-    t_ns: Vec<i64>,
-    position_mm: [Vec<f64>; 3],
+    frames: FrameColumns,
     /// Of either model.
     residuals: [Vec<f32>; 2],
     /// 0 where a frame's list begins.
@@ -100,27 +92,15 @@ struct Group {
 
 impl Group {
     fn push(&mut self, row: &RowView<'_>, before: &[f32], after: &[f32]) {
-        self.run.push(text(&self.run, row.run));
-        self.press.push(row.press);
-        self.phase.push(text(&self.phase, row.phase.name()));
-        self.t_ns.push(row.t_ns);
-        for (column, mm) in self.position_mm.iter_mut().zip(row.position_mm) {
-            column.push(mm);
-        }
+        self.frames.push(row);
         for (column, predicted) in self.residuals.iter_mut().zip([before, after]) {
             column.extend(row.counts.iter().zip(predicted).map(|(measured, predicted)| measured - predicted));
         }
-        self.repeated.extend((0..row.counts.len()).map(|index| i16::from(index > 0)));
+        self.repeated.extend(repetition(row.counts.len()));
     }
 
     fn write(&self, writer: &mut SerializedRowGroupWriter<'_, File>) -> Result<(), ParquetError> {
-        column::<ByteArrayType>(writer, &self.run, None, None)?;
-        column::<Int32Type>(writer, &self.press, None, None)?;
-        column::<ByteArrayType>(writer, &self.phase, None, None)?;
-        column::<Int64Type>(writer, &self.t_ns, None, None)?;
-        for column_mm in &self.position_mm {
-            column::<DoubleType>(writer, column_mm, None, None)?;
-        }
+        self.frames.write(writer)?;
         let defined = vec![1; self.repeated.len()];
         for residuals in &self.residuals {
             column::<FloatType>(writer, residuals, Some(&defined), Some(&self.repeated))?;

@@ -3,7 +3,7 @@
 use std::{fs::File, path::PathBuf};
 
 use parquet::{
-    data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type},
+    data_type::{ByteArray, ByteArrayType, DoubleType, FloatType},
     errors::ParquetError,
     file::writer::SerializedRowGroupWriter,
 };
@@ -12,7 +12,7 @@ use tactus_schema::{Rig, table::RIG_METADATA_KEY};
 use super::{
     RowView, TableError,
     check::Checker,
-    part::{GROUP_ROWS, Part, column, text},
+    part::{FrameColumns, GROUP_ROWS, Part, column, repetition, text},
 };
 
 /// The contract's columns as Parquet; pyarrow, pandas and polars read `counts` as a list of 32-bit floats.
@@ -70,7 +70,7 @@ impl TableWriter {
     pub(crate) fn put(&mut self, row: RowView<'_>) -> Result<(), TableError> {
         self.group.push(&row);
         self.rows += 1;
-        if self.group.t_ns.len() >= GROUP_ROWS { self.close_group() } else { Ok(()) }
+        if self.group.frames.rows() >= GROUP_ROWS { self.close_group() } else { Ok(()) }
     }
 
     /// Adds a pair of file metadata.
@@ -94,7 +94,7 @@ impl TableWriter {
     }
 
     fn close_group(&mut self) -> Result<(), TableError> {
-        if self.group.t_ns.is_empty() {
+        if self.group.frames.rows() == 0 {
             return Ok(());
         }
         let group = std::mem::take(&mut self.group);
@@ -114,11 +114,7 @@ impl std::fmt::Debug for TableWriter {
 /// The columns of the row group in hand.
 #[derive(Default)]
 struct Group {
-    run: Vec<ByteArray>,
-    press: Vec<i32>,
-    phase: Vec<ByteArray>,
-    t_ns: Vec<i64>,
-    position_mm: [Vec<f64>; 3],
+    frames: FrameColumns,
     covering_mm: Vec<f64>,
     indenter: Vec<ByteArray>,
     temperature_c: Vec<f64>,
@@ -129,30 +125,17 @@ struct Group {
 
 impl Group {
     fn push(&mut self, row: &RowView<'_>) {
-        self.run.push(text(&self.run, row.run));
-        self.press.push(row.press);
-        self.phase.push(text(&self.phase, row.phase.name()));
-        self.t_ns.push(row.t_ns);
-        for (column, mm) in self.position_mm.iter_mut().zip(row.position_mm) {
-            column.push(mm);
-        }
+        self.frames.push(row);
         self.covering_mm.push(row.covering_mm);
         self.indenter.push(text(&self.indenter, row.indenter));
         self.temperature_c.extend(row.temperature_c);
         self.temperature_known.push(i16::from(row.temperature_c.is_some()));
         self.counts.extend_from_slice(row.counts);
-        self.counts_repeated.extend((0..row.counts.len()).map(|index| i16::from(index > 0)));
+        self.counts_repeated.extend(repetition(row.counts.len()));
     }
 
     fn write(&self, writer: &mut SerializedRowGroupWriter<'_, File>) -> Result<(), ParquetError> {
-        let [x_mm, y_mm, z_mm] = &self.position_mm;
-        column::<ByteArrayType>(writer, &self.run, None, None)?;
-        column::<Int32Type>(writer, &self.press, None, None)?;
-        column::<ByteArrayType>(writer, &self.phase, None, None)?;
-        column::<Int64Type>(writer, &self.t_ns, None, None)?;
-        column::<DoubleType>(writer, x_mm, None, None)?;
-        column::<DoubleType>(writer, y_mm, None, None)?;
-        column::<DoubleType>(writer, z_mm, None, None)?;
+        self.frames.write(writer)?;
         column::<DoubleType>(writer, &self.covering_mm, None, None)?;
         column::<ByteArrayType>(writer, &self.indenter, None, None)?;
         column::<DoubleType>(writer, &self.temperature_c, Some(&self.temperature_known), None)?;

@@ -1,0 +1,119 @@
+//! How a model fares on the rows that chose nothing, and on all rows, block by block.
+
+use crate::fit::{Fitted, Problem};
+
+/// The noise is known to so many standard errors.
+const SURE_Z: f64 = 2.0;
+/// A gap of so many standard errors is known within a few percent.
+const LARGE_Z: f64 = 20.0;
+
+/// How far a model is from the held-out rows beyond their noise, in units of the noise's variance, summed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct HeldOutGap {
+    pub(crate) value: f64,
+    /// Its standard error, of noise alone: what a model misses is no uncertainty.
+    pub(crate) error: f64,
+}
+
+impl HeldOutGap {
+    /// True if the doubt about the noise is a small part of it.
+    pub(crate) fn is_large(self) -> bool {
+        self.value > LARGE_Z * self.error
+    }
+
+    /// What is left beyond the doubt about the noise.
+    pub(crate) fn sure(self) -> f64 {
+        (self.value - SURE_Z * self.error).max(0.0)
+    }
+}
+
+impl Problem<'_> {
+    /// Weighted squared residuals of the rows that are held out, block by block, and the readings in each.
+    fn heldout_blocks(&self, predicted: &[f64]) -> Vec<[f64; 2]> {
+        let heldout = &self.sensor.rows.heldout;
+        self.blocks_of(predicted, |row| heldout[row])
+    }
+
+    /// Weighted squared residuals of all rows, fitted and held out, block by block.
+    pub(crate) fn blocks(&self, predicted: &[f64]) -> Vec<f64> {
+        self.blocks_of(predicted, |_| true).into_iter().map(|[squares, _]| squares).collect()
+    }
+
+    fn blocks_of(&self, predicted: &[f64], among: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
+        let rows = self.sensor.rows;
+        let elements = rows.elements;
+        let mut blocks = vec![[0.0; 2]; rows.blocks];
+        let of_rows = rows.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
+        for (row, (counts, predicted)) in of_rows.filter(|(row, _)| among(*row)) {
+            let squares = counts.iter().zip(predicted).zip(&self.element_weight);
+            let sum: f64 = squares.map(|((counts, of), weight)| weight * (counts - of).powi(2)).sum();
+            let [total, readings] = &mut blocks[rows.block[row]];
+            *total += rows.weight[row] * sum;
+            *readings += elements as f64;
+        }
+        blocks
+    }
+
+    /// By how much the held-out rows are nearer to one prediction than to another, block by block.
+    pub(crate) fn heldout_gains(&self, less: &[f64], more: &[f64]) -> Vec<f64> {
+        gains(&self.heldout_blocks(less), &self.heldout_blocks(more))
+    }
+
+    /// By how much the held-out rows are nearer to one model than to another, and the error of that, by whole blocks.
+    pub(crate) fn heldout_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
+        let (less, more) = (self.heldout_blocks(&less.predicted), self.heldout_blocks(&more.predicted));
+        let gains = gains(&less, &more);
+        let sum: f64 = gains.iter().sum();
+        let held = less.iter().filter(|[_, readings]| *readings > 0.0).count().max(1) as f64;
+        let scatter: f64 = gains.iter().map(|gain| gain * gain).sum::<f64>() - sum * sum / held;
+        // A gain in one block only is no less of one: its noise is that of the difference of two predictions.
+        let noise = 4.0 * sum.abs();
+        [sum, scatter.max(0.0).min(noise).sqrt()]
+    }
+
+    /// How much of a column the residual of all rows holds, and the standard error of that, by whole blocks.
+    pub(crate) fn share(&self, column: &[f64], predicted: &[f64]) -> Option<[f64; 2]> {
+        let rows = self.sensor.rows;
+        let mut blocks = vec![[0.0; 2]; rows.blocks];
+        for (index, ((value, counts), of)) in column.iter().zip(&rows.counts).zip(predicted).enumerate() {
+            if *value != 0.0 {
+                let (row, element) = (index / rows.elements, index % rows.elements);
+                let weighted = rows.weight[row] * self.element_weight[element] * value;
+                let [along, squares] = &mut blocks[rows.block[row]];
+                *along += weighted * (counts - of);
+                *squares += weighted * value;
+            }
+        }
+        let squares: f64 = blocks.iter().map(|[_, squares]| squares).sum();
+        let share = blocks.iter().map(|[along, _]| along).sum::<f64>() / squares;
+        let scatter: f64 = blocks.iter().map(|[along, squares]| (along - share * squares).powi(2)).sum();
+        (squares > 0.0).then(|| [share, scatter.sqrt() / squares])
+    }
+
+    /// Root mean square of the residuals of the rows that are held out, each weighed by its frames.
+    pub(crate) fn heldout_rms_counts(&self, predicted: &[f64]) -> f64 {
+        let rows = self.sensor.rows;
+        let elements = rows.elements;
+        let (mut sum, mut readings) = (0.0, 0.0);
+        let of_rows = rows.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
+        for (row, (counts, predicted)) in of_rows.filter(|(row, _)| rows.heldout[*row]) {
+            let frames = rows.frames_in(row) as f64;
+            sum +=
+                frames * counts.iter().zip(predicted).map(|(counts, of)| (counts - of).powi(2)).sum::<f64>();
+            readings += frames * elements as f64;
+        }
+        if readings > 0.0 { (sum / readings).sqrt() } else { 0.0 }
+    }
+
+    /// How far a model is from the rows that are held out.
+    pub(crate) fn heldout_gap(&self, predicted: &[f64]) -> HeldOutGap {
+        let blocks = self.heldout_blocks(predicted);
+        let value = blocks.iter().map(|[squares, readings]| squares - readings).sum();
+        let variance: f64 = blocks.iter().map(|[_, readings]| 2.0 * readings).sum();
+        HeldOutGap { value, error: variance.sqrt() }
+    }
+}
+
+fn gains(less: &[[f64; 2]], more: &[[f64; 2]]) -> Vec<f64> {
+    less.iter().zip(more).map(|([less, _], [more, _])| less - more).collect()
+}
