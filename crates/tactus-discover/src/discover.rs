@@ -8,7 +8,7 @@ use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Regist
 use crate::candidates::Candidate;
 use crate::prepare::Prepared;
 use crate::rows::Rows;
-use crate::search::{Equivalent, Search, names};
+use crate::search::{Grown, Search, Stage};
 use crate::sensor::{Parameters, Sensor, Term};
 use crate::telling::{Found, tell};
 use crate::{Base, Discovery, Frames, not_shown};
@@ -87,19 +87,13 @@ pub fn discover(
         options,
         known_terms: known.effects.len(),
         base_gap: problem.heldout_gap(&base.predicted).value,
-        base_cost: base.cost,
         progress: &|what| said.say(what, 0.0),
     };
     let before = search.locate(&base)?;
-    let (grown, rounds) = search.forward(base.clone())?;
-    said.say("taking back what does not earn its place", 0.6);
-    let mut grown = search.back(grown)?;
-    let mut equivalent = Equivalent::new();
-    if !names(&grown.parameters, search.known_terms).is_empty() {
-        said.say("trying every other effect in each one's place", 0.7);
-        (grown, equivalent) = search.exchange(grown)?;
-        grown = search.back(grown)?;
-    }
+    let Grown { at: grown, rounds, equivalent, .. } = search.grow(base.clone(), &|stage| match stage {
+        Stage::TakingBack => said.say("taking back what does not earn its place", 0.6),
+        Stage::Exchanging => said.say("trying every other effect in each one's place", 0.7),
+    })?;
     said.say("what is left", 0.9);
     let after = search.locate(&grown)?;
     said.say("planning what to measure next", 0.95);

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use tactus_model::effect::Definition;
+use tactus_model::effect::{Definition, Kind};
 
 use crate::candidates::{Candidate, Screened, with};
 use crate::discovery;
@@ -65,8 +65,6 @@ pub(crate) struct Search<'a> {
     pub(crate) known_terms: usize,
     /// How far the base model is from the held-out presses.
     pub(crate) base_gap: f64,
-    /// The cost of the base model.
-    pub(crate) base_cost: f64,
     pub(crate) progress: &'a (dyn Fn(&str) + Sync),
 }
 
@@ -84,6 +82,30 @@ pub(crate) struct Tried {
     pub(crate) p_value: f64,
 }
 
+/// A model as far as it has grown.
+pub(crate) struct Grown {
+    pub(crate) at: Fitted,
+    pub(crate) rounds: Vec<Tried>,
+    pub(crate) equivalent: Equivalent,
+    /// By how much effects whose form may be another in reality have lessened the cost.
+    gained: f64,
+}
+
+/// What a search is at.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Stage {
+    TakingBack,
+    Exchanging,
+}
+
+/// Other effects in the places of a model's own.
+enum Exchanged {
+    /// The model with one that serves better.
+    Better(Fitted),
+    /// None does.
+    Settled(Equivalent),
+}
+
 impl Search<'_> {
     /// Scores of all candidates at a model.
     pub(crate) fn screen(&self, fitting: &Fitting<'_>, at: &Fitted) -> Result<Vec<Screened>, DiscoverError> {
@@ -92,28 +114,52 @@ impl Search<'_> {
         parallel::map(self.candidates, self.options.threads, screen).into_iter().collect()
     }
 
-    /// Adds what the residual wants, until it wants nothing.
-    pub(crate) fn forward(&self, mut at: Fitted) -> Result<(Fitted, Vec<Tried>), DiscoverError> {
-        let mut rounds = Vec::new();
+    /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
+    pub(crate) fn grow(&self, base: Fitted, said: &dyn Fn(Stage)) -> Result<Grown, DiscoverError> {
+        let mut grown = Grown { at: base, rounds: Vec::new(), gained: 0.0, equivalent: Equivalent::new() };
+        let mut exchanges_left = EXCHANGES_MAX;
         loop {
-            let mut tried = self.round(&at, rounds.len())?;
-            let Some((taken, fitted)) = self.take(&at, &tried) else {
-                rounds.push(tried);
-                break;
-            };
-            (self.progress)(&format!("round {}: adding {taken}", rounds.len() + 1));
-            tried.round.taken = Some(taken);
-            rounds.push(tried);
-            at = self.problem.fit_from(fitted.parameters, POLISH_ROUNDS, self.options.threads)?;
-            if at.parameters.terms.len() - self.known_terms >= TERMS_MAX {
-                break;
+            self.forward(&mut grown)?;
+            said(Stage::TakingBack);
+            grown.at = self.back(grown.at)?;
+            said(Stage::Exchanging);
+            match self.exchange(&grown.at, exchanges_left > 0)? {
+                Exchanged::Better(better) => {
+                    exchanges_left -= 1;
+                    grown.at =
+                        self.problem.fit_from(better.parameters, POLISH_ROUNDS, self.options.threads)?;
+                }
+                Exchanged::Settled(equivalent) => {
+                    grown.equivalent = equivalent;
+                    return Ok(grown);
+                }
             }
         }
-        Ok((at, rounds))
+    }
+
+    /// Adds what the residual wants, until it wants nothing.
+    fn forward(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
+        loop {
+            let at = &grown.at;
+            let mut tried = self.round(at, grown.rounds.len())?;
+            let full = at.parameters.terms.len() - self.known_terms >= TERMS_MAX;
+            let Some((taken, fitted)) = self.take(at, &tried, grown.gained).filter(|_| !full) else {
+                grown.rounds.push(tried);
+                return Ok(());
+            };
+            (self.progress)(&format!("round {}: adding {taken}", grown.rounds.len() + 1));
+            tried.round.taken = Some(taken);
+            grown.rounds.push(tried);
+            let fitted = self.problem.fit_from(fitted.parameters, POLISH_ROUNDS, self.options.threads)?;
+            if fitted.parameters.terms.last().is_some_and(|term| !is_exact(term.definition)) {
+                grown.gained += grown.at.cost - fitted.cost;
+            }
+            grown.at = fitted;
+        }
     }
 
     /// Scores every candidate and fits those that are wanted.
-    pub(crate) fn round(&self, at: &Fitted, index: usize) -> Result<Tried, DiscoverError> {
+    fn round(&self, at: &Fitted, index: usize) -> Result<Tried, DiscoverError> {
         (self.progress)(&format!("round {}: scoring the effects", index + 1));
         let fitting = self.fitting(at)?;
         let screened = self.screen(&fitting, at)?;
@@ -190,12 +236,12 @@ impl Search<'_> {
         Fitting::at(self.problem, &at.parameters, &at.predicted, self.options.threads)
     }
 
-    fn take(&self, at: &Fitted, tried: &Tried) -> Option<(&'static str, Fitted)> {
+    fn take(&self, at: &Fitted, tried: &Tried, gained: f64) -> Option<(&'static str, Fitted)> {
         let names = names(&at.parameters, self.known_terms);
         let allowed = |name: &&'static str| names.contains(name) || names.len() < NAMES_MAX;
         let (best_name, best) = tried.fits.iter().find(|(name, _)| allowed(name))?;
         let gain = charged(at) - charged(best);
-        if gain <= PENALTY || gain < GAIN_SHARE_LEAST * (self.base_cost - at.cost) {
+        if gain <= PENALTY || gain < GAIN_SHARE_LEAST * gained {
             return None;
         }
         let again = tried.fits.iter().find(|(name, fitted)| {
@@ -205,41 +251,32 @@ impl Search<'_> {
         Some((name, fitted.clone()))
     }
 
-    /// Puts in each effect's place what serves better, and tells what serves as well.
-    pub(crate) fn exchange(&self, mut at: Fitted) -> Result<(Fitted, Equivalent), DiscoverError> {
-        let mut exchanged = 0;
-        'again: loop {
-            let mut equivalent = Equivalent::new();
-            let names = names(&at.parameters, self.known_terms);
-            for name in &names {
-                let less = without(&at.parameters, name, self.known_terms);
-                let less = self.problem.fit_from(less, TRIAL_ROUNDS, self.options.threads)?;
-                let fitting = self.fitting(&less)?;
-                let mut rivals = self.screen(&fitting, &less)?;
-                rivals.retain(|one| !names.contains(&one.definition.name) && one.promise > PENALTY);
-                rivals.sort_by(|a, b| b.promise.total_cmp(&a.promise));
-                // What cannot take up a good part of the gap in a first step is no rival, however far it goes.
-                rivals.retain(|one| one.promise > RIVAL_SHARE * (less.cost - at.cost));
-                rivals.truncate(RIVALS_MAX);
-                let starts: Vec<Term> = rivals.into_iter().map(|one| one.start).collect();
-                let fits = self.fits(&less, &starts)?;
-                let best = fits.iter().min_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
-                if let Some((_, best)) = best
-                    .filter(|(_, best)| charged(best) < charged(&at) - PENALTY && exchanged < EXCHANGES_MAX)
-                {
-                    exchanged += 1;
-                    at = self.problem.fit_from(
-                        best.parameters.clone(),
-                        POLISH_ROUNDS,
-                        self.options.threads,
-                    )?;
-                    continue 'again;
-                }
-                let same = fits.into_iter().filter(|(_, rival)| self.serves_as_well(&less, rival, &at));
-                equivalent.insert(*name, same.collect());
+    /// Tries other effects in the place of each: what serves better than the model, or else what serves as well.
+    fn exchange(&self, at: &Fitted, may_exchange: bool) -> Result<Exchanged, DiscoverError> {
+        let mut equivalent = Equivalent::new();
+        let names = names(&at.parameters, self.known_terms);
+        for name in &names {
+            let less = without(&at.parameters, name, self.known_terms);
+            let less = self.problem.fit_from(less, TRIAL_ROUNDS, self.options.threads)?;
+            let fitting = self.fitting(&less)?;
+            let mut rivals = self.screen(&fitting, &less)?;
+            rivals.retain(|one| !names.contains(&one.definition.name) && one.promise > PENALTY);
+            rivals.sort_by(|a, b| b.promise.total_cmp(&a.promise));
+            // What cannot take up a good part of the gap in a first step is no rival, however far it goes.
+            rivals.retain(|one| one.promise > RIVAL_SHARE * (less.cost - at.cost));
+            rivals.truncate(RIVALS_MAX);
+            let starts: Vec<Term> = rivals.into_iter().map(|one| one.start).collect();
+            let fits = self.fits(&less, &starts)?;
+            let best = fits.iter().min_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
+            if let Some((_, best)) =
+                best.filter(|(_, best)| may_exchange && charged(best) < charged(at) - PENALTY)
+            {
+                return Ok(Exchanged::Better(best.clone()));
             }
-            return Ok((at, equivalent));
+            let same = fits.into_iter().filter(|(_, rival)| self.serves_as_well(&less, rival, at));
+            equivalent.insert(*name, same.collect());
         }
+        Ok(Exchanged::Settled(equivalent))
     }
 
     /// True if the data cannot tell a rival from what is in the model: block by block it is hardly worse, or it closes
@@ -255,7 +292,7 @@ impl Search<'_> {
     }
 
     /// Takes back what does not earn its place, and puts in its place what serves better.
-    pub(crate) fn back(&self, mut at: Fitted) -> Result<Fitted, DiscoverError> {
+    fn back(&self, mut at: Fitted) -> Result<Fitted, DiscoverError> {
         loop {
             let names = names(&at.parameters, self.known_terms);
             if names.is_empty() {
@@ -289,6 +326,11 @@ impl Search<'_> {
             at = self.problem.fit_from(simpler.parameters, POLISH_ROUNDS, self.options.threads)?;
         }
     }
+}
+
+/// True if nature cannot have another form of an effect: wiring is right or wrong.
+fn is_exact(definition: &Definition) -> bool {
+    definition.parameters.iter().any(|parameter| parameter.kind == Kind::Element)
 }
 
 /// The cost of a model, its parameters charged for.
