@@ -125,9 +125,7 @@ discovery-evidence: bench-discovery
     target/release/tactus-bench evidence run
     target/release/tactus-bench evidence run --size ablation --keep-tables --work target/evidence/ablation
     {{ tools }}/peers/bin/python bench/peers/discovery.py report --work target/evidence/ablation
-    # Forward selection of effects by BIC alone, in builds that have it.
-    if target/release/tactus discover --ablation bic --help >/dev/null 2>&1; then \
-        target/release/tactus-bench evidence run --size ablation --work target/evidence/ablation/peers/bic --with=--ablation --with=bic; fi
+    target/release/tactus-bench evidence run --size ablation --work target/evidence/ablation/peers/bic --with=--ablation --with=bic
     target/release/tactus-bench evidence score --ablation target/evidence/ablation --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
 

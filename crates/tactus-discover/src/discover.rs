@@ -37,6 +37,18 @@ pub struct Options {
     pub seed: u64,
     /// How many threads may compute.
     pub threads: usize,
+    /// By which rule effects are added.
+    pub rule: Rule,
+}
+
+/// By which rule effects are added.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Rule {
+    /// The protocol: corrected tests, held-out presses, other effects in each one's place.
+    #[default]
+    Protocol,
+    /// The Bayesian information criterion of the fitted presses alone, forward: what the protocol is compared to.
+    Bic,
 }
 
 /// How far it has come.
@@ -90,10 +102,14 @@ pub fn discover(
         progress: &|what| said.say(what, 0.0),
     };
     let before = search.locate(&base)?;
-    let Grown { at: grown, rounds, equivalent, .. } = search.grow(base.clone(), &|stage| match stage {
+    let stage = |stage: Stage| match stage {
         Stage::TakingBack => said.say("taking back what does not earn its place", 0.6),
         Stage::Exchanging => said.say("trying every other effect in each one's place", 0.7),
-    })?;
+    };
+    let Grown { at: grown, rounds, equivalent, .. } = match options.rule {
+        Rule::Protocol => search.grow(base.clone(), &stage)?,
+        Rule::Bic => search.grow_by_bic(base.clone())?,
+    };
     said.say("what is left", 0.9);
     let after = search.locate(&grown)?;
     said.say("planning what to measure next", 0.95);

@@ -1,6 +1,7 @@
 //! What a simulation is missing: finds where it and measured frames disagree, names the effect, adds it to the model,
 //! and shows the gap shrink.
 
+mod bic;
 mod candidates;
 mod chance;
 mod contacts;
@@ -27,7 +28,7 @@ mod spectrum;
 mod telling;
 mod wiring;
 
-pub use discover::{DiscoverError, Known, Options, Progress, discover, predict};
+pub use discover::{DiscoverError, Known, Options, Progress, Rule, discover, predict};
 pub use discovery::{
     Base, Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment,
     NotShown, Point, Round, Split, Step, Unexplained, Verdict,

@@ -39,7 +39,7 @@ fn measured() -> Frames {
 }
 
 fn noise() -> Noise {
-    Noise { rms_counts: 2.0, by_element_counts: vec![2.0; 48], correlation: vec![1.0] }
+    Noise { rms_counts: 2.0, by_element_counts: vec![2.0; 48], correlation: vec![1.0], rounding_share: 0.0 }
 }
 
 fn explanation(known: &Known, name: &str, values: &[(&str, f64)]) -> Explanation {

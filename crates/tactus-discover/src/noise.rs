@@ -9,6 +9,8 @@
 //! so that the plateau of `D` is the variance of a reading and its rise the autocorrelation `rho`; what is slow, such as
 //! a drift, hardly enters a difference over a second. Nothing of this depends on the model.
 
+use std::f64::consts::PI;
+
 use crate::Frames;
 
 /// The tip has come to rest if it stood still for so long.
@@ -27,6 +29,8 @@ pub(crate) struct Noise {
     pub(crate) by_element_counts: Vec<f64>,
     /// Autocorrelation at a lag of 0, 1, ... frames.
     pub(crate) correlation: Vec<f64>,
+    /// Of the variance of a reading, what the converter does to the same signal every time: no mean lessens it.
+    pub(crate) rounding_share: f64,
 }
 
 impl Noise {
@@ -73,6 +77,7 @@ impl Noise {
         };
         let variances: Vec<f64> = (0..elements).map(variance).collect();
         let typical = median(&variances);
+        let rounding_share = bias_variance(typical - rounding, step_counts) / typical;
         let correlation = (0..=lags)
             .map(|lag| match lag {
                 0 => 1.0,
@@ -88,6 +93,7 @@ impl Noise {
             rms_counts: typical.sqrt(),
             by_element_counts: variances.iter().map(|variance| variance.sqrt()).collect(),
             correlation,
+            rounding_share,
         })
     }
 
@@ -106,20 +112,46 @@ impl Noise {
             (median(&bends) / 0.455).max(step_counts * step_counts / 12.0).max(f64::MIN_POSITIVE).sqrt()
         };
         let by_element_counts: Vec<f64> = (0..elements).map(rms).collect();
-        Self { rms_counts: median(&by_element_counts), by_element_counts, correlation: vec![1.0] }
+        Self {
+            rms_counts: median(&by_element_counts),
+            by_element_counts,
+            correlation: vec![1.0],
+            rounding_share: 0.0,
+        }
     }
 
     /// By how much the variance of a mean of `frames` consecutive readings exceeds that of independent ones.
     pub(crate) fn inflation(&self, frames: usize) -> f64 {
         let count = frames as f64;
         let pairs = self.correlation.iter().enumerate().skip(1).take(frames.saturating_sub(1));
-        1.0 + 2.0 * pairs.map(|(lag, rho)| (1.0 - lag as f64 / count) * rho).sum::<f64>()
+        let correlated = 1.0 + 2.0 * pairs.map(|(lag, rho)| (1.0 - lag as f64 / count) * rho).sum::<f64>();
+        correlated + (count - 1.0) * self.rounding_share
     }
 
     /// After so many frames readings are independent.
     pub(crate) fn memory_frames(&self) -> usize {
         self.correlation.iter().rposition(|rho| *rho > 0.1).unwrap_or(0) + 1
     }
+}
+
+/// Variance of what rounding to a step adds to the mean of a signal under normal noise of some variance, over signals
+/// that lie anywhere in the step. None is left where noise dithers; without noise it is that of rounding itself.
+///
+/// # Source
+/// B. Widrow and I. Kollar, *Quantization Noise* (2008), ch. 9, of a signal `x` under noise of a standard deviation `s`:
+///
+/// ```text
+/// E[error] = step / pi sum_k (-1)^k / k exp(-2 pi^2 k^2 s^2 / step^2) sin(2 pi k x / step)
+/// ```
+///
+/// squared and averaged over `x`.
+fn bias_variance(noise_variance: f64, step_counts: f64) -> f64 {
+    let square = (step_counts * step_counts).max(f64::MIN_POSITIVE);
+    let term = |k: i32| {
+        let k_square = f64::from(k * k);
+        (-4.0 * PI * PI * k_square * noise_variance.max(0.0) / square).exp() / k_square
+    };
+    square / (2.0 * PI * PI) * (1..=400).map(term).sum::<f64>()
 }
 
 /// Of every frame, whether the tip had been at rest for a while.

@@ -64,3 +64,22 @@ fn frames_that_never_repeat_tell_no_noise() {
     let noise = Noise::of_differences(&frames, 0.01);
     assert!((noise.rms_counts - 3.0).abs() < 0.3, "{}", noise.rms_counts);
 }
+
+#[test]
+fn what_rounding_does_to_a_mean_is_that_of_many_rounded_readings() {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    for rms in [0.0, 0.1, 0.2, 0.35] {
+        let mut square = 0.0;
+        for offset in 0..200 {
+            let signal = f64::from(offset) / 200.0;
+            let mut reading = || {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                (signal + rms * noise).round() - signal
+            };
+            let mean: f64 = (0..4000).map(|_| reading()).sum::<f64>() / 4000.0;
+            square += mean * mean / 200.0;
+        }
+        // A mean of 4000 readings is not free of noise itself.
+        assert!((super::bias_variance(rms * rms, 1.0) - square).abs() < 3e-4, "{rms}: {square}");
+    }
+}

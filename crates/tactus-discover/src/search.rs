@@ -23,9 +23,9 @@ pub(crate) const FLIPS: usize = 1999;
 /// Chance of adding anything to a model that lacks nothing.
 pub(crate) const ALPHA: f64 = 0.005;
 /// So many candidates of a round are fitted.
-const FITTED_MAX: usize = 7;
+pub(crate) const FITTED_MAX: usize = 7;
 /// Terms that a model may gain.
-const TERMS_MAX: usize = 7;
+pub(crate) const TERMS_MAX: usize = 7;
 /// Different effects that a model may gain.
 const NAMES_MAX: usize = 4;
 /// A term of an effect that is in the model already is taken before another effect that lessens the gap by no more than
@@ -91,6 +91,12 @@ pub(crate) struct Grown {
     gained: f64,
 }
 
+impl From<Fitted> for Grown {
+    fn from(base: Fitted) -> Self {
+        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new(), gained: 0.0 }
+    }
+}
+
 /// What a search is at.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Stage {
@@ -116,7 +122,7 @@ impl Search<'_> {
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
     pub(crate) fn grow(&self, base: Fitted, said: &dyn Fn(Stage)) -> Result<Grown, DiscoverError> {
-        let mut grown = Grown { at: base, rounds: Vec::new(), gained: 0.0, equivalent: Equivalent::new() };
+        let mut grown = Grown::from(base);
         let mut exchanges_left = EXCHANGES_MAX;
         loop {
             self.forward(&mut grown)?;
@@ -159,7 +165,7 @@ impl Search<'_> {
     }
 
     /// Scores every candidate and fits those that are wanted.
-    fn round(&self, at: &Fitted, index: usize) -> Result<Tried, DiscoverError> {
+    pub(crate) fn round(&self, at: &Fitted, index: usize) -> Result<Tried, DiscoverError> {
         (self.progress)(&format!("round {}: scoring the effects", index + 1));
         let fitting = self.fitting(at)?;
         let screened = self.screen(&fitting, at)?;

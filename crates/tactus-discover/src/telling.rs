@@ -14,7 +14,7 @@ use crate::prepare::Prepared;
 use crate::score::{q_values, sign_flip_p};
 use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Search, Tried, names, without};
 use crate::sensor::{Parameters, Sensor, Term};
-use crate::{DiscoverError, Options, not_shown};
+use crate::{DiscoverError, Options, Rule, not_shown};
 
 /// What is left of the gap at most, for the verdict.
 const EXPLAINED_SHARE: f64 = 0.1;
@@ -63,12 +63,14 @@ pub(crate) fn tell(
     // A small gap is known by what depends on what only; a large one by how much of it is left.
     let clear = after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic);
     let large = search.problem.heldout_gap(&base.predicted).is_large();
-    if left && if large { share > UNEXPLAINED_SHARE } else { clear } {
+    let leaves_too_much = left && if large { share > UNEXPLAINED_SHARE } else { clear };
+    if leaves_too_much && options.rule == Rule::Protocol {
         // A model that leaves so much is none of what it is named after.
         grown = base.clone();
     }
     let named = !names(&grown.parameters, search.known_terms).is_empty();
-    let verdict = match (named || lattice.is_some(), p_value <= ALPHA) {
+    let missing = p_value <= ALPHA && options.rule == Rule::Protocol;
+    let verdict = match (named || lattice.is_some(), missing) {
         (false, false) => Verdict::NothingMissing,
         (false, true) => Verdict::Unexplained,
         (true, _) if share <= EXPLAINED_SHARE || !left => Verdict::Explained,
@@ -235,7 +237,9 @@ impl Search<'_> {
                     .map(|((known, value), error)| Estimated {
                         name: known.name,
                         value: *value,
-                        standard_error: Some(*error).filter(|error| error.is_finite()),
+                        // Beyond its range these data do not tell it.
+                        standard_error: Some(*error)
+                            .filter(|error| *error <= known.range[1] - known.range[0]),
                     })
                     .collect()
             };

@@ -9,7 +9,9 @@ use crate::{Contact, Indenter};
 /// A memory of what presses give, shared by [`Pipeline`](crate::Pipeline)s of one array and one reference press that
 /// follow the same path with other effects: most effects leave the contact and its spread as they are.
 ///
-/// What is remembered is what would be computed, to the bit. Meshes are not remembered.
+/// The image of an upright tool with a flat face is in proportion to its depth: it is remembered once for all depths,
+/// and agrees with what would be computed to rounding. Others are what would be computed, to the bit. Meshes are not
+/// remembered.
 #[derive(Debug)]
 pub struct Images {
     held: Mutex<HashMap<Key, Arc<[f64]>>>,
@@ -31,21 +33,48 @@ impl Images {
         base: Base<'_>,
         press: &Press,
         image_mm: &mut [f64],
-        compute: impl FnOnce(&mut [f64]),
+        compute: impl FnOnce(&Press, &mut [f64]),
     ) {
-        let Some(key) = key(base, press) else { return compute(image_mm) };
+        let thickness_mm = base.covering.thickness_mm;
+        if !is_even(press) {
+            return self.recall_as_it_is(base, press, image_mm, compute);
+        }
+        let contact = Contact { depth_mm: thickness_mm, ..press.contact.clone() };
+        let deepest = Press { contact, ..press.clone() };
+        self.recall_as_it_is(base, &deepest, image_mm, compute);
+        let share = press.contact.depth_mm.min(thickness_mm) / thickness_mm;
+        for of_element in image_mm {
+            *of_element *= share;
+        }
+    }
+
+    fn recall_as_it_is(
+        &self,
+        base: Base<'_>,
+        press: &Press,
+        image_mm: &mut [f64],
+        compute: impl FnOnce(&Press, &mut [f64]),
+    ) {
+        let Some(key) = key(base, press) else { return compute(press, image_mm) };
         let known = self.held.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
         if let Some(known) = known.filter(|known| known.len() == image_mm.len()) {
             image_mm.copy_from_slice(&known);
             return;
         }
-        compute(image_mm);
+        compute(press, image_mm);
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         if held.len() >= self.most {
             held.clear();
         }
         held.insert(key, Arc::from(&*image_mm));
     }
+}
+
+/// True if the penetration is the same all over the tool's face: its image is in proportion to it, up to the covering's
+/// thickness.
+fn is_even(press: &Press) -> bool {
+    let is_flat = matches!(press.contact.indenter, Indenter::Cylinder { .. } | Indenter::Box { .. });
+    is_flat && press.lean.iter().all(|by| *by == 0.0)
 }
 
 fn key(base: Base<'_>, press: &Press) -> Option<Key> {

@@ -292,10 +292,10 @@ impl Pressed {
         for press in self.presses.iter().filter(|press| press.contact.depth_mm > 0.0) {
             let stamped = stamp.is_some_and(|stamp| press.stamped(stamp, base, &mut self.of_one_mm));
             if !stamped {
-                let compute = |image_mm: &mut [f64]| press.indentation(base, image_mm);
+                let compute = |press: &Press, image_mm: &mut [f64]| press.indentation(base, image_mm);
                 match images {
                     Some(images) => images.recall(base, press, &mut self.of_one_mm, compute),
-                    None => compute(&mut self.of_one_mm),
+                    None => compute(press, &mut self.of_one_mm),
                 }
             }
             for (reached, of_one) in self.reached_mm.iter_mut().zip(&self.of_one_mm) {

@@ -196,3 +196,40 @@ fn a_place_that_is_no_number_does_not_panic() {
         }
     }
 }
+
+#[test]
+fn remembered_images_are_those_that_would_be_computed() {
+    let tilt = || effect("indenter-tilt", [("tilt_x_deg", 3.0), ("tilt_y_deg", -2.0)]);
+    let tail = || effect("heavy-tail", [("tail_share", 0.2), ("width_ratio", 2.0)]);
+    for indenter in [
+        Indenter::Cylinder { diameter_mm: 1.0 },
+        Indenter::Box { size_mm: [2.0, 1.0] },
+        Indenter::Sphere { diameter_mm: 3.0 },
+    ] {
+        for effects in [vec![], vec![tail()], vec![tilt()]] {
+            let simulator = Simulator { indenter: indenter.clone(), ..simulator(effects) };
+            // The second press is deeper than the covering is thick.
+            let way = Trajectory::new([
+                (0.0, upon(&simulator, 20, -0.2)),
+                (1.0, upon(&simulator, 20, 0.8)),
+                (2.0, upon(&simulator, 20, 1.4)),
+                (3.0, upon(&simulator, 21, 0.3)),
+            ])
+            .unwrap();
+            let mut computed = Pipeline::new(&simulator).unwrap();
+            let images = Arc::new(Images::new(50));
+            for _ in 0..2 {
+                let mut remembering = Pipeline::new(&simulator).unwrap();
+                remembering.share(Arc::clone(&images));
+                computed.reset();
+                for k in 0..90 {
+                    let moment = Moment::at(f64::from(k) / 30.0);
+                    let want = computed.step(moment, &way).to_vec();
+                    let got = remembering.step(moment, &way);
+                    let worst = got.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(worst < 1e-10, "{indenter:?} {k}: {worst} counts");
+                }
+            }
+        }
+    }
+}

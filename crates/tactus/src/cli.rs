@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
 use crate::commands;
@@ -242,6 +242,16 @@ pub(crate) struct DiscoverArgs {
     /// Who runs the experiments, for the recordings.
     #[arg(long, env = "USER", default_value = "unknown")]
     pub(crate) who: String,
+    /// Go about it in another way, for comparison.
+    #[arg(long, hide = true, value_name = "WAY")]
+    pub(crate) ablation: Option<Ablation>,
+}
+
+/// Another way to find effects, which `docs/discovery-evidence.md` compares with.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Ablation {
+    /// By the Bayesian information criterion alone.
+    Bic,
 }
 
 /// Arguments of `study`.

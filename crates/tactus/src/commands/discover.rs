@@ -11,12 +11,12 @@ use std::path::{Path, PathBuf};
 use std::thread;
 
 use anyhow::{Context, anyhow, bail};
-use tactus_discover::{DiscoverError, Discovery, Known, Options};
+use tactus_discover::{DiscoverError, Discovery, Known, Options, Rule};
 use tactus_model::Array;
 use tactus_report::discovery::{ActiveRun, DiscoveryReport, discovery_html, discovery_json};
 use tactus_schema::{Model, Rig};
 
-use crate::cli::{Common, DiscoverArgs};
+use crate::cli::{Ablation, Common, DiscoverArgs};
 use crate::exit::{Exit, Failure};
 use crate::output;
 use crate::progress::Computation;
@@ -79,7 +79,11 @@ fn analysed(
     };
     let known = known(&measured.rig, &model);
     let threads = args.threads.map_or_else(cores, usize::from);
-    let options = Options { seed: args.seed, threads };
+    let rule = match args.ablation {
+        None => Rule::Protocol,
+        Some(Ablation::Bic) => Rule::Bic,
+    };
+    let options = Options { seed: args.seed, threads, rule };
     let found = tactus_discover::discover(&known, &measured.frames, options, &|now| {
         progress.show(&now.what, now.share);
     });
