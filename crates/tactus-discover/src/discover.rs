@@ -107,7 +107,7 @@ pub fn discover(
         Stage::Exchanging => said.say("trying every other effect in each one's place", 0.7),
     };
     let Grown { at: grown, rounds, equivalent, .. } = match options.rule {
-        Rule::Protocol => search.grow(base.clone(), &stage)?,
+        Rule::Protocol => search.grow(&base, &stage)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
     said.say("what is left", 0.9);

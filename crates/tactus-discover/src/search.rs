@@ -6,7 +6,7 @@
 //! is a simpler explanation than another effect. Back: each effect must earn its place against the model without it, and
 //! against every other effect in its place.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tactus_model::effect::{Definition, Kind};
 
@@ -55,6 +55,10 @@ const INSEPARABLE_SHARE: f64 = 0.9;
 /// of what the whole model leaves of them.
 const EARNS_Z: f64 = 2.0;
 const EARNS_SHARE: f64 = 0.3;
+/// Several effects must bring the held-out presses nearer than one alone does, by so many standard errors and by such a
+/// share of what that one does.
+const SEVERAL_Z: f64 = 3.0;
+const SEVERAL_SHARE: f64 = 0.05;
 
 /// The search's tools.
 pub(crate) struct Search<'a> {
@@ -121,13 +125,16 @@ impl Search<'_> {
     }
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
-    pub(crate) fn grow(&self, base: Fitted, said: &dyn Fn(Stage)) -> Result<Grown, DiscoverError> {
-        let mut grown = Grown::from(base);
+    pub(crate) fn grow(&self, base: &Fitted, said: &dyn Fn(Stage)) -> Result<Grown, DiscoverError> {
+        let mut grown = Grown::from(base.clone());
         let mut exchanges_left = EXCHANGES_MAX;
         loop {
             self.forward(&mut grown)?;
             said(Stage::TakingBack);
             grown.at = self.back(grown.at)?;
+            if let Some(simpler) = self.simpler(base, &grown.at)? {
+                grown.at = simpler;
+            }
             said(Stage::Exchanging);
             match self.exchange(&grown.at, exchanges_left > 0)? {
                 Exchanged::Better(better) => {
@@ -255,6 +262,66 @@ impl Search<'_> {
         });
         let (name, fitted) = again.map_or((best_name, best), |(name, fitted)| (name, fitted));
         Some((name, fitted.clone()))
+    }
+
+    /// One effect, acting twice perhaps, that does nearly all that several do: they may be what its form lacks.
+    fn simpler(&self, base: &Fitted, at: &Fitted) -> Result<Option<Fitted>, DiscoverError> {
+        let mut alone = at.parameters.clone();
+        let mut index = 0;
+        alone.terms.retain(|term| {
+            index += 1;
+            index <= self.known_terms || is_exact(term.definition)
+        });
+        let others =
+            at.parameters.terms.iter().skip(self.known_terms).filter(|term| !is_exact(term.definition));
+        let others: BTreeSet<&str> = others.map(|term| term.definition.name).collect();
+        if others.len() < 2 {
+            return Ok(None);
+        }
+        (self.progress)("trying one effect in the place of several");
+        let alone = if alone.terms.len() == self.known_terms {
+            base.clone()
+        } else {
+            self.problem.fit_from(alone, POLISH_ROUNDS, self.options.threads)?
+        };
+        let mut best: Option<Fitted> = None;
+        for (name, once) in self.fits(&alone, &self.starts(&alone, |_| true, FITTED_MAX)?)? {
+            let once = self.problem.fit_from(once.parameters, POLISH_ROUNDS, self.options.threads)?;
+            let again = self.starts(&once, |other| other == name, 1)?.into_iter().next();
+            let twice = again.map(|start| {
+                let started = with(&once.parameters, start);
+                self.problem.fit_from(started, POLISH_ROUNDS, self.options.threads)
+            });
+            for one in twice.transpose()?.into_iter().chain([once]) {
+                if best.as_ref().is_none_or(|best| charged(&one) < charged(best)) {
+                    best = Some(one);
+                }
+            }
+        }
+        Ok(best.filter(|one| {
+            let [gain, error] = self.problem.heldout_gain(one, at);
+            let [closed, _] = self.problem.heldout_gain(&alone, one);
+            gain < (SEVERAL_Z * error).max(SEVERAL_SHARE * closed)
+        }))
+    }
+
+    /// Where fits of the effects that a model's residual wants most begin, of those among which to look.
+    fn starts(
+        &self,
+        at: &Fitted,
+        among: impl Fn(&str) -> bool,
+        most: usize,
+    ) -> Result<Vec<Term>, DiscoverError> {
+        let fitting = self.fitting(at)?;
+        let candidates: Vec<&Candidate> =
+            self.candidates.iter().filter(|one| among(one.definition.name)).collect();
+        let screen = |one: &&Candidate| one.screen(&fitting, self.problem, &at.parameters, &at.predicted);
+        let screened = parallel::map(&candidates, self.options.threads, screen);
+        let mut screened: Vec<Screened> = screened.into_iter().collect::<Result<_, DiscoverError>>()?;
+        screened.retain(|one| one.promise > PENALTY);
+        screened.sort_by(|a, b| b.promise.total_cmp(&a.promise));
+        screened.truncate(most);
+        Ok(screened.into_iter().map(|one| one.start).collect())
     }
 
     /// Tries other effects in the place of each: what serves better than the model, or else what serves as well.
