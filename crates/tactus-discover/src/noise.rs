@@ -17,6 +17,8 @@ use crate::Frames;
 const SETTLED_S: f64 = 1.0;
 /// Lags of the plateau, in frames: about a second of the paper's sensor.
 const PLATEAU: std::ops::RangeInclusive<usize> = 20..=30;
+/// Elements whose noise differs by fewer standard errors are taken to be alike.
+const ALIKE_Z: f64 = 3.0;
 /// Fewer pairs of frames tell nothing.
 const PAIRS_LEAST: usize = 20;
 
@@ -76,9 +78,7 @@ impl Noise {
             (sum / count as f64).max(rounding).max(f64::MIN_POSITIVE)
         };
         let variances: Vec<f64> = (0..elements).map(variance).collect();
-        let typical = median(&variances);
-        let rounding_share = bias_variance(typical - rounding, step_counts) / typical;
-        let correlation = (0..=lags)
+        let correlation: Vec<f64> = (0..=lags)
             .map(|lag| match lag {
                 0 => 1.0,
                 _ if pairs[lag] < PAIRS_LEAST => 0.0,
@@ -89,6 +89,10 @@ impl Noise {
                 }
             })
             .collect();
+        let independent = pairs[longest] as f64 / memory_frames(&correlation) as f64;
+        let variances = told_apart(&variances, ALIKE_Z * (2.0 / independent).sqrt());
+        let typical = median(&variances);
+        let rounding_share = bias_variance(typical - rounding, step_counts) / typical;
         Some(Self {
             rms_counts: typical.sqrt(),
             by_element_counts: variances.iter().map(|variance| variance.sqrt()).collect(),
@@ -130,8 +134,22 @@ impl Noise {
 
     /// After so many frames readings are independent.
     pub(crate) fn memory_frames(&self) -> usize {
-        self.correlation.iter().rposition(|rho| *rho > 0.1).unwrap_or(0) + 1
+        memory_frames(&self.correlation)
     }
+}
+
+fn memory_frames(correlation: &[f64]) -> usize {
+    correlation.iter().rposition(|rho| *rho > 0.1).unwrap_or(0) + 1
+}
+
+/// Variances that differ by no more than this share are the same, their mean: weights by what only chance makes differ
+/// would make quiet elements of lucky ones, and what is left of them look like more than noise.
+fn told_apart(variances: &[f64], share: f64) -> Vec<f64> {
+    let middle = median(variances);
+    let is_alike = |variance: f64| variance < middle * (1.0 + share) && variance * (1.0 + share) > middle;
+    let alike: Vec<f64> = variances.iter().copied().filter(|variance| is_alike(*variance)).collect();
+    let mean = alike.iter().sum::<f64>() / alike.len().max(1) as f64;
+    variances.iter().map(|variance| if is_alike(*variance) { mean } else { *variance }).collect()
 }
 
 /// Variance of what rounding to a step adds to the mean of a signal under normal noise of some variance, over signals

@@ -83,3 +83,12 @@ fn what_rounding_does_to_a_mean_is_that_of_many_rounded_readings() {
         assert!((super::bias_variance(rms * rms, 1.0) - square).abs() < 3e-4, "{rms}: {square}");
     }
 }
+
+#[test]
+fn elements_that_differ_by_chance_only_are_alike_and_a_noisy_one_is_told() {
+    let got = super::told_apart(&[0.9, 1.0, 1.2, 1.1, 50.0], 0.5);
+    let mean = (0.9 + 1.0 + 1.2 + 1.1) / 4.0;
+    for (got, want) in got.into_iter().zip([mean, mean, mean, mean, 50.0]) {
+        assert!((got - want).abs() < 1e-12, "{got}, not {want}");
+    }
+}

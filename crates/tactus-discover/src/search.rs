@@ -58,7 +58,7 @@ const EARNS_SHARE: f64 = 0.3;
 /// Several effects must bring the held-out presses nearer than one alone does, by so many standard errors and by such a
 /// share of what that one does.
 const SEVERAL_Z: f64 = 3.0;
-const SEVERAL_SHARE: f64 = 0.05;
+const SEVERAL_SHARE: f64 = 0.1;
 
 /// The search's tools.
 pub(crate) struct Search<'a> {

@@ -1,6 +1,7 @@
 //! Where the stage was, and what it did, at any time of a run.
 
 mod gather;
+mod way;
 
 use std::{
     collections::BTreeMap,
@@ -139,21 +140,10 @@ impl Timeline {
         }
     }
 
-    /// Where the stage was, in the robot's frame: between two reports on the straight line, before the first and
-    /// after the last where they say. `None` if it never said.
+    /// Where the stage was, in the robot's frame: between two reports as its speeds before and after say, before the
+    /// first and after the last where they say. `None` if it never said.
     pub fn position_mm(&self, at: MonoTime) -> Option<[f64; 3]> {
-        let next = self.stage.partition_point(|report| report.at <= at);
-        let before = next.checked_sub(1).and_then(|index| self.stage.get(index));
-        match (before, self.stage.get(next)) {
-            (Some(a), Some(b)) => {
-                let share = (at.ns() - a.at.ns()) as f64 / (b.at.ns() - a.at.ns()) as f64;
-                let between =
-                    |axis: usize| a.position_mm[axis] + share * (b.position_mm[axis] - a.position_mm[axis]);
-                Some([between(0), between(1), between(2)])
-            }
-            (Some(nearest), None) | (None, Some(nearest)) => Some(nearest.position_mm),
-            (None, None) => None,
-        }
+        way::position_mm(&self.stage, at)
     }
 
     /// What the stage did, and the index of the press, -1 outside one; idle before the run began.
