@@ -16,6 +16,7 @@ use crate::fit::{Fitted, Problem};
 use crate::parallel;
 use crate::score::{Fitting, Score, flipped, largest, p_value};
 use crate::sensor::{Parameters, Term};
+use crate::wander::WANDER;
 use crate::{DiscoverError, Options};
 
 /// Sign-flipped data sets of a test.
@@ -111,7 +112,12 @@ impl Search<'_> {
     pub(crate) fn screen(&self, fitting: &Fitting<'_>, at: &Fitted) -> Result<Vec<Screened>, DiscoverError> {
         let screen =
             |candidate: &Candidate| candidate.screen(fitting, self.problem, &at.parameters, &at.predicted);
-        parallel::map(self.candidates, self.options.threads, screen).into_iter().collect()
+        let screened = parallel::map(self.candidates, self.options.threads, screen).into_iter();
+        let mut screened = screened.collect::<Result<Vec<_>, DiscoverError>>()?;
+        if screened.iter().any(|one| one.definition.name == WANDER.name) {
+            screened.extend(self.problem.screen_wander(fitting, &at.parameters));
+        }
+        Ok(screened)
     }
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
@@ -177,6 +183,9 @@ impl Search<'_> {
                 shrink: None,
             })
             .collect();
+        // Of two forms of one name the one that is wanted more.
+        tried.sort_by(|a, b| a.effect.cmp(b.effect).then(b.score.total_cmp(&a.score)));
+        tried.dedup_by_key(|one| one.effect);
         let p_value = tried.iter().map(|one| one.p_value).fold(1.0, f64::min);
         let mut order: Vec<usize> = (0..screened.len()).collect();
         order.sort_by(|a, b| screened[*b].promise.total_cmp(&screened[*a].promise));
@@ -188,7 +197,7 @@ impl Search<'_> {
         let starts: Vec<Term> = order.iter().map(|one| screened[*one].start.clone()).collect();
         let mut fits = self.fits(at, &starts)?;
         fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
-        for (name, fitted) in &fits {
+        for (name, fitted) in fits.iter().rev() {
             if let Some(one) = tried.iter_mut().find(|one| one.effect == *name) {
                 let share =
                     self.problem.heldout_gap(&fitted.predicted).value / self.base_gap.max(f64::MIN_POSITIVE);
@@ -284,7 +293,12 @@ impl Search<'_> {
     fn serves_as_well(&self, less: &Fitted, rival: &Fitted, at: &Fitted) -> bool {
         let (of_rival, of_model) =
             (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
-        let worse: Vec<f64> = of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect();
+        let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.wander.is_none()) {
+            of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect()
+        } else {
+            // A wander takes up noise where it is fitted.
+            self.problem.heldout_gains(&rival.predicted, &at.predicted)
+        };
         let sum: f64 = worse.iter().sum();
         let mean = sum / worse.len().max(1) as f64;
         let scatter = worse.iter().map(|one| (one - mean).powi(2)).sum::<f64>().sqrt();

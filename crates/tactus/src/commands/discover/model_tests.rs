@@ -47,6 +47,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
         psf: model.base.psf,
         response: model.base.response.clone(),
         run_baselines_counts: vec![model.base.response.baseline_counts.clone()],
+        run_wander: None,
     };
     let mut grown = base.clone();
     grown.psf.sigma_intercept_mm = 2.3;
