@@ -23,7 +23,7 @@
 //! Walks given readings: G. Wahba, *Spline Models for Observational Data* (1990), ch. 1 and 4. Fits beside them, freed of
 //! what they take up: P. Speckman, *J. R. Stat. Soc. B* 50 (1988) 413. The test: X. Lin, *Biometrika* 84 (1997) 309.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use tactus_model::Effect;
 use tactus_model::effect::{Definition, Make, Now, OnReadout, Parameter};
 
@@ -57,7 +57,7 @@ const KNOT_S_LEAST: f64 = 3.0;
 const FINER_GAIN: f64 = 10.0;
 /// Rates that are tried, in noise per root second: factors of the root of 2 up from the least.
 const RATE_LEAST: f64 = 1e-3;
-const RATES: i32 = 24;
+const RATES: i32 = 32;
 /// Times over which the kernels of the test fall.
 const KERNELS_S: [f64; 3] = [10.0, 40.0, 160.0];
 /// The test takes so many blocks at most.
@@ -375,20 +375,26 @@ impl Problem<'_> {
         let count = used.len();
         let sums = DMatrix::from_fn(count, elements, |b, e| sums[used[b] * elements + e]);
         let products = &sums * sums.transpose();
+        // Flipped residuals have a mean, which the baseline of each run takes up.
+        let mut totals = vec![0.0; rows.paths.len()];
+        used.iter().for_each(|block| totals[runs[*block]] += weights[*block]);
+        let shares = DVector::from_fn(count, |b, _| weights[used[b]] / totals[runs[used[b]]]);
         let of = |kernel_s: &f64| {
+            let same = |b: usize, c: usize| runs[used[b]] == runs[used[c]];
+            let apart_s = |b: usize, c: usize| {
+                (times[used[b]] / weights[used[b]] - times[used[c]] / weights[used[c]]).abs()
+            };
             let kernel = DMatrix::from_fn(count, count, |b, c| {
-                let apart_s = (times[used[b]] / weights[used[b]] - times[used[c]] / weights[used[c]]).abs();
-                if runs[used[b]] == runs[used[c]] { (-apart_s / kernel_s).exp() } else { 0.0 }
+                if same(b, c) { (-apart_s(b, c) / kernel_s).exp() } else { 0.0 }
             });
-            // Flipped residuals have a mean, which the baseline of each run takes up.
-            let mean = DMatrix::from_fn(count, count, |b, c| {
-                let same = runs[used[b]] == runs[used[c]];
-                let of_run = used.iter().filter(|block| runs[**block] == runs[used[b]]);
-                if same { weights[used[b]] / of_run.map(|block| weights[*block]).sum::<f64>() } else { 0.0 }
+            let means = &kernel * &shares;
+            let mut of_run = vec![0.0; totals.len()];
+            (0..count).for_each(|b| of_run[runs[used[b]]] += shares[b] * means[b]);
+            let products = DMatrix::from_fn(count, count, |b, c| {
+                let centred = kernel[(b, c)] - means[b] - means[c] + of_run[runs[used[b]]];
+                if same(b, c) { centred * products[(b, c)] } else { 0.0 }
             });
-            let centred = DMatrix::identity(count, count) - mean;
-            let kernel = centred.transpose() * kernel * centred;
-            Score::of_products(&kernel.component_mul(&products), &used, rows.blocks)
+            Score::of_products(&products, &used, rows.blocks)
         };
         KERNELS_S.iter().map(of).collect()
     }

@@ -34,7 +34,6 @@ fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
         let (press, within) = (frame / 30, frame % 30);
         let [x, y] = known.array.centre_mm(press * 29 % ELEMENTS).unwrap();
         let (phase, depth_mm) = match within {
-            0..5 => (Phase::Idle, -2.0),
             5..10 => (Phase::Load, 0.1 * (within - 4) as f64),
             10..20 => (Phase::Hold, 0.5),
             20..25 => (Phase::Unload, 0.5 - 0.1 * (within - 19) as f64),

@@ -195,7 +195,8 @@ impl Parameter {
 
     /// True if a value is the index of an element.
     fn names_element(&self, value: f64) -> bool {
-        self.kind == Kind::Element || self.kind == Kind::ElementOrAll && value != self.neutral
+        self.kind == Kind::Element
+            || self.kind == Kind::ElementOrAll && value.to_bits() != self.neutral.to_bits()
     }
 }
 
