@@ -377,7 +377,9 @@ impl Problem<'_> {
         let products = &sums * sums.transpose();
         // Flipped residuals have a mean, which the baseline of each run takes up.
         let mut totals = vec![0.0; rows.paths.len()];
-        used.iter().for_each(|block| totals[runs[*block]] += weights[*block]);
+        for block in &used {
+            totals[runs[*block]] += weights[*block];
+        }
         let shares = DVector::from_fn(count, |b, _| weights[used[b]] / totals[runs[used[b]]]);
         let of = |kernel_s: &f64| {
             let same = |b: usize, c: usize| runs[used[b]] == runs[used[c]];
@@ -389,7 +391,9 @@ impl Problem<'_> {
             });
             let means = &kernel * &shares;
             let mut of_run = vec![0.0; totals.len()];
-            (0..count).for_each(|b| of_run[runs[used[b]]] += shares[b] * means[b]);
+            for b in 0..count {
+                of_run[runs[used[b]]] += shares[b] * means[b];
+            }
             let products = DMatrix::from_fn(count, count, |b, c| {
                 let centred = kernel[(b, c)] - means[b] - means[c] + of_run[runs[used[b]]];
                 if same(b, c) { centred * products[(b, c)] } else { 0.0 }
