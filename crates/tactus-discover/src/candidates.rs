@@ -66,7 +66,7 @@ impl Candidate {
         let mut amplitudes = Vec::new();
         let mut shapes = vec![Term::neutral(definition)];
         for (parameter, known) in definition.parameters.iter().enumerate() {
-            if known.kind == Kind::Element {
+            if known.kind != Kind::Real {
                 continue;
             }
             let acts = known.neutral == 0.0 || {

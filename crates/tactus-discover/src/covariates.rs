@@ -91,13 +91,16 @@ impl Forms {
         };
         let rows = problem.sensor.rows;
         let elements = rows.elements;
-        let signal = predicted
+        let mut signal: Vec<f64> = predicted
             .chunks_exact(elements)
             .zip(&rows.run)
             .flat_map(|(counts, run)| {
                 counts.iter().zip(&at.baseline[*run]).map(|(counts, base)| counts - base)
             })
             .collect();
+        if let Some(wander) = &at.wander {
+            wander.add(rows, -1.0, &mut signal);
+        }
         let history = History::of(problem);
         let here: Vec<Option<[f64; 2]>> =
             (0..rows.len()).map(|row| Some([history.place_mm[0][row], history.place_mm[1][row]])).collect();

@@ -11,6 +11,7 @@ use crate::rows::Rows;
 use crate::search::{Grown, Search, Stage};
 use crate::sensor::{Parameters, Sensor, Term};
 use crate::telling::{Found, tell};
+use crate::wander::Wander;
 use crate::{Base, Discovery, Frames, not_shown};
 
 /// What is known before: the model that the data are held against.
@@ -133,6 +134,7 @@ pub fn predict(
     let parameters = Parameters {
         sensitivity: base.response.sensitivity_counts_per_mm.clone(),
         baseline: base.run_baselines_counts.clone(),
+        wander: base.run_wander.as_ref().map(Wander::of),
         psf: base.psf,
         terms: effects.iter().map(Term::of).collect(),
     };

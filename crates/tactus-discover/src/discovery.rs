@@ -56,6 +56,17 @@ pub struct Base {
     pub response: Response,
     /// Baselines of each run, one per element, in counts.
     pub run_baselines_counts: Vec<Vec<f64>>,
+    /// What the zeros of the runs wander beside the effects, which hold what they have in common.
+    pub run_wander: Option<RunWander>,
+}
+
+/// How the zeros of each run wander.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunWander {
+    /// Time from knot to knot; straight between them, and constant after the last.
+    pub knot_s: f64,
+    /// Of each run, knot by knot from its start on, one per element, in counts.
+    pub runs_counts: Vec<Vec<f64>>,
 }
 
 /// An effect that the data cannot show.

@@ -26,6 +26,12 @@ use crate::{DiscoverError, parallel};
 const COST_LEAST: f64 = 0.05;
 const COST_SHARE_LEAST: f64 = 1e-4;
 
+/// A knot that is seen by less than this share of what sees the one before tells nothing of a curve.
+const UNSEEN_SHARE: f64 = 1e-2;
+
+/// Frames enough for a noise's memory to be short beside them.
+const LONG_FRAMES: usize = 1000;
+
 /// An effect with more parameters has many.
 const PARAMETERS_MANY: usize = 6;
 
@@ -37,6 +43,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) element_weight: Vec<f64>,
     /// Weight of the fitted rows; 0 for those held out.
     pub(crate) train: Vec<f64>,
+    /// The same for what is slow beside the noise's own memory.
+    pub(crate) slow: Vec<f64>,
     /// Coverings in the data: with one the slope of the spread is not free.
     pub(crate) coverings: usize,
     /// True if the spread is free at all.
@@ -50,7 +58,8 @@ pub(crate) struct Problem<'a> {
 pub(crate) struct Fitted {
     pub(crate) parameters: Parameters,
     pub(crate) predicted: Vec<f64>,
-    /// Weighted sum of squared residuals of the fitted rows.
+    /// Weighted sum of squared residuals of the fitted rows; if zeros wander, as much less than with zeros that stand still
+    /// as the likelihood gains.
     pub(crate) cost: f64,
     /// Standard errors of the terms' parameters; not a number where one was not free.
     pub(crate) errors: Vec<Vec<f64>>,
@@ -69,7 +78,12 @@ impl<'a> Problem<'a> {
     pub(crate) fn new(sensor: Sensor<'a>, noise: &Noise) -> Self {
         let (rows, frames) = (sensor.rows, sensor.frames);
         let weigh = |(weight, heldout): (&f64, &bool)| if *heldout { 0.0 } else { *weight };
-        let train = rows.weight.iter().zip(&rows.heldout).map(weigh).collect();
+        let train: Vec<f64> = rows.weight.iter().zip(&rows.heldout).map(weigh).collect();
+        let inflation = noise.inflation(LONG_FRAMES);
+        let slow = |(row, weight): (usize, &f64)| {
+            if *weight > 0.0 { rows.frames_in(row) as f64 / inflation } else { 0.0 }
+        };
+        let slow = train.iter().enumerate().map(slow).collect();
         // A single element that is quieter than most is not told from rounding.
         let element_weight =
             noise.by_element_counts.iter().map(|rms| rms.max(0.7 * noise.rms_counts).powi(-2)).collect();
@@ -79,6 +93,7 @@ impl<'a> Problem<'a> {
         Self {
             element_weight,
             train,
+            slow,
             coverings: coverings_mm.len(),
             spread_free: Contacts::of(frames).distinct_places() > 1,
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
@@ -95,7 +110,12 @@ impl<'a> Problem<'a> {
                 free.push(Free::SigmaSlope);
             }
         }
-        for (term, Term { definition, .. }) in parameters.terms.iter().enumerate() {
+        for (term, Term { definition, values }) in parameters.terms.iter().enumerate() {
+            let mut values = definition.parameters.iter().zip(values);
+            if values.any(|(known, value)| known.kind == Kind::ElementOrAll && *value >= 0.0) {
+                // How one element's zero wandered before is no shape to fit.
+                continue;
+            }
             for (parameter, known) in definition.parameters.iter().enumerate() {
                 if known.kind == Kind::Real && known.name != "duration_s" {
                     free.push(Free::Of { term, parameter });
@@ -194,7 +214,7 @@ impl<'a> Problem<'a> {
         threads: usize,
     ) -> Result<Fitted, DiscoverError> {
         let free = self.free(&start);
-        let mut at = start;
+        let mut at = self.wandering(start)?;
         let mut predicted = self.predict(&at)?;
         let mut cost = self.cost(&predicted);
         let mut damping = 1e-3;
@@ -202,7 +222,7 @@ impl<'a> Problem<'a> {
         let mut covariance = None;
         for _ in 0..rounds {
             let linear = self.linear(&at, &predicted)?;
-            let mut residual: Vec<f64> = self.residuals(&predicted).collect();
+            let mut residual = self.standing(&at, &predicted);
             let raw = residual.clone();
             linear.project(&mut residual);
             let places: Vec<usize> = (0..free.len()).collect();
@@ -246,6 +266,12 @@ impl<'a> Problem<'a> {
             if !improved || promise < COST_LEAST.max(COST_SHARE_LEAST * cost) {
                 break;
             }
+        }
+        if covariance.as_ref().is_some_and(|gram| follow(&mut at, &free, gram)) {
+            predicted = self.predict(&at)?;
+        }
+        if at.wander.is_some() {
+            cost = self.wandering_cost(&at, &predicted);
         }
         let errors = self.errors(&at, &free, covariance);
         Ok(Fitted { parameters: at, predicted, cost, errors })
@@ -315,6 +341,27 @@ impl<'a> Problem<'a> {
         }
         errors
     }
+}
+
+/// Knots of a curve that hardly any fitted row sees go on from the knot before: a curve does not return where nobody looks.
+/// True if there are such.
+fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
+    let mut any = false;
+    for (index, pair) in free.windows(2).enumerate() {
+        let [Free::Of { term, parameter: before }, Free::Of { term: same, parameter: knot }] = pair else {
+            continue;
+        };
+        let Term { definition, values } = &mut at.terms[*term];
+        let family = |parameter: usize| {
+            definition.parameters[parameter].name.replace(|letter: char| letter.is_ascii_digit(), "")
+        };
+        let unseen = gram[(index + 1, index + 1)] < UNSEEN_SHARE * gram[(index, index)];
+        if term == same && values.len() > PARAMETERS_MANY && family(*before) == family(*knot) && unseen {
+            values[*knot] = values[*before];
+            any = true;
+        }
+    }
+    any
 }
 
 /// The normal equations of projected columns.

@@ -26,11 +26,12 @@ mod search;
 mod sensor;
 mod spectrum;
 mod telling;
+mod wander;
 mod wiring;
 
 pub use discover::{DiscoverError, Known, Options, Progress, Rule, discover, predict};
 pub use discovery::{
     Base, Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment,
-    NotShown, Point, Round, Split, Step, Unexplained, Verdict,
+    NotShown, Point, Round, RunWander, Split, Step, Unexplained, Verdict,
 };
 pub use frames::{Frame, Frames};

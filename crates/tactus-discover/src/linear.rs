@@ -4,6 +4,7 @@ use crate::DiscoverError;
 use crate::fit::Problem;
 use crate::noise::median;
 use crate::sensor::Parameters;
+use crate::wander::Zeros;
 
 /// Recalibration moves an element's gain within these, as ratios to what is typical of the array: an element beyond is
 /// not an element of another gain.
@@ -16,10 +17,11 @@ const GAIN_ERROR_MAX: f64 = 0.3;
 /// Derivatives at a point, freed of gains and baselines.
 pub(crate) struct Linear<'a> {
     problem: &'a Problem<'a>,
-    /// Of the counts by each element's relative gain, centred in each run.
+    zeros: Zeros<'a>,
+    /// Of the counts by each element's relative gain, freed of the zeros.
     by_gain: Vec<f64>,
-    /// Its means before it was centred, run by run.
-    by_gain_means: Vec<f64>,
+    /// What the zeros took up of it: run by run, knot by knot.
+    by_gain_taken: Vec<Vec<f64>>,
     /// Of every element, the weighted sum of squares of that; 0 where the gain is not free.
     by_gain_squares: Vec<f64>,
 }
@@ -37,7 +39,8 @@ impl<'a> Problem<'a> {
             *slope = (*slope - predicted) / share;
         }
         let elements = self.sensor.rows.elements;
-        let by_gain_means = self.centre(&mut by_gain);
+        let zeros = Zeros::of(self, at);
+        let by_gain_taken = zeros.centre(&mut by_gain);
         let mut by_gain_squares = vec![0.0; elements];
         for ((slope, weight), element) in by_gain.iter().zip(self.weights()).zip((0..elements).cycle()) {
             by_gain_squares[element] += weight * slope * slope;
@@ -48,7 +51,7 @@ impl<'a> Problem<'a> {
                 *squares = 0.0;
             }
         }
-        Ok(Linear { problem: self, by_gain, by_gain_means, by_gain_squares })
+        Ok(Linear { problem: self, zeros, by_gain, by_gain_taken, by_gain_squares })
     }
 
     /// Elements whose gain has come to the end of what recalibration may give it: there it stays, for an effect to explain.
@@ -65,39 +68,12 @@ impl<'a> Problem<'a> {
             })
             .collect()
     }
-
-    /// Takes the mean over the fitted rows of each run off each element; returns the means, run by run.
-    fn centre(&self, column: &mut [f64]) -> Vec<f64> {
-        let rows = self.sensor.rows;
-        let elements = rows.elements;
-        let runs = rows.paths.len();
-        let mut sums = vec![0.0; runs * elements];
-        let mut totals = vec![0.0; runs];
-        for (row, values) in column.chunks_exact(elements).enumerate() {
-            let (run, weight) = (rows.run[row], self.train[row]);
-            totals[run] += weight;
-            for (sum, value) in sums[run * elements..].iter_mut().zip(values) {
-                *sum += weight * value;
-            }
-        }
-        for (sums, total) in sums.chunks_exact_mut(elements).zip(&totals) {
-            for sum in sums {
-                *sum = if *total > 0.0 { *sum / total } else { 0.0 };
-            }
-        }
-        for (row, values) in column.chunks_exact_mut(elements).enumerate() {
-            for (value, mean) in values.iter_mut().zip(&sums[rows.run[row] * elements..]) {
-                *value -= mean;
-            }
-        }
-        sums
-    }
 }
 
 impl Linear<'_> {
     /// Frees a column, row by row and element by element, of what gains and baselines can take up.
     pub(crate) fn project(&self, column: &mut [f64]) {
-        self.problem.centre(column);
+        self.zeros.centre(column);
         let elements = self.by_gain_squares.len();
         let shares = self.shares(column);
         for (values, slopes) in column.chunks_exact_mut(elements).zip(self.by_gain.chunks_exact(elements)) {
@@ -127,11 +103,11 @@ impl Linear<'_> {
         sums
     }
 
-    /// Moves gains and baselines so that they take up what is left.
+    /// Moves gains and zeros so that they take up what is left if the zeros stand still.
     pub(crate) fn take_up(&self, left: &[f64], parameters: &mut Parameters) {
         let elements = self.by_gain_squares.len();
         let mut centred = left.to_vec();
-        let means = self.problem.centre(&mut centred);
+        let mut zeros = self.zeros.centre(&mut centred);
         let shares = self.shares(&centred);
         let declared = &self.problem.sensor.known.response.sensitivity_counts_per_mm;
         let ratios: Vec<f64> = parameters
@@ -159,14 +135,12 @@ impl Linear<'_> {
             taken[element] = if now == 0.0 { 0.0 } else { next / now - 1.0 };
             parameters.sensitivity[element] = next;
         }
-        // The mean that is left in each run, less what the gains' change has moved it by.
-        let of_runs = means.chunks_exact(elements).zip(self.by_gain_means.chunks_exact(elements));
-        for (baseline, (means, by_gain)) in parameters.baseline.iter_mut().zip(of_runs) {
-            for (((baseline, mean), by_gain), taken) in
-                baseline.iter_mut().zip(means).zip(by_gain).zip(&taken)
-            {
-                *baseline += mean - taken * by_gain;
+        // What the zeros take up, less what the gains' change has moved of it.
+        for (zeros, by_gain) in zeros.iter_mut().zip(&self.by_gain_taken) {
+            for ((zero, by_gain), taken) in zeros.iter_mut().zip(by_gain).zip(taken.iter().cycle()) {
+                *zero -= taken * by_gain;
             }
         }
+        self.zeros.put(zeros, parameters);
     }
 }

@@ -156,7 +156,7 @@ impl Setting<'_> {
             let term = with.terms.len() - 1;
             let mut best = 0.0_f64;
             for (parameter, known) in definition.parameters.iter().enumerate() {
-                if known.kind == Kind::Element {
+                if known.kind != Kind::Real {
                     continue;
                 }
                 let mut column = problem.slope(&with, &predicted, Free::Of { term, parameter })?;
@@ -186,7 +186,7 @@ impl Setting<'_> {
 
 /// The same model for a run of its own.
 fn once(of_runs: &Parameters) -> Parameters {
-    Parameters { baseline: vec![of_runs.mean_baseline()], ..of_runs.clone() }
+    Parameters { baseline: vec![of_runs.mean_baseline()], wander: None, ..of_runs.clone() }
 }
 
 fn largest(predicted: &[f64], baseline: &[f64]) -> f64 {

@@ -22,6 +22,8 @@
 //! J. Hemerik, J. J. Goeman and L. Finos, *J. R. Stat. Soc. B* 82 (2020) 841 (sign-flipped scores); P. H. Westfall and
 //! S. S. Young, *Resampling-Based Multiple Testing* (1993), ch. 2 (the largest of many).
 
+use nalgebra::DMatrix;
+
 use crate::DiscoverError;
 use crate::chance::Chance;
 use crate::fit::{Problem, dot};
@@ -44,6 +46,14 @@ pub(crate) struct Score {
     pub(crate) z: f64,
     /// Each block's part of each direction's, clipped.
     parts: Vec<Vec<f32>>,
+    chi_square: ChiSquare,
+}
+
+/// How a sum of squares is distributed under flips: so many times chi-square of so many degrees of freedom.
+#[derive(Debug, Clone, Copy)]
+struct ChiSquare {
+    times: f64,
+    freedom: f64,
 }
 
 /// Directions that are fitted already: all else is freed of them.
@@ -67,7 +77,7 @@ impl<'a> Fitting<'a> {
     ) -> Result<Self, DiscoverError> {
         let linear = problem.linear(parameters, predicted)?;
         let columns = problem.columns(parameters, predicted, threads)?;
-        let mut residual: Vec<f64> = problem.residuals(predicted).collect();
+        let mut residual = problem.standing(parameters, predicted);
         linear.project(&mut residual);
         let weights: Vec<f64> = problem.weights().collect();
         let mut fitting =
@@ -118,6 +128,12 @@ impl<'a> Fitting<'a> {
         dot(&self.weighted_residual, column)
     }
 
+    /// The residual, freed of everything that is fitted already; 0 where it is not fitted.
+    pub(crate) fn residual(&self) -> Vec<f64> {
+        let of = |(weighted, weight): (&f64, &f64)| if *weight > 0.0 { weighted / weight } else { 0.0 };
+        self.weighted_residual.iter().zip(&self.weights).map(of).collect()
+    }
+
     /// The score of freed columns together.
     pub(crate) fn score(&self, columns: &[Vec<f64>]) -> Score {
         let mut independent: Vec<Vec<f64>> = Vec::new();
@@ -134,7 +150,8 @@ impl<'a> Fitting<'a> {
         let scores: Vec<(f64, Vec<f32>)> = independent.iter().map(|column| self.score_of(column)).collect();
         let squares: f64 = scores.iter().map(|(z, _)| z * z).sum();
         Score {
-            z: deviate(squares, scores.len()),
+            z: deviate(squares, scores.len() as f64),
+            chi_square: ChiSquare { times: 1.0, freedom: scores.len() as f64 },
             parts: scores.into_iter().map(|(_, parts)| parts).collect(),
         }
     }
@@ -187,6 +204,34 @@ impl<'a> Fitting<'a> {
     }
 }
 
+impl Score {
+    /// Of a sum of products of pairs of blocks, which is positive whatever their signs. Flips leave the products of a block
+    /// with itself; those of two blocks scatter it (F. E. Satterthwaite, *Biometrics Bull.* 2 (1946) 110).
+    pub(crate) fn of_products(products: &DMatrix<f64>, blocks: &[usize], all_blocks: usize) -> Self {
+        let mean = products.trace();
+        let variance = 2.0 * (products.norm_squared() - products.diagonal().norm_squared());
+        let none = Self { z: 0.0, parts: Vec::new(), chi_square: ChiSquare { times: 1.0, freedom: 0.0 } };
+        // Nothing of the diagonal's own hangs on signs.
+        let firm = DMatrix::from_diagonal_element(blocks.len(), blocks.len(), 1e-9 * mean);
+        let Some(factors) = (products + firm).cholesky().filter(|_| variance > 0.0) else { return none };
+        let chi_square = ChiSquare { times: variance / (2.0 * mean), freedom: 2.0 * mean * mean / variance };
+        let part = |column: usize| {
+            let mut part = vec![0.0; all_blocks];
+            for (block, value) in blocks.iter().zip(factors.l_dirty().column(column).iter()).skip(column) {
+                #[expect(clippy::cast_possible_truncation, reason = "a part of a test's statistic")]
+                let value = *value as f32;
+                part[*block] = value;
+            }
+            part
+        };
+        Self {
+            z: deviate(products.sum() / chi_square.times, chi_square.freedom),
+            parts: (0..blocks.len()).map(part).collect(),
+            chi_square,
+        }
+    }
+}
+
 /// Takes so much of a direction off a column.
 fn take_off(column: &mut [f64], along: f64, direction: &[f64]) {
     for (value, direction) in column.iter_mut().zip(direction) {
@@ -205,12 +250,12 @@ fn shorten(column: &mut [f64], size: f64) {
 ///
 /// # Source
 /// E. B. Wilson and M. M. Hilferty, *Proc. Natl. Acad. Sci.* 17 (1931) 684.
-fn deviate(chi_square: f64, freedom: usize) -> f64 {
-    if freedom == 0 {
+fn deviate(chi_square: f64, freedom: f64) -> f64 {
+    if freedom <= 0.0 {
         return 0.0;
     }
-    let spread = 2.0 / (9.0 * freedom as f64);
-    (((chi_square / freedom as f64).cbrt() - (1.0 - spread)) / spread.sqrt()).max(0.0)
+    let spread = 2.0 / (9.0 * freedom);
+    (((chi_square / freedom).cbrt() - (1.0 - spread)) / spread.sqrt()).max(0.0)
 }
 
 /// The largest of the scores in each of many data sets whose blocks had their signs flipped, for each group.
@@ -233,7 +278,8 @@ pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Ve
                     let sum: f32 = parts.iter().zip(&signs).map(|(part, sign)| part * sign).sum();
                     f64::from(sum * sum)
                 };
-                deviate(score.parts.iter().map(square).sum(), score.parts.len())
+                let ChiSquare { times, freedom } = score.chi_square;
+                deviate(score.parts.iter().map(square).sum::<f64>() / times, freedom)
             });
             largest.push(of_group.fold(0.0, f64::max));
         }

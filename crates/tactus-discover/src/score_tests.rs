@@ -18,7 +18,7 @@ fn q_values_are_those_of_the_published_example() {
 fn a_chi_square_number_becomes_a_normal_deviate() {
     // Upper 1 % points of chi-square (Abramowitz and Stegun, table 26.8); the normal's is 2.326.
     for (freedom, chi_square) in [(4, 13.277), (10, 23.209), (30, 50.892)] {
-        assert!((deviate(chi_square, freedom) - 2.326).abs() < 0.02, "{freedom}");
+        assert!((deviate(chi_square, f64::from(freedom)) - 2.326).abs() < 0.02, "{freedom}");
     }
 }
 

@@ -16,6 +16,7 @@ use crate::fit::{Fitted, Problem};
 use crate::parallel;
 use crate::score::{Fitting, Score, flipped, largest, p_value};
 use crate::sensor::{Parameters, Term};
+use crate::wander::WANDER;
 use crate::{DiscoverError, Options};
 
 /// Sign-flipped data sets of a test.
@@ -121,7 +122,12 @@ impl Search<'_> {
     pub(crate) fn screen(&self, fitting: &Fitting<'_>, at: &Fitted) -> Result<Vec<Screened>, DiscoverError> {
         let screen =
             |candidate: &Candidate| candidate.screen(fitting, self.problem, &at.parameters, &at.predicted);
-        parallel::map(self.candidates, self.options.threads, screen).into_iter().collect()
+        let screened = parallel::map(self.candidates, self.options.threads, screen).into_iter();
+        let mut screened = screened.collect::<Result<Vec<_>, DiscoverError>>()?;
+        if screened.iter().any(|one| one.definition.name == WANDER.name) {
+            screened.extend(self.problem.screen_wander(fitting, &at.parameters));
+        }
+        Ok(screened)
     }
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
@@ -190,6 +196,9 @@ impl Search<'_> {
                 shrink: None,
             })
             .collect();
+        // Of two forms of one name the one that is wanted more.
+        tried.sort_by(|a, b| a.effect.cmp(b.effect).then(b.score.total_cmp(&a.score)));
+        tried.dedup_by_key(|one| one.effect);
         let p_value = tried.iter().map(|one| one.p_value).fold(1.0, f64::min);
         let mut order: Vec<usize> = (0..screened.len()).collect();
         order.sort_by(|a, b| screened[*b].promise.total_cmp(&screened[*a].promise));
@@ -201,7 +210,7 @@ impl Search<'_> {
         let starts: Vec<Term> = order.iter().map(|one| screened[*one].start.clone()).collect();
         let mut fits = self.fits(at, &starts)?;
         fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
-        for (name, fitted) in &fits {
+        for (name, fitted) in fits.iter().rev() {
             if let Some(one) = tried.iter_mut().find(|one| one.effect == *name) {
                 let share =
                     self.problem.heldout_gap(&fitted.predicted).value / self.base_gap.max(f64::MIN_POSITIVE);
@@ -346,22 +355,38 @@ impl Search<'_> {
             {
                 return Ok(Exchanged::Better(best.clone()));
             }
-            let same = fits.into_iter().filter(|(_, rival)| self.serves_as_well(&less, rival, at));
-            equivalent.insert(*name, same.collect());
+            let mut same = Vec::new();
+            for (rival, fitted) in fits {
+                if self.serves_as_well(&less, &fitted, at)? {
+                    same.push((rival, fitted));
+                }
+            }
+            equivalent.insert(*name, same);
         }
         Ok(Exchanged::Settled(equivalent))
     }
 
     /// True if the data cannot tell a rival from what is in the model: block by block it is hardly worse, or it closes
-    /// nearly all of the gap that the other does, so that the form of either may be what differs.
-    fn serves_as_well(&self, less: &Fitted, rival: &Fitted, at: &Fitted) -> bool {
+    /// nearly all of the gap that the other does, so that the form of either may be what differs. That is no excuse for a
+    /// rival that leaves something where the model leaves nothing.
+    fn serves_as_well(&self, less: &Fitted, rival: &Fitted, at: &Fitted) -> Result<bool, DiscoverError> {
         let (of_rival, of_model) =
             (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
-        let worse: Vec<f64> = of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect();
+        let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.wander.is_none()) {
+            of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect()
+        } else {
+            // A wander takes up noise where it is fitted.
+            self.problem.heldout_gains(&rival.predicted, &at.predicted)
+        };
         let sum: f64 = worse.iter().sum();
         let mean = sum / worse.len().max(1) as f64;
         let scatter = worse.iter().map(|one| (one - mean).powi(2)).sum::<f64>().sqrt();
-        sum < INSEPARABLE_Z * scatter || less.cost - rival.cost > INSEPARABLE_SHARE * (less.cost - at.cost)
+        if sum < INSEPARABLE_Z * scatter {
+            return Ok(true);
+        }
+        let leaves_something = |one: &Fitted| Ok::<_, DiscoverError>(self.locate(one)?.p_value <= ALPHA);
+        Ok(less.cost - rival.cost > INSEPARABLE_SHARE * (less.cost - at.cost)
+            && (leaves_something(at)? || !leaves_something(rival)?))
     }
 
     /// Takes back what does not earn its place, and puts in its place what serves better.

@@ -8,6 +8,7 @@ use tactus_model::{
 };
 
 use crate::rows::Rows;
+use crate::wander::{Wander, is_wander};
 use crate::{DiscoverError, Frames, Known};
 
 /// Parameters of the whole model.
@@ -17,6 +18,8 @@ pub(crate) struct Parameters {
     pub(crate) sensitivity: Vec<f64>,
     /// Baselines, run by run, one per element.
     pub(crate) baseline: Vec<Vec<f64>>,
+    /// What the zeros wander beside the baselines, if they do.
+    pub(crate) wander: Option<Wander>,
     pub(crate) psf: Psf,
     pub(crate) terms: Vec<Term>,
 }
@@ -65,6 +68,7 @@ impl Parameters {
         Self {
             sensitivity: known.response.sensitivity_counts_per_mm.clone(),
             baseline: vec![known.response.baseline_counts.clone(); runs],
+            wander: None,
             psf: known.psf,
             terms: known.effects.iter().map(Term::of).collect(),
         }
@@ -77,8 +81,14 @@ impl Parameters {
         (0..self.sensitivity.len()).map(mean).collect()
     }
 
+    /// Its effects, each of them of the library.
     pub(crate) fn effects(&self) -> Result<Vec<Effect>, DiscoverError> {
-        self.terms.iter().map(Term::effect).collect()
+        let terms = self.terms.iter().filter(|term| !is_wander(term));
+        let mut effects = terms.map(Term::effect).collect::<Result<Vec<_>, _>>()?;
+        if let Some(wander) = &self.wander {
+            effects.extend(wander.effects(self.sensitivity.len())?);
+        }
+        Ok(effects)
     }
 }
 
@@ -92,7 +102,7 @@ impl<'a> Sensor<'a> {
     /// Counts of every row and element, before noise and converter.
     pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
         let Self { known, frames, rows, .. } = self;
-        let effects = parameters.effects()?;
+        let effects = parameters.terms.iter().map(Term::effect).collect::<Result<Vec<_>, _>>()?;
         let elements = rows.elements;
         let mut predicted: Vec<f64> = Vec::with_capacity(rows.len() * elements);
         let mut row = 0;
@@ -117,6 +127,9 @@ impl<'a> Sensor<'a> {
                 }
                 row += 1;
             }
+        }
+        if let Some(wander) = &parameters.wander {
+            wander.add(rows, 1.0, &mut predicted);
         }
         let full_scale_counts = known.array.full_scale_counts();
         let least =

@@ -14,6 +14,7 @@ use crate::prepare::Prepared;
 use crate::score::{q_values, sign_flip_p};
 use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Search, Tried, names, without};
 use crate::sensor::{Parameters, Sensor, Term};
+use crate::wander::Wander;
 use crate::{DiscoverError, Options, Rule, not_shown};
 
 /// What is left of the gap at most, for the verdict.
@@ -174,7 +175,12 @@ fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> Base {
         baseline_counts: parameters.mean_baseline(),
         ..prepared.known.response.clone()
     };
-    Base { psf: parameters.psf, response, run_baselines_counts: parameters.baseline.clone() }
+    Base {
+        psf: parameters.psf,
+        response,
+        run_baselines_counts: parameters.baseline.clone(),
+        run_wander: parameters.wander.as_ref().and_then(Wander::apart),
+    }
 }
 
 impl Prepared<'_> {

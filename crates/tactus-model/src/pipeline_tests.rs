@@ -107,7 +107,8 @@ fn strong(definition: &'static Definition) -> Effect {
     definition.parameters.iter().fold(Effect::neutral(definition), |effect, parameter| {
         let [least, most] = parameter.range;
         let value = if parameter.name == "element" { 20.0 } else { 0.9 * parameter.neutral + 0.1 * most };
-        if parameter.name == "answers_for" {
+        // One that starts later is not seen yet.
+        if ["answers_for", "start_s"].contains(&parameter.name) {
             effect
         } else {
             effect.with(parameter.name, value.max(least)).unwrap()

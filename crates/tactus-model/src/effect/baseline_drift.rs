@@ -1,13 +1,15 @@
-//! `baseline-drift`: the zero of all elements wanders in time.
+//! `baseline-drift`: the zero wanders in time, of all elements alike or of one.
 //!
 //! ```text
-//! counts -> counts + c(t)          t since the start
-//! c straight through 0 and offset_01_counts .. offset_16_counts, duration / 16 apart, and constant after the duration
+//! counts -> counts + c(t - start)          t since the start of the run
+//! c straight through 0 and offset_01_counts .. offset_16_counts, duration / 16 apart, and constant before and after
 //! ```
 //!
 //! The start is at 0, since the baselines are the base model's. A wander of any
 //! shape is followed, be it a trend, a warming up or a random walk, of which least squares leave 4 % of the variance;
-//! 12 knots would leave 5 % and 6 knots 10 %. What is faster than a sixteenth of the duration is not.
+//! 12 knots would leave 5 % and 6 knots 10 %. What is faster than a sixteenth of the duration is not: it takes several
+//! effects, each starting where the one before ends. With `element` -1, or without it, all elements wander alike; each for
+//! itself takes an effect for each.
 //!
 //! Derivatives in closed form. Cost: none.
 //!
@@ -22,6 +24,8 @@ pub(super) static DEFINITION: Definition = Definition {
     name: "baseline-drift",
     summary: "the zero wanders in time",
     parameters: &[
+        Parameter::element_or_all("element"),
+        Parameter::given("start_s", 0.0, [0.0, 1e6]),
         Parameter::real("duration_s", 600.0, [1.0, 1e6]),
         offset("offset_01_counts"),
         offset("offset_02_counts"),
@@ -43,7 +47,12 @@ pub(super) static DEFINITION: Definition = Definition {
     near_twins: &["imprint", "relaxation", "gain-drift", "periodic-interference"],
     shown_by: &["drift"],
     make: Make::Readout(|values| {
-        Box::new(BaselineDrift { zero_counts: Curve::new(values[0], &values[1..]), t_s: 0.0 })
+        Box::new(BaselineDrift {
+            element: element(values[0]),
+            start_s: values[1],
+            zero_counts: Curve::new(values[2], &values[3..]),
+            t_s: 0.0,
+        })
     }),
 };
 
@@ -53,28 +62,52 @@ const fn offset(name: &'static str) -> Parameter {
 
 #[derive(Debug)]
 struct BaselineDrift {
+    /// `None` for all.
+    element: Option<usize>,
+    start_s: f64,
     zero_counts: Curve<16>,
-    /// Of the last moment.
+    /// Of the last moment, since the start.
     t_s: f64,
+}
+
+impl BaselineDrift {
+    /// Those of all elements' counts that it acts on.
+    fn own<'a>(&self, counts: &'a mut [f64]) -> &'a mut [f64] {
+        match self.element {
+            None => counts,
+            Some(element) => counts.get_mut(element..=element).unwrap_or_default(),
+        }
+    }
 }
 
 impl OnReadout for BaselineDrift {
     fn counts(&mut self, now: Now<'_>, counts: &mut [f64]) {
-        self.t_s = now.t_s;
-        let drift_counts = self.zero_counts.at(now.t_s);
-        for count in counts {
+        self.t_s = now.t_s - self.start_s;
+        let drift_counts = self.zero_counts.at(self.t_s);
+        for count in self.own(counts) {
             *count += drift_counts;
         }
     }
 
     fn slope(&self, parameter: usize, slope_counts: &mut [f64]) -> bool {
-        slope_counts.fill(match parameter {
-            0 => self.zero_counts.by_duration(self.t_s),
-            1..=16 => self.zero_counts.by_knot(parameter - 1, self.t_s),
+        let slope = match parameter {
+            2 => self.zero_counts.by_duration(self.t_s.max(0.0)),
+            3..=18 => self.zero_counts.by_knot(parameter - 3, self.t_s),
             _ => return false,
-        });
+        };
+        slope_counts.fill(0.0);
+        self.own(slope_counts).fill(slope);
         true
     }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "an index, checked against the array"
+)]
+fn element(value: f64) -> Option<usize> {
+    (value >= 0.0).then_some(value as usize)
 }
 
 #[cfg(test)]

@@ -24,8 +24,34 @@ fn the_zero_wanders_alike_on_all_elements() {
 }
 
 #[test]
+fn one_element_wanders_for_itself_and_from_a_start() {
+    let late = drift().with("element", 20.0).unwrap().with("start_s", 1000.0).unwrap();
+    let one = simulator([late]);
+    let tip_mm = upon(&one, 21, 0.4);
+    let plain = still(&simulator([]), tip_mm);
+    let mut pipeline = Pipeline::new(&one).unwrap();
+    for (t_s, want) in [(0.0, 0.0), (900.0, 0.0), (1225.0, 5.0), (1300.0, 20.0), (1e5, -10.0)] {
+        for (element, (got, plain)) in pipeline.step(Moment::at(t_s), &tip_mm).iter().zip(&plain).enumerate()
+        {
+            let want = if element == 20 { want } else { 0.0 };
+            assert!((got - plain - want).abs() < 1e-9, "{element} after {t_s} s: {}", got - plain);
+        }
+    }
+}
+
+#[test]
+fn without_an_element_it_is_that_of_all() {
+    let given = drift();
+    let named = |(name, _): &(&str, f64)| !["element", "start_s"].contains(name);
+    assert_eq!(Effect::new("baseline-drift", given.parameters().filter(named)).unwrap(), given);
+    assert!(!given.names_elements());
+    let one = given.with("element", 48.0).unwrap();
+    assert!(one.names_elements() && one.fits(simulator([]).model.array()).is_err());
+}
+
+#[test]
 fn derivatives_are_those_of_differences() {
-    let known: Vec<_> = DEFINITION.parameters.iter().map(|parameter| parameter.name).collect();
+    let known: Vec<_> = DEFINITION.parameters.iter().skip(2).map(|parameter| parameter.name).collect();
     for duration_s in [30.0, 90.0, 1600.0] {
         assert_slopes(&drift().with("duration_s", duration_s).unwrap(), &known);
     }

@@ -40,6 +40,10 @@ pub enum Kind {
     Real,
     /// Index of an element; no fit varies it, and it has no meaning on another array.
     Element,
+    /// The same, or -1 for all elements, which it is where it is not given.
+    ElementOrAll,
+    /// A number that no fit varies; neutral where it is not given.
+    Given,
 }
 
 /// Where in the pipeline an effect acts.
@@ -173,10 +177,32 @@ impl Parameter {
     pub const fn element(name: &'static str) -> Self {
         Self { name, neutral: 0.0, range: [0.0, u32::MAX as f64], kind: Kind::Element }
     }
+
+    /// Index of an element, or -1 for all of them.
+    pub const fn element_or_all(name: &'static str) -> Self {
+        Self { name, neutral: -1.0, range: [-1.0, u32::MAX as f64], kind: Kind::ElementOrAll }
+    }
+
+    /// A number within a range that no fit varies.
+    pub const fn given(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
+        Self { name, neutral, range, kind: Kind::Given }
+    }
+
+    /// True if it is neutral where no value is given.
+    const fn is_optional(&self) -> bool {
+        matches!(self.kind, Kind::ElementOrAll | Kind::Given)
+    }
+
+    /// True if a value is the index of an element.
+    fn names_element(&self, value: f64) -> bool {
+        self.kind == Kind::Element
+            || self.kind == Kind::ElementOrAll && value.to_bits() != self.neutral.to_bits()
+    }
 }
 
 impl Effect {
-    /// The effect of a name in the [`REGISTRY`], with a value for each parameter, in any order.
+    /// The effect of a name in the [`REGISTRY`], with a value for each parameter, in any order; those of the kinds
+    /// [`Kind::ElementOrAll`] and [`Kind::Given`] may be left out.
     ///
     /// # Errors
     /// [`EffectError`] says what is unknown, missing or out of range.
@@ -208,6 +234,7 @@ impl Effect {
         }
         let value = |(parameter, value): (&Parameter, Option<f64>)| match value {
             Some(value) => definition.check(parameter, value),
+            None if parameter.is_optional() => Ok(parameter.neutral),
             None => Err(EffectError::Missing { effect, parameter: parameter.name }),
         };
         let values = definition.parameters.iter().zip(given).map(value).collect::<Result<_, _>>()?;
@@ -251,7 +278,8 @@ impl Effect {
 
     /// True if it names elements, and so belongs to one array.
     pub fn names_elements(&self) -> bool {
-        self.definition.parameters.iter().any(|parameter| parameter.kind == Kind::Element)
+        let mut parameters = self.definition.parameters.iter().zip(&self.values);
+        parameters.any(|(parameter, value)| parameter.names_element(*value))
     }
 
     /// Checks that the elements it names are the array's.
@@ -261,8 +289,8 @@ impl Effect {
     pub fn fits(&self, array: &Array) -> Result<(), EffectError> {
         let last = array.elements() - 1;
         for (parameter, &value) in self.definition.parameters.iter().zip(&self.values) {
-            let is_element = value.fract() == 0.0 && value <= last as f64;
-            if parameter.kind == Kind::Element && !is_element {
+            let is_element = value.fract() == 0.0 && (0.0..=last as f64).contains(&value);
+            if parameter.names_element(value) && !is_element {
                 let (effect, parameter) = (self.name(), parameter.name);
                 return Err(EffectError::Element { effect, parameter, last, value });
             }

@@ -33,21 +33,27 @@ fn step(f: &mut fmt::Formatter<'_>, step: &Step) -> fmt::Result {
     let definition = Definition::find(step.effect).ok();
     let summary = definition.map_or("", |definition| definition.summary);
     writeln!(f, "<h3>{}</h3>\n<p>{}.</p>", Text(step.effect), Text(capital(summary)))?;
-    let parameters = step.terms.first().map_or(&[][..], Vec::as_slice);
-    let heads = parameters.iter().map(|parameter| Column::Number(parameter.name));
-    let columns: Vec<Column> = [Column::Name("")].into_iter().chain(heads).collect();
-    let mut table = Table::new(&columns);
-    for (nth, term) in step.terms.iter().enumerate() {
-        let name = if step.terms.len() > 1 { format!("found, {}", nth + 1) } else { "found".into() };
-        table.row([name].into_iter().chain(term.iter().map(value)));
-    }
-    if let Some(definition) = definition {
-        let range = |found: &Estimated| range(definition, found);
-        table.row(["can lie".to_owned()].into_iter().chain(parameters.iter().map(range)));
+    let mut nth = 0;
+    // Terms of one name may be of two forms.
+    for terms in step.terms.chunk_by(|one, other| names(one).eq(names(other))) {
+        let parameters = terms.first().map_or(&[][..], Vec::as_slice);
+        let columns: Vec<Column> =
+            [Column::Name("")].into_iter().chain(names(parameters).map(Column::Number)).collect();
+        let mut table = Table::new(&columns);
+        for term in terms {
+            nth += 1;
+            let name = if step.terms.len() > 1 { format!("found, {nth}") } else { "found".into() };
+            table.row([name].into_iter().chain(term.iter().map(value)));
+        }
+        if let Some(definition) = definition {
+            let range = |found: &Estimated| range(definition, found);
+            table.row(["can lie".to_owned()].into_iter().chain(parameters.iter().map(range)));
+        }
+        writeln!(f, "{table}")?;
     }
     writeln!(
         f,
-        "{table}\n<p>On held-out presses the residual is {} counts rms without it, all else fitted anew, and {} with it; noise alone brings such a \
+        "<p>On held-out presses the residual is {} counts rms without it, all else fitted anew, and {} with it; noise alone brings such a \
          gain with a chance of {} (false-discovery rate {} over all that was tried in its round).</p>",
         digits(step.heldout_rms_before_counts, 3),
         digits(step.heldout_rms_after_counts, 3),
@@ -64,6 +70,10 @@ fn step(f: &mut fmt::Formatter<'_>, step: &Step) -> fmt::Result {
             Text(either(&step.equivalent))
         )
     }
+}
+
+fn names(term: &[Estimated]) -> impl Iterator<Item = &'static str> {
+    term.iter().map(|parameter| parameter.name)
 }
 
 fn value(parameter: &Estimated) -> String {

@@ -277,5 +277,6 @@ fn base() -> Base {
             reference_covering: Covering { thickness_mm: 1.016 },
         },
         run_baselines_counts: vec![vec![100.0; 48]],
+        run_wander: None,
     }
 }

@@ -1,4 +1,5 @@
 use tactus_discover::{Final, GlobalTest, Level, Split, Unexplained, Verdict};
+use tactus_model::effect::Definition;
 use tactus_schema::Rig;
 
 use super::*;
@@ -47,6 +48,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
         psf: model.base.psf,
         response: model.base.response.clone(),
         run_baselines_counts: vec![model.base.response.baseline_counts.clone()],
+        run_wander: None,
     };
     let mut grown = base.clone();
     grown.psf.sigma_intercept_mm = 2.3;
@@ -132,4 +134,20 @@ fn without_repeats_the_noise_stays_as_it_was_said_to_be() {
     let found = Discovery { noise_rms_counts: None, ..found(&before) };
     let noise_rms_counts = grown(&before, &found, "a").base.noise_rms_counts;
     assert!((noise_rms_counts - 1.5).abs() < 1e-12);
+}
+
+#[test]
+fn the_parts_of_a_wander_have_the_evidence_of_the_whole() {
+    let before = before();
+    let mut found = found(&before);
+    let part = Effect::neutral(Definition::find("baseline-drift").unwrap());
+    let part = part.with("element", 20.0).unwrap().with("offset_01_counts", 0.5).unwrap();
+    let whole = vec![Estimated { name: "rms_counts", value: 0.6, standard_error: None }];
+    found.steps.push(Step { effect: "baseline-drift", terms: vec![whole], ..found.steps[0].clone() });
+    found.effects.push(part.clone());
+    let model = grown(&before, &found, "a");
+    let known = model.effects.last().unwrap();
+    assert_eq!(known.effect, part);
+    assert!(known.evidence.is_some() && known.standard_errors.is_empty());
+    assert_eq!(Model::from_toml(&model.to_toml().unwrap()).unwrap(), model);
 }

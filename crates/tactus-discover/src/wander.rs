@@ -1,0 +1,456 @@
+//! Zeros that wander, each element's for itself: the baselines' generalisation.
+//!
+//! ```text
+//! zero(run, e, t) = baseline(run, e) + u(run, e, t)          u straight between knots, a random walk from knot to knot:
+//! u(k + 1) - u(k) ~ N(0, rate^2 knot)
+//! ```
+//!
+//! Given the rate, `u` is eliminated in closed form, as the baselines are: it is the walk's mean given the readings, by
+//! least squares that charge its steps with their precision. One rate and one distance of knots serve all elements and
+//! runs; they are those of the greatest marginal likelihood, and what that likelihood gains is what such a wander lessens
+//! the cost by, however many numbers it takes. Noise counts here as what it is over long times, coloured or not.
+//!
+//! Whether it is wanted is tested like every effect, by flipping the signs of blocks: with `U_be` the sum of the weighted
+//! residual of element `e` in block `b` and `K_bc` a kernel that falls with the time between two blocks,
+//!
+//! ```text
+//! S = sum over b, c of K_bc sum over e of U_be U_ce
+//! ```
+//!
+//! whose terms of one block with itself no flip changes: blocks near in time must be alike.
+//!
+//! # Source
+//! Walks given readings: G. Wahba, *Spline Models for Observational Data* (1990), ch. 1 and 4. Fits beside them, freed of
+//! what they take up: P. Speckman, *J. R. Stat. Soc. B* 50 (1988) 413. The test: X. Lin, *Biometrika* 84 (1997) 309.
+
+use nalgebra::{DMatrix, DVector};
+use tactus_model::Effect;
+use tactus_model::effect::{Definition, Make, Now, OnReadout, Parameter};
+
+use crate::candidates::Screened;
+use crate::fit::Problem;
+use crate::noise::median;
+use crate::rows::Rows;
+use crate::score::{Fitting, Score};
+use crate::sensor::{Parameters, Term};
+use crate::{DiscoverError, RunWander};
+
+/// A wander of every element for itself, as a term of a model: how much, not which way; that is [`Wander`].
+pub(crate) static WANDER: Definition = Definition {
+    name: "baseline-drift",
+    summary: "the zero of each element wanders in time",
+    parameters: &[
+        Parameter::given("counts_per_root_s", 0.0, [0.0, 1e6]),
+        Parameter::given("knot_s", 0.0, [0.0, 1e6]),
+        Parameter::given("rms_counts", 0.0, [0.0, 1e6]),
+    ],
+    near_twins: &["imprint", "relaxation", "gain-drift"],
+    shown_by: &["drift"],
+    make: Make::Readout(|_| Box::new(Elsewhere)),
+};
+
+/// Knots of a `baseline-drift` of the library, which is what a wander is written as.
+const KNOTS: usize = 16;
+/// Knots are no nearer than this, unless there are but so many.
+const KNOT_S_LEAST: f64 = 3.0;
+/// Knots at half the distance must lessen the cost by so much.
+const FINER_GAIN: f64 = 10.0;
+/// Rates that are tried, in noise per root second: factors of the root of 2 up from the least.
+const RATE_LEAST: f64 = 1e-3;
+const RATES: i32 = 32;
+/// Times over which the kernels of the test fall.
+const KERNELS_S: [f64; 3] = [10.0, 40.0, 160.0];
+/// The test takes so many blocks at most.
+const BLOCKS_MAX: usize = 600;
+
+/// What the zeros of each run wander: knot by knot, element by element, from 0 on.
+#[derive(Debug, Clone)]
+pub(crate) struct Wander {
+    pub(crate) knot_s: f64,
+    pub(crate) runs: Vec<Vec<f64>>,
+}
+
+/// What zeros can take up: constants, and what wanders if that is in the model.
+#[derive(Debug)]
+pub(crate) struct Zeros<'a> {
+    problem: &'a Problem<'a>,
+    /// Infinite if nothing wanders.
+    knot_s: f64,
+    knots: usize,
+    /// Precision of a step from knot to knot, in counts^-2.
+    stiffness: f64,
+    /// Products of the knots' shares in the rows, run by run: each with itself, and with the next.
+    grams: Vec<Vec<[f64; 2]>>,
+}
+
+/// How much zeros wander.
+#[derive(Debug, Clone, Copy)]
+struct Walk {
+    knot_s: f64,
+    counts_per_root_s: f64,
+    /// By how much it lessens the cost.
+    gain: f64,
+}
+
+impl Wander {
+    /// Adds a multiple of it to readings, row by row and element by element.
+    pub(crate) fn add(&self, rows: &Rows, times: f64, readings: &mut [f64]) {
+        let elements = rows.elements;
+        for (row, readings) in readings.chunks_exact_mut(elements).enumerate() {
+            let of_run = &self.runs[rows.run[row]];
+            let (knot, share) = place(rows.t_s[row], self.knot_s, of_run.len() / elements);
+            for (knot, share) in [(knot, 1.0 - share), (knot + 1, share)] {
+                for (reading, value) in readings.iter_mut().zip(of_run.iter().skip(knot * elements)) {
+                    *reading += times * share * value;
+                }
+            }
+        }
+    }
+
+    pub(crate) fn of(RunWander { knot_s, runs_counts }: &RunWander) -> Self {
+        Self { knot_s: *knot_s, runs: runs_counts.clone() }
+    }
+
+    /// What each run has apart from the others; none of one run.
+    pub(crate) fn apart(&self) -> Option<RunWander> {
+        let mean = self.mean();
+        let less = |run: &Vec<f64>| run.iter().zip(&mean).map(|(value, mean)| value - mean).collect();
+        let apart = || RunWander { knot_s: self.knot_s, runs_counts: self.runs.iter().map(less).collect() };
+        (self.runs.len() > 1).then(apart)
+    }
+
+    fn mean(&self) -> Vec<f64> {
+        let mut mean = vec![0.0; self.runs.first().map_or(0, Vec::len)];
+        for run in &self.runs {
+            mean.iter_mut().zip(run).for_each(|(mean, value)| *mean += value / self.runs.len() as f64);
+        }
+        mean
+    }
+
+    /// What all runs have in common, as effects of the library: for each element one after another.
+    pub(crate) fn effects(&self, elements: usize) -> Result<Vec<Effect>, DiscoverError> {
+        let mean = self.mean();
+        let definition = Definition::find(WANDER.name)?;
+        let mut effects = Vec::new();
+        for element in 0..elements {
+            let knots: Vec<f64> = mean.iter().skip(element).step_by(elements).copied().collect();
+            for (window, values) in knots.windows(KNOTS + 1).step_by(KNOTS).enumerate() {
+                let duration_s = KNOTS as f64 * self.knot_s;
+                let given = [
+                    ("element", element as f64),
+                    ("start_s", window as f64 * duration_s),
+                    ("duration_s", duration_s),
+                ];
+                let offsets = definition.parameters.iter().filter(|one| one.name.starts_with("offset"));
+                let offsets = offsets
+                    .zip(&values[1..])
+                    .map(|(one, value)| (one.name, (value - values[0]).clamp(one.range[0], one.range[1])));
+                effects.push(Effect::of(definition, given.into_iter().chain(offsets))?);
+            }
+        }
+        Ok(effects)
+    }
+
+    fn rms_counts(&self, elements: usize) -> f64 {
+        let mut squares = 0.0;
+        let mut values = 0.0_f64;
+        for element in 0..elements {
+            for run in &self.runs {
+                let of: Vec<f64> = run.iter().skip(element).step_by(elements).copied().collect();
+                let mean = of.iter().sum::<f64>() / of.len() as f64;
+                squares += of.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+                values += of.len() as f64;
+            }
+        }
+        (squares / values.max(1.0)).sqrt()
+    }
+}
+
+impl<'a> Zeros<'a> {
+    /// Those of a model.
+    pub(crate) fn of(problem: &'a Problem<'a>, at: &Parameters) -> Self {
+        match at.terms.iter().find(|term| is_wander(term)) {
+            Some(Term { values, .. }) if values[0] > 0.0 && values[1] > 0.0 => {
+                Self::walking(problem, values[1], values[0])
+            }
+            _ => Self::new(problem, f64::INFINITY, 1, 0.0),
+        }
+    }
+
+    fn walking(problem: &'a Problem<'a>, knot_s: f64, counts_per_root_s: f64) -> Self {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some knots")]
+        let steps = (problem.duration_s / knot_s).round() as usize;
+        Self::new(problem, knot_s, steps + 1, stiffness(counts_per_root_s, knot_s))
+    }
+
+    fn new(problem: &'a Problem<'a>, knot_s: f64, knots: usize, stiffness: f64) -> Self {
+        let mut zeros = Self { problem, knot_s, knots, stiffness, grams: Vec::new() };
+        let rows = problem.sensor.rows;
+        let mut grams = vec![vec![[0.0; 2]; knots]; rows.paths.len()];
+        for (row, weight) in zeros.weights().iter().enumerate() {
+            let (knot, share) = place(rows.t_s[row], knot_s, knots);
+            let of_run = &mut grams[rows.run[row]];
+            of_run[knot][0] += weight * (1.0 - share).powi(2);
+            if share > 0.0 {
+                of_run[knot][1] += weight * share * (1.0 - share);
+                of_run[knot + 1][0] += weight * share * share;
+            }
+        }
+        zeros.grams = grams;
+        zeros
+    }
+
+    /// Constants take noise as all else does.
+    fn weights(&self) -> &'a [f64] {
+        if self.knots > 1 { &self.problem.slow } else { &self.problem.train }
+    }
+
+    /// Takes off a column what the zeros take up; returns that, run by run, knot by knot, element by element.
+    pub(crate) fn centre(&self, column: &mut [f64]) -> Vec<Vec<f64>> {
+        let (taken, _) = self.taken(column);
+        Wander { knot_s: self.knot_s, runs: taken.clone() }.add(self.problem.sensor.rows, -1.0, column);
+        taken
+    }
+
+    /// What the zeros take up of a column, and by how much their wandering lessens the cost.
+    fn taken(&self, column: &[f64]) -> (Vec<Vec<f64>>, f64) {
+        self.solved(self.sums(column))
+    }
+
+    /// Weighted sums of a column, as each knot sees it: run by run, knot by knot, element by element.
+    fn sums(&self, column: &[f64]) -> Vec<Vec<f64>> {
+        let rows = self.problem.sensor.rows;
+        let elements = rows.elements;
+        let mut sums = vec![vec![0.0; self.knots * elements]; rows.paths.len()];
+        for ((row, values), weight) in column.chunks_exact(elements).enumerate().zip(self.weights()) {
+            let (knot, share) = place(rows.t_s[row], self.knot_s, self.knots);
+            for (knot, share) in [(knot, 1.0 - share), (knot + 1, share)] {
+                let of_run = sums[rows.run[row]].iter_mut().skip(knot * elements);
+                of_run.zip(values).for_each(|(sum, value)| *sum += weight * share * value);
+            }
+        }
+        sums
+    }
+
+    /// The knots that such sums mean, and by how much their wandering lessens the cost.
+    fn solved(&self, mut sums: Vec<Vec<f64>>) -> (Vec<Vec<f64>>, f64) {
+        let mut gain = 0.0;
+        for (sums, gram) in sums.iter_mut().zip(&self.grams) {
+            for (element, weight) in self.problem.element_weight.iter().enumerate() {
+                gain += self.solve(gram, *weight, &mut sums[element..]);
+            }
+        }
+        (sums, gain)
+    }
+
+    /// Solves `(G + stiffness / weight R) u = b` for one element, whose numbers are every so many; `R` charges for steps.
+    /// Returns by how much a wander lessens the cost beside a constant: twice the logarithm of the likelihoods' ratio.
+    fn solve(&self, gram: &[[f64; 2]], weight: f64, values: &mut [f64]) -> f64 {
+        let elements = self.problem.sensor.rows.elements;
+        let stiff = self.stiffness / weight;
+        let last = self.knots - 1;
+        let whole: f64 = gram.iter().map(|[own, next]| own + 2.0 * next).sum();
+        let total: f64 = values.iter().step_by(elements).sum();
+        if whole <= 0.0 {
+            values.iter_mut().step_by(elements).for_each(|value| *value = 0.0);
+            return 0.0;
+        }
+        let mut pivots = vec![0.0; self.knots];
+        let (mut squares, mut logarithms) = (-total * total / whole * weight, -(weight * whole).ln());
+        for knot in 0..=last {
+            let ends = f64::from(u8::from(knot > 0)) + f64::from(u8::from(knot < last));
+            pivots[knot] = gram[knot][0] + ends * stiff;
+            if knot > 0 {
+                let factor = (gram[knot - 1][1] - stiff) / pivots[knot - 1];
+                pivots[knot] -= factor * (gram[knot - 1][1] - stiff);
+                values[knot * elements] -= factor * values[(knot - 1) * elements];
+            }
+            squares += weight * values[knot * elements].powi(2) / pivots[knot];
+            logarithms += (weight * pivots[knot]).ln() - if knot > 0 { self.stiffness.ln() } else { 0.0 };
+        }
+        for knot in (0..=last).rev() {
+            let after =
+                if knot < last { (gram[knot][1] - stiff) * values[(knot + 1) * elements] } else { 0.0 };
+            values[knot * elements] = (values[knot * elements] - after) / pivots[knot];
+        }
+        squares - logarithms
+    }
+}
+
+impl Problem<'_> {
+    /// What is left if the zeros stand still.
+    pub(crate) fn standing(&self, at: &Parameters, predicted: &[f64]) -> Vec<f64> {
+        let mut residual: Vec<f64> = self.residuals(predicted).collect();
+        if let Some(wander) = &at.wander {
+            wander.add(self.sensor.rows, 1.0, &mut residual);
+        }
+        residual
+    }
+
+    /// The parameters with zeros that wander as much as the residual says, if that is in the model at all.
+    pub(crate) fn wandering(&self, mut at: Parameters) -> Result<Parameters, DiscoverError> {
+        let Some(term) = at.terms.iter().position(is_wander) else {
+            at.wander = None;
+            return Ok(at);
+        };
+        let residual = self.standing(&at, &self.predict(&at)?);
+        let walk = self.walk(&residual);
+        at.terms[term].values = vec![walk.counts_per_root_s, walk.knot_s, 0.0];
+        Zeros::of(self, &at).settle(&residual, &mut at);
+        Ok(at)
+    }
+
+    /// The cost of a model whose zeros wander: that of zeros that stand still, less what the likelihood gains.
+    pub(crate) fn wandering_cost(&self, at: &Parameters, predicted: &[f64]) -> f64 {
+        let mut residual = self.standing(at, predicted);
+        let (_, gain) = Zeros::of(self, at).taken(&residual);
+        Zeros::new(self, f64::INFINITY, 1, 0.0).centre(&mut residual);
+        let weighted =
+            residual.iter().zip(self.weights()).map(|(residual, weight)| weight * residual * residual);
+        weighted.sum::<f64>() - gain
+    }
+
+    /// The likeliest walk of what zeros that stand still leave.
+    fn walk(&self, residual: &[f64]) -> Walk {
+        let noise_counts = median(&self.element_weight).powf(-0.5);
+        let mut best: Option<Walk> = None;
+        let mut knots = KNOTS;
+        loop {
+            let knot_s = self.duration_s / knots as f64;
+            let mut zeros = Zeros::walking(self, knot_s, noise_counts);
+            let sums = zeros.sums(residual);
+            let walks = (0..RATES).map(|step| {
+                let counts_per_root_s = RATE_LEAST * noise_counts * 2.0_f64.powf(0.5 * f64::from(step));
+                zeros.stiffness = stiffness(counts_per_root_s, knot_s);
+                let (_, gain) = zeros.solved(sums.clone());
+                Walk { knot_s, counts_per_root_s, gain }
+            });
+            let Some(walk) = walks.max_by(|a, b| a.gain.total_cmp(&b.gain)) else { break };
+            if best.is_some_and(|best| walk.gain < best.gain + FINER_GAIN) {
+                break;
+            }
+            best = Some(walk);
+            knots *= 2;
+            if self.duration_s / (knots as f64) < KNOT_S_LEAST {
+                break;
+            }
+        }
+        best.unwrap_or(Walk { knot_s: self.duration_s, counts_per_root_s: 0.0, gain: 0.0 })
+    }
+
+    /// How much the residual of a model wants its zeros to wander; `None` if they do already.
+    pub(crate) fn screen_wander(&self, fitting: &Fitting<'_>, at: &Parameters) -> Option<Screened> {
+        if at.terms.iter().any(is_wander) {
+            return None;
+        }
+        let walk = self.walk(&fitting.residual());
+        let mut start = Term::neutral(&WANDER);
+        start.values[..2].copy_from_slice(&[walk.counts_per_root_s, walk.knot_s]);
+        Some(Screened {
+            definition: &WANDER,
+            scores: self.alike(&fitting.residual()),
+            promise: walk.gain,
+            start,
+            reach: f64::INFINITY,
+        })
+    }
+
+    /// Are blocks that are near in time alike? A score for each kernel.
+    fn alike(&self, residual: &[f64]) -> Vec<Score> {
+        let rows = self.sensor.rows;
+        let elements = rows.elements;
+        let mut sums = vec![0.0; rows.blocks * elements];
+        let (mut weights, mut times, mut runs) =
+            (vec![0.0; rows.blocks], vec![0.0; rows.blocks], vec![0; rows.blocks]);
+        for ((row, values), weight) in residual.chunks_exact(elements).enumerate().zip(&self.slow) {
+            let block = rows.block[row];
+            runs[block] = rows.run[row];
+            weights[block] += weight;
+            times[block] += weight * rows.t_s[row];
+            let of_block = sums[block * elements..].iter_mut().zip(values).zip(&self.element_weight);
+            of_block.for_each(|((sum, value), of_element)| *sum += weight * of_element * value);
+        }
+        let mut used: Vec<usize> = (0..rows.blocks).filter(|block| weights[*block] > 0.0).collect();
+        used.truncate(BLOCKS_MAX);
+        let count = used.len();
+        let sums = DMatrix::from_fn(count, elements, |b, e| sums[used[b] * elements + e]);
+        let products = &sums * sums.transpose();
+        // Flipped residuals have a mean, which the baseline of each run takes up.
+        let mut totals = vec![0.0; rows.paths.len()];
+        for block in &used {
+            totals[runs[*block]] += weights[*block];
+        }
+        let shares = DVector::from_fn(count, |b, _| weights[used[b]] / totals[runs[used[b]]]);
+        let of = |kernel_s: &f64| {
+            let same = |b: usize, c: usize| runs[used[b]] == runs[used[c]];
+            let apart_s = |b: usize, c: usize| {
+                (times[used[b]] / weights[used[b]] - times[used[c]] / weights[used[c]]).abs()
+            };
+            let kernel = DMatrix::from_fn(count, count, |b, c| {
+                if same(b, c) { (-apart_s(b, c) / kernel_s).exp() } else { 0.0 }
+            });
+            let means = &kernel * &shares;
+            let mut of_run = vec![0.0; totals.len()];
+            for b in 0..count {
+                of_run[runs[used[b]]] += shares[b] * means[b];
+            }
+            let products = DMatrix::from_fn(count, count, |b, c| {
+                let centred = kernel[(b, c)] - means[b] - means[c] + of_run[runs[used[b]]];
+                if same(b, c) { centred * products[(b, c)] } else { 0.0 }
+            });
+            Score::of_products(&products, &used, rows.blocks)
+        };
+        KERNELS_S.iter().map(of).collect()
+    }
+}
+
+impl Zeros<'_> {
+    /// Lets the zeros take up what is left if they stand still.
+    fn settle(&self, residual: &[f64], at: &mut Parameters) {
+        let (taken, _) = self.taken(residual);
+        self.put(taken, at);
+    }
+
+    /// Moves baselines by what was taken up, and lets them wander by the rest of it.
+    pub(crate) fn put(&self, mut taken: Vec<Vec<f64>>, at: &mut Parameters) {
+        let elements = self.problem.sensor.rows.elements;
+        for (baseline, taken) in at.baseline.iter_mut().zip(&mut taken) {
+            let first = taken[..elements].to_vec();
+            baseline.iter_mut().zip(&first).for_each(|(baseline, first)| *baseline += first);
+            taken.iter_mut().zip(first.iter().cycle()).for_each(|(value, first)| *value -= first);
+        }
+        at.wander = (self.knots > 1).then_some(Wander { knot_s: self.knot_s, runs: taken });
+        let term = at.terms.iter_mut().find(|term| is_wander(term));
+        if let (Some(term), Some(wander)) = (term, &at.wander) {
+            term.values[2] = wander.rms_counts(elements);
+        }
+    }
+}
+
+pub(crate) fn is_wander(term: &Term) -> bool {
+    std::ptr::eq(term.definition, &raw const WANDER)
+}
+
+/// Precision of a walk's step from knot to knot.
+fn stiffness(counts_per_root_s: f64, knot_s: f64) -> f64 {
+    1.0 / (counts_per_root_s.powi(2) * knot_s)
+}
+
+/// The knot before a time, and how far on to the next.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the last knot")]
+fn place(t_s: f64, knot_s: f64, knots: usize) -> (usize, f64) {
+    let along = (t_s / knot_s).clamp(0.0, (knots - 1) as f64);
+    (along as usize, along.fract())
+}
+
+/// A wander acts beside the pipeline, for every run has its own.
+#[derive(Debug)]
+struct Elsewhere;
+
+impl OnReadout for Elsewhere {
+    fn counts(&mut self, _: Now<'_>, _: &mut [f64]) {}
+}
+
+#[cfg(test)]
+#[path = "wander_tests.rs"]
+mod tests;
