@@ -21,7 +21,7 @@ impl Search<'_> {
             tried.screened.sort_by(|a, b| b.promise.total_cmp(&a.promise));
             let wanted = tried.screened.iter().take(FITTED_MAX).filter(|one| one.promise > 0.0);
             let starts: Vec<Term> = wanted.map(|one| one.start.clone()).collect();
-            let fits = self.fits(at, &starts)?;
+            let fits = self.fits(at, &starts, 0.0)?;
             let best = fits
                 .into_iter()
                 .min_by(|(_, a), (_, b)| self.criterion(a).total_cmp(&self.criterion(b)))

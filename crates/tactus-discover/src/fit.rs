@@ -27,7 +27,7 @@ const COST_LEAST: f64 = 0.05;
 const COST_SHARE_LEAST: f64 = 1e-4;
 
 /// A knot that is seen by less than this share of what sees the one before tells nothing of a curve.
-const UNSEEN_SHARE: f64 = 1e-2;
+const UNSEEN_SHARE: f64 = 0.1;
 
 /// Frames enough for a noise's memory to be short beside them.
 const LONG_FRAMES: usize = 1000;
@@ -45,6 +45,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) train: Vec<f64>,
     /// The same for what is slow beside the noise's own memory.
     pub(crate) slow: Vec<f64>,
+    /// That without contact, where nothing of a press looks like it; 0 in contact.
+    pub(crate) slow_and_clear: Vec<f64>,
     /// Coverings in the data: with one the slope of the spread is not free.
     pub(crate) coverings: usize,
     /// True if the spread is free at all.
@@ -83,7 +85,9 @@ impl<'a> Problem<'a> {
         let slow = |(row, weight): (usize, &f64)| {
             if *weight > 0.0 { rows.frames_in(row) as f64 / inflation } else { 0.0 }
         };
-        let slow = train.iter().enumerate().map(slow).collect();
+        let slow: Vec<f64> = train.iter().enumerate().map(slow).collect();
+        let clear = |(row, weight): (usize, &f64)| if rows.is_clear(frames, row) { *weight } else { 0.0 };
+        let slow_and_clear = slow.iter().enumerate().map(clear).collect();
         // A single element that is quieter than most is not told from rounding.
         let element_weight =
             noise.by_element_counts.iter().map(|rms| rms.max(0.7 * noise.rms_counts).powi(-2)).collect();
@@ -94,6 +98,7 @@ impl<'a> Problem<'a> {
             element_weight,
             train,
             slow,
+            slow_and_clear,
             coverings: coverings_mm.len(),
             spread_free: Contacts::of(frames).distinct_places() > 1,
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),

@@ -49,7 +49,7 @@ impl Problem<'_> {
             let sum: f64 = squares.map(|((counts, of), weight)| weight * (counts - of).powi(2)).sum();
             let [total, readings] = &mut blocks[rows.block[row]];
             *total += rows.weight[row] * sum;
-            *readings += elements as f64;
+            *readings += if rows.weight[row] > 0.0 { elements as f64 } else { 0.0 };
         }
         blocks
     }

@@ -21,6 +21,9 @@ const FRAMES_MAX: usize = 15;
 const BLOCK_S: f64 = 3.0;
 /// A stretch of rest this long is split between fitted and held-out rows.
 const STRETCH_S: f64 = 10.0;
+/// Near the surface, a frame at which the speed of the stage changes by more does not count: where the tip was, as it
+/// stopped or went off, is not known between two reports of the stage, and no stage does so at once.
+const TURN_MM_PER_S: f64 = 1.2;
 /// One press in so many is held out.
 const HELDOUT_ONE_IN: usize = 3;
 
@@ -147,6 +150,11 @@ impl Rows {
         self.first[row + 1] - self.first[row]
     }
 
+    /// True if the tip was clear of the surface.
+    pub(crate) fn is_clear(&self, frames: &Frames, row: usize) -> bool {
+        frames.position_mm[self.first[row]][2] > CLEAR_MM
+    }
+
     /// Weighs rows by their noise, and cuts them into blocks.
     pub(crate) fn weigh(&mut self, frames: &Frames, noise: &Noise, heldout: &HeldOut) {
         let interval_s = interval_s(frames);
@@ -157,7 +165,8 @@ impl Rows {
             let (frame, start) = (self.first[row], self.first[began]);
             self.heldout[row] = heldout.frames[frame];
             let count = self.frames_in(row);
-            self.weight[row] = count as f64 / noise.inflation(count);
+            let whole = count as f64 / noise.inflation(count);
+            self.weight[row] = if turns(frames, frame) { 0.0 } else { whole };
             let other = self.run[row] != self.run[began]
                 || frames.press[frame] != frames.press[start]
                 || heldout.frames[frame] != heldout.frames[start]
@@ -281,6 +290,17 @@ fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 fn same(one: f64, other: f64) -> bool {
     (one - other).abs() < 0.005
+}
+
+/// True if the stage goes off or stops at a frame, near the surface or in contact.
+fn turns(frames: &Frames, frame: usize) -> bool {
+    let Some(before) = frame.checked_sub(1).filter(|_| frame + 1 < frames.len()) else { return false };
+    let z_mm = |frame: usize| frames.position_mm[frame][2];
+    let speed = |from: usize| (z_mm(from + 1) - z_mm(from)) / (frames.t_s[from + 1] - frames.t_s[from]);
+    // From one run to the next time goes back.
+    let is_one_run = frames.t_s[before] < frames.t_s[frame] && frames.t_s[frame] < frames.t_s[frame + 1];
+    let least_mm = z_mm(before).min(z_mm(frame)).min(z_mm(frame + 1));
+    is_one_run && least_mm < CLEAR_MM && (speed(frame) - speed(before)).abs() > TURN_MM_PER_S
 }
 
 /// Median time between frames.

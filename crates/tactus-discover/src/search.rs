@@ -48,6 +48,8 @@ const PENALTY_EACH: f64 = 6.0;
 /// Rivals of an effect that are fitted in its place, at most, and what their first step must promise.
 const RIVALS_MAX: usize = 5;
 const RIVAL_SHARE: f64 = 0.15;
+/// What a rival must do in a few rounds of what it is to replace.
+const RIVAL_FITTED_SHARE: f64 = 0.5;
 const EXCHANGES_MAX: usize = 3;
 /// Two models are not told apart by fewer standard errors than this, or where one closes so much of what the other does.
 const INSEPARABLE_Z: f64 = 3.0;
@@ -208,7 +210,7 @@ impl Search<'_> {
         order.retain(|one| screened[*one].promise > 0.05 * best);
         order.truncate(FITTED_MAX);
         let starts: Vec<Term> = order.iter().map(|one| screened[*one].start.clone()).collect();
-        let mut fits = self.fits(at, &starts)?;
+        let mut fits = self.fits(at, &starts, 0.0)?;
         fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
         for (name, fitted) in fits.iter().rev() {
             if let Some(one) = tried.iter_mut().find(|one| one.effect == *name) {
@@ -229,11 +231,13 @@ impl Search<'_> {
         })
     }
 
-    /// Fits of a model with each of the terms: all of them in few rounds, and then the best of them to the end.
+    /// Fits of a model with each of the terms: all of them in few rounds, and then the best of them to the end, if they
+    /// lessen the cost by at least so much.
     pub(crate) fn fits(
         &self,
         at: &Fitted,
         starts: &[Term],
+        gain_least: f64,
     ) -> Result<Vec<(&'static str, Fitted)>, DiscoverError> {
         let fit = |start: &Term| {
             (self.progress)(&format!("fitting {}", start.definition.name));
@@ -245,7 +249,7 @@ impl Search<'_> {
             .collect::<Result<_, DiscoverError>>()?;
         fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
         let best = fits.first().map_or(0.0, |(_, best)| at.cost - best.cost);
-        fits.retain(|(_, fitted)| at.cost - fitted.cost > BEHIND_SHARE * best);
+        fits.retain(|(_, fitted)| at.cost - fitted.cost > gain_least.max(BEHIND_SHARE * best));
         fits.truncate(FINISHED_MAX);
         let finish = |(name, fitted): &(&'static str, Fitted)| {
             Ok((*name, self.problem.fit_from(fitted.parameters.clone(), TRIAL_ROUNDS, 1)?))
@@ -294,7 +298,9 @@ impl Search<'_> {
             self.problem.fit_from(alone, POLISH_ROUNDS, self.options.threads)?
         };
         let mut best: Option<Fitted> = None;
-        for (name, once) in self.fits(&alone, &self.starts(&alone, |_| true, FITTED_MAX)?)? {
+        let starts = self.starts(&alone, |_| true, RIVALS_MAX)?;
+        let least = RIVAL_FITTED_SHARE * (alone.cost - at.cost);
+        for (name, once) in self.fits(&alone, &starts, least)? {
             let once = self.problem.fit_from(once.parameters, POLISH_ROUNDS, self.options.threads)?;
             let again = self.starts(&once, |other| other == name, 1)?.into_iter().next();
             let twice = again.map(|start| {
@@ -338,6 +344,15 @@ impl Search<'_> {
         let mut equivalent = Equivalent::new();
         let names = names(&at.parameters, self.known_terms);
         for name in &names {
+            // Nothing answers for a neighbour as a crossed wire does.
+            if at
+                .parameters
+                .terms
+                .iter()
+                .any(|term| term.definition.name == *name && is_exact(term.definition))
+            {
+                continue;
+            }
             let less = without(&at.parameters, name, self.known_terms);
             let less = self.problem.fit_from(less, TRIAL_ROUNDS, self.options.threads)?;
             let fitting = self.fitting(&less)?;
@@ -348,7 +363,7 @@ impl Search<'_> {
             rivals.retain(|one| one.promise > RIVAL_SHARE * (less.cost - at.cost));
             rivals.truncate(RIVALS_MAX);
             let starts: Vec<Term> = rivals.into_iter().map(|one| one.start).collect();
-            let fits = self.fits(&less, &starts)?;
+            let fits = self.fits(&less, &starts, RIVAL_FITTED_SHARE * (less.cost - at.cost))?;
             let best = fits.iter().min_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
             if let Some((_, best)) =
                 best.filter(|(_, best)| may_exchange && charged(best) < charged(at) - PENALTY)

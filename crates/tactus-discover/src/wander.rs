@@ -74,6 +74,8 @@ pub(crate) struct Wander {
 #[derive(Debug)]
 pub(crate) struct Zeros<'a> {
     problem: &'a Problem<'a>,
+    /// Of the rows.
+    weights: &'a [f64],
     /// Infinite if nothing wanders.
     knot_s: f64,
     knots: usize,
@@ -171,23 +173,23 @@ impl<'a> Zeros<'a> {
     pub(crate) fn of(problem: &'a Problem<'a>, at: &Parameters) -> Self {
         match at.terms.iter().find(|term| is_wander(term)) {
             Some(Term { values, .. }) if values[0] > 0.0 && values[1] > 0.0 => {
-                Self::walking(problem, values[1], values[0])
+                Self::walking(problem, &problem.slow, values[1], values[0])
             }
-            _ => Self::new(problem, f64::INFINITY, 1, 0.0),
+            // Constants take noise as all else does.
+            _ => Self::new(problem, &problem.train, f64::INFINITY, 1, 0.0),
         }
     }
 
-    fn walking(problem: &'a Problem<'a>, knot_s: f64, counts_per_root_s: f64) -> Self {
+    fn walking(problem: &'a Problem<'a>, weights: &'a [f64], knot_s: f64, counts_per_root_s: f64) -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some knots")]
         let steps = (problem.duration_s / knot_s).round() as usize;
-        Self::new(problem, knot_s, steps + 1, stiffness(counts_per_root_s, knot_s))
+        Self::new(problem, weights, knot_s, steps + 1, stiffness(counts_per_root_s, knot_s))
     }
 
-    fn new(problem: &'a Problem<'a>, knot_s: f64, knots: usize, stiffness: f64) -> Self {
-        let mut zeros = Self { problem, knot_s, knots, stiffness, grams: Vec::new() };
+    fn new(problem: &'a Problem<'a>, weights: &'a [f64], knot_s: f64, knots: usize, stiffness: f64) -> Self {
         let rows = problem.sensor.rows;
         let mut grams = vec![vec![[0.0; 2]; knots]; rows.paths.len()];
-        for (row, weight) in zeros.weights().iter().enumerate() {
+        for (row, weight) in weights.iter().enumerate() {
             let (knot, share) = place(rows.t_s[row], knot_s, knots);
             let of_run = &mut grams[rows.run[row]];
             of_run[knot][0] += weight * (1.0 - share).powi(2);
@@ -196,13 +198,7 @@ impl<'a> Zeros<'a> {
                 of_run[knot + 1][0] += weight * share * share;
             }
         }
-        zeros.grams = grams;
-        zeros
-    }
-
-    /// Constants take noise as all else does.
-    fn weights(&self) -> &'a [f64] {
-        if self.knots > 1 { &self.problem.slow } else { &self.problem.train }
+        Self { problem, weights, knot_s, knots, stiffness, grams }
     }
 
     /// Takes off a column what the zeros take up; returns that, run by run, knot by knot, element by element.
@@ -222,7 +218,7 @@ impl<'a> Zeros<'a> {
         let rows = self.problem.sensor.rows;
         let elements = rows.elements;
         let mut sums = vec![vec![0.0; self.knots * elements]; rows.paths.len()];
-        for ((row, values), weight) in column.chunks_exact(elements).enumerate().zip(self.weights()) {
+        for ((row, values), weight) in column.chunks_exact(elements).enumerate().zip(self.weights) {
             let (knot, share) = place(rows.t_s[row], self.knot_s, self.knots);
             for (knot, share) in [(knot, 1.0 - share), (knot + 1, share)] {
                 let of_run = sums[rows.run[row]].iter_mut().skip(knot * elements);
@@ -294,7 +290,7 @@ impl Problem<'_> {
             return Ok(at);
         };
         let residual = self.standing(&at, &self.predict(&at)?);
-        let walk = self.walk(&residual);
+        let walk = self.walk(&residual, &self.slow);
         at.terms[term].values = vec![walk.counts_per_root_s, walk.knot_s, 0.0];
         Zeros::of(self, &at).settle(&residual, &mut at);
         Ok(at)
@@ -304,20 +300,20 @@ impl Problem<'_> {
     pub(crate) fn wandering_cost(&self, at: &Parameters, predicted: &[f64]) -> f64 {
         let mut residual = self.standing(at, predicted);
         let (_, gain) = Zeros::of(self, at).taken(&residual);
-        Zeros::new(self, f64::INFINITY, 1, 0.0).centre(&mut residual);
+        Zeros::new(self, &self.train, f64::INFINITY, 1, 0.0).centre(&mut residual);
         let weighted =
             residual.iter().zip(self.weights()).map(|(residual, weight)| weight * residual * residual);
         weighted.sum::<f64>() - gain
     }
 
-    /// The likeliest walk of what zeros that stand still leave.
-    fn walk(&self, residual: &[f64]) -> Walk {
+    /// The likeliest walk of what zeros that stand still leave, in rows of such weights.
+    fn walk(&self, residual: &[f64], weights: &[f64]) -> Walk {
         let noise_counts = median(&self.element_weight).powf(-0.5);
         let mut best: Option<Walk> = None;
         let mut knots = KNOTS;
         loop {
             let knot_s = self.duration_s / knots as f64;
-            let mut zeros = Zeros::walking(self, knot_s, noise_counts);
+            let mut zeros = Zeros::walking(self, weights, knot_s, noise_counts);
             let sums = zeros.sums(residual);
             let walks = (0..RATES).map(|step| {
                 let counts_per_root_s = RATE_LEAST * noise_counts * 2.0_f64.powf(0.5 * f64::from(step));
@@ -338,18 +334,20 @@ impl Problem<'_> {
         best.unwrap_or(Walk { knot_s: self.duration_s, counts_per_root_s: 0.0, gain: 0.0 })
     }
 
-    /// How much the residual of a model wants its zeros to wander; `None` if they do already.
+    /// How much the residual of a model wants its zeros to wander; `None` if they do already. They must without contact
+    /// too: in contact all that a model lacks looks like it.
     pub(crate) fn screen_wander(&self, fitting: &Fitting<'_>, at: &Parameters) -> Option<Screened> {
         if at.terms.iter().any(is_wander) {
             return None;
         }
-        let walk = self.walk(&fitting.residual());
+        let walk = self.walk(&fitting.residual(), &self.slow);
+        let clear = self.walk(&fitting.residual(), &self.slow_and_clear);
         let mut start = Term::neutral(&WANDER);
         start.values[..2].copy_from_slice(&[walk.counts_per_root_s, walk.knot_s]);
         Some(Screened {
             definition: &WANDER,
             scores: self.alike(&fitting.residual()),
-            promise: walk.gain,
+            promise: walk.gain.min(clear.gain),
             start,
             reach: f64::INFINITY,
         })
@@ -362,7 +360,7 @@ impl Problem<'_> {
         let mut sums = vec![0.0; rows.blocks * elements];
         let (mut weights, mut times, mut runs) =
             (vec![0.0; rows.blocks], vec![0.0; rows.blocks], vec![0; rows.blocks]);
-        for ((row, values), weight) in residual.chunks_exact(elements).enumerate().zip(&self.slow) {
+        for ((row, values), weight) in residual.chunks_exact(elements).enumerate().zip(&self.slow_and_clear) {
             let block = rows.block[row];
             runs[block] = rows.run[row];
             weights[block] += weight;
