@@ -9,6 +9,9 @@ use tactus_report::discovery::{DiscoveryReport, Undecided, command, in_words, no
 use crate::commands::calibrate::estimate;
 use crate::output::{duration, print_fields, print_table, say};
 
+/// More parameters of one term do not fit on a line.
+const PARAMETERS_MAX: usize = 6;
+
 pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
     let found = report.discovery;
     for (reason, effects) in not_shown(found) {
@@ -96,13 +99,22 @@ fn step(step: &Step) -> Vec<Vec<String>> {
         let (before, after) = (step.heldout_rms_before_counts, step.heldout_rms_after_counts);
         vec![
             of_step(nth, step.effect.into()),
-            term.iter().map(parameter).collect::<Vec<_>>().join(", "),
+            parameters(term),
             of_step(nth, format!("{before:.3} -> {after:.3}")),
             of_step(nth, chance(step.q_value)),
             of_step(nth, step.equivalent.join(", ")),
         ]
     });
     rows.collect()
+}
+
+/// The parameters of a term, but for the knots of a curve, which a line has no room for.
+fn parameters(term: &[Estimated]) -> String {
+    let mut said: Vec<String> = term.iter().take(PARAMETERS_MAX).map(parameter).collect();
+    if term.len() > PARAMETERS_MAX {
+        said.push(format!("and {} more in report.json", term.len() - PARAMETERS_MAX));
+    }
+    said.join(", ")
 }
 
 fn parameter(parameter: &Estimated) -> String {
