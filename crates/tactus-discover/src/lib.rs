@@ -1,6 +1,8 @@
 //! What a simulation is missing: finds where it and measured frames disagree, names the effect, adds it to the model,
 //! and shows the gap shrink.
 
+#[cfg(test)]
+mod bench;
 mod bic;
 mod candidates;
 mod chance;

@@ -1,21 +1,11 @@
-use tactus_model::{Array, Covering, Indenter, Phase, Psf, Registration, Response};
+use tactus_model::{Phase, Registration};
 
 use super::*;
-use crate::Frame;
+use crate::{Frame, bench};
 
+/// A sensor that lies where the sample rig has it.
 fn known() -> Known {
-    let array = Array::digitacts();
-    Known {
-        response: Response {
-            reference_covering: Covering { thickness_mm: 1.016 },
-            ..Response::uniform(array.elements(), 1000.0, 100.0)
-        },
-        array,
-        psf: Psf::PAPER,
-        registration: Registration { origin_mm: [20.0, 15.0], rotation_deg: 0.0 },
-        indenters: [("cyl1".to_owned(), Indenter::Cylinder { diameter_mm: 1.0 })].into(),
-        effects: Vec::new(),
-    }
+    Known { registration: Registration { origin_mm: [20.0, 15.0], rotation_deg: 0.0 }, ..bench::known() }
 }
 
 /// One press to 0.6 mm at 1 mm/s, under the paper's thinnest covering.

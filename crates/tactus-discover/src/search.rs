@@ -6,7 +6,7 @@
 //! is a simpler explanation than another effect. Back: each effect must earn its place against the model without it, and
 //! against every other effect in its place.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use tactus_model::effect::{Definition, Kind};
 
@@ -122,14 +122,24 @@ enum Exchanged {
 impl Search<'_> {
     /// Scores of all candidates at a model.
     pub(crate) fn screen(&self, fitting: &Fitting<'_>, at: &Fitted) -> Result<Vec<Screened>, DiscoverError> {
-        let screen =
-            |candidate: &Candidate| candidate.screen(fitting, self.problem, &at.parameters, &at.predicted);
-        let screened = parallel::map(self.candidates, self.options.threads, screen).into_iter();
-        let mut screened = screened.collect::<Result<Vec<_>, DiscoverError>>()?;
+        let mut screened = self.screen_among(|_| true, fitting, at)?;
         if screened.iter().any(|one| one.definition.name == WANDER.name) {
             screened.extend(self.problem.screen_wander(fitting, &at.parameters));
         }
         Ok(screened)
+    }
+
+    /// Scores at a model of those effects of the library whose names are among some.
+    fn screen_among(
+        &self,
+        among: impl Fn(&str) -> bool,
+        fitting: &Fitting<'_>,
+        at: &Fitted,
+    ) -> Result<Vec<Screened>, DiscoverError> {
+        let candidates: Vec<&Candidate> =
+            self.candidates.iter().filter(|one| among(one.definition.name)).collect();
+        let screen = |one: &&Candidate| one.screen(fitting, self.problem, &at.parameters, &at.predicted);
+        parallel::map(&candidates, self.options.threads, screen).into_iter().collect()
     }
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
@@ -279,16 +289,9 @@ impl Search<'_> {
 
     /// One effect, acting twice perhaps, that does nearly all that several do: they may be what its form lacks.
     fn simpler(&self, base: &Fitted, at: &Fitted) -> Result<Option<Fitted>, DiscoverError> {
-        let mut alone = at.parameters.clone();
-        let mut index = 0;
-        alone.terms.retain(|term| {
-            index += 1;
-            index <= self.known_terms || is_exact(term.definition)
-        });
-        let others =
-            at.parameters.terms.iter().skip(self.known_terms).filter(|term| !is_exact(term.definition));
-        let others: BTreeSet<&str> = others.map(|term| term.definition.name).collect();
-        if others.len() < 2 {
+        let alone = keeping(&at.parameters, self.known_terms, is_exact);
+        let [all, exact] = [&at.parameters, &alone].map(|one| names(one, self.known_terms).len());
+        if all < exact + 2 {
             return Ok(None);
         }
         (self.progress)("trying one effect in the place of several");
@@ -327,12 +330,7 @@ impl Search<'_> {
         among: impl Fn(&str) -> bool,
         most: usize,
     ) -> Result<Vec<Term>, DiscoverError> {
-        let fitting = self.fitting(at)?;
-        let candidates: Vec<&Candidate> =
-            self.candidates.iter().filter(|one| among(one.definition.name)).collect();
-        let screen = |one: &&Candidate| one.screen(&fitting, self.problem, &at.parameters, &at.predicted);
-        let screened = parallel::map(&candidates, self.options.threads, screen);
-        let mut screened: Vec<Screened> = screened.into_iter().collect::<Result<_, DiscoverError>>()?;
+        let mut screened = self.screen_among(among, &self.fitting(at)?, at)?;
         screened.retain(|one| one.promise > PENALTY);
         screened.sort_by(|a, b| b.promise.total_cmp(&a.promise));
         screened.truncate(most);
@@ -342,17 +340,11 @@ impl Search<'_> {
     /// Tries other effects in the place of each: what serves better than the model, or else what serves as well.
     fn exchange(&self, at: &Fitted, may_exchange: bool) -> Result<Exchanged, DiscoverError> {
         let mut equivalent = Equivalent::new();
+        let mut at_leaves_something = None;
+        let exact = names(&keeping(&at.parameters, self.known_terms, is_exact), self.known_terms);
         let names = names(&at.parameters, self.known_terms);
-        for name in &names {
-            // Nothing answers for a neighbour as a crossed wire does.
-            if at
-                .parameters
-                .terms
-                .iter()
-                .any(|term| term.definition.name == *name && is_exact(term.definition))
-            {
-                continue;
-            }
+        // Nothing answers for a neighbour as a crossed wire does.
+        for name in names.iter().filter(|name| !exact.contains(name)) {
             let less = without(&at.parameters, name, self.known_terms);
             let less = self.problem.fit_from(less, TRIAL_ROUNDS, self.options.threads)?;
             let fitting = self.fitting(&less)?;
@@ -372,7 +364,7 @@ impl Search<'_> {
             }
             let mut same = Vec::new();
             for (rival, fitted) in fits {
-                if self.serves_as_well(&less, &fitted, at)? {
+                if self.serves_as_well(&less, &fitted, at, &mut at_leaves_something)? {
                     same.push((rival, fitted));
                 }
             }
@@ -384,7 +376,15 @@ impl Search<'_> {
     /// True if the data cannot tell a rival from what is in the model: block by block it is hardly worse, or it closes
     /// nearly all of the gap that the other does, so that the form of either may be what differs. That is no excuse for a
     /// rival that leaves something where the model leaves nothing.
-    fn serves_as_well(&self, less: &Fitted, rival: &Fitted, at: &Fitted) -> Result<bool, DiscoverError> {
+    ///
+    /// `at_leaves_something`: whether the model does, once it is known.
+    fn serves_as_well(
+        &self,
+        less: &Fitted,
+        rival: &Fitted,
+        at: &Fitted,
+        at_leaves_something: &mut Option<bool>,
+    ) -> Result<bool, DiscoverError> {
         let (of_rival, of_model) =
             (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
         let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.wander.is_none()) {
@@ -399,9 +399,15 @@ impl Search<'_> {
         if sum < INSEPARABLE_Z * scatter {
             return Ok(true);
         }
+        if less.cost - rival.cost <= INSEPARABLE_SHARE * (less.cost - at.cost) {
+            return Ok(false);
+        }
         let leaves_something = |one: &Fitted| Ok::<_, DiscoverError>(self.locate(one)?.p_value <= ALPHA);
-        Ok(less.cost - rival.cost > INSEPARABLE_SHARE * (less.cost - at.cost)
-            && (leaves_something(at)? || !leaves_something(rival)?))
+        let at_does = match *at_leaves_something {
+            Some(known) => known,
+            None => *at_leaves_something.insert(leaves_something(at)?),
+        };
+        Ok(at_does || !leaves_something(rival)?)
     }
 
     /// Takes back what does not earn its place, and puts in its place what serves better.
@@ -466,11 +472,16 @@ pub(crate) fn names(parameters: &Parameters, known_terms: usize) -> Vec<&'static
 
 /// A model without the terms of an effect that were added.
 pub(crate) fn without(parameters: &Parameters, name: &str, known_terms: usize) -> Parameters {
+    keeping(parameters, known_terms, |definition| definition.name != name)
+}
+
+/// A model with those only of the added effects' terms.
+fn keeping(parameters: &Parameters, known_terms: usize, stays: impl Fn(&Definition) -> bool) -> Parameters {
     let mut less = parameters.clone();
     let mut index = 0;
     less.terms.retain(|term| {
         index += 1;
-        index <= known_terms || term.definition.name != name
+        index <= known_terms || stays(term.definition)
     });
     less
 }

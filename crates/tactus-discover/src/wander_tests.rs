@@ -2,8 +2,9 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::{Array, Covering, Indenter, Phase, Psf, Registration, Response};
+use tactus_model::Phase;
 
+use crate::bench::known;
 use crate::{Base, Discovery, Frame, Frames, Known, Options, Rule, Verdict, discover, predict};
 
 const ELEMENTS: usize = 48;
@@ -11,21 +12,6 @@ const INTERVAL_S: f64 = 0.1;
 const NOISE_COUNTS: f64 = 1.0;
 const RMS_COUNTS: f64 = 1.5;
 const TIME_S: f64 = 20.0;
-
-fn known() -> Known {
-    let array = Array::digitacts();
-    Known {
-        response: Response {
-            reference_covering: Covering { thickness_mm: 1.016 },
-            ..Response::uniform(array.elements(), 1000.0, 100.0)
-        },
-        array,
-        psf: Psf::PAPER,
-        registration: Registration { origin_mm: [0.0, 0.0], rotation_deg: 0.0 },
-        indenters: [("cyl1".to_owned(), Indenter::Cylinder { diameter_mm: 1.0 })].into(),
-        effects: Vec::new(),
-    }
-}
 
 /// Presses on all elements in an order by no place, 3 s each, of such readings.
 fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
