@@ -64,12 +64,12 @@ impl Shared {
             z_mm = self.go([at_mm[0], at_mm[1], to_z_mm.max(near_mm)], speed_mm_per_s).await?[2];
         }
         while (z_mm - to_z_mm).abs() > SAME_HEIGHT_MM {
-            let next_mm = if to_z_mm < z_mm { to_z_mm.max(z_mm - UNCONFIRMED_MAX_MM) } else { to_z_mm };
+            let next_mm = if to_z_mm < z_mm { z_mm - confirmed_step_mm(z_mm - to_z_mm) } else { to_z_mm };
             let down_max_mm_per_s = self.service.envelope.load_speed_max_mm_per_s;
             let speed_mm_per_s =
                 if next_mm < z_mm { speed_mm_per_s.min(down_max_mm_per_s) } else { speed_mm_per_s };
             let reached_mm = self.go([at_mm[0], at_mm[1], next_mm], speed_mm_per_s).await?[2];
-            if next_mm <= to_z_mm {
+            if next_mm <= to_z_mm + SAME_HEIGHT_MM {
                 return Ok(());
             }
             z_mm = reached_mm;
@@ -129,4 +129,10 @@ impl Shared {
             tracing::warn!("the stage did not come to a stand within {STANDSTILL:?}");
         }
     }
+}
+
+/// The first of the fewest equal steps of a way down: none is a stub, in which the tip would hardly get going.
+fn confirmed_step_mm(way_mm: f64) -> f64 {
+    // What is a whole number of steps but for rounding is not one more.
+    way_mm / (way_mm / UNCONFIRMED_MAX_MM - 1e-6).ceil().max(1.0)
 }

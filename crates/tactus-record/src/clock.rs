@@ -6,6 +6,10 @@
 //! observer at the host can know. Without drift that line is level: `offset = min(t_mono - tick * tick_ns)`. A
 //! device clock that runs fast or slow tilts it: then it is the edge of the points' lower convex hull below their
 //! mean, which is the line with the least mean distance to them (Moon, Skelly and Towsley, 1999).
+//!
+//! A coarse counter tells whole ticks: the sampling was anywhere within its tick. Where the ticks are those of frames at an
+//! even rate, that rate says more: the line through the ticks against the frames' numbers is known far better than a
+//! tick. Else it is taken to be in the middle of the tick, right on average, but not after the frame arrived.
 
 use serde::Serialize;
 use tactus_schema::{DeviceTick, MonoTime};
@@ -19,6 +23,15 @@ const DRIFT_MAX: f64 = 500e-6;
 /// Over a shorter time a drift cannot be told from the delays.
 const DRIFT_SPAN_NS: f64 = 60e9;
 
+/// Ticks that are shorter need no help.
+const FINE_TICK_NS: u64 = 10_000;
+
+/// From fewer frames no rate is told.
+const EVEN_FRAMES: usize = 30;
+
+/// Ticks of an even rate are off its line by no more than this, in ticks: half of one, and as much again for doubt.
+const EVEN_TICKS: f64 = 0.75;
+
 /// The estimated clock of one connection of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EpochClock {
@@ -28,6 +41,8 @@ pub struct EpochClock {
     pub frames: u64,
     /// Length of a device tick.
     pub tick_ns: u64,
+    /// Ticks from frame to frame, if the device keeps an even rate: then its device time is on that grid.
+    pub even_ticks: Option<f64>,
     /// Host monotonic time at device time zero of a device clock without drift; with drift, at `reference_tick`
     /// less that tick's device time.
     pub offset_ns: i64,
@@ -69,19 +84,21 @@ impl EpochClock {
         if frames.windows(2).any(|pair| matches!(pair, [(a, _), (b, _)] if b < a)) {
             return Err(NoClock::Jumped);
         }
-        let base_ns = behind_ns(tick_ns, frames[0]);
+        let even_ticks = if tick_ns > FINE_TICK_NS { even_ticks(frames) } else { None };
+        let base_ns = i128::from(frames[0].1.ns()) - device_ns(reference, tick_ns);
         let points: Vec<(f64, f64)> = frames
             .iter()
-            .map(|&frame| {
-                let device_ns = (frame.0.0 - reference.0) as f64 * tick_ns as f64;
-                (device_ns, (behind_ns(tick_ns, frame) - base_ns) as f64)
+            .map(|&(tick, received)| {
+                let device_ns = since_ns(reference, tick, tick_ns, even_ticks);
+                (device_ns, (i128::from(received.ns()) - i128::from(frames[0].1.ns())) as f64 - device_ns)
             })
             .collect();
         let level =
             Line { slope: 0.0, at_zero: points.iter().map(|point| point.1).fold(f64::INFINITY, f64::min) };
         let tilted = lower_line(&points);
         let tilted_residuals = residuals(&points, tilted);
-        let uncertainty = tick_ns as f64 + share_below(&tilted_residuals, 0.05);
+        let doubt_ns = tick_ns as f64 / even_ticks.map_or(1.0, |_| (frames.len() as f64).sqrt());
+        let uncertainty = doubt_ns + share_below(&tilted_residuals, 0.05);
         let span_ns = points.last().map_or(0.0, |point| point.0);
         let drifts = span_ns >= DRIFT_SPAN_NS
             && tilted.slope.abs() <= DRIFT_MAX
@@ -95,27 +112,68 @@ impl EpochClock {
             epoch,
             frames: frames.len() as u64,
             tick_ns,
+            even_ticks,
             offset_ns: clamped(base_ns + i128::from(whole(line.at_zero))),
             reference_tick: reference.0,
             drift_ppm: line.slope * 1e6,
-            uncertainty_ns: whole(tick_ns as f64 + share_below(&residuals, 0.05)),
+            uncertainty_ns: whole(doubt_ns + share_below(&residuals, 0.05)),
             delay_p50_ns: whole(share_below(&residuals, 0.50)),
             delay_p99_ns: whole(share_below(&residuals, 0.99)),
         })
     }
 
     /// When a frame was sampled, on the host's monotonic clock.
-    pub fn sampled(&self, tick: DeviceTick) -> MonoTime {
-        let device_ns = device_ns(tick, self.tick_ns);
-        let since_reference = i128::from(tick.0) - i128::from(self.reference_tick);
-        let drift_ns = since_reference as f64 * self.tick_ns as f64 * self.drift_ppm * 1e-6;
-        MonoTime::from_ns(clamped(device_ns + i128::from(self.offset_ns) + i128::from(whole(drift_ns))))
+    pub fn sampled(&self, tick: DeviceTick, received: MonoTime) -> MonoTime {
+        let Self { tick_ns, even_ticks, offset_ns, .. } = *self;
+        let reference = DeviceTick(self.reference_tick);
+        let since_ns = since_ns(reference, tick, tick_ns, even_ticks);
+        let host_ns = whole(since_ns * (1.0 + self.drift_ppm * 1e-6));
+        let sampled_ns = device_ns(reference, tick_ns) + i128::from(offset_ns) + i128::from(host_ns);
+        let received_ns = i128::from(received.ns());
+        let middle_ns = if even_ticks.is_some() { 0 } else { i128::from(tick_ns / 2) };
+        MonoTime::from_ns(clamped((sampled_ns + middle_ns).min(received_ns.max(sampled_ns))))
     }
 }
 
-/// By how much the host's clock is ahead of the device's at one frame.
-fn behind_ns(tick_ns: u64, (tick, received): (DeviceTick, MonoTime)) -> i128 {
-    i128::from(received.ns()) - device_ns(tick, tick_ns)
+/// Ticks from frame to frame of a device that keeps an even rate.
+fn even_ticks(frames: &[(DeviceTick, MonoTime)]) -> Option<f64> {
+    if frames.len() < EVEN_FRAMES {
+        return None;
+    }
+    let between = |pair: &[(DeviceTick, MonoTime)]| (pair[1].0.0 - pair[0].0.0) as f64;
+    let mut steps: Vec<f64> = frames.windows(2).map(between).collect();
+    steps.sort_by(f64::total_cmp);
+    let median = share_below(&steps, 0.5);
+    // Of frames of which none between them was lost.
+    steps.retain(|step| (step - median).abs() < 1.5);
+    let nearly = steps.iter().sum::<f64>() / steps.len() as f64;
+    if nearly < 1.0 {
+        return None;
+    }
+    let mut number = 0.0;
+    let mut points = vec![(0.0, 0.0)];
+    for pair in frames.windows(2) {
+        number += (between(pair) / nearly).round();
+        points.push((number, (pair[1].0.0 - frames[0].0.0) as f64));
+    }
+    let count = points.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
+    let (mid_number, mid_ticks) = (mean(|point| point.0), mean(|point| point.1));
+    let (mut along, mut spread) = (0.0, 0.0);
+    for (number, ticks) in &points {
+        along += (number - mid_number) * (ticks - mid_ticks);
+        spread += (number - mid_number).powi(2);
+    }
+    let even = along / spread;
+    let is_even =
+        |(number, ticks): &(f64, f64)| (ticks - mid_ticks - even * (number - mid_number)).abs() < EVEN_TICKS;
+    points.iter().all(is_even).then_some(even)
+}
+
+/// Device time since the first frame; on the grid of an even rate.
+fn since_ns(reference: DeviceTick, tick: DeviceTick, tick_ns: u64, even_ticks: Option<f64>) -> f64 {
+    let ticks = (i128::from(tick.0) - i128::from(reference.0)) as f64;
+    even_ticks.map_or(ticks, |even| (ticks / even).round() * even) * tick_ns as f64
 }
 
 /// The device's time; bounded, so that sums with it cannot overflow.

@@ -46,6 +46,8 @@ pub struct StageReport {
     pub at: MonoTime,
     /// Where; robot frame.
     pub position_mm: [f64; 3],
+    /// True if it said that it does not move.
+    pub stands: bool,
 }
 
 /// When a frame was sampled.
@@ -135,7 +137,7 @@ impl Timeline {
     /// When a frame of this recording was sampled.
     pub fn sampling(&self, frame: &Frame) -> Sampling {
         match (self.clocks.get(&frame.epoch), frame.device_tick) {
-            (Some(Ok(clock)), Some(tick)) => Sampling::Device(clock.sampled(tick)),
+            (Some(Ok(clock)), Some(tick)) => Sampling::Device(clock.sampled(tick, frame.received.mono)),
             _ => Sampling::Arrival(frame.received.mono),
         }
     }

@@ -63,7 +63,8 @@ impl Gathered {
         // What a stage that is not there reports is no position.
         let position_mm = [state.x_mm, state.y_mm, state.z_mm];
         if state.status() != pb::StageStatus::Disconnected && position_mm.iter().all(|mm| mm.is_finite()) {
-            self.stage.push(StageReport { at: MonoTime::from_ns(state.t_mono_ns), position_mm });
+            let stands = state.status() == pb::StageStatus::Idle;
+            self.stage.push(StageReport { at: MonoTime::from_ns(state.t_mono_ns), position_mm, stands });
         }
     }
 

@@ -8,7 +8,9 @@
 //! x(t) = x_1 + v_01 (t - t_1)  until they meet,  x_2 + v_23 (t - t_2)  from then      v_ij from report i to report j
 //! ```
 //!
-//! each axis for itself. Where they do not meet between the two reports it is the straight line.
+//! each axis for itself. A report that says that the stage stands gives a speed of 0. The speed from such a report to the next
+//! is less than that of the way, since the stage went off in between: it counts only on the way to the next stop, where
+//! there is no better. Where the lines do not meet between the two reports it is the straight line.
 
 use tactus_schema::MonoTime;
 
@@ -30,9 +32,10 @@ pub(super) fn position_mm(reports: &[StageReport], at: MonoTime) -> Option<[f64;
     let along = |axis: usize| {
         let (x_1, x_2) = (one.position_mm[axis], two.position_mm[axis]);
         let straight = x_1 + (x_2 - x_1) * at_s / two_s;
-        let (Some(earlier), Some(later)) = (earlier, later) else { return straight };
-        let arriving = (x_1 - earlier.position_mm[axis]) / -since_s(earlier.at);
-        let leaving = (later.position_mm[axis] - x_2) / (since_s(later.at) - two_s);
+        let (Some(arriving), Some(leaving)) = (speed(one, earlier, two, axis), speed(two, later, one, axis))
+        else {
+            return straight;
+        };
         let corner_s = (x_2 - leaving * two_s - x_1) / (arriving - leaving);
         if !(0.0..=two_s).contains(&corner_s) {
             straight
@@ -43,6 +46,21 @@ pub(super) fn position_mm(reports: &[StageReport], at: MonoTime) -> Option<[f64;
         }
     };
     Some([along(0), along(1), along(2)])
+}
+
+/// Speed at a report along an axis, in mm/s, on the way between it and another: by the report on its other side.
+fn speed(
+    report: &StageReport,
+    beside: Option<&StageReport>,
+    other: &StageReport,
+    axis: usize,
+) -> Option<f64> {
+    if report.stands {
+        return Some(0.0);
+    }
+    let beside = beside.filter(|beside| !beside.stands || other.stands)?;
+    let by_s = (beside.at.ns() - report.at.ns()) as f64 * 1e-9;
+    Some((beside.position_mm[axis] - report.position_mm[axis]) / by_s)
 }
 
 #[cfg(test)]
