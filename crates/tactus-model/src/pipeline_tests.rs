@@ -200,7 +200,8 @@ fn a_place_that_is_no_number_does_not_panic() {
 
 #[test]
 fn remembered_images_are_those_that_would_be_computed() {
-    let tilt = || effect("indenter-tilt", [("tilt_x_deg", 3.0), ("tilt_y_deg", -2.0)]);
+    let tilt =
+        || effect("indenter-tilt", [("tilt_x_deg", 3.0), ("tilt_y_deg", -2.0), ("touched_share", 0.5)]);
     let tail = || effect("heavy-tail", [("tail_share", 0.2), ("width_ratio", 2.0)]);
     for indenter in [
         Indenter::Cylinder { diameter_mm: 1.0 },

@@ -5,7 +5,11 @@ use crate::effect::bench::{CYLINDER, THIN, effect, linear, still, upon};
 use crate::{Blur, Effect, Indenter, Mesh, Psf, Simulator};
 
 fn tilt(x_deg: f64, y_deg: f64) -> Effect {
-    effect("indenter-tilt", [("tilt_x_deg", x_deg), ("tilt_y_deg", y_deg)])
+    touched(x_deg, y_deg, 0.0)
+}
+
+fn touched(x_deg: f64, y_deg: f64, touched_share: f64) -> Effect {
+    effect("indenter-tilt", [("tilt_x_deg", x_deg), ("tilt_y_deg", y_deg), ("touched_share", touched_share)])
 }
 
 /// A linear sensor whose tool leans.
@@ -78,6 +82,25 @@ fn a_leaning_face_presses_as_the_sum_over_its_points() {
             let one = leaning(indenter, deg[0], deg[1]);
             let tip_mm = upon(&one, 21, depth_mm);
             assert_near(&still(&one, tip_mm), &summed(&one, deg, tip_mm, &face), 5e-4);
+        }
+    }
+}
+
+#[test]
+fn a_tool_that_touched_with_its_lowest_point_stands_as_much_higher() {
+    // The edges of a disc of 1 mm and of a box's corner, leaning 5 and 9 degrees.
+    let corner_mm = 1.5 * 5.0_f64.to_radians().tan() + 0.6 * 9.0_f64.to_radians().tan();
+    let edge_mm = 0.5 * 5.0_f64.to_radians().tan();
+    for (indenter, [x_deg, y_deg], lowest_mm) in [
+        (CYLINDER, [5.0, 0.0], edge_mm),
+        (CYLINDER, [0.0, -5.0], edge_mm),
+        (Indenter::Box { size_mm: [3.0, 1.2] }, [5.0, -9.0], corner_mm),
+    ] {
+        let axis = leaning(indenter.clone(), x_deg, y_deg);
+        for share in [0.25, 1.0] {
+            let edge = Simulator { indenter: indenter.clone(), ..linear([touched(x_deg, y_deg, share)]) };
+            let [deep, higher] = [0.4, 0.4 - share * lowest_mm].map(|depth_mm| upon(&axis, 21, depth_mm));
+            assert_near(&still(&edge, deep), &still(&axis, higher), 1e-9);
         }
     }
 }

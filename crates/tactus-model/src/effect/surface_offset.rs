@@ -15,7 +15,7 @@ pub(super) static DEFINITION: Definition = Definition {
     name: "surface-offset",
     summary: "the covering's surface stands higher or lower than the touch that found it says",
     parameters: &[Parameter::real("offset_mm", 0.0, [-2.0, 2.0])],
-    near_twins: &["saturation", "hardening", "backlash"],
+    near_twins: &["saturation", "hardening", "backlash", "indenter-tilt"],
     shown_by: &["corners", "element-centres", "ladder"],
     make: Make::Motion(|values| Box::new(SurfaceOffset { offset_mm: values[0] })),
 };
