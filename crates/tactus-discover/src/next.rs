@@ -8,7 +8,9 @@
 //! ```
 //!
 //! the smaller of the two, since nobody knows which is wrong. Only the new frames bind that fit: `z` is what the experiment
-//! tells by itself, and with the old data it tells no less.
+//! tells by itself, and with the old data it tells no less. Nature has neither's very form, so that a wrong one must also
+//! leave a good part of what either closes, of old and new frames together: the experiment with the greatest such share
+//! comes first.
 //!
 //! # Source
 //! Designs that discriminate between models: A. C. Atkinson and V. V. Fedorov, *Biometrika* 62 (1975) 57 (T-optimality).
@@ -34,9 +36,26 @@ pub(crate) struct Explanation {
     pub(crate) parameters: Parameters,
 }
 
-/// An experiment that is expected to do better than this decides.
-const DECIDES_Z: f64 = 8.0;
-/// One that does worse is not proposed.
+/// Explanations that the data do not tell apart.
+#[derive(Debug, Clone)]
+pub(crate) struct Pair {
+    /// The one that is in the model, and another in its place.
+    pub(crate) of: [Explanation; 2],
+    /// The model with neither.
+    pub(crate) without: Parameters,
+    /// By how much the one lessens the cost of the data.
+    pub(crate) gain: f64,
+}
+
+/// What an experiment is expected to tell.
+#[derive(Debug, Clone, Copy)]
+struct Expected {
+    z: f64,
+    /// Which share of the gap the wrong one would leave.
+    share: f64,
+}
+
+/// An experiment that does worse is not proposed.
 const WORTH_Z: f64 = 2.0;
 /// Proposals for one question.
 const PROPOSALS_MAX: usize = 3;
@@ -54,12 +73,13 @@ pub(crate) struct Setting<'a> {
 }
 
 impl Setting<'_> {
-    /// For each pair the experiments that tell it apart: those that decide first, the shortest before the others.
-    pub(crate) fn propose(self, pairs: &[[Explanation; 2]]) -> Result<Vec<NextExperiment>, DiscoverError> {
+    /// For each pair the experiments that tell it apart: the one that leaves the wrong one the greatest share, then
+    /// shorter ones.
+    pub(crate) fn propose(self, pairs: &[Pair]) -> Result<Vec<NextExperiment>, DiscoverError> {
         let bench = Bench::of(self.known, self.frames);
         let mut proposals = Vec::new();
         for pair in pairs {
-            let separates = pair.each_ref().map(|one| one.name.clone());
+            let separates = pair.of.each_ref().map(|one| one.name.clone());
             proposals
                 .extend(self.best(&bench.designs(), &separates, |design| self.separation(design, pair))?);
         }
@@ -92,50 +112,49 @@ impl Setting<'_> {
         self,
         designs: &[Design],
         separates: &[String; 2],
-        z: impl Fn(&Design) -> Result<f64, DiscoverError> + Sync,
+        expect: impl Fn(&Design) -> Result<Expected, DiscoverError> + Sync,
     ) -> Result<Vec<NextExperiment>, DiscoverError> {
-        let mut found = Vec::new();
-        for (design, z) in designs.iter().zip(parallel::map(designs, self.threads, z)) {
-            found.push((design, z?));
+        let mut found: Vec<(&Design, Expected)> = Vec::new();
+        for (design, expected) in designs.iter().zip(parallel::map(designs, self.threads, expect)) {
+            found.push((design, expected?));
         }
-        found.retain(|(_, z)| *z >= WORTH_Z);
-        found.sort_by(|(one, one_z), (other, other_z)| {
-            let (one_decides, other_decides) = (*one_z >= DECIDES_Z, *other_z >= DECIDES_Z);
-            other_decides.cmp(&one_decides).then(if one_decides {
-                one.duration_s.total_cmp(&other.duration_s)
-            } else {
-                other_z.total_cmp(one_z)
-            })
+        found.retain(|(_, expected)| expected.z >= WORTH_Z);
+        found.sort_by(|(_, one), (_, other)| {
+            other.share.total_cmp(&one.share).then(other.z.total_cmp(&one.z))
         });
-        // The long form of what is proposed in its short one tells nothing new.
-        let mut names: Vec<&str> = Vec::new();
+        // What tells less must take less time.
+        let mut shortest_s = f64::INFINITY;
         found.retain(|(design, _)| {
-            !names.contains(&design.name) && {
-                names.push(design.name);
-                true
-            }
+            let is_shorter = design.duration_s < shortest_s;
+            shortest_s = shortest_s.min(design.duration_s);
+            is_shorter
         });
-        let proposals = found.into_iter().take(PROPOSALS_MAX).map(|(design, expected_z)| NextExperiment {
+        let proposals = found.into_iter().take(PROPOSALS_MAX).map(|(design, expected)| NextExperiment {
             experiment: design.experiment,
             parameters: design.parameters.clone(),
             duration_s: design.duration_s,
             separates: separates.clone(),
-            expected_z,
+            expected_z: expected.z,
         });
         Ok(proposals.collect())
     }
 
-    fn separation(self, design: &Design, pair: &[Explanation; 2]) -> Result<f64, DiscoverError> {
+    /// The wrong one is the other, whichever is right; the right one is as in the model.
+    fn separation(self, design: &Design, pair: &Pair) -> Result<Expected, DiscoverError> {
         self.on(design, |problem| {
-            let at = pair.each_ref().map(|one| once(&one.parameters));
-            let [one, other] = [problem.predict(&at[0])?, problem.predict(&at[1])?];
+            let [one, other, without] =
+                [&pair.of[0].parameters, &pair.of[1].parameters, &pair.without].map(once);
+            let predicted = [problem.predict(&one)?, problem.predict(&other)?, problem.predict(&without)?];
             let wrong = |at: &Parameters, predicted: &[f64], right: &[f64]| {
                 let mut difference: Vec<f64> = right.iter().zip(predicted).map(|(a, b)| a - b).collect();
                 let fitting = Fitting::at(problem, at, predicted, 1)?;
                 fitting.free(&mut difference);
                 Ok::<f64, DiscoverError>(fitting.size(&difference))
             };
-            Ok(wrong(&at[0], &one, &other)?.min(wrong(&at[1], &other, &one)?))
+            let z =
+                wrong(&one, &predicted[0], &predicted[1])?.min(wrong(&other, &predicted[1], &predicted[0])?);
+            let gap = wrong(&without, &predicted[2], &predicted[0])?;
+            Ok(Expected { z, share: z * z / (pair.gain + gap * gap).max(f64::MIN_POSITIVE) })
         })
     }
 
@@ -145,7 +164,7 @@ impl Setting<'_> {
         design: &Design,
         definition: &'static Definition,
         at: &Parameters,
-    ) -> Result<f64, DiscoverError> {
+    ) -> Result<Expected, DiscoverError> {
         self.on(design, |problem| {
             let at = once(at);
             let predicted = problem.predict(&at)?;
@@ -166,7 +185,8 @@ impl Setting<'_> {
                     best = best.max(fitting.size(&column) * SMALL_SHARE * signal / reach);
                 }
             }
-            Ok(best)
+            // Nothing else would close any of it.
+            Ok(Expected { z: best, share: 1.0 })
         })
     }
 

@@ -75,8 +75,16 @@ pub(crate) struct Search<'a> {
     pub(crate) progress: &'a (dyn Fn(&str) + Sync),
 }
 
-/// For each effect that was added, others that serve as well in its place, and the models with them.
-pub(crate) type Equivalent = BTreeMap<&'static str, Vec<(&'static str, Fitted)>>;
+/// For each effect that was added, what serves as well in its place.
+pub(crate) type Equivalent = BTreeMap<&'static str, Rivals>;
+
+/// What serves as well in an effect's place.
+pub(crate) struct Rivals {
+    /// The model without the effect.
+    pub(crate) without: Fitted,
+    /// The models with another effect in its place.
+    pub(crate) same: Vec<(&'static str, Fitted)>,
+}
 
 /// A round: what was tried, and what came of it.
 pub(crate) struct Tried {
@@ -368,7 +376,7 @@ impl Search<'_> {
                     same.push((rival, fitted));
                 }
             }
-            equivalent.insert(*name, same);
+            equivalent.insert(*name, Rivals { without: less, same });
         }
         Ok(Exchanged::Settled(equivalent))
     }

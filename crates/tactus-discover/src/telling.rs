@@ -8,11 +8,11 @@ use crate::discovery::{
 };
 use crate::fit::Fitted;
 use crate::locate::Located;
-use crate::next::{Explanation, Setting};
+use crate::next::{Explanation, Pair, Setting};
 use crate::noise::Noise;
 use crate::prepare::Prepared;
 use crate::score::{q_values, sign_flip_p};
-use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Search, Tried, names, without};
+use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Rivals, Search, Tried, names, without};
 use crate::sensor::{Parameters, Sensor, Term};
 use crate::wander::Wander;
 use crate::{DiscoverError, Options, Rule, not_shown};
@@ -96,13 +96,14 @@ pub(crate) fn tell(
         name: name.to_owned(),
         parameters: fitted.parameters.clone(),
     };
-    let pairs: Vec<[Explanation; 2]> = equivalent
-        .iter()
-        .filter(|_| named)
-        .flat_map(|(name, rivals)| {
-            rivals.iter().map(|(rival, fitted)| [explained(name, &grown), explained(rival, fitted)])
-        })
-        .collect();
+    let mut pairs: Vec<Pair> = Vec::new();
+    for (name, Rivals { without, same }) in equivalent.iter().filter(|_| named) {
+        pairs.extend(same.iter().map(|(rival, fitted)| Pair {
+            of: [explained(name, &grown), explained(rival, fitted)],
+            without: without.parameters.clone(),
+            gain: without.cost - grown.cost,
+        }));
+    }
     let setting = Setting { known, frames, noise: &prepared.noise, threads: options.threads };
     let mut next_experiments = setting.propose(&pairs)?;
     next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
@@ -257,7 +258,11 @@ impl Search<'_> {
                 q_value: p_value,
                 heldout_rms_before_counts: self.problem.heldout_rms_counts(&before.predicted),
                 heldout_rms_after_counts: self.problem.heldout_rms_counts(&grown.predicted),
-                equivalent: equivalent.get(name).into_iter().flatten().map(|(rival, _)| *rival).collect(),
+                equivalent: equivalent
+                    .get(name)
+                    .into_iter()
+                    .flat_map(|rivals| rivals.same.iter().map(|(rival, _)| *rival))
+                    .collect(),
             });
         }
         let p_values: Vec<f64> = steps.iter().map(|step| step.p_value).collect();
