@@ -22,6 +22,9 @@ const ALIKE_Z: f64 = 3.0;
 /// Fewer pairs of frames tell nothing.
 const PAIRS_LEAST: usize = 20;
 
+/// Median size of a standard normal deviate.
+const MEDIAN_SIZE: f64 = 0.674_490;
+
 /// How readings scatter.
 #[derive(Debug, Clone)]
 pub(crate) struct Noise {
@@ -105,15 +108,14 @@ impl Noise {
     pub(crate) fn of_differences(frames: &Frames, step_counts: f64) -> Self {
         let elements = frames.elements;
         let rms = |element: usize| {
-            // Straight lines leave nothing: (x1 - 2 x2 + x3)^2 / 6.
-            let bends: Vec<f64> = (2..frames.len())
-                .map(|frame| {
-                    let [a, b, c] = [frame - 2, frame - 1, frame].map(|one| frames.counts_of(one)[element]);
-                    f64::from(a - 2.0 * b + c).powi(2) / 6.0
-                })
-                .collect();
-            // The median of a squared normal deviate is 0.455 of its mean.
-            (median(&bends) / 0.455).max(step_counts * step_counts / 12.0).max(f64::MIN_POSITIVE).sqrt()
+            // Straight lines leave nothing: x1 - 2 x2 + x3, of six times the variance.
+            let bend = |frame: usize| {
+                let [a, b, c] = [frame - 2, frame - 1, frame].map(|one| frames.counts_of(one)[element]);
+                f64::from(a - 2.0 * b + c).abs()
+            };
+            let bends: Vec<f64> = (2..frames.len()).map(bend).collect();
+            let variance = (median_in_steps(&bends, step_counts) / MEDIAN_SIZE).powi(2) / 6.0;
+            variance.max(step_counts * step_counts / 12.0).max(f64::MIN_POSITIVE).sqrt()
         };
         let by_element_counts: Vec<f64> = (0..elements).map(rms).collect();
         Self {
@@ -187,6 +189,15 @@ pub(crate) fn median(values: &[f64]) -> f64 {
         count if count % 2 == 1 => sorted[middle],
         _ => f64::midpoint(sorted[middle - 1], sorted[middle]),
     }
+}
+
+/// The median of sizes that come in steps, within the step about the middle one: else it would be off by up to half a step.
+fn median_in_steps(sizes: &[f64], step: f64) -> f64 {
+    let middle = median(sizes);
+    let [least, most] = [(middle - step / 2.0).max(0.0), middle + step / 2.0];
+    let below = sizes.iter().filter(|size| **size < least).count() as f64;
+    let within = sizes.iter().filter(|size| (least..most).contains(*size)).count() as f64;
+    if within > 0.0 { least + (most - least) * (sizes.len() as f64 / 2.0 - below) / within } else { middle }
 }
 
 #[cfg(test)]

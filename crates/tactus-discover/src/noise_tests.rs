@@ -92,3 +92,16 @@ fn elements_that_differ_by_chance_only_are_alike_and_a_noisy_one_is_told() {
         assert!((got - want).abs() < 1e-12, "{got}, not {want}");
     }
 }
+
+#[test]
+fn differences_of_whole_counts_tell_the_noise_of_a_reading() {
+    for step_counts in [0.0, 1.0, 4.0] {
+        let mut frames = resting(0.0);
+        for counts in &mut frames.counts {
+            *counts = if step_counts > 0.0 { (*counts / step_counts).round() * step_counts } else { *counts };
+        }
+        let noise = Noise::of_differences(&frames, f64::from(step_counts));
+        let want = (9.0 + f64::from(step_counts).powi(2) / 12.0).sqrt();
+        assert!((noise.rms_counts / want - 1.0).abs() < 0.02, "{} for {want}", noise.rms_counts);
+    }
+}

@@ -1,4 +1,7 @@
 //! Lines in the spectrum of the residual: tones that something adds to the readings.
+//!
+//! Only frames without contact are looked at. What is slow in them, cut into pieces by the presses, has lines at the rhythm
+//! of the presses too: where that rhythm itself has one, none is taken.
 
 use crate::Frames;
 use crate::noise::median;
@@ -43,17 +46,23 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
     let size = (slot(end - 1) + 1).next_power_of_two().min(1 << 18);
     let idle: Vec<usize> =
         (begin..end).filter(|frame| frames.position_mm[*frame][2] > 0.0 && slot(*frame) < size).collect();
-    let mut power = vec![0.0; size / 2];
-    for element in 0..elements {
+    let spectrum = |values: &[f64]| {
         let mut series = vec![[0.0; 2]; size];
-        let values: Vec<f64> = idle.iter().map(|frame| residual[frame * elements + element]).collect();
-        let middle = median(&values);
-        for (frame, value) in idle.iter().zip(&values) {
-            series[slot(*frame)][0] = value - middle;
+        for (frame, value) in idle.iter().zip(values) {
+            series[slot(*frame)][0] = *value;
         }
         transform(&mut series);
-        for (power, [re, im]) in power.iter_mut().zip(&series) {
-            *power += re * re + im * im;
+        series.truncate(size / 2);
+        series.into_iter().map(|[re, im]| re * re + im * im)
+    };
+    let rhythm: Vec<f64> = spectrum(&vec![1.0; idle.len()]).collect();
+    let mut power = vec![0.0; size / 2];
+    for element in 0..elements {
+        let mut values: Vec<f64> = idle.iter().map(|frame| residual[frame * elements + element]).collect();
+        let middle = median(&values);
+        values.iter_mut().for_each(|value| *value -= middle);
+        for (power, of_element) in power.iter_mut().zip(spectrum(&values)) {
+            *power += of_element;
         }
     }
     let step_hz = 1.0 / (size as f64 * interval_s);
@@ -64,9 +73,10 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
         if power[peak] < power[peak - 1] || power[peak] < power[peak + 1] {
             continue;
         }
-        let around = &power[peak.saturating_sub(AROUND).max(1)..(peak + AROUND).min(power.len())];
-        let stands_out = power[peak] / median(around).max(f64::MIN_POSITIVE);
-        if stands_out > STANDS_OUT {
+        let around = peak.saturating_sub(AROUND).max(1)..(peak + AROUND).min(power.len());
+        let stands_out = |of: &[f64], at: usize| of[at] / median(&of[around.clone()]).max(f64::MIN_POSITIVE);
+        let is_rhythm = (peak - 1..=peak + 1).any(|at| stands_out(&rhythm, at) > STANDS_OUT);
+        if stands_out(&power, peak) > STANDS_OUT && !is_rhythm {
             // The top of a parabola through the logarithms of three.
             let [left, top, right] =
                 [power[peak - 1], power[peak], power[peak + 1]].map(|p| p.max(f64::MIN_POSITIVE).ln());
