@@ -61,10 +61,13 @@ pub(crate) fn tell(
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
     let share = search.share_left(&base, &grown);
     let left = after.p_value <= ALPHA;
+    let count = names(&grown.parameters, search.known_terms).len();
     // A small gap is known by what depends on what only; a large one by how much of it is left.
     let clear = after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic);
     let large = search.problem.heldout_gap(&base.predicted).is_large();
-    let leaves_too_much = left && if large { share > UNEXPLAINED_SHARE } else { clear };
+    // What one effect leaves, of which it closes most, is what its form lacks; several that leave as much are a patchwork.
+    let is_form = count == 1 && search.likely_share_left(&base, &grown) <= UNEXPLAINED_SHARE;
+    let leaves_too_much = left && if large { share > UNEXPLAINED_SHARE } else { clear && !is_form };
     if leaves_too_much && options.rule == Rule::Protocol {
         // A model that leaves so much is none of what it is named after.
         grown = base.clone();
@@ -222,6 +225,16 @@ impl Search<'_> {
     /// What is left beyond the doubt about the noise, as a share of what there was.
     fn share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
         let left = self.problem.heldout_gap(&grown.predicted).sure();
+        self.share_of(base, grown, left)
+    }
+
+    /// The same, the noise taken to be what it is most likely.
+    fn likely_share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
+        let left = self.problem.heldout_gap(&grown.predicted).value.max(0.0);
+        self.share_of(base, grown, left)
+    }
+
+    fn share_of(&self, base: &Fitted, grown: &Fitted, left: f64) -> f64 {
         let [closed, _] = self.problem.heldout_gain(base, grown);
         if closed + left > 0.0 { (left / (closed + left)).clamp(0.0, 1.0) } else { 1.0 }
     }
