@@ -10,7 +10,7 @@
 //! the smaller of the two, since nobody knows which is wrong. Only the new frames bind that fit: `z` is what the experiment
 //! tells by itself, and with the old data it tells no less. Nature has neither's very form, so that a wrong one must also
 //! leave a good part of what either closes, of old and new frames together: the experiment with the greatest such share
-//! comes first.
+//! comes first. Those come before all others of which an effect's definition says that they show it.
 //!
 //! # Source
 //! Designs that discriminate between models: A. C. Atkinson and V. V. Fedorov, *Biometrika* 62 (1975) 57 (T-optimality).
@@ -31,8 +31,8 @@ use design::{Bench, Design};
 /// A model that may be what the data show.
 #[derive(Debug, Clone)]
 pub(crate) struct Explanation {
-    /// Names of its effects.
-    pub(crate) name: String,
+    /// The effect that it has and the other has not.
+    pub(crate) name: &'static str,
     pub(crate) parameters: Parameters,
 }
 
@@ -79,9 +79,19 @@ impl Setting<'_> {
         let bench = Bench::of(self.known, self.frames);
         let mut proposals = Vec::new();
         for pair in pairs {
-            let separates = pair.of.each_ref().map(|one| one.name.clone());
-            proposals
-                .extend(self.best(&bench.designs(), &separates, |design| self.separation(design, pair))?);
+            let separates = pair.of.each_ref().map(|one| one.name.to_owned());
+            let [one, other] = pair.of.each_ref().map(|one| Definition::find(one.name));
+            let shown_by = [one?.shown_by, other?.shown_by].concat();
+            // What is said to show either; small steps promise too much of the others.
+            let (own, others): (Vec<Design>, Vec<Design>) =
+                bench.designs().into_iter().partition(|design| shown_by.contains(&design.name));
+            for designs in [own, others] {
+                let best = self.best(&designs, &separates, |design| self.separation(design, pair))?;
+                if !best.is_empty() {
+                    proposals.extend(best);
+                    break;
+                }
+            }
         }
         Ok(proposals)
     }

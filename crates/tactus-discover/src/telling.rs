@@ -95,10 +95,8 @@ pub(crate) fn tell(
         effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);
         steps.push(coarse(*step_counts, *p_value, of_grown.level.heldout_rms_counts));
     }
-    let explained = |name: &str, fitted: &Fitted| Explanation {
-        name: name.to_owned(),
-        parameters: fitted.parameters.clone(),
-    };
+    let explained =
+        |name: &'static str, fitted: &Fitted| Explanation { name, parameters: fitted.parameters.clone() };
     let mut pairs: Vec<Pair> = Vec::new();
     for (name, Rivals { without, same }) in equivalent.iter().filter(|_| named) {
         pairs.extend(same.iter().map(|(rival, fitted)| Pair {
