@@ -129,6 +129,11 @@ discovery-evidence: bench-discovery
     target/release/tactus-bench evidence score --ablation target/evidence/ablation --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
 
+# Twins that one active round on the embedded rig decides or does not, some ten minutes: docs/discovery-evidence.md.
+discovery-active:
+    cargo build --release --package tactus --package tactus-bench
+    target/release/tactus-bench evidence active --document docs/discovery-evidence.md
+
 # The part of it that CI runs, always the same 46 sets, some two minutes on two cores: it fails if discovery has become worse.
 discovery-evidence-slice:
     cargo build --release --package tactus --package tactus-bench

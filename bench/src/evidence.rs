@@ -14,10 +14,11 @@ mod rate;
 mod run;
 mod score;
 mod timing;
+mod twins;
 
 pub use ablation::{Ablation, ablations};
 pub use campaign::{Campaign, Planned, Sizes, campaigns};
-pub use document::{Costs, document, into_document, misses};
+pub use document::{Costs, Part, document, into_document, misses};
 pub use outcome::{Named, Outcome, Truth, read};
 pub use picture::pictures;
 pub use rate::{Rate, normal_share, quantile};
@@ -27,3 +28,4 @@ pub use score::{
     Z_SEPARATE,
 };
 pub use timing::{Cost, Timing};
+pub use twins::{BUDGET_MIN, Chosen, Decision, TWINS, Twins, Undecided, twins_table};

@@ -8,8 +8,8 @@ use std::thread;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use tactus_bench::evidence::{
-    Ablation, Campaign, Costs, Outcome, Places, Planned, Scores, Sizes, Timing, Workflow, ablations,
-    campaigns, document, into_document, misses, pictures, read, run,
+    self, Ablation, Campaign, Costs, Outcome, Places, Planned, Scores, Sizes, TWINS, Timing, Workflow,
+    ablations, campaigns, document, into_document, misses, pictures, read, run, twins_table,
 };
 
 #[derive(Debug, Args)]
@@ -26,6 +26,24 @@ enum Part {
     Score(WhichArgs),
     /// Time and memory of `tactus discover` from 9,000 to 144,000 frames, as JSON.
     Time(TimeArgs),
+    /// Twins: what the paper's own experiments leave undecided, and one active round on the embedded rig decides.
+    Active(ActiveArgs),
+}
+
+#[derive(Debug, Args)]
+struct ActiveArgs {
+    /// The program that discovers.
+    #[arg(long, default_value = "target/release/tactus")]
+    tactus: PathBuf,
+    /// Only physics that have this in their names.
+    #[arg(long)]
+    only: Option<String>,
+    /// Recordings and reports.
+    #[arg(long, default_value = "target/evidence/active")]
+    work: PathBuf,
+    /// Write the table between its marks in this document.
+    #[arg(long)]
+    document: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -132,6 +150,7 @@ impl EvidenceArgs {
             Part::Run(args) => args.run(),
             Part::Score(which) => which.score().map(drop),
             Part::Time(args) => args.run(),
+            Part::Active(args) => args.run(),
         }
     }
 }
@@ -140,6 +159,24 @@ impl TimeArgs {
     fn run(self) -> Result<()> {
         let timing = Timing::measure(&self.tactus, &self.work, &self.frames, self.runs)?;
         println!("{}", serde_json::to_string_pretty(&timing)?);
+        Ok(())
+    }
+}
+
+impl ActiveArgs {
+    fn run(self) -> Result<()> {
+        let mut decisions = Vec::new();
+        for twins in
+            TWINS.iter().filter(|twins| self.only.as_ref().is_none_or(|part| twins.physics.contains(part)))
+        {
+            decisions.push(twins.decide(&self.tactus, &self.work)?);
+            println!("{}/{} {}", decisions.len(), TWINS.len(), twins.physics);
+        }
+        let text = twins_table(&decisions);
+        println!("{text}");
+        if let Some(path) = &self.document {
+            into(path, evidence::Part::Active, &text)?;
+        }
         Ok(())
     }
 }
@@ -203,9 +240,7 @@ impl WhichArgs {
         write(&self.work.join("evidence.md"), &text)?;
         write(&self.work.join("misses.txt"), &misses(&outcomes))?;
         if let Some(path) = &self.document {
-            let before = fs::read_to_string(path).with_context(|| path.display().to_string())?;
-            let after = into_document(&before, &text);
-            write(path, &after.with_context(|| format!("{} has no marks", path.display()))?)?;
+            into(path, evidence::Part::Evidence, &text)?;
         }
         if let Some(folder) = &self.images {
             for (name, picture) in pictures(&scores) {
@@ -235,6 +270,13 @@ impl Bounds {
         ensure!(wrong <= self.wrong_most, "at most {} sets with a wrong name", self.wrong_most);
         Ok(())
     }
+}
+
+/// Writes a part of a document anew.
+fn into(path: &Path, part: evidence::Part, text: &str) -> Result<()> {
+    let before = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let after = into_document(&before, part, text);
+    write(path, &after.with_context(|| format!("{} has no marks", path.display()))?)
 }
 
 fn write(path: &Path, text: &str) -> Result<()> {

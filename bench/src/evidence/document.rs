@@ -12,12 +12,27 @@ use super::rate::Rate;
 use super::score::{Band, OutsideScore, Scores, Several, Shrink};
 use super::timing::Timing;
 
-/// Between these lines a document is written anew.
-const MARKS: [&str; 2] = ["<!-- evidence: begin -->", "<!-- evidence: end -->"];
+/// A part of a document that is written anew, between marks of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// What is found in the sets.
+    Evidence,
+    /// What `tactus discover --active` decides.
+    Active,
+}
 
-/// Puts a text between the marks of a document; `None` if it has none.
-pub fn into_document(document: &str, text: &str) -> Option<String> {
-    let [begin, end] = MARKS;
+impl Part {
+    fn marks(self) -> [&'static str; 2] {
+        match self {
+            Self::Evidence => ["<!-- evidence: begin -->", "<!-- evidence: end -->"],
+            Self::Active => ["<!-- active: begin -->", "<!-- active: end -->"],
+        }
+    }
+}
+
+/// Puts a text between a part's marks in a document; `None` if it has none.
+pub fn into_document(document: &str, part: Part, text: &str) -> Option<String> {
+    let [begin, end] = part.marks();
     let (before, rest) = document.split_once(begin)?;
     let (_, after) = rest.split_once(end)?;
     Some(format!("{before}{begin}\n\n{}\n\n{end}{after}", text.trim()))

@@ -3,12 +3,12 @@ use super::*;
 
 #[test]
 fn only_what_stands_between_the_marks_is_written_anew() {
-    let [begin, end] = MARKS;
+    let [begin, end] = Part::Evidence.marks();
     let document = format!("before\n{begin}\nold\n{end}\nafter\n");
-    let Some(after) = into_document(&document, "new\n") else { panic!("it has marks") };
+    let Some(after) = into_document(&document, Part::Evidence, "new\n") else { panic!("it has marks") };
     assert_eq!(after, format!("before\n{begin}\n\nnew\n\n{end}\nafter\n"));
-    assert_eq!(into_document(&after, "new"), Some(after.clone()));
-    assert_eq!(into_document("no marks", "new"), None);
+    assert_eq!(into_document(&after, Part::Evidence, "new"), Some(after.clone()));
+    assert_eq!(into_document(&after, Part::Active, "new"), None);
 }
 
 #[test]

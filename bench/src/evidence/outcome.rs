@@ -224,7 +224,7 @@ fn gap_error(report: &Report, elements: f64, phi: f64) -> f64 {
     if gap > 0.0 { error / gap } else { f64::INFINITY }
 }
 
-fn parsed<T: DeserializeOwned>(path: &std::path::Path) -> Result<T> {
+pub(super) fn parsed<T: DeserializeOwned>(path: &std::path::Path) -> Result<T> {
     let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
     serde_json::from_str(&text).with_context(|| path.display().to_string())
 }

@@ -1,0 +1,238 @@
+//! Twins: what the paper's own experiments leave undecided, and what one that `tactus discover --active` chooses decides.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+use serde::Deserialize;
+
+use super::outcome::parsed;
+
+/// Hidden physics, and what it is mistaken for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Twins {
+    /// What the embedded rig hides, as `tactus-mock hidden list` names it.
+    pub physics: &'static str,
+    /// 1 is a bad rig.
+    pub strength: f64,
+    /// What it is.
+    pub effect: &'static str,
+    /// What it looks like.
+    pub twins: &'static [&'static str],
+    /// The paper's experiment that leaves it undecided.
+    pub experiment: &'static str,
+}
+
+/// An effect that was added, and those that the data could not tell from it.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct Undecided {
+    effect: String,
+    equivalent: Vec<String>,
+}
+
+/// An experiment that was chosen and run.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Chosen {
+    experiment: String,
+    parameters: BTreeMap<String, String>,
+    duration_s: f64,
+    #[serde(rename = "before_equivalent")]
+    before: Vec<Undecided>,
+    #[serde(rename = "after_equivalent")]
+    after: Vec<Undecided>,
+}
+
+/// What became of a pair.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decision {
+    /// The pair.
+    pub twins: Twins,
+    /// What was run in the round, in order; none if nothing was undecided.
+    pub chosen: Vec<Chosen>,
+}
+
+/// The twins of the document.
+pub const TWINS: [Twins; 6] = [
+    Twins {
+        physics: "lost-motion",
+        strength: 0.2,
+        effect: "backlash",
+        twins: &["hysteresis"],
+        experiment: "corners",
+    },
+    Twins {
+        physics: "imprint-power-law",
+        strength: 0.1,
+        effect: "imprint",
+        twins: &["relaxation"],
+        experiment: "element-centres",
+    },
+    Twins {
+        physics: "soft-edge",
+        strength: 0.2,
+        effect: "edge-effect",
+        twins: &["misregistration", "crosstalk", "gain-drift"],
+        experiment: "corners",
+    },
+    Twins {
+        physics: "stretched-spread",
+        strength: 0.2,
+        effect: "anisotropic-spread",
+        twins: &["crosstalk"],
+        experiment: "corners",
+    },
+    Twins {
+        physics: "low-pass-second-order",
+        strength: 0.5,
+        effect: "low-pass",
+        twins: &["time-lag"],
+        experiment: "corners",
+    },
+    Twins {
+        physics: "dead-band",
+        strength: 0.4,
+        effect: "surface-offset",
+        twins: &["indenter-tilt"],
+        experiment: "element-centres",
+    },
+];
+
+/// Time that a round may take on the rig.
+pub const BUDGET_MIN: f64 = 6.0;
+
+const RIG: &str = include_str!("../../../config/rigs/sim.toml");
+
+#[derive(Debug, Deserialize)]
+struct Report {
+    active: Vec<Chosen>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Summary {
+    recording: PathBuf,
+}
+
+impl Twins {
+    /// Runs the paper's experiment and one active round on the embedded rig, which hides the physics and nothing else.
+    ///
+    /// # Errors
+    /// If the program or a file fails.
+    pub fn decide(self, tactus: &Path, work: &Path) -> Result<Decision> {
+        let folder = work.join(self.physics);
+        if folder.exists() {
+            fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        }
+        fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        let (rig, truth, out) =
+            (folder.join("rig.toml"), folder.join("hidden.toml"), folder.join("discovery"));
+        fs::write(&rig, plain(RIG)?)?;
+        fs::write(
+            &truth,
+            format!(
+                "schema = \"tactus.hidden/1\"\n[[physics]]\nid = \"{}\"\nstrength = {:?}\nseed = 7\n",
+                self.physics, self.strength
+            ),
+        )?;
+        let on_rig = |command: &mut Command| -> Result<Vec<u8>> {
+            let command = command.arg("--embedded").arg("--rig-file").arg(&rig).arg("--truth").arg(&truth);
+            let output = command.output().with_context(|| tactus.display().to_string())?;
+            let said = String::from_utf8_lossy(&output.stderr);
+            ensure!(!output.stdout.is_empty(), "{}: {said}", self.physics);
+            Ok(output.stdout)
+        };
+        let mut run = Command::new(tactus);
+        run.args(["--json", "run", self.experiment, "--no-report", "--seed", "3", "--out"]);
+        let summary: Summary = serde_json::from_slice(&on_rig(run.arg(folder.join("paper")))?)?;
+        let mut discover = Command::new(tactus);
+        discover.args(["--json", "discover", "--active", "--budget-min"]).arg(BUDGET_MIN.to_string());
+        on_rig(discover.arg(summary.recording).arg("--out").arg(&out))?;
+        let report: Report = parsed(&out.join("report.json"))?;
+        Ok(Decision { twins: self, chosen: report.active })
+    }
+}
+
+impl Decision {
+    /// True if the truth or one of its twins was named, with the others as good.
+    pub fn is_undecided_before(&self) -> bool {
+        let Twins { effect, twins, .. } = self.twins;
+        self.chosen.first().is_some_and(|first| {
+            first.before.iter().any(|one| {
+                let has = |name: &str| one.effect == name || one.equivalent.iter().any(|other| other == name);
+                has(effect) && twins.iter().all(|twin| has(twin))
+            })
+        })
+    }
+
+    /// True if then the truth was named, and no twin was named or as good any more.
+    pub fn is_decided_after(&self) -> bool {
+        let Twins { effect, twins, .. } = self.twins;
+        let is_twin = |name: &str| twins.contains(&name);
+        self.chosen.last().is_some_and(|last| {
+            last.after
+                .iter()
+                .any(|one| one.effect == effect && !one.equivalent.iter().any(|other| is_twin(other)))
+                && !last.after.iter().any(|one| is_twin(&one.effect))
+        })
+    }
+
+    /// How long the rig was busy with the round.
+    pub fn duration_s(&self) -> f64 {
+        self.chosen.iter().map(|chosen| chosen.duration_s).sum()
+    }
+
+    fn row(&self) -> String {
+        let Twins { physics, strength, effect, twins, experiment } = self.twins;
+        let (before, after) = self.chosen.first().map_or_else(
+            || ("nothing undecided".into(), "-".into()),
+            |first| (in_words(&first.before), in_words(&first.after)),
+        );
+        let experiments: Vec<String> = self.chosen.iter().map(Chosen::command).collect();
+        let is_so = self.is_undecided_before() && self.is_decided_after();
+        format!(
+            "| {physics} | {strength} | {effect} or {} | {experiment} | {before} | {} | {:.0} s | {after} | {} |\n",
+            twins.join(", "),
+            experiments.join("; "),
+            self.duration_s(),
+            if is_so { "yes" } else { "**no**" }
+        )
+    }
+}
+
+/// The table of the document.
+pub fn twins_table(decisions: &[Decision]) -> String {
+    let head = "| hidden | strength | effect, twins | measured | named | chosen | on the rig | named then | decided |\n\
+                |---|---|---|---|---|---|---|---|---|\n";
+    let rows: Vec<String> = decisions.iter().map(Decision::row).collect();
+    [head, &rows.concat()].concat()
+}
+
+impl Chosen {
+    fn command(&self) -> String {
+        let parameters = self.parameters.iter().map(|(name, value)| format!(" {name}={value}"));
+        format!("{}{}", self.experiment, parameters.collect::<String>())
+    }
+}
+
+fn in_words(undecided: &[Undecided]) -> String {
+    let either = |one: &Undecided| [&[one.effect.clone()][..], &one.equivalent].concat().join(" or ");
+    let all: Vec<String> = undecided.iter().map(either).collect();
+    if all.is_empty() { "nothing named".into() } else { all.join("; ") }
+}
+
+/// The rig without what its own simulation hides.
+fn plain(rig: &str) -> Result<String> {
+    let mut rig: toml::Table = rig.parse()?;
+    let simulation = rig.get_mut("simulation").and_then(toml::Value::as_table_mut);
+    let simulation = simulation.context("the rig has no simulation")?;
+    simulation.remove("miswired");
+    let nowhere: toml::Table = "origin_mm = [0.0, 0.0]\nrotation_deg = 0.0".parse()?;
+    simulation.insert("registration_error".into(), nowhere.into());
+    simulation.insert("quadratic_per_mm".into(), 0.0.into());
+    Ok(toml::to_string(&rig)?)
+}
+
+#[cfg(test)]
+#[path = "twins_tests.rs"]
+mod tests;
