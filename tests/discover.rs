@@ -1,8 +1,8 @@
 //! Discovery on the command line: what it refuses, and that what it finds is so on a new run.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use tactus_e2e::{Said, repository, tactus};
@@ -110,8 +110,8 @@ fn refused_aloud(files: &[&str], more: &[&str]) -> Said {
     said
 }
 
-/// A rig that hides nothing but what a test has it hide, and a file that has it hide physics of strength 1.
-fn hide(folder: &Path, physics: &str) {
+/// A rig that hides nothing but what a test has it hide, and a file that has it hide physics of a strength; 1 is a bad rig.
+fn hide(folder: &Path, physics: &str, strength: f64) {
     let text = fs::read_to_string(repository("config/rigs/sim.toml")).unwrap();
     let mut rig: toml::Table = toml::from_str(&text).unwrap();
     let simulation = rig["simulation"].as_table_mut().unwrap();
@@ -120,7 +120,9 @@ fn hide(folder: &Path, physics: &str) {
     simulation.insert("registration_error".into(), nowhere.into());
     simulation.insert("quadratic_per_mm".into(), 0.0.into());
     fs::write(folder.join("rig.toml"), toml::to_string(&rig).unwrap()).unwrap();
-    let hidden = format!("schema = \"tactus.hidden/1\"\n[[physics]]\nid = \"{physics}\"\nseed = 7\n");
+    let hidden = format!(
+        "schema = \"tactus.hidden/1\"\n[[physics]]\nid = \"{physics}\"\nstrength = {strength:?}\nseed = 7\n"
+    );
     fs::write(folder.join("hidden.toml"), hidden).unwrap();
 }
 
@@ -151,7 +153,7 @@ fn gap_counts(one: &str, other: &str) -> f64 {
 fn is_named_and_closed(physics: &str, effect: &str, times_smaller: f64) {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
-    hide(folder, physics);
+    hide(folder, physics, 1.0);
     let first = diagnosed(folder, &["--truth", "hidden.toml"], "1");
     let said = tactus(folder, &["--json", "discover", &first]);
     assert_eq!(said.code, Some(0), "{said:?}");
@@ -180,7 +182,7 @@ fn a_sloping_surface_is_named_and_the_grown_model_closes_the_gap_on_a_new_run() 
 #[test]
 fn the_same_data_and_seed_give_the_same_report() {
     let folder = TempDir::new().unwrap();
-    hide(folder.path(), "hum-sine");
+    hide(folder.path(), "hum-sine", 1.0);
     let recording = diagnosed(folder.path(), &["--truth", "hidden.toml"], "1");
     let [one, other] = [("one", "1"), ("other", "2")].map(|(out, threads)| {
         let said = tactus(folder.path(), &["discover", &recording, "--out", out, "--threads", threads]);
@@ -188,4 +190,66 @@ fn the_same_data_and_seed_give_the_same_report() {
         fs::read(folder.path().join(out).join("report.json")).unwrap()
     });
     assert_eq!(one, other);
+}
+
+#[test]
+fn nothing_is_missing_of_a_rig_that_hides_nothing() {
+    let folder = TempDir::new().unwrap();
+    hide(folder.path(), "hum-sine", 1.0);
+    let recording = diagnosed(folder.path(), &[], "1");
+    let said = tactus(folder.path(), &["--json", "discover", &recording]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert_eq!(said.json()["verdict"], "nothing-missing", "{}", said.json()["gap"]);
+}
+
+/// What was named, and what the data could not tell from it.
+fn explanations(run: &Value, when: &str) -> Vec<(String, Vec<String>)> {
+    let of = |step: &Value| {
+        let others =
+            step["equivalent"].as_array().unwrap().iter().map(|name| name.as_str().unwrap().to_owned());
+        (step["effect"].as_str().unwrap().to_owned(), others.collect())
+    };
+    run[when].as_array().unwrap().iter().map(of).collect()
+}
+
+#[test]
+fn lost_motion_and_hysteresis_are_undecided_by_the_papers_corners_and_decided_by_one_active_round() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    hide(folder, "lost-motion", 0.2);
+    let rig = ["--embedded", "--rig-file", "rig.toml", "--truth", "hidden.toml"];
+    let corners = ["--json", "run", "corners", "--no-report", "--seed", "3"];
+    let said = tactus(folder, &[&corners[..], &rig].concat());
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let recording = said.json()["recording"].as_str().unwrap().to_owned();
+    let active = ["--json", "discover", &recording, "--active", "--rounds", "1", "--budget-min", "3"];
+    let said = tactus(folder, &[&active[..], &rig].concat());
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let report = said.json();
+    let [run] = &report["active"].as_array().unwrap()[..] else { panic!("one run: {}", report["active"]) };
+    assert_eq!(explanations(run, "before_equivalent"), [("backlash".into(), vec!["hysteresis".into()])]);
+    assert_eq!(explanations(run, "after_equivalent"), [("backlash".into(), vec![])]);
+    assert!(run["duration_s"].as_f64().unwrap() < 180.0, "{run}");
+
+    // The run is on file, and where it pressed is within the rig's envelope.
+    let runs = fs::read_dir(folder.join("discovery/runs")).unwrap();
+    let recordings: Vec<_> = runs.map(|run| run.unwrap().path().join("recording.mcap")).collect();
+    let rig: toml::Table = toml::from_str(&fs::read_to_string(folder.join("rig.toml")).unwrap()).unwrap();
+    let within = |axis: &str, mm: f64| {
+        let [least, most] = [0, 1].map(|end| rig["envelope"][axis][end].as_float().unwrap());
+        (least..=most).contains(&mm)
+    };
+    let of = |table: &str, key: &str| rig[table][key].as_float().unwrap();
+    let deepest_mm = of("envelope", "depth_share_max") * of("covering", "thickness_mm");
+    let mut frames = 0;
+    rows::visit(&recordings.iter().map(PathBuf::as_path).collect::<Vec<_>>(), |_, row| {
+        let [x_mm, y_mm, z_mm] = row.position_mm;
+        if z_mm >= 0.0 {
+            return;
+        }
+        frames += 1;
+        assert!(within("x_mm", x_mm) && within("y_mm", y_mm) && z_mm >= -deepest_mm, "{:?}", row.position_mm);
+    })
+    .unwrap();
+    assert!(frames > 300, "{frames}");
 }

@@ -60,7 +60,9 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
     for element in 0..elements {
         let mut values: Vec<f64> = idle.iter().map(|frame| residual[frame * elements + element]).collect();
         let middle = median(&values);
-        values.iter_mut().for_each(|value| *value -= middle);
+        for value in &mut values {
+            *value -= middle;
+        }
         for (power, of_element) in power.iter_mut().zip(spectrum(&values)) {
             *power += of_element;
         }
