@@ -179,7 +179,7 @@ impl Decision {
 
     /// How long the rig was busy with the round.
     pub fn duration_s(&self) -> f64 {
-        self.chosen.iter().map(|chosen| chosen.duration_s).sum()
+        self.chosen.iter().fold(0.0, |sum, chosen| sum + chosen.duration_s)
     }
 
     fn row(&self) -> String {

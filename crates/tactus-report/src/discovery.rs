@@ -11,6 +11,7 @@ mod basis;
 mod figures;
 mod gap;
 mod json;
+mod next;
 mod tried;
 mod words;
 
@@ -29,6 +30,7 @@ use crate::{
 pub use active::{ActiveRun, Undecided, command};
 pub use figures::{element_maps, levels, residual_against};
 pub use json::discovery_json;
+pub use next::{Proposal, proposals};
 pub use words::in_words;
 
 /// A discovery, and what it was made from.

@@ -11,10 +11,10 @@ use std::{env, fs, path::Path};
 
 use made_up::{data, empty, explained, nothing_missing, report, unexplained};
 use serde_json::Value;
-use tactus_discover::{Discovery, Unexplained, Verdict};
+use tactus_discover::{Discovery, NextExperiment, Unexplained, Verdict};
 use tactus_model::Array;
 use tactus_report::discovery::{
-    DiscoveryReport, discovery_html, discovery_json, element_maps, in_words, levels, not_shown,
+    DiscoveryReport, discovery_html, discovery_json, element_maps, in_words, levels, not_shown, proposals,
     residual_against,
 };
 
@@ -156,6 +156,7 @@ fn what_cannot_be_shown_comes_first_and_what_it_rests_on_last() {
         "What stays unexplained",
         "What to measure next",
         "<code>tactus run diagnose -p parts=approach</code>",
+        "tells hysteresis from backlash (z = 11)",
         "What this rests on",
         "no physical sensor was read",
     ] {
@@ -268,4 +269,29 @@ fn figures_draw_what_was_found() {
     {
         assert!(levels.contains(name), "{name}");
     }
+}
+
+#[test]
+fn an_experiment_that_answers_several_questions_is_proposed_once() {
+    let mut found = explained();
+    let first = found.next_experiments[0].clone();
+    let separates = |one: &str, other: &str| [one.to_owned(), other.to_owned()];
+    let parameters = vec![("parts", "hold".to_owned())];
+    found.next_experiments.extend([
+        NextExperiment { separates: separates("imprint", "nothing"), parameters, ..first.clone() },
+        NextExperiment { separates: separates("imprint", "nothing"), expected_z: 4.0, ..first.clone() },
+        NextExperiment { separates: separates("relaxation", "nothing"), expected_z: 5.0, ..first },
+    ]);
+    let proposals = proposals(&found);
+    let told: Vec<[&str; 2]> = proposals.iter().map(|one| [&*one.command, &*one.tells]).collect();
+    assert_eq!(
+        told,
+        [
+            [
+                "tactus run diagnose -p parts=approach",
+                "tells hysteresis from backlash (z = 11); shows imprint (z = 4.0) and relaxation (z = 5.0)"
+            ],
+            ["tactus run diagnose -p parts=hold", "shows imprint (z = 11)"],
+        ]
+    );
 }

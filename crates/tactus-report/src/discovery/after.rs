@@ -5,20 +5,20 @@ use std::fmt;
 use tactus_discover::{Discovery, Level};
 
 use super::{
-    active::command,
     figures::levels,
+    next,
     words::{list, percent},
 };
 use crate::{
     document::{Column, Table},
     markup::Text,
-    numbers::{digits, duration},
+    numbers::digits,
 };
 
 pub(super) fn sections(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     before_and_after(f, found)?;
     unexplained(f, found)?;
-    next(f, found)
+    next::section(f, found)
 }
 
 fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
@@ -76,28 +76,4 @@ fn unexplained(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
         )?;
     }
     writeln!(f, "</section>")
-}
-
-fn next(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
-    writeln!(f, "<section>\n<h2>What to measure next</h2>")?;
-    if found.next_experiments.is_empty() {
-        return writeln!(f, "<p>No experiment is proposed.</p>\n</section>");
-    }
-    writeln!(f, "<ol>")?;
-    for next in &found.next_experiments {
-        let [one, other] = &next.separates;
-        writeln!(
-            f,
-            "<li>To tell {} from {}, which would then differ by {} standard errors:<br><code>{}</code> ({})</li>",
-            Text(one),
-            Text(other),
-            digits(next.expected_z, 2),
-            Text(command(next.experiment, &next.parameters)),
-            duration(next.duration_s)
-        )?;
-    }
-    writeln!(
-        f,
-        "</ol>\n<p>Then give the new recording together with these data to <code>tactus discover</code>.</p>\n</section>"
-    )
 }

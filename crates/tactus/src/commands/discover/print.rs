@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use tactus_calibrate::Estimate;
 use tactus_discover::{Estimated, Step};
-use tactus_report::discovery::{DiscoveryReport, Undecided, command, in_words, not_shown};
+use tactus_report::discovery::{
+    DiscoveryReport, Proposal, Undecided, command, in_words, not_shown, proposals,
+};
 
 use crate::commands::calibrate::estimate;
 use crate::output::{duration, print_fields, print_table, say};
@@ -42,17 +44,12 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
         let [before, after] = [&run.before, &run.after].map(|undecided| Undecided::in_words(undecided));
         say(&format!("{}: {before} -> {after}", command(&run.experiment, &run.parameters)));
     }
-    if !found.next_experiments.is_empty() {
+    let proposals = proposals(found);
+    if !proposals.is_empty() {
         say("");
     }
-    for next in &found.next_experiments {
-        let [one, other] = &next.separates;
-        let z = next.expected_z;
-        let command = command(next.experiment, &next.parameters);
-        say(&format!(
-            "next: {command}  (tells {one} from {other}, z = {z:.1}; {})",
-            duration(next.duration_s)
-        ));
+    for Proposal { command, duration_s, tells } in proposals {
+        say(&format!("next: {command}  ({})\n      {tells}", duration(duration_s)));
     }
     say("");
     for path in paths {

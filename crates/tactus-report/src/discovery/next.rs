@@ -1,0 +1,82 @@
+//! What to measure next: each experiment once, with all that it would tell.
+
+use std::fmt;
+
+use tactus_discover::{Discovery, NextExperiment};
+
+use super::{active::command, words::list};
+use crate::{
+    markup::Text,
+    numbers::{digits, duration},
+};
+
+/// An experiment to be made next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposal {
+    /// What to type to run it.
+    pub command: String,
+    /// How long it takes on the rig, roughly.
+    pub duration_s: f64,
+    /// What it tells, such as `tells backlash from hysteresis (z = 11); shows imprint (z = 4.1)`.
+    pub tells: String,
+}
+
+/// The proposed experiments in their order, each once.
+pub fn proposals(found: &Discovery) -> Vec<Proposal> {
+    let mut commands: Vec<(String, Vec<&NextExperiment>)> = Vec::new();
+    for next in &found.next_experiments {
+        let command = command(next.experiment, &next.parameters);
+        match commands.iter_mut().find(|(other, _)| *other == command) {
+            Some((_, questions)) => questions.push(next),
+            None => commands.push((command, vec![next])),
+        }
+    }
+    let proposal = |(command, questions): (String, Vec<&NextExperiment>)| Proposal {
+        command,
+        duration_s: questions[0].duration_s,
+        tells: tells(&questions),
+    };
+    commands.into_iter().map(proposal).collect()
+}
+
+fn tells(questions: &[&NextExperiment]) -> String {
+    let mut parts: Vec<String> = Vec::new();
+    let mut shown: Vec<String> = Vec::new();
+    for next in questions {
+        let [one, other] = &next.separates;
+        let z = digits(next.expected_z, 2);
+        if other == "nothing" {
+            shown.push(format!("{one} (z = {z})"));
+        } else {
+            parts.push(format!("tells {one} from {other} (z = {z})"));
+        }
+    }
+    if !shown.is_empty() {
+        let shown: Vec<&str> = shown.iter().map(String::as_str).collect();
+        parts.push(format!("shows {}", list(&shown)));
+    }
+    parts.join("; ")
+}
+
+pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
+    writeln!(f, "<section>\n<h2>What to measure next</h2>")?;
+    let proposals = proposals(found);
+    if proposals.is_empty() {
+        return writeln!(f, "<p>No experiment is proposed.</p>\n</section>");
+    }
+    writeln!(f, "<ol>")?;
+    for Proposal { command, duration_s, tells } in &proposals {
+        writeln!(
+            f,
+            "<li><code>{}</code> ({})<br>{}</li>",
+            Text(command),
+            duration(*duration_s),
+            Text(tells)
+        )?;
+    }
+    writeln!(
+        f,
+        "</ol>\n<p>z: by how many standard errors two explanations would differ, or a small effect would stand out. Then give the \
+         new recording together with these data to <code>tactus discover</code>.</p>\n</section>"
+    )
+}
