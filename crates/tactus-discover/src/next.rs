@@ -76,15 +76,18 @@ impl Setting<'_> {
     /// For each pair the experiments that tell it apart: the one that leaves the wrong one the greatest share, then
     /// shorter ones.
     pub(crate) fn propose(self, pairs: &[Pair]) -> Result<Vec<NextExperiment>, DiscoverError> {
-        let bench = Bench::of(self.known, self.frames);
+        if pairs.is_empty() {
+            return Ok(Vec::new());
+        }
+        let designs = Bench::of(self.known, self.frames).designs();
         let mut proposals = Vec::new();
         for pair in pairs {
             let separates = pair.of.each_ref().map(|one| one.name.to_owned());
             let [one, other] = pair.of.each_ref().map(|one| Definition::find(one.name));
             let shown_by = [one?.shown_by, other?.shown_by].concat();
             // What is said to show either; small steps promise too much of the others.
-            let (own, others): (Vec<Design>, Vec<Design>) =
-                bench.designs().into_iter().partition(|design| shown_by.contains(&design.name));
+            let (own, others): (Vec<&Design>, Vec<&Design>) =
+                designs.iter().partition(|design| shown_by.contains(&design.name));
             for designs in [own, others] {
                 let best = self.best(&designs, &separates, |design| self.separation(design, pair))?;
                 if !best.is_empty() {
@@ -102,17 +105,17 @@ impl Setting<'_> {
         not_shown: &[NotShown],
         at: &Parameters,
     ) -> Result<Vec<NextExperiment>, DiscoverError> {
-        let bench = Bench::of(self.known, self.frames);
+        if not_shown.is_empty() {
+            return Ok(Vec::new());
+        }
+        let designs = Bench::of(self.known, self.frames).designs();
         let mut proposals = Vec::new();
         for NotShown { effect, .. } in not_shown {
             let definition = Definition::find(effect)?;
-            let designs: Vec<Design> = bench
-                .designs()
-                .into_iter()
-                .filter(|design| definition.shown_by.contains(&design.name))
-                .collect();
+            let own: Vec<&Design> =
+                designs.iter().filter(|design| definition.shown_by.contains(&design.name)).collect();
             let separates = [(*effect).to_owned(), "nothing".to_owned()];
-            let best = self.best(&designs, &separates, |design| self.visibility(design, definition, at))?;
+            let best = self.best(&own, &separates, |design| self.visibility(design, definition, at))?;
             proposals.extend(best.into_iter().take(1));
         }
         Ok(proposals)
@@ -120,12 +123,13 @@ impl Setting<'_> {
 
     fn best(
         self,
-        designs: &[Design],
+        designs: &[&Design],
         separates: &[String; 2],
         expect: impl Fn(&Design) -> Result<Expected, DiscoverError> + Sync,
     ) -> Result<Vec<NextExperiment>, DiscoverError> {
         let mut found: Vec<(&Design, Expected)> = Vec::new();
-        for (design, expected) in designs.iter().zip(parallel::map(designs, self.threads, expect)) {
+        let expected = parallel::map(designs, self.threads, |design| expect(design));
+        for (design, expected) in designs.iter().zip(expected) {
             found.push((design, expected?));
         }
         found.retain(|(_, expected)| expected.z >= WORTH_Z);

@@ -77,8 +77,8 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
         }
         let around = peak.saturating_sub(AROUND).max(1)..(peak + AROUND).min(power.len());
         let stands_out = |of: &[f64], at: usize| of[at] / median(&of[around.clone()]).max(f64::MIN_POSITIVE);
-        let is_rhythm = (peak - 1..=peak + 1).any(|at| stands_out(&rhythm, at) > STANDS_OUT);
-        if stands_out(&power, peak) > STANDS_OUT && !is_rhythm {
+        let is_rhythm = || (peak - 1..=peak + 1).any(|at| stands_out(&rhythm, at) > STANDS_OUT);
+        if stands_out(&power, peak) > STANDS_OUT && !is_rhythm() {
             // The top of a parabola through the logarithms of three.
             let [left, top, right] =
                 [power[peak - 1], power[peak], power[peak + 1]].map(|p| p.max(f64::MIN_POSITIVE).ln());

@@ -29,7 +29,7 @@ const FINE_TICK_NS: u64 = 10_000;
 /// From fewer frames no rate is told.
 const EVEN_FRAMES: usize = 30;
 
-/// Ticks of an even rate are off its line by no more than this, in ticks: half of one, and as much again for doubt.
+/// Ticks of an even rate are off its line by no more than this, in ticks: half of one, and half as much again for doubt.
 const EVEN_TICKS: f64 = 0.75;
 
 /// The estimated clock of one connection of the sensor.

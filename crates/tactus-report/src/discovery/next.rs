@@ -52,7 +52,6 @@ fn tells(questions: &[&NextExperiment]) -> String {
         }
     }
     if !shown.is_empty() {
-        let shown: Vec<&str> = shown.iter().map(String::as_str).collect();
         parts.push(format!("shows {}", list(&shown)));
     }
     parts.join("; ")
