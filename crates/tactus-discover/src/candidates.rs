@@ -1,16 +1,22 @@
 //! Every effect of the library as a candidate, with what it would take to start a fit of it.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::{Definition, Kind, REGISTRY};
 
-use crate::DiscoverError;
-use crate::fit::{Free, Problem, solve};
+use crate::fit::{Fitted, Free, Problem, solve};
 use crate::score::{Fitting, Score};
 use crate::sensor::{Parameters, Term};
+use crate::{DiscoverError, wiring};
 
 /// Values of a shape that spans orders of magnitude, and of any other.
 const VALUES_MANY: usize = 5;
 const VALUES_FEW: usize = 3;
+
+/// An element that seems to take more than this share of another's signal, or less than none, may answer for it alone: its
+/// gain is then that of a model in which it answers for itself, and says nothing.
+const CROSSED_SHARE: f64 = 0.5;
 
 /// An effect of the library, as these data could show it.
 #[derive(Debug, Clone)]
@@ -19,7 +25,16 @@ pub(crate) struct Candidate {
     /// Parameters that change something by themselves.
     amplitudes: Vec<usize>,
     /// Values of the others from which fits start.
-    shapes: Vec<Term>,
+    shapes: Shapes,
+}
+
+/// Where the values of an effect's shape parameters come from.
+#[derive(Debug, Clone)]
+enum Shapes {
+    /// A grid, the same for every model.
+    Grid(Vec<Term>),
+    /// Pairs of elements: those that a model's residual suggests.
+    Wiring,
 }
 
 /// A candidate at the residual of a model: how much it is wanted.
@@ -36,32 +51,21 @@ pub(crate) struct Screened {
     pub(crate) reach: f64,
 }
 
-/// What data suggest of shapes that no grid would find.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Hints {
-    /// Frequencies of lines in the spectrum.
-    pub(crate) frequencies_hz: Vec<f64>,
-    /// Pairs of an element and another for which it may answer.
-    pub(crate) wiring: Vec<[usize; 2]>,
-}
-
 impl Candidate {
-    /// All effects of the library, `declared` being the model without them.
+    /// All effects of the library, at a model without them and the frequencies of lines in the spectrum of what it leaves.
     pub(crate) fn all(
         problem: &Problem<'_>,
-        at: &Parameters,
-        predicted: &[f64],
-        hints: &Hints,
+        at: &Fitted,
+        frequencies_hz: &[f64],
     ) -> Result<Vec<Self>, DiscoverError> {
-        REGISTRY.iter().map(|definition| Self::of(definition, problem, at, predicted, hints)).collect()
+        REGISTRY.iter().map(|definition| Self::of(definition, problem, at, frequencies_hz)).collect()
     }
 
     fn of(
         definition: &'static Definition,
         problem: &Problem<'_>,
-        at: &Parameters,
-        predicted: &[f64],
-        hints: &Hints,
+        at: &Fitted,
+        frequencies_hz: &[f64],
     ) -> Result<Self, DiscoverError> {
         let mut amplitudes = Vec::new();
         let mut shapes = vec![Term::neutral(definition)];
@@ -70,13 +74,13 @@ impl Candidate {
                 continue;
             }
             let acts = known.neutral == 0.0 || {
-                let with = with(at, Term::neutral(definition));
+                let with = with(&at.parameters, Term::neutral(definition));
                 let free = Free::Of { term: with.terms.len() - 1, parameter };
-                problem.slope(&with, predicted, free)?.iter().any(|slope| *slope != 0.0)
+                problem.slope(&with, &at.predicted, free)?.iter().any(|slope| *slope != 0.0)
             };
             let range = known.range;
             if known.name.ends_with("_hz") {
-                shapes = cross(&shapes, parameter, &hints.frequencies_hz);
+                shapes = cross(&shapes, parameter, frequencies_hz);
             } else if known.name == "duration_s" {
                 shapes = cross(&shapes, parameter, &[problem.duration_s.clamp(range[0], range[1])]);
             } else if acts {
@@ -86,11 +90,20 @@ impl Candidate {
                 shapes = cross(&shapes, parameter, &values);
             }
         }
-        if definition.parameters.iter().any(|known| known.kind == Kind::Element) {
-            shapes = hints.wiring.iter().filter_map(|pair| wired(definition, *pair)).collect();
-            amplitudes.retain(|parameter| definition.parameters[*parameter].kind == Kind::Real);
-        }
+        let wires = definition.parameters.iter().any(|known| known.kind == Kind::Element);
+        let shapes = if wires { Shapes::Wiring } else { Shapes::Grid(shapes) };
         Ok(Self { definition, amplitudes, shapes })
+    }
+
+    /// Terms from which fits of this effect on top of a model start, but for its amplitudes.
+    fn shapes(&self, problem: &Problem<'_>, at: &Fitted) -> Cow<'_, [Term]> {
+        match &self.shapes {
+            Shapes::Grid(terms) => Cow::Borrowed(terms),
+            Shapes::Wiring => {
+                let pairs = wiring::pairs(problem, at);
+                Cow::Owned(pairs.into_iter().filter_map(|pair| wired(self.definition, pair)).collect())
+            }
+        }
     }
 
     /// How much the residual of a model wants this effect.
@@ -98,8 +111,7 @@ impl Candidate {
         &self,
         fitting: &Fitting<'_>,
         problem: &Problem<'_>,
-        at: &Parameters,
-        predicted: &[f64],
+        at: &Fitted,
     ) -> Result<Screened, DiscoverError> {
         let mut screened = Screened {
             definition: self.definition,
@@ -108,13 +120,13 @@ impl Candidate {
             start: Term::neutral(self.definition),
             reach: 0.0,
         };
-        for shape in &self.shapes {
-            let start = with(at, shape.clone());
+        for shape in self.shapes(problem, at).iter() {
+            let start = with(&at.parameters, shape.clone());
             let term = start.terms.len() - 1;
             let mut columns = Vec::with_capacity(self.amplitudes.len());
             for parameter in &self.amplitudes {
                 let free = Free::Of { term, parameter: *parameter };
-                let mut column = problem.slope(&start, predicted, free)?;
+                let mut column = problem.slope(&start, &at.predicted, free)?;
                 let whole = fitting.size(&column);
                 fitting.free(&mut column);
                 if fitting.size(&column) < 1e-6 * whole {
@@ -145,18 +157,23 @@ impl Candidate {
                 fitting.inner(&columns[active[i]], &columns[active[j]])
             });
             let right = DVector::from_fn(count, |i, _| fitting.wanted(&columns[active[i]]));
-            let step = solve(&gram, &right, 0.0);
+            let step = solve(&gram, &right, 0.0, gram.diagonal().as_slice());
             let outside = active.iter().zip(step.iter()).position(|(place, step)| {
                 let parameter = self.amplitudes[*place];
                 let range = self.definition.parameters[parameter].range;
                 let value = shape.values[parameter];
-                (*step < 0.0 && value <= range[0]) || (*step > 0.0 && value >= range[1])
+                let ends = (*step < 0.0 && value <= range[0]) || (*step > 0.0 && value >= range[1]);
+                ends && !matches!(self.shapes, Shapes::Wiring)
             });
             if let Some(outside) = outside {
                 active.remove(outside);
                 continue;
             }
             let mut start = shape.clone();
+            let turns = step.iter().any(|step| !(0.0..CROSSED_SHARE).contains(step));
+            if turns && matches!(self.shapes, Shapes::Wiring) {
+                return (step.dot(&right), crossed(start));
+            }
             for (place, step) in active.iter().zip(step.iter()) {
                 let parameter = self.amplitudes[*place];
                 let [least, most] = self.definition.parameters[parameter].range;
@@ -203,6 +220,17 @@ fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> 
     let count = if ratio > 300.0 { VALUES_MANY } else { VALUES_FEW };
     // Within the ends: the middles of equal parts.
     (0..count).map(|k| least * ratio.powf((k as f64 + 0.5) / count as f64)).collect()
+}
+
+/// A pair's term as far as it goes: the element answers for the other alone.
+fn crossed(mut pair: Term) -> Term {
+    for (known, value) in pair.definition.parameters.iter().zip(&mut pair.values) {
+        if known.kind == Kind::Real {
+            let [least, most] = known.range;
+            *value = if known.neutral == 0.0 { most } else { least + 0.02 * (known.neutral - least) };
+        }
+    }
+    pair
 }
 
 fn wired(definition: &'static Definition, pair: [usize; 2]) -> Option<Term> {

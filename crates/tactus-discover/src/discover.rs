@@ -92,7 +92,7 @@ pub fn discover(
     let base = prepared.base.clone();
     said.say("scoring the effects", 0.1);
     let lacking = not_shown::lacking(&problem, prepared.replicates);
-    let mut candidates = Candidate::all(&problem, &base.parameters, &base.predicted, &prepared.hints)?;
+    let mut candidates = Candidate::all(&problem, &base, &prepared.frequencies_hz)?;
     candidates.retain(|one| lacking.iter().all(|lacking| lacking.effect != one.definition.name));
     let search = Search {
         problem: &problem,

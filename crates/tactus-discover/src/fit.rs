@@ -26,6 +26,13 @@ use crate::{DiscoverError, parallel};
 const COST_LEAST: f64 = 0.05;
 const COST_SHARE_LEAST: f64 = 1e-4;
 
+/// Gains and baselines move before all else if they alone take up so much of the cost.
+const TAKEN_UP_LEAST: f64 = 0.1;
+
+/// A parameter of whose square gains and baselines leave less than this share is damped as if they left so much: what they
+/// can do as well goes nowhere far.
+const OWN_SHARE_LEAST: f64 = 1e-3;
+
 /// A knot that is seen by less than this share of what sees the one before tells nothing of a curve.
 const UNSEEN_SHARE: f64 = 0.1;
 
@@ -142,6 +149,11 @@ impl<'a> Problem<'a> {
             .sum()
     }
 
+    /// Weighted sum of the squares of a column in the fitted rows.
+    fn weighed_square(&self, column: &[f64]) -> f64 {
+        column.iter().zip(self.weights()).map(|(value, weight)| weight * value * value).sum()
+    }
+
     pub(crate) fn residuals<'b>(&'b self, predicted: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
         self.sensor.rows.counts.iter().zip(predicted).map(|(counts, predicted)| counts - predicted)
     }
@@ -221,6 +233,9 @@ impl<'a> Problem<'a> {
         let free = self.free(&start);
         let mut at = self.wandering(start)?;
         let mut predicted = self.predict(&at)?;
+        if let Some((better, of_better)) = self.taken_up(&at, &predicted)? {
+            (at, predicted) = (better, of_better);
+        }
         let mut cost = self.cost(&predicted);
         let mut damping = 1e-3;
         let mut kept: Vec<Option<Vec<f64>>> = vec![None; free.len()];
@@ -247,11 +262,15 @@ impl<'a> Problem<'a> {
                 linear.project(column);
             }
             let (gram, right) = normal(self, &projected, &residual);
+            let own = |(index, column): (usize, &Vec<f64>)| {
+                gram[(index, index)].max(OWN_SHARE_LEAST * self.weighed_square(column))
+            };
+            let squares: Vec<f64> = columns.iter().enumerate().map(own).collect();
             covariance = Some(gram.clone());
             let mut improved = false;
             let mut promise = 0.0;
             while damping < 1e8 {
-                let step = solve(&gram, &right, damping);
+                let step = solve(&gram, &right, damping, &squares);
                 promise = step.dot(&right);
                 let next = self.stepped(&at, &free, &step, &linear, &raw, &columns);
                 let next_predicted = self.predict(&next)?;
@@ -280,6 +299,26 @@ impl<'a> Problem<'a> {
         }
         let errors = self.errors(&at, &free, covariance);
         Ok(Fitted { parameters: at, predicted, cost, errors })
+    }
+
+    /// The parameters with gains and baselines that take up what they can, and what that gives, if it is much: a start
+    /// whose effects are not neutral has the gains of a model without them.
+    fn taken_up(
+        &self,
+        at: &Parameters,
+        predicted: &[f64],
+    ) -> Result<Option<(Parameters, Vec<f64>)>, DiscoverError> {
+        let linear = self.linear(at, predicted)?;
+        let raw = self.standing(at, predicted);
+        let mut residual = raw.clone();
+        linear.project(&mut residual);
+        if self.weighed_square(&residual) > (1.0 - TAKEN_UP_LEAST) * self.weighed_square(&raw) {
+            return Ok(None);
+        }
+        let mut next = at.clone();
+        linear.take_up(&raw, &mut next);
+        let of_next = self.predict(&next)?;
+        Ok((self.cost(&of_next) < self.cost(predicted)).then_some((next, of_next)))
     }
 
     fn stepped(
@@ -389,21 +428,30 @@ pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
-/// A step of the damped normal equations.
-pub(crate) fn solve(gram: &DMatrix<f64>, right: &DVector<f64>, damping: f64) -> DVector<f64> {
-    let scale = DVector::from_fn(gram.nrows(), |i, _| positive_root(gram[(i, i)]));
-    let damped = scaled(gram, damping + 1e-9);
+/// A step of the damped normal equations; each parameter is held by the damping as a share of its square.
+pub(crate) fn solve(
+    gram: &DMatrix<f64>,
+    right: &DVector<f64>,
+    damping: f64,
+    squares: &[f64],
+) -> DVector<f64> {
+    let scale: Vec<f64> = squares.iter().map(|square| positive_root(*square)).collect();
+    let mut damped =
+        DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / (scale[i] * scale[j]));
+    for i in 0..gram.nrows() {
+        damped[(i, i)] += if gram[(i, i)] > 0.0 { damping + 1e-9 } else { 1.0 };
+    }
     let scaled_right = DVector::from_fn(gram.nrows(), |i, _| right[i] / scale[i]);
     let Some(factors) = damped.cholesky() else { return DVector::zeros(gram.nrows()) };
     let step = factors.solve(&scaled_right);
     DVector::from_fn(gram.nrows(), |i, _| if gram[(i, i)] > 0.0 { step[i] / scale[i] } else { 0.0 })
 }
 
-/// A Gram matrix with ones on its diagonal, and the damping upon them.
-fn scaled(gram: &DMatrix<f64>, damping: f64) -> DMatrix<f64> {
+/// A Gram matrix with ones on its diagonal, or a little more.
+fn scaled(gram: &DMatrix<f64>, more: f64) -> DMatrix<f64> {
     let scale: Vec<f64> = (0..gram.nrows()).map(|i| positive_root(gram[(i, i)])).collect();
     DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {
-        if i == j { 1.0 + damping } else { gram[(i, j)] / (scale[i] * scale[j]) }
+        if i == j { 1.0 + more } else { gram[(i, j)] / (scale[i] * scale[j]) }
     })
 }
 

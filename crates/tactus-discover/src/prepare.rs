@@ -1,11 +1,10 @@
-//! What a search starts from: the split, the noise, the rows, and hints of what no grid would find.
+//! What a search starts from: the split, the noise, the rows, and the lines in the spectrum.
 
-use crate::candidates::Hints;
 use crate::fit::{Fitted, Problem};
 use crate::noise::Noise;
 use crate::rows::{HeldOut, Rows, still};
 use crate::sensor::{Parameters, Sensor};
-use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum, wiring};
+use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum};
 
 /// Presses that are fitted, at least.
 const PRESSES_LEAST: usize = 3;
@@ -30,7 +29,8 @@ pub(crate) struct Prepared<'a> {
     pub(crate) rows: Rows,
     /// The base model, recalibrated on the rows.
     pub(crate) base: Fitted,
-    pub(crate) hints: Hints,
+    /// Frequencies of lines in the spectrum of what the base model leaves: tones that no grid would find.
+    pub(crate) frequencies_hz: Vec<f64>,
     pub(crate) warnings: Vec<String>,
 }
 
@@ -60,8 +60,9 @@ impl<'a> Prepared<'a> {
         let whole = Rows::of(frames, false)?;
         let mut rows = Rows::of(frames, true)?;
         rows.weigh(frames, &noise, &heldout);
-        let (mut base, hints) = hints(known, frames, &noise, &whole, &rows, options)?;
-        if !hints.frequencies_hz.is_empty() {
+        let mut base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise), options)?;
+        let frequencies_hz = lines_hz(&Sensor::new(known, frames, &whole), &base)?;
+        if !frequencies_hz.is_empty() {
             // A tone is lost in rows of several frames.
             rows = Rows::of(frames, false)?;
             rows.weigh(frames, &noise, &heldout);
@@ -79,7 +80,7 @@ impl<'a> Prepared<'a> {
             whole,
             rows,
             base,
-            hints,
+            frequencies_hz,
             warnings,
         })
     }
@@ -96,21 +97,10 @@ fn recalibrated(problem: &Problem<'_>, options: Options) -> Result<Fitted, Disco
     problem.fit_from(Parameters::declared(known, rows.paths.len()), BASE_ROUNDS, options.threads)
 }
 
-/// The recalibrated base model, and what it leaves suggests.
-fn hints(
-    known: &Known,
-    frames: &Frames,
-    noise: &Noise,
-    whole: &Rows,
-    rows: &Rows,
-    options: Options,
-) -> Result<(Fitted, Hints), DiscoverError> {
-    let problem = Problem::new(Sensor::new(known, frames, rows), noise);
-    let base = recalibrated(&problem, options)?;
-    let predicted = Sensor::new(known, frames, whole).predict(&base.parameters)?;
+/// Frequencies of lines in the spectrum of what a model leaves of every frame.
+fn lines_hz(whole: &Sensor<'_>, base: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+    let predicted = whole.predict(&base.parameters)?;
     let residual: Vec<f64> =
-        frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
-    let frequencies_hz = spectrum::lines_hz(frames, &residual);
-    let wiring = wiring::pairs(&problem, &base);
-    Ok((base, Hints { frequencies_hz, wiring }))
+        whole.frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
+    Ok(spectrum::lines_hz(whole.frames, &residual))
 }

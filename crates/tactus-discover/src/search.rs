@@ -146,7 +146,7 @@ impl Search<'_> {
     ) -> Result<Vec<Screened>, DiscoverError> {
         let candidates: Vec<&Candidate> =
             self.candidates.iter().filter(|one| among(one.definition.name)).collect();
-        let screen = |one: &&Candidate| one.screen(fitting, self.problem, &at.parameters, &at.predicted);
+        let screen = |one: &&Candidate| one.screen(fitting, self.problem, at);
         parallel::map(&candidates, self.options.threads, screen).into_iter().collect()
     }
 

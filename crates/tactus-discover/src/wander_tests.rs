@@ -1,88 +1,19 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
-use tactus_model::Phase;
 
-use crate::bench::known;
-use crate::{Base, Discovery, Frame, Frames, Known, Options, Rule, Verdict, discover, predict};
+use crate::bench::{ELEMENTS, INTERVAL_S, found, known, measured, processes};
+use crate::{Verdict, predict};
 
-const ELEMENTS: usize = 48;
-const INTERVAL_S: f64 = 0.1;
 const NOISE_COUNTS: f64 = 1.0;
 const RMS_COUNTS: f64 = 1.5;
 const TIME_S: f64 = 20.0;
-
-/// Presses on all elements in an order by no place, 3 s each, of such readings.
-fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
-    let mut frames = Frames::new(ELEMENTS);
-    for (frame, t_ns) in (0..30 * ELEMENTS).zip((0..).step_by(100_000_000)) {
-        let (press, within) = (frame / 30, frame % 30);
-        let [x, y] = known.array.centre_mm(press * 29 % ELEMENTS).unwrap();
-        let (phase, depth_mm) = match within {
-            5..10 => (Phase::Load, 0.1 * (within - 4) as f64),
-            10..20 => (Phase::Hold, 0.5),
-            20..25 => (Phase::Unload, 0.5 - 0.1 * (within - 19) as f64),
-            _ => (Phase::Idle, -2.0),
-        };
-        let depth_mm = if press % 2 == 0 { depth_mm } else { 0.7 * depth_mm };
-        #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
-        let counts: Vec<f32> = counts(frame).into_iter().map(|counts| counts as f32).collect();
-        frames.push(Frame {
-            run: "a",
-            press: if phase == Phase::Idle { -1 } else { i32::try_from(press).unwrap() },
-            phase,
-            t_ns,
-            position_mm: [x, y, -depth_mm],
-            covering_mm: 1.016,
-            indenter: "cyl1",
-            temperature_c: None,
-            counts: &counts,
-        });
-    }
-    frames
-}
-
-/// What the model gives for the presses, and upon it what else there is: frame by frame, element by element.
-fn measured(known: &Known, upon: &[Vec<f64>]) -> Frames {
-    let blank = frames(known, |_| vec![0.0; ELEMENTS]);
-    let base = Base {
-        psf: known.psf,
-        response: known.response.clone(),
-        run_baselines_counts: vec![vec![100.0; ELEMENTS]],
-        run_wander: None,
-    };
-    let clean = predict(known, &blank, &base, &[]).unwrap();
-    frames(known, |frame| {
-        let clean = &clean[frame * ELEMENTS..(frame + 1) * ELEMENTS];
-        clean.iter().zip(&upon[frame]).map(|(clean, upon)| f64::from(*clean) + upon).collect()
-    })
-}
-
-/// Of each frame, independent processes of so many members: Ornstein and Uhlenbeck's.
-fn processes(members: usize, rms_counts: f64, time_s: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
-    let kept = (-INTERVAL_S / time_s).exp();
-    let mut normal = || -> f64 { StandardNormal.sample(rng) };
-    let mut now: Vec<f64> = (0..members).map(|_| rms_counts * normal()).collect();
-    (0..30 * ELEMENTS)
-        .map(|_| {
-            for value in &mut now {
-                *value = kept * *value + rms_counts * (1.0 - kept * kept).sqrt() * normal();
-            }
-            now.clone()
-        })
-        .collect()
-}
 
 fn sum(one: &[Vec<f64>], other: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let of = |(one, other): (&Vec<f64>, &Vec<f64>)| {
         one.iter().cycle().zip(other).map(|(one, other)| one + other).collect()
     };
     one.iter().zip(other).map(of).collect()
-}
-
-fn found(known: &Known, frames: &Frames) -> Discovery {
-    discover(known, frames, Options { seed: 1, threads: 2, rule: Rule::Protocol }, &|_| {}).unwrap()
 }
 
 /// Mean square of what the best interpolation leaves of the held-out readings, their noise included: the mean of the process
@@ -114,7 +45,7 @@ fn zeros_that_wander_each_for_itself_are_followed_nearly_as_well_as_can_be() {
     let wander = processes(ELEMENTS, RMS_COUNTS, TIME_S, &mut rng);
     let noise = processes(ELEMENTS, NOISE_COUNTS, 1e-3, &mut rng);
     let upon = sum(&wander, &noise);
-    let frames = measured(&known, &upon);
+    let frames = measured(&known, &[], &upon);
     let found = found(&known, &frames);
     let names: Vec<&str> = found.steps.iter().map(|step| step.effect).collect();
     assert_eq!(names, ["baseline-drift"]);
@@ -149,7 +80,7 @@ fn a_zero_that_all_share_is_one_curve() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let wander = processes(1, RMS_COUNTS, 2.0 * TIME_S, &mut rng);
     let noise = processes(ELEMENTS, NOISE_COUNTS, 1e-3, &mut rng);
-    let found = found(&known, &measured(&known, &sum(&wander, &noise)));
+    let found = found(&known, &measured(&known, &[], &sum(&wander, &noise)));
     assert_eq!(found.steps[0].effect, "baseline-drift");
     assert_eq!(found.steps[0].terms[0][2].name, "duration_s");
 }
@@ -159,6 +90,6 @@ fn coloured_noise_is_no_wander() {
     let known = known();
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let noise = processes(ELEMENTS, NOISE_COUNTS, 0.5, &mut rng);
-    let found = found(&known, &measured(&known, &noise));
+    let found = found(&known, &measured(&known, &[], &noise));
     assert_eq!(found.verdict, Verdict::NothingMissing);
 }

@@ -104,3 +104,7 @@ impl Sums {
         if left > 1e-9 * self.signals[at(other, other)] { reading * reading / left } else { 0.0 }
     }
 }
+
+#[cfg(test)]
+#[path = "wiring_tests.rs"]
+mod tests;

@@ -1,0 +1,37 @@
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use tactus_model::Effect;
+
+use crate::Verdict;
+use crate::bench::{ELEMENTS, found, known, measured, processes};
+
+/// The paper's two faulty elements, which answer for a neighbour each, beside effects that are in the way of seeing them.
+#[test]
+fn both_of_the_papers_faulty_elements_are_found_beside_other_effects() {
+    let known = known();
+    let effect =
+        |name: &str, parameters: &[(&str, f64)]| Effect::new(name, parameters.iter().copied()).unwrap();
+    let answers = |element: f64, answers_for: f64| {
+        let shares = [("own_share", 0.0), ("other_share", 1.0)];
+        effect("miswired", &[&[("element", element), ("answers_for", answers_for)], &shares[..]].concat())
+    };
+    let hidden = [
+        answers(18.0, 19.0),
+        answers(22.0, 23.0),
+        effect(
+            "misregistration",
+            &[("offset_x_mm", 0.06), ("offset_y_mm", -0.04), ("rotation_deg", 0.2), ("scale_error", 0.0)],
+        ),
+        effect("hardening", &[("growth_at_1_mm", 0.15), ("exponent", 1.0), ("own_share", 1.0)]),
+    ];
+    let noise = processes(ELEMENTS, 2.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(1));
+    let found = found(&known, &measured(&known, &hidden, &noise));
+    let mut names: Vec<&str> = found.steps.iter().map(|step| step.effect).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["hardening", "misregistration", "miswired"]);
+    assert_eq!(found.verdict, Verdict::Explained);
+    let wires = found.steps.iter().find(|step| step.effect == "miswired").unwrap();
+    let mut elements: Vec<f64> = wires.terms.iter().map(|term| term[0].value).collect();
+    elements.sort_by(f64::total_cmp);
+    assert_eq!(elements, [18.0, 22.0]);
+}
