@@ -198,7 +198,7 @@ fn residuals_are_measured_minus_predicted_and_say_of_which_rig() {
     let mut writer = ResidualWriter::create(&path, rig, true).unwrap();
     for row in table.rows() {
         let below: Vec<f32> = row.counts.iter().map(|counts| counts - 3.0).collect();
-        writer.push(&row, &below, row.counts).unwrap();
+        writer.push(&row, row.press == 0, &below, row.counts).unwrap();
     }
     assert!(!path.exists(), "it stands there only when it is whole");
     writer.finish().unwrap();
@@ -212,6 +212,6 @@ fn residuals_are_measured_minus_predicted_and_say_of_which_rig() {
     assert_eq!(
         rows[2],
         "{run: \"a\", press: 0, phase: \"hold\", t_ns: 70000000, x_mm: 20.9, y_mm: 15.9, z_mm: -2E-1, \
-         residual_before: [3.0, 3.0, 3.0, 3.0], residual_after: [0E0, 0E0, 0E0, 0E0]}"
+         held_out: true, residual_before: [3.0, 3.0, 3.0, 3.0], residual_after: [0E0, 0E0, 0E0, 0E0]}"
     );
 }

@@ -2,7 +2,11 @@
 
 use std::{fs::File, path::PathBuf};
 
-use parquet::{data_type::FloatType, errors::ParquetError, file::writer::SerializedRowGroupWriter};
+use parquet::{
+    data_type::{BoolType, FloatType},
+    errors::ParquetError,
+    file::writer::SerializedRowGroupWriter,
+};
 use tactus_schema::{Rig, table::RIG_METADATA_KEY};
 
 use super::{
@@ -22,12 +26,14 @@ const SCHEMA: &str = "
         required double x_mm;
         required double y_mm;
         required double z_mm;
+        required boolean held_out;
         required group residual_before (LIST) { repeated group list { required float element; } }
         required group residual_after (LIST) { repeated group list { required float element; } }
     }";
 
 /// A table of residuals being written: measured minus predicted, in counts, frame by frame, of a model before and
-/// after something was added to it. The columns beside them are those of the measurement table.
+/// after something was added to it, and whether the frame was held out of the fit of both. The columns beside them are those
+/// of the measurement table.
 ///
 /// Until [`ResidualWriter::finish`] the rows stand in a file beside `path` with the ending `.part`.
 pub struct ResidualWriter {
@@ -51,8 +57,14 @@ impl ResidualWriter {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn push(&mut self, row: &RowView<'_>, before: &[f32], after: &[f32]) -> Result<(), TableError> {
-        self.group.push(row, before, after);
+    pub fn push(
+        &mut self,
+        row: &RowView<'_>,
+        held_out: bool,
+        before: &[f32],
+        after: &[f32],
+    ) -> Result<(), TableError> {
+        self.group.push(row, held_out, before, after);
         if self.group.frames.rows() >= GROUP_ROWS { self.close_group() } else { Ok(()) }
     }
 
@@ -84,6 +96,7 @@ impl std::fmt::Debug for ResidualWriter {
 #[derive(Default)]
 struct Group {
     frames: FrameColumns,
+    held_out: Vec<bool>,
     /// Of either model.
     residuals: [Vec<f32>; 2],
     /// 0 where a frame's list begins.
@@ -91,8 +104,9 @@ struct Group {
 }
 
 impl Group {
-    fn push(&mut self, row: &RowView<'_>, before: &[f32], after: &[f32]) {
+    fn push(&mut self, row: &RowView<'_>, held_out: bool, before: &[f32], after: &[f32]) {
         self.frames.push(row);
+        self.held_out.push(held_out);
         for (column, predicted) in self.residuals.iter_mut().zip([before, after]) {
             column.extend(row.counts.iter().zip(predicted).map(|(measured, predicted)| measured - predicted));
         }
@@ -101,6 +115,7 @@ impl Group {
 
     fn write(&self, writer: &mut SerializedRowGroupWriter<'_, File>) -> Result<(), ParquetError> {
         self.frames.write(writer)?;
+        column::<BoolType>(writer, &self.held_out, None, None)?;
         let defined = vec![1; self.repeated.len()];
         for residuals in &self.residuals {
             column::<FloatType>(writer, residuals, Some(&defined), Some(&self.repeated))?;

@@ -14,13 +14,14 @@ pub(super) fn write(discovered: &Discovered, path: &Path) -> anyhow::Result<()> 
     let before = predict(known, &measured.frames, &discovery.recalibrated, &known.effects)?;
     let after = predict(known, &measured.frames, &discovery.grown, &discovery.effects)?;
     let elements = measured.rig.array.elements();
-    let mut predicted = before.chunks_exact(elements).zip(after.chunks_exact(elements));
+    let predicted = before.chunks_exact(elements).zip(after.chunks_exact(elements));
+    let mut predicted = discovery.heldout_frames.iter().zip(predicted);
     let mut table = ResidualWriter::create(path, &measured.rig, measured.simulated)?;
     let (mut rows, mut written) = (0, Ok(()));
     rows::visit(&measured.files, |_, row| {
         rows += 1;
-        if let (Ok(()), Some((before, after))) = (&written, predicted.next()) {
-            written = table.push(&row, before, after);
+        if let (Ok(()), Some((held_out, (before, after)))) = (&written, predicted.next()) {
+            written = table.push(&row, *held_out, before, after);
         }
     })?;
     written?;
