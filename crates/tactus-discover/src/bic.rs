@@ -29,7 +29,7 @@ impl Search<'_> {
             tried.round.taken = best.as_ref().map(|(name, _)| *name);
             grown.rounds.push(tried);
             let Some((_, best)) = best else { break };
-            grown.at = self.problem.fit_from(best.parameters, POLISH_ROUNDS, self.options.threads)?;
+            grown.at = self.problem.fit_from(best.parameters, POLISH_ROUNDS)?;
         }
         Ok(grown)
     }

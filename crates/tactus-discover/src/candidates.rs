@@ -95,6 +95,15 @@ impl Candidate {
         Ok(Self { definition, amplitudes, shapes })
     }
 
+    /// Derivatives that a screening takes, about.
+    pub(crate) fn columns(&self) -> usize {
+        let shapes = match &self.shapes {
+            Shapes::Grid(terms) => terms.len(),
+            Shapes::Wiring => wiring::PAIRS_MAX,
+        };
+        shapes * self.amplitudes.len()
+    }
+
     /// Terms from which fits of this effect on top of a model start, but for its amplitudes.
     fn shapes(&self, problem: &Problem<'_>, at: &Fitted) -> Cow<'_, [Term]> {
         match &self.shapes {

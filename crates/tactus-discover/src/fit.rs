@@ -15,12 +15,13 @@
 use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::Kind;
 
+use crate::DiscoverError;
 use crate::contacts::Contacts;
 use crate::linear::Linear;
 use crate::noise::Noise;
+use crate::parallel::Threads;
 use crate::scale::Scale;
 use crate::sensor::{Parameters, Sensor, Term};
-use crate::{DiscoverError, parallel};
 
 /// A fit ends when a step promises to lessen the cost by less than this.
 const COST_LEAST: f64 = 0.05;
@@ -60,6 +61,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) spread_free: bool,
     /// Duration of the longest run.
     pub(crate) duration_s: f64,
+    pub(crate) threads: &'a Threads,
 }
 
 /// A model that was fitted.
@@ -84,7 +86,7 @@ pub(crate) enum Free {
 
 impl<'a> Problem<'a> {
     /// A fit of the rows that are not held out.
-    pub(crate) fn new(sensor: Sensor<'a>, noise: &Noise) -> Self {
+    pub(crate) fn new(sensor: Sensor<'a>, noise: &Noise, threads: &'a Threads) -> Self {
         let (rows, frames) = (sensor.rows, sensor.frames);
         let weigh = |(weight, heldout): (&f64, &bool)| if *heldout { 0.0 } else { *weight };
         let train: Vec<f64> = rows.weight.iter().zip(&rows.heldout).map(weigh).collect();
@@ -110,6 +112,7 @@ impl<'a> Problem<'a> {
             spread_free: Contacts::of(frames).distinct_places() > 1,
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
             sensor,
+            threads,
         }
     }
 
@@ -212,36 +215,30 @@ impl<'a> Problem<'a> {
     }
 
     /// Derivatives of every reading by each free parameter.
-    pub(crate) fn columns(
-        &self,
-        at: &Parameters,
-        predicted: &[f64],
-        threads: usize,
-    ) -> Result<Vec<Vec<f64>>, DiscoverError> {
+    pub(crate) fn columns(&self, at: &Parameters, predicted: &[f64]) -> Result<Vec<Vec<f64>>, DiscoverError> {
         let free = self.free(at);
-        parallel::map(&free, threads, |one| self.slope(at, predicted, *one)).into_iter().collect()
+        self.threads.map(&free, |one| self.slope(at, predicted, *one)).into_iter().collect()
     }
 
     /// The best parameters near a start, in at most so many rounds. Derivatives by the parameters of effects that have
     /// many, such as the knots of a curve, are taken once: the counts are nearly linear in them.
-    pub(crate) fn fit_from(
-        &self,
-        start: Parameters,
-        rounds: usize,
-        threads: usize,
-    ) -> Result<Fitted, DiscoverError> {
+    pub(crate) fn fit_from(&self, start: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
         let free = self.free(&start);
         let mut at = self.wandering(start)?;
         let mut predicted = self.predict(&at)?;
-        if let Some((better, of_better)) = self.taken_up(&at, &predicted)? {
+        let mut linear = self.linear(&at, &predicted)?;
+        if let Some((better, of_better)) = self.taken_up(&linear, &at, &predicted)? {
+            linear = self.linear(&better, &of_better)?;
             (at, predicted) = (better, of_better);
         }
         let mut cost = self.cost(&predicted);
         let mut damping = 1e-3;
         let mut kept: Vec<Option<Vec<f64>>> = vec![None; free.len()];
         let mut covariance = None;
-        for _ in 0..rounds {
-            let linear = self.linear(&at, &predicted)?;
+        for round in 0..rounds {
+            if round > 0 {
+                linear = self.linear(&at, &predicted)?;
+            }
             let mut residual = self.standing(&at, &predicted);
             let raw = residual.clone();
             linear.project(&mut residual);
@@ -251,7 +248,7 @@ impl<'a> Problem<'a> {
                 None => self.slope(&at, &predicted, free[*place]),
             };
             let columns: Vec<Vec<f64>> =
-                parallel::map(&places, threads, column).into_iter().collect::<Result<_, DiscoverError>>()?;
+                self.threads.map(&places, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             for ((kept, column), one) in kept.iter_mut().zip(&columns).zip(&free) {
                 if matches!(one, Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY) {
                     kept.get_or_insert_with(|| column.clone());
@@ -305,10 +302,10 @@ impl<'a> Problem<'a> {
     /// whose effects are not neutral has the gains of a model without them.
     fn taken_up(
         &self,
+        linear: &Linear<'_>,
         at: &Parameters,
         predicted: &[f64],
     ) -> Result<Option<(Parameters, Vec<f64>)>, DiscoverError> {
-        let linear = self.linear(at, predicted)?;
         let raw = self.standing(at, predicted);
         let mut residual = raw.clone();
         linear.project(&mut residual);

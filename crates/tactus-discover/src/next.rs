@@ -22,10 +22,11 @@ use tactus_model::effect::{Definition, Kind};
 use crate::discovery::{NextExperiment, NotShown};
 use crate::fit::{Free, Problem};
 use crate::noise::Noise;
+use crate::parallel::Threads;
 use crate::rows::{HeldOut, Rows};
 use crate::score::Fitting;
 use crate::sensor::{Parameters, Sensor, Term};
-use crate::{DiscoverError, Frames, Known, parallel};
+use crate::{DiscoverError, Frames, Known};
 use design::{Bench, Design};
 
 /// A model that may be what the data show.
@@ -69,7 +70,7 @@ pub(crate) struct Setting<'a> {
     /// The data: no design goes deeper, or loads faster, than they did.
     pub(crate) frames: &'a Frames,
     pub(crate) noise: &'a Noise,
-    pub(crate) threads: usize,
+    pub(crate) threads: &'a Threads,
 }
 
 impl Setting<'_> {
@@ -128,7 +129,7 @@ impl Setting<'_> {
         expect: impl Fn(&Design) -> Result<Expected, DiscoverError> + Sync,
     ) -> Result<Vec<NextExperiment>, DiscoverError> {
         let mut found: Vec<(&Design, Expected)> = Vec::new();
-        let expected = parallel::map(designs, self.threads, |design| expect(design));
+        let expected = self.threads.map(designs, |design| expect(design));
         for (design, expected) in designs.iter().zip(expected) {
             found.push((design, expected?));
         }
@@ -161,7 +162,7 @@ impl Setting<'_> {
             let predicted = [problem.predict(&one)?, problem.predict(&other)?, problem.predict(&without)?];
             let wrong = |at: &Parameters, predicted: &[f64], right: &[f64]| {
                 let mut difference: Vec<f64> = right.iter().zip(predicted).map(|(a, b)| a - b).collect();
-                let fitting = Fitting::at(problem, at, predicted, 1)?;
+                let fitting = Fitting::at(problem, at, predicted)?;
                 fitting.free(&mut difference);
                 Ok::<f64, DiscoverError>(fitting.size(&difference))
             };
@@ -182,7 +183,7 @@ impl Setting<'_> {
         self.on(design, |problem| {
             let at = once(at);
             let predicted = problem.predict(&at)?;
-            let fitting = Fitting::at(problem, &at, &predicted, 1)?;
+            let fitting = Fitting::at(problem, &at, &predicted)?;
             let signal = largest(&predicted, &at.baseline[0]);
             let mut with = at.clone();
             with.terms.push(Term::neutral(definition));
@@ -214,7 +215,7 @@ impl Setting<'_> {
         let mut rows = Rows::of(frames, true)?;
         let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
         rows.weigh(frames, self.noise, &all);
-        work(&Problem::new(Sensor::new(self.known, frames, &rows), self.noise))
+        work(&Problem::new(Sensor::new(self.known, frames, &rows), self.noise, self.threads))
     }
 }
 

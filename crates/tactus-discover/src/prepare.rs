@@ -2,6 +2,7 @@
 
 use crate::fit::{Fitted, Problem};
 use crate::noise::Noise;
+use crate::parallel::Threads;
 use crate::rows::{HeldOut, Rows, still};
 use crate::sensor::{Parameters, Sensor};
 use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum};
@@ -32,6 +33,7 @@ pub(crate) struct Prepared<'a> {
     /// Frequencies of lines in the spectrum of what the base model leaves: tones that no grid would find.
     pub(crate) frequencies_hz: Vec<f64>,
     pub(crate) warnings: Vec<String>,
+    pub(crate) threads: Threads,
 }
 
 impl<'a> Prepared<'a> {
@@ -57,16 +59,17 @@ impl<'a> Prepared<'a> {
         let replicates = replicated.is_some();
         let noise = replicated.unwrap_or_else(|| Noise::of_differences(frames, step_counts));
 
+        let threads = Threads::new(options.threads);
         let whole = Rows::of(frames, false)?;
         let mut rows = Rows::of(frames, true)?;
         rows.weigh(frames, &noise, &heldout);
-        let mut base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise), options)?;
+        let mut base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise, &threads))?;
         let frequencies_hz = lines_hz(&Sensor::new(known, frames, &whole), &base)?;
         if !frequencies_hz.is_empty() {
             // A tone is lost in rows of several frames.
             rows = Rows::of(frames, false)?;
             rows.weigh(frames, &noise, &heldout);
-            base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise), options)?;
+            base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise, &threads))?;
         }
         Ok(Self {
             known,
@@ -82,19 +85,20 @@ impl<'a> Prepared<'a> {
             base,
             frequencies_hz,
             warnings,
+            threads,
         })
     }
 
     /// The fit of its rows.
     pub(crate) fn problem(&self) -> Problem<'_> {
-        Problem::new(Sensor::new(self.known, self.frames, &self.rows), &self.noise)
+        Problem::new(Sensor::new(self.known, self.frames, &self.rows), &self.noise, &self.threads)
     }
 }
 
 /// The base model, recalibrated.
-fn recalibrated(problem: &Problem<'_>, options: Options) -> Result<Fitted, DiscoverError> {
+fn recalibrated(problem: &Problem<'_>) -> Result<Fitted, DiscoverError> {
     let Sensor { known, rows, .. } = problem.sensor;
-    problem.fit_from(Parameters::declared(known, rows.paths.len()), BASE_ROUNDS, options.threads)
+    problem.fit_from(Parameters::declared(known, rows.paths.len()), BASE_ROUNDS)
 }
 
 /// Frequencies of lines in the spectrum of what a model leaves of every frame.

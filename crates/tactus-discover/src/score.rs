@@ -29,6 +29,7 @@ use crate::chance::Chance;
 use crate::fit::{Problem, dot};
 use crate::linear::Linear;
 use crate::noise::median;
+use crate::parallel::Threads;
 use crate::sensor::Parameters;
 
 /// Median of the squared standard normal distribution.
@@ -73,10 +74,9 @@ impl<'a> Fitting<'a> {
         problem: &'a Problem<'a>,
         parameters: &Parameters,
         predicted: &[f64],
-        threads: usize,
     ) -> Result<Self, DiscoverError> {
         let linear = problem.linear(parameters, predicted)?;
-        let columns = problem.columns(parameters, predicted, threads)?;
+        let columns = problem.columns(parameters, predicted)?;
         let mut residual = problem.standing(parameters, predicted);
         linear.project(&mut residual);
         let weights: Vec<f64> = problem.weights().collect();
@@ -205,6 +205,16 @@ impl<'a> Fitting<'a> {
 }
 
 impl Score {
+    /// Its value if blocks had such signs.
+    fn flipped(&self, signs: &[f32]) -> f64 {
+        let square = |parts: &Vec<f32>| {
+            let sum: f32 = parts.iter().zip(signs).map(|(part, sign)| part * sign).sum();
+            f64::from(sum * sum)
+        };
+        let ChiSquare { times, freedom } = self.chi_square;
+        deviate(self.parts.iter().map(square).sum::<f64>() / times, freedom)
+    }
+
     /// Of a sum of products of pairs of blocks, which is positive whatever their signs. Flips leave the products of a block
     /// with itself; those of two blocks scatter it (F. E. Satterthwaite, *Biometrics Bull.* 2 (1946) 110).
     pub(crate) fn of_products(products: &DMatrix<f64>, blocks: &[usize], all_blocks: usize) -> Self {
@@ -259,32 +269,25 @@ fn deviate(chi_square: f64, freedom: f64) -> f64 {
 }
 
 /// The largest of the scores in each of many data sets whose blocks had their signs flipped, for each group.
-pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
+pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64, threads: &Threads) -> Vec<Vec<f64>> {
     let blocks =
         groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
     let mut chance = Chance::new(seed);
-    let mut largest = vec![Vec::with_capacity(flips); groups.len()];
-    let mut signs = vec![1.0_f32; blocks];
-    for _ in 0..flips {
-        for chunk in signs.chunks_mut(64) {
-            let bits = chance.bits();
-            for (place, sign) in chunk.iter_mut().enumerate() {
-                *sign = if bits >> place & 1 == 1 { 1.0 } else { -1.0 };
-            }
-        }
-        for (largest, group) in largest.iter_mut().zip(groups) {
-            let of_group = group.iter().map(|score| {
-                let square = |parts: &Vec<f32>| {
-                    let sum: f32 = parts.iter().zip(&signs).map(|(part, sign)| part * sign).sum();
-                    f64::from(sum * sum)
-                };
-                let ChiSquare { times, freedom } = score.chi_square;
-                deviate(score.parts.iter().map(square).sum::<f64>() / times, freedom)
-            });
-            largest.push(of_group.fold(0.0, f64::max));
+    let mut signs = vec![1.0_f32; flips * blocks];
+    for chunk in signs.chunks_mut(blocks.max(1)).flat_map(|flip| flip.chunks_mut(64)) {
+        let bits = chance.bits();
+        for (place, sign) in chunk.iter_mut().enumerate() {
+            *sign = if bits >> place & 1 == 1 { 1.0 } else { -1.0 };
         }
     }
-    largest
+    let largest = |group: &Vec<&Score>| -> Vec<f64> {
+        let of_flip = |flip: usize| {
+            let signs = &signs[flip * blocks..(flip + 1) * blocks];
+            group.iter().map(|score| score.flipped(signs)).fold(0.0, f64::max)
+        };
+        (0..flips).map(of_flip).collect()
+    };
+    threads.map(groups, largest)
 }
 
 /// The largest of all groups in each flipped data set.

@@ -13,7 +13,6 @@ use tactus_model::effect::{Definition, Kind};
 use crate::candidates::{Candidate, Screened, with};
 use crate::discovery;
 use crate::fit::{Fitted, Problem};
-use crate::parallel;
 use crate::score::{Fitting, Score, flipped, largest, p_value};
 use crate::sensor::{Parameters, Term};
 use crate::wander::WANDER;
@@ -147,7 +146,7 @@ impl Search<'_> {
         let candidates: Vec<&Candidate> =
             self.candidates.iter().filter(|one| among(one.definition.name)).collect();
         let screen = |one: &&Candidate| one.screen(fitting, self.problem, at);
-        parallel::map(&candidates, self.options.threads, screen).into_iter().collect()
+        self.problem.threads.map_longest_first(&candidates, |one| one.columns(), screen).into_iter().collect()
     }
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
@@ -165,8 +164,7 @@ impl Search<'_> {
             match self.exchange(&grown.at, exchanges_left > 0)? {
                 Exchanged::Better(better) => {
                     exchanges_left -= 1;
-                    grown.at =
-                        self.problem.fit_from(better.parameters, POLISH_ROUNDS, self.options.threads)?;
+                    grown.at = self.problem.fit_from(better.parameters, POLISH_ROUNDS)?;
                 }
                 Exchanged::Settled(equivalent) => {
                     grown.equivalent = equivalent;
@@ -189,7 +187,7 @@ impl Search<'_> {
             (self.progress)(&format!("round {}: adding {taken}", grown.rounds.len() + 1));
             tried.round.taken = Some(taken);
             grown.rounds.push(tried);
-            let fitted = self.problem.fit_from(fitted.parameters, POLISH_ROUNDS, self.options.threads)?;
+            let fitted = self.problem.fit_from(fitted.parameters, POLISH_ROUNDS)?;
             if fitted.parameters.terms.last().is_some_and(|term| !is_exact(term.definition)) {
                 grown.gained += grown.at.cost - fitted.cost;
             }
@@ -203,7 +201,8 @@ impl Search<'_> {
         let fitting = self.fitting(at)?;
         let screened = self.screen(&fitting, at)?;
         let groups: Vec<Vec<&Score>> = screened.iter().map(|one| one.scores.iter().collect()).collect();
-        let under_none = flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1));
+        let under_none =
+            flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1), self.problem.threads);
         let largest = largest(&under_none);
         let statistic = |one: &Screened| one.scores.iter().map(|score| score.z).fold(0.0, f64::max);
         let mut tried: Vec<discovery::Candidate> = screened
@@ -260,9 +259,12 @@ impl Search<'_> {
         let fit = |start: &Term| {
             (self.progress)(&format!("fitting {}", start.definition.name));
             let started = with(&at.parameters, start.clone());
-            Ok((start.definition.name, self.problem.fit_from(started, FIRST_ROUNDS, 1)?))
+            Ok((start.definition.name, self.problem.fit_from(started, FIRST_ROUNDS)?))
         };
-        let mut fits: Vec<(&'static str, Fitted)> = parallel::map(starts, self.options.threads, fit)
+        let mut fits: Vec<(&'static str, Fitted)> = self
+            .problem
+            .threads
+            .map_longest_first(starts, |one| one.values.len(), fit)
             .into_iter()
             .collect::<Result<_, DiscoverError>>()?;
         fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
@@ -270,14 +272,14 @@ impl Search<'_> {
         fits.retain(|(_, fitted)| at.cost - fitted.cost > gain_least.max(BEHIND_SHARE * best));
         fits.truncate(FINISHED_MAX);
         let finish = |(name, fitted): &(&'static str, Fitted)| {
-            Ok((*name, self.problem.fit_from(fitted.parameters.clone(), TRIAL_ROUNDS, 1)?))
+            Ok((*name, self.problem.fit_from(fitted.parameters.clone(), TRIAL_ROUNDS)?))
         };
-        parallel::map(&fits, self.options.threads, finish).into_iter().collect()
+        self.problem.threads.map(&fits, finish).into_iter().collect()
     }
 
     /// The model's tangent space and residual.
     pub(crate) fn fitting(&self, at: &Fitted) -> Result<Fitting<'_>, DiscoverError> {
-        Fitting::at(self.problem, &at.parameters, &at.predicted, self.options.threads)
+        Fitting::at(self.problem, &at.parameters, &at.predicted)
     }
 
     fn take(&self, at: &Fitted, tried: &Tried, gained: f64) -> Option<(&'static str, Fitted)> {
@@ -306,17 +308,17 @@ impl Search<'_> {
         let alone = if alone.terms.len() == self.known_terms {
             base.clone()
         } else {
-            self.problem.fit_from(alone, POLISH_ROUNDS, self.options.threads)?
+            self.problem.fit_from(alone, POLISH_ROUNDS)?
         };
         let mut best: Option<Fitted> = None;
         let starts = self.starts(&alone, |_| true, RIVALS_MAX)?;
         let least = RIVAL_FITTED_SHARE * (alone.cost - at.cost);
         for (name, once) in self.fits(&alone, &starts, least)? {
-            let once = self.problem.fit_from(once.parameters, POLISH_ROUNDS, self.options.threads)?;
+            let once = self.problem.fit_from(once.parameters, POLISH_ROUNDS)?;
             let again = self.starts(&once, |other| other == name, 1)?.into_iter().next();
             let twice = again.map(|start| {
                 let started = with(&once.parameters, start);
-                self.problem.fit_from(started, POLISH_ROUNDS, self.options.threads)
+                self.problem.fit_from(started, POLISH_ROUNDS)
             });
             for one in twice.transpose()?.into_iter().chain([once]) {
                 if best.as_ref().is_none_or(|best| charged(&one) < charged(best)) {
@@ -354,7 +356,7 @@ impl Search<'_> {
         // Nothing answers for a neighbour as a crossed wire does.
         for name in names.iter().filter(|name| !exact.contains(name)) {
             let less = without(&at.parameters, name, self.known_terms);
-            let less = self.problem.fit_from(less, TRIAL_ROUNDS, self.options.threads)?;
+            let less = self.problem.fit_from(less, TRIAL_ROUNDS)?;
             let fitting = self.fitting(&less)?;
             let mut rivals = self.screen(&fitting, &less)?;
             rivals.retain(|one| !names.contains(&one.definition.name) && one.promise > PENALTY);
@@ -427,10 +429,10 @@ impl Search<'_> {
             }
             let without = |name: &&'static str| {
                 (self.progress)(&format!("without {name}"));
-                self.problem.fit_from(without(&at.parameters, name, self.known_terms), TRIAL_ROUNDS, 1)
+                self.problem.fit_from(without(&at.parameters, name, self.known_terms), TRIAL_ROUNDS)
             };
             let fits: Vec<Fitted> =
-                parallel::map(&names, self.options.threads, without).into_iter().collect::<Result<_, _>>()?;
+                self.problem.threads.map(&names, without).into_iter().collect::<Result<_, _>>()?;
             let gap = self.problem.heldout_gap(&at.predicted);
             let worth = |less: &Fitted| {
                 let [gain, error] = self.problem.heldout_gain(less, &at);
@@ -450,7 +452,7 @@ impl Search<'_> {
                 return Ok(at);
             }
             let Some(simpler) = fits.into_iter().nth(least) else { return Ok(at) };
-            at = self.problem.fit_from(simpler.parameters, POLISH_ROUNDS, self.options.threads)?;
+            at = self.problem.fit_from(simpler.parameters, POLISH_ROUNDS)?;
         }
     }
 }

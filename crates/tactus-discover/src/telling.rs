@@ -105,7 +105,7 @@ pub(crate) fn tell(
             gain: without.cost - grown.cost,
         }));
     }
-    let setting = Setting { known, frames, noise: &prepared.noise, threads: options.threads };
+    let setting = Setting { known, frames, noise: &prepared.noise, threads: &prepared.threads };
     let mut next_experiments = setting.propose(&pairs)?;
     next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
 
@@ -243,7 +243,7 @@ impl Search<'_> {
         let mut steps = Vec::new();
         for name in names {
             let less = without(&grown.parameters, name, self.known_terms);
-            let before = self.problem.fit_from(less, POLISH_ROUNDS, self.options.threads)?;
+            let before = self.problem.fit_from(less, POLISH_ROUNDS)?;
             let gains = self.problem.heldout_gains(&before.predicted, &grown.predicted);
             let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(self.known_terms);
             let estimated = |(term, errors): (&Term, &Vec<f64>)| {

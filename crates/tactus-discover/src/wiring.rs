@@ -8,7 +8,7 @@ const GAIN_LEAST: f64 = 30.0;
 /// And by so many times what is typical of the elements.
 const STANDS_OUT: f64 = 6.0;
 /// So many pairs at most.
-const PAIRS_MAX: usize = 4;
+pub(crate) const PAIRS_MAX: usize = 4;
 /// An element that answers with less than this share of the typical gain may be dead.
 const DEAD_SHARE: f64 = 0.3;
 
