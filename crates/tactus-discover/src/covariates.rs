@@ -13,6 +13,9 @@ const LOOK_MM: f64 = 0.3;
 /// A sideways move shorter than this has no direction.
 const ASIDE_MM: f64 = 0.05;
 
+/// Presses whose places in their elements differ by no more than this were all meant for one place there.
+const CENTRED_MM: f64 = 0.02;
+
 /// What a dependence multiplies: a value for each reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
@@ -227,7 +230,11 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
         let values: Vec<f64> = place.iter().map(|place| place[axis]).collect();
         add(on_sensor, "mm", &values, &deep, 4, &[Signal, along[axis], along[1 - axis]]);
         let within: Vec<f64> = values.iter().map(|value| value - nearest(centres, *value)).collect();
-        add(in_element, "mm", &within, &deep, 4, &[Signal, along[axis]]);
+        let of_deep = || within.iter().zip(&deep).filter(|(_, deep)| **deep).map(|(within, _)| *within);
+        let spread_mm = of_deep().fold(f64::NEG_INFINITY, f64::max) - of_deep().fold(f64::INFINITY, f64::min);
+        if spread_mm > CENTRED_MM {
+            add(in_element, "mm", &within, &deep, 4, &[Signal, along[axis]]);
+        }
     }
     if history.temperature_c.iter().all(|c| c.is_finite()) {
         add("temperature", "C", &history.temperature_c, &every, 4, &[Offset, Signal]);
