@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use super::speed_setting;
+
 /// Largest position that is sent, either way: what fits in the controller's 32 bits.
 const POSITION_MAX_MICROSTEPS: f64 = 2_147_483_647.0;
 
@@ -15,6 +17,9 @@ pub struct Config {
     /// Acceleration along the path, more than 0, of which each axis is set to its part; `None` leaves the
     /// axes' own.
     pub accel_mm_per_s2: Option<f64>,
+    /// `maxspeed` of each axis while it is homed, more than 0, as the last move may have left a much lower one;
+    /// `None` leaves that. The axes limit their speed near the sensor by themselves.
+    pub homing_speed_mm_per_s: Option<f64>,
     /// Commands carry checksums, and the devices are set to answer with them (`comm.checksum`); a message
     /// without one is then dropped.
     pub checksums: bool,
@@ -112,6 +117,9 @@ impl Config {
         if let Some(accel_mm_per_s2) = self.accel_mm_per_s2 {
             positive("accel_mm_per_s2", accel_mm_per_s2)?;
         }
+        if let Some(speed_mm_per_s) = self.homing_speed_mm_per_s {
+            positive("homing_speed_mm_per_s", speed_mm_per_s)?;
+        }
         let mut seen: Vec<(AxisName, Axis)> = Vec::new();
         for (name, axis) in self.named_axes() {
             axis.check(name)?;
@@ -146,6 +154,11 @@ impl Axis {
         let from_origin = self.direction.sign() * position_mm * 1000.0 / self.um_per_microstep;
         let microsteps = (from_origin + f64::from(self.origin_microsteps)).round();
         (microsteps.abs() <= POSITION_MAX_MICROSTEPS).then_some(microsteps as i64)
+    }
+
+    /// The `maxspeed` of the controller for a speed; `None` if it is not more than 0 or too fast to be told.
+    pub fn speed_setting(&self, speed_mm_per_s: f64) -> Option<i64> {
+        speed_setting(speed_mm_per_s * 1000.0 / self.um_per_microstep)
     }
 
     fn check(&self, name: AxisName) -> Result<(), ConfigError> {

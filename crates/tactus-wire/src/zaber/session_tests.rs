@@ -39,6 +39,7 @@ fn config() -> Config {
         axes: [Some(axis(1, 1)), Some(axis(1, 2)), Some(z)],
         tolerance_mm: 0.002,
         accel_mm_per_s2: None,
+        homing_speed_mm_per_s: None,
         checksums: false,
         trusts_reference: false,
     }

@@ -41,7 +41,9 @@ impl Session {
 
     fn judge(&mut self, now: Duration) {
         self.report();
-        let (moves, position_mm) = (self.moves(), self.position_mm());
+        // The list of warnings, if it is needed, is asked for in the next round.
+        let moves = self.axes.iter().any(|state| state.busy || state.needs_list);
+        let position_mm = self.position_mm();
         let Phase::Moving(travel) = &mut self.phase else { return };
         if moves {
             travel.elsewhere = None;
@@ -123,6 +125,11 @@ impl Session {
     /// Sends the axes in some slots home.
     pub(super) fn home_group(&mut self, slots: Vec<usize>) {
         self.begin_batch();
+        let homing_speed = self.config.homing_speed_mm_per_s;
+        for slot in &slots {
+            let speed = self.axes.get(*slot).and_then(|state| state.axis.speed_setting(homing_speed?));
+            self.queue.extend(speed.map(|speed| Question { slot: *slot, ask: Ask::Speed(speed) }));
+        }
         self.queue.extend(slots.iter().map(|slot| Question { slot: *slot, ask: Ask::Home }));
         if let Phase::Homing { group, .. } = &mut self.phase {
             *group = slots;

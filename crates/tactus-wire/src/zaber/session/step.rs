@@ -10,6 +10,10 @@ use crate::zaber::Command;
 /// Between rounds of questions while the stage stands.
 const POLL_IDLE: Duration = Duration::from_millis(100);
 
+/// Between rounds at least, while the stage moves: as fast as replies come, which take longer, but not in no time
+/// where they take none.
+const POLL_MOVING: Duration = Duration::from_millis(10);
+
 /// For how long a stop is sent again to a device that does not confirm it.
 const STOP_SILENCE_MAX: Duration = Duration::from_secs(2);
 
@@ -157,12 +161,13 @@ impl Session {
         if self.pending.is_some() || !self.queue.is_empty() {
             return None;
         }
-        let waits = match &self.phase {
+        let interval = match &self.phase {
             Phase::Greeting | Phase::Clearing | Phase::Over => return None,
-            Phase::Ready => !self.moves() && !self.at_once,
-            Phase::Moving(_) | Phase::Homing { .. } | Phase::Stopping(_) => false,
+            _ if self.at_once => Duration::ZERO,
+            Phase::Ready if !self.moves() => POLL_IDLE,
+            Phase::Ready | Phase::Moving(_) | Phase::Homing { .. } | Phase::Stopping(_) => POLL_MOVING,
         };
-        Some(self.round_began.filter(|_| waits).map_or(Duration::ZERO, |began| began + POLL_IDLE))
+        Some(self.round_began.map_or(Duration::ZERO, |began| began + interval))
     }
 
     fn begin_round(&mut self, now: Duration) {

@@ -1,6 +1,6 @@
 //! Faults, homing, restarts and silence.
 
-use super::{Failure, Play, Status, config};
+use super::{Config, Failure, Play, Status, config};
 use crate::zaber::{Alarm, AxisName, Flag};
 
 const STALLED_Z: Alarm = Alarm { name: AxisName::Z, flag: Flag::STALLED };
@@ -17,6 +17,22 @@ fn z_is_homed_first_and_the_others_together() {
     play.run(5000);
     assert_eq!(play.commands(), ["/2 1 home", "/1 1 home", "/1 2 home"]);
     assert_eq!(play.result(), Ok([0.0, 0.0, 20.0]));
+}
+
+#[test]
+fn homing_has_a_speed_of_its_own_if_that_is_asked_for() {
+    let mut play = Play::homed_with(Config { homing_speed_mm_per_s: Some(10.0), ..config() });
+    // The slowest move that can be told, and not waited for.
+    play.move_to([0.001, 0.0, 20.0], 0.001);
+    play.run(3000);
+    assert!(play.result().is_ok());
+    play.log.clear();
+    play.home();
+    play.run(100);
+    assert!(play.result().is_ok());
+    let speeds = ["/1 1 set maxspeed 32768", "/1 2 set maxspeed 32768"];
+    assert_eq!(play.commands()[..2], ["/2 1 set maxspeed 32768", "/2 1 home"]);
+    assert_eq!(play.commands()[2..], [speeds[0], speeds[1], "/1 1 home", "/1 2 home"]);
 }
 
 #[test]
@@ -150,6 +166,30 @@ fn a_restart_at_a_stand_does_too() {
     play.run(200);
     assert_eq!(play.count("= reference lost of x"), 1);
     assert_eq!(play.status(), Status::Unhomed);
+}
+
+#[test]
+fn a_lost_reference_that_hides_behind_another_warning_is_found_in_motion() {
+    let mut play = Play::homed();
+    play.move_to([3.0, 0.0, 16.0], 1.0);
+    play.run(500);
+    play.stage.axes[2].warnings = vec![Flag::parse("WV").unwrap(), Flag::NO_REFERENCE];
+    play.run(60);
+    assert_eq!(play.count("= reference lost of z"), 1);
+    assert_eq!(play.result(), Err(Failure::Unhomed));
+}
+
+#[test]
+fn a_caution_alone_stops_nothing() {
+    let mut play = Play::homed();
+    play.stage.axes[2].warnings = vec![Flag::parse("WV").unwrap()];
+    play.move_to([0.0, 0.0, 19.0], 5.0);
+    play.run(1000);
+    assert_eq!(play.result(), Ok([0.0, 0.0, 19.0]));
+    assert_eq!(play.status(), Status::Idle);
+    play.home();
+    play.run(2000);
+    assert!(play.result().is_ok());
 }
 
 #[test]
