@@ -18,13 +18,15 @@
 //! - A move that is answered `OK BUSY` is under way and no more; it has ended when a later reply says `IDLE`.
 //!   An axis that starts without knowing where it is shows `WR` until it is homed.
 //!
+//! The words of the flags and rejections are ours. Nothing here has met a real device yet.
+//!
 //! # Why not `zproto`
 //! The `zproto` crate (0.4) is well kept and knows the protocol, but the parts that parse do not stand alone:
-//! the crate depends on `serialport` whatever features are chosen, which would be a second serial stack with
-//! a C library beside `tokio-serial`; its public packet parser reads one line from a borrowed buffer, while
-//! putting a message in parts together, matching ids and checking warnings live in a port type that blocks on
-//! reading; and it has nothing for the device's side, which a virtual stage needs. What remains for us would
-//! be a page of parsing, which is here.
+//! it depends on `serialport` whatever features are chosen, which would be a second serial stack, with
+//! libudev below it, beside `tokio-serial`; its packet parser takes one packet at a time, while cutting a
+//! stream, putting a message in parts together and matching ids live in a port type that blocks on reading;
+//! and it writes no replies, which a virtual stage needs. What remains for us would be a page of parsing,
+//! which is here.
 //!
 //! [`Decoder`] and [`Message`] read what devices say, [`Command`] is what a host says, [`Flag`] and
 //! [`Rejection`] are in words, [`Session`] is the host's side of the conversation. [`CommandDecoder`] and

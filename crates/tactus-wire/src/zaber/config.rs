@@ -17,8 +17,8 @@ pub struct Config {
     /// Acceleration along the path, more than 0, of which each axis is set to its part; `None` leaves the
     /// axes' own.
     pub accel_mm_per_s2: Option<f64>,
-    /// `maxspeed` of each axis while it is homed, more than 0, as the last move may have left a much lower one;
-    /// `None` leaves that. The axes limit their speed near the sensor by themselves.
+    /// `maxspeed` of each axis while it is homed, more than 0, as the last move may have left a much lower
+    /// one; `None` leaves that. The axes limit their speed near the sensor by themselves.
     pub homing_speed_mm_per_s: Option<f64>,
     /// Commands carry checksums, and the devices are set to answer with them (`comm.checksum`); a message
     /// without one is then dropped.

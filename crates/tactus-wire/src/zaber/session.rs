@@ -113,7 +113,8 @@ impl Session {
         self.ignored + self.decoder.dropped()
     }
 
-    /// Begins the conversation: asks each device and axis what it is and where it stands. Nothing is moved.
+    /// Begins the conversation: asks each device and axis what it is and where it stands. Nothing is
+    /// moved; a stage that is found moving is stopped.
     pub fn start(&mut self, now: Duration) -> Vec<Action> {
         self.phase = Phase::Greeting;
         let mut devices = Vec::new();

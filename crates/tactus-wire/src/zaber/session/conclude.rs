@@ -17,7 +17,7 @@ impl Session {
         let was_round = self.round_began.is_some() && self.round_ended.is_none();
         self.round_ended = Some(now);
         match &mut self.phase {
-            Phase::Greeting => self.conclude_greeting(),
+            Phase::Greeting => self.conclude_greeting(now),
             Phase::Ready | Phase::Over => self.report(),
             Phase::Moving(travel) if !was_round => {
                 travel.set_out = true;
@@ -31,12 +31,16 @@ impl Session {
         }
     }
 
-    fn conclude_greeting(&mut self) {
+    fn conclude_greeting(&mut self, now: Duration) {
         self.phase = Phase::Ready;
         self.renew_alarm();
         self.homed = self.config.trusts_reference && self.is_referenced() && self.alarm.is_none();
         self.actions.push(Action::Connected { identity: self.identity.clone() });
         self.report();
+        // Whatever sent it off is gone: perhaps this host, before it was cut off.
+        if self.moves() {
+            self.halt(now, None);
+        }
     }
 
     fn judge(&mut self, now: Duration) {

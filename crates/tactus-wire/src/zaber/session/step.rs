@@ -10,8 +10,8 @@ use crate::zaber::Command;
 /// Between rounds of questions while the stage stands.
 const POLL_IDLE: Duration = Duration::from_millis(100);
 
-/// Between rounds at least, while the stage moves: as fast as replies come, which take longer, but not in no time
-/// where they take none.
+/// Between rounds at least, while the stage moves: as fast as replies come, which take longer, but not in no
+/// time where they take none.
 const POLL_MOVING: Duration = Duration::from_millis(10);
 
 /// For how long a stop is sent again to a device that does not confirm it.

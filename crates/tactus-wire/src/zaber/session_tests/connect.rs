@@ -80,6 +80,17 @@ fn a_reference_that_hides_behind_another_warning_is_looked_for() {
 }
 
 #[test]
+fn a_stage_that_is_found_moving_is_stopped() {
+    let mut play = Play::new(config());
+    play.stage.axes[2].target = 90_000.0;
+    play.start();
+    play.run(200);
+    assert_eq!(play.count("= Moving"), 1);
+    assert_eq!(play.commands().last().unwrap(), "/0 0 stop");
+    assert!(!play.stage.axes[2].is_busy() && play.session.is_ready());
+}
+
+#[test]
 fn a_silent_port_is_given_up() {
     let mut play = Play::new(config());
     play.stage.is_dead = true;

@@ -114,6 +114,7 @@ impl Fake {
         };
         if result.is_ok() {
             if command.text == "stop" && self.glides {
+                // Nothing happens.
             } else if command.text == "set comm.checksum 1" {
                 self.checksums = true;
             } else if command.text == "get version" {
