@@ -6,3 +6,4 @@
 
 pub mod grbl;
 pub mod weiss;
+pub mod zaber;

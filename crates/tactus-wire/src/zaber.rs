@@ -1,0 +1,52 @@
+//! `zaber-ascii`: stages that speak version 2 of Zaber's ASCII protocol, firmware 6 and 7.
+//!
+//! # Source
+//! Zaber's published ASCII protocol manual, in short:
+//! - A command is `/`, address (0: all devices), axis (0: all axes), message id and words, ended by LF. Each
+//!   device that it is for answers it once: `@`, address in two digits, axis, id in two digits, `OK` or `RJ`,
+//!   `BUSY` or `IDLE`, the gravest warning flag or `--`, data, CR LF. `#` are further lines for people, `!`
+//!   comes unasked when a motion ends and `comm.alert` is on.
+//! - `:` and two hexadecimal digits may end a message: all bytes after the first, and those digits' value,
+//!   sum to zero modulo 256. A device checks a checksum that a command carries; its own messages carry one if
+//!   `comm.checksum` is 1.
+//! - A message that is longer than a line ends with `\` and goes on in an info that begins with `cont` and a
+//!   number.
+//! - Faults begin with F, warnings with W, notices with N; the reply shows the gravest one, `warnings` lists
+//!   all of an axis with their number in front, `warnings clear` clears those that a person has to see to.
+//! - Positions are in microsteps; `maxspeed` is microsteps per second times 1.6384, `accel` is microsteps per
+//!   second squared times 1.6384 / 10000, and 0 means no limit there.
+//! - A move that is answered `OK BUSY` is under way and no more; it has ended when a later reply says `IDLE`.
+//!   An axis that starts without knowing where it is shows `WR` until it is homed.
+//!
+//! The words of the flags and rejections are ours. Nothing here has met a real device yet.
+//!
+//! # Why not `zproto`
+//! The `zproto` crate (0.4) is well kept and knows the protocol, but the parts that parse do not stand alone:
+//! it depends on `serialport` whatever features are chosen, which would be a second serial stack, with
+//! libudev below it, beside `tokio-serial`; its packet parser takes one packet at a time, while cutting a
+//! stream, putting a message in parts together and matching ids live in a port type that blocks on reading;
+//! and it writes no replies, which a virtual stage needs. What remains for us would be a page of parsing,
+//! which is here.
+//!
+//! [`Decoder`] and [`Message`] read what devices say, [`Command`] is what a host says, [`Flag`] and
+//! [`Rejection`] are in words, [`Session`] is the host's side of the conversation. [`CommandDecoder`] and
+//! [`Message::encode`] are the device's side.
+
+mod checksum;
+mod command;
+mod config;
+mod decoder;
+mod flag;
+mod packet;
+mod path;
+mod rejection;
+mod session;
+
+pub use command::{Command, CommandDecoder};
+pub use config::{Axis, AxisName, Config, ConfigError, Direction};
+pub use decoder::Decoder;
+pub use flag::{Flag, Severity};
+pub use packet::{Header, Message, Packet, PacketError};
+pub use path::{accel_setting, speed_setting};
+pub use rejection::Rejection;
+pub use session::{Action, Alarm, Failure, Report, Session, SessionError, Status};

@@ -1,0 +1,201 @@
+//! How a stage is made up of axes.
+
+use core::fmt;
+
+use super::speed_setting;
+
+/// Largest position that is sent, either way: what fits in the controller's 32 bits.
+const POSITION_MAX_MICROSTEPS: f64 = 2_147_483_647.0;
+
+/// A stage: up to three axes of one or more devices on one port.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    /// x, y and z. An axis that is missing stands at 0 mm for ever.
+    pub axes: [Option<Axis>; 3],
+    /// A move is done when the stage stands within this of the target, more than 0.
+    pub tolerance_mm: f64,
+    /// Acceleration along the path, more than 0, of which each axis is set to its part; `None` leaves the
+    /// axes' own.
+    pub accel_mm_per_s2: Option<f64>,
+    /// `maxspeed` of each axis while it is homed, more than 0, as the last move may have left a much lower
+    /// one; `None` leaves that. The axes limit their speed near the sensor by themselves.
+    pub homing_speed_mm_per_s: Option<f64>,
+    /// Commands carry checksums, and the devices are set to answer with them (`comm.checksum`); a message
+    /// without one is then dropped.
+    pub checksums: bool,
+    /// True: a stage that says when it is connected that it has its reference position counts as homed.
+    /// False: it must be homed after each connection; an axis that stalled, and whose warning was cleared by
+    /// someone else, says that it has it too.
+    pub trusts_reference: bool,
+}
+
+/// One axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// Address of its device, 1 to 99.
+    pub device: u8,
+    /// Its number in the device, 1 to 9.
+    pub number: u8,
+    /// Length of a microstep, more than 0.
+    pub um_per_microstep: f64,
+    /// Which way it counts.
+    pub direction: Direction,
+    /// The position that is 0 mm.
+    pub origin_microsteps: i32,
+}
+
+/// Which way an axis counts, seen in the stage's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// More microsteps are more mm.
+    Positive,
+    /// More microsteps are fewer mm.
+    Negative,
+}
+
+/// Which axis of the stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisName {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third, along which the tip presses.
+    Z,
+}
+
+/// Why a configuration makes no stage.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// It has no axis.
+    #[error("the stage has no axis")]
+    NoAxis,
+    /// A number is out of range.
+    #[error("{name}: {field} is {value}, but must be {range}")]
+    Range {
+        /// Of which axis.
+        name: AxisName,
+        /// Which number.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it may be.
+        range: &'static str,
+    },
+    /// A number of the stage is not more than 0.
+    #[error("{field} is {value}, but must be more than 0")]
+    NotPositive {
+        /// Which number.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// Two axes are the same one.
+    #[error("{first} and {second} are the same axis of the same device")]
+    Same {
+        /// The one.
+        first: AxisName,
+        /// The other.
+        second: AxisName,
+    },
+}
+
+impl Config {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// If it has no axis, one axis twice, or a number that is out of range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let positive = |field, value: f64| {
+            if value.is_finite() && value > 0.0 {
+                Ok(())
+            } else {
+                Err(ConfigError::NotPositive { field, value })
+            }
+        };
+        positive("tolerance_mm", self.tolerance_mm)?;
+        if let Some(accel_mm_per_s2) = self.accel_mm_per_s2 {
+            positive("accel_mm_per_s2", accel_mm_per_s2)?;
+        }
+        if let Some(speed_mm_per_s) = self.homing_speed_mm_per_s {
+            positive("homing_speed_mm_per_s", speed_mm_per_s)?;
+        }
+        let mut seen: Vec<(AxisName, Axis)> = Vec::new();
+        for (name, axis) in self.named_axes() {
+            axis.check(name)?;
+            let same =
+                seen.iter().find(|(_, other)| (other.device, other.number) == (axis.device, axis.number));
+            if let Some((first, _)) = same {
+                return Err(ConfigError::Same { first: *first, second: name });
+            }
+            seen.push((name, axis));
+        }
+        if seen.is_empty() { Err(ConfigError::NoAxis) } else { Ok(()) }
+    }
+
+    /// The axes that are there.
+    pub(super) fn named_axes(&self) -> impl Iterator<Item = (AxisName, Axis)> {
+        let names = [AxisName::X, AxisName::Y, AxisName::Z];
+        names.into_iter().zip(self.axes).filter_map(|(name, axis)| Some((name, axis?)))
+    }
+}
+
+impl Axis {
+    /// Where a position of the controller is in the stage's frame.
+    #[expect(clippy::cast_precision_loss, reason = "exact up to 2^53 microsteps, which are kilometres")]
+    pub fn position_mm(&self, microsteps: i64) -> f64 {
+        let from_origin = microsteps.saturating_sub(i64::from(self.origin_microsteps));
+        self.direction.sign() * from_origin as f64 * self.um_per_microstep / 1000.0 + 0.0
+    }
+
+    /// The nearest position of the controller; `None` if it is none that can be sent.
+    #[expect(clippy::cast_possible_truncation, reason = "checked to be within 32 bits")]
+    pub fn microsteps(&self, position_mm: f64) -> Option<i64> {
+        let from_origin = self.direction.sign() * position_mm * 1000.0 / self.um_per_microstep;
+        let microsteps = (from_origin + f64::from(self.origin_microsteps)).round();
+        (microsteps.abs() <= POSITION_MAX_MICROSTEPS).then_some(microsteps as i64)
+    }
+
+    /// The `maxspeed` of the controller for a speed; `None` if it is not more than 0 or too fast to be told.
+    pub fn speed_setting(&self, speed_mm_per_s: f64) -> Option<i64> {
+        speed_setting(speed_mm_per_s * 1000.0 / self.um_per_microstep)
+    }
+
+    fn check(&self, name: AxisName) -> Result<(), ConfigError> {
+        let range = |field, value, range| Err(ConfigError::Range { name, field, value, range });
+        if !(1..=99).contains(&self.device) {
+            return range("device", f64::from(self.device), "1 to 99");
+        }
+        if !(1..=9).contains(&self.number) {
+            return range("number", f64::from(self.number), "1 to 9");
+        }
+        let um = self.um_per_microstep;
+        if !(um.is_finite() && um > 0.0) {
+            return range("um_per_microstep", um, "more than 0");
+        }
+        Ok(())
+    }
+}
+
+impl Direction {
+    fn sign(self) -> f64 {
+        match self {
+            Self::Positive => 1.0,
+            Self::Negative => -1.0,
+        }
+    }
+}
+
+impl fmt::Display for AxisName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+        })
+    }
+}
+
+#[cfg(test)]
+#[path = "config_tests.rs"]
+mod tests;

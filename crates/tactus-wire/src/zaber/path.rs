@@ -1,0 +1,75 @@
+//! One straight path: what each axis is set to, so that all arrive together.
+
+use super::Axis;
+
+/// `maxspeed` in microsteps per second.
+const SPEED_SCALE: f64 = 1.6384;
+
+/// `accel` in microsteps per second squared.
+const ACCEL_SCALE: f64 = 1.6384 / 10_000.0;
+
+/// Largest value of either setting.
+const SETTING_MAX: f64 = 2_147_483_647.0;
+
+/// The `maxspeed` for a speed: rounded, 1 at least. `None` if it is not more than 0 or too fast to be told.
+///
+/// # Source
+/// The manual's entry of `maxspeed`: speed in microsteps/s times 1.6384.
+pub fn speed_setting(microsteps_per_s: f64) -> Option<i64> {
+    setting(microsteps_per_s * SPEED_SCALE)
+}
+
+/// The `accel` for an acceleration: rounded, 1 at least, since 0 means no limit. `None` if it is
+/// not more than 0 or too high to be told.
+///
+/// # Source
+/// The manual's entry of `accel`: acceleration in microsteps/s² times 1.6384 / 10000.
+pub fn accel_setting(microsteps_per_s2: f64) -> Option<i64> {
+    setting(microsteps_per_s2 * ACCEL_SCALE)
+}
+
+/// What one axis is to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Leg {
+    pub(super) target_microsteps: i64,
+    pub(super) speed: i64,
+    pub(super) accel: Option<i64>,
+}
+
+/// Length of a path.
+pub(super) fn length_mm(from_mm: [f64; 3], to_mm: [f64; 3]) -> f64 {
+    from_mm.iter().zip(to_mm).map(|(from, to)| (to - from) * (to - from)).sum::<f64>().sqrt()
+}
+
+/// The leg of an axis that goes `way_mm` of a path of `path_mm`, either sign. `None` if the speed or the
+/// acceleration cannot be told to the controller.
+pub(super) fn leg(
+    axis: &Axis,
+    target_microsteps: i64,
+    way_mm: f64,
+    path_mm: f64,
+    speed_mm_per_s: f64,
+    accel_mm_per_s2: Option<f64>,
+) -> Option<Leg> {
+    let share = (way_mm / path_mm).abs().min(1.0);
+    let microsteps = |mm: f64| mm * 1000.0 / axis.um_per_microstep;
+    let speed = microsteps(speed_mm_per_s * share);
+    // The axis that goes farthest must not be faster than asked; its share is 0.57 at least.
+    if share > 0.5 && speed * SPEED_SCALE < 1.0 {
+        return None;
+    }
+    let accel = match accel_mm_per_s2 {
+        Some(accel) => Some(accel_setting(microsteps(accel * share))?),
+        None => None,
+    };
+    Some(Leg { target_microsteps, speed: speed_setting(speed)?, accel })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "checked to be within 32 bits")]
+fn setting(value: f64) -> Option<i64> {
+    (value > 0.0 && value <= SETTING_MAX).then(|| value.round().max(1.0) as i64)
+}
+
+#[cfg(test)]
+#[path = "path_tests.rs"]
+mod tests;

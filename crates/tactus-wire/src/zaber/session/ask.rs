@@ -1,0 +1,123 @@
+//! Questions to devices, one at a time.
+
+use core::time::Duration;
+
+use crate::zaber::Flag;
+
+/// An answer that has not come after this is asked for again; it comes after some 5 ms.
+const REPLY_TIMEOUT: Duration = Duration::from_millis(250);
+
+/// A move or a homing that is not answered by then may have been lost, or not.
+const MOTION_REPLY_TIMEOUT: Duration = Duration::from_millis(500);
+
+/// A question that stays unanswered for this long means that the device is gone.
+const SILENCE_MAX: Duration = Duration::from_secs(2);
+
+/// What is asked or told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ask {
+    Checksums,
+    Version,
+    AxisCount,
+    LimitMin,
+    LimitMax,
+    Position,
+    Warnings,
+    Clear,
+    Enable,
+    Speed(i64),
+    Accel(i64),
+    Move(i64),
+    Home,
+}
+
+/// A question to the axis in a slot, or to its device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Question {
+    pub(super) slot: usize,
+    pub(super) ask: Ask,
+}
+
+/// The question that stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Pending {
+    pub(super) question: Question,
+    pub(super) id: u8,
+    pub(super) since: Duration,
+    pub(super) sent: Duration,
+}
+
+/// What an answer says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Answer {
+    Done,
+    Text(String),
+    Number(i64),
+    Flags(Vec<Flag>),
+}
+
+impl Ask {
+    /// The words of the command.
+    pub(super) fn text(self) -> String {
+        match self {
+            Self::Checksums => "set comm.checksum 1".to_owned(),
+            Self::Version => "get version".to_owned(),
+            Self::AxisCount => "get system.axiscount".to_owned(),
+            Self::LimitMin => "get limit.min".to_owned(),
+            Self::LimitMax => "get limit.max".to_owned(),
+            Self::Position => "get pos".to_owned(),
+            Self::Warnings => "warnings".to_owned(),
+            Self::Clear => "warnings clear".to_owned(),
+            Self::Enable => "driver enable".to_owned(),
+            Self::Speed(value) => format!("set maxspeed {value}"),
+            Self::Accel(value) => format!("set accel {value}"),
+            Self::Move(target) => format!("move abs {target}"),
+            Self::Home => "home".to_owned(),
+        }
+    }
+
+    /// For the device, not for one of its axes.
+    pub(super) fn is_of_device(self) -> bool {
+        matches!(self, Self::Checksums | Self::Version | Self::AxisCount)
+    }
+
+    /// Sets an axis in motion, so that it is sent once and never again.
+    pub(super) fn moves(self) -> bool {
+        matches!(self, Self::Move(_) | Self::Home)
+    }
+
+    /// Reads the data of an answer; `None` if it is no answer to this.
+    pub(super) fn read(self, data: &str) -> Option<Answer> {
+        match self {
+            Self::Version => (!data.is_empty() && data.len() <= 16).then(|| Answer::Text(data.to_owned())),
+            Self::AxisCount | Self::LimitMin | Self::LimitMax | Self::Position => {
+                data.parse().ok().map(Answer::Number)
+            }
+            Self::Warnings => {
+                let mut words = data.split_ascii_whitespace();
+                let count: usize = words.next()?.parse().ok()?;
+                let flags: Vec<_> = words.map(Flag::parse).collect::<Option<_>>()?;
+                (flags.len() == count).then_some(Answer::Flags(flags))
+            }
+            Self::Checksums
+            | Self::Clear
+            | Self::Enable
+            | Self::Speed(_)
+            | Self::Accel(_)
+            | Self::Move(_)
+            | Self::Home => Some(Answer::Done),
+        }
+    }
+}
+
+impl Pending {
+    /// When to do something about the lack of an answer.
+    pub(super) fn overdue(&self) -> Duration {
+        self.sent + if self.question.ask.moves() { MOTION_REPLY_TIMEOUT } else { REPLY_TIMEOUT }
+    }
+
+    /// True if there is no more hope for an answer.
+    pub(super) fn is_silent(&self, now: Duration) -> bool {
+        now.saturating_sub(self.since) >= SILENCE_MAX
+    }
+}

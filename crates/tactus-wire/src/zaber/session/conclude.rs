@@ -1,0 +1,142 @@
+//! What follows when a batch or a round of questions has been answered.
+
+use core::time::Duration;
+
+use super::ask::{Ask, Question};
+use super::axis_state::Reference;
+use super::phase::Phase;
+use super::{Action, Failure, Session};
+use crate::zaber::path::length_mm;
+
+/// For how long the stage must say that it stands elsewhere, before that is believed.
+const ELSEWHERE_MIN: Duration = Duration::from_millis(200);
+
+impl Session {
+    /// Every question of a batch or a round has its answer.
+    pub(super) fn conclude(&mut self, now: Duration) {
+        let was_round = self.round_began.is_some() && self.round_ended.is_none();
+        self.round_ended = Some(now);
+        match &mut self.phase {
+            Phase::Greeting => self.conclude_greeting(now),
+            Phase::Ready | Phase::Over => self.report(),
+            Phase::Moving(travel) if !was_round => {
+                travel.set_out = true;
+                self.at_once = true;
+            }
+            Phase::Homing { .. } if !was_round => self.at_once = true,
+            Phase::Moving(_) => self.judge(now),
+            Phase::Homing { .. } => self.conclude_homing(),
+            Phase::Clearing => self.conclude_clearing(),
+            Phase::Stopping(_) => self.conclude_stop(),
+        }
+    }
+
+    fn conclude_greeting(&mut self, now: Duration) {
+        self.phase = Phase::Ready;
+        self.renew_alarm();
+        self.homed = self.config.trusts_reference && self.is_referenced() && self.alarm.is_none();
+        self.actions.push(Action::Connected { identity: self.identity.clone() });
+        self.report();
+        // Whatever sent it off is gone: perhaps this host, before it was cut off.
+        if self.moves() {
+            self.halt(now, None);
+        }
+    }
+
+    fn judge(&mut self, now: Duration) {
+        self.report();
+        // The list of warnings, if it is needed, is asked for in the next round.
+        let moves = self.axes.iter().any(|state| state.busy || state.needs_list);
+        let position_mm = self.position_mm();
+        let Phase::Moving(travel) = &mut self.phase else { return };
+        if moves {
+            travel.elsewhere = None;
+            return;
+        }
+        let target_mm = travel.target_mm;
+        let result = if length_mm(position_mm, target_mm) <= self.config.tolerance_mm {
+            Ok(position_mm)
+        } else {
+            let since = *travel.elsewhere.get_or_insert(now);
+            if now.saturating_sub(since) < ELSEWHERE_MIN {
+                return;
+            }
+            Err(Failure::NotThere { target_mm, position_mm })
+        };
+        self.phase = Phase::Ready;
+        self.done(result);
+    }
+
+    fn conclude_homing(&mut self) {
+        let Phase::Homing { group, then, .. } = &mut self.phase else { return };
+        let of_group = |slot: &usize| self.axes.get(*slot);
+        // The list of warnings, if it is needed, is asked for in the next round.
+        if group.iter().filter_map(of_group).any(|state| state.busy || state.needs_list) {
+            return self.report();
+        }
+        let has_failed = group.iter().filter_map(of_group).any(|state| state.reference == Reference::Lost);
+        let next = then.take().filter(|slots| !slots.is_empty());
+        if has_failed {
+            self.phase = Phase::Ready;
+            self.report();
+            self.done(Err(Failure::Unhomed));
+        } else if let Some(next) = next {
+            self.report();
+            self.home_group(next);
+        } else {
+            self.phase = Phase::Ready;
+            self.homed = self.is_referenced() && self.alarm.is_none();
+            self.report();
+            let result = if self.homed { Ok(self.position_mm()) } else { Err(Failure::Unhomed) };
+            self.done(result);
+        }
+    }
+
+    fn conclude_clearing(&mut self) {
+        self.phase = Phase::Ready;
+        self.renew_alarm();
+        self.report();
+        let result = self.alarm.map_or(Ok(self.position_mm()), |alarm| Err(Failure::Alarm(alarm)));
+        self.done(result);
+    }
+
+    fn conclude_stop(&mut self) {
+        let (moves, began) = (self.moves(), self.round_began);
+        let Phase::Stopping(stop) = &self.phase else { return };
+        let is_later = began.is_some_and(|began| began >= stop.sent);
+        if moves || !stop.unheard.is_empty() || !is_later {
+            return self.report();
+        }
+        self.end_stop();
+    }
+
+    fn is_referenced(&self) -> bool {
+        self.axes.iter().all(|state| state.reference == Reference::Known)
+    }
+
+    /// The stage stands, or is not waited for any longer.
+    pub(super) fn end_stop(&mut self) {
+        let phase = core::mem::replace(&mut self.phase, Phase::Ready);
+        self.report();
+        if let Phase::Stopping(stop) = phase
+            && let Some(failure) = stop.failure
+        {
+            let position_mm = self.position_mm();
+            self.done(Err(failure.at(position_mm)));
+        }
+    }
+
+    /// Sends the axes in some slots home.
+    pub(super) fn home_group(&mut self, slots: Vec<usize>) {
+        self.begin_batch();
+        let homing_speed = self.config.homing_speed_mm_per_s;
+        for slot in &slots {
+            let speed = self.axes.get(*slot).and_then(|state| state.axis.speed_setting(homing_speed?));
+            self.queue.extend(speed.map(|speed| Question { slot: *slot, ask: Ask::Speed(speed) }));
+        }
+        self.queue.extend(slots.iter().map(|slot| Question { slot: *slot, ask: Ask::Home }));
+        if let Phase::Homing { group, .. } = &mut self.phase {
+            *group = slots;
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! What a session does about what devices say.
+
+use core::time::Duration;
+
+use super::ask::{Answer, Ask, Pending, Question};
+use super::axis_state::{AxisState, Reference};
+use super::phase::Phase;
+use super::{Action, Alarm, Failure, Session, SessionError};
+use crate::zaber::{Flag, Header, Message, Rejection, Severity};
+
+impl Session {
+    /// Does what one message calls for.
+    pub(super) fn hear(&mut self, now: Duration, message: &Message) {
+        match message {
+            _ if matches!(self.phase, Phase::Over) => {}
+            Message::Reply { header, accepted, busy, flag, data } => {
+                self.hear_reply(now, *header, *accepted, *busy, *flag, data);
+            }
+            Message::Alert { header, flag, .. } => self.hear_alert(now, *header, *flag),
+            Message::Info { .. } => {}
+        }
+    }
+
+    fn hear_reply(
+        &mut self,
+        now: Duration,
+        header: Header,
+        accepted: bool,
+        busy: bool,
+        flag: Flag,
+        data: &str,
+    ) {
+        if let Phase::Stopping(stop) = &mut self.phase
+            && header.id == Some(stop.id)
+        {
+            if accepted {
+                stop.unheard.retain(|device| *device != header.device);
+            }
+            return;
+        }
+        let Some(pending) = self.pending.filter(|pending| self.is_answer(pending, header)) else {
+            self.ignored += 1;
+            return;
+        };
+        let question = pending.question;
+        if !accepted {
+            return self.hear_rejection(now, question, &Rejection::parse(data));
+        }
+        let Some(answer) = question.ask.read(data) else {
+            self.ignored += 1;
+            return;
+        };
+        self.pending = None;
+        if !self.take_answer(question, busy, answer.clone()) || question.ask.is_of_device() {
+            return;
+        }
+        let all = if let Answer::Flags(flags) = &answer { Some(&flags[..]) } else { None };
+        if self.hear_flags(now, question, flag, all) && self.queue.is_empty() {
+            self.conclude(now);
+        }
+    }
+
+    fn is_answer(&self, pending: &Pending, header: Header) -> bool {
+        let Question { slot, ask } = pending.question;
+        let Some(state) = self.axes.get(slot) else { return false };
+        let axis = if ask.is_of_device() { 0 } else { state.axis.number };
+        header == Header { device: state.axis.device, axis, id: Some(pending.id) }
+    }
+
+    /// Takes over what an answer says; false if it ends the session.
+    fn take_answer(&mut self, Question { slot, ask }: Question, busy: bool, answer: Answer) -> bool {
+        let Some(state) = self.axes.get_mut(slot) else { return true };
+        if !ask.is_of_device() {
+            state.busy = busy;
+        }
+        match (ask, answer) {
+            (Ask::Position, Answer::Number(number)) => state.position = number,
+            (Ask::LimitMin, Answer::Number(number)) => state.limit_min = number,
+            (Ask::LimitMax, Answer::Number(number)) => state.limit_max = number,
+            (Ask::AxisCount, Answer::Number(axis_count)) if axis_count < i64::from(state.axis.number) => {
+                let (device, number, name) = (state.axis.device, state.axis.number, state.name);
+                self.fail(SessionError::NoAxis { device, number, name, axis_count });
+                return false;
+            }
+            (Ask::Version, Answer::Text(version)) => {
+                let device = state.axis.device;
+                let separator = if self.identity.is_empty() { "" } else { ", " };
+                let device = format!("{separator}device {device} firmware {version}");
+                self.identity.push_str(&device);
+            }
+            _ => {}
+        }
+        true
+    }
+
+    fn hear_rejection(&mut self, now: Duration, question: Question, rejection: &Rejection) {
+        let command = question.ask.text();
+        let moving = matches!(self.phase, Phase::Moving(_) | Phase::Homing { .. });
+        match question.ask {
+            Ask::Move(_) | Ask::Home | Ask::Speed(_) | Ask::Accel(_) if moving => {
+                let name =
+                    self.axes.get(question.slot).map(|state| state.name.to_string()).unwrap_or_default();
+                let failure = Failure::Refused { command, reason: format!("{name}: {rejection}") };
+                self.halt(now, Some(failure));
+            }
+            // What is still wrong afterwards shows in the warnings.
+            Ask::Clear | Ask::Enable => {
+                self.pending = None;
+            }
+            // Asked again when the time is over.
+            ask if *rejection == Rejection::Again && !ask.moves() => {}
+            Ask::Checksums
+            | Ask::Version
+            | Ask::AxisCount
+            | Ask::LimitMin
+            | Ask::LimitMax
+            | Ask::Position
+            | Ask::Warnings
+            | Ask::Speed(_)
+            | Ask::Accel(_)
+            | Ask::Move(_)
+            | Ask::Home => {
+                let device = self.device_of(question.slot);
+                self.fail(SessionError::Refused { device, command, rejection: rejection.clone() });
+            }
+        }
+    }
+
+    /// An alert has no id and may be as old as its way is long: it is believed for the worse only.
+    fn hear_alert(&mut self, now: Duration, header: Header, flag: Flag) {
+        let is_meant = |state: &AxisState| {
+            state.axis.device == header.device && (header.axis == 0 || header.axis == state.axis.number)
+        };
+        let severity = flag.severity();
+        if self.axes.iter().any(is_meant) && !matches!(severity, Severity::None | Severity::Notice) {
+            self.at_once = true;
+        }
+        if header.axis != 0
+            && let Some(slot) = self.axes.iter().position(is_meant)
+            && severity == Severity::Fault
+        {
+            self.hear_flags(now, Question { slot, ask: Ask::Warnings }, flag, None);
+        }
+    }
+
+    /// Takes over the flags of an axis; false if what was under way is off.
+    fn hear_flags(
+        &mut self,
+        now: Duration,
+        Question { slot, ask }: Question,
+        flag: Flag,
+        all: Option<&[Flag]>,
+    ) -> bool {
+        let Some(state) = self.axes.get_mut(slot) else { return true };
+        let is_new_fault = state.take_flags(flag, all);
+        // Both flags stay until the next command, so that only a flag that is new tells of someone else.
+        let is_others = matches!(flag, Flag::MANUAL_CONTROL | Flag::INTERRUPTED);
+        if ask.moves() {
+            state.is_ours = !is_others;
+        }
+        let (name, is_lost, is_ours) = (state.name, state.reference == Reference::Lost, state.is_ours);
+        if matches!(self.phase, Phase::Greeting | Phase::Clearing) {
+            return true;
+        }
+        self.renew_alarm();
+        if is_new_fault && let Some(alarm) = self.alarm {
+            self.homed = false;
+            self.fault(now, alarm);
+            return false;
+        }
+        if is_lost && self.homed {
+            self.homed = false;
+            self.actions.push(Action::ReferenceLost { name });
+            if let Phase::Moving(_) = self.phase {
+                self.halt(now, Some(Failure::Unhomed));
+                return false;
+            }
+        }
+        let is_command = matches!(&self.phase, Phase::Moving(_) | Phase::Homing { .. });
+        if is_command && is_ours && is_others {
+            let position_mm = self.position_mm();
+            self.halt(now, Some(Failure::Interrupted { name, flag, position_mm }));
+            return false;
+        }
+        true
+    }
+
+    /// An axis is at fault: the others are stopped, and the command in hand ends when all stand.
+    fn fault(&mut self, now: Duration, alarm: Alarm) {
+        match &mut self.phase {
+            Phase::Stopping(stop) => {
+                if stop.failure.is_some() {
+                    stop.failure = Some(Failure::Alarm(alarm));
+                }
+                self.queue.clear();
+                self.pending = None;
+                self.at_once = true;
+            }
+            Phase::Moving(_) | Phase::Homing { .. } => self.halt(now, Some(Failure::Alarm(alarm))),
+            Phase::Greeting | Phase::Ready | Phase::Clearing | Phase::Over => self.halt(now, None),
+        }
+        self.report();
+    }
+}
