@@ -1,7 +1,10 @@
 //! `zaber-ascii`: stages that speak version 2 of Zaber's ASCII protocol, firmware 6 and 7.
 //!
 //! # Source
-//! Zaber's published ASCII protocol manual, in short:
+//! Zaber's ASCII protocol, version 2, as public code that quotes its manual, the list of flags that Zaber publishes
+//! and the `zproto` crate tell of it. The manual itself was not at hand, and no real device was met; least sure are a few
+//! rejections (`DRIVERDISABLED`, `INACTIVE`, `NOTSUPPORTED`, `REMOTE`) and the very words of the answer to
+//! `warnings clear`. In short:
 //! - A command is `/`, address (0: all devices), axis (0: all axes), message id and words, ended by LF. Each
 //!   device that it is for answers it once: `@`, address in two digits, axis, id in two digits, `OK` or `RJ`,
 //!   `BUSY` or `IDLE`, the gravest warning flag or `--`, data, CR LF. `#` are further lines for people, `!`
