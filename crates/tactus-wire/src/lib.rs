@@ -5,4 +5,7 @@
 #![warn(clippy::indexing_slicing)]
 
 pub mod grbl;
+pub mod singletact;
 pub mod weiss;
+
+mod wrapping;
