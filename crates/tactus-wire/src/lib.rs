@@ -5,6 +5,7 @@
 #![warn(clippy::indexing_slicing)]
 
 pub mod anyskin;
+pub mod declared;
 pub mod grbl;
 pub mod singletact;
 pub mod weiss;
