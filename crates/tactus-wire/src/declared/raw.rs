@@ -259,3 +259,7 @@ pub struct RawUsb {
     /// Address of the endpoint that frames come from; 0x80 or more.
     pub endpoint: u8,
 }
+
+#[cfg(test)]
+#[path = "raw_tests.rs"]
+mod tests;
