@@ -53,6 +53,8 @@
 //! in the file an error lies, and a description can come in other ways than as TOML. [`RawFormat::check`] makes a [`Format`], or
 //! names the field that contradicts the others. [`Decoder`] is the host's side, [`Encoder`] a virtual device's.
 //!
+//! [`propose`] says what recorded bytes of an unknown format may be.
+//!
 //! # Source
 //! The parameters of CRCs are those of the public catalogue of CRC algorithms (width, poly, init, refin and refout as one,
 //! xorout, check).
@@ -65,6 +67,7 @@ mod format;
 mod inspect;
 mod raw;
 mod samples;
+mod sniff;
 
 pub use checksum::{Algorithm, CRC32, Crc, CrcParameters, CrcWidth};
 pub use decoder::{Decoder, DecoderStats, Frame};
@@ -76,3 +79,4 @@ pub use raw::{
     RawSamples, RawSequence, RawTimestamp, RawUsb, SCHEMA, SampleType,
 };
 pub use samples::Samples;
+pub use sniff::{MAX_STRIDE_BYTES, Proposal, propose};
