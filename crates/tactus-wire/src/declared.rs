@@ -53,12 +53,14 @@
 //! in the file an error lies, and a description can come in other ways than as TOML. [`RawFormat::check`] makes a [`Format`], or
 //! names the field that contradicts the others. [`Decoder`] is the host's side, [`Encoder`] a virtual device's.
 //!
-//! [`propose`] says what recorded bytes of an unknown format may be.
+//! To match a description to a device, record what it sends: [`propose`] says what bytes of an unknown format may be,
+//! [`check_capture`] holds them against a description, and says how to correct it.
 //!
 //! # Source
 //! The parameters of CRCs are those of the public catalogue of CRC algorithms (width, poly, init, refin and refout as one,
 //! xorout, check).
 
+mod capture;
 mod checksum;
 mod decoder;
 mod encoder;
@@ -69,6 +71,7 @@ mod raw;
 mod samples;
 mod sniff;
 
+pub use capture::{CaptureReport, Hint, Mismatch, Stride, check_capture};
 pub use checksum::{Algorithm, CRC32, Crc, CrcParameters, CrcWidth};
 pub use decoder::{Decoder, DecoderStats, Frame};
 pub use encoder::{ElementsError, Encoder};

@@ -43,8 +43,9 @@ pub struct Proposal {
 /// the array is best. Lost bytes, and frames of several lengths, spoil it.
 pub fn propose(capture: &[u8]) -> Vec<Proposal> {
     let bytes = capture.get(..MAX_LOOKED_AT_BYTES).unwrap_or(capture);
+    let chance = chance(bytes);
     let mut likenesses: Vec<(usize, f64)> = (2..=MAX_STRIDE_BYTES.min(bytes.len() / 3))
-        .map(|stride| (stride, likeness(bytes, stride)))
+        .map(|stride| (stride, likeness(bytes, stride, chance)))
         .filter(|(_, likeness)| *likeness > 0.0)
         .collect();
     likenesses.sort_by(|(a_stride, a), (b_stride, b)| b.total_cmp(a).then(a_stride.cmp(b_stride)));
@@ -58,19 +59,28 @@ pub fn propose(capture: &[u8]) -> Vec<Proposal> {
 }
 
 /// Share of bytes that are the same one stride later, beyond chance.
-fn likeness(bytes: &[u8], stride: usize) -> f64 {
+fn likeness(bytes: &[u8], stride: usize, chance: f64) -> f64 {
     let later = bytes.get(stride..).unwrap_or_default();
     let same: usize = bytes.iter().zip(later).map(|(now, later)| usize::from(now == later)).sum();
-    let mut counts = [0_u32; 256];
-    for byte in later {
+    let same = same as f64 / later.len().max(1) as f64;
+    if chance < 1.0 { (same - chance) / (1.0 - chance) } else { 0.0 }
+}
+
+/// Share of bytes that would be the same in any other order too.
+fn chance(bytes: &[u8]) -> f64 {
+    let length = bytes.len().max(1) as f64;
+    histogram(bytes).iter().map(|count| (*count as f64 / length).powi(2)).sum()
+}
+
+/// How often each byte is there.
+fn histogram<'a>(bytes: impl IntoIterator<Item = &'a u8>) -> [usize; 256] {
+    let mut counts = [0; 256];
+    for byte in bytes {
         if let Some(count) = counts.get_mut(usize::from(*byte)) {
             *count += 1;
         }
     }
-    let length = later.len().max(1) as f64;
-    let chance: f64 = counts.iter().map(|count| (f64::from(*count) / length).powi(2)).sum();
-    let same = same as f64 / length;
-    if chance < 1.0 { (same - chance) / (1.0 - chance) } else { 0.0 }
+    counts
 }
 
 /// The proposal for a stride, if bytes mark each frame once.
@@ -106,12 +116,7 @@ struct Column {
 impl Column {
     fn of(bytes: &[u8], stride: usize, phase: usize) -> Self {
         let values = || bytes.iter().skip(phase).step_by(stride);
-        let mut counts = [0_usize; 256];
-        for value in values() {
-            if let Some(count) = counts.get_mut(usize::from(*value)) {
-                *count += 1;
-            }
-        }
+        let counts = histogram(values());
         let total = counts.iter().sum::<usize>();
         let (mode, most) = (0..=u8::MAX).zip(&counts).max_by_key(|(_, count)| **count).unwrap_or((0, &0));
         let steps = values().zip(values().skip(1)).filter(|(a, b)| a.wrapping_add(1) == **b).count();
@@ -169,4 +174,4 @@ pub(super) fn find<'a>(bytes: &'a [u8], pattern: &'a [u8]) -> impl Iterator<Item
 
 #[cfg(test)]
 #[path = "sniff_tests.rs"]
-mod tests;
+pub(super) mod tests;
