@@ -8,9 +8,9 @@
 //! 5 x (temperature, x, y, z: f32 LE) | 0D 0A
 //! ```
 //!
-//! with neither a beginning nor a checksum, and `0D 0A` can occur in the numbers. So [`Decoder`] takes a place for the end of a frame
-//! only if frames of this length go on from it. The board sends no time and no count: what is lost between two
-//! frames can be told in bytes only.
+//! with neither a beginning nor a checksum, and `0D 0A` can occur in the numbers. So [`Decoder`] takes a
+//! place for the end of a frame only if frames of this length go on from it. The board sends no time and no
+//! count: what is lost between two frames can be told in bytes only.
 
 mod decoder;
 mod frame;

@@ -1,8 +1,8 @@
 //! `declared`: any format of frames of one length, told by a description instead of by code.
 //!
 //! The wire format of the `DigiTacts` kit is not public, and laboratories build arrays of their own. So a
-//! description says how a frame looks; it is written in TOML (`tactus.link/1`, examples in `config/links`) and checked
-//! once:
+//! description says how a frame looks; it is written in TOML (`tactus.link/1`, examples in `config/links`)
+//! and checked once:
 //!
 //! ```toml
 //! schema = "tactus.link/1"
@@ -46,19 +46,20 @@
 //! endian = "big"
 //! ```
 //!
-//! besides `[hid] report_id` and `[usb] interface, endpoint`, which say where frames come from. Negative offsets are from the
-//! frame's end.
+//! besides `[hid] report_id` and `[usb] interface, endpoint`, which say where frames come from. Negative
+//! offsets are from the frame's end.
 //!
-//! [`RawFormat`] is the description as written, for serde only: whoever reads a file knows its path and shows where
-//! in the file an error lies, and a description can come in other ways than as TOML. [`RawFormat::check`] makes a [`Format`], or
-//! names the field that contradicts the others. [`Decoder`] is the host's side, [`Encoder`] a virtual device's.
+//! [`RawFormat`] is the description as written, for serde only: whoever reads a file knows its path and shows
+//! where in the file an error lies, and a description can come in other ways than as TOML.
+//! [`RawFormat::check`] makes a [`Format`], or names the field that contradicts the others. [`Decoder`] is
+//! the host's side, [`Encoder`] a virtual device's.
 //!
-//! To match a description to a device, record what it sends: [`propose`] says what bytes of an unknown format may be,
-//! [`check_capture`] holds them against a description, and says how to correct it.
+//! To match a description to a device, record what it sends: [`propose`] says what bytes of an unknown format
+//! may be, [`check_capture`] holds them against a description, and says how to correct it.
 //!
 //! # Source
-//! The parameters of CRCs are those of the public catalogue of CRC algorithms (width, poly, init, refin and refout as one,
-//! xorout, check).
+//! The parameters of CRCs are those of the public catalogue of CRC algorithms (width, poly, init, refin and
+//! refout as one, xorout, check).
 
 mod capture;
 mod checksum;
@@ -83,3 +84,7 @@ pub use raw::{
 };
 pub use samples::Samples;
 pub use sniff::{MAX_STRIDE_BYTES, Proposal, propose};
+
+#[cfg(test)]
+#[path = "declared/any_description_tests.rs"]
+mod any_description_tests;

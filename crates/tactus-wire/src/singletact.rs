@@ -9,15 +9,16 @@
 //! ```
 //!
 //! where `operation` is 1 for read, 2 for write, 4 for calibrate; a read has no data (`n` is what it asks
-//! for) and one zero byte behind it, so that it fills 16 bytes. 100 is the timeout of the I2C bus in ms. The board answers:
+//! for) and one zero byte behind it, so that it fills 16 bytes. 100 is the timeout of the I2C bus in ms. The
+//! board answers:
 //!
 //! ```text
 //! FF FF FF FF | address | timed out | id | timestamp: u32 BE | n | data | FE FE FE FE
 //! ```
 //!
-//! from an Arduino, and with `AA AA AA AA` in front from the USB board. The timestamp is in units of 0.1 ms; in the answer to a write
-//! it is an earlier one. The element's reading lies at location 128: a frame counter u16 BE, two bytes that
-//! the library passes over, the value u16 BE; the library takes 255 for nothing.
+//! from an Arduino, and with `AA AA AA AA` in front from the USB board. The timestamp is in units of 0.1 ms;
+//! in the answer to a write it is an earlier one. The element's reading lies at location 128: a frame counter
+//! u16 BE, two bytes that the library passes over, the value u16 BE; the library takes 255 for nothing.
 //!
 //! Every element answers at address 4 and at one of its own.
 //!

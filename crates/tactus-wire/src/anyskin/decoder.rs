@@ -11,9 +11,9 @@ pub const CONFIRMING_FRAMES: usize = 3;
 /// `None`; what comes out does not depend on how the stream was cut. It holds at most [`CONFIRMING_FRAMES`]
 /// frames and what was pushed since.
 ///
-/// A frame that follows another is given when its last byte arrives. At the beginning, and where a frame does not
-/// end as it should, the decoder looks for the first place from where [`CONFIRMING_FRAMES`] frames do: those before the last of them
-/// are late, but none is lost.
+/// A frame that follows another is given when its last byte arrives. At the beginning, and where a frame does
+/// not end as it should, the decoder looks for the first place from where [`CONFIRMING_FRAMES`] frames do:
+/// those before the last of them are late, but none is lost.
 #[derive(Debug, Clone, Default)]
 pub struct Decoder {
     bytes: Vec<u8>,

@@ -11,8 +11,8 @@ const MAGNETOMETER_BYTES: usize = 16;
 /// What every frame ends with.
 const END: [u8; 2] = *b"\r\n";
 
-/// Numbers between these magnitudes, and zero, are what a magnetometer may say in whatever unit. Bytes read at
-/// a wrong place mostly give others.
+/// Numbers between these magnitudes, and zero, are what a magnetometer may say in whatever unit. Bytes read
+/// at a wrong place mostly give others.
 const PLAUSIBLE: core::ops::Range<f32> = 1e-9..1e9;
 
 /// One reading of all magnetometers.
@@ -27,7 +27,8 @@ pub struct Frame {
 pub struct Magnetometer {
     /// In degrees Celsius, as the firmware converts it.
     pub temperature_c: f32,
-    /// The field along the chip's x, y and z, in microtesla as the firmware converts it. May be any number, NaN too.
+    /// The field along the chip's x, y and z, in microtesla as the firmware converts it. May be any number,
+    /// NaN too.
     pub field_ut: [f32; 3],
 }
 

@@ -144,7 +144,8 @@ pub enum Hint {
     },
 }
 
-/// Holds a capture against a description: what decodes, where it fails first, and how the description may be corrected.
+/// Holds a capture against a description: what decodes, where it fails first, and how the description may be
+/// corrected.
 ///
 /// A capture of packets is their bytes one behind the other.
 pub fn check_capture(format: &Arc<Format>, capture: &[u8]) -> CaptureReport {
@@ -450,7 +451,8 @@ fn hint_sequence(format: &Format, slices: &[&[u8]], closed_at: Option<Field>, hi
 fn hint_timestamp(format: &Format, slices: &[&[u8]], hints: &mut Vec<Hint>) {
     let Some(timestamp) = format.timestamp else { return };
     let values = |field: Field| slices.iter().filter_map(move |slice| field.read(slice)).collect::<Vec<_>>();
-    // Ahead by less than a thousandth of the way round: a clock that is read in order, and not one whose high bytes are low.
+    // Ahead by less than a thousandth of the way round: a clock that is read in order, and not one whose high
+    // bytes are low.
     let in_order = |values: &[u64]| {
         nearly_all(values.iter().zip(values.iter().skip(1)).map(|(a, b)| {
             let ahead = (u128::from(*b) + timestamp.wrap - u128::from(*a) % timestamp.wrap) % timestamp.wrap;
@@ -530,26 +532,27 @@ impl fmt::Display for Hint {
             ),
             Self::FrameBytes { described, found: None, syncs } => write!(
                 f,
-                "frame.sync: found {syncs} times, but neither every {described} bytes nor at another distance again and \
-                 again; are these its bytes, and does the capture lack some?"
+                "frame.sync: found {syncs} times, but neither every {described} bytes nor at another distance \
+                 again and again; are these its bytes, and does the capture lack some?"
             ),
             Self::LengthAdds { value, adds } => {
                 write!(f, "frame.length.adds: the field says {value} in every frame; write adds = {adds}")
             }
             Self::LengthEndian { endian } => {
-                write!(f, "frame.length.endian: the field is right in the other byte order; write \"{}\"", name(*endian))
+                let endian = name(*endian);
+                write!(f, "frame.length.endian: the field is right in the other byte order; write \"{endian}\"")
             }
             Self::LengthVaries { values: [a, b] } => write!(
                 f,
-                "frame.length.offset: the field says {a} and {b} in frames of one length; the length lies elsewhere, or \
-                 leave it out"
+                "frame.length.offset: the field says {a} and {b} in frames of one length; the length lies \
+                 elsewhere, or leave it out"
             ),
             Self::ChecksumIs { algorithm, from, offset, endian, differs } => {
                 let field = differs.first().map_or("checksum".to_owned(), |first| format!("checksum.{first}"));
                 write!(
                     f,
-                    "{field}: the checksum holds if it is {algorithm}, covers from byte {from}, stands at byte {offset} \
-                     and is \"{}\"",
+                    "{field}: the checksum holds if it is {algorithm}, covers from byte {from}, stands at byte \
+                     {offset} and is \"{}\"",
                     name(*endian)
                 )?;
                 match differs.as_slice() {

@@ -98,8 +98,8 @@ fn another_length_is_seen() {
         [
             "frame.bytes: sync is found every 40 bytes (29 times of 30), but the description says frames of 41",
             "frame.length.adds: the field says 36 in every frame; write adds = 4",
-            "checksum.offset: the checksum holds if it is crc16 with polynomial = 0x8005, init = 0xffff, reflect = true, \
-         xorout = 0x0000, covers from byte 2, stands at byte 38 and is \"little\"; the description differs in offset",
+            "checksum.offset: the checksum holds if it is crc16 with polynomial = 0x8005, init = 0xffff, \
+         reflect = true, xorout = 0x0000, covers from byte 2, stands at byte 38 and is \"little\"; the description differs in offset",
         ]
     );
 }
@@ -109,10 +109,8 @@ fn another_sync_is_seen() {
     let hints = hints(&[("0xA5, 0x5A", "0x5A, 0xA5")]);
     assert_eq!(
         hints,
-        [
-            "frame.sync: the bytes 5A A5 are nowhere; in the opposite order they are there 30 times; A5 5A is there every \
-         40 bytes, first at 0"
-        ]
+        ["frame.sync: the bytes 5A A5 are nowhere; in the opposite order they are there 30 times; A5 5A \
+         is there every 40 bytes, first at 0"]
     );
 }
 
@@ -151,16 +149,15 @@ fn the_length_field_is_corrected() {
     ]);
     assert_eq!(
         varies,
-        [
-            "frame.length.offset: the field says 0 and 1 in frames of one length; the length lies elsewhere, or leave it out"
-        ]
+        ["frame.length.offset: the field says 0 and 1 in frames of one length; the length lies elsewhere, \
+         or leave it out"]
     );
 }
 
 #[test]
 fn the_checksum_is_corrected() {
-    let holds = "the checksum holds if it is crc16 with polynomial = 0x8005, init = 0xffff, reflect = true, xorout = 0x0000, \
-                 covers from byte 2, stands at byte 38 and is \"little\"; the description";
+    let holds = "the checksum holds if it is crc16 with polynomial = 0x8005, init = 0xffff, reflect = true, \
+                 xorout = 0x0000, covers from byte 2, stands at byte 38 and is \"little\"; the description";
     assert_eq!(hints(&[("from = 2", "from = 0")]), [format!("checksum.from: {holds} differs in from")]);
     assert_eq!(
         hints(&[("from = 2", "from = 2\nendian = \"big\"")]),

@@ -138,7 +138,8 @@ impl Crc {
 
     fn lowest_first(&self, mut crc: u32, bytes: &[u8]) -> u32 {
         let (eights, rest) = bytes.as_chunks::<8>();
-        // The update is linear over exclusive or, so that the bytes of a block can be looked up independently.
+        // The update is linear over exclusive or, so that the bytes of a block can be looked up
+        // independently.
         for &[b0, b1, b2, b3, b4, b5, b6, b7] in eights {
             let [c0, c1, c2, c3] = crc.to_le_bytes();
             crc = self.block([b0 ^ c0, b1 ^ c1, b2 ^ c2, b3 ^ c3, b4, b5, b6, b7]);

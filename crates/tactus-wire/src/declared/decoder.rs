@@ -12,9 +12,10 @@ use crate::wrapping::{Step, Wrapping};
 /// `None`; what comes out of a stream does not depend on how it was cut. It holds at most one unfinished
 /// frame and what was pushed since, and makes nothing new for a frame.
 ///
-/// With a checksum, the first whole frame after garbage is found when its last byte arrives. Without one, a frame in which sync
-/// bytes begin anew may be none, but the end of one and the beginning of the next: it is believed only if sync bytes
-/// follow it, so that it is given when these arrive. A longer sync makes that rare.
+/// With a checksum, the first whole frame after garbage is found when its last byte arrives. Without one, a
+/// frame in which sync bytes begin anew may be none, but the end of one and the beginning of the next: it is
+/// believed only if sync bytes follow it, so that it is given when these arrive. A longer sync makes that
+/// rare.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     format: Arc<Format>,

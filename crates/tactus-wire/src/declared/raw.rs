@@ -7,8 +7,8 @@ pub const SCHEMA: &str = "tactus.link/1";
 
 /// A description as it is written; [`check`](RawFormat::check) makes a [`Format`](super::Format) of it.
 ///
-/// Offsets are in bytes from the beginning of the frame, that is from the first sync byte; negative ones are from its
-/// end.
+/// Offsets are in bytes from the beginning of the frame, that is from the first sync byte; negative ones are
+/// from its end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawFormat {
@@ -121,8 +121,9 @@ pub struct RawSamples {
 pub enum SampleType {
     /// One byte.
     U8,
-    /// Twelve bits; two samples in three bytes, a last odd one in two. `little`: the first sample is the first byte and the low half
-    /// of the second. `big`: it is the first byte and the high half of the second, the byte above the half.
+    /// Twelve bits; two samples in three bytes, a last odd one in two. `little`: the first sample is the
+    /// first byte and the low half of the second. `big`: it is the first byte and the high half of the
+    /// second, the byte above the half.
     U12,
     /// Two bytes.
     U16,
@@ -143,7 +144,8 @@ pub enum SampleType {
 pub enum RawOrder {
     /// One of the usual ones.
     Named(OrderName),
-    /// The element that each sample belongs to, in the order of the wire; elements are counted from 0, row-major.
+    /// The element that each sample belongs to, in the order of the wire; elements are counted from 0,
+    /// row-major.
     Elements(Vec<usize>),
 }
 
@@ -222,7 +224,8 @@ pub struct RawChecksum {
     pub reflect: Option<bool>,
     /// What the result of a CRC is combined with; for crc32 0xFFFFFFFF if absent.
     pub xorout: Option<u32>,
-    /// Of the nine characters `123456789`, as catalogues of checksums list it: a guard against a wrong parameter.
+    /// Of the nine characters `123456789`, as catalogues of checksums list it: a guard against a wrong
+    /// parameter.
     pub check: Option<u32>,
 }
 

@@ -62,3 +62,18 @@ fn pr2_fingertip() {
     decoder.push(&packet);
     assert!(!decoder.next_frame().unwrap().stale);
 }
+
+#[test]
+fn the_example_in_the_documentation_is_good() {
+    let documentation = include_str!("../declared.rs");
+    let example: String = documentation
+        .lines()
+        .map_while(|line| line.strip_prefix("//!"))
+        .skip_while(|line| *line != " ```toml")
+        .skip(1)
+        .take_while(|line| *line != " ```")
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    let format = toml::from_str::<RawFormat>(&example.replace("[3, 0, ...]", "")).unwrap().check().unwrap();
+    assert_eq!((format.name(), format.frame_bytes()), ("my array", 104));
+}

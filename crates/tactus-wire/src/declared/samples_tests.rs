@@ -88,8 +88,8 @@ proptest! {
         shuffle in any::<prop::sample::Index>(),
     ) {
         let endian = if big { Endian::Big } else { Endian::Little };
-        let counts: Vec<f32> =
-            counts.into_iter().map(|count| if kind == SampleType::U8 { f32::from(count % 256) } else { count.into() }).collect();
+        let greatest = if kind == SampleType::U8 { 255 } else { 4095 };
+        let counts: Vec<f32> = counts.into_iter().map(|count| f32::from(count.min(greatest))).collect();
         let turn = shuffle.index(counts.len());
         let places = (0..counts.len()).map(|element| (element + turn) % counts.len()).collect();
         let samples = Samples { places: Some(places), offset: 3, ..samples(kind, endian, counts.len()) };

@@ -9,7 +9,8 @@ const MAX_LOOKED_AT_BYTES: usize = 1 << 16;
 /// Strides that are looked at more closely.
 const CANDIDATES: usize = 64;
 
-/// Share of frames that must have the same byte for it to be called constant, and that must step by one for a counter.
+/// Share of frames that must have the same byte for it to be called constant, and that must step by one for a
+/// counter.
 const NEARLY_ALL: f64 = 0.97;
 
 /// A stride this much like the best is preferred to it if it is shorter.
@@ -25,22 +26,24 @@ pub struct Proposal {
     pub stride: usize,
     /// Share of the bytes that are the same one stride later, beyond what chance explains; up to 1.
     pub likeness: f64,
-    /// Bytes that are there once in every stride, at the same place; likely what frames begin with, or a part of it.
+    /// Bytes that are there once in every stride, at the same place; likely what frames begin with, or a part
+    /// of it.
     pub sync: Vec<u8>,
     /// Where they stand first.
     pub first_at: usize,
     /// Bytes that are the same in every frame, as offsets from the sync.
     pub constant: Vec<usize>,
-    /// Bytes that count by one from frame to frame, as offsets from the sync: likely the low byte of a sequence.
+    /// Bytes that count by one from frame to frame, as offsets from the sync: likely the low byte of a
+    /// sequence.
     pub counters: Vec<usize>,
 }
 
 /// Looks for frames of one length in bytes of which nothing is known.
 ///
-/// The bytes are compared with themselves one stride later, for all strides up to [`MAX_STRIDE_BYTES`] and a third of the
-/// capture; a stride is proposed if bytes that do not change mark each frame once. Best first; none if nothing
-/// repeats. The first 64 KiB are looked at. A second of recording is enough as a rule, and one in which nothing touches
-/// the array is best. Lost bytes, and frames of several lengths, spoil it.
+/// The bytes are compared with themselves one stride later, for all strides up to [`MAX_STRIDE_BYTES`] and a
+/// third of the capture; a stride is proposed if bytes that do not change mark each frame once. Best first;
+/// none if nothing repeats. The first 64 KiB are looked at. A second of recording is enough as a rule, and
+/// one in which nothing touches the array is best. Lost bytes, and frames of several lengths, spoil it.
 pub fn propose(capture: &[u8]) -> Vec<Proposal> {
     let bytes = capture.get(..MAX_LOOKED_AT_BYTES).unwrap_or(capture);
     let chance = chance(bytes);

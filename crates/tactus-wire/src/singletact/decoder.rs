@@ -7,12 +7,13 @@ use super::{HEADER, Reply, Request, USB_HEADER, reply, request};
 /// Finds packets in a stream that may be cut anywhere and hold garbage.
 ///
 /// Feed it with [`push`](Self::push); then the host calls [`next_reply`](Self::next_reply), the device
-/// [`next_request`](Self::next_request), until it gives `None`. What comes out does not depend on how the stream was
-/// cut. It holds at most one unfinished packet and what was pushed since.
+/// [`next_request`](Self::next_request), until it gives `None`. What comes out does not depend on how the
+/// stream was cut. It holds at most one unfinished packet and what was pushed since.
 ///
 /// There is no checksum. A packet is believed if header, address, length and footer agree; of packets that
-/// overlap, the one that ends first, and of those the one that begins last. So the first whole packet after garbage is found when its last byte arrives,
-/// unless the garbage ends with a whole header whose length happens to lead to four footer bytes within that packet.
+/// overlap, the one that ends first, and of those the one that begins last. So the first whole packet after
+/// garbage is found when its last byte arrives, unless the garbage ends with a whole header whose length
+/// happens to lead to four footer bytes within that packet.
 #[derive(Debug, Clone, Default)]
 pub struct Decoder {
     bytes: Vec<u8>,
@@ -97,7 +98,8 @@ impl Decoder {
         }
     }
 
-    /// Of the packets that begin at `from` or later and end by `limit`, the one that ends first; of those the last.
+    /// Of the packets that begin at `from` or later and end by `limit`, the one that ends first; of those the
+    /// last.
     fn first_to_end_within(
         &self,
         from: usize,

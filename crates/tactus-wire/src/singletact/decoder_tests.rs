@@ -9,7 +9,8 @@ fn reply(id: u8) -> Vec<u8> {
     Reply { via, address: 4, timed_out: false, id, timestamp_ticks: 0xFFFF_FFFF, data: &data }.encode()
 }
 
-/// The ids that come out if the stream arrives in pieces of these lengths, over and over; and the bytes skipped.
+/// The ids that come out if the stream arrives in pieces of these lengths, over and over; and the bytes
+/// skipped.
 fn decode(stream: &[u8], pieces: &[usize], requests: bool) -> (Vec<u8>, u64) {
     let mut decoder = Decoder::new();
     let mut ids = Vec::new();

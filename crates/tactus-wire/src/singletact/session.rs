@@ -19,10 +19,10 @@ pub const STALE_AFTER: Duration = Duration::from_secs(1);
 
 /// A conversation over one connection: polls the elements in turn, a round in every interval.
 ///
-/// Call [`start`](Self::start) once, [`receive`](Self::receive) with what arrives and
-/// [`timer`](Self::timer) when [`deadline`](Self::deadline) has come; do what the actions say, in their
-/// order. Times never go back. There is one request on the way at any time; a round that takes longer than
-/// the interval is followed by the next at once. A lost element is still polled, and found again when it answers.
+/// Call [`start`](Self::start) once, [`receive`](Self::receive) with what arrives and [`timer`](Self::timer)
+/// when [`deadline`](Self::deadline) has come; do what the actions say, in their order. Times never go back.
+/// There is one request on the way at any time; a round that takes longer than the interval is followed by
+/// the next at once. A lost element is still polled, and found again when it answers.
 #[derive(Debug)]
 pub struct Session {
     interval: Duration,
@@ -38,7 +38,8 @@ pub struct Session {
 /// What is polled.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Config {
-    /// I2C addresses, each below 128 and once; a reading names its place in this list.
+    /// I2C addresses, each below 128 and once; a reading names its place in this list. Every element answers
+    /// at 4 too, so that 4 serves only where there is one.
     pub addresses: Vec<u8>,
     /// From the beginning of one round to that of the next; zero for as fast as they answer.
     pub interval: Duration,
@@ -89,12 +90,13 @@ pub struct Reading {
     pub element: usize,
     /// The board's clock at the answer, unwrapped, in units of [`TICK`].
     pub tick: u64,
-    /// The ticks of earlier readings are from another clock: this is the first reading, or the board has restarted.
+    /// The ticks of earlier readings are from another clock: this is the first reading, or the board has
+    /// restarted.
     pub new_clock: bool,
     /// The element's own count of its readings, as received; wraps at 65 536.
     pub counter: u16,
-    /// Readings of the element that lie between the one before and this, unseen. An element that reads faster than it
-    /// is polled passes some over as a rule. 0 for the first.
+    /// Readings of the element that lie between the one before and this, unseen. An element that reads faster
+    /// than it is polled passes some over as a rule. 0 for the first.
     pub passed_over: u64,
     /// The value.
     pub counts: u16,

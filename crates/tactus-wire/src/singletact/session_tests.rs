@@ -13,7 +13,8 @@ enum Input {
 
 use Input::{Hear, Start, Timer};
 
-/// Plays a dialogue with the elements 4 and 9, polled every 20 ms: each input must lead to exactly these actions.
+/// Plays a dialogue with the elements 4 and 9, polled every 20 ms: each input must lead to exactly these
+/// actions.
 fn check(dialogue: impl IntoIterator<Item = (u64, Input, Vec<Action>)>) -> Session {
     let config = Config { addresses: vec![4, 9], interval: Duration::from_millis(20) };
     let mut session = Session::new(config).unwrap();
