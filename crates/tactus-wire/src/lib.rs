@@ -4,6 +4,11 @@
 //! [`Duration`](core::time::Duration) since an instant of the caller's choice, the same for all calls.
 #![warn(clippy::indexing_slicing)]
 
+pub mod anyskin;
+pub mod declared;
 pub mod grbl;
+pub mod singletact;
 pub mod weiss;
 pub mod zaber;
+
+mod wrapping;

@@ -8,12 +8,15 @@
 //! AA AA AA | id: u8 | length: u16 LE | payload | crc: u16 LE
 //! ```
 //!
-//! with the checksum only where there is a payload; it covers id, length and payload. Firmware older
-//! than that library closes a packet with an 8-bit sum instead; that form is not supported.
+//! with the checksum only where there is a payload; it covers id, length and payload. Firmware older than
+//! that library closes a packet with an 8-bit sum instead, taken here to cover the same bytes; no published
+//! source says which. All encoders write the newer form, and [`Checksum::close`] turns it into the older one;
+//! [`Decoder`] and [`Config`] are told which to expect.
 //!
 //! [`Decoder`] serves both ends of the link: the host reads replies and frames with it, a virtual
 //! device reads [`Command`]s. [`Session`] is the host's side of the conversation.
 
+mod checksum;
 mod command;
 mod crc;
 mod decoder;
@@ -23,6 +26,7 @@ mod packet;
 mod session;
 mod ticks;
 
+pub use checksum::Checksum;
 pub use command::{
     Command, CommandError, acknowledge, acquire, query_controller, query_matrix, query_sensor,
 };

@@ -3,13 +3,10 @@
 use std::ops::Range;
 
 use super::packet::{HEADER_BYTES, SYNC};
-use super::{BOOT_MESSAGE, Packet, crc};
+use super::{BOOT_MESSAGE, Checksum, Packet};
 
 /// Longest payload that [`Decoder::new`] believes in.
 const DEFAULT_MAX_PAYLOAD_BYTES: usize = 4096;
-
-/// Bytes after the payload.
-const CHECKSUM_BYTES: usize = 2;
 
 /// Finds packets in a stream that may be cut anywhere and hold garbage.
 ///
@@ -26,6 +23,7 @@ pub struct Decoder {
     /// Bytes before this are done with.
     start: usize,
     max_payload_bytes: usize,
+    checksum: Checksum,
     /// How much of [`BOOT_MESSAGE`] the skipped bytes end with.
     boot_matched: usize,
     stats: DecoderStats,
@@ -84,9 +82,16 @@ impl Decoder {
             bytes: Vec::new(),
             start: 0,
             max_payload_bytes: bytes,
+            checksum: Checksum::default(),
             boot_matched: 0,
             stats: DecoderStats::default(),
         }
+    }
+
+    /// The same decoder, for packets that are closed in another form.
+    #[must_use]
+    pub fn with_checksum(self, checksum: Checksum) -> Self {
+        Self { checksum, ..self }
     }
 
     /// Takes what arrived.
@@ -158,14 +163,14 @@ impl Decoder {
         }
         let covered = HEADER_BYTES - SYNC.len() + length;
         let Some((covered, tail)) = rest.split_at_checked(covered) else { return Candidate::Unfinished };
-        let Some(found) = tail.first_chunk::<CHECKSUM_BYTES>() else { return Candidate::Unfinished };
-        let (expected, found) = (crc(covered), u16::from_le_bytes(*found));
+        let Some(found) = self.checksum.read(tail) else { return Candidate::Unfinished };
+        let expected = self.checksum.of(covered);
         let verdict = if expected == found {
             Ok(())
         } else {
             Err(ChecksumError { id, bytes: length, expected, found })
         };
-        Candidate::Whole { end: at + HEADER_BYTES + length + CHECKSUM_BYTES, verdict }
+        Candidate::Whole { end: at + HEADER_BYTES + length + self.checksum.bytes(), verdict }
     }
 
     /// Of the checksummed packets that lie within `from..limit` and end before `limit`, the one that ends first.
@@ -190,7 +195,7 @@ impl Decoder {
         let packet = self.bytes.get(self.start..end)?;
         let id = *packet.get(SYNC.len())?;
         let payload =
-            packet.get(HEADER_BYTES..packet.len().saturating_sub(CHECKSUM_BYTES)).unwrap_or_default();
+            packet.get(HEADER_BYTES..packet.len().saturating_sub(self.checksum.bytes())).unwrap_or_default();
         self.start = end;
         self.boot_matched = 0;
         Some(Packet { id, payload })

@@ -4,8 +4,8 @@ use core::time::Duration;
 
 use super::ticks::{Placed, Ticks};
 use super::{
-    ControllerInfo, Decoder, DecoderStats, ErrorCode, Frame, FrameError, InfoError, MatrixInfo, Packet,
-    SensorInfo, acquire, id, query_controller, query_matrix, query_sensor,
+    Checksum, ControllerInfo, Decoder, DecoderStats, ErrorCode, Frame, FrameError, InfoError, MatrixInfo,
+    Packet, SensorInfo, acquire, id, query_controller, query_matrix, query_sensor,
 };
 
 /// A question that is not answered is asked again after this; an acquisition without fresh frames too.
@@ -38,6 +38,8 @@ pub struct Config {
     pub fps: u16,
     /// Have frames run-length encoded.
     pub run_length: bool,
+    /// How the controller's firmware closes packets, both ways.
+    pub checksum: Checksum,
 }
 
 /// What is there, as it says.
@@ -140,7 +142,7 @@ impl Session {
         let max_payload_bytes = (5 + 4 * config.elements).max(1024);
         Self {
             config,
-            decoder: Decoder::with_max_payload(max_payload_bytes),
+            decoder: Decoder::with_max_payload(max_payload_bytes).with_checksum(config.checksum),
             ticks: Ticks::default(),
             state: State::Over,
             device: Device::default(),
@@ -212,13 +214,14 @@ impl Session {
 
     fn ask(&mut self, now: Duration, question: Question, asked: u32) -> Action {
         self.state = State::Asking { question, asked, deadline: now + ANSWER_TIMEOUT };
-        Action::Send(match question {
+        let packet = match question {
             Question::SwitchOff => acquire(false, false, 0),
             Question::Controller => query_controller(),
             Question::Sensor => query_sensor(),
             Question::Matrix => query_matrix(0),
             Question::SwitchOn => acquire(true, self.config.run_length, self.config.fps),
-        })
+        };
+        Action::Send(self.config.checksum.close(packet))
     }
 
     fn handle(

@@ -2,8 +2,8 @@ use core::time::Duration;
 
 use super::{Action, Config, Device, Loss, Reading, Session, SessionError};
 use crate::weiss::{
-    BOOT_MESSAGE, ControllerInfo, ErrorCode, FrameError, InfoError, MatrixInfo, SensorInfo, acknowledge,
-    acquire, encode_frame, encode_packet, id, query_controller, query_matrix, query_sensor,
+    BOOT_MESSAGE, Checksum, ControllerInfo, ErrorCode, FrameError, InfoError, MatrixInfo, SensorInfo,
+    acknowledge, acquire, encode_frame, encode_packet, id, query_controller, query_matrix, query_sensor,
 };
 
 /// What reaches the session at a time in ms.
@@ -16,9 +16,13 @@ enum Input {
 
 use Input::{Hear, Start, Timer};
 
+fn config(checksum: Checksum) -> Config {
+    Config { elements: 2, fps: 30, run_length: false, checksum }
+}
+
 /// Plays a dialogue: at each line's time the input must lead to exactly these actions.
 fn check(dialogue: impl IntoIterator<Item = (u64, Input, Vec<Action>)>) -> Session {
-    let mut session = Session::new(Config { elements: 2, fps: 30, run_length: false });
+    let mut session = Session::new(config(Checksum::Crc));
     for (ms, input, expected) in dialogue {
         let now = Duration::from_millis(ms);
         let actions = match input {
@@ -231,4 +235,25 @@ fn a_reply_of_another_form_ends_the_session() {
         (0, acknowledged(), send(query_controller())),
         (0, Hear(encode_packet(id::CONTROLLER, &[0; 3])), vec![Action::Failed(SessionError::Answer(error))]),
     ]);
+}
+
+#[test]
+fn older_firmware_is_spoken_to_in_its_form() {
+    let mut session = Session::new(config(Checksum::Sum8));
+    for (ms, input, expected) in greeting(0) {
+        let now = Duration::from_millis(ms);
+        let actions = match input {
+            Start => session.start(now),
+            Hear(bytes) => session.receive(now, &Checksum::Sum8.close(bytes)),
+            Timer => session.timer(now),
+        };
+        let mut expected = expected;
+        for action in &mut expected {
+            if let Action::Send(packet) = action {
+                *packet = Checksum::Sum8.close(packet.clone());
+            }
+        }
+        assert_eq!(actions, expected);
+    }
+    assert_eq!(session.decoder_stats().bad_checksums, 0);
 }

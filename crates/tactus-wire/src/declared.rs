@@ -1,0 +1,90 @@
+//! `declared`: any format of frames of one length, told by a description instead of by code.
+//!
+//! The wire format of the `DigiTacts` kit is not public, and laboratories build arrays of their own. So a
+//! description says how a frame looks; it is written in TOML (`tactus.link/1`, examples in `config/links`)
+//! and checked once:
+//!
+//! ```toml
+//! schema = "tactus.link/1"
+//! name = "my array"
+//! framing = "stream"            # or "packet": each read of the device is one frame
+//!
+//! [frame]
+//! bytes = 104                   # the whole frame
+//! sync = [0xAA, 0x55]           # what it begins with
+//! trailer = []                  # what it ends with
+//! length = { offset = 2, width = 1, adds = 4 }   # bytes of the frame are what this says, and 4
+//!
+//! [samples]
+//! offset = 6
+//! elements = 48
+//! rows = 6
+//! cols = 8
+//! type = "u16"                  # u8, u12 (packed), u16, i16, u32, f32
+//! endian = "little"
+//! order = "row-major"           # or "column-major", or the element of each sample: [3, 0, ...]
+//! bad = [65535]                 # values that mark an element as bad
+//!
+//! [sequence]
+//! offset = 3
+//! width = 1                     # wraps at 256, unless wrap says otherwise
+//!
+//! [timestamp]
+//! offset = 4
+//! width = 2
+//! tick_ns = 1_000_000
+//! unchanged_is_stale = false
+//!
+//! [checksum]
+//! kind = "crc16"                # none, sum8, xor8, crc16, crc32
+//! polynomial = 0x1021
+//! init = 0xFFFF
+//! reflect = false
+//! xorout = 0
+//! check = 0x29B1                # of "123456789": a guard against a wrong parameter
+//! from = 2                      # the first byte that it covers; it stands at the end, behind them all
+//! endian = "big"
+//! ```
+//!
+//! besides `[hid] report_id` and `[usb] interface, endpoint`, which say where frames come from. Negative
+//! offsets are from the frame's end.
+//!
+//! [`RawFormat`] is the description as written, for serde only: whoever reads a file knows its path and shows
+//! where in the file an error lies, and a description can come in other ways than as TOML.
+//! [`RawFormat::check`] makes a [`Format`], or names the field that contradicts the others. [`Decoder`] is
+//! the host's side, [`Encoder`] a virtual device's.
+//!
+//! To match a description to a device, record what it sends: [`propose`] says what bytes of an unknown format
+//! may be, [`check_capture`] holds them against a description, and says how to correct it.
+//!
+//! # Source
+//! The parameters of CRCs are those of the public catalogue of CRC algorithms (width, poly, init, refin and
+//! refout as one, xorout, check).
+
+mod capture;
+mod checksum;
+mod decoder;
+mod encoder;
+mod field;
+mod format;
+mod inspect;
+mod raw;
+mod samples;
+mod sniff;
+
+pub use capture::{CaptureReport, Hint, Mismatch, Stride, check_capture};
+pub use checksum::{Algorithm, CRC32, Crc, CrcParameters, CrcWidth};
+pub use decoder::{Decoder, DecoderStats, Frame};
+pub use encoder::{ElementsError, Encoder};
+pub use field::Field;
+pub use format::{Format, FormatError, MAX_FRAME_BYTES};
+pub use raw::{
+    ChecksumKind, Endian, Framing, OrderName, RawChecksum, RawFormat, RawFrame, RawHid, RawLength, RawOrder,
+    RawSamples, RawSequence, RawTimestamp, RawUsb, SCHEMA, SampleType,
+};
+pub use samples::Samples;
+pub use sniff::{MAX_STRIDE_BYTES, Proposal, propose};
+
+#[cfg(test)]
+#[path = "declared/any_description_tests.rs"]
+mod any_description_tests;

@@ -1,0 +1,85 @@
+//! Whether bytes are a frame of a format.
+
+use super::Format;
+
+/// What stands at a place of a stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// Something else than a frame's beginning.
+    NoHead,
+    /// What may become a frame; it has not all arrived.
+    Unfinished,
+    /// The length field says something else.
+    BadLength { found: u64, expected: u64 },
+    /// It does not end as it should.
+    BadTrailer,
+    /// The checksum does not hold.
+    BadChecksum { found: u64, expected: u64 },
+    /// A frame.
+    Good,
+}
+
+impl Format {
+    /// What stands at the beginning of `bytes`.
+    pub(super) fn inspect(&self, bytes: &[u8]) -> Verdict {
+        if !begins_like(bytes, &self.head) {
+            return Verdict::NoHead;
+        }
+        if let Some(length) = self.length {
+            match length.field.read(bytes) {
+                Some(found) if found != length.value => {
+                    return Verdict::BadLength { found, expected: length.value };
+                }
+                Some(_) | None => {}
+            }
+        }
+        let Some(frame) = bytes.get(..self.bytes) else { return Verdict::Unfinished };
+        if !frame.ends_with(&self.trailer) {
+            return Verdict::BadTrailer;
+        }
+        if let Some(checksum) = &self.checksum {
+            let covered = frame.get(checksum.from..checksum.to).unwrap_or_default();
+            let expected = checksum.algorithm.of(covered).into();
+            let found = checksum.field.read(frame).unwrap_or_default();
+            if found != expected {
+                return Verdict::BadChecksum { found, expected };
+            }
+        }
+        Verdict::Good
+    }
+
+    /// Whether `bytes` begin as a frame does; `None` if they end before that is known.
+    pub(super) fn stands_at(&self, bytes: &[u8]) -> Option<bool> {
+        if !begins_like(bytes, &self.head) {
+            return Some(false);
+        }
+        (bytes.len() >= self.head.len()).then_some(true)
+    }
+
+    /// Offset of the first place where a frame's beginning stands, or stands as far as the bytes reach.
+    pub(super) fn find_head(&self, bytes: &[u8]) -> Option<usize> {
+        let first = *self.head.first()?;
+        let mut at = 0;
+        loop {
+            at += find_byte(first, bytes.get(at..)?)?;
+            if begins_like(bytes.get(at..)?, &self.head) {
+                return Some(at);
+            }
+            at += 1;
+        }
+    }
+}
+
+/// Whether `bytes` begin with `head`, as far as they reach.
+fn begins_like(bytes: &[u8], head: &[u8]) -> bool {
+    bytes.iter().zip(head).all(|(byte, expected)| byte == expected)
+}
+
+/// Offset of the first such byte; looks at blocks, which the compiler compares in one go.
+fn find_byte(wanted: u8, bytes: &[u8]) -> Option<usize> {
+    let (blocks, _) = bytes.as_chunks::<32>();
+    let has_none = |block: &&[u8; 32]| block.iter().fold(0, |any, byte| any | u8::from(*byte == wanted)) == 0;
+    let without = 32 * blocks.iter().take_while(has_none).count();
+    let rest = bytes.get(without..)?;
+    rest.iter().position(|byte| *byte == wanted).map(|offset| without + offset)
+}

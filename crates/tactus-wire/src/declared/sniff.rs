@@ -1,0 +1,180 @@
+//! What bytes of an unknown format say of it.
+
+/// Longest frame that is looked for.
+pub const MAX_STRIDE_BYTES: usize = 4096;
+
+/// So much of a capture is looked at.
+const MAX_LOOKED_AT_BYTES: usize = 1 << 16;
+
+/// Strides that are looked at more closely.
+const CANDIDATES: usize = 64;
+
+/// Share of frames that must have the same byte for it to be called constant, and that must step by one for a
+/// counter.
+const NEARLY_ALL: f64 = 0.97;
+
+/// A stride this much like the best is preferred to it if it is shorter.
+const AS_GOOD: f64 = 0.8;
+
+/// Longest sync that is proposed.
+const MAX_SYNC_BYTES: usize = 8;
+
+/// What a format may be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposal {
+    /// Length of a frame in bytes.
+    pub stride: usize,
+    /// Share of the bytes that are the same one stride later, beyond what chance explains; up to 1.
+    pub likeness: f64,
+    /// Bytes that are there once in every stride, at the same place; likely what frames begin with, or a part
+    /// of it.
+    pub sync: Vec<u8>,
+    /// Where they stand first.
+    pub first_at: usize,
+    /// Bytes that are the same in every frame, as offsets from the sync.
+    pub constant: Vec<usize>,
+    /// Bytes that count by one from frame to frame, as offsets from the sync: likely the low byte of a
+    /// sequence.
+    pub counters: Vec<usize>,
+}
+
+/// Looks for frames of one length in bytes of which nothing is known.
+///
+/// The bytes are compared with themselves one stride later, for all strides up to [`MAX_STRIDE_BYTES`] and a
+/// third of the capture; a stride is proposed if bytes that do not change mark each frame once. Best first;
+/// none if nothing repeats. The first 64 KiB are looked at. A second of recording is enough as a rule, and
+/// one in which nothing touches the array is best. Lost bytes, and frames of several lengths, spoil it.
+pub fn propose(capture: &[u8]) -> Vec<Proposal> {
+    let bytes = capture.get(..MAX_LOOKED_AT_BYTES).unwrap_or(capture);
+    let chance = chance(bytes);
+    let mut likenesses: Vec<(usize, f64)> = (2..=MAX_STRIDE_BYTES.min(bytes.len() / 3))
+        .map(|stride| (stride, likeness(bytes, stride, chance)))
+        .filter(|(_, likeness)| *likeness > 0.0)
+        .collect();
+    likenesses.sort_by(|(a_stride, a), (b_stride, b)| b.total_cmp(a).then(a_stride.cmp(b_stride)));
+    likenesses.truncate(CANDIDATES);
+    let mut proposals: Vec<Proposal> =
+        likenesses.into_iter().filter_map(|(stride, likeness)| proposal(bytes, stride, likeness)).collect();
+    if let Some(best) = proposals.first().map(|best| best.likeness) {
+        proposals.sort_by_key(|proposal| (proposal.likeness < AS_GOOD * best, proposal.stride));
+    }
+    proposals
+}
+
+/// Share of bytes that are the same one stride later, beyond chance.
+fn likeness(bytes: &[u8], stride: usize, chance: f64) -> f64 {
+    let later = bytes.get(stride..).unwrap_or_default();
+    let same: usize = bytes.iter().zip(later).map(|(now, later)| usize::from(now == later)).sum();
+    let same = same as f64 / later.len().max(1) as f64;
+    if chance < 1.0 { (same - chance) / (1.0 - chance) } else { 0.0 }
+}
+
+/// Share of bytes that would be the same in any other order too.
+fn chance(bytes: &[u8]) -> f64 {
+    let length = bytes.len().max(1) as f64;
+    histogram(bytes).iter().map(|count| (*count as f64 / length).powi(2)).sum()
+}
+
+/// How often each byte is there.
+fn histogram<'a>(bytes: impl IntoIterator<Item = &'a u8>) -> [usize; 256] {
+    let mut counts = [0; 256];
+    for byte in bytes {
+        if let Some(count) = counts.get_mut(usize::from(*byte)) {
+            *count += 1;
+        }
+    }
+    counts
+}
+
+/// The proposal for a stride, if bytes mark each frame once.
+fn proposal(bytes: &[u8], stride: usize, likeness: f64) -> Option<Proposal> {
+    let columns: Vec<Column> = (0..stride).map(|phase| Column::of(bytes, stride, phase)).collect();
+    let marks = runs(&columns).into_iter().filter_map(|run| Mark::of(bytes, &columns, run));
+    let mark = marks.max_by_key(|mark| (mark.telling, mark.after_varied))?;
+    let first_at = find(bytes, &mark.sync).next()?;
+    let from_sync = |matches: fn(&Column) -> bool| -> Vec<usize> {
+        let phases = columns.iter().cycle().skip(mark.phase).take(stride).enumerate();
+        phases.filter(|(_, column)| matches(column)).map(|(offset, _)| offset).collect()
+    };
+    Some(Proposal {
+        stride,
+        likeness,
+        first_at,
+        constant: from_sync(|column| column.value.is_some()),
+        counters: from_sync(|column| column.counts),
+        sync: mark.sync,
+    })
+}
+
+/// The bytes at one place of all frames.
+struct Column {
+    /// Theirs, if they are all the same.
+    value: Option<u8>,
+    /// They step by one.
+    counts: bool,
+    /// How many different ones.
+    kinds: usize,
+}
+
+impl Column {
+    fn of(bytes: &[u8], stride: usize, phase: usize) -> Self {
+        let values = || bytes.iter().skip(phase).step_by(stride);
+        let counts = histogram(values());
+        let total = counts.iter().sum::<usize>();
+        let (mode, most) = (0..=u8::MAX).zip(&counts).max_by_key(|(_, count)| **count).unwrap_or((0, &0));
+        let steps = values().zip(values().skip(1)).filter(|(a, b)| a.wrapping_add(1) == **b).count();
+        Self {
+            value: (*most as f64 >= NEARLY_ALL * total as f64).then_some(mode),
+            counts: total > 2 && steps as f64 >= NEARLY_ALL * (total - 1) as f64,
+            kinds: counts.iter().filter(|count| **count > 0).count(),
+        }
+    }
+}
+
+/// Where runs of constant columns begin, and how long they are; a run may go on at the beginning.
+fn runs(columns: &[Column]) -> Vec<(usize, usize)> {
+    let stride = columns.len();
+    let constant = |phase: usize| columns.get(phase % stride).is_some_and(|column| column.value.is_some());
+    (0..stride)
+        .filter(|phase| constant(*phase) && !constant(phase + stride - 1))
+        .map(|phase| (phase, (phase..phase + stride).take_while(|phase| constant(*phase)).count()))
+        .collect()
+}
+
+/// Constant bytes that are there once in every stride.
+struct Mark {
+    phase: usize,
+    sync: Vec<u8>,
+    /// Bytes of its run that are neither 0x00 nor 0xFF, which are rare outside of marks.
+    telling: usize,
+    /// Different bytes in front of it: a checksum in front of a sync varies most.
+    after_varied: usize,
+}
+
+impl Mark {
+    fn of(bytes: &[u8], columns: &[Column], (phase, length): (usize, usize)) -> Option<Self> {
+        let stride = columns.len();
+        let run: Vec<u8> =
+            columns.iter().cycle().skip(phase).take(length).filter_map(|column| column.value).collect();
+        let expected = bytes.len() as f64 / stride as f64;
+        let is_mark = |sync: &&[u8]| {
+            let found = find(bytes, sync).take(bytes.len() / stride * 2 + 2).count() as f64;
+            (found - expected).abs() <= (0.05 * expected).max(1.5)
+        };
+        let lengths = (2..=length.min(MAX_SYNC_BYTES)).chain([1]);
+        let sync = lengths.filter_map(|length| run.get(..length)).find(is_mark)?.to_vec();
+        let telling = run.iter().filter(|byte| !matches!(byte, 0x00 | 0xFF)).count();
+        let before = columns.get((phase + stride - 1) % stride);
+        Some(Self { phase, sync, telling, after_varied: before.map_or(0, |column| column.kinds) })
+    }
+}
+
+/// Where a pattern stands.
+pub(super) fn find<'a>(bytes: &'a [u8], pattern: &'a [u8]) -> impl Iterator<Item = usize> + 'a {
+    let windows = bytes.windows(pattern.len().max(1)).enumerate();
+    windows.filter(move |(_, window)| *window == pattern).map(|(at, _)| at)
+}
+
+#[cfg(test)]
+#[path = "sniff_tests.rs"]
+pub(super) mod tests;

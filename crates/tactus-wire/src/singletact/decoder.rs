@@ -1,0 +1,151 @@
+//! Requests and replies out of a stream of bytes, whatever else is in it.
+
+use std::ops::Range;
+
+use super::{HEADER, Reply, Request, USB_HEADER, reply, request};
+
+/// Finds packets in a stream that may be cut anywhere and hold garbage.
+///
+/// Feed it with [`push`](Self::push); then the host calls [`next_reply`](Self::next_reply), the device
+/// [`next_request`](Self::next_request), until it gives `None`. What comes out does not depend on how the
+/// stream was cut. It holds at most one unfinished packet and what was pushed since.
+///
+/// There is no checksum. A packet is believed if header, address, length and footer agree; of packets that
+/// overlap, the one that ends first, and of those the one that begins last. So the first whole packet after
+/// garbage is found when its last byte arrives, unless the garbage ends with a whole header whose length
+/// happens to lead to four footer bytes within that packet.
+#[derive(Debug, Clone, Default)]
+pub struct Decoder {
+    bytes: Vec<u8>,
+    /// Bytes before this are done with.
+    start: usize,
+    /// A read request ended at `start`: a zero there still belongs to it.
+    zero_belongs: bool,
+    stats: DecoderStats,
+}
+
+/// What a [`Decoder`] met beside good packets, since it was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DecoderStats {
+    /// Bytes that were part of no packet.
+    pub skipped_bytes: u64,
+}
+
+/// What stands at a header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Extent {
+    /// No packet.
+    Impossible,
+    /// It has not all arrived.
+    Unfinished,
+    /// It has arrived.
+    Whole { length: usize },
+}
+
+impl Decoder {
+    /// An empty decoder.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Takes what arrived.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.bytes.drain(..self.start);
+        self.start = 0;
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// The next reply, or `None` until more is pushed.
+    pub fn next_reply(&mut self) -> Option<Reply<'_>> {
+        let packet = self.next_packet(reply::extent)?;
+        Reply::parse(self.bytes.get(packet)?)
+    }
+
+    /// The next request, or `None` until more is pushed.
+    pub fn next_request(&mut self) -> Option<Request<'_>> {
+        if self.zero_belongs
+            && let Some(first) = self.bytes.get(self.start)
+        {
+            self.start += usize::from(*first == 0);
+            self.zero_belongs = false;
+        }
+        let packet = self.next_packet(request::extent)?;
+        self.zero_belongs = packet.len() == READ_BYTES;
+        Request::parse(self.bytes.get(packet)?)
+    }
+
+    /// What it met beside good packets.
+    pub fn stats(&self) -> DecoderStats {
+        self.stats
+    }
+
+    fn next_packet(&mut self, extent: fn(&[u8]) -> Extent) -> Option<Range<usize>> {
+        loop {
+            self.skip_to_header();
+            let outer_at = self.start;
+            let (limit, whole) = match extent(self.bytes.get(outer_at..)?) {
+                Extent::Impossible => {
+                    self.skip(1);
+                    continue;
+                }
+                Extent::Unfinished => (self.bytes.len() + 1, None),
+                Extent::Whole { length } => (outer_at + length, Some(outer_at..outer_at + length)),
+            };
+            let packet = self.first_to_end_within(outer_at + 1, limit, extent).or(whole)?;
+            self.skip(packet.start - outer_at);
+            self.start = packet.end;
+            return Some(packet);
+        }
+    }
+
+    /// Of the packets that begin at `from` or later and end by `limit`, the one that ends first; of those the
+    /// last.
+    fn first_to_end_within(
+        &self,
+        from: usize,
+        mut limit: usize,
+        extent: fn(&[u8]) -> Extent,
+    ) -> Option<Range<usize>> {
+        let mut first = None;
+        let mut at = from;
+        while let Some(offset) = find_header(self.bytes.get(at..limit.min(self.bytes.len()))?) {
+            at += offset;
+            if let Extent::Whole { length } = extent(self.bytes.get(at..)?)
+                && at + length <= limit
+            {
+                first = Some(at..at + length);
+                limit = at + length;
+            }
+            at += 1;
+        }
+        first
+    }
+
+    /// Skips to the next header, or to the end but for what may become one.
+    fn skip_to_header(&mut self) {
+        let rest = self.bytes.get(self.start..).unwrap_or_default();
+        let skipped = find_header(rest).unwrap_or_else(|| {
+            let last = rest.last().copied().filter(|byte| [HEADER, USB_HEADER].contains(byte));
+            let begun = rest.iter().rev().take(3).take_while(|byte| Some(**byte) == last).count();
+            rest.len() - begun
+        });
+        self.skip(skipped);
+    }
+
+    fn skip(&mut self, count: usize) {
+        self.stats.skipped_bytes += count as u64;
+        self.start += count;
+    }
+}
+
+/// Length of a read request but for the zero behind it; no other request is that short.
+const READ_BYTES: usize = 15;
+
+/// Offset of the first four header bytes in a row, of either board.
+fn find_header(bytes: &[u8]) -> Option<usize> {
+    bytes.array_windows().position(|four| *four == [HEADER; 4] || *four == [USB_HEADER; 4])
+}
+
+#[cfg(test)]
+#[path = "decoder_tests.rs"]
+mod tests;
