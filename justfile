@@ -45,7 +45,7 @@ deny-tool:
 
 # Every shipped configuration, rig, model and script goes through the constructor that the service uses.
 validate: build
-    target/debug/tactus validate config/*.toml config/rigs/*.toml config/models/*.toml experiments/*.star
+    target/debug/tactus validate config/*.toml config/rigs/*.toml config/models/*.toml config/links/*.toml experiments/*.star
 
 # The unit file: known keys only, and a sandbox.
 systemd:

@@ -79,7 +79,10 @@ enum Command {
     Design(DesignArgs),
     /// Draw the paper's figures.
     Figures(FiguresArgs),
-    /// Check files: configurations, rigs, models, scripts, tables, recordings.
+    /// Match the description of a device's frames to what the device sends.
+    #[command(subcommand)]
+    Link(LinkCommand),
+    /// Check files: configurations, rigs, models, links, scripts, tables, recordings.
     Validate(ValidateArgs),
     /// Print the completions for a shell.
     Completions {
@@ -380,6 +383,22 @@ pub(crate) struct FiguresArgs {
     pub(crate) out: PathBuf,
 }
 
+#[derive(Debug, Subcommand)]
+enum LinkCommand {
+    /// Check a description, and hold recorded bytes against it: what decodes, where it fails first, what to correct.
+    Check(LinkCheckArgs),
+}
+
+/// Arguments of `link check`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LinkCheckArgs {
+    /// The description, such as config/links/digitacts.toml.
+    pub(crate) file: PathBuf,
+    /// Bytes as the device sent them; packets one behind the other.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) capture: Option<PathBuf>,
+}
+
 /// Arguments of `validate`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ValidateArgs {
@@ -430,6 +449,7 @@ fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
         Command::Simulate(args) => commands::simulate::simulate(common, &args),
         Command::Design(args) => commands::design::design(common, &args),
         Command::Figures(args) => commands::figures::figures(common, &args),
+        Command::Link(LinkCommand::Check(args)) => commands::link::check(common, &args),
         Command::Validate(args) => Ok(commands::validate::validate(common, &args)),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "tactus", &mut std::io::stdout());

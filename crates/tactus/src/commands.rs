@@ -6,6 +6,7 @@ pub(crate) mod design;
 pub(crate) mod discover;
 pub(crate) mod figures;
 pub(crate) mod files;
+pub(crate) mod link;
 pub(crate) mod plan;
 pub(crate) mod run;
 pub(crate) mod simulate;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use tactus_schema::{DeviceTick, Frame, Rig, Stamp, pb};
-use tactus_wire::weiss::{Action, Config, Device, Loss, Reading, Session, SessionError};
+use tactus_wire::weiss::{Action, Checksum, Config, Device, Loss, Reading, Session, SessionError};
 use tokio::sync::mpsc;
 use tokio::time::sleep;
 
@@ -107,7 +107,7 @@ impl ArrayExpectation {
             reason = "saturates, as it should"
         )]
         let fps = self.rate_hz.round() as u16;
-        Config { elements: self.rows * self.cols, fps, run_length: false }
+        Config { elements: self.rows * self.cols, fps, run_length: false, checksum: Checksum::Crc }
     }
 }
 

@@ -10,7 +10,9 @@ use tactus_daemon::experiments;
 use tactus_plan::RigView;
 use tactus_record::Completeness;
 use tactus_schema::{Model, Rig, model, rig};
+use tactus_wire::declared;
 
+use super::link;
 use crate::cli::{Common, ValidateArgs};
 use crate::exit::Exit;
 
@@ -67,10 +69,12 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             TruthFile::from_toml(&text)?;
             Ok("hidden physics for a simulated rig".into())
         }
+        Some(declared::SCHEMA) => Ok(link::in_words(&link::described(file)?)),
         Some(other) => bail!(
-            "schema {other:?} is unknown; there is: {}, {}, {HIDDEN_SCHEMA}",
+            "schema {other:?} is unknown; there is: {}, {}, {}, {HIDDEN_SCHEMA}",
             rig::SCHEMA,
-            model::SCHEMA
+            model::SCHEMA,
+            declared::SCHEMA
         ),
         None => Ok(format!("a service's configuration for rig {:?}", Config::load(file)?.rig.name)),
     }
