@@ -42,7 +42,7 @@
 //! reflect = false
 //! xorout = 0
 //! check = 0x29B1                # of "123456789": a guard against a wrong parameter
-//! from = 2                      # the first byte that it covers; it stands at the end, and covers all before it
+//! from = 2                      # the first byte that it covers; it stands at the end, behind them all
 //! endian = "big"
 //! ```
 //!

@@ -527,8 +527,8 @@ impl fmt::Display for Hint {
             }
             Self::FrameBytes { described, found: Some(Stride { bytes, count }), syncs } => write!(
                 f,
-                "frame.bytes: sync is found every {bytes} bytes ({count} times of {syncs}), but the description says \
-                 frames of {described}"
+                "frame.bytes: sync is found every {bytes} bytes ({count} times of {syncs}), but the \
+                 description says frames of {described}"
             ),
             Self::FrameBytes { described, found: None, syncs } => write!(
                 f,
@@ -540,7 +540,10 @@ impl fmt::Display for Hint {
             }
             Self::LengthEndian { endian } => {
                 let endian = name(*endian);
-                write!(f, "frame.length.endian: the field is right in the other byte order; write \"{endian}\"")
+                write!(
+                    f,
+                    "frame.length.endian: the field is right in the other byte order; write \"{endian}\""
+                )
             }
             Self::LengthVaries { values: [a, b] } => write!(
                 f,
@@ -548,7 +551,8 @@ impl fmt::Display for Hint {
                  elsewhere, or leave it out"
             ),
             Self::ChecksumIs { algorithm, from, offset, endian, differs } => {
-                let field = differs.first().map_or("checksum".to_owned(), |first| format!("checksum.{first}"));
+                let field =
+                    differs.first().map_or("checksum".to_owned(), |first| format!("checksum.{first}"));
                 write!(
                     f,
                     "{field}: the checksum holds if it is {algorithm}, covers from byte {from}, stands at byte \
@@ -561,8 +565,8 @@ impl fmt::Display for Hint {
                 }
             }
             Self::ChecksumUnknown => f.write_str(
-                "checksum.kind: it does not hold, nor does any other that was tried, wherever the covered bytes begin; \
-                 with \"none\" frames are read unprotected",
+                "checksum.kind: it does not hold, nor does any other that was tried, wherever the \
+                 covered bytes begin; with \"none\" frames are read unprotected",
             ),
             Self::SequenceAt { counters } if counters.is_empty() => {
                 f.write_str("sequence.offset: it does not count by one, nor does any byte; leave it out")
@@ -570,7 +574,7 @@ impl fmt::Display for Hint {
             Self::SequenceAt { counters } => {
                 let counters: Vec<String> = counters.iter().map(ToString::to_string).collect();
                 let counters = counters.join(", ");
-                write!(f, "sequence.offset: it does not count by one from frame to frame; these bytes do: {counters}")
+                write!(f, "sequence.offset: it does not count by one; these bytes do: {counters}")
             }
             Self::TimestampEndian { endian } => {
                 let endian = name(*endian);
@@ -581,8 +585,8 @@ impl fmt::Display for Hint {
             }
             Self::SampleEndian { endian, smoother } => write!(
                 f,
-                "samples.endian: from frame to frame the samples change {smoother:.0} times less in the other byte \
-                 order; write \"{}\"",
+                "samples.endian: from frame to frame the samples change {smoother:.0} times less in the other \
+                 byte order; write \"{}\"",
                 name(*endian)
             ),
         }

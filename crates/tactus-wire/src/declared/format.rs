@@ -181,8 +181,8 @@ fn head(framing: Framing, hid: Option<RawHid>, sync: &[u8]) -> Result<Vec<u8>, F
         return Err(wrong("framing", "HID reports are packets; write framing = \"packet\""));
     }
     if framing == Framing::Stream && sync.is_empty() {
-        let problem = "is missing; a stream needs bytes that every frame begins with (or framing = \"packet\", if \
-                       each read of the device is one frame)";
+        let problem = "is missing; a stream needs bytes that every frame begins with (or framing = \
+                       \"packet\", if each read of the device is one frame)";
         return Err(wrong("frame.sync", problem));
     }
     let id = hid.map(|hid| hid.report_id).filter(|id| *id != 0);
@@ -207,8 +207,8 @@ impl RawLength {
             Some(value) if u128::from(value) < field.values() => Ok(Length { field, value }),
             _ => {
                 let problem = format!(
-                    "a frame of {} bytes less {} is nothing that a field of {} bytes can say; set it to frame.bytes \
-                     less what the field says",
+                    "a frame of {} bytes less {} is nothing that a field of {} bytes can say; set it to \
+                     frame.bytes less what the field says",
                     layout.bytes, self.adds, self.width
                 );
                 Err(wrong("frame.length.adds", problem))
@@ -339,7 +339,7 @@ impl RawChecksum {
         }
         if from < offset + width && offset < to {
             let problem = format!(
-                "bytes {from} to {to} hold the checksum itself, at {offset}; it cannot cover itself, end before it"
+                "bytes {from} to {to} hold the checksum itself, at {offset}; it covers no byte of its own"
             );
             return Err(wrong("checksum.to", problem));
         }
@@ -377,8 +377,8 @@ impl RawChecksum {
             (Some(number), _) => Ok(number),
             (None, CrcWidth::Bits32) => Ok(default),
             (None, CrcWidth::Bits16) => {
-                let problem = "is missing; there is no usual crc16. CCITT-FALSE is polynomial = 0x1021, init = 0xFFFF, \
-                               reflect = false, xorout = 0; Modbus is 0x8005, 0xFFFF, true, 0";
+                let problem = "is missing; there is no usual crc16. CCITT-FALSE is polynomial = 0x1021, \
+                               init = 0xFFFF, reflect = false, xorout = 0; Modbus is 0x8005, 0xFFFF, true, 0";
                 Err(wrong(field, problem))
             }
         };
@@ -452,7 +452,7 @@ impl Layout {
         let to = from.saturating_add(bytes);
         if to > self.bytes {
             let problem = format!(
-                "{bytes} bytes from byte {from} on end at {to}, behind the frame of {}; correct it, or frame.bytes",
+                "{bytes} bytes from byte {from} on end at {to}, behind the frame of {}; correct one of them",
                 self.bytes
             );
             return Err(wrong(field, problem));
@@ -460,7 +460,7 @@ impl Layout {
         let other = self.taken.iter().find(|(_, other_from, other_to)| from < *other_to && *other_from < to);
         if let Some((other, other_from, other_to)) = other {
             let problem = format!(
-                "bytes {from} to {} are those of {other} too, which has {other_from} to {}; correct one of them",
+                "bytes {from} to {} are those of {other} too, which has {other_from} to {}; correct one",
                 to - 1,
                 other_to - 1
             );

@@ -107,7 +107,7 @@ fn contradictions_are_named() {
     refused("init = 0xFFFF", "init = 0", "checksum.check", "0x31c3, not 0x29b1");
     refused("kind = \"crc16\"", "kind = \"sum8\"", "checksum.polynomial", "belongs to a crc");
     refused("from = 2", "from = 16", "checksum.from", "nothing lies");
-    refused("from = 2", "to = 18", "checksum.to", "cannot cover itself");
+    refused("from = 2", "to = 18", "checksum.to", "no byte of its own");
     refused("from = 2", "offset = 13", "checksum.offset", "samples.offset");
     refused("endpoint = 0x81", "endpoint = 0x02", "usb.endpoint", "0x82");
     refused("[usb]\ninterface = 1\nendpoint = 0x81", "[hid]\nreport_id = 1", "framing", "packet");

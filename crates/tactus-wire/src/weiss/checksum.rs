@@ -6,7 +6,7 @@ use super::packet::{HEADER_BYTES, SYNC};
 /// How packets with a payload are closed, which depends on the controller's firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Checksum {
-    /// [`crc`], two bytes, low byte first.
+    /// [`crc()`], two bytes, low byte first.
     #[default]
     Crc,
     /// Older firmware: the sum of the same bytes, its low eight bits. One damaged packet in 256 passes.
