@@ -1,16 +1,16 @@
 //! A recording held against a description.
 
+mod hint;
+mod search;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+pub use hint::Hint;
 
 use super::inspect::Verdict;
 use super::sniff::find;
 use super::{Decoder, DecoderStats, Format, Framing};
-
-mod hint;
-mod search;
-
-pub use hint::Hint;
 
 /// Strides that are told.
 const STRIDES_TOLD: usize = 5;
