@@ -7,7 +7,7 @@ use super::{Field, Samples};
 /// Longest frame.
 pub const MAX_FRAME_BYTES: usize = 65_536;
 
-/// A format that can be decoded: a [`RawFormat`] without contradictions.
+/// A format that can be decoded: a [`RawFormat`](super::RawFormat) without contradictions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Format {
     pub(super) name: String,
