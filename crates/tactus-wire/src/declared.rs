@@ -62,12 +62,14 @@
 //! refout as one, xorout, check).
 
 mod capture;
+mod check;
 mod checksum;
 mod decoder;
 mod encoder;
 mod field;
 mod format;
 mod inspect;
+mod layout;
 mod raw;
 mod samples;
 mod sniff;

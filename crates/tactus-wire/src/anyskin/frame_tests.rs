@@ -22,7 +22,7 @@ fn another_end_is_no_frame() {
 proptest! {
     #[test]
     fn round_trip(numbers: [[f32; 4]; 5]) {
-        let magnetometer = |[temperature_c, x, y, z]: [f32; 4]| Magnetometer { temperature_c, field_ut: [x, y, z] };
+        let magnetometer = |[t, x, y, z]: [f32; 4]| Magnetometer { temperature_c: t, field_ut: [x, y, z] };
         let frame = Frame { magnetometers: numbers.map(magnetometer) };
         let bytes = frame.encode();
         // Bytes are compared: NaN is not itself.

@@ -95,12 +95,12 @@ impl Decoder {
         &self.format
     }
 
-    /// Takes what arrived; with [`Framing::Packet`] exactly one packet.
+    /// Takes what arrived; with [`Framing::Packet`] exactly one packet, or nothing.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.drain(..self.start);
         self.gone += self.start as u64;
         self.start = 0;
-        if self.format.framing == Framing::Packet && bytes.len() != self.format.bytes {
+        if self.format.framing == Framing::Packet && bytes.len() != self.format.bytes && !bytes.is_empty() {
             self.stats.bad_lengths += 1;
             self.stats.skipped_bytes += bytes.len() as u64;
             self.gone += bytes.len() as u64;

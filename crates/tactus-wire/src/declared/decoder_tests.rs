@@ -286,6 +286,7 @@ fn packets_are_frames_or_nothing() {
     assert_eq!(good[1], [3, 1, 0, 1, 0, 5]);
     decoder.push(&good[1]);
     assert_eq!(first_counts(&drain(&mut decoder)), [1.0]);
+    decoder.push(&[]);
     decoder.push(&good[1][..5]);
     decoder.push(&[9, 1, 0, 1, 0, 11]);
     decoder.push(&[3, 1, 0, 1, 0, 4]);
