@@ -157,6 +157,7 @@ impl Candidate {
     /// The linear step from nothing, within the ranges: by how much it lessens the cost, and where it ends.
     fn first_step(&self, fitting: &Fitting<'_>, shape: &Term, columns: &[Vec<f64>]) -> (f64, Term) {
         let mut active: Vec<usize> = (0..columns.len()).collect();
+        let wires = matches!(self.shapes, Shapes::Wiring);
         loop {
             if active.is_empty() {
                 return (0.0, shape.clone());
@@ -172,15 +173,14 @@ impl Candidate {
                 let range = self.definition.parameters[parameter].range;
                 let value = shape.values[parameter];
                 let ends = (*step < 0.0 && value <= range[0]) || (*step > 0.0 && value >= range[1]);
-                ends && !matches!(self.shapes, Shapes::Wiring)
+                ends && !wires
             });
             if let Some(outside) = outside {
                 active.remove(outside);
                 continue;
             }
             let mut start = shape.clone();
-            let turns = step.iter().any(|step| !(0.0..CROSSED_SHARE).contains(step));
-            if turns && matches!(self.shapes, Shapes::Wiring) {
+            if wires && step.iter().any(|step| !(0.0..CROSSED_SHARE).contains(step)) {
                 return (step.dot(&right), crossed(start));
             }
             for (place, step) in active.iter().zip(step.iter()) {

@@ -11,4 +11,6 @@ pub mod singletact;
 pub mod weiss;
 pub mod zaber;
 
+#[cfg(test)]
+mod pieces;
 mod wrapping;

@@ -2,6 +2,7 @@ use proptest::prelude::*;
 
 use super::{CONFIRMING_FRAMES, Decoder, DecoderStats};
 use crate::anyskin::{FRAME_BYTES, Frame, Magnetometer};
+use crate::pieces::cut;
 
 /// A frame that is told from others by its number.
 fn frame(number: u8) -> Vec<u8> {
@@ -26,18 +27,12 @@ fn frames(numbers: core::ops::Range<u8>) -> Vec<u8> {
 fn decode(stream: &[u8], pieces: &[usize]) -> (Vec<f32>, DecoderStats) {
     let mut decoder = Decoder::new();
     let mut numbers = Vec::new();
-    let mut rest = stream;
-    for piece in pieces.iter().cycle() {
-        if rest.is_empty() {
-            break;
-        }
-        let (now, later) = rest.split_at((*piece).clamp(1, rest.len()));
-        decoder.push(now);
+    for piece in cut(stream, pieces) {
+        decoder.push(piece);
         while let Some(frame) = decoder.next_frame() {
             numbers.push(frame.magnetometers[2].field_ut[1]);
         }
         assert!(decoder.bytes.len() - decoder.start < CONFIRMING_FRAMES * FRAME_BYTES);
-        rest = later;
     }
     (numbers, decoder.stats())
 }

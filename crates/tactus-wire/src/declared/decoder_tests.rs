@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::{Decoder, DecoderStats};
 use crate::declared::{Encoder, Format, RawFormat};
+use crate::pieces::cut;
 
 fn format(text: &str) -> Arc<Format> {
     Arc::new(toml::from_str::<RawFormat>(text).unwrap().check().unwrap())
@@ -107,16 +108,10 @@ fn drain(decoder: &mut Decoder) -> Vec<Owned> {
 fn decode(format: &Arc<Format>, stream: &[u8], pieces: &[usize]) -> (Vec<Owned>, DecoderStats) {
     let mut decoder = Decoder::new(Arc::clone(format));
     let mut frames = Vec::new();
-    let mut rest = stream;
-    for piece in pieces.iter().cycle() {
-        if rest.is_empty() {
-            break;
-        }
-        let (now, later) = rest.split_at((*piece).clamp(1, rest.len()));
-        decoder.push(now);
+    for piece in cut(stream, pieces) {
+        decoder.push(piece);
         frames.extend(drain(&mut decoder));
         assert!(decoder.bytes.len() - decoder.start < format.frame_bytes() + format.head.len());
-        rest = later;
     }
     (frames, decoder.stats())
 }

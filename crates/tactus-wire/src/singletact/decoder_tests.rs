@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::Decoder;
+use crate::pieces::cut;
 use crate::singletact::{ElementReading, Operation, Reply, Request, Via};
 
 fn reply(id: u8) -> Vec<u8> {
@@ -14,13 +15,8 @@ fn reply(id: u8) -> Vec<u8> {
 fn decode(stream: &[u8], pieces: &[usize], requests: bool) -> (Vec<u8>, u64) {
     let mut decoder = Decoder::new();
     let mut ids = Vec::new();
-    let mut rest = stream;
-    for piece in pieces.iter().cycle() {
-        if rest.is_empty() {
-            break;
-        }
-        let (now, later) = rest.split_at((*piece).clamp(1, rest.len()));
-        decoder.push(now);
+    for piece in cut(stream, pieces) {
+        decoder.push(piece);
         if requests {
             while let Some(request) = decoder.next_request() {
                 ids.push(request.id);
@@ -30,7 +26,6 @@ fn decode(stream: &[u8], pieces: &[usize], requests: bool) -> (Vec<u8>, u64) {
                 ids.push(reply.id);
             }
         }
-        rest = later;
     }
     (ids, decoder.stats().skipped_bytes)
 }

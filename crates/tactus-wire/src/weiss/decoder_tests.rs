@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::{ChecksumError, Decoder, DecoderStats};
+use crate::pieces::cut;
 use crate::weiss::{acquire, crc, encode_frame, encode_packet, query_sensor};
 
 /// A packet or the fault that took its place, owned.
@@ -18,15 +19,9 @@ fn drain(decoder: &mut Decoder) -> Vec<Owned> {
 fn decode(stream: &[u8], pieces: &[usize]) -> (Vec<Owned>, DecoderStats) {
     let mut decoder = Decoder::new();
     let mut packets = Vec::new();
-    let mut rest = stream;
-    for piece in pieces.iter().cycle() {
-        if rest.is_empty() {
-            break;
-        }
-        let (now, later) = rest.split_at((*piece).clamp(1, rest.len()));
-        decoder.push(now);
+    for piece in cut(stream, pieces) {
+        decoder.push(piece);
         packets.extend(drain(&mut decoder));
-        rest = later;
     }
     (packets, decoder.stats())
 }

@@ -13,14 +13,17 @@ use crate::exit::{Exit, Failure};
 use crate::output::{print_fields, say};
 
 pub(crate) fn check(common: &Common, args: &LinkCheckArgs) -> anyhow::Result<Exit> {
-    let format = Arc::new(described(&args.file)?);
+    let file = args.file.display();
+    let text = fs::read_to_string(&args.file).with_context(|| format!("{file} cannot be read"))?;
+    let format = described(&text).map_err(|error| Failure::new(Exit::Usage, format!("{file}: {error}")))?;
+    let format = Arc::new(format);
     let capture = args.capture.as_deref().map(read).transpose()?;
     let report = capture.map(|bytes| check_capture(&format, &bytes));
     if common.json {
         let capture = report.as_ref().map(of_capture);
         say(&json!({ "file": args.file, "format": of_format(&format), "capture": capture }).to_string());
     } else {
-        say(&format!("{}: {}", args.file.display(), in_words(&format)));
+        say(&format!("{file}: {}", in_words(&format)));
         if let Some(report) = &report {
             print(report);
         }
@@ -31,12 +34,9 @@ pub(crate) fn check(common: &Common, args: &LinkCheckArgs) -> anyhow::Result<Exi
 /// A description without contradiction.
 ///
 /// # Errors
-/// If it cannot be read, is no description, or contradicts itself: the line or the field, and what to do.
-pub(crate) fn described(path: &Path) -> anyhow::Result<Format> {
-    let text = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-    let refused = |why: String| Failure::new(Exit::Usage, format!("{}: {why}", path.display()));
-    let raw: RawFormat = toml::from_str(&text).map_err(|error| refused(error.to_string()))?;
-    Ok(raw.check().map_err(|error| refused(error.to_string()))?)
+/// If it is no description or contradicts itself: the line or the field, and what to do.
+pub(crate) fn described(text: &str) -> anyhow::Result<Format> {
+    Ok(toml::from_str::<RawFormat>(text)?.check()?)
 }
 
 /// What is described, in words.

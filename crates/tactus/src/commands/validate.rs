@@ -69,7 +69,7 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             TruthFile::from_toml(&text)?;
             Ok("hidden physics for a simulated rig".into())
         }
-        Some(declared::SCHEMA) => Ok(link::in_words(&link::described(file)?)),
+        Some(declared::SCHEMA) => Ok(link::in_words(&link::described(&text)?)),
         Some(other) => bail!(
             "schema {other:?} is unknown; there is: {}, {}, {}, {HIDDEN_SCHEMA}",
             rig::SCHEMA,
