@@ -54,7 +54,7 @@ const EXCHANGES_MAX: usize = 3;
 const INSEPARABLE_Z: f64 = 3.0;
 const INSEPARABLE_SHARE: f64 = 0.9;
 /// An effect stays if the held-out presses are further off without it by so many standard errors, and by such a share
-/// of what the whole model leaves of them.
+/// of what the whole model leaves of them, where that depends on anything.
 const EARNS_Z: f64 = 2.0;
 const EARNS_SHARE: f64 = 0.3;
 /// Several effects must bring the held-out presses nearer than one alone does, by so many standard errors and by such a
@@ -412,12 +412,16 @@ impl Search<'_> {
         if less.cost - rival.cost <= INSEPARABLE_SHARE * (less.cost - at.cost) {
             return Ok(false);
         }
-        let leaves_something = |one: &Fitted| Ok::<_, DiscoverError>(self.locate(one)?.p_value <= ALPHA);
         let at_does = match *at_leaves_something {
             Some(known) => known,
-            None => *at_leaves_something.insert(leaves_something(at)?),
+            None => *at_leaves_something.insert(self.leaves_something(at)?),
         };
-        Ok(at_does || !leaves_something(rival)?)
+        Ok(at_does || !self.leaves_something(rival)?)
+    }
+
+    /// True if what a model leaves depends on any covariate.
+    fn leaves_something(&self, one: &Fitted) -> Result<bool, DiscoverError> {
+        Ok(self.locate(one)?.p_value <= ALPHA)
     }
 
     /// Takes back what does not earn its place, and puts in its place what serves better.
@@ -433,18 +437,21 @@ impl Search<'_> {
             };
             let fits: Vec<Fitted> =
                 self.problem.threads.map(&names, without).into_iter().collect::<Result<_, _>>()?;
-            let gap = self.problem.heldout_gap(&at.predicted);
-            let worth = |less: &Fitted| {
-                let [gain, error] = self.problem.heldout_gain(less, &at);
-                // Beyond noise, and as much again as a part of what the whole model leaves.
-                let left = EARNS_SHARE * gap.sure();
-                (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(if left > 0.0 {
-                    gain / left
-                } else {
-                    f64::INFINITY
+            let left = EARNS_SHARE * self.problem.heldout_gap(&at.predicted).sure();
+            let worths: Vec<[f64; 2]> = fits
+                .iter()
+                .map(|less| {
+                    let [gain, error] = self.problem.heldout_gain(less, &at);
+                    let of_left = if left > 0.0 { gain / left } else { f64::INFINITY };
+                    [gain / error.max(f64::MIN_POSITIVE) / EARNS_Z, of_left]
                 })
-            };
-            let Some((least, worth)) = fits.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+                .collect();
+            // What is left and depends on nothing is a doubt about the noise, and no measure for a small effect.
+            let is_measure = worths.iter().any(|[clear, of_left]| *clear >= 1.0 && *of_left < 1.0)
+                && self.leaves_something(&at)?;
+            let worth = |[clear, of_left]: &[f64; 2]| if is_measure { clear.min(*of_left) } else { *clear };
+            let Some((least, worth)) =
+                worths.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
             else {
                 return Ok(at);
             };
