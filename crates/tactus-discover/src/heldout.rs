@@ -4,6 +4,9 @@ use crate::fit::{Fitted, Problem};
 
 /// The noise is known to so many standard errors.
 const SURE_Z: f64 = 2.0;
+/// A signal of so many standard deviations of the noise is one, and one of so few is none.
+const LOUD: f64 = 5.0;
+const QUIET: f64 = 0.5;
 /// A gap of so many standard errors is known within a few percent.
 const LARGE_Z: f64 = 20.0;
 
@@ -111,6 +114,42 @@ impl Problem<'_> {
         let value = blocks.iter().map(|[squares, readings]| squares - readings).sum();
         let variance: f64 = blocks.iter().map(|[_, readings]| 2.0 * readings).sum();
         HeldOutGap { value, error: variance.sqrt() }
+    }
+}
+
+impl Problem<'_> {
+    /// What a model surely leaves of the held-out rows, in units of the noise's variance, summed: the readings with a signal
+    /// of all rows, fitted or held out, against those without, which have the same noise.
+    pub(crate) fn surely_left(&self, at: &Fitted) -> f64 {
+        let rows = self.sensor.rows;
+        let elements = rows.elements;
+        let (mut loud, mut quiet, mut held) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let of_rows = rows.counts.chunks_exact(elements).zip(at.predicted.chunks_exact(elements)).enumerate();
+        for (row, (counts, predicted)) in of_rows.filter(|(row, _)| rows.weight[*row] > 0.0) {
+            held[usize::from(rows.heldout[row])] += 1.0;
+            let baseline = &at.parameters.baseline[rows.run[row]];
+            for (((counts, of), weight), baseline) in
+                counts.iter().zip(predicted).zip(&self.element_weight).zip(baseline)
+            {
+                let signal = (of - baseline).abs() * weight.sqrt();
+                let square = rows.weight[row] * weight * (counts - of).powi(2);
+                let [sum, readings] = if signal > LOUD {
+                    &mut loud
+                } else if signal < QUIET {
+                    &mut quiet
+                } else {
+                    continue;
+                };
+                *sum += square;
+                *readings += 1.0;
+            }
+        }
+        if quiet[1] == 0.0 || loud[1] == 0.0 {
+            return 0.0;
+        }
+        let value = loud[0] - quiet[0] / quiet[1] * loud[1];
+        let error = (2.0 * self.memory * (loud[1] + loud[1] * loud[1] / quiet[1])).sqrt();
+        (value - SURE_Z * error).max(0.0) * held[1] / (held[0] + held[1])
     }
 }
 

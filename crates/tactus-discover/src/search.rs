@@ -437,21 +437,17 @@ impl Search<'_> {
             };
             let fits: Vec<Fitted> =
                 self.problem.threads.map(&names, without).into_iter().collect::<Result<_, _>>()?;
-            let left = EARNS_SHARE * self.problem.heldout_gap(&at.predicted).sure();
-            let worths: Vec<[f64; 2]> = fits
-                .iter()
-                .map(|less| {
-                    let [gain, error] = self.problem.heldout_gain(less, &at);
-                    let of_left = if left > 0.0 { gain / left } else { f64::INFINITY };
-                    [gain / error.max(f64::MIN_POSITIVE) / EARNS_Z, of_left]
+            let left = EARNS_SHARE * self.problem.surely_left(&at);
+            let worth = |less: &Fitted| {
+                let [gain, error] = self.problem.heldout_gain(less, &at);
+                // Beyond noise, and as much again as a part of what the whole model leaves.
+                (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(if left > 0.0 {
+                    gain / left
+                } else {
+                    f64::INFINITY
                 })
-                .collect();
-            // What is left and depends on nothing is a doubt about the noise, and no measure for a small effect.
-            let is_measure = worths.iter().any(|[clear, of_left]| *clear >= 1.0 && *of_left < 1.0)
-                && self.leaves_something(&at)?;
-            let worth = |[clear, of_left]: &[f64; 2]| if is_measure { clear.min(*of_left) } else { *clear };
-            let Some((least, worth)) =
-                worths.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+            };
+            let Some((least, worth)) = fits.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
             else {
                 return Ok(at);
             };
