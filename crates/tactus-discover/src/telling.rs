@@ -19,7 +19,8 @@ use crate::{DiscoverError, Options, Rule, not_shown};
 
 /// What is left of the gap at most, for the verdict.
 const EXPLAINED_SHARE: f64 = 0.1;
-/// What is left withdraws all names if it depends on any covariate and is more than this share of a gap that is well known,
+/// What is left withdraws all names if it is certainly more than this share of the gap, or depends on any covariate and is
+/// more than this share of a gap that is well known,
 const UNEXPLAINED_SHARE: f64 = 0.35;
 /// or, of one that is not, depends on one so clearly, and by so much of how clearly it did at first.
 const LEFT_Z: f64 = 5.2;
@@ -62,12 +63,14 @@ pub(crate) fn tell(
     let share = search.share_left(&base, &grown);
     let left = after.p_value <= ALPHA;
     let count = names(&grown.parameters, search.known_terms).len();
+    let certain = if count > 0 { search.certain_share_left(&base, &grown) } else { 0.0 };
     // A small gap is known by what depends on what only; a large one by how much of it is left.
     let clear = after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic);
     let large = search.problem.heldout_gap(&base.predicted).is_large();
     // What one effect leaves, of which it closes most, is what its form lacks; several that leave as much are a patchwork.
     let is_form = count == 1 && search.likely_share_left(&base, &grown) <= UNEXPLAINED_SHARE;
-    let leaves_too_much = left && if large { share > UNEXPLAINED_SHARE } else { clear && !is_form };
+    let leaves_too_much = certain > UNEXPLAINED_SHARE
+        || left && if large { share > UNEXPLAINED_SHARE } else { clear && !is_form };
     if leaves_too_much && options.rule == Rule::Protocol {
         // A model that leaves so much is none of what it is named after.
         grown = base.clone();
@@ -77,7 +80,7 @@ pub(crate) fn tell(
     let verdict = match (named || lattice.is_some(), missing) {
         (false, false) => Verdict::NothingMissing,
         (false, true) => Verdict::Unexplained,
-        (true, _) if share <= EXPLAINED_SHARE || !left => Verdict::Explained,
+        (true, _) if certain <= EXPLAINED_SHARE && (share <= EXPLAINED_SHARE || !left) => Verdict::Explained,
         (true, _) => Verdict::PartlyExplained,
     };
 
@@ -147,7 +150,7 @@ pub(crate) fn tell(
             share: match verdict {
                 Verdict::NothingMissing => 0.0,
                 Verdict::Unexplained => 1.0,
-                Verdict::Explained | Verdict::PartlyExplained => share,
+                Verdict::Explained | Verdict::PartlyExplained => share.max(certain),
             },
         },
         next_experiments,
@@ -230,6 +233,12 @@ impl Search<'_> {
     fn likely_share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
         let left = self.problem.heldout_gap(&grown.predicted).value.max(0.0);
         self.share_of(base, grown, left)
+    }
+
+    /// The same, of readings with a signal against those without: what no doubt about the noise explains away.
+    fn certain_share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
+        let left = self.problem.surely_left(grown);
+        if left > 0.0 { self.share_of(base, grown, left) } else { 0.0 }
     }
 
     fn share_of(&self, base: &Fitted, grown: &Fitted, left: f64) -> f64 {
