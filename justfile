@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd python solid-check discovery-evidence-slice gpu
+ci: fmt lint docs deny test validate systemd python fuzz-slice solid-check discovery-evidence-slice gpu
 
 # The README's second command.
 test:
@@ -163,3 +163,18 @@ gpu:
     cargo clippy -p tactus-scene --features gpu --all-targets -- -D warnings
     cargo test -p tactus-scene --features gpu --test gpu
     cargo run --quiet -p tactus --features gpu -- simulate --scene wrench --roll-deg 10 --gpu
+
+# Every target of `fuzz/` for so many seconds, from nothing or from where the last time ended (target/fuzz/corpus).
+# What makes one panic is kept in fuzz/artifacts; `cargo fuzz run TARGET FILE` shows it again.
+fuzz seconds="600": fuzz-tools
+    for target in $({{ tools }}/bin/cargo-fuzz list); do \
+        mkdir -p target/fuzz/corpus/$target && \
+        {{ tools }}/bin/cargo-fuzz run --sanitizer none --target-dir target/fuzz $target target/fuzz/corpus/$target config/links config/rigs config/models \
+            -- -max_total_time={{ seconds }} -max_len=4096 -print_final_stats=1 || exit 1; \
+    done
+
+# The part of it that CI runs.
+fuzz-slice: (fuzz "5")
+
+fuzz-tools:
+    test -x {{ tools }}/bin/cargo-fuzz || cargo install cargo-fuzz --locked --quiet --root {{ tools }}

@@ -1,5 +1,7 @@
 //! What bytes of an unknown format say of it.
 
+use std::cmp::Reverse;
+
 /// Longest frame that is looked for.
 pub const MAX_STRIDE_BYTES: usize = 4096;
 
@@ -15,6 +17,9 @@ const NEARLY_ALL: f64 = 0.97;
 
 /// A stride this much like the best is preferred to it if it is shorter.
 const AS_GOOD: f64 = 0.8;
+
+/// Runs of constant bytes that are looked for in the whole capture, the most telling first: sync bytes are among those.
+const RUNS_LOOKED_FOR: usize = 16;
 
 /// Longest sync that is proposed.
 const MAX_SYNC_BYTES: usize = 8;
@@ -93,8 +98,9 @@ fn histogram<'a>(bytes: impl IntoIterator<Item = &'a u8>) -> [usize; 256] {
 /// The proposal for a stride, if bytes mark each frame once.
 fn proposal(bytes: &[u8], stride: usize, likeness: f64) -> Option<Proposal> {
     let columns: Vec<Column> = (0..stride).map(|phase| Column::of(bytes, stride, phase)).collect();
-    let marks = runs(&columns).into_iter().filter_map(|run| Mark::of(bytes, &columns, run));
-    let mark = marks.max_by_key(|mark| (mark.telling, mark.after_varied))?;
+    let mut runs: Vec<Run> = runs(&columns).into_iter().map(|run| Run::of(&columns, run)).collect();
+    runs.sort_by_key(|run| Reverse((run.telling, run.after_varied)));
+    let mark = runs.iter().take(RUNS_LOOKED_FOR).find_map(|run| run.mark(bytes, stride))?;
     let first_at = find(bytes, &mark.sync).next()?;
     let from_sync = |matches: fn(&Column) -> bool| -> Vec<usize> {
         let phases = columns.iter().cycle().skip(mark.phase).take(stride).enumerate();
@@ -145,31 +151,41 @@ fn runs(columns: &[Column]) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// Constant bytes that are there once in every stride.
-struct Mark {
+/// Columns side by side in which nothing changes.
+struct Run {
     phase: usize,
-    sync: Vec<u8>,
-    /// Bytes of its run that are neither 0x00 nor 0xFF, which are rare outside of marks.
+    values: Vec<u8>,
+    /// Bytes that are neither 0x00 nor 0xFF, which are rare outside of marks.
     telling: usize,
     /// Different bytes in front of it: a checksum in front of a sync varies most.
     after_varied: usize,
 }
 
-impl Mark {
-    fn of(bytes: &[u8], columns: &[Column], (phase, length): (usize, usize)) -> Option<Self> {
-        let stride = columns.len();
-        let run: Vec<u8> =
+/// Constant bytes that are there once in every stride.
+struct Mark {
+    phase: usize,
+    sync: Vec<u8>,
+}
+
+impl Run {
+    fn of(columns: &[Column], (phase, length): (usize, usize)) -> Self {
+        let values: Vec<u8> =
             columns.iter().cycle().skip(phase).take(length).filter_map(|column| column.value).collect();
+        let telling = values.iter().filter(|byte| !matches!(byte, 0x00 | 0xFF)).count();
+        let before = columns.get((phase + columns.len() - 1) % columns.len());
+        Self { phase, values, telling, after_varied: before.map_or(0, |column| column.kinds) }
+    }
+
+    /// Its shortest beginning of two bytes or more, or else its first byte, that is there once in every stride.
+    fn mark(&self, bytes: &[u8], stride: usize) -> Option<Mark> {
         let expected = bytes.len() as f64 / stride as f64;
         let is_mark = |sync: &&[u8]| {
             let found = find(bytes, sync).take(bytes.len() / stride * 2 + 2).count() as f64;
             (found - expected).abs() <= (0.05 * expected).max(1.5)
         };
-        let lengths = (2..=length.min(MAX_SYNC_BYTES)).chain([1]);
-        let sync = lengths.filter_map(|length| run.get(..length)).find(is_mark)?.to_vec();
-        let telling = run.iter().filter(|byte| !matches!(byte, 0x00 | 0xFF)).count();
-        let before = columns.get((phase + stride - 1) % stride);
-        Some(Self { phase, sync, telling, after_varied: before.map_or(0, |column| column.kinds) })
+        let lengths = (2..=self.values.len().min(MAX_SYNC_BYTES)).chain([1]);
+        let sync = lengths.filter_map(|length| self.values.get(..length)).find(is_mark)?.to_vec();
+        Some(Mark { phase: self.phase, sync })
     }
 }
 
