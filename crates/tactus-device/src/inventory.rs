@@ -85,6 +85,8 @@ pub fn inventory() -> io::Result<Vec<Found>> {
     let mut found = serial_ports(&serial::ports()?, Path::new("/dev/serial/by-id"));
     found.extend(usb_interfaces(&bus::devices(Path::new(bus::ROOT)), &holders));
     found.extend(hid_nodes(hid::nodes()?));
+    // A container may see the machine's devices in `/sys` and have the nodes of few.
+    found.retain(|one| one.node.exists());
     for one in &mut found {
         if access(&one.node, Mode::READ_OK | Mode::WRITE_OK).is_err() {
             one.access = Access::Denied;

@@ -80,6 +80,8 @@ enum Command {
     /// Draw the paper's figures.
     Figures(FiguresArgs),
     /// Which devices are there, what to write into a rig file for each, whether they may be opened, whose they are.
+    ///
+    /// With `--rig RIG.toml`, what that rig means is looked for too.
     Devices(DevicesArgs),
     /// Match the description of a device's frames to what the device sends.
     #[command(subcommand)]
@@ -393,7 +395,7 @@ enum LinkCommand {
     Sniff(LinkSniffArgs),
 }
 
-/// Arguments of `devices`. Its `--rig` may also be a rig's file.
+/// Arguments of `devices`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DevicesArgs {
     /// A service's configuration, whose rig is looked at in place of those in config/rigs and /etc/tactus/rigs.
@@ -421,6 +423,9 @@ pub(crate) struct LinkSniffArgs {
     /// Bits per second of a serial port.
     #[arg(long, value_name = "N", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) baud: u32,
+    /// Number of the interface, of a HID that has several.
+    #[arg(long, value_name = "N")]
+    pub(crate) interface: Option<u8>,
     /// End after so long; else with Ctrl-C.
     #[arg(long, value_name = "S")]
     pub(crate) seconds: Option<f64>,

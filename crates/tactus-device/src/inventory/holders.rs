@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 use std::fs;
+use std::ops::RangeInclusive;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
@@ -25,8 +26,8 @@ pub(super) struct Holders {
     proc: PathBuf,
     /// Process ids by the file's device and number, as the system writes them.
     locks: HashMap<String, u32>,
-    /// Process ids by the node.
-    open: HashMap<PathBuf, u32>,
+    /// Process ids by what their open files are.
+    open: HashMap<Open, u32>,
 }
 
 impl Holders {
@@ -37,8 +38,8 @@ impl Holders {
         let open = pids.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).flat_map(|pid: u32| {
             let files = fs::read_dir(proc.join(pid.to_string()).join("fd")).into_iter().flatten().flatten();
             files.filter_map(move |file| {
-                let node = fs::read_link(file.path()).ok().filter(|node| node.starts_with("/dev"))?;
-                Some((node, pid))
+                fs::read_link(file.path()).ok().filter(|node| node.starts_with("/dev"))?;
+                Some((Open::at(&file.path())?, pid))
             })
         });
         Self { proc: proc.to_owned(), locks: locks.lines().filter_map(lock).collect(), open: open.collect() }
@@ -46,12 +47,32 @@ impl Holders {
 
     /// The program that holds the device at a node, if one is seen to.
     pub(super) fn of(&self, node: &Path) -> Option<Holder> {
-        let node = fs::canonicalize(node).ok()?;
-        let pid = self.locks.get(&key(&node)?).or_else(|| self.open.get(&node))?;
+        let pid = self.locks.get(&key(node)?).or_else(|| self.open.get(&Open::at(node)?))?;
         let name = fs::read_to_string(self.proc.join(pid.to_string()).join("comm")).unwrap_or_default();
         Some(Holder { pid: *pid, name: name.trim().to_owned() })
     }
 }
+
+/// A device as its nodes tell it, of which a container may have its own.
+#[derive(Debug, PartialEq, Eq, Hash)]
+struct Open {
+    device: u64,
+    /// Of a pseudo-terminal: each container counts them anew.
+    file_system: Option<u64>,
+}
+
+impl Open {
+    /// `None` for what is no device. Looking at a node does not open it.
+    fn at(node: &Path) -> Option<Self> {
+        let file = fs::metadata(node).ok()?;
+        let device = file.rdev();
+        let is_pseudo = PSEUDO_TERMINALS.contains(&major(device));
+        (device != 0).then_some(Self { device, file_system: is_pseudo.then_some(file.dev()) })
+    }
+}
+
+/// Their major numbers.
+const PSEUDO_TERMINALS: RangeInclusive<u32> = 136..=143;
 
 /// `1: FLOCK  ADVISORY  WRITE 1234 00:06:567 0 EOF`
 fn lock(line: &str) -> Option<(String, u32)> {

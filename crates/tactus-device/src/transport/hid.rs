@@ -120,7 +120,8 @@ pub(crate) fn nodes() -> io::Result<Vec<HidNode>> {
             node.usages.push(usage);
             continue;
         }
-        let said = |text: Option<&str>| text.filter(|text| !text.is_empty()).map(str::to_owned);
+        let said =
+            |text: Option<&str>| text.map(str::trim).filter(|text| !text.is_empty()).map(str::to_owned);
         let on_usb = matches!(info.bus_type(), BusType::Usb);
         nodes.push(HidNode {
             path,

@@ -90,9 +90,13 @@ pub(super) fn stream(
 
 /// Reads until nobody listens or the link breaks.
 fn pump(name: &str, source: &mut impl PacketSource, sender: &mpsc::Sender<io::Result<Vec<u8>>>) {
+    let mut is_slow = false;
     while !sender.is_closed() {
         let packet = match source.next() {
-            Ok(None) => continue,
+            Ok(None) => {
+                is_slow = false;
+                continue;
+            }
             Ok(Some(packet)) => packet,
             Err(error) => {
                 tracing::debug!(device = name, %error, "the link broke");
@@ -105,7 +109,10 @@ fn pump(name: &str, source: &mut impl PacketSource, sender: &mpsc::Sender<io::Re
             Ok(()) => {}
             Err(TrySendError::Closed(_)) => return,
             Err(TrySendError::Full(packet)) => {
-                tracing::warn!(device = name, "packets are taken too slowly: {PACKETS_MAX} of them wait");
+                // Once, until all has been read that was there.
+                if !mem::replace(&mut is_slow, true) {
+                    tracing::warn!(device = name, "packets are taken too slowly: {PACKETS_MAX} of them wait");
+                }
                 if sender.blocking_send(packet).is_err() {
                     return;
                 }

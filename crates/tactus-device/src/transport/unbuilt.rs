@@ -24,7 +24,7 @@ impl UnbuiltConnector {
 
 impl Connect for UnbuiltConnector {
     fn connect(&self) -> BoxFuture<'_, Result<Box<dyn ByteStream>, DeviceError>> {
-        async { Err(DeviceError::new(self, ErrorKind::Absent, UNBUILT)) }.boxed()
+        async move { Err(DeviceError::new(self, ErrorKind::Absent, UNBUILT)) }.boxed()
     }
 }
 

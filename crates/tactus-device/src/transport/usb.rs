@@ -16,6 +16,7 @@ use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use rusb::{Context, DeviceHandle, UsbContext};
 use tactus_schema::rig::UsbLink;
+use tactus_wire::declared::MAX_FRAME_BYTES;
 use tokio::task::spawn_blocking;
 
 use super::identity::{ABSENT, Candidate, permission, the_one};
@@ -33,8 +34,8 @@ const GAP: Duration = Duration::from_millis(5);
 /// A transfer that goes on for longer is handed out in parts.
 const TRANSFER_MAX: Duration = Duration::from_millis(100);
 
-/// So is a longer one; a described frame has no more.
-const TRANSFER_MAX_BYTES: usize = 65_536;
+/// So is a longer one; no frame has more.
+const TRANSFER_MAX_BYTES: usize = MAX_FRAME_BYTES;
 
 /// A device that does not take a packet within this is not there any more.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
@@ -208,6 +209,14 @@ fn explain(name: impl fmt::Display, device: &UsbDevice, interface: u8, error: ru
             ErrorKind::Busy,
             format!(
                 "another program holds interface {interface}: end it; `fuser -v {}` shows it",
+                device.node().display()
+            ),
+        ),
+        // As in a container that shows the machine's devices and has not been handed them.
+        rusb::Error::NoDevice if !device.node().exists() => (
+            ErrorKind::Absent,
+            format!(
+                "the system knows it, but {} is not here: is it handed to this container?",
                 device.node().display()
             ),
         ),

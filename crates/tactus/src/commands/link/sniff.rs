@@ -21,7 +21,8 @@ use crate::exit::{Exit, Failure};
 use crate::output::{print_fields, say};
 
 pub(crate) fn sniff(common: &Common, args: &LinkSniffArgs) -> anyhow::Result<Exit> {
-    let transport = transport(&args.device, args.baud).map_err(|error| Failure::new(Exit::Usage, error))?;
+    let transport = transport(&args.device, args.baud, args.interface)
+        .map_err(|error| Failure::new(Exit::Usage, error))?;
     let seconds = args.seconds.map(Duration::try_from_secs_f64).transpose();
     let seconds = seconds.map_err(|error| Failure::new(Exit::Usage, format!("--seconds: {error}")))?;
     let mut capture = Capture::new(&transport, args.save.as_deref())?;
@@ -43,7 +44,7 @@ pub(crate) fn sniff(common: &Common, args: &LinkSniffArgs) -> anyhow::Result<Exi
 }
 
 /// What a person writes for a device.
-fn transport(text: &str, baud: u32) -> anyhow::Result<Transport> {
+fn transport(text: &str, baud: u32, interface: Option<u8>) -> anyhow::Result<Transport> {
     let hex = |digits: &str| u8::from_str_radix(digits.strip_prefix("0x").unwrap_or(digits), 16).ok();
     if let Some(rest) = text.strip_prefix("usb:") {
         // From the end, for a serial number may have colons.
@@ -61,7 +62,7 @@ fn transport(text: &str, baud: u32) -> anyhow::Result<Transport> {
     }
     if let Some(identity) = text.strip_prefix("hid:") {
         let identity = identity.parse()?;
-        return Ok(Transport::Hid(HidLink { identity, interface: None, report_bytes: None }));
+        return Ok(Transport::Hid(HidLink { identity, interface, report_bytes: None }));
     }
     if let Some(address) = text.strip_prefix("tcp:") {
         return Ok(Transport::Tcp { address: address.to_owned() });

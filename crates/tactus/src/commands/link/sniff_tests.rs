@@ -16,7 +16,7 @@ fn devices_are_told_as_people_write_them() {
         ("hid:1209:0020/A1", "{ kind = \"hid\", vid = 0x1209, pid = 0x0020, serial = \"A1\" }"),
         ("tcp:10.0.0.7:4001", "{ kind = \"tcp\", address = \"10.0.0.7:4001\" }"),
     ] {
-        assert_eq!(transport(text, 9600).unwrap().to_toml(), toml);
+        assert_eq!(transport(text, 9600, None).unwrap().to_toml(), toml);
     }
 }
 
@@ -29,7 +29,7 @@ fn what_is_no_device_is_refused_with_its_form() {
         ("hid:1209", "VID:PID"),
         ("serial:ttyACM0", "VID:PID"),
     ] {
-        let error = transport(text, 9600).unwrap_err().to_string();
+        let error = transport(text, 9600, None).unwrap_err().to_string();
         assert!(error.contains(form), "{text}: {error}");
     }
 }
@@ -66,7 +66,7 @@ fn of_many_bytes_some_are_shown_and_the_others_counted() {
 }
 
 fn capture(transport: &str, packets: &[&[u8]]) -> Capture {
-    let mut capture = Capture::new(&super::transport(transport, 9600).unwrap(), None).unwrap();
+    let mut capture = Capture::new(&super::transport(transport, 9600, None).unwrap(), None).unwrap();
     for packet in packets {
         capture.take(packet).unwrap();
     }
