@@ -7,6 +7,7 @@
 //! A device that is not read waits, so nothing is lost between it and the reader, however slow that is.
 
 use std::fmt;
+use std::fs::OpenOptions;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -86,7 +87,16 @@ impl UsbConnector {
     /// Opens the device and takes the interface from whatever driver of the system has it.
     fn claim(&self, device: &UsbDevice) -> Result<Arc<DeviceHandle<Context>>, DeviceError> {
         let explain = |error| explain(self, device, self.link.interface, error);
-        let devices = Context::new().and_then(|context| context.devices()).map_err(explain)?;
+        // First by ourselves: libusb tells some refusals, such as those of a systemd unit, as faults of the device.
+        if let Err(error) = OpenOptions::new().read(true).write(true).open(device.node())
+            && let Some(refused) = refused(self, device, error)
+        {
+            return Err(refused);
+        }
+        let devices = Context::new().and_then(|context| context.devices()).map_err(|error| {
+            let what = format!("{NO_LIBUSB} ({error})");
+            DeviceError::from_io(self, ErrorKind::Permission, what, io::Error::other(error))
+        })?;
         let found = devices
             .iter()
             .find(|found| (found.bus_number(), found.address()) == (device.bus, device.address))
@@ -195,28 +205,42 @@ fn in_words(endpoint: UsbEndpoint) -> String {
     format!("{:#04x} ({kind})", endpoint.address)
 }
 
+const NO_LIBUSB: &str = "this program is not let look for USB devices: under systemd, its unit needs AF_NETLINK among \
+    RestrictAddressFamilies";
+
+/// Why its node cannot be opened, if that is for lack of permission or of the node.
+fn refused(name: impl fmt::Display, device: &UsbDevice, error: io::Error) -> Option<DeviceError> {
+    let UsbDevice { vid, pid, .. } = device;
+    let node = device.node();
+    let (kind, what) = if error.kind() == io::ErrorKind::PermissionDenied {
+        let rule =
+            format!("SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vid:04x}\", ATTR{{idProduct}}==\"{pid:04x}\"");
+        (ErrorKind::Permission, permission(node.display(), &rule))
+    } else if error.kind() == io::ErrorKind::NotFound {
+        // As in a container that shows the machine's devices and has not been handed them.
+        let node = node.display();
+        (
+            ErrorKind::Absent,
+            format!("the system knows it, but {node} is not here: is it handed to this container?"),
+        )
+    } else {
+        return None;
+    };
+    Some(DeviceError::from_io(name, kind, format!("{what} ({error})"), error))
+}
+
 /// Why a device could not be opened or its interface not claimed.
 fn explain(name: impl fmt::Display, device: &UsbDevice, interface: u8, error: rusb::Error) -> DeviceError {
+    if error == rusb::Error::Access
+        && let Some(refused) = refused(&name, device, io::ErrorKind::PermissionDenied.into())
+    {
+        return refused;
+    }
     let (kind, what) = match error {
-        rusb::Error::Access => {
-            let UsbDevice { vid, pid, .. } = device;
-            let rule = format!(
-                "SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vid:04x}\", ATTR{{idProduct}}==\"{pid:04x}\""
-            );
-            (ErrorKind::Permission, permission(device.node().display(), &rule))
-        }
         rusb::Error::Busy => (
             ErrorKind::Busy,
             format!(
                 "another program holds interface {interface}: end it; `fuser -v {}` shows it",
-                device.node().display()
-            ),
-        ),
-        // As in a container that shows the machine's devices and has not been handed them.
-        rusb::Error::NoDevice if !device.node().exists() => (
-            ErrorKind::Absent,
-            format!(
-                "the system knows it, but {} is not here: is it handed to this container?",
                 device.node().display()
             ),
         ),
@@ -227,6 +251,7 @@ fn explain(name: impl fmt::Display, device: &UsbDevice, interface: u8, error: ru
         ),
         rusb::Error::Io
         | rusb::Error::InvalidParam
+        | rusb::Error::Access
         | rusb::Error::Timeout
         | rusb::Error::Overflow
         | rusb::Error::Pipe

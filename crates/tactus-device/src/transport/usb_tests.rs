@@ -1,5 +1,7 @@
 use std::collections::VecDeque;
 
+use rustix::io::Errno;
+
 use super::*;
 use crate::bus::tests::{BOARD, sysfs};
 
@@ -51,6 +53,14 @@ fn permission_absence_and_others_programs_are_told_apart() {
     assert_eq!(kind, ErrorKind::Permission);
     assert!(what.contains("/dev/bus/usb/001/007") && what.contains("70-tactus.rules"), "{what}");
     assert!(what.contains("ATTR{idVendor}==\"1209\", ATTR{idProduct}==\"0020\""), "{what}");
+    for (kind, errno) in [
+        (ErrorKind::Permission, Errno::ACCESS),
+        (ErrorKind::Permission, Errno::PERM),
+        (ErrorKind::Absent, Errno::NOENT),
+    ] {
+        assert_eq!(refused("usb", &board, errno.into()).map(|error| error.kind), Some(kind));
+    }
+    assert!(refused("usb", &board, Errno::BUSY.into()).is_none());
     let (kind, what) = explain(rusb::Error::Busy);
     assert_eq!(kind, ErrorKind::Busy);
     assert!(what.contains("another program holds interface 3"), "{what}");
