@@ -1,10 +1,15 @@
 //! `tactus link check`: a description of frames held against what a device sent, made here byte by byte.
+//! `tactus link sniff`: the same bytes, sent by a device on a pseudo-terminal.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::Write;
 use std::path::Path;
 
-use tactus_e2e::{Said, repository, tactus};
+use rustix::process::Signal;
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use serde_json::Value;
+use tactus_e2e::{Process, Said, repository, tactus};
 use tempfile::TempDir;
 
 /// CRC-16/CCITT-FALSE, bit by bit: polynomial 0x1021, from 0xFFFF, not reflected.
@@ -17,11 +22,17 @@ fn crc(bytes: &[u8]) -> u16 {
     })
 }
 
+/// 0 to 3, and nothing that repeats.
+fn noise(index: u8, element: u16) -> u16 {
+    let mixed = (u32::from(index) << 16 | u32::from(element)).wrapping_mul(0x9E37_79B9);
+    u16::try_from((mixed ^ mixed >> 15).wrapping_mul(0x85EB_CA77) >> 30).unwrap()
+}
+
 /// A frame as config/links/digitacts.toml tells it: sync, length, count, clock in ms, 48 samples, checksum.
 fn frame(index: u8) -> Vec<u8> {
     let mut bytes = vec![0xAA, 0x55, 101, index];
     bytes.extend((33 * u32::from(index)).to_le_bytes());
-    bytes.extend((0..48).flat_map(|element: u16| (100 + 7 * element + u16::from(index) % 3).to_le_bytes()));
+    bytes.extend((0..48).flat_map(|element| (100 + 7 * element + noise(index, element)).to_le_bytes()));
     bytes.extend(crc(&bytes[2..]).to_le_bytes());
     bytes
 }
@@ -93,4 +104,78 @@ fn a_contradiction_is_refused_by_the_name_of_its_field() {
     assert!(said.err.contains("chekcsum") && said.err.contains("line"), "{said:?}");
     let validated = tactus(folder.path(), &["validate", "link.toml"]);
     assert_eq!(validated.code, Some(1), "{validated:?}");
+}
+
+/// The near end of a pseudo-terminal, and the path of the far end.
+fn terminal() -> (File, String) {
+    // Else whoever is started here holds the near end too, and the device never goes.
+    let near = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
+    grantpt(&near).unwrap();
+    unlockpt(&near).unwrap();
+    let path = ptsname(&near, Vec::new()).unwrap().into_string().unwrap();
+    (near.into(), path)
+}
+
+#[test]
+fn what_a_device_sends_is_saved_and_its_frames_are_proposed() {
+    let folder = TempDir::new().unwrap();
+    let (mut device, path) = terminal();
+    // As much as a pseudo-terminal takes before somebody reads.
+    let sent = &capture()[..3200];
+    let arguments = ["link", "sniff", &path, "--json", "--bytes", "3200", "--save", "bytes.bin"];
+    let mut sniff = Process::start("tactus", folder.path(), &arguments);
+    sniff.wait_for(&format!("listening to {path}"));
+    device.write_all(sent).unwrap();
+    let line = sniff.wait_for("proposals");
+    assert_eq!(sniff.wait().0, Some(0));
+    let told: Value = serde_json::from_str(&line).unwrap();
+    assert_eq!(
+        [&told["bytes"], &told["broken"], &told["packets"]],
+        [&3200.into(), &Value::Null, &Value::Null]
+    );
+    let proposal = &told["proposals"][0];
+    assert_eq!([&proposal["stride"], &proposal["first_at"]], [106, 3], "{proposal}");
+    assert_eq!(proposal["sync"], serde_json::json!([0xAA, 0x55]), "{proposal}");
+    let next = told["next"].as_str().unwrap();
+    assert!(next.contains("frame.bytes = 106") && next.contains("--capture bytes.bin"), "{next}");
+    assert_eq!(fs::read(folder.path().join("bytes.bin")).unwrap(), sent);
+
+    // And the next step, with the description as it is shipped.
+    fs::write(folder.path().join("link.toml"), shipped()).unwrap();
+    let checked = tactus(folder.path(), &["link", "check", "link.toml", "--capture", "bytes.bin", "--json"]);
+    assert_eq!(checked.json()["capture"]["frames"], 29);
+}
+
+#[test]
+fn listening_ends_well_with_an_interrupt_and_when_the_device_goes() {
+    let folder = TempDir::new().unwrap();
+    let (device, path) = terminal();
+    let mut sniff = Process::start("tactus", folder.path(), &["link", "sniff", &path]);
+    sniff.wait_for("listening");
+    sniff.signal(Signal::INT);
+    let (code, said) = sniff.wait();
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("next: nothing came: is the device switched on"), "{said}");
+
+    let mut sniff = Process::start("tactus", folder.path(), &["link", "sniff", &path]);
+    sniff.wait_for("listening");
+    drop(device);
+    let (code, said) = sniff.wait();
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("ended  "), "{said}");
+}
+
+#[test]
+fn a_device_that_cannot_be_opened_is_told_with_what_to_do() {
+    let folder = TempDir::new().unwrap();
+    for (device, code, says) in [
+        ("/dev/serial/by-id/none", 1, "there is no such port"),
+        ("usb:1209:ffff/none:3:85", 1, "usb:1209:ffff/none: there is no such device"),
+        ("hid:1209:ffff/none", 1, "hid:1209:ffff/none: there is no such device"),
+        ("usb:1209:ffff", 2, "is not usb:VID:PID[/SERIAL]:INTERFACE:ENDPOINT"),
+    ] {
+        let said = tactus(folder.path(), &["link", "sniff", device]);
+        assert_eq!(said.code, Some(code), "{said:?}");
+        assert!(said.err.contains(says), "{said:?}");
+    }
 }

@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
-use tactus_device::transport::{Connect, serial::SerialConnector, tcp::TcpConnector};
+use tactus_device::transport::Connect;
+use tactus_device::transport::hid::HidConnector;
+use tactus_device::transport::serial::SerialConnector;
+use tactus_device::transport::tcp::TcpConnector;
 use tactus_device::{ArrayExpectation, Clock, GrblOptions, GrblStage, WeissSensor};
 use tactus_engine::Devices;
 use tactus_mock::{RigControl, Truth, VirtualRig};
 use tactus_schema::Rig;
-use tactus_schema::rig::{SensorProtocol, Service, StageProtocol, Transport};
+use tactus_schema::rig::{SensorProtocol, Service, StageProtocol, Transport, UsbLink};
 
 /// Started devices, and the truth behind the virtual ones among them.
 #[derive(Debug)]
@@ -51,12 +54,29 @@ pub fn open(rig: &Rig, service: &Service, truth: impl FnOnce() -> Truth, clock: 
 }
 
 fn connector(transport: &Transport, embedded: impl FnOnce() -> Option<Box<dyn Connect>>) -> Box<dyn Connect> {
-    match transport {
-        Transport::Serial { path, baud } => Box::new(SerialConnector::new(path, *baud)),
-        Transport::Tcp { address } => Box::new(TcpConnector::new(address)),
-        Transport::Embedded => match embedded() {
-            Some(connector) => connector,
-            None => unreachable!("a virtual rig was started for every embedded transport"),
-        },
+    match physical(transport).or_else(embedded) {
+        Some(connector) => connector,
+        None => unreachable!("a virtual rig was started for every embedded transport"),
     }
+}
+
+/// The way to a physical device; `None` for one that is embedded.
+pub fn physical(transport: &Transport) -> Option<Box<dyn Connect>> {
+    Some(match transport {
+        Transport::Serial { port, baud } => Box::new(SerialConnector::of(port.clone(), *baud)),
+        Transport::Usb(link) => usb(link.clone()),
+        Transport::Hid(link) => Box::new(HidConnector::new(link.clone())),
+        Transport::Tcp { address } => Box::new(TcpConnector::new(address)),
+        Transport::Embedded => return None,
+    })
+}
+
+#[cfg(feature = "usb")]
+fn usb(link: UsbLink) -> Box<dyn Connect> {
+    Box::new(tactus_device::transport::usb::UsbConnector::new(link))
+}
+
+#[cfg(not(feature = "usb"))]
+fn usb(link: UsbLink) -> Box<dyn Connect> {
+    Box::new(tactus_device::transport::unbuilt::UnbuiltConnector::new(link))
 }

@@ -8,6 +8,8 @@ use std::io;
 pub enum ErrorKind {
     /// There is no such device.
     Absent,
+    /// What is there is another device than the rig file tells, or one of several.
+    WrongDevice,
     /// It is there, but this user may not open it.
     Permission,
     /// Somebody else holds it.

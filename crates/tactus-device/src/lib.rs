@@ -5,8 +5,10 @@
 //! a move done that did not happen. All time is tokio's, so that a paused runtime makes it virtual.
 
 mod backoff;
+mod bus;
 mod clock;
 mod error;
+mod inventory;
 mod link;
 mod sensor;
 mod stage;
@@ -15,5 +17,6 @@ pub mod transport;
 
 pub use clock::Clock;
 pub use error::{DeviceError, ErrorKind};
+pub use inventory::{Access, Found, Holder, inventory};
 pub use sensor::{ArrayExpectation, Sensor, SensorEvent, WeissSensor};
 pub use stage::{GrblOptions, GrblStage, Stage, StageError, Target};

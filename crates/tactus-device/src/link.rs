@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use tactus_schema::{MonoTime, Stamp};
+use tactus_wire::declared::MAX_FRAME_BYTES;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::time::{sleep_until, timeout};
 
@@ -12,8 +13,8 @@ use crate::{Clock, DeviceError, ErrorKind};
 /// A device that does not take a command within this is not there any more.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Read at once; many frames' worth.
-const BUFFER_BYTES: usize = 4096;
+/// Read at once: many frames' worth, and the longest packet whole.
+const BUFFER_BYTES: usize = MAX_FRAME_BYTES;
 
 /// An open link, the clock, and the device's name for errors.
 pub(crate) struct Link {

@@ -8,6 +8,7 @@ mod file;
 mod registration;
 mod service;
 mod simulation;
+mod transport;
 
 use std::collections::BTreeMap;
 
@@ -16,6 +17,7 @@ use tactus_model::{Array, ArrayError, Covering, Indenter, Psf, Registration};
 use crate::description::WrongField;
 
 pub use file::SCHEMA;
+pub use transport::{HidLink, IdentityError, MAX_REPORT_BYTES, SerialPort, Transport, UsbIdentity, UsbLink};
 
 /// A checked rig description.
 #[derive(Debug, Clone, PartialEq)]
@@ -158,25 +160,6 @@ pub struct StageLink {
 pub enum StageProtocol {
     /// Grbl 1.1 and grblHAL.
     Grbl,
-}
-
-/// What carries a device's bytes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Transport {
-    /// The rig's own virtual device, in the service's process.
-    Embedded,
-    /// A serial port or pseudo-terminal.
-    Serial {
-        /// Device path; stable names such as those under by-id are best.
-        path: String,
-        /// Bits per second.
-        baud: u32,
-    },
-    /// A serial server.
-    Tcp {
-        /// `host:port`.
-        address: String,
-    },
 }
 
 /// The truth of a simulated rig, which the service does not see.

@@ -79,6 +79,10 @@ enum Command {
     Design(DesignArgs),
     /// Draw the paper's figures.
     Figures(FiguresArgs),
+    /// Which devices are there, what to write into a rig file for each, whether they may be opened, whose they are.
+    ///
+    /// With `--rig RIG.toml`, what that rig means is looked for too.
+    Devices(DevicesArgs),
     /// Match the description of a device's frames to what the device sends.
     #[command(subcommand)]
     Link(LinkCommand),
@@ -387,6 +391,16 @@ pub(crate) struct FiguresArgs {
 enum LinkCommand {
     /// Check a description, and hold recorded bytes against it: what decodes, where it fails first, what to correct.
     Check(LinkCheckArgs),
+    /// Show the bytes that a device sends, and what they may be.
+    Sniff(LinkSniffArgs),
+}
+
+/// Arguments of `devices`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DevicesArgs {
+    /// A service's configuration, whose rig is looked at in place of those in config/rigs and /etc/tactus/rigs.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
 }
 
 /// Arguments of `link check`.
@@ -397,6 +411,30 @@ pub(crate) struct LinkCheckArgs {
     /// Bytes as the device sent them; packets one behind the other.
     #[arg(long, value_name = "FILE")]
     pub(crate) capture: Option<PathBuf>,
+}
+
+/// Arguments of `link sniff`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LinkSniffArgs {
+    /// A serial port's path, serial:VID:PID[/SERIAL], usb:VID:PID[/SERIAL]:INTERFACE:ENDPOINT, hid:VID:PID[/SERIAL], or
+    /// tcp:HOST:PORT; numbers in hexadecimal but the interface's. `tactus devices` shows what is there.
+    #[arg(value_name = "PORT|usb:VID:PID[/SERIAL]:IFACE:EP|hid:VID:PID")]
+    pub(crate) device: String,
+    /// Bits per second of a serial port.
+    #[arg(long, value_name = "N", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) baud: u32,
+    /// Number of the interface, of a HID that has several.
+    #[arg(long, value_name = "N")]
+    pub(crate) interface: Option<u8>,
+    /// End after so long; else with Ctrl-C.
+    #[arg(long, value_name = "S")]
+    pub(crate) seconds: Option<f64>,
+    /// End after so many bytes.
+    #[arg(long, value_name = "N")]
+    pub(crate) bytes: Option<NonZeroUsize>,
+    /// Where the bytes go, for `link check --capture`.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save: Option<PathBuf>,
 }
 
 /// Arguments of `validate`.
@@ -449,7 +487,9 @@ fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
         Command::Simulate(args) => commands::simulate::simulate(common, &args),
         Command::Design(args) => commands::design::design(common, &args),
         Command::Figures(args) => commands::figures::figures(common, &args),
+        Command::Devices(args) => commands::devices::devices(common, &args),
         Command::Link(LinkCommand::Check(args)) => commands::link::check(common, &args),
+        Command::Link(LinkCommand::Sniff(args)) => commands::link::sniff::sniff(common, &args),
         Command::Validate(args) => Ok(commands::validate::validate(common, &args)),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "tactus", &mut std::io::stdout());

@@ -3,6 +3,7 @@
 pub(crate) mod calibrate;
 pub(crate) mod control;
 pub(crate) mod design;
+pub(crate) mod devices;
 pub(crate) mod discover;
 pub(crate) mod figures;
 pub(crate) mod files;

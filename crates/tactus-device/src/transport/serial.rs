@@ -1,20 +1,23 @@
-//! A serial port, a USB serial device or a pseudo-terminal.
+//! A serial port, a USB serial device or a pseudo-terminal; at a path, or wherever the system has put it.
 
 use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
+use serialport::{SerialPortInfo, SerialPortType};
+use tactus_schema::rig::SerialPort;
 use tokio_serial::SerialPortBuilderExt;
 
+use super::identity::{Candidate, the_one};
 use super::{ByteStream, Connect};
 use crate::{DeviceError, ErrorKind};
 
 /// Opens a serial port: 8 data bits, no parity, 1 stop bit, no flow control, for us alone.
 #[derive(Debug, Clone)]
 pub struct SerialConnector {
-    path: PathBuf,
+    port: SerialPort,
     baud: u32,
 }
 
@@ -22,32 +25,96 @@ impl SerialConnector {
     /// The port at `path`, `baud` bits a second. Of a device's names choose the one that stays with it,
     /// such as those under `/dev/serial/by-id`.
     pub fn new(path: impl Into<PathBuf>, baud: u32) -> Self {
-        Self { path: path.into(), baud }
+        let path: PathBuf = path.into();
+        Self::of(SerialPort::Path(path.to_string_lossy().into_owned()), baud)
+    }
+
+    /// The port, `baud` bits a second. One that is told by its USB device is looked for at each connection.
+    pub fn of(port: SerialPort, baud: u32) -> Self {
+        Self { port, baud }
     }
 
     fn open(&self) -> Result<Box<dyn ByteStream>, DeviceError> {
-        let builder = tokio_serial::new(self.path.to_string_lossy(), self.baud);
-        match builder.open_native_async() {
-            Ok(stream) => Ok(Box::new(stream)),
-            Err(error) => Err(self.explain(error)),
+        let path = self.path()?;
+        match tokio_serial::new(&path, self.baud).open_native_async() {
+            Ok(stream) => {
+                tracing::info!(device = %self, path, baud = self.baud, "opened");
+                Ok(Box::new(stream))
+            }
+            Err(error) => Err(self.explain(&path, error)),
         }
     }
 
-    fn explain(&self, error: tokio_serial::Error) -> DeviceError {
+    /// Where the port is now.
+    fn path(&self) -> Result<String, DeviceError> {
+        match &self.port {
+            SerialPort::Path(path) => Ok(path.clone()),
+            SerialPort::Usb(identity) => {
+                let ports = ports().map_err(|error| {
+                    let what = format!("serial ports cannot be listed: {error}");
+                    DeviceError::from_io(self, ErrorKind::DeviceFault, what, error)
+                })?;
+                let on_usb =
+                    ports.into_iter().filter(|port| matches!(port.port_type, SerialPortType::UsbPort(_)));
+                the_one(self, identity, on_usb.collect(), APART).map(|port| port.port_name)
+            }
+        }
+    }
+
+    fn explain(&self, path: &str, error: tokio_serial::Error) -> DeviceError {
         use tokio_serial::ErrorKind::{InvalidInput, Io, NoDevice, Unknown};
+        let is_there = Path::new(path).exists();
         let (kind, what) = match error.kind {
             Io(io::ErrorKind::PermissionDenied) => (ErrorKind::Permission, PERMISSION),
             // So the library calls it when somebody else has locked the port.
-            NoDevice if self.path.exists() => (ErrorKind::Busy, BUSY),
-            InvalidInput | Unknown | Io(_) if self.path.exists() => (ErrorKind::Protocol, NOT_SERIAL),
+            NoDevice if is_there => (ErrorKind::Busy, BUSY),
+            InvalidInput | Unknown | Io(_) if is_there => (ErrorKind::Protocol, NOT_SERIAL),
             NoDevice | InvalidInput | Unknown | Io(_) => (ErrorKind::Absent, ABSENT),
         };
-        DeviceError::from_io(self, kind, format!("{what} ({error})"), error.into())
+        let what = match &self.port {
+            SerialPort::Path(_) => format!("{what} ({error})"),
+            SerialPort::Usb(_) => format!("{what} ({path}: {error})"),
+        };
+        DeviceError::from_io(self, kind, what, error.into())
     }
 }
 
+/// All serial ports that the system knows, by name; none is opened for it.
+pub(crate) fn ports() -> io::Result<Vec<SerialPortInfo>> {
+    // Where the system shows nothing, as in some containers, the library would panic.
+    if !Path::new("/sys/class/tty").is_dir() {
+        return Ok(Vec::new());
+    }
+    let mut ports = serialport::available_ports()?;
+    ports.sort_by(|a, b| a.port_name.cmp(&b.port_name));
+    Ok(ports)
+}
+
+impl Candidate for SerialPortInfo {
+    /// 0 for both if it is none on USB.
+    fn vid_pid(&self) -> (u16, u16) {
+        match &self.port_type {
+            SerialPortType::UsbPort(usb) => (usb.vid, usb.pid),
+            SerialPortType::PciPort | SerialPortType::BluetoothPort | SerialPortType::Unknown => (0, 0),
+        }
+    }
+
+    fn serial(&self) -> Option<&str> {
+        match &self.port_type {
+            SerialPortType::UsbPort(usb) => usb.serial_number.as_deref().filter(|serial| !serial.is_empty()),
+            SerialPortType::PciPort | SerialPortType::BluetoothPort | SerialPortType::Unknown => None,
+        }
+    }
+
+    fn place(&self) -> String {
+        self.port_name.clone()
+    }
+}
+
+const APART: &str = "Name the serial number in the rig file; of ports that share one, or have none, name the path \
+    under /dev/serial/by-id or by-path instead";
 const ABSENT: &str = "there is no such port: is the device plugged in and switched on, and is the path right? \
-    `ls /dev/serial/by-id` shows what is there";
+    `tactus devices` shows what is there";
 const PERMISSION: &str = "this user may not open the port: add the user to the group that owns it \
     (`ls -l` shows it, often dialout) and log in again";
 const BUSY: &str = "another program holds the port: end that program; `fuser -v` on the path shows it";
@@ -61,7 +128,7 @@ impl Connect for SerialConnector {
 
 impl fmt::Display for SerialConnector {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.path.display())
+        self.port.fmt(f)
     }
 }
 

@@ -1,7 +1,9 @@
+use serialport::{SerialPortInfo, SerialPortType, UsbPortInfo};
+use tactus_schema::rig;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio_serial::{SerialPort, SerialStream};
 
-use super::SerialConnector;
+use super::{APART, SerialConnector, the_one};
 use crate::transport::Connect;
 use crate::{DeviceError, ErrorKind};
 
@@ -57,4 +59,37 @@ async fn a_port_that_somebody_holds_is_busy() {
     assert!(error.to_string().contains("another program holds the port"), "{error}");
     drop(held);
     connector.connect().await.unwrap();
+}
+
+#[tokio::test]
+async fn a_port_that_is_told_by_its_device_is_looked_for() {
+    let port = rig::SerialPort::Usb("1209:ffff/none".parse().unwrap());
+    let error = SerialConnector::of(port, 9600).connect().await.err().expect("it opened");
+    assert_eq!(error.kind, ErrorKind::Absent);
+    assert!(error.to_string().starts_with("serial:1209:ffff/none: there is no such device"), "{error}");
+}
+
+#[test]
+fn of_several_ports_the_one_with_the_serial_number_is_meant() {
+    let port = |name: &str, serial: Option<&str>| SerialPortInfo {
+        port_name: name.to_owned(),
+        port_type: SerialPortType::UsbPort(UsbPortInfo {
+            vid: 0x0403,
+            pid: 0x6001,
+            serial_number: serial.map(str::to_owned),
+            manufacturer: None,
+            product: None,
+        }),
+    };
+    let other = SerialPortInfo { port_name: "/dev/ttyS0".into(), port_type: SerialPortType::Unknown };
+    let find = |identity: &str| {
+        let ports = vec![other.clone(), port("/dev/ttyUSB0", Some("A1")), port("/dev/ttyUSB1", Some("B2"))];
+        the_one("serial", &identity.parse().unwrap(), ports, APART).map(|port| port.port_name)
+    };
+    assert_eq!(find("0403:6001/B2").unwrap(), "/dev/ttyUSB1");
+    let error = find("0403:6001").unwrap_err();
+    assert_eq!(error.kind, ErrorKind::WrongDevice);
+    let text = error.to_string();
+    assert!(text.contains("\"A1\" at /dev/ttyUSB0; serial number \"B2\" at /dev/ttyUSB1"), "{text}");
+    assert!(text.contains("/dev/serial/by-id"), "{text}");
 }

@@ -2,9 +2,8 @@
 
 use serde::Deserialize;
 
-use super::{
-    Envelope, Motion, OnGap, Policy, SensorLink, SensorProtocol, Service, StageLink, StageProtocol, Transport,
-};
+use super::transport::RawTransport;
+use super::{Envelope, Motion, OnGap, Policy, SensorLink, SensorProtocol, Service, StageLink, StageProtocol};
 use crate::description::{WrongField, not_negative, positive, range, wrong};
 
 #[derive(Debug, Deserialize)]
@@ -69,14 +68,6 @@ pub(super) struct RawStageLink {
 #[serde(rename_all = "kebab-case")]
 enum RawStageProtocol {
     Grbl,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-enum RawTransport {
-    Embedded,
-    Serial { path: String, baud: u32 },
-    Tcp { address: String },
 }
 
 /// All of the parts, or none.
@@ -221,25 +212,5 @@ impl RawStageLink {
             },
             transport: self.transport.check("stage.transport")?,
         })
-    }
-}
-
-impl RawTransport {
-    fn check(self, field: &str) -> Result<Transport, WrongField> {
-        match self {
-            Self::Embedded => Ok(Transport::Embedded),
-            Self::Serial { path, baud } if !path.is_empty() && baud > 0 => {
-                Ok(Transport::Serial { path, baud })
-            }
-            Self::Serial { .. } => {
-                Err(wrong(field, "a serial transport needs a path and a baud rate above 0"))
-            }
-            Self::Tcp { address }
-                if address.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok()) =>
-            {
-                Ok(Transport::Tcp { address })
-            }
-            Self::Tcp { address } => Err(wrong(field, format!("address {address:?} is not host:port"))),
-        }
     }
 }

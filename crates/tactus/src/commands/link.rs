@@ -1,4 +1,7 @@
 //! `link check`: is a description of a device's frames without contradiction, and does it fit what the device sends?
+//! `link sniff`: what does it send?
+
+pub(crate) mod sniff;
 
 use std::fs;
 use std::path::Path;

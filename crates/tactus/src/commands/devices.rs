@@ -1,0 +1,231 @@
+//! `devices`: what is there, what to write into a rig file for it, whether it may be opened, and which rig means it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use serde_json::{Value, json};
+use tactus_daemon::config::{self, Config};
+use tactus_device::{Access, Found, inventory};
+use tactus_schema::Rig;
+use tactus_schema::rig::{SerialPort, Transport};
+
+use crate::cli::{Common, DevicesArgs};
+use crate::exit::Exit;
+use crate::output::{print_table, say};
+
+pub(crate) fn devices(common: &Common, args: &DevicesArgs) -> anyhow::Result<Exit> {
+    let rigs = Rigs::find(common.rig.as_deref(), args.config.as_deref())?;
+    let found = inventory().context("the devices of this machine cannot be listed")?;
+    if common.json {
+        say(&to_json(&found, &rigs).to_string());
+    } else {
+        print(&found, &rigs);
+    }
+    Ok(Exit::Done)
+}
+
+/// Where rig files are looked for, if none is named.
+const FOLDERS: [&str; 2] = ["config/rigs", "/etc/tactus/rigs"];
+
+/// What rigs say of their devices.
+#[derive(Debug, Default)]
+struct Rigs {
+    links: Vec<Link>,
+    /// Files that are none.
+    notes: Vec<String>,
+    /// Named by whoever asks: what is not there is then told.
+    are_named: bool,
+}
+
+#[derive(Debug)]
+struct Link {
+    rig: String,
+    /// `sensor` or `stage`.
+    role: &'static str,
+    transport: Transport,
+}
+
+impl Rigs {
+    fn find(rig: Option<&str>, config: Option<&Path>) -> anyhow::Result<Self> {
+        let mut rigs = Self::default();
+        let file =
+            rig.map(Path::new).filter(|rig| rig.extension().is_some_and(|extension| extension == "toml"));
+        if let Some(file) = file {
+            rigs.add(&config::load_rig(file)?.0);
+        }
+        if let Some(config) = config {
+            rigs.add(&Config::load(config)?.rig);
+        }
+        rigs.are_named = file.is_some() || config.is_some();
+        if !rigs.are_named {
+            for file in FOLDERS.iter().flat_map(|folder| toml_files(Path::new(folder))) {
+                match config::load_rig(&file) {
+                    Ok((found, _)) if rig.is_none_or(|name| name == found.name) => rigs.add(&found),
+                    Ok(_) => {}
+                    Err(error) => rigs.notes.push(error.to_string()),
+                }
+            }
+        }
+        Ok(rigs)
+    }
+
+    fn add(&mut self, rig: &Rig) {
+        let Some(service) = &rig.service else { return };
+        for (role, transport) in [("sensor", &service.sensor.transport), ("stage", &service.stage.transport)]
+        {
+            self.links.push(Link { rig: rig.name.clone(), role, transport: transport.clone() });
+        }
+    }
+
+    fn that_mean<'a>(&'a self, found: &'a Found) -> impl Iterator<Item = &'a Link> {
+        self.links.iter().filter(|link| found.is_meant_by(&link.transport))
+    }
+
+    /// What the named rigs mean and is not there.
+    fn missing(&self, found: &[Found]) -> Vec<&Link> {
+        let is_there = |link: &Link| match &link.transport {
+            Transport::Embedded | Transport::Tcp { .. } => true,
+            // A pseudo-terminal is a port too, and not listed.
+            Transport::Serial { port: SerialPort::Path(path), .. } => Path::new(path).exists(),
+            Transport::Serial { .. } | Transport::Usb(_) | Transport::Hid(_) => {
+                found.iter().any(|one| one.is_meant_by(&link.transport))
+            }
+        };
+        self.links.iter().filter(|link| self.are_named && !is_there(link)).collect()
+    }
+}
+
+fn toml_files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<_> = entries
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .collect();
+    files.sort();
+    files
+}
+
+const NOTHING: &str = "nothing that could be a rig's was found: no serial port, no USB interface of a vendor's own, no \
+    human interface device but keyboards and mice. Is the device switched on, is its cable one that carries data, and \
+    does `dmesg` show it when it is plugged in? A container or virtual machine sees only devices that are handed to \
+    it. The simulated rig needs none: `tactus run element-centres --embedded`";
+
+const DENIED_SERIAL: &str = "A serial port without permission: add the user to the group that owns it (`ls -l` shows it, \
+    often dialout) and log in again.";
+
+const DENIED_USB: &str = "USB and HID without permission: the rules of Tactus, /etc/udev/rules.d/70-tactus.rules, need \
+    a line with vendor and product; load them as root with `udevadm control --reload && udevadm trigger`.";
+
+fn print(found: &[Found], rigs: &Rigs) {
+    if found.is_empty() {
+        say(NOTHING);
+    } else {
+        let rows: Vec<_> = found.iter().map(|one| row(one, rigs)).collect();
+        print_table(&["KIND", "DEVICE", "IDENTITY", "AT", "OPEN", "RIG"], &rows);
+        say("");
+        say("In a rig file, under [sensor] or [stage]:");
+        for one in found {
+            say("");
+            say(&format!("    # {}", comment(one)));
+            say(&format!("    transport = {}", one.transport.to_toml()));
+        }
+    }
+    let denied = |serial: bool| {
+        found.iter().any(|one| one.access == Access::Denied && (kind(one) == "serial") == serial)
+    };
+    for (is_so, what) in [(denied(true), DENIED_SERIAL), (denied(false), DENIED_USB)] {
+        if is_so {
+            say("");
+            say(what);
+        }
+    }
+    for Link { rig, role, transport } in rigs.missing(found) {
+        say("");
+        say(&format!("The {role} of rig {rig:?} is not there: {transport}"));
+    }
+    for note in &rigs.notes {
+        eprintln!("tactus: {note}");
+    }
+}
+
+fn row(one: &Found, rigs: &Rigs) -> Vec<String> {
+    let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    let rigs: Vec<_> = rigs.that_mean(one).map(|Link { rig, role, .. }| format!("{rig} ({role})")).collect();
+    vec![
+        kind(one).to_owned(),
+        or_dash(one.product.clone()),
+        or_dash(one.identity.as_ref().map(ToString::to_string)),
+        one.by_id.as_ref().unwrap_or(&one.node).display().to_string(),
+        match &one.access {
+            Access::Free => "yes".to_owned(),
+            Access::Denied => "no permission".to_owned(),
+            Access::Held(None) => "in use".to_owned(),
+            Access::Held(Some(holder)) => format!("in use by {} ({})", holder.name, holder.pid),
+        },
+        or_dash((!rigs.is_empty()).then(|| rigs.join(", "))),
+    ]
+}
+
+fn comment(one: &Found) -> String {
+    let name = one.product.as_deref().unwrap_or("A port");
+    let place = one.node.display();
+    if one.is_stable {
+        format!("{name}, now at {place}")
+    } else {
+        format!("{name}, now at {place}; nothing tells it from others of its kind: plug in one only")
+    }
+}
+
+fn kind(one: &Found) -> &'static str {
+    match one.transport {
+        Transport::Serial { .. } => "serial",
+        Transport::Usb(_) => "usb",
+        Transport::Hid(_) => "hid",
+        Transport::Embedded | Transport::Tcp { .. } => "none",
+    }
+}
+
+fn to_json(found: &[Found], rigs: &Rigs) -> Value {
+    let link = |Link { rig, role, .. }: &Link| json!({ "rig": rig, "role": role });
+    let device = |one: &Found| {
+        let (interface, endpoint_in, endpoint_out) = match &one.transport {
+            Transport::Usb(link) => (Some(link.interface), Some(link.endpoint_in), link.endpoint_out),
+            Transport::Hid(link) => (link.interface, None, None),
+            Transport::Embedded | Transport::Serial { .. } | Transport::Tcp { .. } => (None, None, None),
+        };
+        let (access, held_by) = match &one.access {
+            Access::Free => ("free", None),
+            Access::Denied => ("denied", None),
+            Access::Held(holder) => ("held", holder.as_ref()),
+        };
+        let identity = one.identity.as_ref();
+        json!({
+            "kind": kind(one),
+            "product": one.product,
+            "vid": identity.map(|own| own.vid),
+            "pid": identity.map(|own| own.pid),
+            "serial": identity.and_then(|own| own.serial.as_ref()),
+            "interface": interface,
+            "endpoint_in": endpoint_in,
+            "endpoint_out": endpoint_out,
+            "node": one.node,
+            "by_id": one.by_id,
+            "transport": one.transport.to_toml(),
+            "stable": one.is_stable,
+            "access": access,
+            "held_by": held_by.map(|holder| json!({ "pid": holder.pid, "name": holder.name })),
+            "rigs": rigs.that_mean(one).map(link).collect::<Vec<_>>(),
+        })
+    };
+    json!({
+        "devices": found.iter().map(device).collect::<Vec<_>>(),
+        "missing": rigs.missing(found).into_iter().map(link).collect::<Vec<_>>(),
+        "notes": rigs.notes,
+        "hint": found.is_empty().then_some(NOTHING),
+    })
+}
+
+#[cfg(test)]
+#[path = "devices_tests.rs"]
+mod tests;
