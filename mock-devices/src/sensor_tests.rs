@@ -1,11 +1,15 @@
-use tactus_wire::weiss::{Frame, Packet, acquire, query_controller, query_matrix};
+use tactus_wire::weiss::{Decoder, Frame, Packet, acquire, query_controller, query_matrix};
 
 use super::*;
 use crate::bench::{Bench, sim_rig};
 use crate::faults::LinkFault;
 
 fn switched_on(seed: u64) -> Bench<VirtualSensor> {
-    Bench::new(&sim_rig(), seed, VirtualSensor::new)
+    speaking(&SensorCodec::default(), seed)
+}
+
+fn speaking(codec: &SensorCodec, seed: u64) -> Bench<VirtualSensor> {
+    Bench::new(&sim_rig(), seed, |world, now| VirtualSensor::new(world, codec, now))
 }
 
 /// Booted and pushing plain frames, with nothing unread.

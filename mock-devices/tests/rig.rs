@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tactus_device::{
-    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorEvent, Stage, StageError, Target,
-    WeissSensor,
+    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Stage,
+    StageError, Target,
 };
 use tactus_mock::faults::{FaultError, FaultScript};
 use tactus_mock::{RigControl, VirtualRig, twin_of};
@@ -19,7 +19,7 @@ use tokio::time::{sleep, timeout};
 struct Lab {
     rig: Rig,
     control: RigControl,
-    sensor: WeissSensor,
+    sensor: SensorDriver,
     stage: Arc<dyn Stage>,
 }
 
@@ -35,7 +35,12 @@ fn ideal_rig() -> Rig {
 async fn lab(rig: Rig, seed: u64) -> Lab {
     let clock = Clock::paused();
     let mut devices = VirtualRig::start(&rig, seed);
-    let sensor = WeissSensor::start(devices.sensor_connector(), ArrayExpectation::of(&rig), clock);
+    let sensor = SensorDriver::start(
+        SensorCodec::default(),
+        devices.sensor_connector(),
+        ArrayExpectation::of(&rig),
+        clock,
+    );
     let options = GrblOptions { tolerance_mm: 0.005, simulated: true };
     let (stage, mut reports) = GrblStage::start(devices.stage_connector(), options, clock);
     // The reports must be drained for the stage to go on.

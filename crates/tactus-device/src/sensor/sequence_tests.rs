@@ -2,15 +2,28 @@ use std::time::Duration;
 
 use tactus_schema::{DeviceTick, FrameFlags, MonoTime};
 
-use super::{Cause, Place, Sequence};
+use super::{Arrival, Before, Cause, Place, Sequence};
 
 /// 30 Hz, a tick a millisecond.
 fn sequence() -> Sequence {
     Sequence::new(30.0, Duration::from_millis(1))
 }
 
+/// One frame, without a device's clock or count.
+fn arrival(received_ms: i64) -> Arrival {
+    Arrival {
+        tick: None,
+        before: Before::Times,
+        received: MonoTime::from_ns(received_ms * 1_000_000),
+        together: 1,
+        passed_over: 0,
+        cause: Cause::Link,
+    }
+}
+
 fn place(sequence: &mut Sequence, tick_ms: u64, received_ms: i64, cause: Cause) -> Place {
-    sequence.place(DeviceTick(tick_ms), MonoTime::from_ns(received_ms * 1_000_000), cause)
+    let tick = Some(DeviceTick(tick_ms));
+    sequence.place(Arrival { tick, cause, ..arrival(received_ms) })
 }
 
 #[test]
@@ -63,4 +76,47 @@ fn the_reason_is_told() {
     place(&mut sequence, 0, 0, Cause::Link);
     let placed = place(&mut sequence, 100, 100, Cause::HostTooSlow);
     assert_eq!(placed.gap.unwrap().reason, "the service was too slow to take them");
+}
+
+/// What is missing before a frame that comes `after_ms` behind the first.
+fn missing(tick: Duration, second: Arrival) -> u32 {
+    let mut sequence = Sequence::new(30.0, tick);
+    sequence.place(Arrival { tick: second.tick.map(|_| DeviceTick(0)), ..arrival(0) });
+    sequence.place(second).lost_before
+}
+
+#[test]
+fn the_devices_own_count_is_exact_but_for_whole_rounds_which_times_tell() {
+    let numbers = |lost| Before::Numbers { lost, wrap: 256 };
+    for (lost, after_ms, want) in
+        [(0, 0, 0), (0, 900, 0), (3, 10, 3), (3, 133, 3), (3, 8_667, 259), (0, 17_100, 512)]
+    {
+        let second = Arrival { before: numbers(lost), ..arrival(after_ms) };
+        assert_eq!(missing(Duration::ZERO, second), want, "{lost} after {after_ms} ms");
+    }
+    let jumped = Arrival { before: numbers(2), cause: Cause::ClockJumped, ..arrival(100) };
+    assert_eq!(missing(Duration::ZERO, jumped), 2, "a clock that jumps does not change the count");
+    let slow = Arrival { before: numbers(2), passed_over: 5, cause: Cause::HostTooSlow, ..arrival(267) };
+    assert_eq!(missing(Duration::ZERO, slow), 7);
+}
+
+#[test]
+fn by_the_hosts_clock_alone_a_late_frame_is_no_loss() {
+    for (after_ms, together, want) in
+        [(33, 1, 0), (67, 1, 0), (80, 1, 0), (100, 1, 2), (200, 1, 5), (200, 6, 0), (200, 3, 3), (0, 1, 0)]
+    {
+        let second = Arrival { together, ..arrival(after_ms) };
+        assert_eq!(missing(Duration::ZERO, second), want, "{after_ms} ms, {together} at once");
+    }
+    let damaged = Arrival { before: Before::Damage, ..arrival(67) };
+    assert_eq!(missing(Duration::ZERO, damaged), 1, "something did get lost");
+    let garbage = Arrival { before: Before::Damage, ..arrival(33) };
+    assert_eq!(missing(Duration::ZERO, garbage), 0, "there was no time for a frame");
+}
+
+#[test]
+fn a_clock_too_coarse_to_tell_frames_apart_counts_none() {
+    let second = Arrival { tick: Some(DeviceTick(1)), ..arrival(33) };
+    assert_eq!(missing(Duration::from_secs(1), second), 0);
+    assert_eq!(missing(Duration::from_millis(10), Arrival { tick: Some(DeviceTick(10)), ..second }), 2);
 }
