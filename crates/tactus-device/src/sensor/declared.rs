@@ -38,7 +38,6 @@ struct Last {
     number: Option<u64>,
     /// The tick of a fresh frame and when that came.
     tick: Option<(u64, Duration)>,
-    skipped_bytes: u64,
 }
 
 /// How a device's ticks are told.
@@ -46,16 +45,16 @@ struct Last {
 pub(super) struct TickLength {
     /// Length of a tick as it is told; 0 without a clock.
     pub(super) told_ns: u64,
-    /// Ticks told for one of the device's.
-    per_tick: f64,
+    /// Ticks told for one of the device's, if not one.
+    per_tick: Option<f64>,
 }
 
 impl TickLength {
     /// That of a format's clock.
     pub(super) fn of(format: &Format) -> Self {
-        let Some(tick_ns) = format.tick_ns() else { return Self { told_ns: 0, per_tick: 1.0 } };
+        let Some(tick_ns) = format.tick_ns() else { return Self { told_ns: 0, per_tick: None } };
         if tick_ns.fract() != 0.0 && tick_ns < FINE_TICK_NS {
-            return Self { told_ns: 1, per_tick: tick_ns };
+            return Self { told_ns: 1, per_tick: Some(tick_ns) };
         }
         #[expect(
             clippy::cast_possible_truncation,
@@ -63,24 +62,22 @@ impl TickLength {
             reason = "positive; saturates, as it should"
         )]
         let told_ns = tick_ns.round() as u64;
-        Self { told_ns, per_tick: 1.0 }
+        Self { told_ns, per_tick: None }
     }
 
     fn tell(self, tick: u64) -> DeviceTick {
-        if self.per_tick == 1.0 {
-            return DeviceTick(tick);
-        }
+        let Some(per_tick) = self.per_tick else { return DeviceTick(tick) };
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "positive; saturates, as it should"
         )]
-        let told = (tick as f64 * self.per_tick).round() as u64;
+        let told = (tick as f64 * per_tick).round() as u64;
         DeviceTick(told)
     }
 
     fn seconds(self, ticks: u64) -> f64 {
-        ticks as f64 * self.per_tick * self.told_ns as f64 * 1e-9
+        ticks as f64 * self.per_tick.unwrap_or(1.0) * self.told_ns as f64 * 1e-9
     }
 }
 
@@ -142,8 +139,7 @@ impl Conversation for Listener {
         let Self { decoder, listening, ticks, wrap, last, met, repeats } = self;
         listening.bytes(now);
         decoder.push(bytes);
-        loop {
-            let Some(frame) = decoder.next_frame() else { break };
+        while let Some(frame) = decoder.next_frame() {
             *repeats |= frame.stale;
             let came_twice = frame.sequence.is_some() && frame.sequence == last.number;
             if frame.stale || came_twice {
@@ -156,6 +152,7 @@ impl Conversation for Listener {
                 None => Before::Times,
             };
             let new_clock = frame.new_clock || is_set_forward(&frame, last.tick, *ticks, now);
+            *last = Last { number: frame.sequence, tick: frame.tick.map(|tick| (tick, now)) };
             let reading = Reading {
                 tick: frame.tick.map(|tick| ticks.tell(tick)),
                 new_clock,
@@ -163,12 +160,9 @@ impl Conversation for Listener {
                 counts: frame.counts.to_vec(),
                 bad: frame.bad.iter().filter_map(|element| u32::try_from(*element).ok()).collect(),
             };
-            let is_first = last.number.is_none() && last.tick.is_none() && met.frames == 0;
-            last.number = frame.sequence;
-            last.tick = frame.tick.map(|tick| (tick, now));
-            *met = decoder.stats();
-            let damaged = !is_first && met.skipped_bytes > last.skipped_bytes;
-            last.skipped_bytes = met.skipped_bytes;
+            let met_before = std::mem::replace(met, decoder.stats());
+            // What was skipped before the first frame were no frames of this connection.
+            let damaged = met_before.frames > 0 && met.skipped_bytes > met_before.skipped_bytes;
             let before = if damaged && before == Before::Times { Before::Damage } else { before };
             if listening.fresh_frame(now) {
                 actions.push(Action::Connected);
