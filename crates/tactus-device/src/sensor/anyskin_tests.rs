@@ -97,9 +97,10 @@ async fn a_damaged_frame_is_one_lost_and_garbage_is_none() {
         assert_eq!(frame(&mut sensor).await.seq, seq, "there was no time for more");
     }
     sleep(5 * PERIOD).await;
-    stream(&mut device, 1).await;
-    assert_eq!(gap(&mut sensor).await, 5);
-    assert_eq!(frame(&mut sensor).await.seq, 15);
+    stream(&mut device, 2).await;
+    assert_eq!(frame(&mut sensor).await.seq, 10);
+    assert_eq!(gap(&mut sensor).await, 5, "the next is as late");
+    assert_eq!(frame(&mut sensor).await.seq, 16);
 }
 
 #[tokio::test(start_paused = true)]

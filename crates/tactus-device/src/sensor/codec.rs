@@ -20,11 +20,12 @@ use crate::ErrorKind;
 /// | codec | speaks first | device's clock | frames lost on the way are counted by |
 /// |---|---|---|---|
 /// | `WeissDsa` | the host, once | 1 ms | the device's clock |
-/// | `SingleTact` | the host, for each reading | 0.1 ms | the board's clock |
+/// | `SingleTact` | the host, for each reading | 0.1 ms | rounds of polls without a reading |
 /// | `AnySkin` | the device | none | damage among the bytes, and the host's clock |
 /// | `Declared` | the device | as described | its count of frames, or its clock, or as `AnySkin` |
 ///
-/// By the host's clock alone one missing frame cannot be told from one that is late: gaps are told from two on.
+/// By the host's clock alone, a frame behind a loss looks like one that was held up: the gap is told with the next
+/// frame, one too late.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SensorCodec {
     /// `weiss-dsa`.

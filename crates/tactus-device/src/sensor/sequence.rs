@@ -6,8 +6,14 @@ use tactus_schema::{DeviceTick, FrameFlags, MonoTime, pb};
 
 use super::conversation::Before;
 
-/// A frame that comes less than this many periods too late, by the host's clock alone, may just be late.
-const LATE_PERIODS: f64 = 1.5;
+/// By the host's clock alone, a frame this many periods behind its time may be one behind a loss.
+const BEHIND_PERIODS: f64 = 0.5;
+
+/// What is buffered on the way comes within this; what is later than that was lost.
+const BUFFERED_S: f64 = 1.0;
+
+/// How much of a small lateness is forgotten with each frame: rates are not quite what the rig says.
+const FORGOTTEN: f64 = 0.1;
 
 /// Counts every frame that the sensor took or should have taken: by the device's own count, or by its clock or,
 /// where that is another one than before or there is none, by the host's.
@@ -26,6 +32,8 @@ struct Last {
     seq: u64,
     tick: Option<DeviceTick>,
     received: MonoTime,
+    /// Behind its time, by the host's clock.
+    late_periods: f64,
 }
 
 /// A frame that has come.
@@ -79,7 +87,7 @@ impl Sequence {
     pub(super) fn place(&mut self, arrival: Arrival) -> Place {
         let Arrival { tick, received, cause, .. } = arrival;
         let Some(last) = self.last else {
-            self.last = Some(Last { seq: 0, tick, received });
+            self.last = Some(Last { seq: 0, tick, received, late_periods: 0.0 });
             return Place {
                 seq: 0,
                 epoch: self.epoch,
@@ -90,9 +98,9 @@ impl Sequence {
         };
         let new_epoch = matches!(cause, Cause::Reconnected | Cause::ClockJumped);
         self.epoch += u32::from(new_epoch);
-        let lost_before = self.missing(last, &arrival);
+        let (lost_before, late_periods) = self.missing(last, &arrival);
         let seq = last.seq + u64::from(lost_before) + 1;
-        self.last = Some(Last { seq, tick, received });
+        self.last = Some(Last { seq, tick, received, late_periods });
         let gap = (lost_before > 0).then(|| pb::Gap {
             frames_lost: lost_before.into(),
             after_seq: last.seq,
@@ -111,34 +119,65 @@ impl Sequence {
 }
 
 impl Sequence {
-    fn missing(&self, last: Last, arrival: &Arrival) -> u32 {
+    /// How many frames are missing, and by how many periods the arrival is late if so many are.
+    fn missing(&self, last: Last, arrival: &Arrival) -> (u32, f64) {
         let periods = arrival.received.since(last.received).as_secs_f64() * self.rate_hz;
-        let too_long = periods - arrival.together as f64;
-        let by_host = too_long.round();
+        let by_host = (periods - arrival.together as f64).round();
         let by_ticks = || {
             let (tick, [from, to]) = (self.tick?, [last.tick?, arrival.tick?]);
             Some((to.0.saturating_sub(from.0) as f64 * tick.as_secs_f64() * self.rate_hz).round() - 1.0)
         };
+        let passed_over = arrival.passed_over as f64;
+        let mut late_periods = 0.0;
         let missing = match (arrival.cause, arrival.before) {
             (Cause::Link | Cause::HostTooSlow | Cause::ClockJumped, Before::Numbers { lost, wrap }) => {
-                let lost = lost.saturating_add(arrival.passed_over) as f64;
+                let lost = lost as f64 + passed_over;
                 // Whole rounds of the count, which it cannot tell itself.
                 lost + ((by_host - lost) / wrap as f64).round().max(0.0) * wrap as f64
             }
             (Cause::Reconnected | Cause::ClockJumped, _) => by_host,
-            (Cause::Link | Cause::HostTooSlow, Before::Times) => {
-                by_ticks().unwrap_or(if too_long < LATE_PERIODS { 0.0 } else { by_host })
-            }
-            (Cause::Link | Cause::HostTooSlow, Before::Damage) => by_ticks().unwrap_or(by_host),
+            (Cause::Link | Cause::HostTooSlow, before) => by_ticks().unwrap_or_else(|| {
+                let late = last.late_periods + periods - 1.0 - passed_over;
+                let lost =
+                    self.missing_by_arrivals(last.late_periods, late, periods, before, arrival.together);
+                late_periods = settled(late - lost);
+                lost + passed_over
+            }),
         };
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "saturates, as it should"
         )]
-        let missing = missing.max(arrival.passed_over as f64) as u32;
-        missing
+        let missing = missing.max(passed_over) as u32;
+        (missing, late_periods)
     }
+
+    /// A frame that is late and stands alone may have been lost ones' follower or just slow: those that were held up
+    /// come close behind each other, and then the last of them is in time. So a loss is told when the frame after
+    /// it, a period later, is as late; at once if bytes were damaged or the silence was longer than any buffer.
+    fn missing_by_arrivals(
+        &self,
+        was_late: f64,
+        late: f64,
+        periods: f64,
+        before: Before,
+        together: usize,
+    ) -> f64 {
+        let alone = late - (together.max(1) - 1) as f64;
+        if before == Before::Damage || alone >= BUFFERED_S * self.rate_hz {
+            alone.round().max(0.0)
+        } else if periods >= BEHIND_PERIODS && was_late >= BEHIND_PERIODS && late >= BEHIND_PERIODS {
+            was_late.min(late).round()
+        } else {
+            0.0
+        }
+    }
+}
+
+/// The lateness to go on with: none of a frame that came early, less of one that was hardly late.
+fn settled(late_periods: f64) -> f64 {
+    if late_periods < BEHIND_PERIODS { late_periods.max(0.0) * (1.0 - FORGOTTEN) } else { late_periods }
 }
 
 impl Cause {

@@ -100,18 +100,43 @@ fn the_devices_own_count_is_exact_but_for_whole_rounds_which_times_tell() {
     assert_eq!(missing(Duration::ZERO, slow), 7);
 }
 
+/// What is missing before each frame that comes at these times, by the host's clock alone.
+fn missing_by_arrivals(arrivals_ms: &[i64]) -> Vec<u32> {
+    let mut sequence = Sequence::new(30.0, Duration::ZERO);
+    arrivals_ms.iter().map(|ms| sequence.place(arrival(*ms)).lost_before).collect()
+}
+
 #[test]
-fn by_the_hosts_clock_alone_a_late_frame_is_no_loss() {
-    for (after_ms, together, want) in
-        [(33, 1, 0), (67, 1, 0), (80, 1, 0), (100, 1, 2), (200, 1, 5), (200, 6, 0), (200, 3, 3), (0, 1, 0)]
-    {
-        let second = Arrival { together, ..arrival(after_ms) };
-        assert_eq!(missing(Duration::ZERO, second), want, "{after_ms} ms, {together} at once");
+fn by_the_hosts_clock_alone_a_loss_is_told_from_a_delay_by_the_frame_after_it() {
+    for (arrivals_ms, want) in [
+        (&[0, 33, 67, 100][..], &[0, 0, 0, 0][..]),
+        (&[0, 67, 100, 133], &[0, 0, 1, 0]),
+        (&[0, 200, 233, 267], &[0, 0, 5, 0]),
+        // Held up, and all there in the end.
+        (&[0, 67, 68, 100, 133], &[0, 0, 0, 0, 0]),
+        (&[0, 200, 200, 201, 201, 202, 202, 233], &[0; 8]),
+        // Of five that were held up, two are missing.
+        (&[0, 200, 200, 201, 201, 233, 267], &[0, 0, 0, 0, 0, 2, 0]),
+        // Longer than any buffer.
+        (&[0, 2000, 2033], &[0, 59, 0]),
+    ] {
+        assert_eq!(missing_by_arrivals(arrivals_ms), want, "{arrivals_ms:?}");
     }
-    let damaged = Arrival { before: Before::Damage, ..arrival(67) };
-    assert_eq!(missing(Duration::ZERO, damaged), 1, "something did get lost");
-    let garbage = Arrival { before: Before::Damage, ..arrival(33) };
-    assert_eq!(missing(Duration::ZERO, garbage), 0, "there was no time for a frame");
+    // A device that is a little slower, or faster, than the rig says loses nothing.
+    for period_us in [32_000, 34_500] {
+        let arrivals_ms: Vec<i64> = (0..3000).map(|frame| frame * period_us / 1000).collect();
+        assert_eq!(missing_by_arrivals(&arrivals_ms).iter().sum::<u32>(), 0, "{period_us}");
+    }
+}
+
+#[test]
+fn damage_on_the_way_is_a_loss_if_there_was_time_for_one() {
+    let damaged = |after_ms, together| Arrival { before: Before::Damage, together, ..arrival(after_ms) };
+    for (after_ms, together, want) in [(67, 1, 1), (33, 1, 0), (133, 3, 1), (100, 3, 0)] {
+        assert_eq!(missing(Duration::ZERO, damaged(after_ms, together)), want, "{after_ms} ms, {together}");
+    }
+    let slow = Arrival { passed_over: 5, cause: Cause::HostTooSlow, ..arrival(200) };
+    assert_eq!(missing(Duration::ZERO, slow), 5, "they came, and were not taken");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Elements that speak `singletact`: polled one after the other, a frame a round.
+//! Elements that speak `singletact`: polled one after the other, a frame a round; rounds without one are counted.
 
 use std::time::Duration;
 
@@ -13,12 +13,22 @@ use crate::ErrorKind;
 pub(super) struct Poller {
     session: Session,
     first_address: u8,
+    beat: Beat,
     round: Round,
     /// By element.
     lost: Vec<bool>,
     flows: bool,
     /// Bytes skipped and replies to no request, as of the last frame.
     met: u64,
+}
+
+/// The beat of rounds, as the session keeps it: a round that is late by an interval or more begins a new beat.
+#[derive(Debug)]
+struct Beat {
+    interval: Duration,
+    begun: Option<Duration>,
+    /// Beats since the last frame, the present one too.
+    missed: u64,
 }
 
 /// The readings of the round in progress.
@@ -40,6 +50,7 @@ impl Poller {
         Ok(Self {
             session: Session::new(Config { addresses: addresses.to_vec(), interval })?,
             first_address: addresses.first().copied().unwrap_or_default(),
+            beat: Beat { interval, begun: None, missed: 0 },
             round: Round::new(elements),
             lost: vec![false; elements],
             flows: false,
@@ -47,13 +58,14 @@ impl Poller {
         })
     }
 
-    fn translate(&mut self, actions: Vec<singletact::Action>) -> Vec<Action> {
+    fn translate(&mut self, now: Duration, actions: Vec<singletact::Action>) -> Vec<Action> {
         let mut translated = Vec::new();
         for action in actions {
             match action {
                 singletact::Action::Send(request) => {
                     if request.address == self.first_address {
                         self.end_round(&mut translated);
+                        self.beat.round_begins(now);
                     }
                     translated.push(send(&request));
                 }
@@ -77,7 +89,9 @@ impl Poller {
     /// A frame, if any element was read in this round.
     fn end_round(&mut self, to: &mut Vec<Action>) {
         let round = std::mem::replace(&mut self.round, Round::new(self.lost.len()));
-        let Some(reading) = round.reading() else { return };
+        let missed = self.beat.missed.saturating_sub(1);
+        let Some(reading) = round.reading(missed) else { return };
+        self.beat.missed = 0;
         if !std::mem::replace(&mut self.flows, true) {
             to.push(Action::Connected);
         }
@@ -123,17 +137,17 @@ impl Poller {
 impl Conversation for Poller {
     fn start(&mut self, now: Duration) -> Vec<Action> {
         let actions = self.session.start(now);
-        self.translate(actions)
+        self.translate(now, actions)
     }
 
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
         let actions = self.session.receive(now, bytes);
-        self.translate(actions)
+        self.translate(now, actions)
     }
 
     fn timer(&mut self, now: Duration) -> Vec<Action> {
         let actions = self.session.timer(now);
-        self.translate(actions)
+        self.translate(now, actions)
     }
 
     fn deadline(&self) -> Option<Duration> {
@@ -143,6 +157,17 @@ impl Conversation for Poller {
     fn quality(&self) -> String {
         let (stats, unexpected) = (self.session.decoder_stats(), self.session.unexpected_replies());
         format!("{} bytes skipped, {unexpected} replies to no request", stats.skipped_bytes)
+    }
+}
+
+impl Beat {
+    fn round_begins(&mut self, now: Duration) {
+        let Self { interval, begun, missed } = self;
+        let due = begun.map_or(now, |begun| begun.saturating_add(*interval));
+        let behind = now.saturating_sub(due);
+        let skipped = behind.as_nanos().checked_div(interval.as_nanos()).unwrap_or(0);
+        *missed = missed.saturating_add(1 + u64::try_from(skipped).unwrap_or(u64::MAX));
+        *begun = Some(if skipped > 0 { now } else { due });
     }
 }
 
@@ -159,12 +184,12 @@ impl Round {
         self.new_clock |= reading.new_clock;
     }
 
-    fn reading(self) -> Option<Reading> {
+    fn reading(self, lost: u64) -> Option<Reading> {
         let Self { counts, tick, new_clock } = self;
         counts.iter().any(Option::is_some).then(|| Reading {
             tick: Some(DeviceTick(tick)),
             new_clock,
-            before: Before::Times,
+            before: Before::Numbers { lost, wrap: u64::MAX },
             bad: (0..)
                 .zip(&counts)
                 .filter(|(_, counts)| counts.is_none())

@@ -110,13 +110,14 @@ async fn a_round_without_an_answer_is_a_frame_less() {
     board.answer(1).await;
     connected(&mut sensor).await;
     frame(&mut sensor).await;
-    // The board's clock goes on: 3 of 50 frames a second are missing.
-    board.ticks += 700;
+    // The poll of 20 ms is given up after 250 ms; the next follows at once, 11 beats late.
+    let mut unanswered = [0; 16];
+    board.device.read_exact(&mut unanswered).await.unwrap();
     board.answer(1).await;
     let event = sensor.next().await;
     let SensorEvent::Gap(gap) = event else { panic!("not a gap: {event:?}") };
-    assert_eq!(gap.frames_lost, 3);
-    assert_eq!(frame(&mut sensor).await.seq, 4);
+    assert_eq!(gap.frames_lost, 12);
+    assert_eq!(frame(&mut sensor).await.seq, 13);
 }
 
 #[tokio::test(start_paused = true)]
