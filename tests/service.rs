@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Lab, tactus};
+use tactus_e2e::{Lab, repository, tactus};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb::{self, run_event::Event};
 
@@ -76,6 +76,59 @@ fn a_run_started_by_the_cli_is_done_and_recorded() {
     let said = lab.tactus(&["run", &script, "--truth", "model.toml"]);
     assert_eq!(said.code, Some(2), "{said:?}");
     assert!(said.err.contains("has devices of its own: add --embedded"), "{said:?}");
+}
+
+/// The shipped rig whose sensor sends described frames; its description stays where it is.
+fn described(_: String) -> String {
+    let rig = fs::read_to_string(repository("config/rigs/pty-declared.toml")).unwrap();
+    let link = repository("config/links/digitacts.toml").display().to_string();
+    rig.replace("../links/digitacts.toml", &link)
+}
+
+#[test]
+fn a_sensor_whose_frames_are_described_is_read_and_recorded_with_its_description() {
+    let mut lab = Lab::start(described);
+    let script = lab.script("presses.star", PRESSES);
+    let said = lab.tactus(&["--json", "run", &script, "--no-report"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let summary = said.json();
+    assert_eq!((&summary["presses"], &summary["frames_lost"]), (&4.into(), &0.into()));
+    let recording = PathBuf::from(summary["recording"].as_str().unwrap());
+    let told = messages(&recording);
+    let info = told
+        .iter()
+        .find_map(|message| if let Message::SensorInfo(info) = message { Some(info) } else { None });
+    let info = info.expect("what the sensor says of itself");
+    assert_eq!((info.link.as_str(), info.tick_ns, info.simulated), ("declared, digitacts", 1_000_000, true));
+    let frames: Vec<_> = told
+        .iter()
+        .filter_map(|message| if let Message::Frame(frame) = message { Some(frame) } else { None })
+        .collect();
+    assert_eq!(frames.len() as u64, summary["frames"].as_u64().unwrap());
+    assert!(frames.iter().all(|frame| frame.counts.len() == 48 && frame.bad_elements.is_empty()));
+    assert!(
+        frames.iter().any(|frame| frame.counts.iter().any(|count| *count > 250.0)),
+        "something was pressed"
+    );
+    let kept = tactus_record::read(&recording).unwrap().find_map(|entry| match entry.unwrap() {
+        Entry::Attachment(attachment) if attachment.name == "link.toml" => Some(attachment.data),
+        Entry::Attachment(_) | Entry::Message { .. } | Entry::Run(_) => None,
+    });
+    assert_eq!(kept, Some(fs::read(repository("config/links/digitacts.toml")).unwrap()));
+
+    // Frames that are lost are counted by the device's own count, and the press is repeated.
+    fs::remove_dir_all(lab.folder.path().join("runs")).unwrap();
+    let script = lab.script("long.star", LONG_DWELL);
+    let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
+    wait_until_pressing(&lab);
+    lab.mock.type_line("sensor drop-frames 2");
+    let (code, said) = client.wait();
+    assert_eq!(code, Some(3), "{said}");
+    let lost: Vec<_> = events(&self::recording(&lab))
+        .into_iter()
+        .filter_map(|event| if let Event::Gap(gap) = event { Some(gap.frames_lost) } else { None })
+        .collect();
+    assert_eq!(lost, [2]);
 }
 
 #[test]

@@ -8,6 +8,7 @@ use std::thread;
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 use serde_json::json;
+use tactus_device::SensorCodec;
 use tactus_schema::Rig;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
@@ -44,7 +45,7 @@ enum Command {
 
 #[derive(Debug, Args)]
 struct RigArgs {
-    /// The rig file; its `[simulation]` is what the devices hide.
+    /// The rig file; its `[simulation]` is what the devices hide, and the sensor speaks as its `[sensor]` says.
     #[arg(long)]
     config: PathBuf,
     /// What the sensor hides: a model file, in the place of the rig file's gains, noise and spread, or a file of
@@ -85,6 +86,7 @@ impl Cli {
 
 async fn serve(args: RigArgs) -> Result<()> {
     let rig = Rig::from_toml(&read(&args.config)?).with_context(|| args.config.display().to_string())?;
+    let (codec, _) = SensorCodec::load(&rig, &args.config)?;
     let script = match &args.faults {
         Some(path) => FaultScript::from_toml(&read(path)?).with_context(|| path.display().to_string())?,
         None => FaultScript::default(),
@@ -99,7 +101,7 @@ async fn serve(args: RigArgs) -> Result<()> {
     let sensor_port = open(args.link_dir.as_deref(), "sensor")?;
     let stage_port = open(args.link_dir.as_deref(), "stage")?;
     announce(&sensor_port, &stage_port, args.json)?;
-    let started = start_devices(truth, rig.covering, Instant::now());
+    let started = start_devices(truth, rig.covering, &codec, Instant::now());
     let control = started.control;
     // Dropped at the end, which removes the links.
     let mut devices = JoinSet::new();

@@ -4,9 +4,9 @@ use std::fmt;
 use std::sync::Arc;
 
 use futures_util::future::BoxFuture;
-use tactus_device::DeviceError;
 use tactus_device::transport::memory::{self, MemoryConnector};
 use tactus_device::transport::{ByteStream, Connect};
+use tactus_device::{DeviceError, SensorCodec};
 use tactus_model::Covering;
 use tactus_schema::Rig;
 use tokio::time::Instant;
@@ -33,21 +33,23 @@ impl VirtualRig {
     /// one behaviour, to the byte.
     ///
     /// A rig without a simulation behaves as its description says, without noise; see [`twin_of`](crate::twin_of).
+    /// The sensor speaks as the rig file says, but for `declared`, which takes another file: then by the default.
     ///
     /// # Panics
     /// Outside of a tokio runtime.
     pub fn start(rig: &Rig, seed: u64) -> Self {
-        Self::of(Truth::of_rig(rig, seed), rig.covering)
+        let codec = rig.service.as_ref().and_then(|service| SensorCodec::of(&service.sensor.protocol));
+        Self::of(Truth::of_rig(rig, seed), rig.covering, &codec.unwrap_or_default())
     }
 
-    /// As [`start`](Self::start), of any truth; the covering is the one in place.
+    /// As [`start`](Self::start), of any truth; the covering is the one in place, and the sensor speaks by `codec`.
     ///
     /// # Panics
     /// Outside of a tokio runtime, and of a truth that was not made by its own constructors.
-    pub fn of(truth: Truth, covering: Covering) -> Self {
+    pub fn of(truth: Truth, covering: Covering, codec: &SensorCodec) -> Self {
         let (sensor, sensor_port) = memory::pair("sensor");
         let (stage, stage_port) = memory::pair("stage");
-        let started = start_devices(truth, covering, Instant::now());
+        let started = start_devices(truth, covering, codec, Instant::now());
         // In memory a device never fails.
         tokio::spawn(cable::run(started.sensor, Port::Memory(sensor_port), started.taps.sensor));
         tokio::spawn(cable::run(started.stage, Port::Memory(stage_port), started.taps.stage));
@@ -78,10 +80,10 @@ pub(crate) struct Started {
     pub(crate) control: RigControl,
 }
 
-pub(crate) fn start_devices(truth: Truth, covering: Covering, now: Instant) -> Started {
+pub(crate) fn start_devices(truth: Truth, covering: Covering, codec: &SensorCodec, now: Instant) -> Started {
     let world = Shared::new(World::new(Arc::new(truth), covering));
     let (control, taps) = RigControl::new(world.clone(), now);
-    let sensor = VirtualSensor::new(world.clone(), now);
+    let sensor = VirtualSensor::new(world.clone(), codec, now);
     let stage = VirtualStage::new(world, now);
     Started { sensor, stage, taps, control }
 }

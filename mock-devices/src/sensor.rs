@@ -1,18 +1,18 @@
-//! The device's side of `weiss-dsa`: a tactile controller whose elements feel the virtual world.
+//! The device's side of a sensor's protocol: a tactile array whose elements feel the virtual world.
 //!
-//! It answers the queries and the acquisition command and pushes frames on an exact grid of its rate.
-//! Where the protocol has room for it, it says that it is simulated: serial numbers spell `SIM`, the
-//! matrix's unique id `SIMULA`.
+//! A `weiss-dsa` controller answers the queries and the acquisition command and pushes frames on an exact grid of
+//! its rate; `declared` and `anyskin` devices push them from power-up on; `singletact` elements answer polls. Where
+//! the protocol has room for it, the device says that it is simulated: the controller's serial numbers spell `SIM`,
+//! its matrix's unique id `SIMULA`, the element's register `SIMULATED`. The other two have no room.
 
 mod tamper;
+mod voice;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use tactus_wire::weiss::{
-    BOOT_MESSAGE, Command, CommandError, ControllerInfo, Decoder, ErrorCode, MatrixInfo, SensorInfo,
-    acknowledge, id,
-};
+use tactus_device::SensorCodec;
+use tactus_wire::weiss::{BOOT_MESSAGE, Command, CommandError, ErrorCode, acknowledge, id};
 use tokio::time::Instant;
 
 use crate::cable::Device;
@@ -20,6 +20,7 @@ use crate::faults::SensorFault;
 use crate::outbox::Outbox;
 use crate::world::Shared;
 use tamper::Tamper;
+use voice::{Asked, Register, Voice};
 
 /// From power-up to the boot message. The real controller needs about 8 s; a simulated rig would make
 /// everybody wait for nothing, and a shorter pause takes the driver through the same states.
@@ -29,21 +30,17 @@ const BOOT: Duration = Duration::from_millis(100);
 const BOOT_MESSAGES: usize = 3;
 
 /// A clock that is about to wrap does so after this.
-const WRAPS_AFTER_MS: i64 = 1000;
+const WRAPS_AFTER: Duration = Duration::from_secs(1);
 
-const SERIAL_NUMBER: u32 = u32::from_le_bytes(*b"SIM\0");
-
-const MATRIX_UID: [u8; 6] = *b"SIMULA";
-
-/// A virtual tactile controller.
+/// A virtual tactile array and its electronics.
 #[derive(Debug)]
 pub(crate) struct VirtualSensor {
     world: Shared,
     /// The clock's zero.
     powered_up: Instant,
-    clock_offset_ms: i64,
+    clock_offset_ticks: i128,
     is_booting: bool,
-    decoder: Decoder,
+    voice: Voice,
     acquisition: Option<Acquisition>,
     counts: Vec<u16>,
     /// Elements that do not read what they feel, with what they read instead.
@@ -62,19 +59,19 @@ struct Acquisition {
 }
 
 impl VirtualSensor {
-    /// A controller that is switched on now.
-    pub(crate) fn new(world: Shared, now: Instant) -> Self {
-        let truth = world.lock().truth().clone();
+    /// A device that is switched on now and speaks by `codec`.
+    pub(crate) fn new(world: Shared, codec: &SensorCodec, now: Instant) -> Self {
+        let seed = world.lock().truth().seed;
         let mut sensor = Self {
             world,
             powered_up: now,
-            clock_offset_ms: 0,
+            clock_offset_ticks: 0,
             is_booting: true,
-            decoder: Decoder::new(),
+            voice: Voice::of(codec),
             acquisition: None,
             counts: Vec::new(),
             overridden: BTreeMap::new(),
-            tamper: Tamper::new(truth.seed),
+            tamper: Tamper::new(seed),
             outbox: Outbox::default(),
         };
         sensor.power_up(now);
@@ -83,45 +80,55 @@ impl VirtualSensor {
 
     fn power_up(&mut self, now: Instant) {
         self.powered_up = now;
-        self.clock_offset_ms = 0;
-        self.is_booting = true;
-        self.decoder = Decoder::new();
-        self.acquisition = None;
+        self.clock_offset_ticks = 0;
+        self.voice.power_up();
         self.outbox.clear();
-        self.outbox.push(now + BOOT, BOOT_MESSAGE.repeat(BOOT_MESSAGES));
+        self.is_booting = self.voice.boots();
+        if self.is_booting {
+            self.outbox.push(now + BOOT, BOOT_MESSAGE.repeat(BOOT_MESSAGES));
+        }
+        let rate_hz = self.own_rate_hz();
+        self.acquisition =
+            self.voice.streams().then_some(Acquisition { run_length: false, rate_hz, next: 1 });
     }
 
-    fn answer(&mut self, command: Command, now: Instant) -> Vec<u8> {
-        let truth = self.world.lock().truth().clone();
-        let array = truth.model.array();
+    fn answer(&mut self, asked: Asked, now: Instant) -> Vec<u8> {
+        match asked {
+            Asked::Weiss(command) => {
+                let answer = self.obey(command, now);
+                self.voice.close(answer)
+            }
+            Asked::SingleTact { address, id, asked } => {
+                let element = self.voice.element_at(address);
+                if element.is_some() && asked == Register::Reading {
+                    self.sample(now);
+                }
+                let counts = element.and_then(|element| self.counts.get(element).copied().or(Some(0)));
+                let (tick, rate_hz) = (self.tick(now), self.own_rate_hz());
+                let running = now.duration_since(self.powered_up);
+                self.tamper.frame(now, |_| voice::reply((address, id, asked), tick, running, rate_hz, counts))
+            }
+        }
+    }
+
+    fn obey(&mut self, command: Result<Command, CommandError>, now: Instant) -> Vec<u8> {
         match command {
-            Command::QueryController => {
-                ControllerInfo { serial_number: SERIAL_NUMBER, ..ControllerInfo::default() }.encode()
-            }
-            Command::QuerySensor => {
-                SensorInfo { matrices: 1, serial_number: SERIAL_NUMBER, ..SensorInfo::default() }.encode()
-            }
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "the protocol has single precision and 16 bits"
-            )]
-            Command::QueryMatrix { matrix: 0 } => MatrixInfo {
-                element_mm: array.element_mm().map(|side| side as f32),
-                cells_x: array.cols() as u16,
-                cells_y: array.rows() as u16,
-                uid: MATRIX_UID,
-                full_scale: array.full_scale_counts() as f32,
-                ..MatrixInfo::default()
-            }
-            .encode(),
-            Command::QueryMatrix { .. } => acknowledge(id::MATRIX, ErrorCode::INDEX_OUT_OF_BOUNDS),
-            Command::Acquire { run, run_length, fps } => {
-                let rate_hz = rate(f64::from(fps), array.rate_hz());
+            Ok(Command::QueryController) => voice::controller(),
+            Ok(Command::QuerySensor) => voice::sensor(),
+            Ok(Command::QueryMatrix { matrix }) => voice::matrix(matrix, self.world.lock().truth()),
+            Ok(Command::Acquire { run, run_length, fps }) => {
+                let rate_hz = rate(f64::from(fps), self.own_rate_hz());
                 self.acquisition =
                     run.then(|| Acquisition { run_length, rate_hz, next: self.after(now, rate_hz) });
                 acknowledge(id::ACQUIRE, ErrorCode::SUCCESS)
             }
+            Err(CommandError::Unknown { id }) => acknowledge(id, ErrorCode::UNKNOWN_COMMAND),
+            Err(CommandError::Length { id, .. }) => acknowledge(id, ErrorCode::FORMAT),
         }
+    }
+
+    fn own_rate_hz(&self) -> f64 {
+        self.world.lock().truth().model.array().rate_hz()
     }
 
     /// Number of the first sampling after `now`.
@@ -136,14 +143,10 @@ impl VirtualSensor {
     }
 
     fn take_frame(&mut self, at: Instant, run_length: bool, period: Duration) {
-        self.world.lock().sample(at, &mut self.counts);
-        for (element, reading) in &self.overridden {
-            if let Some(count) = self.counts.get_mut(*element) {
-                *count = *reading;
-            }
-        }
-        let timestamp_ms = self.timestamp_ms(at);
-        let bytes = self.tamper.frame(timestamp_ms, &self.counts, run_length, at);
+        self.sample(at);
+        let tick = self.tick(at);
+        let Self { voice, tamper, counts, .. } = self;
+        let bytes = tamper.frame(at, |elements| voice.frame(tick, counts, run_length, elements));
         if self.tamper.is_dripping(at) {
             self.outbox.drip(at, period, &bytes);
         } else {
@@ -151,12 +154,19 @@ impl VirtualSensor {
         }
     }
 
-    /// The controller's clock, which wraps.
-    fn timestamp_ms(&self, at: Instant) -> u32 {
-        let elapsed_ms = i64::try_from(at.duration_since(self.powered_up).as_millis()).unwrap_or(i64::MAX);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it wraps")]
-        let timestamp_ms = elapsed_ms.wrapping_add(self.clock_offset_ms) as u32;
-        timestamp_ms
+    fn sample(&mut self, at: Instant) {
+        self.world.lock().sample(at, &mut self.counts);
+        for (element, reading) in &self.overridden {
+            if let Some(count) = self.counts.get_mut(*element) {
+                *count = *reading;
+            }
+        }
+    }
+
+    /// What the device's clock shows; 0 if it has none.
+    fn tick(&self, at: Instant) -> u64 {
+        let running = at.duration_since(self.powered_up);
+        self.voice.clock().map_or(0, |clock| clock.shows(running, self.clock_offset_ticks))
     }
 
     /// What an element reads at present.
@@ -175,21 +185,12 @@ impl Device for VirtualSensor {
         if self.is_booting {
             return;
         }
-        self.decoder.push(bytes);
-        let mut decoder = std::mem::take(&mut self.decoder);
-        while let Some(packet) = decoder.next_packet() {
-            // Real firmware does not answer what it cannot read.
-            let Ok(packet) = packet else { continue };
-            let answer = match Command::parse(&packet) {
-                Ok(command) => self.answer(command, now),
-                Err(CommandError::Unknown { id }) => acknowledge(id, ErrorCode::UNKNOWN_COMMAND),
-                Err(CommandError::Length { id, .. }) => acknowledge(id, ErrorCode::FORMAT),
-            };
+        for asked in self.voice.hear(bytes) {
+            let answer = self.answer(asked, now);
             if !self.tamper.is_stalled(now) {
                 self.outbox.push(now, answer);
             }
         }
-        self.decoder = decoder;
     }
 
     fn wake(&mut self, now: Instant) {
@@ -220,10 +221,16 @@ impl Device for VirtualSensor {
     fn fault(&mut self, fault: SensorFault, now: Instant) {
         match fault {
             SensorFault::Link(fault) => self.tamper.arm(fault, now),
-            SensorFault::ClockJump { ms } => self.clock_offset_ms = self.clock_offset_ms.wrapping_add(ms),
+            SensorFault::ClockJump { ms } => {
+                let by = Duration::from_millis(ms.unsigned_abs());
+                let ticks = self.voice.clock().map_or(0, |clock| clock.ticks(by));
+                self.clock_offset_ticks += if ms < 0 { -ticks } else { ticks };
+            }
             SensorFault::ClockWrap => {
-                let to_go_ms = i64::from(u32::MAX - self.timestamp_ms(now));
-                self.clock_offset_ms = self.clock_offset_ms.wrapping_add(to_go_ms - WRAPS_AFTER_MS);
+                let shown = self.tick(now);
+                if let Some(clock) = self.voice.clock() {
+                    self.clock_offset_ticks += clock.until_wrap(shown, WRAPS_AFTER);
+                }
             }
             SensorFault::Stuck(element) => {
                 let reading = self.reading(element, now);

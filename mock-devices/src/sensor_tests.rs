@@ -1,11 +1,15 @@
-use tactus_wire::weiss::{Frame, Packet, acquire, query_controller, query_matrix};
+use tactus_wire::weiss::{Decoder, Frame, Packet, acquire, query_controller, query_matrix};
 
 use super::*;
 use crate::bench::{Bench, sim_rig};
 use crate::faults::LinkFault;
 
 fn switched_on(seed: u64) -> Bench<VirtualSensor> {
-    Bench::new(&sim_rig(), seed, VirtualSensor::new)
+    speaking(&SensorCodec::default(), seed)
+}
+
+fn speaking(codec: &SensorCodec, seed: u64) -> Bench<VirtualSensor> {
+    Bench::new(&sim_rig(), seed, |world, now| VirtualSensor::new(world, codec, now))
 }
 
 /// Booted and pushing plain frames, with nothing unread.
@@ -191,4 +195,43 @@ fn unplugged_and_plugged_in_it_boots_again_with_a_new_clock() {
     assert_eq!(bench.bytes(200), b"\x1b[5n\x1b[5n\x1b[5n");
     bench.send(&acquire(true, false, 30));
     assert_eq!(timestamps_ms(&bench.bytes(60)), [233]);
+}
+
+#[test]
+fn a_singletact_board_answers_by_address_and_says_that_it_is_simulated() {
+    use tactus_wire::singletact::{Decoder, Operation, Request};
+    fn ask(bench: &mut Bench<VirtualSensor>, address: u8, operation: Operation<'_>) -> (bool, Vec<u8>) {
+        bench.send(&Request { address, id: 7, operation }.encode().unwrap());
+        let bytes = bench.bytes(0);
+        let mut decoder = Decoder::new();
+        decoder.push(&bytes);
+        let reply = decoder.next_reply().unwrap();
+        assert_eq!((reply.id, reply.address), (7, address));
+        (reply.timed_out, reply.data.to_vec())
+    }
+    let codec = SensorCodec::SingleTact { addresses: vec![9, 10] };
+    let mut bench = speaking(&codec, 1);
+    let reading = Operation::Read { location: 128, bytes: 6 };
+    assert_eq!(bench.bytes(100), b"", "it is asked");
+    let (timed_out, data) = ask(&mut bench, 10, reading);
+    assert!(!timed_out && (80..120).contains(&u16::from_be_bytes([data[4], data[5]])), "{data:?}");
+    assert!(ask(&mut bench, 11, reading).0, "there is no such element");
+    let (_, data) = ask(&mut bench, 9, Operation::Read { location: 0, bytes: 20 });
+    assert_eq!(data, b"SIMULATED SIMULATED ");
+    assert_eq!(ask(&mut bench, 9, Operation::Write { location: 5, data: &[1] }), (false, Vec::new()));
+}
+
+#[test]
+fn an_older_controller_closes_its_packets_by_a_sum() {
+    use tactus_wire::weiss::Checksum;
+    let mut bench = speaking(&SensorCodec::WeissDsa { checksum: Checksum::Sum8 }, 1);
+    bench.bytes(100);
+    bench.send(&Checksum::Sum8.close(acquire(true, false, 30)));
+    let mut decoder = Decoder::new().with_checksum(Checksum::Sum8);
+    decoder.push(&bench.bytes(1000));
+    let mut packets = 0;
+    while let Some(packet) = decoder.next_packet() {
+        packets += usize::from(packet.is_ok());
+    }
+    assert_eq!((packets, decoder.stats().skipped_bytes), (31, 0));
 }

@@ -6,20 +6,22 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tactus_device::{
-    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorEvent, Stage, StageError, Target,
-    WeissSensor,
+    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Stage,
+    StageError, Target,
 };
 use tactus_mock::faults::{FaultError, FaultScript};
-use tactus_mock::{RigControl, VirtualRig, twin_of};
+use tactus_mock::{RigControl, Truth, VirtualRig, twin_of};
 use tactus_model::{Contact, ForwardModel, Response};
 use tactus_schema::{Frame, Rig, pb};
+use tactus_wire::declared::RawFormat;
+use tactus_wire::weiss::Checksum;
 use tokio::time::{sleep, timeout};
 
 /// A rig with its drivers connected.
 struct Lab {
     rig: Rig,
     control: RigControl,
-    sensor: WeissSensor,
+    sensor: SensorDriver,
     stage: Arc<dyn Stage>,
 }
 
@@ -33,9 +35,13 @@ fn ideal_rig() -> Rig {
 }
 
 async fn lab(rig: Rig, seed: u64) -> Lab {
+    lab_speaking(SensorCodec::default(), rig, seed).await
+}
+
+async fn lab_speaking(codec: SensorCodec, rig: Rig, seed: u64) -> Lab {
     let clock = Clock::paused();
-    let mut devices = VirtualRig::start(&rig, seed);
-    let sensor = WeissSensor::start(devices.sensor_connector(), ArrayExpectation::of(&rig), clock);
+    let mut devices = VirtualRig::of(Truth::of_rig(&rig, seed), rig.covering, &codec);
+    let sensor = SensorDriver::start(codec, devices.sensor_connector(), ArrayExpectation::of(&rig), clock);
     let options = GrblOptions { tolerance_mm: 0.005, simulated: true };
     let (stage, mut reports) = GrblStage::start(devices.stage_connector(), options, clock);
     // The reports must be drained for the stage to go on.
@@ -263,9 +269,136 @@ async fn garbage_on_every_link_harms_no_frame_and_no_move() {
     assert!(frames.windows(2).all(|pair| pair[1].seq == pair[0].seq + 1));
 }
 
+/// The declared format that is shipped.
+fn declared() -> SensorCodec {
+    let toml = include_str!("../../config/links/digitacts.toml");
+    let format = toml::from_str::<RawFormat>(toml).unwrap().check().unwrap();
+    SensorCodec::Declared { format: Arc::new(format) }
+}
+
+/// The simulated rig with another number of rows and columns, and no faulty elements.
+fn rig_of(rows: usize, cols: usize) -> Rig {
+    let centres = |count: usize| (0..count).map(|place| 0.9 + 2.0 * place as f64).collect::<Vec<_>>();
+    let toml = include_str!("../../config/rigs/sim.toml")
+        .replace("rows = 6", &format!("rows = {rows}"))
+        .replace("cols = 8", &format!("cols = {cols}"))
+        .replace("[0.9, 2.9, 5.1, 7.1, 9.1, 11.1, 13.3, 15.3]", &format!("{:?}", centres(cols)))
+        .replace("[0.9, 2.9, 4.9, 6.9, 8.9, 10.9]", &format!("{:?}", centres(rows)))
+        .replace("miswired = ", "# ");
+    Rig::from_toml(&toml).unwrap()
+}
+
+#[tokio::test(start_paused = true)]
+async fn every_protocol_reads_the_same_world() {
+    let singletact = SensorCodec::SingleTact { addresses: vec![10, 11, 12] };
+    for (codec, rig) in [
+        (SensorCodec::WeissDsa { checksum: Checksum::Sum8 }, sim_rig()),
+        (declared(), sim_rig()),
+        (SensorCodec::AnySkin, rig_of(5, 3)),
+        (singletact, rig_of(1, 3)),
+        (SensorCodec::SingleTact { addresses: vec![4] }, rig_of(1, 1)),
+    ] {
+        let mut lab = lab_speaking(codec.clone(), rig, 1).await;
+        let centre = lab.rig.array.centre_mm(0).unwrap();
+        lab.press(lab.rig.registration.to_robot(centre), 0.5).await.unwrap();
+        lab.fresh().await;
+        let (frames, gaps) = lab.read(60).await;
+        assert!(gaps.is_empty(), "{codec:?}: {gaps:?}");
+        assert!(
+            frames.windows(2).all(|pair| pair[1].seq == pair[0].seq + 1 && pair[1].epoch == pair[0].epoch)
+        );
+        let want = lab.control.image_counts();
+        assert!(want[0] > 400.0);
+        for (got, want) in mean(&frames).into_iter().zip(want) {
+            assert!((got - want).abs() < 1.5, "{codec:?}: {got} {want}");
+        }
+        lab.inject("sensor disconnect 2s");
+        let (after, gaps) = lab.read(30).await;
+        let epoch = frames[0].epoch + 1;
+        assert!(after.iter().any(|frame| frame.epoch == epoch) && gaps.len() == 1, "{codec:?}: {gaps:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn described_frames_that_are_lost_are_missed_by_their_number() {
+    for (fault, lost) in [
+        ("sensor drop-frames 5", &[5][..]),
+        ("sensor drop-frames 1", &[1]),
+        ("sensor wrong-checksum", &[1]),
+        ("sensor truncate", &[1]),
+        ("sensor drop 7", &[1]),
+        ("sensor wrong-count 47", &[1]),
+        ("sensor stall 500ms", &[15]),
+        ("sensor duplicate", &[]),
+        ("sensor garbage 300", &[]),
+        ("sensor drip 1s", &[]),
+        ("sensor burst 4", &[]),
+    ] {
+        let mut lab = lab_speaking(declared(), sim_rig(), 1).await;
+        lab.fresh().await;
+        lab.inject(fault);
+        let (frames, gaps) = lab.read(60).await;
+        assert_eq!(gaps.iter().map(|gap| gap.frames_lost).collect::<Vec<_>>(), lost, "{fault}");
+        assert!(frames.iter().all(|frame| frame.epoch == frames[0].epoch), "{fault}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_described_clock_wraps_unnoticed_and_jumps_into_a_new_epoch() {
+    let mut lab = lab_speaking(declared(), sim_rig(), 1).await;
+    let before = lab.fresh().await;
+    lab.inject("sensor clock-wrap");
+    let (frames, gaps) = lab.read(90).await;
+    assert!(
+        gaps.is_empty() && frames[89].epoch == before.epoch + 1,
+        "set forward once, then wrapped: {gaps:?}"
+    );
+    lab.inject("sensor clock-jump -500ms");
+    let (frames, gaps) = lab.read(10).await;
+    assert!(gaps.is_empty() && frames[9].epoch == before.epoch + 2, "{gaps:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn without_count_and_clock_the_frame_after_it_tells_a_loss() {
+    for (fault, lost) in [
+        ("sensor drop-frames 5", &[5][..]),
+        ("sensor drop-frames 1", &[1]),
+        ("sensor burst 4", &[]),
+        ("sensor wrong-checksum", &[1]),
+        ("sensor drop 7", &[1]),
+        ("sensor garbage 300", &[]),
+    ] {
+        let mut lab = lab_speaking(SensorCodec::AnySkin, rig_of(5, 3), 1).await;
+        lab.fresh().await;
+        lab.inject(fault);
+        let (_, gaps) = lab.read(60).await;
+        assert_eq!(gaps.iter().map(|gap| gap.frames_lost).collect::<Vec<_>>(), lost, "{fault}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn polls_that_are_not_answered_are_counted() {
+    let codec = SensorCodec::SingleTact { addresses: vec![4] };
+    for (fault, least, most) in
+        [("sensor drop-frames 1", 6, 8), ("sensor stall 500ms", 13, 24), ("sensor garbage 100", 0, 0)]
+    {
+        let mut lab = lab_speaking(codec.clone(), rig_of(1, 1), 1).await;
+        lab.fresh().await;
+        lab.inject(fault);
+        let (_, gaps) = lab.read(60).await;
+        // An answer is waited for for 250 ms, in which 7 frames could have been.
+        let lost: u64 = gaps.iter().map(|gap| gap.frames_lost).sum();
+        assert!((least..=most).contains(&lost), "{fault}: {gaps:?}");
+    }
+}
+
 #[test]
 fn every_shipped_rig_is_one_that_can_be_simulated() {
-    for text in [include_str!("../../config/rigs/sim.toml"), include_str!("../../config/rigs/pty.toml")] {
+    for text in [
+        include_str!("../../config/rigs/sim.toml"),
+        include_str!("../../config/rigs/pty.toml"),
+        include_str!("../../config/rigs/pty-declared.toml"),
+    ] {
         let rig = Rig::from_toml(text).unwrap();
         assert!(rig.simulated && rig.simulation.is_some() && rig.service.is_some());
     }

@@ -10,7 +10,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use tactus_device::transport::Connect;
 use tactus_device::transport::serial::SerialConnector;
 use tactus_device::{
-    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorEvent, Target, WeissSensor,
+    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Target,
 };
 use tactus_schema::{Frame, Rig, pb};
 use tactus_wire::weiss::{self as wire, Decoder};
@@ -70,13 +70,18 @@ fn bench() -> Rig {
     Rig::from_toml(&fs::read_to_string(CONFIG).unwrap()).unwrap()
 }
 
-fn open_sensor(path: &Path) -> WeissSensor {
+fn open_sensor(path: &Path) -> SensorDriver {
     let connector = SerialConnector::new(path, 115_200);
-    WeissSensor::start(Box::new(connector), ArrayExpectation::of(&bench()), Clock::real())
+    SensorDriver::start(
+        SensorCodec::default(),
+        Box::new(connector),
+        ArrayExpectation::of(&bench()),
+        Clock::real(),
+    )
 }
 
 /// The next frames.
-async fn frames(sensor: &mut WeissSensor, count: usize) -> Vec<Frame> {
+async fn frames(sensor: &mut SensorDriver, count: usize) -> Vec<Frame> {
     let mut frames = Vec::new();
     while frames.len() < count {
         if let SensorEvent::Frame(frame) = sensor.next().await {
@@ -88,7 +93,7 @@ async fn frames(sensor: &mut WeissSensor, count: usize) -> Vec<Frame> {
 }
 
 /// Waits until the sensor is lost, and then for frames.
-async fn frames_after_loss(sensor: &mut WeissSensor, count: usize) -> Vec<Frame> {
+async fn frames_after_loss(sensor: &mut SensorDriver, count: usize) -> Vec<Frame> {
     while !matches!(sensor.next().await, SensorEvent::Lost(_)) {}
     frames(sensor, count).await
 }

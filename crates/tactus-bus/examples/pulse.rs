@@ -120,6 +120,7 @@ impl Pulse {
             flags: gap,
             lost_before,
             simulated: true,
+            bad_elements: [].into(),
         });
     }
 

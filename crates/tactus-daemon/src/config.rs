@@ -4,15 +4,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use tactus_device::{LinkFileError, SensorCodec};
 use tactus_schema::{Rig, RigError};
+
+use crate::order::Texts;
 
 /// The checked configuration, with the rig it names.
 #[derive(Debug, Clone)]
 pub struct Config {
     /// The rig.
-    pub rig: Rig,
-    /// The rig file's text, for the recordings.
-    pub rig_toml: String,
+    pub rig: RigFiles,
     /// Where experiment scripts are looked for, before the built-in ones.
     pub experiments: Option<PathBuf>,
     /// Where recordings go.
@@ -21,6 +22,26 @@ pub struct Config {
     pub bus: BusSection,
     /// How to log.
     pub log: LogSection,
+}
+
+/// A rig, how its sensor is spoken to, and the texts of the files that say so.
+#[derive(Debug, Clone)]
+pub struct RigFiles {
+    /// The rig.
+    pub rig: Rig,
+    /// How its sensor is spoken to.
+    pub codec: SensorCodec,
+    /// For the recordings.
+    pub texts: RigTexts,
+}
+
+/// What was read of a rig, as it was read.
+#[derive(Debug, Clone)]
+pub struct RigTexts {
+    /// The rig file.
+    pub rig_toml: String,
+    /// The description of the sensor's frames, if the rig file names one.
+    pub link_toml: Option<String>,
 }
 
 /// `[bus]`: endpoints in zenoh's form, such as `tcp/127.0.0.1:7447`.
@@ -85,6 +106,9 @@ pub enum ConfigError {
         /// What is wrong with it.
         source: RigError,
     },
+    /// The description of the sensor's frames that the rig file names.
+    #[error(transparent)]
+    Link(#[from] LinkFileError),
     /// The folder of experiments is not there.
     #[error("{}: experiments = {folder:?} is no folder", path.display())]
     Experiments {
@@ -128,7 +152,7 @@ impl Default for LogSection {
 }
 
 impl Config {
-    /// Reads and checks the file and the rig file it names. Paths in it are relative to its own folder,
+    /// Reads and checks the file, the rig file it names, and the files that this one names. Paths in it are relative to its own folder,
     /// but recordings: those are relative to systemd's state directory, or else to the working directory.
     ///
     /// # Errors
@@ -137,34 +161,52 @@ impl Config {
         let raw: RawConfig = toml::from_str(&read(path)?)
             .map_err(|source| ConfigError::Form { path: path.to_owned(), source })?;
         let folder = path.parent().unwrap_or(Path::new("."));
-        let (rig, rig_toml) = load_rig(&folder.join(raw.rig))?;
+        let rig = load_rig(&folder.join(raw.rig))?;
         let experiments = raw.experiments.map(|experiments| folder.join(experiments));
         if let Some(folder) = experiments.clone().filter(|folder| !folder.is_dir()) {
             return Err(ConfigError::Experiments { path: path.to_owned(), folder });
         }
         let state = std::env::var_os("STATE_DIRECTORY").map(PathBuf::from).unwrap_or_default();
-        Ok(Self {
-            rig,
-            rig_toml,
-            experiments,
-            recordings: state.join(raw.recordings),
-            bus: raw.bus,
-            log: raw.log,
-        })
+        Ok(Self { rig, experiments, recordings: state.join(raw.recordings), bus: raw.bus, log: raw.log })
     }
 }
 
-/// Reads a rig file that a service can use, and its text.
+impl RigFiles {
+    /// A rig that a service can use, from the text of its file; a description of frames is looked for relative to
+    /// `path`.
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub fn of(text: &str, path: &Path) -> Result<Self, ConfigError> {
+        let rig =
+            Rig::from_toml(text).map_err(|source| ConfigError::Rig { path: path.to_owned(), source })?;
+        if rig.service.is_none() {
+            return Err(ConfigError::NoService { path: path.to_owned() });
+        }
+        let (codec, link) = SensorCodec::load(&rig, path)?;
+        let texts = RigTexts { rig_toml: text.to_owned(), link_toml: link.map(|link| link.text) };
+        Ok(Self { rig, codec, texts })
+    }
+}
+
+impl RigTexts {
+    /// All that was read.
+    pub fn all(&self) -> Texts<'_> {
+        Texts { rig_toml: Some(&self.rig_toml), link_toml: self.link_toml.as_deref() }
+    }
+
+    /// Without the rig file, what of it says of simulated devices being otherwise.
+    pub fn without_rig(&self) -> Texts<'_> {
+        Texts { rig_toml: None, ..self.all() }
+    }
+}
+
+/// Reads a rig file that a service can use, and the description of its sensor's frames if it names one.
 ///
 /// # Errors
 /// As [`Config::load`].
-pub fn load_rig(path: &Path) -> Result<(Rig, String), ConfigError> {
-    let text = read(path)?;
-    let rig = Rig::from_toml(&text).map_err(|source| ConfigError::Rig { path: path.to_owned(), source })?;
-    if rig.service.is_none() {
-        return Err(ConfigError::NoService { path: path.to_owned() });
-    }
-    Ok((rig, text))
+pub fn load_rig(path: &Path) -> Result<RigFiles, ConfigError> {
+    RigFiles::of(&read(path)?, path)
 }
 
 fn read(path: &Path) -> Result<String, ConfigError> {

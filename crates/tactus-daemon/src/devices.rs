@@ -6,11 +6,11 @@ use tactus_device::transport::Connect;
 use tactus_device::transport::hid::HidConnector;
 use tactus_device::transport::serial::SerialConnector;
 use tactus_device::transport::tcp::TcpConnector;
-use tactus_device::{ArrayExpectation, Clock, GrblOptions, GrblStage, WeissSensor};
+use tactus_device::{ArrayExpectation, Clock, GrblOptions, GrblStage, SensorCodec, SensorDriver};
 use tactus_engine::Devices;
 use tactus_mock::{RigControl, Truth, VirtualRig};
 use tactus_schema::Rig;
-use tactus_schema::rig::{SensorProtocol, Service, StageProtocol, Transport, UsbLink};
+use tactus_schema::rig::{Service, StageProtocol, Transport, UsbLink};
 
 /// Started devices, and the truth behind the virtual ones among them.
 #[derive(Debug)]
@@ -21,21 +21,24 @@ pub struct Opened {
     pub control: Option<RigControl>,
 }
 
-/// Starts the drivers of a rig, and its virtual devices where the rig says `embedded`; `truth` is what those hide.
+/// Starts the drivers of a rig, and its virtual devices where the rig says `embedded`; `truth` is what those hide, and
+/// both ends of the sensor's link speak by `codec`.
 ///
 /// Devices need not be there yet: drivers wait for them.
-pub fn open(rig: &Rig, service: &Service, truth: impl FnOnce() -> Truth, clock: Clock) -> Opened {
+pub fn open(
+    rig: &Rig,
+    service: &Service,
+    codec: SensorCodec,
+    truth: impl FnOnce() -> Truth,
+    clock: Clock,
+) -> Opened {
     let embedded = [&service.sensor.transport, &service.stage.transport].contains(&&Transport::Embedded);
-    let mut virtual_rig = embedded.then(|| VirtualRig::of(truth(), rig.covering));
+    let mut virtual_rig = embedded.then(|| VirtualRig::of(truth(), rig.covering, &codec));
     let sensor_link =
         connector(&service.sensor.transport, || virtual_rig.as_mut().map(VirtualRig::sensor_connector));
     let stage_link =
         connector(&service.stage.transport, || virtual_rig.as_mut().map(VirtualRig::stage_connector));
-    let sensor = match service.sensor.protocol {
-        SensorProtocol::WeissDsa => {
-            Box::new(WeissSensor::start(sensor_link, ArrayExpectation::of(rig), clock))
-        }
-    };
+    let sensor = Box::new(SensorDriver::start(codec, sensor_link, ArrayExpectation::of(rig), clock));
     let (stage, stage_reports) = match service.stage.protocol {
         StageProtocol::Grbl => GrblStage::start(
             stage_link,

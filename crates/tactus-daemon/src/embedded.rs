@@ -11,6 +11,7 @@ use tactus_record::RecordError;
 use tactus_schema::rig::Transport;
 use tactus_schema::{Rig, RigError};
 
+use crate::config::{ConfigError, RigFiles};
 use crate::order::{self, Ask};
 use crate::recorder::{InPlace, OnThread};
 use crate::twin::{self, Plan, TwinError};
@@ -20,6 +21,14 @@ pub use tactus_mock::{HIDDEN_SCHEMA, Truth, TruthError, TruthFile};
 
 /// The rig that needs no hardware, as it is shipped in `config/rigs/sim.toml`.
 pub const SIMULATED_RIG: &str = include_str!("../../../config/rigs/sim.toml");
+
+/// [`SIMULATED_RIG`], read.
+///
+/// # Errors
+/// None, unless the shipped file is wrong.
+pub fn simulated_rig() -> Result<RigFiles, ConfigError> {
+    RigFiles::of(SIMULATED_RIG, Path::new("sim.toml"))
+}
 
 /// How time passes in an embedded run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,8 +106,7 @@ pub fn truth(rig: &Rig) -> Option<Truth> {
 /// # Errors
 /// [`EmbeddedError`] if there was no run at all; how a run ended is in [`Finished`].
 pub fn run(
-    rig: &Rig,
-    rig_toml: &str,
+    RigFiles { rig, codec, texts }: &RigFiles,
     truth: Option<&TruthFile>,
     ask: Ask,
     folder: &Path,
@@ -131,15 +139,15 @@ pub fn run(
         return Err(EmbeddedError::NotPossible(Box::new(plan)));
     }
     order.planned = Some(plan.promise());
-    let rig_toml = truth.is_none().then_some(rig_toml);
-    let (recording, path) = order::recording(&order, rig, rig_toml, folder, clock.now().wall)?;
+    let texts = if truth.is_none() { texts.all() } else { texts.without_rig() };
+    let (recording, path) = order::recording(&order, rig, texts, folder, clock.now().wall)?;
     order.recording = path.display().to_string();
     let record: Box<dyn Record> = match pace {
         Pace::Virtual => Box::new(InPlace(recording)),
         Pace::Real => Box::new(OnThread::start(recording)?),
     };
     runtime.block_on(async {
-        let opened = devices::open(rig, &service, || hidden, clock);
+        let opened = devices::open(rig, &service, codec.clone(), || hidden, clock);
         let engine = Engine::start(rig.clone(), opened.devices, clock, Arc::new(Unpublished))?;
         started(&engine, &order);
         match engine.run(order, record).await {

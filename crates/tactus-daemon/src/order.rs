@@ -22,6 +22,15 @@ pub struct Ask {
     pub who: String,
 }
 
+/// The rig's files for a recording.
+#[derive(Debug, Clone, Copy)]
+pub struct Texts<'a> {
+    /// The rig file; none if what it says of simulated devices is not so.
+    pub rig_toml: Option<&'a str>,
+    /// The description of the sensor's frames, if the rig file names one.
+    pub link_toml: Option<&'a str>,
+}
+
 /// Makes the order, with a new run id. Everything about the parameters is checked here.
 ///
 /// # Errors
@@ -49,15 +58,15 @@ pub fn order(ask: Ask, rig: &Rig, at: WallTime) -> Result<RunOrder, ScriptError>
     })
 }
 
-/// Opens the recording of an order: `recording.mcap` in a folder of the run's own, made below `folder`. `rig_toml` is the
-/// rig file's text, unless what it says of simulated devices is not so.
+/// Opens the recording of an order: `recording.mcap` in a folder of the run's own, made below `folder`. It
+/// keeps the rig's files as they were read, the rig file unless what it says of simulated devices is not so.
 ///
 /// # Errors
 /// [`RecordError`] names the path.
 pub fn recording(
     order: &RunOrder,
     rig: &Rig,
-    rig_toml: Option<&str>,
+    texts: Texts<'_>,
     folder: &Path,
     started: WallTime,
 ) -> Result<(Recording, PathBuf), RecordError> {
@@ -75,7 +84,8 @@ pub fn recording(
             experiment: order.script.name(),
             who: &order.who,
             rig,
-            rig_toml,
+            rig_toml: texts.rig_toml,
+            link_toml: texts.link_toml,
             script: tactus_record::Script {
                 name: &format!("{}.star", order.script.name()),
                 source: order.script.source(),

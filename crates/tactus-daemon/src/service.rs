@@ -29,7 +29,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::timeout;
 use tracing::{error, info, warn};
 
-use crate::config::{Config, ConfigError, LogFormat};
+use crate::config::{Config, ConfigError, LogFormat, RigFiles};
 use crate::{devices, logging, notify};
 use answer::Desk;
 use watch::OnBus;
@@ -105,7 +105,7 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     let mut interrupt = signal(SignalKind::interrupt()).map_err(system("SIGINT"))?;
 
     let clock = Clock::real();
-    let rig = config.rig.clone();
+    let RigFiles { rig, codec, .. } = config.rig.clone();
     let Some(rig_service) = rig.service.clone() else {
         return Err(EngineError::NoService { rig: rig.name }.into());
     };
@@ -120,7 +120,7 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     }
     let (bus, calls) = Bus::open(&endpoints, keys).await?;
     let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
-    let opened = devices::open(&rig, &rig_service, truth, clock);
+    let opened = devices::open(&rig, &rig_service, codec, truth, clock);
     let engine = Engine::start(rig, opened.devices, clock, Arc::new(OnBus(bus.publisher())))?;
 
     let Calls { stops, commands } = calls;

@@ -3,7 +3,7 @@
 use std::thread;
 use std::time::Duration;
 
-use tactus_device::Clock;
+use tactus_device::{Clock, SensorCodec};
 use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, Unpublished};
 use tactus_mock::{Truth, twin_of};
 use tactus_schema::rig::Transport;
@@ -92,7 +92,9 @@ async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
     let Some(service) = twin.service.clone() else {
         return Err(tactus_engine::EngineError::NoService { rig: twin.name }.into());
     };
-    let opened = devices::open(&twin, &service, || Truth::of_rig(&twin, order.seed), clock);
+    // What a step does is the same by every codec: the twin has one that needs no description.
+    let codec = SensorCodec::default();
+    let opened = devices::open(&twin, &service, codec, || Truth::of_rig(&twin, order.seed), clock);
     let engine = Engine::start(twin, opened.devices, clock, std::sync::Arc::new(Unpublished))?;
     match timeout(LONGEST, engine.run(order, Box::new(Unrecorded))).await {
         Ok(Ok(outcome)) => Ok(outcome),

@@ -2,11 +2,13 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
+use tactus_daemon::config::RigFiles;
 use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, Truth};
 use tactus_daemon::order::Ask;
 use tactus_daemon::{devices, experiments};
-use tactus_device::Clock;
+use tactus_device::{Clock, SensorCodec};
 use tactus_plan::{Arguments, Script};
 use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
@@ -15,9 +17,9 @@ use tempfile::TempDir;
 
 fn run(script: Script, arguments: Arguments, rig_toml: &str) -> Result<(Finished, TempDir), EmbeddedError> {
     let folder = TempDir::new().unwrap();
-    let rig = Rig::from_toml(rig_toml).unwrap();
+    let rig = RigFiles::of(rig_toml, Path::new("rig.toml")).unwrap();
     let ask = Ask { script, arguments, seed: Some(1), who: "test".into() };
-    let finished = embedded::run(&rig, rig_toml, None, ask, folder.path(), Pace::Virtual, |_, _| {})?;
+    let finished = embedded::run(&rig, None, ask, folder.path(), Pace::Virtual, |_, _| {})?;
     Ok((finished, folder))
 }
 
@@ -63,7 +65,8 @@ fn the_truth_is_the_rig_files_and_the_devices_own() {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
     let of_the_devices = runtime.unwrap().block_on(async {
         let service = rig.service.as_ref().unwrap();
-        devices::open(&rig, service, || Truth::of_rig(&rig, truth.seed), Clock::paused())
+        let codec = SensorCodec::default();
+        devices::open(&rig, service, codec, || Truth::of_rig(&rig, truth.seed), Clock::paused())
             .control
             .unwrap()
             .truth()

@@ -18,5 +18,5 @@ pub mod transport;
 pub use clock::Clock;
 pub use error::{DeviceError, ErrorKind};
 pub use inventory::{Access, Found, Holder, inventory};
-pub use sensor::{ArrayExpectation, Sensor, SensorEvent, WeissSensor};
+pub use sensor::{ArrayExpectation, LinkFile, LinkFileError, Sensor, SensorCodec, SensorDriver, SensorEvent};
 pub use stage::{GrblOptions, GrblStage, Stage, StageError, Target};

@@ -37,6 +37,11 @@ impl Link {
         Self { stream, buffer: vec![0; BUFFER_BYTES].into(), clock, device }
     }
 
+    /// The same link, of which one read gives up to `bytes`, or more.
+    pub(crate) fn reading_at_least(self, bytes: usize) -> Self {
+        Self { buffer: vec![0; bytes.max(BUFFER_BYTES)].into(), ..self }
+    }
+
     /// Waits for bytes or the deadline. Cancel-safe.
     pub(crate) async fn next(
         &mut self,

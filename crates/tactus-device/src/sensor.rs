@@ -1,6 +1,17 @@
 //! The tactile array.
+//!
+//! One driver reads every array: it connects, reconnects, numbers frames and tells of losses. How a device is
+//! spoken to is a [`SensorCodec`], behind which stands a conversation without I/O for each protocol.
 
+mod anyskin;
+mod codec;
+mod conversation;
+mod declared;
+mod driver;
+mod link_file;
+mod listening;
 mod sequence;
+mod singletact;
 mod weiss;
 
 use futures_util::future::BoxFuture;
@@ -8,7 +19,9 @@ use tactus_schema::{Frame, pb};
 
 use crate::DeviceError;
 
-pub use weiss::{ArrayExpectation, WeissSensor};
+pub use codec::SensorCodec;
+pub use driver::{ArrayExpectation, SensorDriver};
+pub use link_file::{LinkFile, LinkFileError};
 
 /// A tactile array that is being read. One task owns it.
 pub trait Sensor: Send {

@@ -13,6 +13,7 @@ fn frame(at_ms: i64, count: f32, lost_before: u32) -> Frame {
         flags: FrameFlags::default(),
         lost_before,
         simulated: true,
+        bad_elements: [].into(),
     }
 }
 

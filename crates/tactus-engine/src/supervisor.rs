@@ -10,11 +10,23 @@ const SILENT_PERIODS_MAX: f64 = 3.0;
 #[derive(Debug)]
 pub struct Supervisor {
     limits: Limits,
-    reference_counts: Option<Vec<f64>>,
-    tare_counts: Option<Vec<f64>>,
+    reference: Option<Zero>,
+    tare: Option<Zero>,
     z_mm: f64,
     last_frame: MonoTime,
+    /// By index; as many as the last frame had.
+    elements: Vec<Element>,
     tripped: bool,
+}
+
+/// What elements read without load; `None` for one that was not read then, which has no zero.
+type Zero = Vec<Option<f64>>;
+
+#[derive(Debug, Clone, Copy)]
+struct Element {
+    last_read: Option<MonoTime>,
+    /// In the last frame.
+    is_read: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -70,6 +82,20 @@ pub enum Violation {
         /// Height of the tip.
         z_mm: f64,
     },
+    /// An element that was read at the run's first zero is not read any more: what presses it is not seen.
+    #[error(
+        "element {element} was not read for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
+    )]
+    ElementSilence {
+        /// Index of the element.
+        element: usize,
+        /// Since it was last read.
+        silent_s: f64,
+        /// The limit.
+        limit_s: f64,
+        /// Height of the tip.
+        z_mm: f64,
+    },
     /// The stage reports a depth beyond the limit.
     #[error(
         "the stage reports a depth of {depth_mm:.3} mm; the limit is {limit_mm:.3} mm (envelope.depth_share_max)"
@@ -89,6 +115,7 @@ impl Violation {
             Self::ElementForce { .. } => "element-force",
             Self::SumForce { .. } => "sum-force",
             Self::Silence { .. } => "silence",
+            Self::ElementSilence { .. } => "element-silence",
             Self::Depth { .. } => "depth",
         }
     }
@@ -108,10 +135,11 @@ impl Supervisor {
                 slack_mm: motion.tolerance_mm,
                 silence_max_s: SILENT_PERIODS_MAX / rig.array.rate_hz(),
             },
-            reference_counts: None,
-            tare_counts: None,
+            reference: None,
+            tare: None,
             z_mm: f64::INFINITY,
             last_frame: MonoTime::default(),
+            elements: Vec::new(),
             tripped: false,
         }
     }
@@ -119,8 +147,8 @@ impl Supervisor {
     /// A run begins: the zeros of the last one are no longer true.
     pub fn begin(&mut self, depth_max_mm: f64) {
         self.set_depth_max_mm(depth_max_mm);
-        self.reference_counts = None;
-        self.tare_counts = None;
+        self.reference = None;
+        self.tare = None;
     }
 
     /// Another covering is in place.
@@ -129,30 +157,66 @@ impl Supervisor {
     }
 
     /// The run's reference zero. Loads are limited against it and against the current tare, so that
-    /// repeated taring cannot ratchet the limit up.
+    /// repeated taring cannot ratchet the limit up. An element that has not been read for as long as a sensor may
+    /// be silent is known not to be: it has no zero and no limit, and its silence stops nothing.
     pub fn set_reference(&mut self, counts: Vec<f64>) {
-        self.tare_counts = Some(counts.clone());
-        self.reference_counts = Some(counts);
+        let zero = self.zero(counts);
+        self.tare = Some(zero.clone());
+        self.reference = Some(zero);
     }
 
     /// The script's new zero.
     pub fn set_tare(&mut self, counts: Vec<f64>) {
-        self.tare_counts = Some(counts);
+        self.tare = Some(self.zero(counts));
+    }
+
+    fn zero(&self, counts: Vec<f64>) -> Zero {
+        let was_read = |element: usize| {
+            self.elements.get(element).is_none_or(|element| {
+                let silent = element.last_read.map(|read| self.last_frame.since(read).as_secs_f64());
+                silent.is_some_and(|silent_s| silent_s <= self.limits.silence_max_s)
+            })
+        };
+        let zero =
+            |(element, count): (usize, f64)| Some(count).filter(|_| count.is_finite() && was_read(element));
+        counts.into_iter().enumerate().map(zero).collect()
     }
 
     /// Watches again after a violation was dealt with.
     pub fn rearm(&mut self, now: MonoTime) {
         self.tripped = false;
         self.last_frame = self.last_frame.max(now);
+        for element in &mut self.elements {
+            element.last_read = element.last_read.map(|read| read.max(now));
+        }
     }
 
     /// Looks at a frame.
     pub fn on_frame(&mut self, frame: &Frame) -> Option<Violation> {
         self.last_frame = frame.received.mono;
-        let violation = [(&self.tare_counts, "the tare"), (&self.reference_counts, "the run's first zero")]
+        self.look_at_elements(frame);
+        let violation = [(&self.tare, "the tare"), (&self.reference, "the run's first zero")]
             .into_iter()
-            .find_map(|(zero, against)| self.limits.force(frame, zero.as_deref()?, against));
+            .find_map(|(zero, against)| self.limits.force(frame, &self.elements, zero.as_deref()?, against));
         self.trip(violation)
+    }
+
+    /// What was not read stands in a frame with an earlier value, which says nothing of the present load.
+    fn look_at_elements(&mut self, frame: &Frame) {
+        let at = frame.received.mono;
+        self.elements.resize(frame.counts.len(), Element { last_read: None, is_read: false });
+        for (element, count) in self.elements.iter_mut().zip(frame.counts.iter()) {
+            element.is_read = count.is_finite();
+        }
+        for element in frame.bad_elements.iter() {
+            let element = usize::try_from(*element).ok().and_then(|element| self.elements.get_mut(element));
+            if let Some(element) = element {
+                element.is_read = false;
+            }
+        }
+        for element in self.elements.iter_mut().filter(|element| element.is_read) {
+            element.last_read = Some(at);
+        }
     }
 
     /// Looks at a report of the stage. A stage that does not know where it is leaves the last known height.
@@ -177,11 +241,32 @@ impl Supervisor {
 
     /// Looks at the clock.
     pub fn on_time(&mut self, now: MonoTime) -> Option<Violation> {
+        if self.z_mm >= self.limits.near_mm {
+            return None;
+        }
+        let (limit_s, z_mm) = (self.limits.silence_max_s, self.z_mm);
         let silent_s = now.since(self.last_frame).as_secs_f64();
-        let limit_s = self.limits.silence_max_s;
-        let violation = (self.z_mm < self.limits.near_mm && silent_s > limit_s)
-            .then_some(Violation::Silence { silent_s, limit_s, z_mm: self.z_mm });
+        let violation = if silent_s > limit_s {
+            Some(Violation::Silence { silent_s, limit_s, z_mm })
+        } else {
+            self.silent_element(now)
+        };
         self.trip(violation)
+    }
+
+    /// An element that has a zero and is not read.
+    fn silent_element(&self, now: MonoTime) -> Option<Violation> {
+        let zeros = self.reference.as_ref()?.iter();
+        zeros.zip(&self.elements).enumerate().find_map(|(element, (zero, state))| {
+            let silent_s = now.since(state.last_read.unwrap_or_default()).as_secs_f64();
+            let is_silent = zero.is_some() && !state.is_read && silent_s > self.limits.silence_max_s;
+            is_silent.then_some(Violation::ElementSilence {
+                element,
+                silent_s,
+                limit_s: self.limits.silence_max_s,
+                z_mm: self.z_mm,
+            })
+        })
     }
 
     /// A violation is told once: what follows it is its own clean-up.
@@ -193,14 +278,22 @@ impl Supervisor {
 }
 
 impl Limits {
-    fn force(&self, frame: &Frame, zero: &[f64], against: &'static str) -> Option<Violation> {
+    fn force(
+        &self,
+        frame: &Frame,
+        elements: &[Element],
+        zero: &[Option<f64>],
+        against: &'static str,
+    ) -> Option<Violation> {
+        // Only what was read, now and then: a rise of anything else is no number.
         let rises = || {
-            let pairs = frame.counts.iter().zip(zero).zip(&self.signs);
-            pairs.map(|((count, zero), sign)| (f64::from(*count) - zero) * sign)
+            let pairs = frame.counts.iter().zip(elements).zip(zero).zip(&self.signs).enumerate();
+            pairs.filter_map(|(element, (((count, state), zero), sign))| {
+                let zero = zero.filter(|_| state.is_read)?;
+                Some((element, (f64::from(*count) - zero) * sign))
+            })
         };
-        if let Some((element, rise_counts)) =
-            rises().enumerate().find(|(_, rise)| *rise > self.element_max_counts)
-        {
+        if let Some((element, rise_counts)) = rises().find(|(_, rise)| *rise > self.element_max_counts) {
             return Some(Violation::ElementForce {
                 element,
                 rise_counts,
@@ -208,7 +301,7 @@ impl Limits {
                 against,
             });
         }
-        let rise_counts: f64 = rises().sum();
+        let rise_counts: f64 = rises().map(|(_, rise)| rise).sum();
         (rise_counts > self.sum_max_counts).then_some(Violation::SumForce {
             rise_counts,
             limit_counts: self.sum_max_counts,

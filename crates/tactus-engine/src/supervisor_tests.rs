@@ -22,6 +22,7 @@ fn frame(ms: i64, counts: &[f32]) -> Frame {
         flags: FrameFlags::default(),
         lost_before: 0,
         simulated: true,
+        bad_elements: [].into(),
     }
 }
 
@@ -105,4 +106,56 @@ fn a_sensor_that_falls_when_pressed_is_limited_too() {
     assert_eq!(supervisor.on_frame(&frame(0, &[4000.0; 48])), None, "it rises when it is let go");
     let violation = supervisor.on_frame(&frame(33, &[900.0; 48])).unwrap();
     assert_eq!(violation.rule(), "element-force");
+}
+
+/// A frame in which elements were not read.
+fn partly_read(ms: i64, counts: &[f32], bad: &[u32]) -> Frame {
+    Frame { bad_elements: bad.into(), flags: FrameFlags::BAD_ELEMENTS, ..frame(ms, counts) }
+}
+
+#[test]
+fn what_was_not_read_neither_trips_nor_hides_a_load() {
+    let mut supervisor = supervisor();
+    supervisor.set_reference(vec![10_000.0; 48]);
+    let mut counts = [10_000.0; 48];
+    counts[3] = f32::NAN;
+    counts[4] = 60_000.0;
+    counts[5] = 0.0;
+    assert_eq!(supervisor.on_frame(&partly_read(0, &counts, &[4, 5])), None);
+    // 45 elements rise by 900: their sum is over its limit, whatever the three others stand with.
+    let mut counts = counts.map(|count| count + 900.0);
+    counts[5] = -1e9;
+    let violation = supervisor.on_frame(&partly_read(33, &counts, &[4, 5])).unwrap();
+    assert_eq!(violation.rule(), "sum-force");
+}
+
+#[test]
+fn an_element_that_falls_silent_near_the_covering_is_a_stop() {
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.on_frame(&partly_read(0, &[100.0; 4], &[2])), None);
+    supervisor.set_reference(vec![100.0; 4]);
+    assert_eq!(supervisor.on_report(&at_height(-0.2)), None);
+    for ms in [33, 67, 100] {
+        assert_eq!(supervisor.on_frame(&partly_read(ms, &[100.0; 4], &[1, 2])), None);
+        assert_eq!(supervisor.on_time(at_ms(ms)), None, "a bad reading or three are borne");
+    }
+    assert_eq!(supervisor.on_frame(&partly_read(133, &[100.0; 4], &[1, 2])), None);
+    let violation = supervisor.on_time(at_ms(134)).unwrap();
+    assert!(matches!(violation, Violation::ElementSilence { element: 1, .. }), "{violation}");
+}
+
+#[test]
+fn an_element_that_was_never_read_stops_nothing_until_it_has_a_zero() {
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.on_frame(&partly_read(0, &[0.0, 100.0], &[0])), None);
+    supervisor.set_reference(vec![0.0, 100.0]);
+    assert_eq!(supervisor.on_report(&at_height(-0.2)), None);
+    assert_eq!(supervisor.on_frame(&frame(2000, &[9000.0, 100.0])), None, "its zero was never read");
+    supervisor.set_tare(vec![9000.0, 100.0]);
+    assert_eq!(supervisor.on_frame(&frame(2033, &[9000.0, 100.0])), None);
+    let violation = supervisor.on_frame(&frame(2067, &[11_001.0, 100.0])).unwrap();
+    assert!(
+        matches!(violation, Violation::ElementForce { element: 0, against: "the tare", .. }),
+        "{violation}"
+    );
 }

@@ -52,6 +52,7 @@ fn begin(disk: Disk) -> Result<ChannelWriter<Disk>, McapError> {
         who: "ada",
         rig: &rig,
         rig_toml: Some(RIG_TOML),
+        link_toml: Some("schema = \"tactus.link/1\""),
         script: Script { name: "corners.star", source: "" },
         versions: &BTreeMap::new(),
         parameters_json: "{}",
@@ -105,7 +106,10 @@ fn the_header_is_durable_before_the_first_message() {
             file.name.as_str()
         })
         .collect();
-    assert_eq!(names, ["rig.json", "rig.toml", "corners.star", "versions.json", "parameters.json"]);
+    assert_eq!(
+        names,
+        ["rig.json", "rig.toml", "link.toml", "corners.star", "versions.json", "parameters.json"]
+    );
 }
 
 #[test]

@@ -11,6 +11,8 @@ pub(crate) const METADATA_NAME: &str = "tactus.run";
 pub(crate) const RIG_JSON: &str = "rig.json";
 /// Attachment: the rig file as it was read.
 pub(crate) const RIG_TOML: &str = "rig.toml";
+/// Attachment: the description of the sensor's frames (`tactus.link/1`) that the rig file names, as it was read.
+pub(crate) const LINK_TOML: &str = "link.toml";
 /// Attachment: name to version, as a JSON object.
 pub(crate) const VERSIONS_JSON: &str = "versions.json";
 /// Attachment: the parameters as the script saw them, as a JSON object.
@@ -29,6 +31,8 @@ pub struct Header<'a> {
     pub rig: &'a Rig,
     /// The rig file as it was read; none if what it says of simulated devices is not so.
     pub rig_toml: Option<&'a str>,
+    /// The description of the sensor's frames as it was read, if the rig file names one.
+    pub link_toml: Option<&'a str>,
     /// The experiment's script.
     pub script: Script<'a>,
     /// Name to version of everything that had a part in it.
@@ -104,13 +108,14 @@ impl Header<'_> {
         };
         let versions = serde_json::Value::from_iter(self.versions.clone());
         let rig_toml = self.rig_toml.map(|text| attach(RIG_TOML, "application/toml", text.into()));
+        let link_toml = self.link_toml.map(|text| attach(LINK_TOML, "application/toml", text.into()));
         let rig_json = attach(RIG_JSON, "application/json", self.rig.to_json());
         let others = [
             attach(self.script.name, "text/x-starlark", self.script.source.into()),
             attach(VERSIONS_JSON, "application/json", versions.to_string()),
             attach(PARAMETERS_JSON, "application/json", self.parameters_json.into()),
         ];
-        [rig_json].into_iter().chain(rig_toml).chain(others).collect()
+        [rig_json].into_iter().chain(rig_toml).chain(link_toml).chain(others).collect()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Measured rows, of recordings and measurement tables alike.
 
 use std::{
+    collections::BTreeSet,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -115,7 +116,14 @@ impl Gathered {
         if timeline.stage().is_empty() {
             return Err(RowsError::NoStage { path: path.to_owned() });
         }
-        let mut frames = Frames { timeline, last: None, moved: 0, by_arrival: 0 };
+        let mut frames = Frames {
+            timeline,
+            last: None,
+            moved: 0,
+            by_arrival: 0,
+            bad_elements: BTreeSet::new(),
+            partly_read: 0,
+        };
         let mut checker = Checker::new(timeline.rig());
         let mut index = 0;
         let (_, reader) = read_run(path)?;
@@ -188,6 +196,9 @@ struct Frames<'a> {
     /// Frames whose sampling time was not after the one before.
     moved: u64,
     by_arrival: u64,
+    /// Elements that were not read in some frames, and these frames.
+    bad_elements: BTreeSet<u32>,
+    partly_read: u64,
 }
 
 impl Frames<'_> {
@@ -195,6 +206,8 @@ impl Frames<'_> {
         let timeline = self.timeline;
         let sampling = timeline.sampling(frame);
         self.by_arrival += u64::from(matches!(sampling, Sampling::Arrival(_)));
+        self.bad_elements.extend(frame.bad_elements.iter());
+        self.partly_read += u64::from(!frame.bad_elements.is_empty());
         let mut at = sampling.time();
         if let Some(last) = self.last.filter(|last| at <= *last) {
             at = last.after(Duration::from_nanos(1));
@@ -219,7 +232,7 @@ impl Frames<'_> {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let Self { timeline, moved, by_arrival, .. } = *self;
+        let Self { timeline, moved, by_arrival, partly_read, .. } = *self;
         let mut warnings = Vec::new();
         if let Completeness::Truncated { at_byte, reason } = timeline.completeness() {
             warnings.push(format!("the recording is readable up to byte {at_byte} only: {reason}"));
@@ -234,6 +247,13 @@ impl Frames<'_> {
         }
         if moved > 0 {
             warnings.push(format!("{moved} frames did not come after the one before; moved to do so"));
+        }
+        if partly_read > 0 {
+            let elements: Vec<String> = self.bad_elements.iter().map(ToString::to_string).collect();
+            warnings.push(format!(
+                "in {partly_read} frames elements were not read and stand with an earlier reading: {}",
+                elements.join(", ")
+            ));
         }
         let run = &timeline.run().run_id;
         warnings.into_iter().map(|warning| format!("run {run}: {warning}")).collect()

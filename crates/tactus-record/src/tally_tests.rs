@@ -20,6 +20,7 @@ fn frame(seq: u64, lost_before: u32) -> Frame {
         flags: FrameFlags::default(),
         lost_before,
         simulated: true,
+        bad_elements: [].into(),
     }
 }
 

@@ -138,6 +138,28 @@ fn frames_without_a_device_clock_are_dated_by_their_arrival_and_said_so() {
 }
 
 #[test]
+fn elements_that_were_not_read_are_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = Plan::short(1).make();
+    let path = dir.path().join("run.mcap");
+    let mut frames = 0;
+    recorded_as(&run, &path, |fed| {
+        if let Fed::Frame(frame) = fed {
+            frames += 1;
+            match frames {
+                3 => frame.bad_elements = [7, 11].into(),
+                4 => frame.bad_elements = [7].into(),
+                _ => {}
+            }
+        }
+        true
+    });
+    let (summary, _) = exported(dir.path(), &[&path]);
+    let told = "in 2 frames elements were not read and stand with an earlier reading: 7, 11";
+    assert!(summary.warnings.iter().any(|warning| warning.ends_with(told)), "{:?}", summary.warnings);
+}
+
+#[test]
 fn the_device_clock_begins_anew_with_each_connection() {
     let dir = tempfile::tempdir().unwrap();
     let run = Plan::short(2).make();

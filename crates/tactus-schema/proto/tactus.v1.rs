@@ -19,6 +19,8 @@ pub struct Frame {
     pub lost_before: u32,
     #[prost(bool, tag = "9")]
     pub simulated: bool,
+    #[prost(uint32, repeated, tag = "10")]
+    pub bad_elements: ::prost::alloc::vec::Vec<u32>,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct SensorInfo {
@@ -396,6 +398,7 @@ pub enum FrameFlag {
     GapBefore = 1,
     NewEpoch = 2,
     Saturated = 4,
+    BadElements = 8,
 }
 impl FrameFlag {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -408,6 +411,7 @@ impl FrameFlag {
             Self::GapBefore => "FRAME_FLAG_GAP_BEFORE",
             Self::NewEpoch => "FRAME_FLAG_NEW_EPOCH",
             Self::Saturated => "FRAME_FLAG_SATURATED",
+            Self::BadElements => "FRAME_FLAG_BAD_ELEMENTS",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -417,6 +421,7 @@ impl FrameFlag {
             "FRAME_FLAG_GAP_BEFORE" => Some(Self::GapBefore),
             "FRAME_FLAG_NEW_EPOCH" => Some(Self::NewEpoch),
             "FRAME_FLAG_SATURATED" => Some(Self::Saturated),
+            "FRAME_FLAG_BAD_ELEMENTS" => Some(Self::BadElements),
             _ => None,
         }
     }

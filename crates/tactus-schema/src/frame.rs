@@ -15,7 +15,8 @@ pub struct Frame {
     pub device_tick: Option<DeviceTick>,
     /// When the last byte of the frame reached the host.
     pub received: Stamp,
-    /// Raw counts, row-major, one per element.
+    /// Raw counts, row-major, one per element; always finite. One that was not read stands with its last reading
+    /// of this epoch, or with 0.
     pub counts: Arc<[f32]>,
     /// What is known of this frame.
     pub flags: FrameFlags,
@@ -23,6 +24,8 @@ pub struct Frame {
     pub lost_before: u32,
     /// True if no physical sensor was read.
     pub simulated: bool,
+    /// Elements that were not read, in order; [`FrameFlags::BAD_ELEMENTS`] says whether there are any.
+    pub bad_elements: Arc<[u32]>,
 }
 
 /// Bits of [`pb::FrameFlag`].
@@ -36,6 +39,8 @@ impl FrameFlags {
     pub const NEW_EPOCH: Self = Self(pb::FrameFlag::NewEpoch as u32);
     /// At least one element stands at the end of its range.
     pub const SATURATED: Self = Self(pb::FrameFlag::Saturated as u32);
+    /// At least one element was not read.
+    pub const BAD_ELEMENTS: Self = Self(pb::FrameFlag::BadElements as u32);
 
     /// True if every bit of `other` is set.
     pub fn contains(self, other: Self) -> bool {
@@ -61,6 +66,7 @@ impl From<&Frame> for pb::Frame {
             flags: frame.flags.0,
             lost_before: frame.lost_before,
             simulated: frame.simulated,
+            bad_elements: frame.bad_elements.to_vec(),
         }
     }
 }
@@ -79,6 +85,7 @@ impl From<pb::Frame> for Frame {
             flags: FrameFlags(message.flags),
             lost_before: message.lost_before,
             simulated: message.simulated,
+            bad_elements: message.bad_elements.into(),
         }
     }
 }

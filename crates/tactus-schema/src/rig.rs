@@ -139,12 +139,42 @@ pub struct SensorLink {
     pub transport: Transport,
 }
 
-/// Protocols of sensors (devices.md).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Protocols of sensors (devices.md). What a frame's counts are depends on it.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SensorProtocol {
-    /// `weiss-dsa`: the `DSACON32m` and relatives, push mode.
-    WeissDsa,
+    /// `weiss-dsa`: the `DSACON32m` and relatives, push mode; 12-bit counts.
+    WeissDsa {
+        /// `checksum`: how the controller's firmware closes its packets; `crc` unless the file says otherwise.
+        checksum: WeissChecksum,
+    },
+    /// `singletact`: single elements behind one interface board, polled; the elements' counts, about 255 without load.
+    SingleTact {
+        /// `addresses`: of the elements on the board's I2C bus, in the order of the array's elements.
+        addresses: Vec<u8>,
+    },
+    /// `anyskin`: the boards of `ReSkin` and `AnySkin`. The array has [`ANYSKIN_SHAPE`]: a row for each magnetometer in
+    /// the order of the wire, a column for each of its axes x, y, z. "Counts" are then microteslas with a sign, as the
+    /// firmware converts them, and no covering's depth follows from one of them by the forward model.
+    AnySkin,
+    /// `declared`: frames as another file (`tactus.link/1`) describes them.
+    Declared {
+        /// `format`: path of that file, relative to the rig file. Whoever reads the rig file reads it too.
+        format: String,
+    },
 }
+
+/// How older and newer firmware of `weiss-dsa` closes packets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum WeissChecksum {
+    /// `crc`: two bytes.
+    #[default]
+    Crc,
+    /// `sum8`: older firmware's sum of all bytes.
+    Sum8,
+}
+
+/// Rows and columns of an array that speaks `anyskin`: magnetometers and axes.
+pub const ANYSKIN_SHAPE: [usize; 2] = [5, 3];
 
 /// The stage's link.
 #[derive(Debug, Clone, PartialEq, Eq)]

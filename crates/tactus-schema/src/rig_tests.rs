@@ -121,3 +121,96 @@ fn numbers_of_any_spelling_are_read_from_json() {
     let listed = json.replace("\"baseline_counts\":100.0", &format!("\"baseline_counts\":{:?}", vec![7; 48]));
     assert_eq!(Rig::from_json(&listed).unwrap().baseline_counts, vec![7.0; 48]);
 }
+
+/// The shipped rig with another `[sensor]`; `array` changes the array.
+fn with_sensor(sensor: &str, array: &[(&str, &str)]) -> Result<SensorProtocol, String> {
+    let mut toml = SIM.replace("protocol = \"weiss-dsa\"", sensor).replace("miswired = ", "# ");
+    for (from, to) in array {
+        assert!(toml.contains(from), "the shipped rig has no {from:?}");
+        toml = toml.replace(from, to);
+    }
+    let rig = Rig::from_toml(&toml).map_err(|error| error.to_string())?;
+    Ok(rig.service.unwrap().sensor.protocol)
+}
+
+const ONE_ELEMENT: [(&str, &str); 4] = [
+    ("rows = 6", "rows = 1"),
+    ("cols = 8", "cols = 1"),
+    ("[0.9, 2.9, 5.1, 7.1, 9.1, 11.1, 13.3, 15.3]", "[7.5]"),
+    ("[0.9, 2.9, 4.9, 6.9, 8.9, 10.9]", "[7.5]"),
+];
+
+const FIVE_BY_THREE: [(&str, &str); 4] = [
+    ("rows = 6", "rows = 5"),
+    ("cols = 8", "cols = 3"),
+    ("[0.9, 2.9, 5.1, 7.1, 9.1, 11.1, 13.3, 15.3]", "[0.9, 2.9, 5.1]"),
+    ("[0.9, 2.9, 4.9, 6.9, 8.9, 10.9]", "[0.9, 2.9, 4.9, 6.9, 8.9]"),
+];
+
+#[test]
+fn each_sensor_protocol_has_its_own_keys() {
+    let weiss = |checksum| SensorProtocol::WeissDsa { checksum };
+    for (sensor, array, want) in [
+        ("protocol = \"weiss-dsa\"", &[][..], weiss(WeissChecksum::Crc)),
+        ("protocol = \"weiss-dsa\"\nchecksum = \"crc\"", &[], weiss(WeissChecksum::Crc)),
+        ("protocol = \"weiss-dsa\"\nchecksum = \"sum8\"", &[], weiss(WeissChecksum::Sum8)),
+        (
+            "protocol = \"singletact\"\naddresses = [4]",
+            &ONE_ELEMENT,
+            SensorProtocol::SingleTact { addresses: vec![4] },
+        ),
+        ("protocol = \"anyskin\"", &FIVE_BY_THREE, SensorProtocol::AnySkin),
+        (
+            "protocol = \"declared\"\nformat = \"../links/digitacts.toml\"",
+            &[],
+            SensorProtocol::Declared { format: "../links/digitacts.toml".into() },
+        ),
+    ] {
+        assert_eq!(with_sensor(sensor, array).unwrap(), want);
+    }
+}
+
+#[test]
+fn keys_of_another_sensor_protocol_and_contradictions_are_refused() {
+    for (sensor, array, refusal) in [
+        (
+            "protocol = \"anyskin\"\nchecksum = \"crc\"",
+            &FIVE_BY_THREE[..],
+            "sensor.checksum: belongs to protocol = \"weiss-dsa\", not to \"anyskin\"",
+        ),
+        ("protocol = \"weiss-dsa\"\naddresses = [4]", &[], "sensor.addresses: belongs to"),
+        (
+            "protocol = \"singletact\"\naddresses = [4]\nformat = \"a\"",
+            &ONE_ELEMENT,
+            "sensor.format: belongs to",
+        ),
+        ("protocol = \"singletact\"", &ONE_ELEMENT, "sensor.addresses: missing"),
+        (
+            "protocol = \"singletact\"\naddresses = [128]",
+            &ONE_ELEMENT,
+            "sensor.addresses: 128 is no I2C address",
+        ),
+        (
+            "protocol = \"singletact\"\naddresses = [4, 5]",
+            &ONE_ELEMENT,
+            "sensor.addresses: lists 2 addresses, one for each element, but array.rows and array.cols say 1 x 1",
+        ),
+        ("protocol = \"declared\"", &[], "sensor.format: missing"),
+        (
+            "protocol = \"anyskin\"",
+            &[],
+            "sensor.protocol: \"anyskin\" is 5 magnetometers by 3 axes, but array.rows and array.cols say 6 x 8",
+        ),
+    ] {
+        let error = with_sensor(sensor, array).unwrap_err();
+        assert!(error.starts_with(refusal), "{error}");
+    }
+    let two = [("rows = 6", "rows = 1"), ("cols = 8", "cols = 2")];
+    let centres = [
+        ("[0.9, 2.9, 5.1, 7.1, 9.1, 11.1, 13.3, 15.3]", "[0.9, 2.9]"),
+        ("[0.9, 2.9, 4.9, 6.9, 8.9, 10.9]", "[0.9]"),
+    ];
+    let error =
+        with_sensor("protocol = \"singletact\"\naddresses = [5, 5]", &[two, centres].concat()).unwrap_err();
+    assert!(error.starts_with("sensor.addresses: 5 is there twice"), "{error}");
+}

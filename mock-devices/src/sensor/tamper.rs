@@ -2,7 +2,6 @@
 
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
-use tactus_wire::weiss::encode_frame;
 use tokio::time::Instant;
 
 use crate::faults::LinkFault;
@@ -75,25 +74,17 @@ impl Tamper {
         self.armed.dripping_until.is_some_and(|until| at < until)
     }
 
-    /// The bytes that leave the controller for a frame sampled at `at`: none, one packet, or what became of it.
-    pub(super) fn frame(
-        &mut self,
-        timestamp_ms: u32,
-        counts: &[u16],
-        run_length: bool,
-        at: Instant,
-    ) -> Vec<u8> {
-        if self.is_stalled(at) {
-            return Vec::new();
-        }
+    /// The bytes that leave the device for a frame sampled at `at`: none, one packet, or what became of it.
+    ///
+    /// Every frame is encoded, since those that are lost count too; with a number if it is to have as many elements.
+    pub(super) fn frame(&mut self, at: Instant, encode: impl FnOnce(Option<usize>) -> Vec<u8>) -> Vec<u8> {
+        let is_stalled = self.is_stalled(at);
         let Self { rng, armed } = self;
-        if strikes(&mut armed.drop_frames) {
+        let is_lost = is_stalled || strikes(&mut armed.drop_frames);
+        let mut bytes = encode(if is_lost { None } else { armed.wrong_count.take() });
+        if is_lost || bytes.is_empty() {
             return Vec::new();
         }
-        let mut bytes = match armed.wrong_count.take() {
-            Some(elements) => encode_frame(timestamp_ms, &with_length(counts, elements), run_length),
-            None => encode_frame(timestamp_ms, counts, run_length),
-        };
         if strikes(&mut armed.wrong_checksum_frames)
             && let Some(last) = bytes.last_mut()
         {
@@ -142,10 +133,4 @@ fn strikes(frames: &mut usize) -> bool {
     let is_armed = *frames > 0;
     *frames = frames.saturating_sub(1);
     is_armed
-}
-
-/// The counts cut off or, with the last repeated, drawn out to another length.
-fn with_length(counts: &[u16], elements: usize) -> Vec<u16> {
-    let last = counts.last().copied().unwrap_or(0);
-    counts.iter().copied().chain(std::iter::repeat(last)).take(elements).collect()
 }

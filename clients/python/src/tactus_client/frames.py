@@ -37,6 +37,8 @@ class Frame:
     simulated: bool
     #: How the elements lie; None if the service has not said.
     shape: tuple | None
+    #: Elements that were not read; each stands in ``counts`` with its last reading, or with 0.
+    bad_elements: tuple = ()
 
     @property
     def image(self):
@@ -64,6 +66,7 @@ class Frame:
             lost_before=message.lost_before,
             simulated=message.simulated,
             shape=shape,
+            bad_elements=tuple(message.bad_elements),
         )
 
 

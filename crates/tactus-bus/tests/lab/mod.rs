@@ -74,6 +74,7 @@ pub(crate) fn frame(seq: u64) -> Frame {
         flags: FrameFlags::default(),
         lost_before: 0,
         simulated: true,
+        bad_elements: [].into(),
     }
 }
 

@@ -124,9 +124,9 @@ impl Desk {
         }
         claim.check().map_err(No::failed)?;
         order.planned = Some(plan.promise());
+        let texts = self.config.rig.texts.all();
         let (recording, path) =
-            order::recording(&order, &rig, Some(&self.config.rig_toml), &self.config.recordings, now)
-                .map_err(No::failed)?;
+            order::recording(&order, &rig, texts, &self.config.recordings, now).map_err(No::failed)?;
         let path = std::path::absolute(&path).unwrap_or(path);
         info!(run = order.run_id, recording = %path.display(), presses = plan.promise().presses, "run accepted");
         let record = Box::new(OnThread::start(recording).map_err(No::failed)?);

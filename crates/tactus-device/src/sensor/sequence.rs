@@ -4,13 +4,24 @@ use std::time::Duration;
 
 use tactus_schema::{DeviceTick, FrameFlags, MonoTime, pb};
 
-/// Counts every frame that the sensor took or should have taken, by its clock or, where that is another one
-/// than before, by the host's.
+use super::conversation::Before;
+
+/// By the host's clock alone, a frame this many periods behind its time may be one behind a loss.
+const BEHIND_PERIODS: f64 = 0.5;
+
+/// What is buffered on the way comes within this; what is later than that was lost.
+const BUFFERED_S: f64 = 1.0;
+
+/// How much of a small lateness is forgotten with each frame: rates are not quite what the rig says.
+const FORGOTTEN: f64 = 0.1;
+
+/// Counts every frame that the sensor took or should have taken: by the device's own count, or by its clock or,
+/// where that is another one than before or there is none, by the host's.
 #[derive(Debug, Clone)]
 pub(super) struct Sequence {
     rate_hz: f64,
-    /// Length of a device tick.
-    tick: Duration,
+    /// Length of a device tick, if it is short enough to tell frames apart.
+    tick: Option<Duration>,
     /// Number of the present epoch; the first is 0.
     epoch: u32,
     last: Option<Last>,
@@ -19,8 +30,25 @@ pub(super) struct Sequence {
 #[derive(Debug, Clone, Copy)]
 struct Last {
     seq: u64,
-    tick: DeviceTick,
+    tick: Option<DeviceTick>,
     received: MonoTime,
+    /// Behind its time, by the host's clock.
+    late_periods: f64,
+}
+
+/// A frame that has come.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrival {
+    /// By the device's clock; comparable with the last frame's unless `cause` says otherwise.
+    pub(super) tick: Option<DeviceTick>,
+    /// What else is known of the way from the last frame.
+    pub(super) before: Before,
+    pub(super) received: MonoTime,
+    /// Frames that came at once, this one and those behind it: by their arrival, they stand for as many periods.
+    pub(super) together: usize,
+    /// Frames that came between the last one and this, and were not taken.
+    pub(super) passed_over: u64,
+    pub(super) cause: Cause,
 }
 
 /// A frame's place.
@@ -48,15 +76,18 @@ pub(super) enum Cause {
 }
 
 impl Sequence {
-    /// No frames yet.
+    /// No frames yet. A device without a clock has a tick of zero.
     pub(super) fn new(rate_hz: f64, tick: Duration) -> Self {
-        Self { rate_hz, tick, epoch: 0, last: None }
+        // Of frames closer than two ticks a clock cannot tell how many there were.
+        let tells_apart = !tick.is_zero() && 2.0 * tick.as_secs_f64() * rate_hz <= 1.0;
+        Self { rate_hz, tick: tells_apart.then_some(tick), epoch: 0, last: None }
     }
 
-    /// Places the next frame. Its tick is comparable with the last one's unless `cause` says otherwise.
-    pub(super) fn place(&mut self, tick: DeviceTick, received: MonoTime, cause: Cause) -> Place {
+    /// Places the next frame.
+    pub(super) fn place(&mut self, arrival: Arrival) -> Place {
+        let Arrival { tick, received, cause, .. } = arrival;
         let Some(last) = self.last else {
-            self.last = Some(Last { seq: 0, tick, received });
+            self.last = Some(Last { seq: 0, tick, received, late_periods: 0.0 });
             return Place {
                 seq: 0,
                 epoch: self.epoch,
@@ -66,21 +97,10 @@ impl Sequence {
             };
         };
         let new_epoch = matches!(cause, Cause::Reconnected | Cause::ClockJumped);
-        let since_last_s = if new_epoch {
-            self.epoch += 1;
-            received.since(last.received).as_secs_f64()
-        } else {
-            tick.0.saturating_sub(last.tick.0) as f64 * self.tick.as_secs_f64()
-        };
-        let periods = (since_last_s * self.rate_hz).round();
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "saturates, as it should"
-        )]
-        let lost_before = (periods - 1.0).max(0.0) as u32;
+        self.epoch += u32::from(new_epoch);
+        let (lost_before, late_periods) = self.missing(last, &arrival);
         let seq = last.seq + u64::from(lost_before) + 1;
-        self.last = Some(Last { seq, tick, received });
+        self.last = Some(Last { seq, tick, received, late_periods });
         let gap = (lost_before > 0).then(|| pb::Gap {
             frames_lost: lost_before.into(),
             after_seq: last.seq,
@@ -98,10 +118,72 @@ impl Sequence {
     }
 }
 
+impl Sequence {
+    /// How many frames are missing, and by how many periods the arrival is late if so many are.
+    fn missing(&self, last: Last, arrival: &Arrival) -> (u32, f64) {
+        let periods = arrival.received.since(last.received).as_secs_f64() * self.rate_hz;
+        let by_host = (periods - arrival.together as f64).round();
+        let by_ticks = || {
+            let (tick, [from, to]) = (self.tick?, [last.tick?, arrival.tick?]);
+            Some((to.0.saturating_sub(from.0) as f64 * tick.as_secs_f64() * self.rate_hz).round() - 1.0)
+        };
+        let passed_over = arrival.passed_over as f64;
+        let mut late_periods = 0.0;
+        let missing = match (arrival.cause, arrival.before) {
+            (Cause::Link | Cause::HostTooSlow | Cause::ClockJumped, Before::Numbers { lost, wrap }) => {
+                let lost = lost as f64 + passed_over;
+                // Whole rounds of the count, which it cannot tell itself.
+                lost + ((by_host - lost) / wrap as f64).round().max(0.0) * wrap as f64
+            }
+            (Cause::Reconnected | Cause::ClockJumped, _) => by_host,
+            (Cause::Link | Cause::HostTooSlow, before) => by_ticks().unwrap_or_else(|| {
+                let late = last.late_periods + periods - 1.0 - passed_over;
+                let lost =
+                    self.missing_by_arrivals(last.late_periods, late, periods, before, arrival.together);
+                late_periods = settled(late - lost);
+                lost + passed_over
+            }),
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates, as it should"
+        )]
+        let missing = missing.max(passed_over) as u32;
+        (missing, late_periods)
+    }
+
+    /// A frame that is late and stands alone may have been lost ones' follower or just slow: those that were held up
+    /// come close behind each other, and then the last of them is in time. So a loss is told when the frame after
+    /// it, a period later, is as late; at once if bytes were damaged or the silence was longer than any buffer.
+    fn missing_by_arrivals(
+        &self,
+        was_late: f64,
+        late: f64,
+        periods: f64,
+        before: Before,
+        together: usize,
+    ) -> f64 {
+        let alone = late - (together.max(1) - 1) as f64;
+        if before == Before::Damage || alone >= BUFFERED_S * self.rate_hz {
+            alone.round().max(0.0)
+        } else if periods >= BEHIND_PERIODS && was_late >= BEHIND_PERIODS && late >= BEHIND_PERIODS {
+            was_late.min(late).round()
+        } else {
+            0.0
+        }
+    }
+}
+
+/// The lateness to go on with: none of a frame that came early, less of one that was hardly late.
+fn settled(late_periods: f64) -> f64 {
+    if late_periods < BEHIND_PERIODS { late_periods.max(0.0) * (1.0 - FORGOTTEN) } else { late_periods }
+}
+
 impl Cause {
     fn reason(self) -> &'static str {
         match self {
-            Self::Link => "the device's clock says that frames are missing",
+            Self::Link => "they never came from the device",
             Self::Reconnected => "the device was connected anew",
             Self::ClockJumped => "the device's clock jumped",
             Self::HostTooSlow => "the service was too slow to take them",

@@ -2,15 +2,28 @@ use std::time::Duration;
 
 use tactus_schema::{DeviceTick, FrameFlags, MonoTime};
 
-use super::{Cause, Place, Sequence};
+use super::{Arrival, Before, Cause, Place, Sequence};
 
 /// 30 Hz, a tick a millisecond.
 fn sequence() -> Sequence {
     Sequence::new(30.0, Duration::from_millis(1))
 }
 
+/// One frame, without a device's clock or count.
+fn arrival(received_ms: i64) -> Arrival {
+    Arrival {
+        tick: None,
+        before: Before::Times,
+        received: MonoTime::from_ns(received_ms * 1_000_000),
+        together: 1,
+        passed_over: 0,
+        cause: Cause::Link,
+    }
+}
+
 fn place(sequence: &mut Sequence, tick_ms: u64, received_ms: i64, cause: Cause) -> Place {
-    sequence.place(DeviceTick(tick_ms), MonoTime::from_ns(received_ms * 1_000_000), cause)
+    let tick = Some(DeviceTick(tick_ms));
+    sequence.place(Arrival { tick, cause, ..arrival(received_ms) })
 }
 
 #[test]
@@ -63,4 +76,72 @@ fn the_reason_is_told() {
     place(&mut sequence, 0, 0, Cause::Link);
     let placed = place(&mut sequence, 100, 100, Cause::HostTooSlow);
     assert_eq!(placed.gap.unwrap().reason, "the service was too slow to take them");
+}
+
+/// What is missing before a frame that comes `after_ms` behind the first.
+fn missing(tick: Duration, second: Arrival) -> u32 {
+    let mut sequence = Sequence::new(30.0, tick);
+    sequence.place(Arrival { tick: second.tick.map(|_| DeviceTick(0)), ..arrival(0) });
+    sequence.place(second).lost_before
+}
+
+#[test]
+fn the_devices_own_count_is_exact_but_for_whole_rounds_which_times_tell() {
+    let numbers = |lost| Before::Numbers { lost, wrap: 256 };
+    for (lost, after_ms, want) in
+        [(0, 0, 0), (0, 900, 0), (3, 10, 3), (3, 133, 3), (3, 8_667, 259), (0, 17_100, 512)]
+    {
+        let second = Arrival { before: numbers(lost), ..arrival(after_ms) };
+        assert_eq!(missing(Duration::ZERO, second), want, "{lost} after {after_ms} ms");
+    }
+    let jumped = Arrival { before: numbers(2), cause: Cause::ClockJumped, ..arrival(100) };
+    assert_eq!(missing(Duration::ZERO, jumped), 2, "a clock that jumps does not change the count");
+    let slow = Arrival { before: numbers(2), passed_over: 5, cause: Cause::HostTooSlow, ..arrival(267) };
+    assert_eq!(missing(Duration::ZERO, slow), 7);
+}
+
+/// What is missing before each frame that comes at these times, by the host's clock alone.
+fn missing_by_arrivals(arrivals_ms: &[i64]) -> Vec<u32> {
+    let mut sequence = Sequence::new(30.0, Duration::ZERO);
+    arrivals_ms.iter().map(|ms| sequence.place(arrival(*ms)).lost_before).collect()
+}
+
+#[test]
+fn by_the_hosts_clock_alone_a_loss_is_told_from_a_delay_by_the_frame_after_it() {
+    for (arrivals_ms, want) in [
+        (&[0, 33, 67, 100][..], &[0, 0, 0, 0][..]),
+        (&[0, 67, 100, 133], &[0, 0, 1, 0]),
+        (&[0, 200, 233, 267], &[0, 0, 5, 0]),
+        // Held up, and all there in the end.
+        (&[0, 67, 68, 100, 133], &[0, 0, 0, 0, 0]),
+        (&[0, 200, 200, 201, 201, 202, 202, 233], &[0; 8]),
+        // Of five that were held up, two are missing.
+        (&[0, 200, 200, 201, 201, 233, 267], &[0, 0, 0, 0, 0, 2, 0]),
+        // Longer than any buffer.
+        (&[0, 2000, 2033], &[0, 59, 0]),
+    ] {
+        assert_eq!(missing_by_arrivals(arrivals_ms), want, "{arrivals_ms:?}");
+    }
+    // A device that is a little slower, or faster, than the rig says loses nothing.
+    for period_us in [32_000, 34_500] {
+        let arrivals_ms: Vec<i64> = (0..3000).map(|frame| frame * period_us / 1000).collect();
+        assert_eq!(missing_by_arrivals(&arrivals_ms).iter().sum::<u32>(), 0, "{period_us}");
+    }
+}
+
+#[test]
+fn damage_on_the_way_is_a_loss_if_there_was_time_for_one() {
+    let damaged = |after_ms, together| Arrival { before: Before::Damage, together, ..arrival(after_ms) };
+    for (after_ms, together, want) in [(67, 1, 1), (33, 1, 0), (133, 3, 1), (100, 3, 0)] {
+        assert_eq!(missing(Duration::ZERO, damaged(after_ms, together)), want, "{after_ms} ms, {together}");
+    }
+    let slow = Arrival { passed_over: 5, cause: Cause::HostTooSlow, ..arrival(200) };
+    assert_eq!(missing(Duration::ZERO, slow), 5, "they came, and were not taken");
+}
+
+#[test]
+fn a_clock_too_coarse_to_tell_frames_apart_counts_none() {
+    let second = Arrival { tick: Some(DeviceTick(1)), ..arrival(33) };
+    assert_eq!(missing(Duration::from_secs(1), second), 0);
+    assert_eq!(missing(Duration::from_millis(10), Arrival { tick: Some(DeviceTick(10)), ..second }), 2);
 }

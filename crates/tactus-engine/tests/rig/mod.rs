@@ -70,6 +70,7 @@ impl Sensor for FakeSensor {
                     flags: FrameFlags::default(),
                     lost_before: lost,
                     simulated: true,
+                    bad_elements: [].into(),
                 };
                 if lost == 0 {
                     return SensorEvent::Frame(frame);

@@ -126,6 +126,7 @@ impl Maker {
                 flags,
                 lost_before,
                 simulated: true,
+                bad_elements: [].into(),
             });
             if lost_before > 0 {
                 let gap = pb::Gap {

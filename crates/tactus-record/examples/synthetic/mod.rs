@@ -124,6 +124,7 @@ impl Run {
             who: "ada",
             rig: &self.rig,
             rig_toml: Some(RIG_TOML),
+            link_toml: None,
             script: Script { name: "element-centres.star", source: SCRIPT },
             versions: &versions,
             parameters_json: r#"{"dwell_s":0.25}"#,

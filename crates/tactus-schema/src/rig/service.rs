@@ -1,9 +1,13 @@
 //! What the lab service needs of a rig, as the rig file writes it: limits, motion, policy, links.
 
 use serde::Deserialize;
+use tactus_model::Array;
 
 use super::transport::RawTransport;
-use super::{Envelope, Motion, OnGap, Policy, SensorLink, SensorProtocol, Service, StageLink, StageProtocol};
+use super::{
+    ANYSKIN_SHAPE, Envelope, Motion, OnGap, Policy, SensorLink, SensorProtocol, Service, StageLink,
+    StageProtocol, WeissChecksum,
+};
 use crate::description::{WrongField, not_negative, positive, range, wrong};
 
 #[derive(Debug, Deserialize)]
@@ -49,12 +53,27 @@ enum RawOnGap {
 pub(super) struct RawSensorLink {
     protocol: RawSensorProtocol,
     transport: RawTransport,
+    checksum: Option<RawWeissChecksum>,
+    addresses: Option<Vec<u16>>,
+    format: Option<String>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum RawSensorProtocol {
     WeissDsa,
+    #[serde(rename = "singletact")]
+    SingleTact,
+    #[serde(rename = "anyskin")]
+    AnySkin,
+    Declared,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum RawWeissChecksum {
+    Crc,
+    Sum8,
 }
 
 #[derive(Debug, Deserialize)]
@@ -72,6 +91,7 @@ enum RawStageProtocol {
 
 /// All of the parts, or none.
 pub(super) fn check(
+    array: &Array,
     envelope: Option<RawEnvelope>,
     motion: Option<RawMotion>,
     policy: Option<RawPolicy>,
@@ -86,7 +106,7 @@ pub(super) fn check(
                 motion: motion.check(&envelope)?,
                 envelope,
                 policy: policy.check()?,
-                sensor: sensor.check()?,
+                sensor: sensor.check(array)?,
                 stage: stage.check()?,
             }))
         }
@@ -193,15 +213,101 @@ impl RawPolicy {
     }
 }
 
+/// Addresses on an I2C bus end here.
+const I2C_ADDRESSES: u16 = 128;
+
 impl RawSensorLink {
-    fn check(self) -> Result<SensorLink, WrongField> {
+    fn check(self, array: &Array) -> Result<SensorLink, WrongField> {
+        let Self { protocol, transport, checksum, addresses, format } = self;
+        let keys = [
+            ("checksum", checksum.is_some(), RawSensorProtocol::WeissDsa),
+            ("addresses", addresses.is_some(), RawSensorProtocol::SingleTact),
+            ("format", format.is_some(), RawSensorProtocol::Declared),
+        ];
+        if let Some((key, _, owner)) = keys.iter().find(|(_, given, owner)| *given && *owner != protocol) {
+            let problem = format!(
+                "belongs to protocol = {:?}, not to {:?}; leave it out",
+                owner.name(),
+                protocol.name()
+            );
+            return Err(wrong(format!("sensor.{key}"), problem));
+        }
         Ok(SensorLink {
-            protocol: match self.protocol {
-                RawSensorProtocol::WeissDsa => SensorProtocol::WeissDsa,
+            protocol: match protocol {
+                RawSensorProtocol::WeissDsa => SensorProtocol::WeissDsa {
+                    checksum: match checksum {
+                        None | Some(RawWeissChecksum::Crc) => WeissChecksum::Crc,
+                        Some(RawWeissChecksum::Sum8) => WeissChecksum::Sum8,
+                    },
+                },
+                RawSensorProtocol::SingleTact => {
+                    SensorProtocol::SingleTact { addresses: check_addresses(addresses, array)? }
+                }
+                RawSensorProtocol::AnySkin => check_anyskin(array)?,
+                RawSensorProtocol::Declared => SensorProtocol::Declared { format: check_format(format)? },
             },
-            transport: self.transport.check("sensor.transport")?,
+            transport: transport.check("sensor.transport")?,
         })
     }
+}
+
+impl RawSensorProtocol {
+    /// As it stands in the file.
+    fn name(self) -> &'static str {
+        match self {
+            Self::WeissDsa => "weiss-dsa",
+            Self::SingleTact => "singletact",
+            Self::AnySkin => "anyskin",
+            Self::Declared => "declared",
+        }
+    }
+}
+
+/// One element for each address, each address once.
+fn check_addresses(addresses: Option<Vec<u16>>, array: &Array) -> Result<Vec<u8>, WrongField> {
+    let field = "sensor.addresses";
+    let Some(addresses) = addresses else {
+        let problem =
+            "missing; list the I2C address of every element, [4] for one that was given none of its own";
+        return Err(wrong(field, problem));
+    };
+    if addresses.len() != array.elements() {
+        let (rows, cols) = (array.rows(), array.cols());
+        let problem = format!(
+            "lists {} addresses, one for each element, but array.rows and array.cols say {rows} x {cols}",
+            addresses.len()
+        );
+        return Err(wrong(field, problem));
+    }
+    let mut checked = Vec::with_capacity(addresses.len());
+    for address in addresses {
+        let narrow = u8::try_from(address).ok().filter(|_| address < I2C_ADDRESSES);
+        let narrow = narrow.ok_or_else(|| wrong(field, format!("{address} is no I2C address: 0 to 127")))?;
+        if checked.contains(&narrow) {
+            return Err(wrong(field, format!("{address} is there twice; give each element its own")));
+        }
+        checked.push(narrow);
+    }
+    Ok(checked)
+}
+
+fn check_anyskin(array: &Array) -> Result<SensorProtocol, WrongField> {
+    let shape = [array.rows(), array.cols()];
+    if shape == ANYSKIN_SHAPE {
+        return Ok(SensorProtocol::AnySkin);
+    }
+    let ([rows, cols], [own_rows, own_cols]) = (shape, ANYSKIN_SHAPE);
+    let problem = format!(
+        "\"anyskin\" is {own_rows} magnetometers by {own_cols} axes, but array.rows and array.cols say {rows} x {cols}"
+    );
+    Err(wrong("sensor.protocol", problem))
+}
+
+fn check_format(format: Option<String>) -> Result<String, WrongField> {
+    format.filter(|path| !path.is_empty()).ok_or_else(|| {
+        let problem = "missing; name the file that describes the frames, such as \"../links/digitacts.toml\"";
+        wrong("sensor.format", problem)
+    })
 }
 
 impl RawStageLink {

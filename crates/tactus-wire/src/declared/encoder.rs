@@ -66,6 +66,11 @@ impl Encoder {
         Ok(&self.frame)
     }
 
+    /// Begins at the number 0 again, as a device that is switched on.
+    pub fn restart(&mut self) {
+        self.sequence = 0;
+    }
+
     /// Passes over a number, as if its frame had been lost.
     pub fn lose_frame(&mut self) {
         self.sequence = self.sequence.wrapping_add(1);

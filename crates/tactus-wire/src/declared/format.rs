@@ -94,6 +94,16 @@ impl Format {
         self.timestamp.map(|timestamp| timestamp.tick_ns)
     }
 
+    /// Length of the device clock's tick in ns, and after how many ticks it is 0 again, if it has a clock.
+    pub fn clock(&self) -> Option<(f64, u128)> {
+        self.timestamp.map(|timestamp| (timestamp.tick_ns, timestamp.wrap))
+    }
+
+    /// After how many frames the count of frames is 0 again, if there is one; saturates.
+    pub fn sequence_wrap(&self) -> Option<u64> {
+        self.sequence.map(|sequence| u64::try_from(sequence.wrap).unwrap_or(u64::MAX))
+    }
+
     /// The HID report id, if it is a HID; 0 if its reports have none.
     pub fn hid_report_id(&self) -> Option<u8> {
         self.hid.map(|hid| hid.report_id)

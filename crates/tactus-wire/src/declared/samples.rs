@@ -26,7 +26,7 @@ impl SampleType {
     }
 
     /// The least and the greatest whole number that a sample can be; none for f32.
-    pub(super) fn range(self) -> Option<(f64, f64)> {
+    pub fn range(self) -> Option<(f64, f64)> {
         match self {
             Self::U8 => Some((0.0, 255.0)),
             Self::U12 => Some((0.0, 4095.0)),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde_json::{Value, json};
-use tactus_daemon::config::{self, Config};
+use tactus_daemon::config::{self, Config, RigFiles};
 use tactus_device::{Access, Found, inventory};
 use tactus_schema::Rig;
 use tactus_schema::rig::{SerialPort, Transport};
@@ -52,16 +52,18 @@ impl Rigs {
         let file =
             rig.map(Path::new).filter(|rig| rig.extension().is_some_and(|extension| extension == "toml"));
         if let Some(file) = file {
-            rigs.add(&config::load_rig(file)?.0);
+            rigs.add(&config::load_rig(file)?.rig);
         }
         if let Some(config) = config {
-            rigs.add(&Config::load(config)?.rig);
+            rigs.add(&Config::load(config)?.rig.rig);
         }
         rigs.are_named = file.is_some() || config.is_some();
         if !rigs.are_named {
             for file in FOLDERS.iter().flat_map(|folder| toml_files(Path::new(folder))) {
                 match config::load_rig(&file) {
-                    Ok((found, _)) if rig.is_none_or(|name| name == found.name) => rigs.add(&found),
+                    Ok(RigFiles { rig: found, .. }) if rig.is_none_or(|name| name == found.name) => {
+                        rigs.add(&found)
+                    }
                     Ok(_) => {}
                     Err(error) => rigs.notes.push(error.to_string()),
                 }

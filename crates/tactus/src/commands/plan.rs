@@ -19,7 +19,7 @@ const SEED: u64 = 1;
 pub(crate) fn plan(common: &Common, args: &PlanArgs) -> anyhow::Result<Exit> {
     let (script, arguments) = experiment(&args.experiment)?;
     let rig = match &args.rig_file {
-        Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.0,
+        Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.rig,
         None => Rig::from_toml(SIMULATED_RIG)?,
     };
     let parameters =

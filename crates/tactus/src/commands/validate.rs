@@ -57,7 +57,7 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
     let text = std::fs::read_to_string(file).context("cannot be read")?;
     match schema(&text) {
         Some(rig::SCHEMA) => {
-            let (rig, _) = config::load_rig(file)?;
+            let rig = config::load_rig(file)?.rig;
             Ok(format!("rig {:?}, {} x {} elements", rig.name, rig.array.rows(), rig.array.cols()))
         }
         Some(model::SCHEMA) => {
@@ -76,7 +76,7 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             model::SCHEMA,
             declared::SCHEMA
         ),
-        None => Ok(format!("a service's configuration for rig {:?}", Config::load(file)?.rig.name)),
+        None => Ok(format!("a service's configuration for rig {:?}", Config::load(file)?.rig.rig.name)),
     }
 }
 

@@ -40,6 +40,7 @@ async fn stream(client: &Client) -> anyhow::Result<Exit> {
             "lost_before": frame.lost_before,
             "simulated": frame.simulated,
             "counts": frame.counts,
+            "bad_elements": frame.bad_elements,
         });
         // A reader that has seen enough closes its end.
         if writeln!(out, "{line}").and_then(|()| out.flush()).is_err() {

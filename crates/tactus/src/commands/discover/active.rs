@@ -166,7 +166,7 @@ impl<'a> Lab<'a> {
             (rig.clone(), line)
         } else {
             let rig = match &args.rig_file {
-                Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.0,
+                Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.rig,
                 None => Rig::from_toml(SIMULATED_RIG)?,
             };
             let why = if asked { "as asked".into() } else { format!("no service at {}", common.endpoint) };

@@ -6,11 +6,10 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use tactus_daemon::config;
-use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, TruthError, TruthFile};
+use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, TruthError, TruthFile};
 use tactus_daemon::order::Ask;
 use tactus_engine::{Engine, StopOrder};
 use tactus_plan::{Arguments, Script};
-use tactus_schema::Rig;
 use tactus_schema::pb::{self, RunPhase};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::{MissedTickBehavior, interval};
@@ -31,10 +30,11 @@ pub(super) fn run(
     arguments: Arguments,
     why: &str,
 ) -> anyhow::Result<Summary> {
-    let (rig, rig_toml) = match &args.rig_file {
+    let files = match &args.rig_file {
         Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?,
-        None => (Rig::from_toml(SIMULATED_RIG)?, SIMULATED_RIG.to_owned()),
+        None => embedded::simulated_rig()?,
     };
+    let rig = &files.rig;
     if !rig.simulated {
         let error =
             format!("rig {:?} is not simulated: real devices are run by the service, `tactusd`", rig.name);
@@ -52,7 +52,7 @@ pub(super) fn run(
     let simulated = rig.simulated;
     let silent = common.json;
     let mut attending = None;
-    let done = embedded::run(&rig, &rig_toml, truth.as_ref(), ask, &args.out, pace, |engine, _| {
+    let done = embedded::run(&files, truth.as_ref(), ask, &args.out, pace, |engine, _| {
         attending = attend(engine.clone(), silent);
     });
     if let Some(attending) = attending {

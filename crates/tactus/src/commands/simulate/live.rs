@@ -236,6 +236,7 @@ impl Sensor {
             flags,
             lost_before,
             simulated: true,
+            bad_elements: [].into(),
         }
     }
 

@@ -4,7 +4,7 @@
 //! the images, as for any press. The model images the same presses.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
@@ -158,7 +158,20 @@ fn rig_with(args: &StudyArgs, mesh: &Mesh, angle_deg: f64) -> anyhow::Result<Pat
     let tools =
         rig.get_mut("indenters").and_then(Value::as_table_mut).context("the rig file has no tools")?;
     tools.insert("h".into(), tool.into());
+    describe_from_anywhere(&mut rig, args.rig_file.as_deref())?;
     let path = args.out.join(format!("rig-with-h-{angle_deg}.toml"));
     fs::write(&path, toml::to_string(&rig)?).with_context(|| path.display().to_string())?;
     Ok(path)
+}
+
+/// The description of the sensor's frames is named relative to the rig file, which now stands elsewhere.
+fn describe_from_anywhere(rig: &mut Table, rig_file: Option<&Path>) -> anyhow::Result<()> {
+    let format =
+        rig.get_mut("sensor").and_then(Value::as_table_mut).and_then(|sensor| sensor.get_mut("format"));
+    if let (Some(format), Some(folder)) = (format, rig_file.and_then(Path::parent))
+        && let Some(path) = format.as_str()
+    {
+        *format = std::path::absolute(folder.join(path))?.display().to_string().into();
+    }
+    Ok(())
 }

@@ -102,6 +102,10 @@ impl Screen {
         if !self.alive {
             spans.push(Span::styled("  SERVICE NOT READY", Style::new().fg(Color::Red)));
         }
+        let not_read = self.frame.as_ref().map_or(0, |frame| frame.bad_elements.len());
+        if not_read > 0 {
+            spans.push(Span::styled(format!("  {not_read} elements not read"), Style::new().fg(Color::Red)));
+        }
         let rate_hz = self.health.as_ref().map_or(0.0, |health| health.frame_rate_hz);
         spans.push(Span::raw(format!(
             "  {rate_hz:.1} Hz  {} frames  {} lost at the device  {} missed here",

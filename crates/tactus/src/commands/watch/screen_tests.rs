@@ -31,6 +31,14 @@ fn the_view_says_that_it_is_simulated_and_what_was_lost() {
 }
 
 #[test]
+fn the_view_says_what_was_not_read() {
+    let mut screen = screen();
+    assert!(!drawn(&screen).contains("not read"));
+    screen.on_frame(pb::Frame { counts: vec![100.0; 48], bad_elements: vec![3, 9], ..Default::default() });
+    assert!(drawn(&screen).contains("2 elements not read"));
+}
+
+#[test]
 fn row_zero_stands_at_the_bottom_and_column_zero_at_the_left() {
     let mut screen = screen();
     let mut counts = vec![100.0; 48];

@@ -13,11 +13,11 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream
 use tokio::time::{Instant, sleep};
 use tokio_serial::{SerialPort, SerialStream};
 
-use super::{ArrayExpectation, EVENTS_MAX, WeissSensor};
+use super::{ArrayExpectation, EVENTS_MAX, SensorDriver};
 use crate::transport::memory::{MemoryPort, pair};
 use crate::transport::serial::SerialConnector;
 use crate::transport::{ByteStream, Connect};
-use crate::{Clock, DeviceError, ErrorKind, Sensor, SensorEvent};
+use crate::{Clock, DeviceError, ErrorKind, Sensor, SensorCodec, SensorEvent};
 
 fn expectation() -> ArrayExpectation {
     ArrayExpectation {
@@ -31,9 +31,9 @@ fn expectation() -> ArrayExpectation {
     }
 }
 
-fn start() -> (WeissSensor, MemoryPort) {
+fn start() -> (SensorDriver, MemoryPort) {
     let (connector, port) = pair("sensor");
-    (WeissSensor::start(Box::new(connector), expectation(), Clock::paused()), port)
+    (SensorDriver::start(SensorCodec::default(), Box::new(connector), expectation(), Clock::paused()), port)
 }
 
 /// Answers a host as the controller does, until it is told to push frames.
@@ -71,25 +71,25 @@ async fn send(stream: &mut DuplexStream, timestamp_ms: u32) {
     stream.write_all(&encode_frame(timestamp_ms, &[7, 8], false)).await.unwrap();
 }
 
-async fn frame(sensor: &mut WeissSensor) -> Frame {
+async fn frame(sensor: &mut SensorDriver) -> Frame {
     let event = sensor.next().await;
     let SensorEvent::Frame(frame) = event else { panic!("not a frame: {event:?}") };
     frame
 }
 
-async fn gap(sensor: &mut WeissSensor) -> pb::Gap {
+async fn gap(sensor: &mut SensorDriver) -> pb::Gap {
     let event = sensor.next().await;
     let SensorEvent::Gap(gap) = event else { panic!("not a gap: {event:?}") };
     gap
 }
 
-async fn connected(sensor: &mut WeissSensor) -> pb::SensorInfo {
+async fn connected(sensor: &mut SensorDriver) -> pb::SensorInfo {
     let event = sensor.next().await;
     let SensorEvent::Connected(info) = event else { panic!("not connected: {event:?}") };
     info
 }
 
-async fn lost(sensor: &mut WeissSensor) -> (ErrorKind, String) {
+async fn lost(sensor: &mut SensorDriver) -> (ErrorKind, String) {
     let event = sensor.next().await;
     let SensorEvent::Lost(error) = event else { panic!("not lost: {event:?}") };
     (error.kind, error.to_string())
@@ -163,7 +163,8 @@ async fn two_seconds_unplugged_are_sixty_frames() {
 async fn a_device_that_is_not_there_is_told_once_and_found_within_a_second() {
     let (connector, mut port) = pair("sensor");
     port.unplug();
-    let mut sensor = WeissSensor::start(Box::new(connector), expectation(), Clock::paused());
+    let mut sensor =
+        SensorDriver::start(SensorCodec::default(), Box::new(connector), expectation(), Clock::paused());
     assert_eq!(lost(&mut sensor).await.0, ErrorKind::Absent);
     sleep(Duration::from_mins(1)).await;
     let plugged_in = Instant::now();
@@ -310,7 +311,8 @@ async fn works_on_a_real_pseudo_terminal() {
     drop(far);
     // Reading from this end fails until the other is open.
     let opened = Opened(Mutex::new(Some(connector.connect().await.unwrap())), connector);
-    let mut sensor = WeissSensor::start(Box::new(opened), expectation(), Clock::real());
+    let mut sensor =
+        SensorDriver::start(SensorCodec::default(), Box::new(opened), expectation(), Clock::real());
     greet(&mut device).await;
     for timestamp_ms in [0, 33, 67] {
         device.write_all(&encode_frame(timestamp_ms, &[0x0AAA, 27], false)).await.unwrap();
