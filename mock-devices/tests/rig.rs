@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tactus_device::{
-    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorEvent, Stage, StageError, Target,
+    ArrayExpectation, Clock, DrivenStage, Sensor, SensorEvent, Stage, StageError, StageOptions, Target,
     WeissSensor,
 };
 use tactus_mock::faults::{FaultError, FaultScript};
@@ -36,8 +36,9 @@ async fn lab(rig: Rig, seed: u64) -> Lab {
     let clock = Clock::paused();
     let mut devices = VirtualRig::start(&rig, seed);
     let sensor = WeissSensor::start(devices.sensor_connector(), ArrayExpectation::of(&rig), clock);
-    let options = GrblOptions { tolerance_mm: 0.005, simulated: true };
-    let (stage, mut reports) = GrblStage::start(devices.stage_connector(), options, clock);
+    let options = StageOptions { tolerance_mm: 0.005, simulated: true };
+    let protocol = &rig.service.as_ref().unwrap().stage.protocol;
+    let (stage, mut reports) = DrivenStage::start(devices.stage_connector(), protocol, options, clock);
     // The reports must be drained for the stage to go on.
     tokio::spawn(async move { while reports.recv().await.is_some() {} });
     let mut state = stage.state();

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use tactus_device::transport::{Connect, serial::SerialConnector, tcp::TcpConnector};
-use tactus_device::{ArrayExpectation, Clock, GrblOptions, GrblStage, WeissSensor};
+use tactus_device::{ArrayExpectation, Clock, DrivenStage, StageOptions, WeissSensor};
 use tactus_engine::Devices;
 use tactus_mock::{RigControl, Truth, VirtualRig};
 use tactus_schema::Rig;
-use tactus_schema::rig::{SensorProtocol, Service, StageProtocol, Transport};
+use tactus_schema::rig::{SensorProtocol, Service, Transport};
 
 /// Started devices, and the truth behind the virtual ones among them.
 #[derive(Debug)]
@@ -33,13 +33,8 @@ pub fn open(rig: &Rig, service: &Service, truth: impl FnOnce() -> Truth, clock: 
             Box::new(WeissSensor::start(sensor_link, ArrayExpectation::of(rig), clock))
         }
     };
-    let (stage, stage_reports) = match service.stage.protocol {
-        StageProtocol::Grbl => GrblStage::start(
-            stage_link,
-            GrblOptions { tolerance_mm: service.motion.tolerance_mm, simulated: rig.simulated },
-            clock,
-        ),
-    };
+    let (stage, stage_reports) =
+        DrivenStage::start(stage_link, &service.stage.protocol, stage_options(rig, service), clock);
     let control = virtual_rig.map(|rig| rig.control());
     let own_stage = service.stage.transport == Transport::Embedded;
     let change_covering = control.clone().filter(|_| own_stage).map(|control| {
@@ -48,6 +43,10 @@ pub fn open(rig: &Rig, service: &Service, truth: impl FnOnce() -> Truth, clock: 
         change
     });
     Opened { devices: Devices { sensor, stage, stage_reports, change_covering }, control }
+}
+
+fn stage_options(rig: &Rig, service: &Service) -> StageOptions {
+    StageOptions { tolerance_mm: service.motion.tolerance_mm, simulated: rig.simulated }
 }
 
 fn connector(transport: &Transport, embedded: impl FnOnce() -> Option<Box<dyn Connect>>) -> Box<dyn Connect> {

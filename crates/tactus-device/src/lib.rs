@@ -16,4 +16,6 @@ pub mod transport;
 pub use clock::Clock;
 pub use error::{DeviceError, ErrorKind};
 pub use sensor::{ArrayExpectation, Sensor, SensorEvent, WeissSensor};
-pub use stage::{GrblOptions, GrblStage, Stage, StageError, Target};
+pub use stage::{
+    Connection, DrivenStage, Stage, StageError, StageOptions, Target, grbl_config, zaber_config,
+};

@@ -8,6 +8,7 @@ mod file;
 mod registration;
 mod service;
 mod simulation;
+mod stage;
 
 use std::collections::BTreeMap;
 
@@ -16,6 +17,7 @@ use tactus_model::{Array, ArrayError, Covering, Indenter, Psf, Registration};
 use crate::description::WrongField;
 
 pub use file::SCHEMA;
+pub use stage::{GrblAxes, GrblAxis, MachineAxis, StageLink, StageProtocol, ZaberAxes, ZaberAxis};
 
 /// A checked rig description.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,22 +144,6 @@ pub struct SensorLink {
 pub enum SensorProtocol {
     /// `weiss-dsa`: the `DSACON32m` and relatives, push mode.
     WeissDsa,
-}
-
-/// The stage's link.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StageLink {
-    /// How it speaks.
-    pub protocol: StageProtocol,
-    /// Over what.
-    pub transport: Transport,
-}
-
-/// Protocols of stages (devices.md).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StageProtocol {
-    /// Grbl 1.1 and grblHAL.
-    Grbl,
 }
 
 /// What carries a device's bytes.

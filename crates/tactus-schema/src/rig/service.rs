@@ -2,9 +2,8 @@
 
 use serde::Deserialize;
 
-use super::{
-    Envelope, Motion, OnGap, Policy, SensorLink, SensorProtocol, Service, StageLink, StageProtocol, Transport,
-};
+use super::stage::RawStageLink;
+use super::{Envelope, Motion, OnGap, Policy, SensorLink, SensorProtocol, Service, Transport};
 use crate::description::{WrongField, not_negative, positive, range, wrong};
 
 #[derive(Debug, Deserialize)]
@@ -59,21 +58,8 @@ enum RawSensorProtocol {
 }
 
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct RawStageLink {
-    protocol: RawStageProtocol,
-    transport: RawTransport,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum RawStageProtocol {
-    Grbl,
-}
-
-#[derive(Debug, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-enum RawTransport {
+pub(super) enum RawTransport {
     Embedded,
     Serial { path: String, baud: u32 },
     Tcp { address: String },
@@ -213,19 +199,8 @@ impl RawSensorLink {
     }
 }
 
-impl RawStageLink {
-    fn check(self) -> Result<StageLink, WrongField> {
-        Ok(StageLink {
-            protocol: match self.protocol {
-                RawStageProtocol::Grbl => StageProtocol::Grbl,
-            },
-            transport: self.transport.check("stage.transport")?,
-        })
-    }
-}
-
 impl RawTransport {
-    fn check(self, field: &str) -> Result<Transport, WrongField> {
+    pub(super) fn check(self, field: &str) -> Result<Transport, WrongField> {
         match self {
             Self::Embedded => Ok(Transport::Embedded),
             Self::Serial { path, baud } if !path.is_empty() && baud > 0 => {
