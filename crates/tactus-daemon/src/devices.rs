@@ -7,7 +7,9 @@ use tactus_device::{ArrayExpectation, Clock, DrivenStage, StageOptions, WeissSen
 use tactus_engine::Devices;
 use tactus_mock::{RigControl, Truth, VirtualRig};
 use tactus_schema::Rig;
+use tactus_schema::pb::StageState;
 use tactus_schema::rig::{SensorProtocol, Service, Transport};
+use tokio::sync::mpsc;
 
 /// Started devices, and the truth behind the virtual ones among them.
 #[derive(Debug)]
@@ -26,15 +28,13 @@ pub fn open(rig: &Rig, service: &Service, truth: impl FnOnce() -> Truth, clock: 
     let mut virtual_rig = embedded.then(|| VirtualRig::of(truth(), rig.covering));
     let sensor_link =
         connector(&service.sensor.transport, || virtual_rig.as_mut().map(VirtualRig::sensor_connector));
-    let stage_link =
-        connector(&service.stage.transport, || virtual_rig.as_mut().map(VirtualRig::stage_connector));
     let sensor = match service.sensor.protocol {
         SensorProtocol::WeissDsa => {
             Box::new(WeissSensor::start(sensor_link, ArrayExpectation::of(rig), clock))
         }
     };
-    let (stage, stage_reports) =
-        DrivenStage::start(stage_link, &service.stage.protocol, stage_options(rig, service), clock);
+    let embedded_stage = || virtual_rig.as_mut().map(VirtualRig::stage_connector);
+    let (stage, stage_reports) = open_stage(rig, service, embedded_stage, clock);
     let control = virtual_rig.map(|rig| rig.control());
     let own_stage = service.stage.transport == Transport::Embedded;
     let change_covering = control.clone().filter(|_| own_stage).map(|control| {
@@ -45,8 +45,16 @@ pub fn open(rig: &Rig, service: &Service, truth: impl FnOnce() -> Truth, clock: 
     Opened { devices: Devices { sensor, stage, stage_reports, change_covering }, control }
 }
 
-fn stage_options(rig: &Rig, service: &Service) -> StageOptions {
-    StageOptions { tolerance_mm: service.motion.tolerance_mm, simulated: rig.simulated }
+/// Starts the driver of a rig's stage alone; `embedded` is the way to it where the rig says `embedded`.
+pub(crate) fn open_stage(
+    rig: &Rig,
+    service: &Service,
+    embedded: impl FnOnce() -> Option<Box<dyn Connect>>,
+    clock: Clock,
+) -> (Arc<DrivenStage>, mpsc::Receiver<StageState>) {
+    let options = StageOptions { tolerance_mm: service.motion.tolerance_mm, simulated: rig.simulated };
+    let link = connector(&service.stage.transport, embedded);
+    DrivenStage::start(link, &service.stage.protocol, options, clock)
 }
 
 fn connector(transport: &Transport, embedded: impl FnOnce() -> Option<Box<dyn Connect>>) -> Box<dyn Connect> {

@@ -19,3 +19,4 @@ pub use sensor::{ArrayExpectation, Sensor, SensorEvent, WeissSensor};
 pub use stage::{
     Connection, DrivenStage, Stage, StageError, StageOptions, Target, grbl_config, zaber_config,
 };
+pub use tactus_wire::stage::{Controller, Setting};
