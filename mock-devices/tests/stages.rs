@@ -50,14 +50,14 @@ struct Lab {
 
 impl Lab {
     /// Connected, and not homed.
-    async fn new(lines: &str) -> Self {
+    fn new(lines: &str) -> Self {
         let rig = Rig::from_toml(&SIM.replace("protocol = \"grbl\"\n", lines)).unwrap();
         let protocol = rig.service.as_ref().unwrap().stage.protocol.clone();
-        Self::speaking(&rig, &protocol).await
+        Self::speaking(&rig, &protocol)
     }
 
     /// Whose driver is told of another protocol, or of other axes.
-    async fn speaking(rig: &Rig, protocol: &StageProtocol) -> Self {
+    fn speaking(rig: &Rig, protocol: &StageProtocol) -> Self {
         let mut devices = VirtualRig::start(rig, 1);
         let options = StageOptions { tolerance_mm: 0.005, simulated: true };
         let (stage, mut reports) =
@@ -68,7 +68,7 @@ impl Lab {
 
     /// Homed, and at [`START_MM`].
     async fn homed(lines: &str) -> Self {
-        let lab = Self::new(lines).await;
+        let lab = Self::new(lines);
         lab.until(StageStatus::Unhomed).await;
         lab.stage.home().await.unwrap();
         near(lab.go(START_MM).await.unwrap(), START_MM);
@@ -146,7 +146,7 @@ async fn a_stop_in_mid_move_ends_it_and_keeps_the_position() {
 #[tokio::test(start_paused = true)]
 async fn homing_can_be_stopped_and_leaves_the_stage_unhomed() {
     for lines in STAGES {
-        let lab = Lab::new(lines).await;
+        let lab = Lab::new(lines);
         lab.until(StageStatus::Unhomed).await;
         let stage = Arc::clone(&lab.stage);
         let homing = tokio::spawn(async move { stage.home().await });
@@ -269,7 +269,7 @@ async fn an_alarm_stops_the_stage_until_it_is_cleared_and_homed() {
 #[tokio::test(start_paused = true)]
 async fn homing_that_fails_is_an_alarm() {
     for lines in STAGES {
-        let lab = Lab::new(lines).await;
+        let lab = Lab::new(lines);
         lab.until(StageStatus::Unhomed).await;
         lab.inject("stage homing-fails");
         let result = lab.stage.home().await;
@@ -325,7 +325,7 @@ async fn another_stage_than_the_rigs_is_refused_with_both_values() {
         ),
     ] {
         let told = true_lines.replace(from, to);
-        let lab = Lab::speaking(&of(true_lines), &protocol(of(&told))).await;
+        let lab = Lab::speaking(&of(true_lines), &protocol(of(&told)));
         let mut connection = lab.stage.connection();
         let lost =
             connection.wait_for(|now| matches!(now, Connection::Seeking(Some(_)))).await.unwrap().clone();

@@ -48,7 +48,6 @@ struct Defects {
     is_never_idle: bool,
     ignores_moves: bool,
     refuses_next: bool,
-    homing_fails: bool,
 }
 
 impl ZaberController {
@@ -138,12 +137,6 @@ impl ZaberController {
             if moves && std::mem::take(&mut defects.refuses_next) {
                 return Err(Rejection::BadData);
             }
-            if matches!(words, ["home"])
-                && axis.name() == AxisName::Z
-                && std::mem::take(&mut defects.homing_fails)
-            {
-                axis.fail_homing();
-            }
             let lie_mm = if axis.name() == AxisName::Z { defects.lie_z_mm } else { 0.0 };
             let stays = moves && defects.ignores_moves;
             answers.push(axis.obey(&mut world, words, lie_mm, stays, now)?);
@@ -167,6 +160,13 @@ impl ZaberController {
             let moves = self.defects.is_never_idle || axis.is_busy(&mut world);
             (busy || moves, axis::graver(flag, axis.flag()))
         })
+    }
+
+    /// The next homing of z finds no sensor.
+    fn fail_homing(&mut self, fails: bool) {
+        for z in self.axes.iter_mut().filter(|axis| axis.name() == AxisName::Z) {
+            z.fail_homing(fails);
+        }
     }
 
     fn say(&mut self, message: &Message, now: Instant) {
@@ -236,13 +236,14 @@ impl Controller for ZaberController {
                     axis.lose_steps(&mut world, lost_mm);
                 }
             }
-            ControllerFault::HomingFails => self.defects.homing_fails = true,
+            ControllerFault::HomingFails => self.fail_homing(true),
             ControllerFault::Reset => self.power_up(now),
         }
     }
 
     fn mend(&mut self) {
         self.defects = Defects::default();
+        self.fail_homing(false);
     }
 }
 

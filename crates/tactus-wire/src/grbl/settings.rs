@@ -31,7 +31,7 @@ impl Settings {
     /// Holds the settings against what is asked of the controller. Nothing is changed.
     pub(super) fn check(&self, config: &Config) -> Result<(), SessionError> {
         // Further bits are grblHAL's and say how to home.
-        self.need(HOMING, "1, homing on", |value| is_odd(value))?;
+        self.need(HOMING, "1, homing on", is_odd)?;
         if config.needs_soft_limits {
             self.need(SOFT_LIMITS, "1, soft limits on", |value| value != 0.0)?;
         }

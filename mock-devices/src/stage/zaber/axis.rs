@@ -143,8 +143,8 @@ impl VirtualAxis {
         world.motion_of(self.index).lose_steps(lost_mm);
     }
 
-    pub(super) fn fail_homing(&mut self) {
-        self.fails_homing = true;
+    pub(super) fn fail_homing(&mut self, fails: bool) {
+        self.fails_homing = fails;
     }
 
     /// Carries out a command; `stays` if it is to accept a move and make none.
@@ -158,7 +158,7 @@ impl VirtualAxis {
     ) -> Result<String, Rejection> {
         let done = Ok("0".to_owned());
         match *words {
-            [] => done,
+            [] | ["driver", "enable"] => done,
             ["get", setting] => self.get(world, setting, lie_mm, now).map(|value| value.to_string()),
             ["set", "maxspeed", value] => {
                 self.maxspeed = number(value, 0)?;
@@ -201,7 +201,6 @@ impl VirtualAxis {
                 self.flags.retain(|flag| flag.severity() == Severity::Suspect);
                 done
             }
-            ["driver", "enable"] => done,
             _ => Err(Rejection::BadCommand),
         }
     }
@@ -278,8 +277,8 @@ impl VirtualAxis {
     fn list(&self) -> String {
         let mut flags = self.flags.clone();
         flags.sort_by_key(|flag| std::cmp::Reverse(gravity(*flag)));
-        let words = flags.iter().map(|flag| format!(" {flag}")).collect::<String>();
-        format!("{:02}{words}", flags.len())
+        let words = flags.iter().map(Flag::to_string);
+        [format!("{:02}", flags.len())].into_iter().chain(words).collect::<Vec<_>>().join(" ")
     }
 
     /// Travel in microsteps.

@@ -24,7 +24,7 @@ impl Session {
             Response::Ok => self.hear_ok(now),
             Response::Error(code) => self.hear_error(now, code),
             Response::Alarm(code) => self.hear_alarm(code),
-            Response::Banner(banner) => self.hear_banner(now, banner),
+            Response::Banner(banner) => self.hear_banner(now, &banner),
             Response::Status(report) => self.hear_report(now, &report),
             Response::Unknown(_) => self.unknown_lines += 1,
             Response::Setting { number, value } => self.settings.take(number, value),
@@ -130,10 +130,10 @@ impl Session {
         }
     }
 
-    fn hear_banner(&mut self, now: Duration, banner: String) {
+    fn hear_banner(&mut self, now: Duration, banner: &str) {
         self.poll.reset();
         self.state = None;
-        self.identity.clone_from(&banner);
+        banner.clone_into(&mut self.identity);
         let failure = match core::mem::replace(&mut self.phase, Phase::Ready) {
             Phase::Resetting { purpose: Purpose::Clear, .. } => {
                 self.send_line("$X");
