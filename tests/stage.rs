@@ -122,3 +122,15 @@ fn a_stage_that_the_service_holds_is_left_alone() {
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.out.contains("another program holds the port"), "{said:?}");
 }
+
+#[test]
+fn a_service_presses_with_a_stage_that_speaks_zaber() {
+    let lab = Lab::start(|rig| rig.replace("protocol = \"grbl\"\n", ZABER));
+    let script = lab.script(
+        "presses.star",
+        "def run(rig):\n    tare()\n    for x in (5.0, 9.0):\n        press(x, 5.0, depths_mm = [0.2, 0.4])\n",
+    );
+    let said = lab.tactus(&["--json", "run", &script, "--no-report"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert_eq!(said.json()["dwells"], 4);
+}
