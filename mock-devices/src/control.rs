@@ -113,7 +113,7 @@ impl RigControl {
     pub fn is_moving(&self) -> bool {
         let mut world = self.world.lock();
         world.settle(Instant::now());
-        world.motion.is_moving()
+        world.is_moving()
     }
 
     /// What every element reads at present but for noise and quantisation, in counts, row-major.

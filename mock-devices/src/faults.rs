@@ -100,7 +100,7 @@ pub enum StageFault {
 /// What a stage's controller does wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ControllerFault {
-    /// `alarm 1`: stops dead and raises an alarm.
+    /// `alarm 1`: stops dead and raises an alarm. Zaber's faults have letters: there z stalls, whatever the number.
     Alarm(u8),
     /// `lie 0.05`: reports a z this much too high, in mm.
     Lie {

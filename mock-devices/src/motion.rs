@@ -54,6 +54,11 @@ impl Motion {
         }
     }
 
+    /// From the next move on.
+    pub(crate) fn set_acceleration(&mut self, acceleration_mm_per_s2: f64) {
+        self.acceleration_mm_per_s2 = acceleration_mm_per_s2;
+    }
+
     /// Where the controller believes the tip to be at `at`, which is not before the last change.
     pub(crate) fn believed_mm(&self, at: Instant) -> Point {
         self.current(at).map_or(self.rest_mm, |current| current.position_mm(at))

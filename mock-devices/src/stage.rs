@@ -1,26 +1,27 @@
-//! The device's side of `grbl`: a stage controller that moves the virtual world's tip.
+//! The device's side of a stage: a controller that moves the virtual world's tip, and the line to it.
 //!
-//! It does what Grbl 1.1 was seen to do, within what a stage needs: straight moves, jogs, hold and
-//! resume, reset, homing, limits, alarms, settings. Each move begins and ends at rest. Machine and work
-//! coordinates are the robot's frame. `$I` and a message behind the banner say that it is simulated.
+//! Which protocol it speaks is the rig's: [`grbl`] or [`zaber`]. Kinematics and faults are the same.
 
-mod controller;
-mod gcode;
-mod input;
-mod report;
-mod settings;
+mod grbl;
+mod zaber;
 
 use std::time::Duration;
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use tactus_device::{grbl_config, zaber_config};
+use tactus_schema::rig::StageProtocol;
 use tokio::time::Instant;
 
 use crate::cable::Device;
-use crate::faults::StageFault;
+use crate::faults::{ControllerFault, StageFault};
 use crate::truth::Draw;
 use crate::world::Shared;
-use controller::Controller;
+use grbl::GrblController;
+use zaber::ZaberController;
+
+/// A session judges what it is told by its own tolerance; a controller has none.
+const NO_MATTER_MM: f64 = 1.0;
 
 /// Garbage behind each echoed line.
 const GARBAGE_BYTES: usize = 8;
@@ -28,7 +29,7 @@ const GARBAGE_BYTES: usize = 8;
 /// A virtual stage controller and what is wrong with it.
 #[derive(Debug)]
 pub(crate) struct VirtualStage {
-    controller: Controller,
+    controller: Box<dyn Controller>,
     /// It neither listens nor speaks until then; what arrives waits.
     hung_until: Option<Instant>,
     unheard: Vec<u8>,
@@ -37,12 +38,50 @@ pub(crate) struct VirtualStage {
     rng: ChaCha8Rng,
 }
 
+/// What a controller does with bytes and time. Times never go back.
+trait Controller: std::fmt::Debug + Send {
+    /// Takes bytes from the host.
+    fn receive(&mut self, bytes: &[u8], now: Instant);
+
+    /// Does what is due.
+    fn wake(&mut self, now: Instant);
+
+    /// Lets motion go on to `now`, and what follows from it.
+    fn only_move(&mut self, now: Instant);
+
+    /// When something is due.
+    fn next_wake(&self) -> Option<Instant>;
+
+    /// When the tip runs into a limit, whether or not the controller listens.
+    fn limit_at(&self) -> Option<Instant>;
+
+    /// The bytes that leave it by now.
+    fn output(&mut self, now: Instant) -> Vec<u8>;
+
+    /// Takes on a defect.
+    fn fault(&mut self, fault: ControllerFault, now: Instant);
+
+    /// Loses its defects.
+    fn mend(&mut self);
+}
+
 impl VirtualStage {
     /// A controller that is switched on now.
     pub(crate) fn new(world: Shared, now: Instant) -> Self {
-        let seed = world.lock().truth().seed;
+        let (seed, protocol) = {
+            let world = world.lock();
+            (world.truth().seed, world.truth().stage_protocol.clone())
+        };
+        let controller: Box<dyn Controller> = match protocol {
+            StageProtocol::Grbl(axes) => {
+                Box::new(GrblController::new(world, grbl_config(&axes, NO_MATTER_MM), now))
+            }
+            StageProtocol::Zaber(axes) => {
+                Box::new(ZaberController::new(world, &zaber_config(&axes, NO_MATTER_MM), now))
+            }
+        };
         Self {
-            controller: Controller::new(world, now),
+            controller,
             hung_until: None,
             unheard: Vec::new(),
             echoes: false,
@@ -127,7 +166,3 @@ impl Device for VirtualStage {
 
     fn plugged_in(&mut self, _now: Instant) {}
 }
-
-#[cfg(test)]
-#[path = "stage_tests.rs"]
-mod tests;

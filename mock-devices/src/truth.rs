@@ -10,7 +10,7 @@ use tactus_model::{
     Simulator,
 };
 use tactus_schema::Rig;
-use tactus_schema::rig::{ElementFault, SimulatedStage, Simulation};
+use tactus_schema::rig::{ElementFault, GrblAxes, SimulatedStage, Simulation, StageProtocol};
 
 use crate::feel::Feel;
 use crate::hidden::{Climate, Dose, Sensor};
@@ -41,6 +41,8 @@ pub struct Truth {
     pub indenter: Indenter,
     /// The stage.
     pub stage: SimulatedStage,
+    /// How its controller speaks, and how its axes lie.
+    pub stage_protocol: StageProtocol,
 }
 
 /// What draws random numbers: each has a stream of its own, so that one does not disturb the others.
@@ -108,6 +110,10 @@ impl Truth {
             surface_mm: simulation.surface_mm,
             indenter: tool(&rig.indenter),
             stage: simulation.stage,
+            stage_protocol: rig.service.as_ref().map_or_else(
+                || StageProtocol::Grbl(GrblAxes::default()),
+                |service| service.stage.protocol.clone(),
+            ),
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_model::{Covering, Moment, Trail};
-use tactus_schema::rig::{ElementFault, SimulatedStage};
+use tactus_schema::rig::{ElementFault, SimulatedStage, StageProtocol};
 use tokio::time::Instant;
 
 use crate::feel::Feel;
@@ -20,8 +20,10 @@ pub(crate) struct Shared(Arc<Mutex<World>>);
 #[derive(Debug)]
 pub(crate) struct World {
     truth: Arc<Truth>,
-    /// The stage's tip and what its controller believes.
+    /// The stage's tip and what its controller believes, where one controller moves all axes.
     pub(crate) motion: Motion,
+    /// The same of x, y and z, where each axis moves by itself; the other two parts of its places are 0.
+    by_axis: Option<[Motion; 3]>,
     covering: Covering,
     surface_mm: f64,
     deepest_mm: f64,
@@ -53,8 +55,18 @@ impl World {
         let [x_mm, y_mm, z_mm] = truth.stage.travel_mm;
         let tip_mm = [middle(x_mm), middle(y_mm), z_mm[1] - 0.1 * (z_mm[1] - z_mm[0])];
         let feel = truth.feel(covering).expect("a checked truth feels");
+        let acceleration_mm_per_s2 = truth.stage.acceleration_mm_per_s2;
+        let by_axis = match &truth.stage_protocol {
+            StageProtocol::Grbl(_) => None,
+            // An axis that is missing stands at 0 for ever.
+            StageProtocol::Zaber(zaber) => Some(std::array::from_fn(|axis| {
+                let at_mm = if zaber.axes[axis].is_some() { tip_mm[axis] } else { 0.0 };
+                Motion::at_rest([0.0; 3], on_axis(axis, at_mm), acceleration_mm_per_s2)
+            })),
+        };
         Self {
-            motion: Motion::at_rest([0.0; 3], tip_mm, truth.stage.acceleration_mm_per_s2),
+            motion: Motion::at_rest([0.0; 3], tip_mm, acceleration_mm_per_s2),
+            by_axis,
             covering,
             surface_mm: truth.surface_mm,
             deepest_mm: truth.surface_mm - tip_mm[2],
@@ -108,12 +120,12 @@ impl World {
 
     /// Where the tip truly is, in the stage's steps.
     pub(crate) fn tip_mm(&self, at: Instant) -> Point {
-        self.in_steps(self.motion.true_mm(at))
+        self.in_steps(self.of_motion(|motion| motion.true_mm(at)))
     }
 
     /// Where the controller believes the tip to be, in the stage's steps.
     pub(crate) fn believed_mm(&self, at: Instant) -> Point {
-        self.in_steps(self.motion.believed_mm(at))
+        self.in_steps(self.of_motion(|motion| motion.believed_mm(at)))
     }
 
     /// How far the tip stands below the covering's true surface; negative above it.
@@ -131,12 +143,42 @@ impl World {
     /// any change of the motion.
     pub(crate) fn settle(&mut self, now: Instant) {
         // Along a straight line depth is greatest at an end: of a finished move, or where the tip is.
-        let ends = self.motion.true_ends_mm().filter(|(end, _)| *end <= now).map(|(_, tip_mm)| tip_mm);
-        let lowest_mm =
-            ends.chain([self.motion.true_mm(now)]).map(|[_, _, z]| z).fold(f64::INFINITY, f64::min);
+        let vertical = self.by_axis.as_ref().map_or(&self.motion, |[_, _, z]| z);
+        let ends = vertical.true_ends_mm().filter(|(end, _)| *end <= now).map(|(_, tip_mm)| tip_mm);
+        let lowest_mm = ends.chain([vertical.true_mm(now)]).map(|[_, _, z]| z).fold(f64::INFINITY, f64::min);
         let vertical_step_mm = self.truth.stage.vertical_step_mm;
         self.deepest_mm = self.deepest_mm.max(self.surface_mm - round_to(lowest_mm, vertical_step_mm));
-        self.motion.settle(now);
+        self.motions().for_each(|motion| motion.settle(now));
+    }
+
+    /// True while anything moves.
+    pub(crate) fn is_moving(&mut self) -> bool {
+        self.motions().any(|motion| motion.is_moving())
+    }
+
+    /// The motion of one axis, where each moves by itself; else that of all.
+    pub(crate) fn motion_of(&mut self, axis: usize) -> &mut Motion {
+        match &mut self.by_axis {
+            Some(motions) => &mut motions[axis],
+            None => &mut self.motion,
+        }
+    }
+
+    /// What moves.
+    fn motions(&mut self) -> impl Iterator<Item = &mut Motion> {
+        let (all, each) = match &mut self.by_axis {
+            Some(motions) => (None, Some(motions)),
+            None => (Some(&mut self.motion), None),
+        };
+        all.into_iter().chain(each.into_iter().flatten())
+    }
+
+    /// A place that each motion tells its part of.
+    fn of_motion(&self, place: impl Fn(&Motion) -> Point) -> Point {
+        match &self.by_axis {
+            Some(motions) => std::array::from_fn(|axis| place(&motions[axis])[axis]),
+            None => place(&self.motion),
+        }
     }
 
     /// Thickness of the covering in place.
@@ -175,6 +217,13 @@ impl World {
         let SimulatedStage { lateral_step_mm, vertical_step_mm, .. } = self.truth.stage;
         [round_to(x, lateral_step_mm), round_to(y, lateral_step_mm), round_to(z, vertical_step_mm)]
     }
+}
+
+/// A place on one axis.
+pub(crate) fn on_axis(axis: usize, mm: f64) -> Point {
+    let mut place = [0.0; 3];
+    place[axis] = mm;
+    place
 }
 
 fn round_to(value: f64, step: f64) -> f64 {

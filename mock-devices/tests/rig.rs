@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tactus_device::{
-    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Stage,
-    StageError, Target,
+    ArrayExpectation, Clock, DrivenStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Stage, StageError,
+    StageOptions, Target,
 };
 use tactus_mock::faults::{FaultError, FaultScript};
 use tactus_mock::{RigControl, Truth, VirtualRig, twin_of};
@@ -42,8 +42,9 @@ async fn lab_speaking(codec: SensorCodec, rig: Rig, seed: u64) -> Lab {
     let clock = Clock::paused();
     let mut devices = VirtualRig::of(Truth::of_rig(&rig, seed), rig.covering, &codec);
     let sensor = SensorDriver::start(codec, devices.sensor_connector(), ArrayExpectation::of(&rig), clock);
-    let options = GrblOptions { tolerance_mm: 0.005, simulated: true };
-    let (stage, mut reports) = GrblStage::start(devices.stage_connector(), options, clock);
+    let options = StageOptions { tolerance_mm: 0.005, simulated: true };
+    let protocol = &rig.service.as_ref().unwrap().stage.protocol;
+    let (stage, mut reports) = DrivenStage::start(devices.stage_connector(), protocol, options, clock);
     // The reports must be drained for the stage to go on.
     tokio::spawn(async move { while reports.recv().await.is_some() {} });
     let mut state = stage.state();

@@ -10,8 +10,10 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use tactus_device::transport::Connect;
 use tactus_device::transport::serial::SerialConnector;
 use tactus_device::{
-    ArrayExpectation, Clock, GrblOptions, GrblStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Target,
+    ArrayExpectation, Clock, DrivenStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Stage,
+    StageOptions, Target,
 };
+use tactus_schema::rig::{GrblAxes, StageProtocol};
 use tactus_schema::{Frame, Rig, pb};
 use tactus_wire::weiss::{self as wire, Decoder};
 use tokio::io::AsyncReadExt;
@@ -156,8 +158,9 @@ async fn the_production_drivers_work_with_it() {
     let before = frames(&mut sensor, 5).await;
 
     let connector = SerialConnector::new(folder.path().join("stage"), 115_200);
-    let options = GrblOptions { tolerance_mm: 0.005, simulated: true };
-    let (stage, mut reports) = GrblStage::start(Box::new(connector), options, Clock::real());
+    let options = StageOptions { tolerance_mm: 0.005, simulated: true };
+    let protocol = StageProtocol::Grbl(GrblAxes::default());
+    let (stage, mut reports) = DrivenStage::start(Box::new(connector), &protocol, options, Clock::real());
     tokio::spawn(async move { while reports.recv().await.is_some() {} });
     stage.state().wait_for(|state| state.status() != pb::StageStatus::Disconnected).await.unwrap();
     stage.home().await.unwrap();

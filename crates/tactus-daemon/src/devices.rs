@@ -6,11 +6,13 @@ use tactus_device::transport::Connect;
 use tactus_device::transport::hid::HidConnector;
 use tactus_device::transport::serial::SerialConnector;
 use tactus_device::transport::tcp::TcpConnector;
-use tactus_device::{ArrayExpectation, Clock, GrblOptions, GrblStage, SensorCodec, SensorDriver};
+use tactus_device::{ArrayExpectation, Clock, DrivenStage, SensorCodec, SensorDriver, StageOptions};
 use tactus_engine::Devices;
 use tactus_mock::{RigControl, Truth, VirtualRig};
 use tactus_schema::Rig;
-use tactus_schema::rig::{Service, StageProtocol, Transport, UsbLink};
+use tactus_schema::pb::StageState;
+use tactus_schema::rig::{Service, Transport, UsbLink};
+use tokio::sync::mpsc;
 
 /// Started devices, and the truth behind the virtual ones among them.
 #[derive(Debug)]
@@ -36,16 +38,9 @@ pub fn open(
     let mut virtual_rig = embedded.then(|| VirtualRig::of(truth(), rig.covering, &codec));
     let sensor_link =
         connector(&service.sensor.transport, || virtual_rig.as_mut().map(VirtualRig::sensor_connector));
-    let stage_link =
-        connector(&service.stage.transport, || virtual_rig.as_mut().map(VirtualRig::stage_connector));
     let sensor = Box::new(SensorDriver::start(codec, sensor_link, ArrayExpectation::of(rig), clock));
-    let (stage, stage_reports) = match service.stage.protocol {
-        StageProtocol::Grbl => GrblStage::start(
-            stage_link,
-            GrblOptions { tolerance_mm: service.motion.tolerance_mm, simulated: rig.simulated },
-            clock,
-        ),
-    };
+    let embedded_stage = || virtual_rig.as_mut().map(VirtualRig::stage_connector);
+    let (stage, stage_reports) = open_stage(rig, service, embedded_stage, clock);
     let control = virtual_rig.map(|rig| rig.control());
     let own_stage = service.stage.transport == Transport::Embedded;
     let change_covering = control.clone().filter(|_| own_stage).map(|control| {
@@ -54,6 +49,18 @@ pub fn open(
         change
     });
     Opened { devices: Devices { sensor, stage, stage_reports, change_covering }, control }
+}
+
+/// Starts the driver of a rig's stage alone; `embedded` is the way to it where the rig says `embedded`.
+pub(crate) fn open_stage(
+    rig: &Rig,
+    service: &Service,
+    embedded: impl FnOnce() -> Option<Box<dyn Connect>>,
+    clock: Clock,
+) -> (Arc<DrivenStage>, mpsc::Receiver<StageState>) {
+    let options = StageOptions { tolerance_mm: service.motion.tolerance_mm, simulated: rig.simulated };
+    let link = connector(&service.stage.transport, embedded);
+    DrivenStage::start(link, &service.stage.protocol, options, clock)
 }
 
 fn connector(transport: &Transport, embedded: impl FnOnce() -> Option<Box<dyn Connect>>) -> Box<dyn Connect> {

@@ -10,6 +10,7 @@
 //! | [`twin`] | the dry run on a simulated twin |
 //! | [`embedded`] | one run in this process, without a service |
 //! | [`service`] | the service: bus, commands, health, systemd |
+//! | [`stage_check`] | a look at a rig's stage alone: what it is, and whether it moves as it says |
 
 pub mod config;
 pub mod devices;
@@ -19,6 +20,7 @@ pub mod logging;
 pub mod order;
 pub mod recorder;
 pub mod service;
+pub mod stage_check;
 pub mod twin;
 
 mod notify;

@@ -81,3 +81,23 @@ fn a_rig_that_hides_nothing_has_no_truth() {
     let of_data = Rig::from_json(&simulated.to_json()).unwrap();
     assert!(embedded::truth(&real).is_none() && embedded::truth(&of_data).is_none());
 }
+
+#[test]
+fn a_run_on_a_stage_that_speaks_zaber_is_done_and_goes_no_deeper_than_it_may() {
+    let toml = SIMULATED_RIG.replace(
+        "protocol = \"grbl\"\n",
+        "protocol = \"zaber-ascii\"
+axes.x = { device = 1, axis = 1, um_per_microstep = 0.047625 }
+axes.y = { device = 1, axis = 2, um_per_microstep = 0.047625 }
+axes.z = { device = 2, axis = 1, um_per_microstep = 0.047625, direction = -1, origin_microsteps = 629_921 }
+",
+    );
+    let script = Script::parse(
+        "two",
+        "def run(rig):\n    for x in (5.0, 9.0):\n        press(x, 5.0, depths_mm = [0.2, 0.6])\n",
+    );
+    let (Finished { outcome, .. }, _folder) = run(script.unwrap(), Arguments::default(), &toml).unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
+    assert_eq!((outcome.presses, outcome.dwells, outcome.frames_lost), (2, 4, 0));
+    assert!((outcome.travel_mm[2][0] + 0.6).abs() < 1e-3, "{:?}", outcome.travel_mm);
+}

@@ -19,4 +19,7 @@ pub use clock::Clock;
 pub use error::{DeviceError, ErrorKind};
 pub use inventory::{Access, Found, Holder, inventory};
 pub use sensor::{ArrayExpectation, LinkFile, LinkFileError, Sensor, SensorCodec, SensorDriver, SensorEvent};
-pub use stage::{GrblOptions, GrblStage, Stage, StageError, Target};
+pub use stage::{
+    Connection, DrivenStage, Stage, StageError, StageOptions, Target, grbl_config, zaber_config,
+};
+pub use tactus_wire::stage::{Controller, Setting};

@@ -1,14 +1,20 @@
 //! The indentation stage.
 
+mod driven;
+mod driver;
 mod grbl;
+mod stop;
+mod zaber;
 
 use futures_util::future::BoxFuture;
 use tactus_schema::pb;
+use tactus_schema::rig::{GrblAxes, ZaberAxes};
+use tactus_wire::stage::Direction;
 use tokio::sync::watch;
 
 use crate::DeviceError;
 
-pub use grbl::{GrblOptions, GrblStage};
+pub use driven::{Connection, DrivenStage, StageOptions};
 
 /// A place to go, robot frame, and how fast.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,12 +65,27 @@ pub enum StageError {
         reason: String,
     },
     /// The controller went into alarm.
-    #[error("the stage is in alarm {code}: {meaning}; see to it, then `tactus reset`")]
+    #[error("the stage is in alarm {name}: {meaning}; see to it, then `tactus reset`")]
     Alarm {
         /// The controller's number.
         code: u32,
+        /// The controller's short name for it: the number, or the axis and its flag.
+        name: String,
         /// What the number means.
         meaning: String,
+    },
+    /// Someone else moved the stage during the move, by a knob or from another host; it was stopped.
+    #[error(
+        "{axis} was moved by someone else ({meaning}); the stage was stopped at {position_mm:?} mm: leave its knob \
+         alone and end other programs that command it"
+    )]
+    Interrupted {
+        /// Which axis.
+        axis: String,
+        /// What the controller says of it.
+        meaning: String,
+        /// Where the stage stands.
+        position_mm: [f64; 3],
     },
     /// The position is not known: the stage has not been homed since it started, reset or stepped out.
     #[error("the stage's position is not known: home it first")]
@@ -92,4 +113,18 @@ pub enum StageError {
     /// The link or the device failed.
     #[error(transparent)]
     Device(#[from] DeviceError),
+}
+
+/// What a rig says of a stage that speaks `grbl`, as its session takes it. A virtual stage needs the same.
+pub fn grbl_config(axes: &GrblAxes, tolerance_mm: f64) -> tactus_wire::grbl::Config {
+    grbl::config(axes, tolerance_mm)
+}
+
+/// What a rig says of a stage that speaks `zaber-ascii`, as its session takes it. A virtual stage needs the same.
+pub fn zaber_config(axes: &ZaberAxes, tolerance_mm: f64) -> tactus_wire::zaber::Config {
+    zaber::config(axes, tolerance_mm)
+}
+
+fn direction(is_forward: bool) -> Direction {
+    if is_forward { Direction::Positive } else { Direction::Negative }
 }

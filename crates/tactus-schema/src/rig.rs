@@ -8,6 +8,7 @@ mod file;
 mod registration;
 mod service;
 mod simulation;
+mod stage;
 mod transport;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use tactus_model::{Array, ArrayError, Covering, Indenter, Psf, Registration};
 use crate::description::WrongField;
 
 pub use file::SCHEMA;
+pub use stage::{GrblAxes, GrblAxis, MachineAxis, StageLink, StageProtocol, ZaberAxes, ZaberAxis};
 pub use transport::{HidLink, IdentityError, MAX_REPORT_BYTES, SerialPort, Transport, UsbIdentity, UsbLink};
 
 /// A checked rig description.
@@ -175,22 +177,6 @@ pub enum WeissChecksum {
 
 /// Rows and columns of an array that speaks `anyskin`: magnetometers and axes.
 pub const ANYSKIN_SHAPE: [usize; 2] = [5, 3];
-
-/// The stage's link.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StageLink {
-    /// How it speaks.
-    pub protocol: StageProtocol,
-    /// Over what.
-    pub transport: Transport,
-}
-
-/// Protocols of stages (devices.md).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StageProtocol {
-    /// Grbl 1.1 and grblHAL.
-    Grbl,
-}
 
 /// The truth of a simulated rig, which the service does not see.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,7 +7,9 @@
 pub mod anyskin;
 pub mod declared;
 pub mod grbl;
+pub mod lines;
 pub mod singletact;
+pub mod stage;
 pub mod weiss;
 pub mod zaber;
 

@@ -17,19 +17,13 @@
 //! - Faults begin with F, warnings with W, notices with N; the reply shows the gravest one, `warnings` lists
 //!   all of an axis with their number in front, `warnings clear` clears those that a person has to see to.
 //! - Positions are in microsteps; `maxspeed` is microsteps per second times 1.6384, `accel` is microsteps per
-//!   second squared times 1.6384 / 10000, and 0 means no limit there.
+//!   second squared times 1.6384 / 10000, and 0 means no limit there. `resolution` is how many microsteps make a full step,
+//!   so that with it a microstep's length changes.
 //! - A move that is answered `OK BUSY` is under way and no more; it has ended when a later reply says `IDLE`.
 //!   An axis that starts without knowing where it is shows `WR` until it is homed.
 //!
-//! The words of the flags and rejections are ours. Nothing here has met a real device yet.
-//!
-//! # Why not `zproto`
-//! The `zproto` crate (0.4) is well kept and knows the protocol, but the parts that parse do not stand alone:
-//! it depends on `serialport` whatever features are chosen, which would be a second serial stack, with
-//! libudev below it, beside `tokio-serial`; its packet parser takes one packet at a time, while cutting a
-//! stream, putting a message in parts together and matching ids live in a port type that blocks on reading;
-//! and it writes no replies, which a virtual stage needs. What remains for us would be a page of parsing,
-//! which is here.
+//! The words of the flags and rejections are ours. Nothing here has met a real device yet. Why this is not the `zproto`
+//! crate: `docs/decisions/0012-zabers-protocol-is-ours.md`.
 //!
 //! [`Decoder`] and [`Message`] read what devices say, [`Command`] is what a host says, [`Flag`] and
 //! [`Rejection`] are in words, [`Session`] is the host's side of the conversation. [`CommandDecoder`] and
@@ -46,10 +40,10 @@ mod rejection;
 mod session;
 
 pub use command::{Command, CommandDecoder};
-pub use config::{Axis, AxisName, Config, ConfigError, Direction};
+pub use config::{Axis, Config, ConfigError};
 pub use decoder::Decoder;
 pub use flag::{Flag, Severity};
 pub use packet::{Header, Message, Packet, PacketError};
-pub use path::{accel_setting, speed_setting};
+pub use path::{accel_setting, accel_told, speed_setting, speed_told};
 pub use rejection::Rejection;
-pub use session::{Action, Alarm, Failure, Report, Session, SessionError, Status};
+pub use session::{Session, SessionError};

@@ -32,7 +32,7 @@ pub(crate) struct Common {
         env = "TACTUS_ENDPOINT"
     )]
     pub(crate) endpoint: String,
-    /// Which rig, where several are served.
+    /// Which rig, where several are served; of `stage check`, its file.
     #[arg(long, global = true, value_name = "NAME", env = "TACTUS_RIG")]
     pub(crate) rig: Option<String>,
     /// One JSON object on standard output, for machines.
@@ -86,6 +86,9 @@ enum Command {
     /// Match the description of a device's frames to what the device sends.
     #[command(subcommand)]
     Link(LinkCommand),
+    /// Look at a stage before it is used.
+    #[command(subcommand)]
+    Stage(StageCommand),
     /// Check files: configurations, rigs, models, links, scripts, tables, recordings.
     Validate(ValidateArgs),
     /// Print the completions for a shell.
@@ -437,6 +440,30 @@ pub(crate) struct LinkSniffArgs {
     pub(crate) save: Option<PathBuf>,
 }
 
+#[derive(Debug, Subcommand)]
+enum StageCommand {
+    /// Is the stage there, is it the one of the rig file, does each axis move as it says? Without `--rig RIG.toml`,
+    /// the embedded simulated rig's.
+    ///
+    /// It opens the stage itself, shows what answered, and at the safe height moves each axis by 10 um and back. The
+    /// service must not run: it holds the stage. Exit code 0 if all is good, 1 if not.
+    Check(StageCheckArgs),
+}
+
+/// Arguments of `stage check`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct StageCheckArgs {
+    /// The rig's file; the same as `--rig FILE.toml`.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rig_file: Option<PathBuf>,
+    /// Home the stage first: it moves all the way to its switches.
+    #[arg(long)]
+    pub(crate) home: bool,
+    /// Move hardware without asking.
+    #[arg(long)]
+    pub(crate) yes: bool,
+}
+
 /// Arguments of `validate`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ValidateArgs {
@@ -490,6 +517,7 @@ fn dispatch(common: &Common, command: Command) -> anyhow::Result<Exit> {
         Command::Devices(args) => commands::devices::devices(common, &args),
         Command::Link(LinkCommand::Check(args)) => commands::link::check(common, &args),
         Command::Link(LinkCommand::Sniff(args)) => commands::link::sniff::sniff(common, &args),
+        Command::Stage(StageCommand::Check(args)) => commands::stage::check(common, &args),
         Command::Validate(args) => Ok(commands::validate::validate(common, &args)),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "tactus", &mut std::io::stdout());

@@ -11,6 +11,7 @@ pub(crate) mod link;
 pub(crate) mod plan;
 pub(crate) mod run;
 pub(crate) mod simulate;
+pub(crate) mod stage;
 pub(crate) mod study;
 pub(crate) mod validate;
 pub(crate) mod watch;

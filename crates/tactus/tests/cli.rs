@@ -24,6 +24,7 @@ fn the_help_names_every_command() {
         "recover",
         "report",
         "discover",
+        "stage",
         "validate",
         "completions",
     ] {
@@ -49,4 +50,13 @@ fn wrong_usage_is_exit_code_2_and_a_missing_service_says_how_to_start_one() {
     assert!(said.contains("no service at tcp/127.0.0.1:1") && said.contains("tactusd --config"), "{said}");
     let endpoint = tactus(&["--endpoint", "nowhere", "status"]);
     assert_eq!(endpoint.status.code(), Some(2));
+}
+
+#[test]
+fn a_stage_check_on_the_embedded_rig_needs_nothing() {
+    let checked = tactus(&["stage", "check", "--home"]);
+    let said = String::from_utf8(checked.stdout).unwrap();
+    assert_eq!(checked.status.code(), Some(0), "{said}");
+    let header = "axis  asked mm  reported mm  error um  took ms  verdict";
+    assert!(said.lines().any(|line| line == header), "{said}");
 }

@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 use tactus_model::{Covering, Psf};
 
 use super::registration::RawRegistration;
-use super::service::{self, RawEnvelope, RawMotion, RawPolicy, RawSensorLink, RawStageLink};
+use super::service::{self, RawEnvelope, RawMotion, RawPolicy, RawSensorLink};
 use super::simulation::RawSimulation;
+use super::stage::RawStageLink;
 use super::{Rig, RigError, SensitivityReference};
 use crate::Model;
 use crate::description::{

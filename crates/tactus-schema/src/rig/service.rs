@@ -3,10 +3,10 @@
 use serde::Deserialize;
 use tactus_model::Array;
 
+use super::stage::RawStageLink;
 use super::transport::RawTransport;
 use super::{
-    ANYSKIN_SHAPE, Envelope, Motion, OnGap, Policy, SensorLink, SensorProtocol, Service, StageLink,
-    StageProtocol, WeissChecksum,
+    ANYSKIN_SHAPE, Envelope, Motion, OnGap, Policy, SensorLink, SensorProtocol, Service, WeissChecksum,
 };
 use crate::description::{WrongField, not_negative, positive, range, wrong};
 
@@ -74,19 +74,6 @@ enum RawSensorProtocol {
 enum RawWeissChecksum {
     Crc,
     Sum8,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct RawStageLink {
-    protocol: RawStageProtocol,
-    transport: RawTransport,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum RawStageProtocol {
-    Grbl,
 }
 
 /// All of the parts, or none.
@@ -308,15 +295,4 @@ fn check_format(format: Option<String>) -> Result<String, WrongField> {
         let problem = "missing; name the file that describes the frames, such as \"../links/digitacts.toml\"";
         wrong("sensor.format", problem)
     })
-}
-
-impl RawStageLink {
-    fn check(self) -> Result<StageLink, WrongField> {
-        Ok(StageLink {
-            protocol: match self.protocol {
-                RawStageProtocol::Grbl => StageProtocol::Grbl,
-            },
-            transport: self.transport.check("stage.transport")?,
-        })
-    }
 }

@@ -1,6 +1,6 @@
 //! The host's side of the conversation.
 
-mod action;
+mod error;
 mod hear;
 mod phase;
 mod step;
@@ -10,10 +10,16 @@ use core::time::Duration;
 use phase::{Phase, Purpose};
 
 use super::poll::Poll;
-use super::travel::{Travel, distance_mm};
-use super::{FEED_HOLD, Lines, MachineState, Response};
+use super::settings::Settings;
+use super::travel::Travel;
+use super::{Config, ConfigError, FEED_HOLD, MachineState, Response, alarm_meaning};
+use crate::lines::Lines;
+use crate::stage::{self, Alarm, Cause, Failure, Session as _, distance_mm};
 
-pub use action::{Action, Config, Failure, Report, SessionError, Status};
+pub use error::SessionError;
+
+/// What a session wants done, or tells.
+type Action = stage::Action<SessionError>;
 
 /// How long a banner is waited for that comes by itself when the port is opened.
 const LISTEN: Duration = Duration::from_millis(500);
@@ -27,15 +33,8 @@ const SPEED_MIN_MM_PER_S: f64 = 0.001 / 60.0;
 /// Half of the reporting step: places nearer than this are the same.
 const SAME_PLACE_MM: f64 = 0.0005;
 
-/// A conversation over one connection. Positions are in the work frame, which is the machine's unless an
-/// offset is set in the controller.
-///
-/// Call [`start`](Self::start) once, [`receive`](Self::receive) with what arrives and [`timer`](Self::timer)
-/// when [`deadline`](Self::deadline) has come; do what the actions say, in their order. Times never go
-/// back. Commands ([`home`](Self::home), [`move_to`](Self::move_to), [`clear_alarm`](Self::clear_alarm)) are
-/// given one at a time, while [`is_ready`](Self::is_ready); each ends with one [`Action::Done`].
-/// [`stop`](Self::stop) may be called at any time. After [`Action::Failed`] it does nothing more: open the
-/// link anew. The command in hand then ends without [`Action::Done`].
+/// A conversation with a controller over one connection; see [`stage::Session`]. The controller's coordinates are its
+/// work frame, which is the machine's unless an offset is set in it.
 ///
 /// The position counts as known only from a successful homing on, until an alarm, a reset that was not
 /// ours, or a stop that had to reset the controller in motion.
@@ -48,7 +47,9 @@ pub struct Session {
     homed: bool,
     /// In alarm, with its number; 0 if it was not told.
     alarm: Option<u8>,
-    banner: String,
+    /// The banner, and what `$I` tells.
+    identity: String,
+    settings: Settings,
     /// As last reported since the last reset.
     state: Option<MachineState>,
     position_mm: [f64; 3],
@@ -59,30 +60,57 @@ pub struct Session {
 
 impl Session {
     /// A session that has not started.
-    pub fn new(config: Config) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// If the configuration makes no stage; see [`Config::check`].
+    pub fn new(config: Config) -> Result<Self, ConfigError> {
+        config.check()?;
+        Ok(Self {
             config,
             lines: Lines::default(),
             poll: Poll::default(),
             phase: Phase::Over,
             homed: false,
             alarm: None,
-            banner: String::new(),
+            identity: String::new(),
+            settings: Settings::default(),
             state: None,
             position_mm: [0.0; 3],
             work_offset_mm: None,
             unknown_lines: 0,
             actions: Vec::new(),
-        }
+        })
     }
 
-    /// True if a command would be taken: none is in hand, and no stop or reset is under way.
-    pub fn is_ready(&self) -> bool {
+    fn is_over(&self) -> bool {
+        matches!(self.phase, Phase::Over)
+    }
+
+    fn check_ready(&self, command: &str) -> Result<(), Failure> {
+        if self.is_ready() { Ok(()) } else { Err(Failure::refused(command, "another command is in hand")) }
+    }
+
+    fn check_alarm(&self) -> Result<(), Failure> {
+        self.alarm.map_or(Ok(()), |code| Err(Failure::Alarm(alarm(code))))
+    }
+
+    fn check_homed(&self) -> Result<(), Failure> {
+        if self.homed { Ok(()) } else { Err(Failure::Unhomed) }
+    }
+}
+
+impl stage::Session for Session {
+    type Error = SessionError;
+
+    fn cause(error: &SessionError) -> Cause {
+        error.cause()
+    }
+
+    fn is_ready(&self) -> bool {
         matches!(self.phase, Phase::Ready)
     }
 
-    /// True while a stop, or the stop of an overdue move, has not come to its end.
-    pub fn is_stopping(&self) -> bool {
+    fn is_stopping(&self) -> bool {
         match &self.phase {
             Phase::Holding { .. } => true,
             Phase::Resetting { purpose, .. } | Phase::Looking { purpose, .. } => {
@@ -92,29 +120,26 @@ impl Session {
             | Phase::Moving(_)
             | Phase::Homing { .. }
             | Phase::Unlocking { .. }
+            | Phase::Asking { .. }
             | Phase::Over => false,
         }
     }
 
-    /// When [`timer`](Self::timer) is due; `None` once the session is over.
-    pub fn deadline(&self) -> Option<Duration> {
+    fn deadline(&self) -> Option<Duration> {
         let poll = self.poll_interval().map(|interval| self.poll.next(interval));
         [self.phase.deadline(), poll].into_iter().flatten().min()
     }
 
-    /// Lines that could not be read, since the start.
-    pub fn unknown_lines(&self) -> u64 {
+    fn unknown_lines(&self) -> u64 {
         self.unknown_lines + self.lines.dropped()
     }
 
-    /// Begins the conversation.
-    pub fn start(&mut self, now: Duration) -> Vec<Action> {
+    fn start(&mut self, now: Duration) -> Vec<Action> {
         self.phase = Phase::Resetting { purpose: Purpose::Greet, resets: 0, deadline: now + LISTEN };
         self.finish(now)
     }
 
-    /// Finds the reference position.
-    pub fn home(&mut self, now: Duration) -> Vec<Action> {
+    fn home(&mut self, now: Duration) -> Vec<Action> {
         if self.is_over() {
             return Vec::new();
         }
@@ -131,12 +156,11 @@ impl Session {
         self.finish(now)
     }
 
-    /// Goes to a place in a straight line. A target equal to the present position is done at once.
-    pub fn move_to(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) -> Vec<Action> {
+    fn move_to(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) -> Vec<Action> {
         if self.is_over() {
             return Vec::new();
         }
-        let travel = Travel::new(now, self.position_mm, target_mm, speed_mm_per_s);
+        let travel = Travel::new(now, &self.config, self.position_mm, target_mm, speed_mm_per_s);
         let checked = self
             .check_ready(travel.line())
             .and_then(|()| check_numbers(travel.line(), target_mm, speed_mm_per_s))
@@ -145,7 +169,7 @@ impl Session {
         if let Err(failure) = checked {
             self.done(Err(failure));
         } else if self.state == Some(MachineState::Idle)
-            && distance_mm(self.position_mm, travel.target_mm()) < SAME_PLACE_MM
+            && distance_mm(self.position_mm, travel.arrival().target_mm()) < SAME_PLACE_MM
         {
             self.done(Ok(self.position_mm));
         } else {
@@ -155,9 +179,8 @@ impl Session {
         self.finish(now)
     }
 
-    /// Clears an alarm: resets and unlocks the controller. The position is suspect after it. Without an alarm
-    /// nothing is done.
-    pub fn clear_alarm(&mut self, now: Duration) -> Vec<Action> {
+    /// Resets and unlocks the controller.
+    fn clear_alarm(&mut self, now: Duration) -> Vec<Action> {
         if self.is_over() {
             return Vec::new();
         }
@@ -171,10 +194,10 @@ impl Session {
         self.finish(now)
     }
 
-    /// Stops motion now: the first action is the byte to send. The stage decelerates and keeps its
+    /// The stage decelerates and keeps its
     /// position; what the controller still holds is then flushed by a reset, made at a stand. Homing can only
     /// be ended by a reset.
-    pub fn stop(&mut self, now: Duration) -> Vec<Action> {
+    fn stop(&mut self, now: Duration) -> Vec<Action> {
         let stopped = Some(Failure::Stopped { position_mm: self.position_mm });
         match self.phase.clone() {
             // It stands, and would not answer.
@@ -186,7 +209,9 @@ impl Session {
             Phase::Looking { purpose: Purpose::Stop { failure, .. }, .. } => self.hold(now, failure),
             Phase::Holding { .. } => self.send(FEED_HOLD),
             Phase::Homing { .. } => self.reset(now, Purpose::Stop { failure: stopped, held_mm: None }, 1),
-            Phase::Looking { purpose: Purpose::Greet, .. } => self.reset(now, Purpose::Greet, 1),
+            Phase::Looking { purpose: Purpose::Greet, .. } | Phase::Asking { .. } => {
+                self.reset(now, Purpose::Greet, 1);
+            }
             Phase::Resetting { purpose, resets: 0, .. } => self.reset(now, purpose, 1),
             // Reset already: nothing moves.
             Phase::Resetting { .. } | Phase::Over => {}
@@ -194,16 +219,14 @@ impl Session {
         self.finish(now)
     }
 
-    /// Takes what arrived.
-    pub fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
+    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
         let mut lines = core::mem::take(&mut self.lines);
         lines.push(bytes, |line| self.hear(now, Response::parse(line)));
         self.lines = lines;
         self.finish(now)
     }
 
-    /// Does what is due at [`deadline`](Self::deadline).
-    pub fn timer(&mut self, now: Duration) -> Vec<Action> {
+    fn timer(&mut self, now: Duration) -> Vec<Action> {
         if self.phase.deadline().is_some_and(|deadline| now >= deadline) {
             self.overdue(now);
         }
@@ -214,36 +237,21 @@ impl Session {
         }
         self.finish(now)
     }
-
-    fn is_over(&self) -> bool {
-        matches!(self.phase, Phase::Over)
-    }
-
-    fn check_ready(&self, command: &str) -> Result<(), Failure> {
-        if self.is_ready() { Ok(()) } else { Err(refused(command, "another command is in hand")) }
-    }
-
-    fn check_alarm(&self) -> Result<(), Failure> {
-        self.alarm.map_or(Ok(()), |code| Err(Failure::Alarm { code }))
-    }
-
-    fn check_homed(&self) -> Result<(), Failure> {
-        if self.homed { Ok(()) } else { Err(Failure::Unhomed) }
-    }
 }
 
 fn check_numbers(command: &str, target_mm: [f64; 3], speed_mm_per_s: f64) -> Result<(), Failure> {
     if !target_mm.iter().all(|mm| mm.is_finite()) {
-        return Err(refused(command, "the target is not a place"));
+        return Err(Failure::refused(command, "the target is not a place"));
     }
     if !(speed_mm_per_s.is_finite() && speed_mm_per_s >= SPEED_MIN_MM_PER_S) {
-        return Err(refused(command, "the speed is not one that can be sent"));
+        return Err(Failure::refused(command, "the speed is not one that can be sent"));
     }
     Ok(())
 }
 
-fn refused(command: &str, reason: &str) -> Failure {
-    Failure::Refused { command: command.to_owned(), reason: reason.to_owned() }
+/// An alarm by its number.
+fn alarm(code: u8) -> Alarm {
+    Alarm { code: code.into(), axis: None, meaning: alarm_meaning(code) }
 }
 
 #[cfg(test)]

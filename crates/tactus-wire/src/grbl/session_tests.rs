@@ -11,12 +11,16 @@ mod any_dialogue;
 mod connect;
 #[path = "session_tests/moves.rs"]
 mod moves;
+#[path = "session_tests/settings.rs"]
+mod settings;
 #[path = "session_tests/stops.rs"]
 mod stops;
 
 use core::time::Duration;
 
-use super::{Action, Config, Failure, Session};
+use super::{Action, Session};
+use crate::grbl::Config;
+use crate::stage::{Failure, Session as _};
 
 const TOLERANCE_MM: f64 = 0.005;
 
@@ -27,8 +31,17 @@ const HOMED: &str = "
     520 < Grbl 1.1h ['$' for help]
     520 > ?
     530 < <Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000>
-    530 = connected Grbl 1.1h ['$' for help]
-    530 = Unhomed 0.000 0.000 0.000
+    530 > $I
+    531 < [VER:1.1h.20190830:]
+    531 < [OPT:V,15,128]
+    531 < ok
+    531 > $$
+    532 < $20=1
+    532 < $22=1
+    532 < $100=250.000
+    532 < ok
+    532 = connected Grbl 1.1h ['$' for help], VER:1.1h.20190830
+    532 = Unhomed 0.000 0.000 0.000
     540 * home
     540 > $H
     540 = Homing 0.000 0.000 0.000
@@ -52,8 +65,12 @@ const MOVING: &str = "
 
 /// Plays the inputs of a transcript, timers running in between, and compares the whole of it.
 fn check(transcript: &str) -> Session {
+    check_with(Config::aligned(TOLERANCE_MM), transcript)
+}
+
+fn check_with(config: Config, transcript: &str) -> Session {
     let expected: Vec<&str> = transcript.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    let mut session = Session::new(Config { tolerance_mm: TOLERANCE_MM });
+    let mut session = Session::new(config).unwrap();
     let mut actual = Vec::new();
     for line in expected.iter().filter(|line| **line != "...") {
         let (ms, rest) = line.split_once(' ').unwrap();
@@ -118,18 +135,19 @@ fn describe(now: Duration, action: &Action) -> String {
         Action::Send(bytes) => {
             format!("> {}", String::from_utf8_lossy(bytes).trim_end().replace('\x18', "^X"))
         }
-        Action::Connected { banner } => format!("= connected {banner}"),
+        Action::Connected(controller) => format!("= connected {}", controller.identity),
         Action::Report(report) => {
-            let alarm = report.alarm.map(|code| format!(" {code}")).unwrap_or_default();
+            let alarm = report.alarm.map(|alarm| format!(" {}", alarm.name())).unwrap_or_default();
             format!("= {:?}{alarm} {}", report.status, place(report.position_mm))
         }
-        Action::Reset { banner } => format!("= reset {banner}"),
+        Action::Suspect { why } => format!("= suspect: {why}"),
         Action::Done(Ok(position_mm)) => format!("= done {}", place(*position_mm)),
         Action::Done(Err(failure)) => match failure {
             Failure::Stopped { position_mm } => format!("= stopped {}", place(*position_mm)),
             Failure::Refused { reason, .. } => format!("= refused {reason}"),
-            Failure::Alarm { code } => format!("= alarm {code}"),
+            Failure::Alarm(alarm) => format!("= alarm {}", alarm.name()),
             Failure::Unhomed => "= unhomed".to_owned(),
+            Failure::Interrupted { .. } => "= interrupted".to_owned(),
             Failure::NotThere { target_mm, position_mm } => {
                 format!("= not at {} but at {}", place(*target_mm), place(*position_mm))
             }
@@ -142,8 +160,8 @@ fn describe(now: Duration, action: &Action) -> String {
     format!("{} {text}", now.as_millis())
 }
 
-fn homed(rest: &str) {
-    check(&format!("{HOMED}{rest}"));
+fn homed(rest: &str) -> Session {
+    check(&format!("{HOMED}{rest}"))
 }
 
 fn moving(rest: &str) -> Session {

@@ -1,49 +1,34 @@
-//! One straight move: how long it may take, and when it is done.
+//! One straight move: the line that orders it, and what a report means for it.
 
 use core::time::Duration;
 
-/// What a move may take beyond twice its length over its speed.
-const ALLOWANCE: Duration = Duration::from_secs(2);
-
-/// For how long the controller must say that it stands elsewhere, before that is believed: right after `ok`
-/// it may not have set out yet.
-const ELSEWHERE_MIN: Duration = Duration::from_millis(200);
+use super::Config;
+use crate::stage::{Arrival, Judgement, distance_mm};
 
 /// A move under way.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Travel {
-    target_mm: [f64; 3],
+    arrival: Arrival,
     line: String,
-    sent: Duration,
-    /// When this is not done by then, something is wrong.
-    pub(super) overdue: Duration,
     /// When the controller took the line.
     accepted: Option<Duration>,
-    /// Since when the controller says that it stands elsewhere.
-    elsewhere: Option<Duration>,
-}
-
-/// What a report means for a move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Judgement {
-    /// Go on waiting.
-    Underway,
-    /// Arrived.
-    Done,
-    /// Standing, but not there.
-    NotThere,
 }
 
 impl Travel {
     /// A move that sets out now. The target is rounded to the three decimals that are sent.
-    pub(super) fn new(now: Duration, from_mm: [f64; 3], target_mm: [f64; 3], speed_mm_per_s: f64) -> Self {
-        let target_mm = target_mm.map(round_to_um);
-        let [x, y, z] = target_mm;
+    pub(super) fn new(
+        now: Duration,
+        config: &Config,
+        from_mm: [f64; 3],
+        target_mm: [f64; 3],
+        speed_mm_per_s: f64,
+    ) -> Self {
+        let machine_mm = config.to_machine(target_mm).map(round_to_um);
+        let target_mm = config.to_stage(machine_mm);
+        let [x, y, z] = machine_mm;
         let line = format!("G90 G21 G1 X{x:.3} Y{y:.3} Z{z:.3} F{:.3}", speed_mm_per_s * 60.0);
-        let expected_s = 2.0 * distance_mm(from_mm, target_mm) / speed_mm_per_s;
-        let expected = Duration::try_from_secs_f64(expected_s).unwrap_or(Duration::MAX);
-        let overdue = now.saturating_add(expected).saturating_add(ALLOWANCE);
-        Self { target_mm, line, sent: now, overdue, accepted: None, elsewhere: None }
+        let expected_s = distance_mm(from_mm, target_mm) / speed_mm_per_s;
+        Self { arrival: Arrival::new(now, target_mm, expected_s), line, accepted: None }
     }
 
     /// The line to send, without its end.
@@ -51,12 +36,8 @@ impl Travel {
         &self.line
     }
 
-    pub(super) fn target_mm(&self) -> [f64; 3] {
-        self.target_mm
-    }
-
-    pub(super) fn waited(&self, now: Duration) -> Duration {
-        now.saturating_sub(self.sent)
+    pub(super) fn arrival(&self) -> &Arrival {
+        &self.arrival
     }
 
     /// True if the line has not been taken yet.
@@ -68,7 +49,8 @@ impl Travel {
         self.accepted = Some(now);
     }
 
-    /// Judges a report received now: whether the controller stands, where, and since when it was asked.
+    /// Judges a report received now: whether the controller stands, where, and since when it was asked. One that was
+    /// asked for before the `ok` proves nothing.
     pub(super) fn judge(
         &mut self,
         now: Duration,
@@ -78,24 +60,11 @@ impl Travel {
         tolerance_mm: f64,
     ) -> Judgement {
         let asked_after_ok = asked.zip(self.accepted).is_some_and(|(asked, accepted)| asked >= accepted);
-        if !asked_after_ok || !stands {
-            self.elsewhere = None;
-            return Judgement::Underway;
-        }
-        if distance_mm(position_mm, self.target_mm) <= tolerance_mm {
-            return Judgement::Done;
-        }
-        let since = *self.elsewhere.get_or_insert(now);
-        if now.saturating_sub(since) >= ELSEWHERE_MIN { Judgement::NotThere } else { Judgement::Underway }
+        self.arrival.judge(now, stands && asked_after_ok, position_mm, tolerance_mm)
     }
 }
 
-/// Distance between two places.
-pub(super) fn distance_mm(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
-}
-
 /// Rounds to the controller's three decimals; no negative zero.
-pub(super) fn round_to_um(mm: f64) -> f64 {
+fn round_to_um(mm: f64) -> f64 {
     (mm * 1000.0).round() / 1000.0 + 0.0
 }

@@ -2,7 +2,7 @@
 
 use super::checksum::{checksum, verify};
 use super::packet::Fields;
-use crate::grbl::Lines;
+use crate::lines::Lines;
 
 /// A command.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,8 +1,7 @@
 //! How a stage is made up of axes.
 
-use core::fmt;
-
 use super::speed_setting;
+use crate::stage::{AxisName, Direction};
 
 /// Largest position that is sent, either way: what fits in the controller's 32 bits.
 const POSITION_MAX_MICROSTEPS: f64 = 2_147_483_647.0;
@@ -42,26 +41,9 @@ pub struct Axis {
     pub direction: Direction,
     /// The position that is 0 mm.
     pub origin_microsteps: i32,
-}
-
-/// Which way an axis counts, seen in the stage's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
-    /// More microsteps are more mm.
-    Positive,
-    /// More microsteps are fewer mm.
-    Negative,
-}
-
-/// Which axis of the stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AxisName {
-    /// The first.
-    X,
-    /// The second.
-    Y,
-    /// The third, along which the tip presses.
-    Z,
+    /// What its `resolution` must be, microsteps a full step, as a microstep's length depends on it; more than 0.
+    /// `None` takes any.
+    pub resolution: Option<u32>,
 }
 
 /// Why a configuration makes no stage.
@@ -135,8 +117,7 @@ impl Config {
 
     /// The axes that are there.
     pub(super) fn named_axes(&self) -> impl Iterator<Item = (AxisName, Axis)> {
-        let names = [AxisName::X, AxisName::Y, AxisName::Z];
-        names.into_iter().zip(self.axes).filter_map(|(name, axis)| Some((name, axis?)))
+        AxisName::ALL.into_iter().zip(self.axes).filter_map(|(name, axis)| Some((name, axis?)))
     }
 }
 
@@ -173,26 +154,10 @@ impl Axis {
         if !(um.is_finite() && um > 0.0) {
             return range("um_per_microstep", um, "more than 0");
         }
-        Ok(())
-    }
-}
-
-impl Direction {
-    fn sign(self) -> f64 {
-        match self {
-            Self::Positive => 1.0,
-            Self::Negative => -1.0,
+        if self.resolution == Some(0) {
+            return range("resolution", 0.0, "more than 0");
         }
-    }
-}
-
-impl fmt::Display for AxisName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::X => "x",
-            Self::Y => "y",
-            Self::Z => "z",
-        })
+        Ok(())
     }
 }
 

@@ -8,6 +8,7 @@ const AXIS: Axis = Axis {
     um_per_microstep: 0.5,
     direction: Direction::Positive,
     origin_microsteps: 1000,
+    resolution: None,
 };
 
 #[test]

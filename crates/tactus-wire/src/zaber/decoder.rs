@@ -1,7 +1,7 @@
 //! Messages out of a stream of bytes.
 
 use super::{Message, Packet};
-use crate::grbl::Lines;
+use crate::lines::Lines;
 
 /// Messages that may wait for their next part at once.
 const PARTIAL_MAX: usize = 4;

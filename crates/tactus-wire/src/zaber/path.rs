@@ -28,17 +28,22 @@ pub fn accel_setting(microsteps_per_s2: f64) -> Option<i64> {
     setting(microsteps_per_s2 * ACCEL_SCALE)
 }
 
+/// The speed, microsteps per second, that a `maxspeed` means.
+pub fn speed_told(setting: i64) -> f64 {
+    setting as f64 / SPEED_SCALE
+}
+
+/// The acceleration, microsteps per second squared, that an `accel` means.
+pub fn accel_told(setting: i64) -> f64 {
+    setting as f64 / ACCEL_SCALE
+}
+
 /// What one axis is to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Leg {
     pub(super) target_microsteps: i64,
     pub(super) speed: i64,
     pub(super) accel: Option<i64>,
-}
-
-/// Length of a path.
-pub(super) fn length_mm(from_mm: [f64; 3], to_mm: [f64; 3]) -> f64 {
-    from_mm.iter().zip(to_mm).map(|(from, to)| (to - from) * (to - from)).sum::<f64>().sqrt()
 }
 
 /// The leg of an axis that goes `way_mm` of a path of `path_mm`, either sign. `None` if the speed or the

@@ -1,5 +1,6 @@
 use super::{Leg, accel_setting, leg, speed_setting};
-use crate::zaber::{Axis, Direction};
+use crate::stage::Direction;
+use crate::zaber::Axis;
 
 const AXIS: Axis = Axis {
     device: 1,
@@ -7,6 +8,7 @@ const AXIS: Axis = Axis {
     um_per_microstep: 0.5,
     direction: Direction::Positive,
     origin_microsteps: 0,
+    resolution: None,
 };
 
 #[test]

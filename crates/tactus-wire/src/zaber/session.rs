@@ -1,9 +1,9 @@
 //! The host's side of the conversation.
 
-mod action;
 mod ask;
 mod axis_state;
 mod conclude;
+mod error;
 mod hear;
 mod phase;
 mod step;
@@ -15,25 +15,19 @@ use ask::{Ask, Pending, Question};
 use axis_state::AxisState;
 use phase::{Phase, Travel};
 
-use super::path::{leg, length_mm};
-use super::{AxisName, Config, ConfigError, Decoder, Flag};
+use super::path::leg;
+use super::{Config, ConfigError, Decoder, Flag};
+use crate::stage::{self, Alarm, Arrival, AxisName, Cause, Failure, Session as _, Setting, distance_mm};
 
-pub use action::{Action, Alarm, Failure, Report, SessionError, Status};
+pub use error::SessionError;
 
-/// What a move may take beyond twice its length over its speed, and its acceleration.
-const MOVE_ALLOWANCE: Duration = Duration::from_secs(2);
+/// What a session wants done, or tells.
+type Action = stage::Action<SessionError>;
 
 /// How long homing may take: the longest axes at Zaber's default approach speeds take about a minute.
 const HOMING_TIMEOUT: Duration = Duration::from_mins(2);
 
-/// A conversation over one connection with all devices of a stage.
-///
-/// Call [`start`](Self::start) once, [`receive`](Self::receive) with what arrives and [`timer`](Self::timer)
-/// when [`deadline`](Self::deadline) has come; do what the actions say, in their order. Times never go back.
-/// Commands ([`home`](Self::home), [`move_to`](Self::move_to), [`clear_alarm`](Self::clear_alarm)) are given
-/// one at a time, while [`is_ready`](Self::is_ready); each ends with one [`Action::Done`].
-/// [`stop`](Self::stop) may be called at any time. After [`Action::Failed`] it does nothing more: open the
-/// link anew. The command in hand then ends without [`Action::Done`].
+/// A conversation over one connection with all devices of a stage; see [`stage::Session`].
 ///
 /// One question stands at a time, and its answer is known by its message id; only a stop overtakes it. So no
 /// axis ever has more than one move in flight. A question that only asks or sets is asked again when no
@@ -92,163 +86,14 @@ impl Session {
         })
     }
 
-    /// True if a command would be taken: none is in hand, and no stop is under way.
-    pub fn is_ready(&self) -> bool {
-        matches!(self.phase, Phase::Ready)
-    }
-
-    /// True while a stop, or the stop of a command that went wrong, has not come to its end.
-    pub fn is_stopping(&self) -> bool {
-        matches!(self.phase, Phase::Stopping(_))
-    }
-
-    /// When [`timer`](Self::timer) is due; `None` once the session is over.
-    pub fn deadline(&self) -> Option<Duration> {
-        let answer = self.pending.as_ref().map(Pending::overdue);
-        [self.phase.deadline(), answer, self.next_round()].into_iter().flatten().min()
-    }
-
-    /// Lines that could not be read and messages that answered nothing, since the start.
-    pub fn unknown_lines(&self) -> u64 {
-        self.ignored + self.decoder.dropped()
-    }
-
-    /// Begins the conversation: asks each device and axis what it is and where it stands. Nothing is
-    /// moved; a stage that is found moving is stopped.
-    pub fn start(&mut self, now: Duration) -> Vec<Action> {
-        self.phase = Phase::Greeting;
-        let mut devices = Vec::new();
-        for slot in 0..self.axes.len() {
-            let device = self.device_of(slot);
-            if !devices.contains(&device) {
-                devices.push(device);
-                if self.config.checksums {
-                    self.queue.push_back(Question { slot, ask: Ask::Checksums });
-                }
-                self.queue.push_back(Question { slot, ask: Ask::Version });
-            }
-            for ask in [Ask::AxisCount, Ask::LimitMin, Ask::LimitMax, Ask::Warnings, Ask::Position] {
-                self.queue.push_back(Question { slot, ask });
-            }
-        }
-        self.finish(now)
-    }
-
-    /// Finds the reference position: z first, so that the tip is clear, then the others together.
-    pub fn home(&mut self, now: Duration) -> Vec<Action> {
-        if self.is_over() {
-            return Vec::new();
-        }
-        let checked = self.check_ready("home").and_then(|()| self.check_alarm());
-        if let Err(failure) = checked.and_then(|()| self.check_stands("home")) {
-            self.done(Err(failure));
-            return self.finish(now);
-        }
-        self.homed = false;
-        let is_z = |slot: &usize| self.axes.get(*slot).is_some_and(|state| state.name == AxisName::Z);
-        let (first, then): (Vec<usize>, Vec<usize>) = (0..self.axes.len()).partition(is_z);
-        self.phase = Phase::Homing { group: Vec::new(), then: Some(then), deadline: now + HOMING_TIMEOUT };
-        self.home_group(first);
-        self.report();
-        self.finish(now)
-    }
-
-    /// Goes to a place, mm, at a speed along the way: each axis is set to its part of the speed, so that all
-    /// arrive together. A target equal to the present position is done at once.
-    ///
-    /// The axes start one after another, a question and its answer apart: on a line at 115200 baud that is
-    /// about 5 ms, by which the path departs from a straight line.
-    pub fn move_to(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) -> Vec<Action> {
-        if self.is_over() {
-            return Vec::new();
-        }
-        let [x, y, z] = target_mm;
-        let command = format!("move to {x:.3} {y:.3} {z:.3} mm at {speed_mm_per_s:.3} mm/s");
-        let checked = self
-            .check_ready(&command)
-            .and_then(|()| self.check_numbers(&command, target_mm, speed_mm_per_s))
-            .and_then(|()| self.check_alarm())
-            .and_then(|()| self.check_homed())
-            .and_then(|()| self.check_stands(&command))
-            .and_then(|()| self.plan(now, &command, target_mm, speed_mm_per_s));
-        match checked {
-            Err(failure) => self.done(Err(failure)),
-            Ok(None) => self.done(Ok(self.position_mm())),
-            Ok(Some(travel)) => {
-                self.phase = Phase::Moving(travel);
-            }
-        }
-        self.finish(now)
-    }
-
-    /// Clears what has to be seen to, on every axis, and switches drivers on that were off. The position is
-    /// suspect after it. Without an alarm nothing is done.
-    pub fn clear_alarm(&mut self, now: Duration) -> Vec<Action> {
-        if self.is_over() {
-            return Vec::new();
-        }
-        if let Err(failure) = self.check_ready("warnings clear") {
-            self.done(Err(failure));
-        } else if self.alarm.is_none() {
-            self.done(Ok(self.position_mm()));
-        } else {
-            self.homed = false;
-            self.phase = Phase::Clearing;
-            self.begin_batch();
-            for slot in 0..self.axes.len() {
-                self.queue.push_back(Question { slot, ask: Ask::Clear });
-                let is_off = |state: &AxisState| state.fault.is_some_and(Flag::driver_is_off);
-                if self.axes.get(slot).is_some_and(is_off) {
-                    self.queue.push_back(Question { slot, ask: Ask::Enable });
-                }
-                self.queue.push_back(Question { slot, ask: Ask::Warnings });
-            }
-        }
-        self.finish(now)
-    }
-
-    /// Stops all devices of the port now: the first action is the message to send. The axes decelerate and
-    /// keep their position; the stop ends when every device has confirmed it and every axis says that it
-    /// stands. What goes on moving for 3 s is stopped by `estop`, after which the position is suspect.
-    pub fn stop(&mut self, now: Duration) -> Vec<Action> {
-        let stopped = Failure::Stopped { position_mm: self.position_mm() };
-        match &self.phase {
-            Phase::Over => {}
-            Phase::Greeting => self.send_stop("stop"),
-            Phase::Ready => self.halt(now, None),
-            Phase::Moving(_) | Phase::Homing { .. } | Phase::Clearing => self.halt(now, Some(stopped)),
-            Phase::Stopping(stop) => {
-                let text = stop.text();
-                self.repeat_stop(now, text);
-            }
-        }
-        self.finish(now)
-    }
-
-    /// Takes what arrived.
-    pub fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
-        let mut decoder = core::mem::take(&mut self.decoder);
-        decoder.push(bytes, |message| {
-            self.hear(now, &message);
-            // The next question goes out with the answer to the last, whatever else has arrived.
-            self.proceed(now);
-        });
-        if self.needs_checksums() {
-            decoder.require_checksums();
-        }
-        self.decoder = decoder;
-        self.finish(now)
-    }
-
-    /// Does what is due at [`deadline`](Self::deadline).
-    pub fn timer(&mut self, now: Duration) -> Vec<Action> {
-        if self.phase.deadline().is_some_and(|deadline| now >= deadline) {
-            self.overdue(now);
-        }
-        if self.pending.as_ref().is_some_and(|pending| now >= pending.overdue()) {
-            self.unanswered(now);
-        }
-        self.finish(now)
+    /// What the axes are set to, in mm.
+    fn settings(&self) -> Vec<Setting> {
+        let told = |state: &AxisState| Setting {
+            name: "limit.min, limit.max".to_owned(),
+            value: format!("{}, {}", state.limit_min, state.limit_max),
+            meaning: format!("{}: {}", state.name, state.travel()),
+        };
+        self.axes.iter().map(told).collect()
     }
 
     /// What each axis is to do; `None` if the stage is there.
@@ -276,7 +121,7 @@ impl Session {
             return Ok(None);
         }
         let from_mm = self.position_mm();
-        let path_mm = length_mm(from_mm, reached_mm);
+        let path_mm = distance_mm(from_mm, reached_mm);
         let accel = self.config.accel_mm_per_s2;
         let (mut settings, mut moves) = (Vec::new(), Vec::new());
         for (slot, target) in targets {
@@ -292,18 +137,10 @@ impl Session {
         }
         self.begin_batch();
         self.queue.extend(settings.into_iter().chain(moves));
-        let expected_s = 2.0 * (path_mm / speed_mm_per_s + accel.map_or(0.0, |accel| speed_mm_per_s / accel));
-        let expected = Duration::try_from_secs_f64(expected_s).unwrap_or(Duration::MAX);
-        let overdue = now.saturating_add(expected).saturating_add(MOVE_ALLOWANCE);
+        let expected_s = path_mm / speed_mm_per_s + accel.map_or(0.0, |accel| speed_mm_per_s / accel);
+        let arrival = Arrival::new(now, reached_mm, expected_s);
         let command = command.to_owned();
-        Ok(Some(Travel {
-            command,
-            target_mm: reached_mm,
-            sent: now,
-            overdue,
-            set_out: false,
-            elsewhere: None,
-        }))
+        Ok(Some(Travel { command, arrival, set_out: false }))
     }
 
     fn is_over(&self) -> bool {
@@ -311,12 +148,12 @@ impl Session {
     }
 
     fn check_ready(&self, command: &str) -> Result<(), Failure> {
-        if self.is_ready() { Ok(()) } else { Err(refused(command, "another command is in hand")) }
+        if self.is_ready() { Ok(()) } else { Err(Failure::refused(command, "another command is in hand")) }
     }
 
     fn check_stands(&self, command: &str) -> Result<(), Failure> {
         if self.moves() {
-            return Err(refused(command, "the stage is being moved, by its knob or another host"));
+            return Err(Failure::refused(command, "the stage is being moved, by its knob or another host"));
         }
         Ok(())
     }
@@ -331,24 +168,183 @@ impl Session {
 
     fn check_numbers(&self, command: &str, target_mm: [f64; 3], speed_mm_per_s: f64) -> Result<(), Failure> {
         if !target_mm.iter().all(|mm| mm.is_finite()) {
-            return Err(refused(command, "the target is not a place"));
+            return Err(Failure::refused(command, "the target is not a place"));
         }
-        let missing = [AxisName::X, AxisName::Y, AxisName::Z]
+        let missing = AxisName::ALL
             .into_iter()
             .filter(|name| self.axes.iter().all(|state| state.name != *name))
             .any(|name| name.of(target_mm).abs() > self.config.tolerance_mm);
         if missing {
-            return Err(refused(command, "the target needs an axis that the stage lacks"));
+            return Err(Failure::refused(command, "the target needs an axis that the stage lacks"));
         }
         if !(speed_mm_per_s.is_finite() && speed_mm_per_s > 0.0) {
-            return Err(refused(command, "the speed is not one that can be sent"));
+            return Err(Failure::refused(command, "the speed is not one that can be sent"));
         }
         Ok(())
     }
 }
 
-fn refused(command: &str, reason: &str) -> Failure {
-    Failure::Refused { command: command.to_owned(), reason: reason.to_owned() }
+impl stage::Session for Session {
+    type Error = SessionError;
+
+    fn cause(error: &SessionError) -> Cause {
+        error.cause()
+    }
+
+    fn is_ready(&self) -> bool {
+        matches!(self.phase, Phase::Ready)
+    }
+
+    fn is_stopping(&self) -> bool {
+        matches!(self.phase, Phase::Stopping(_))
+    }
+
+    fn deadline(&self) -> Option<Duration> {
+        let answer = self.pending.as_ref().map(Pending::overdue);
+        [self.phase.deadline(), answer, self.next_round()].into_iter().flatten().min()
+    }
+
+    fn unknown_lines(&self) -> u64 {
+        self.ignored + self.decoder.dropped()
+    }
+
+    /// Asks each device and axis what it is and where it stands. Nothing is
+    /// moved; a stage that is found moving is stopped.
+    fn start(&mut self, now: Duration) -> Vec<Action> {
+        self.phase = Phase::Greeting;
+        let mut devices = Vec::new();
+        for slot in 0..self.axes.len() {
+            let device = self.device_of(slot);
+            if !devices.contains(&device) {
+                devices.push(device);
+                if self.config.checksums {
+                    self.queue.push_back(Question { slot, ask: Ask::Checksums });
+                }
+                self.queue.push_back(Question { slot, ask: Ask::Version });
+            }
+            self.queue.push_back(Question { slot, ask: Ask::AxisCount });
+            if self.axes.get(slot).is_some_and(|state| state.axis.resolution.is_some()) {
+                self.queue.push_back(Question { slot, ask: Ask::Resolution });
+            }
+            for ask in [Ask::LimitMin, Ask::LimitMax, Ask::Warnings, Ask::Position] {
+                self.queue.push_back(Question { slot, ask });
+            }
+        }
+        self.finish(now)
+    }
+
+    /// Z first, so that the tip is clear, then the others together.
+    fn home(&mut self, now: Duration) -> Vec<Action> {
+        if self.is_over() {
+            return Vec::new();
+        }
+        let checked = self.check_ready("home").and_then(|()| self.check_alarm());
+        if let Err(failure) = checked.and_then(|()| self.check_stands("home")) {
+            self.done(Err(failure));
+            return self.finish(now);
+        }
+        self.homed = false;
+        let is_z = |slot: &usize| self.axes.get(*slot).is_some_and(|state| state.name == AxisName::Z);
+        let (first, then): (Vec<usize>, Vec<usize>) = (0..self.axes.len()).partition(is_z);
+        self.phase = Phase::Homing { group: Vec::new(), then: Some(then), deadline: now + HOMING_TIMEOUT };
+        self.home_group(first);
+        self.report();
+        self.finish(now)
+    }
+
+    /// Each axis is set to its part of the speed, so that all arrive together.
+    ///
+    /// The axes start one after another, a question and its answer apart: on a line at 115200 baud that is
+    /// about 5 ms, by which the path departs from a straight line.
+    fn move_to(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) -> Vec<Action> {
+        if self.is_over() {
+            return Vec::new();
+        }
+        let [x, y, z] = target_mm;
+        let command = format!("move to {x:.3} {y:.3} {z:.3} mm at {speed_mm_per_s:.3} mm/s");
+        let checked = self
+            .check_ready(&command)
+            .and_then(|()| self.check_numbers(&command, target_mm, speed_mm_per_s))
+            .and_then(|()| self.check_alarm())
+            .and_then(|()| self.check_homed())
+            .and_then(|()| self.check_stands(&command))
+            .and_then(|()| self.plan(now, &command, target_mm, speed_mm_per_s));
+        match checked {
+            Err(failure) => self.done(Err(failure)),
+            Ok(None) => self.done(Ok(self.position_mm())),
+            Ok(Some(travel)) => {
+                self.phase = Phase::Moving(travel);
+            }
+        }
+        self.finish(now)
+    }
+
+    /// Clears what has to be seen to, on every axis, and switches drivers on that were off.
+    fn clear_alarm(&mut self, now: Duration) -> Vec<Action> {
+        if self.is_over() {
+            return Vec::new();
+        }
+        if let Err(failure) = self.check_ready("warnings clear") {
+            self.done(Err(failure));
+        } else if self.alarm.is_none() {
+            self.done(Ok(self.position_mm()));
+        } else {
+            self.homed = false;
+            self.phase = Phase::Clearing;
+            self.begin_batch();
+            for slot in 0..self.axes.len() {
+                self.queue.push_back(Question { slot, ask: Ask::Clear });
+                let is_off = |state: &AxisState| state.fault.is_some_and(Flag::driver_is_off);
+                if self.axes.get(slot).is_some_and(is_off) {
+                    self.queue.push_back(Question { slot, ask: Ask::Enable });
+                }
+                self.queue.push_back(Question { slot, ask: Ask::Warnings });
+            }
+        }
+        self.finish(now)
+    }
+
+    /// Stops all devices of the port. The axes decelerate and
+    /// keep their position; the stop ends when every device has confirmed it and every axis says that it
+    /// stands. What goes on moving for 3 s is stopped by `estop`, after which the position is suspect.
+    fn stop(&mut self, now: Duration) -> Vec<Action> {
+        let stopped = Failure::Stopped { position_mm: self.position_mm() };
+        match &self.phase {
+            Phase::Over => {}
+            Phase::Greeting => self.send_stop("stop"),
+            Phase::Ready => self.halt(now, None),
+            Phase::Moving(_) | Phase::Homing { .. } | Phase::Clearing => self.halt(now, Some(stopped)),
+            Phase::Stopping(stop) => {
+                let text = stop.text();
+                self.repeat_stop(now, text);
+            }
+        }
+        self.finish(now)
+    }
+
+    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
+        let mut decoder = core::mem::take(&mut self.decoder);
+        decoder.push(bytes, |message| {
+            self.hear(now, &message);
+            // The next question goes out with the answer to the last, whatever else has arrived.
+            self.proceed(now);
+        });
+        if self.needs_checksums() {
+            decoder.require_checksums();
+        }
+        self.decoder = decoder;
+        self.finish(now)
+    }
+
+    fn timer(&mut self, now: Duration) -> Vec<Action> {
+        if self.phase.deadline().is_some_and(|deadline| now >= deadline) {
+            self.overdue(now);
+        }
+        if self.pending.as_ref().is_some_and(|pending| now >= pending.overdue()) {
+            self.unanswered(now);
+        }
+        self.finish(now)
+    }
 }
 
 #[cfg(test)]

@@ -18,8 +18,9 @@ use core::time::Duration;
 
 use fake::Fake;
 
-use super::{Action, Failure, Report, Session, Status};
-use crate::zaber::{Axis, Config, Direction};
+use super::{Action, Session};
+use crate::stage::{Direction, Failure, Report, Session as _, Status};
+use crate::zaber::{Axis, Config};
 
 /// Bytes take this long, either way.
 const LATENCY: Duration = Duration::from_millis(2);
@@ -33,6 +34,7 @@ fn config() -> Config {
         um_per_microstep: 0.5,
         direction: Direction::Positive,
         origin_microsteps: 0,
+        resolution: None,
     };
     let z = Axis { direction: Direction::Negative, origin_microsteps: 40_000, ..axis(2, 1) };
     Config {
@@ -170,14 +172,14 @@ impl Play {
                     self.under_way.push((self.now + LATENCY, true, bytes));
                     text
                 }
-                Action::Connected { identity } => format!("= connected {identity}"),
+                Action::Connected(controller) => format!("= connected {}", controller.identity),
                 Action::Report(report) => {
                     self.report = Some(report);
                     let [x, y, z] = report.position_mm;
-                    let alarm = report.alarm.map(|alarm| format!(" {} {}", alarm.name, alarm.flag));
+                    let alarm = report.alarm.map(|alarm| format!(" {}", alarm.name()));
                     format!("= {:?}{} {x:.3} {y:.3} {z:.3}", report.status, alarm.unwrap_or_default())
                 }
-                Action::ReferenceLost { name } => format!("= reference lost of {name}"),
+                Action::Suspect { why } => format!("= suspect: {why}"),
                 Action::Done(result) => {
                     self.results.push(result.clone());
                     format!("= done {result:?}")

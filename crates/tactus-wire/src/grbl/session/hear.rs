@@ -2,10 +2,11 @@
 
 use core::time::Duration;
 
-use super::phase::{Phase, Purpose};
-use super::{Action, Failure, SAME_PLACE_MM, Session};
-use crate::grbl::travel::{Judgement, Travel, distance_mm};
+use super::phase::{Phase, Purpose, Question};
+use super::{Action, Failure, SAME_PLACE_MM, Session, SessionError, alarm};
+use crate::grbl::travel::Travel;
 use crate::grbl::{FEED_HOLD, MachineState, Position, Response, StatusReport, error_meaning};
+use crate::stage::{Controller, Judgement, distance_mm};
 
 /// How long `$X` may take.
 const UNLOCK_TIMEOUT: Duration = Duration::from_secs(2);
@@ -21,15 +22,14 @@ impl Session {
         }
         match response {
             Response::Ok => self.hear_ok(now),
-            Response::Error(code) => self.hear_error(code),
+            Response::Error(code) => self.hear_error(now, code),
             Response::Alarm(code) => self.hear_alarm(code),
-            Response::Banner(banner) => self.hear_banner(now, banner),
+            Response::Banner(banner) => self.hear_banner(now, &banner),
             Response::Status(report) => self.hear_report(now, &report),
             Response::Unknown(_) => self.unknown_lines += 1,
-            Response::Message(_)
-            | Response::Probe { .. }
-            | Response::Setting { .. }
-            | Response::Feedback(_) => {}
+            Response::Setting { number, value } => self.settings.take(number, value),
+            Response::Feedback(text) => self.hear_feedback(&text),
+            Response::Message(_) | Response::Probe { .. } => {}
         }
     }
 
@@ -45,12 +45,49 @@ impl Session {
             self.poll.at_once();
         } else if let Phase::Unlocking { .. } = self.phase {
             self.look(now, Purpose::Clear);
+        } else if let Phase::Asking { question, .. } = self.phase {
+            self.hear_answered(now, question);
         }
     }
 
-    fn hear_error(&mut self, code: u8) {
+    /// Of what `$I` tells only the version is of interest.
+    fn hear_feedback(&mut self, text: &str) {
+        if let Phase::Asking { question: Question::Build, .. } = self.phase
+            && text.starts_with("VER:")
+        {
+            self.identity.push_str(", ");
+            self.identity.push_str(text.trim_end_matches(':'));
+        }
+    }
+
+    /// What was asked before the controller is taken for the rig's has been answered.
+    fn hear_answered(&mut self, now: Duration, question: Question) {
+        if question == Question::Build {
+            return self.ask(now, Question::Settings, 1);
+        }
+        if let Err(error) = self.settings.check(&self.config) {
+            return self.fail(error);
+        }
+        self.phase = Phase::Ready;
+        let (identity, settings) = (self.identity.clone(), self.settings.list());
+        self.actions.push(Action::Connected(Controller { identity, settings }));
+        self.report();
+    }
+
+    fn hear_error(&mut self, now: Duration, code: u8) {
         if code == ERROR_AT_BOOT {
             return;
+        }
+        if let Phase::Asking { question, .. } = self.phase {
+            return match question {
+                // It has no version to tell.
+                Question::Build => self.hear_answered(now, question),
+                Question::Settings => self.fail(SessionError::Refused {
+                    question: question.line(),
+                    code,
+                    meaning: error_meaning(code),
+                }),
+            };
         }
         let command = if let Phase::Moving(travel) = &self.phase
             && travel.awaits_ok()
@@ -81,20 +118,22 @@ impl Session {
             | Phase::Looking { purpose: Purpose::Clear, .. } => true,
             Phase::Holding { failure, .. } => failure.is_some(),
             // A reset may raise an alarm; its banner follows.
-            Phase::Resetting { .. } | Phase::Looking { .. } | Phase::Over => return self.report(),
+            Phase::Resetting { .. } | Phase::Looking { .. } | Phase::Asking { .. } | Phase::Over => {
+                return self.report();
+            }
             Phase::Ready => false,
         };
         self.phase = Phase::Ready;
         self.report();
         if ended {
-            self.done(Err(Failure::Alarm { code }));
+            self.done(Err(Failure::Alarm(alarm(code))));
         }
     }
 
-    fn hear_banner(&mut self, now: Duration, banner: String) {
+    fn hear_banner(&mut self, now: Duration, banner: &str) {
         self.poll.reset();
         self.state = None;
-        self.banner.clone_from(&banner);
+        banner.clone_into(&mut self.identity);
         let failure = match core::mem::replace(&mut self.phase, Phase::Ready) {
             Phase::Resetting { purpose: Purpose::Clear, .. } => {
                 self.send_line("$X");
@@ -103,7 +142,9 @@ impl Session {
             }
             Phase::Resetting { purpose, .. } => return self.look(now, purpose),
             // The one that comes by itself and the one that was asked for.
-            Phase::Looking { purpose: Purpose::Greet, .. } => return self.look(now, Purpose::Greet),
+            Phase::Looking { purpose: Purpose::Greet, .. } | Phase::Asking { .. } => {
+                return self.look(now, Purpose::Greet);
+            }
             Phase::Looking { purpose: Purpose::Stop { failure, .. }, .. }
             | Phase::Holding { failure, .. } => failure,
             Phase::Moving(_)
@@ -113,7 +154,7 @@ impl Session {
             Phase::Looking { purpose: Purpose::Recover, .. } | Phase::Ready | Phase::Over => None,
         };
         self.homed = false;
-        self.actions.push(Action::Reset { banner });
+        self.actions.push(Action::Suspect { why: format!("the controller was reset: {banner}") });
         self.report();
         if let Some(failure) = failure {
             self.done(Err(failure));
@@ -143,11 +184,12 @@ impl Session {
             Phase::Moving(travel) => self.judge(now, asked, travel),
             Phase::Homing { accepted: Some(accepted), .. } if asked_since(accepted) => self.conclude_homing(),
             Phase::Holding { failure, since } if asked_since(since) => self.conclude_hold(now, failure),
-            Phase::Looking { purpose, since } if asked_since(since) => self.conclude_look(purpose),
+            Phase::Looking { purpose, since } if asked_since(since) => self.conclude_look(now, purpose),
             Phase::Homing { .. }
             | Phase::Holding { .. }
             | Phase::Looking { .. }
             | Phase::Resetting { .. }
+            | Phase::Asking { .. }
             | Phase::Unlocking { .. }
             | Phase::Ready
             | Phase::Over => self.report(),
@@ -159,19 +201,19 @@ impl Session {
         let before = self.work_offset_mm;
         self.work_offset_mm = report.work_offset_mm.or(before);
         let offset_mm = self.work_offset_mm.unwrap_or_default();
-        self.position_mm = match report.position {
+        self.position_mm = self.config.to_stage(match report.position {
             Position::Work(mm) => mm,
             Position::Machine([x, y, z]) => {
                 let [offset_x, offset_y, offset_z] = offset_mm;
                 [x - offset_x, y - offset_y, z - offset_z]
             }
-        };
+        });
         before.is_some_and(|before| distance_mm(before, offset_mm) > SAME_PLACE_MM)
     }
 
     fn judge(&mut self, now: Duration, asked: Option<Duration>, mut travel: Travel) {
         let (position_mm, stands) = (self.position_mm, self.state == Some(MachineState::Idle));
-        let target_mm = travel.target_mm();
+        let target_mm = travel.arrival().target_mm();
         let result = match travel.judge(now, asked, stands, position_mm, self.config.tolerance_mm) {
             Judgement::Underway => {
                 self.phase = Phase::Moving(travel);
@@ -213,14 +255,10 @@ impl Session {
         }
     }
 
-    fn conclude_look(&mut self, purpose: Purpose) {
+    fn conclude_look(&mut self, now: Duration, purpose: Purpose) {
         let position_mm = self.position_mm;
         match purpose {
-            Purpose::Greet => {
-                self.phase = Phase::Ready;
-                self.actions.push(Action::Connected { banner: self.banner.clone() });
-                self.report();
-            }
+            Purpose::Greet => self.ask(now, Question::Build, 1),
             Purpose::Recover => {
                 self.phase = Phase::Ready;
                 self.report();

@@ -15,6 +15,8 @@ pub(super) enum Phase {
     Resetting { purpose: Purpose, resets: u32, deadline: Duration },
     /// The first report asked for since then is waited for.
     Looking { purpose: Purpose, since: Duration },
+    /// The controller is asked what it is, for the `tries`th time.
+    Asking { question: Question, tries: u32, deadline: Duration },
     /// Nothing is in hand.
     Ready,
     /// A move is in hand.
@@ -27,6 +29,15 @@ pub(super) enum Phase {
     Holding { failure: Option<Failure>, since: Duration },
     /// It has not started, or has failed.
     Over,
+}
+
+/// What the controller is asked before it is taken for the rig's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Question {
+    /// `$I`: its version.
+    Build,
+    /// `$$`: its settings.
+    Settings,
 }
 
 /// What a reset is for.
@@ -47,11 +58,22 @@ impl Phase {
     pub(super) fn deadline(&self) -> Option<Duration> {
         match self {
             Self::Resetting { deadline, .. }
+            | Self::Asking { deadline, .. }
             | Self::Homing { deadline, .. }
             | Self::Unlocking { deadline } => Some(*deadline),
-            Self::Moving(travel) => Some(travel.overdue),
+            Self::Moving(travel) => Some(travel.arrival().overdue()),
             Self::Holding { since, .. } => Some(*since + HOLD_TIMEOUT),
             Self::Looking { .. } | Self::Ready | Self::Over => None,
+        }
+    }
+}
+
+impl Question {
+    /// The line to send, without its end.
+    pub(super) fn line(self) -> &'static str {
+        match self {
+            Self::Build => "$I",
+            Self::Settings => "$$",
         }
     }
 }

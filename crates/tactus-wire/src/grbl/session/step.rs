@@ -2,9 +2,10 @@
 
 use core::time::Duration;
 
-use super::phase::{Phase, Purpose};
-use super::{Action, Failure, Report, Session, SessionError, Status};
+use super::phase::{Phase, Purpose, Question};
+use super::{Action, Failure, Session, SessionError, alarm};
 use crate::grbl::{FEED_HOLD, MachineState, SOFT_RESET, STATUS_QUERY};
+use crate::stage::{Report, Status};
 
 /// Between status reports while standing.
 const POLL_IDLE: Duration = Duration::from_millis(100);
@@ -15,6 +16,12 @@ const POLL_MOVING: Duration = Duration::from_millis(50);
 /// How long the banner may take after a reset; some boards pass through a boot loader.
 const BANNER_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// How long the answer to `$I` or `$$` may take.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// How often they are asked.
+const TRIES_MAX: u32 = 3;
+
 /// How often a reset is tried.
 const RESETS_MAX: u32 = 4;
 
@@ -24,7 +31,7 @@ impl Session {
         let report = Report {
             position_mm: self.position_mm,
             status: self.status(),
-            alarm: self.alarm.filter(|code| *code != 0),
+            alarm: self.alarm.filter(|code| *code != 0).map(alarm),
         };
         self.actions.push(Action::Report(report));
     }
@@ -39,7 +46,11 @@ impl Session {
         match self.phase {
             Phase::Homing { .. } => self.send(SOFT_RESET),
             Phase::Ready | Phase::Moving(_) | Phase::Holding { .. } => self.send(FEED_HOLD),
-            Phase::Resetting { .. } | Phase::Looking { .. } | Phase::Unlocking { .. } | Phase::Over => {}
+            Phase::Resetting { .. }
+            | Phase::Looking { .. }
+            | Phase::Asking { .. }
+            | Phase::Unlocking { .. }
+            | Phase::Over => {}
         }
         self.phase = Phase::Over;
         self.actions.push(Action::Failed(error));
@@ -64,6 +75,15 @@ impl Session {
         self.poll.at_once();
     }
 
+    /// Asks the controller what it is, for the `tries`th time.
+    pub(super) fn ask(&mut self, now: Duration, question: Question, tries: u32) {
+        if question == Question::Settings {
+            self.settings.forget();
+        }
+        self.send_line(question.line());
+        self.phase = Phase::Asking { question, tries, deadline: now + ANSWER_TIMEOUT };
+    }
+
     /// Does what follows when a phase has taken too long.
     pub(super) fn overdue(&mut self, now: Duration) {
         match self.phase.clone() {
@@ -72,10 +92,14 @@ impl Session {
             }
             Phase::Resetting { purpose, resets, .. } => self.reset(now, purpose, resets + 1),
             Phase::Moving(travel) => {
-                let (target_mm, waited) = (travel.target_mm(), travel.waited(now));
+                let (target_mm, waited) = (travel.arrival().target_mm(), travel.arrival().waited(now));
                 let failure = Failure::Overdue { target_mm, position_mm: self.position_mm, waited };
                 self.hold(now, Some(failure));
             }
+            Phase::Asking { question, tries, .. } if tries >= TRIES_MAX => {
+                self.fail(SessionError::Silent { question: question.line() });
+            }
+            Phase::Asking { question, tries, .. } => self.ask(now, question, tries + 1),
             Phase::Homing { .. } => self.fail(SessionError::Silent { question: "that it is homed" }),
             Phase::Unlocking { .. } => self.fail(SessionError::Silent { question: "to $X" }),
             Phase::Holding { failure, .. } => self.reset(now, Purpose::Stop { failure, held_mm: None }, 1),
@@ -98,7 +122,7 @@ impl Session {
     /// How often to ask for a report; `None` if it would not be answered.
     pub(super) fn poll_interval(&self) -> Option<Duration> {
         match self.phase {
-            Phase::Resetting { .. } | Phase::Unlocking { .. } | Phase::Over => None,
+            Phase::Resetting { .. } | Phase::Asking { .. } | Phase::Unlocking { .. } | Phase::Over => None,
             Phase::Homing { accepted, .. } => accepted.map(|_| POLL_MOVING),
             // A question asked now would only delay the one that follows the `ok`.
             Phase::Moving(ref travel) if travel.awaits_ok() => Some(POLL_IDLE),

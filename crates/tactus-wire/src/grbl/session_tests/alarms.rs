@@ -103,6 +103,8 @@ fn homing_may_fail() {
         950 = Homing 1.000 1.000 5.000
         960 < <Home|MPos:1.000,1.000,5.000|FS:0,0>
         960 = Homing 1.000 1.000 5.000
+        12000 * move 2 1 5 at 10
+        12000 = refused another command is in hand
         24950 < ALARM:9
         24950 = Alarm 9 1.000 1.000 5.000
         24950 = alarm 9
@@ -132,7 +134,7 @@ fn homing_may_fail() {
 fn a_banner_in_motion_leaves_the_position_suspect() {
     moving(
         "1010 < Grbl 1.1h ['$' for help]
-        1010 = reset Grbl 1.1h ['$' for help]
+        1010 = suspect: the controller was reset: Grbl 1.1h ['$' for help]
         1010 = Unhomed 1.010 1.000 5.000
         1010 = unhomed
         1010 > ?
@@ -147,7 +149,7 @@ fn a_banner_in_motion_leaves_the_position_suspect() {
 fn a_banner_at_a_stand_does_too() {
     homed(
         "950 < Grbl 1.1h ['$' for help]
-        950 = reset Grbl 1.1h ['$' for help]
+        950 = suspect: the controller was reset: Grbl 1.1h ['$' for help]
         950 = Unhomed 1.000 1.000 5.000
         950 > ?
         960 < <Idle|MPos:0.000,0.000,0.000|FS:0,0>
@@ -162,9 +164,31 @@ fn the_error_of_boot_is_no_answer_to_a_move() {
         950 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
         955 < error:7
         960 < Grbl 1.1h ['$' for help]
-        960 = reset Grbl 1.1h ['$' for help]
+        960 = suspect: the controller was reset: Grbl 1.1h ['$' for help]
         960 = Unhomed 1.000 1.000 5.000
         960 = unhomed
         960 > ?",
+    );
+}
+
+#[test]
+fn a_locked_controller_refuses_moves_until_it_is_reset_and_unlocked() {
+    // The alarm's line was lost, and `?` goes unanswered: the refusal is what shows it.
+    homed(
+        "950 * move 2 1 5 at 10
+        950 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
+        955 < error:9
+        955 = Idle 1.000 1.000 5.000
+        955 = refused error 9: locked by an alarm or a jog
+        1000 > ?
+        1250 > ?
+        1500 > ?
+        1750 > ?
+        2000 > ?
+        2250 > ?
+        2500 > ?
+        2750 > ?
+        3000 > !
+        3000 = failed: the controller did not answer for its status",
     );
 }

@@ -5,7 +5,9 @@ use core::time::Duration;
 use proptest::prelude::*;
 
 use super::{TOLERANCE_MM, command};
-use crate::grbl::{Action, Config, Session, Status};
+use crate::grbl::session::Action;
+use crate::grbl::{Config, Session};
+use crate::stage::{Session as _, Status};
 
 const BANNER: &str = "Grbl 1.1h ['$' for help]";
 
@@ -30,6 +32,8 @@ fn line() -> impl Strategy<Value = &'static str> {
         "<Hold:0|MPos:1.500,1.000,5.000|FS:0,0>",
         "<Alarm|MPos:1.500,1.000,5.000|FS:0,0>",
         "<Idle|MPos:1.000,1.000,5.000|WCO:1.000,0.000,0.000>",
+        "$22=0",
+        "[VER:1.1h.20190830:]",
         "noise",
     ])
 }
@@ -57,7 +61,7 @@ struct Play {
 impl Play {
     /// A homed stage at (1, 1, 5).
     fn homed() -> Self {
-        let session = Session::new(Config { tolerance_mm: TOLERANCE_MM });
+        let session = Session::new(Config::aligned(TOLERANCE_MM)).unwrap();
         let mut play = Self { session, now: Duration::ZERO, in_hand: 0, known: false };
         let greeting = play.session.start(play.now);
         play.check(&greeting);
@@ -65,6 +69,10 @@ impl Play {
         for event in [
             Event::Line(BANNER),
             Event::Line(at_home),
+            Event::Line("ok"),
+            Event::Line("$20=1"),
+            Event::Line("$22=1"),
+            Event::Line("ok"),
             Event::Command("home"),
             Event::Line("ok"),
             Event::Line(at_home),
@@ -118,7 +126,11 @@ impl Play {
                     Status::Moving | Status::Hold => {}
                 },
                 Action::Failed(_) => assert_eq!(self.session.deadline(), None),
-                Action::Send(_) | Action::Connected { .. } | Action::Reset { .. } => {}
+                Action::Send(bytes) => {
+                    let writes = bytes.contains(&b'=') || bytes.contains(&b'~');
+                    assert!(!writes, "a setting is written, or a hold given up: {bytes:?}");
+                }
+                Action::Connected(_) | Action::Suspect { .. } => {}
             }
         }
         assert!(!self.session.is_ready() || self.in_hand == 0, "ready with a command in hand");

@@ -1,6 +1,7 @@
 //! Finding the controller, and listening to it.
 
 use super::{check, homed, moving};
+use crate::stage::Session as _;
 
 #[test]
 fn a_banner_that_comes_by_itself_needs_no_reset() {
@@ -11,6 +12,12 @@ fn a_banner_that_comes_by_itself_needs_no_reset() {
         150 > ?
         151 < [MSG:'$H'|'$X' to unlock]
         180 < <Alarm|MPos:0.000,0.000,0.000|FS:0,0>
+        180 > $I
+        180 < ok
+        180 > $$
+        180 < $20=1
+        180 < $22=1
+        180 < ok
         180 = connected Grbl 1.1h ['$' for help]
         180 = Unhomed 0.000 0.000 0.000
         190 * home
@@ -41,6 +48,12 @@ fn a_banner_of_its_own_and_the_one_asked_for() {
         502 < Grbl 1.1h ['$' for help]
         502 > ?
         510 < <Idle|MPos:0.000,0.000,0.000|FS:0,0>
+        510 > $I
+        510 < ok
+        510 > $$
+        510 < $20=1
+        510 < $22=1
+        510 < ok
         510 = connected Grbl 1.1h ['$' for help]
         510 = Unhomed 0.000 0.000 0.000",
     );

@@ -1,6 +1,7 @@
 //! When a move is done, and when it is not.
 
 use super::{homed, moving};
+use crate::stage::Session as _;
 
 #[test]
 fn a_move_is_done_when_idle_at_the_target() {
@@ -166,4 +167,27 @@ fn a_move_to_where_the_stage_stands_is_done_at_once() {
         951 * move 1 1 4.9994 at 0.5
         951 > G90 G21 G1 X1.000 Y1.000 Z4.999 F30.000",
     );
+}
+
+#[test]
+fn a_target_is_rounded_to_the_three_decimals_that_the_controller_knows() {
+    homed(
+        "950 * move 1.50049 1 -0.0004 at 10
+        950 > G90 G21 G1 X1.500 Y1.000 Z0.000 F600.000
+        955 < ok
+        955 > ?
+        960 < <Idle|MPos:1.500,1.000,0.000|FS:0,0>
+        960 = Idle 1.500 1.000 0.000
+        960 = done 1.500 1.000 0.000",
+    );
+}
+
+#[test]
+fn a_probing_that_someone_else_made_is_passed_over() {
+    let session = homed(
+        "950 < [PRB:1.000,2.000,-0.250:1]
+        960 * move 1 1 5 at 10
+        960 = done 1.000 1.000 5.000",
+    );
+    assert_eq!(session.unknown_lines(), 0);
 }

@@ -210,3 +210,26 @@ fn a_stage_that_says_even_after_the_reset_that_it_moves_is_not_waited_for() {
         4040 = unhomed",
     );
 }
+
+#[test]
+fn a_jog_of_someone_else_is_stopped_too() {
+    homed(
+        "1000 > ?
+        1010 < <Jog|MPos:1.100,1.000,5.000|FS:600,0>
+        1010 = Moving 1.100 1.000 5.000
+        1020 * stop
+        1020 > !
+        1020 > ?
+        1030 < <Jog|MPos:1.200,1.000,5.000|FS:100,0>
+        1030 = Moving 1.200 1.000 5.000
+        1030 > !
+        1070 > ?
+        1080 < <Idle|MPos:1.210,1.000,5.000|FS:0,0>
+        1080 = Idle 1.210 1.000 5.000
+        1080 > ^X
+        1090 < Grbl 1.1h ['$' for help]
+        1090 > ?
+        1100 < <Idle|MPos:1.210,1.000,5.000|FS:0,0>
+        1100 = Idle 1.210 1.000 5.000",
+    );
+}

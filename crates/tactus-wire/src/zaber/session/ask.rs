@@ -19,6 +19,7 @@ pub(super) enum Ask {
     Checksums,
     Version,
     AxisCount,
+    Resolution,
     LimitMin,
     LimitMax,
     Position,
@@ -63,6 +64,7 @@ impl Ask {
             Self::Checksums => "set comm.checksum 1".to_owned(),
             Self::Version => "get version".to_owned(),
             Self::AxisCount => "get system.axiscount".to_owned(),
+            Self::Resolution => "get resolution".to_owned(),
             Self::LimitMin => "get limit.min".to_owned(),
             Self::LimitMax => "get limit.max".to_owned(),
             Self::Position => "get pos".to_owned(),
@@ -90,7 +92,7 @@ impl Ask {
     pub(super) fn read(self, data: &str) -> Option<Answer> {
         match self {
             Self::Version => (!data.is_empty() && data.len() <= 16).then(|| Answer::Text(data.to_owned())),
-            Self::AxisCount | Self::LimitMin | Self::LimitMax | Self::Position => {
+            Self::AxisCount | Self::Resolution | Self::LimitMin | Self::LimitMax | Self::Position => {
                 data.parse().ok().map(Answer::Number)
             }
             Self::Warnings => {

@@ -1,6 +1,7 @@
 //! What is known of one axis.
 
-use crate::zaber::{Axis, AxisName, Flag, Severity};
+use crate::stage::AxisName;
+use crate::zaber::{Axis, Flag, Severity};
 
 /// What is known of one axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,25 +76,5 @@ impl AxisState {
         }
         self.needs_list = !is_complete;
         is_new
-    }
-}
-
-impl AxisName {
-    /// Its part of a place.
-    pub(super) fn of(self, [x, y, z]: [f64; 3]) -> f64 {
-        match self {
-            Self::X => x,
-            Self::Y => y,
-            Self::Z => z,
-        }
-    }
-
-    /// Puts its part into a place.
-    pub(super) fn set(self, [x, y, z]: &mut [f64; 3], mm: f64) {
-        match self {
-            Self::X => *x = mm,
-            Self::Y => *y = mm,
-            Self::Z => *z = mm,
-        }
     }
 }

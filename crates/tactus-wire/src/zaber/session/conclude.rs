@@ -6,10 +6,7 @@ use super::ask::{Ask, Question};
 use super::axis_state::Reference;
 use super::phase::Phase;
 use super::{Action, Failure, Session};
-use crate::zaber::path::length_mm;
-
-/// For how long the stage must say that it stands elsewhere, before that is believed.
-const ELSEWHERE_MIN: Duration = Duration::from_millis(200);
+use crate::stage::{Controller, Judgement};
 
 impl Session {
     /// Every question of a batch or a round has its answer.
@@ -35,7 +32,8 @@ impl Session {
         self.phase = Phase::Ready;
         self.renew_alarm();
         self.homed = self.config.trusts_reference && self.is_referenced() && self.alarm.is_none();
-        self.actions.push(Action::Connected { identity: self.identity.clone() });
+        let (identity, settings) = (self.identity.clone(), self.settings());
+        self.actions.push(Action::Connected(Controller { identity, settings }));
         self.report();
         // Whatever sent it off is gone: perhaps this host, before it was cut off.
         if self.moves() {
@@ -49,19 +47,11 @@ impl Session {
         let moves = self.axes.iter().any(|state| state.busy || state.needs_list);
         let position_mm = self.position_mm();
         let Phase::Moving(travel) = &mut self.phase else { return };
-        if moves {
-            travel.elsewhere = None;
-            return;
-        }
-        let target_mm = travel.target_mm;
-        let result = if length_mm(position_mm, target_mm) <= self.config.tolerance_mm {
-            Ok(position_mm)
-        } else {
-            let since = *travel.elsewhere.get_or_insert(now);
-            if now.saturating_sub(since) < ELSEWHERE_MIN {
-                return;
-            }
-            Err(Failure::NotThere { target_mm, position_mm })
+        let target_mm = travel.arrival.target_mm();
+        let result = match travel.arrival.judge(now, !moves, position_mm, self.config.tolerance_mm) {
+            Judgement::Underway => return,
+            Judgement::Done => Ok(position_mm),
+            Judgement::NotThere => Err(Failure::NotThere { target_mm, position_mm }),
         };
         self.phase = Phase::Ready;
         self.done(result);

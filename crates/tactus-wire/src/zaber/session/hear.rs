@@ -5,7 +5,8 @@ use core::time::Duration;
 use super::ask::{Answer, Ask, Pending, Question};
 use super::axis_state::{AxisState, Reference};
 use super::phase::Phase;
-use super::{Action, Alarm, Failure, Session, SessionError};
+use super::{Action, Failure, Session, SessionError};
+use crate::stage::Alarm;
 use crate::zaber::{Flag, Header, Message, Rejection, Severity};
 
 impl Session {
@@ -75,6 +76,14 @@ impl Session {
         }
         match (ask, answer) {
             (Ask::Position, Answer::Number(number)) => state.position = number,
+            (Ask::Resolution, Answer::Number(found)) => {
+                let needed = state.axis.resolution.map_or(found, i64::from);
+                if found != needed {
+                    let name = state.name;
+                    self.fail(SessionError::Setting { setting: "resolution", name, found, needed });
+                    return false;
+                }
+            }
             (Ask::LimitMin, Answer::Number(number)) => state.limit_min = number,
             (Ask::LimitMax, Answer::Number(number)) => state.limit_max = number,
             (Ask::AxisCount, Answer::Number(axis_count)) if axis_count < i64::from(state.axis.number) => {
@@ -112,6 +121,7 @@ impl Session {
             Ask::Checksums
             | Ask::Version
             | Ask::AxisCount
+            | Ask::Resolution
             | Ask::LimitMin
             | Ask::LimitMax
             | Ask::Position
@@ -170,7 +180,9 @@ impl Session {
         }
         if is_lost && self.homed {
             self.homed = false;
-            self.actions.push(Action::ReferenceLost { name });
+            let why =
+                format!("{name} no longer knows where it is: it was restarted, or pushed while it stood");
+            self.actions.push(Action::Suspect { why });
             if let Phase::Moving(_) = self.phase {
                 self.halt(now, Some(Failure::Unhomed));
                 return false;
@@ -179,7 +191,7 @@ impl Session {
         let is_command = matches!(&self.phase, Phase::Moving(_) | Phase::Homing { .. });
         if is_command && is_ours && is_others {
             let position_mm = self.position_mm();
-            self.halt(now, Some(Failure::Interrupted { name, flag, position_mm }));
+            self.halt(now, Some(Failure::Interrupted { axis: name, meaning: flag.meaning(), position_mm }));
             return false;
         }
         true

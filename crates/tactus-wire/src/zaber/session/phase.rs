@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use super::Failure;
+use crate::stage::Arrival;
 
 /// A stop that a device has not confirmed by then is sent again.
 const STOP_REPLY_TIMEOUT: Duration = Duration::from_millis(250);
@@ -35,14 +36,9 @@ pub(super) enum Phase {
 pub(super) struct Travel {
     pub(super) command: String,
     /// In whole microsteps.
-    pub(super) target_mm: [f64; 3],
-    pub(super) sent: Duration,
-    /// When this is not done by then, something is wrong.
-    pub(super) overdue: Duration,
+    pub(super) arrival: Arrival,
     /// Every axis has confirmed its move.
     pub(super) set_out: bool,
-    /// Since when the stage says that it stands elsewhere.
-    pub(super) elsewhere: Option<Duration>,
 }
 
 /// A stop under way.
@@ -65,7 +61,7 @@ impl Phase {
     /// When something is to be done about it.
     pub(super) fn deadline(&self) -> Option<Duration> {
         match self {
-            Self::Moving(travel) => Some(travel.overdue),
+            Self::Moving(travel) => Some(travel.arrival.overdue()),
             Self::Homing { deadline, .. } => Some(*deadline),
             Self::Stopping(stop) => Some(stop.deadline()),
             Self::Greeting | Self::Ready | Self::Clearing | Self::Over => None,

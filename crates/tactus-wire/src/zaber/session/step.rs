@@ -4,7 +4,8 @@ use core::time::Duration;
 
 use super::ask::{Ask, Pending, Question};
 use super::phase::{Phase, Stop};
-use super::{Action, Alarm, Failure, Report, Session, SessionError, Status, refused};
+use super::{Action, Failure, Session, SessionError};
+use crate::stage::{Alarm, Report, Session as _, Status};
 use crate::zaber::Command;
 
 /// Between rounds of questions while the stage stands.
@@ -84,12 +85,12 @@ impl Session {
     pub(super) fn overdue(&mut self, now: Duration) {
         match self.phase.clone() {
             Phase::Moving(travel) => {
-                let (target_mm, position_mm) = (travel.target_mm, self.position_mm());
-                let waited = now.saturating_sub(travel.sent);
+                let (target_mm, position_mm) = (travel.arrival.target_mm(), self.position_mm());
+                let waited = travel.arrival.waited(now);
                 self.halt(now, Some(Failure::Overdue { target_mm, position_mm, waited }));
             }
             Phase::Homing { .. } => {
-                self.halt(now, Some(refused("home", "the reference was not found in time")));
+                self.halt(now, Some(Failure::refused("home", "the reference was not found in time")));
             }
             Phase::Stopping(stop) => self.stop_overdue(now, &stop),
             Phase::Greeting | Phase::Ready | Phase::Clearing | Phase::Over => {}
@@ -121,7 +122,8 @@ impl Session {
         let Some(pending) = self.pending else { return };
         let Question { slot, ask } = pending.question;
         if ask.moves() {
-            return self.halt(now, Some(refused(&ask.text(), "no answer came; the stage was stopped")));
+            return self
+                .halt(now, Some(Failure::refused(&ask.text(), "no answer came; the stage was stopped")));
         }
         if pending.is_silent(now) {
             let device = self.device_of(slot);
@@ -191,9 +193,12 @@ impl Session {
 
     /// The alarm is what the axes say now.
     pub(super) fn renew_alarm(&mut self) {
-        let mut faults =
-            self.axes.iter().filter_map(|state| Some(Alarm { name: state.name, flag: state.fault? }));
-        self.alarm = faults.next_back();
+        let mut faults = self.axes.iter().filter_map(|state| Some((state.name, state.fault?)));
+        self.alarm = faults.next_back().map(|(name, flag)| Alarm {
+            code: flag.code(),
+            axis: Some(name),
+            meaning: flag.meaning(),
+        });
     }
 
     /// True if an axis says that it moves.

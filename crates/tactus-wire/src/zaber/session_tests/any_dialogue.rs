@@ -5,7 +5,9 @@ use core::time::Duration;
 use proptest::prelude::*;
 
 use super::{Play, config};
-use crate::zaber::{Action, Session, Status};
+use crate::stage::{Session as _, Status};
+use crate::zaber::Session;
+use crate::zaber::session::Action;
 
 #[derive(Debug, Clone)]
 enum Event {

@@ -1,6 +1,7 @@
 //! Finding the devices, and listening to them.
 
 use super::{Play, Status, config};
+use crate::stage::Session as _;
 use crate::zaber::{Axis, ConfigError, Flag, Session};
 
 #[test]
@@ -110,6 +111,24 @@ fn an_axis_that_the_device_lacks() {
     play.start();
     play.run(200);
     assert_eq!(play.count("= failed: device 2 has 1 axes, but the rig uses its axis 4 as z"), 1);
+}
+
+#[test]
+fn microsteps_of_another_length_are_refused_with_both_values() {
+    let mut config = config();
+    config.axes[2] = config.axes[2].map(|axis| Axis { resolution: Some(64), ..axis });
+    let mut play = Play::new(config.clone());
+    play.start();
+    play.run(200);
+    assert_eq!(play.count("= connected"), 1);
+    assert_eq!(play.count("get resolution"), 1, "only the axis whose resolution the rig relies on");
+    play = Play::new(config);
+    play.stage.resolution = 128;
+    play.start();
+    play.run(200);
+    let refusal = "= failed: the controller has resolution = 128 on z, but the rig needs 64";
+    assert_eq!(play.count(refusal), 1, "{}", play.log.join("\n"));
+    assert_eq!(play.count("set "), 0, "nothing is changed");
 }
 
 #[test]

@@ -12,6 +12,8 @@ pub(super) struct Fake {
     ear: CommandDecoder,
     pub(super) axes: Vec<FakeAxis>,
     pub(super) checksums: bool,
+    /// Microsteps a full step.
+    pub(super) resolution: u32,
     /// Replies that will be lost.
     pub(super) lost_replies: usize,
     /// Nothing is heard or said.
@@ -62,6 +64,7 @@ impl Fake {
             ear: CommandDecoder::default(),
             axes: vec![axis(1, 1), axis(1, 2), axis(2, 1)],
             checksums: false,
+            resolution: 64,
             lost_replies: 0,
             is_dead: false,
             glides: false,
@@ -121,6 +124,8 @@ impl Fake {
                 result = Ok("7.38".to_owned());
             } else if command.text == "get system.axiscount" {
                 result = Ok(axis_count.to_string());
+            } else if command.text == "get resolution" {
+                result = Ok(self.resolution.to_string());
             } else {
                 for axis in self.axes.iter_mut().filter(is_meant) {
                     result = axis.obey(&command.text);

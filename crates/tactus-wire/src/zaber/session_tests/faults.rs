@@ -1,9 +1,17 @@
 //! Faults, homing, restarts and silence.
 
 use super::{Config, Failure, Play, Status, config};
-use crate::zaber::{Alarm, AxisName, Flag};
+use crate::stage::{Alarm, AxisName, Session as _};
+use crate::zaber::Flag;
 
-const STALLED_Z: Alarm = Alarm { name: AxisName::Z, flag: Flag::STALLED };
+/// What a flag of an axis is as an alarm.
+fn alarm(axis: AxisName, flag: Flag) -> Alarm {
+    Alarm { code: flag.code(), axis: Some(axis), meaning: flag.meaning() }
+}
+
+fn stalled_z() -> Alarm {
+    alarm(AxisName::Z, Flag::STALLED)
+}
 
 #[test]
 fn z_is_homed_first_and_the_others_together() {
@@ -41,15 +49,15 @@ fn a_stall_stops_all_axes_and_must_be_cleared_and_homed() {
     play.stage.axes[2].stalls_at = Some(4_000.0);
     play.move_to([3.0, 0.0, 16.0], 5.0);
     play.run(2000);
-    assert_eq!(play.result(), Err(Failure::Alarm(STALLED_Z)));
+    assert_eq!(play.result(), Err(Failure::Alarm(stalled_z())));
     assert_eq!(play.commands().iter().filter(|said| *said == "/0 0 stop").count(), 1);
     assert!(play.stage.axes[0].position < 3_200.0);
-    assert_eq!((play.status(), play.report.unwrap().alarm), (Status::Alarm, Some(STALLED_Z)));
+    assert_eq!((play.status(), play.report.unwrap().alarm), (Status::Alarm, Some(stalled_z())));
 
     play.move_to([3.0, 0.0, 20.0], 1.0);
-    assert_eq!(play.result(), Err(Failure::Alarm(STALLED_Z)));
+    assert_eq!(play.result(), Err(Failure::Alarm(stalled_z())));
     play.home();
-    assert_eq!(play.result(), Err(Failure::Alarm(STALLED_Z)));
+    assert_eq!(play.result(), Err(Failure::Alarm(stalled_z())));
 
     play.stage.axes[2].stalls_at = None;
     play.clear();
@@ -77,7 +85,7 @@ fn an_alarm_that_cannot_be_cleared() {
     play.stage.rejects = Some(("warnings clear", "BADCOMMAND"));
     play.clear();
     play.run(100);
-    assert_eq!(play.result(), Err(Failure::Alarm(Alarm { name: AxisName::X, flag: hot })));
+    assert_eq!(play.result(), Err(Failure::Alarm(alarm(AxisName::X, hot))));
     assert_eq!(play.commands()[..3], ["/1 1 warnings clear", "/1 1 driver enable", "/1 1 warnings"]);
 }
 
@@ -100,7 +108,7 @@ fn an_alert_of_a_stall_stops_the_stage_at_once() {
     assert!(stops, "{actions:?}");
     play.act(actions);
     play.run(500);
-    assert_eq!(play.result(), Err(Failure::Alarm(STALLED_Z)));
+    assert_eq!(play.result(), Err(Failure::Alarm(stalled_z())));
 }
 
 #[test]
@@ -113,7 +121,7 @@ fn homing_may_fail() {
     play.run(200);
     play.home();
     play.run(5000);
-    assert_eq!(play.result(), Err(Failure::Alarm(Alarm { name: AxisName::Z, flag: limit })));
+    assert_eq!(play.result(), Err(Failure::Alarm(alarm(AxisName::Z, limit))));
     assert_eq!(play.commands().iter().filter(|said| said.ends_with("home")).count(), 1);
     assert_eq!(play.status(), Status::Alarm);
 
@@ -151,7 +159,7 @@ fn a_restart_in_motion_leaves_the_position_suspect() {
     play.stage.is_dead = false;
     play.stage.reboot(play.now, 2);
     play.run(500);
-    assert_eq!(play.count("= reference lost of z"), 1);
+    assert_eq!(play.count("= suspect: z no longer knows where it is"), 1);
     assert_eq!(play.result(), Err(Failure::Unhomed));
     assert_eq!(play.status(), Status::Unhomed);
     assert!(!play.stage.axes[0].is_busy(), "x was stopped");
@@ -164,7 +172,7 @@ fn a_restart_at_a_stand_does_too() {
     let mut play = Play::homed();
     play.stage.reboot(play.now, 1);
     play.run(200);
-    assert_eq!(play.count("= reference lost of x"), 1);
+    assert_eq!(play.count("= suspect: x no longer knows where it is"), 1);
     assert_eq!(play.status(), Status::Unhomed);
 }
 
@@ -175,7 +183,7 @@ fn a_lost_reference_that_hides_behind_another_warning_is_found_in_motion() {
     play.run(500);
     play.stage.axes[2].warnings = vec![Flag::parse("WV").unwrap(), Flag::NO_REFERENCE];
     play.run(60);
-    assert_eq!(play.count("= reference lost of z"), 1);
+    assert_eq!(play.count("= suspect: z no longer knows where it is"), 1);
     assert_eq!(play.result(), Err(Failure::Unhomed));
 }
 

@@ -1,7 +1,8 @@
 //! When a move is done, and when it is not.
 
 use super::{Config, Failure, Play, Status, config};
-use crate::zaber::{AxisName, Flag};
+use crate::stage::{AxisName, Session as _};
+use crate::zaber::Flag;
 
 #[test]
 fn the_axes_are_set_to_their_parts_of_the_speed_and_arrive_together() {
@@ -164,8 +165,8 @@ fn a_move_that_someone_else_ends_is_told() {
     play.run(500);
     play.stage.axes[0].warnings.push(Flag::INTERRUPTED);
     play.run(500);
-    let Err(Failure::Interrupted { name, flag, .. }) = play.result() else { panic!() };
-    assert_eq!((name, flag), (AxisName::X, Flag::INTERRUPTED));
+    let Err(Failure::Interrupted { axis, meaning, .. }) = play.result() else { panic!() };
+    assert_eq!((axis, meaning), (AxisName::X, Flag::INTERRUPTED.meaning()));
     assert_eq!(play.status(), Status::Idle);
 }
 

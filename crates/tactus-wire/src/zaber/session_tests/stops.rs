@@ -1,6 +1,7 @@
 //! Stops.
 
 use super::{Failure, Play, Status};
+use crate::stage::Session as _;
 use crate::zaber::Command;
 
 #[test]

@@ -1,6 +1,15 @@
-//! The controller's states, what time does to them, and its real-time commands.
+//! A controller that speaks `grbl`: its states, what time does to them, and its real-time commands.
+//!
+//! It does what Grbl 1.1 was seen to do, within what a stage needs: straight moves, jogs, hold and
+//! resume, reset, homing, limits, alarms, settings. Each move begins and ends at rest. Machine and work
+//! coordinates are one; how they lie in the robot's frame is what the rig says. `$I` and a message behind the banner say
+//! that it is simulated.
 
+mod gcode;
+mod input;
 mod lines;
+mod report;
+mod settings;
 
 use std::time::Duration;
 
@@ -8,15 +17,17 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use tokio::time::Instant;
 
-use super::gcode::{GrblError, MotionMode};
-use super::input::{Input, RealTime};
-use super::report::{self, Status};
-use super::settings::Settings;
+use super::Controller;
 use crate::faults::ControllerFault;
 use crate::motion::Point;
 use crate::outbox::Outbox;
 use crate::truth::Draw;
 use crate::world::Shared;
+use gcode::{GrblError, MotionMode};
+use input::{Input, RealTime};
+use report::Status;
+use settings::Settings;
+use tactus_wire::grbl::Config;
 
 /// A status report leaves this long after it was asked for.
 const REPORT_LATENCY_MS: std::ops::RangeInclusive<u64> = 2..=5;
@@ -35,8 +46,10 @@ const ALARM_HOMING_FAILED: u8 = 9;
 
 /// The controller.
 #[derive(Debug)]
-pub(super) struct Controller {
+pub(super) struct GrblController {
     world: Shared,
+    /// How its coordinates lie in the robot's frame.
+    frame: Config,
     settings: Settings,
     mode: Mode,
     modal: Modal,
@@ -89,29 +102,8 @@ struct Defects {
     homing_fails: bool,
 }
 
-impl Controller {
-    pub(super) fn new(world: Shared, now: Instant) -> Self {
-        let truth = world.lock().truth().clone();
-        let mut controller = Self {
-            world,
-            settings: Settings::of(&truth.stage),
-            mode: Mode::Ready,
-            modal: Modal::default(),
-            input: Input::default(),
-            outbox: Outbox::default(),
-            report_due: None,
-            reports: 0,
-            busy_until: None,
-            limit_at: None,
-            rng: Draw::StageController.rng(truth.seed),
-            defects: Defects::default(),
-        };
-        controller.power_up(now);
-        controller
-    }
-
-    /// Takes bytes from the host.
-    pub(super) fn receive(&mut self, bytes: &[u8], now: Instant) {
+impl Controller for GrblController {
+    fn receive(&mut self, bytes: &[u8], now: Instant) {
         self.wake(now);
         for byte in bytes {
             if let Some(command) = self.input.push(*byte) {
@@ -121,8 +113,7 @@ impl Controller {
         }
     }
 
-    /// Does what is due.
-    pub(super) fn wake(&mut self, now: Instant) {
+    fn wake(&mut self, now: Instant) {
         self.only_move(now);
         if self.report_due.is_some_and(|due| due <= now) {
             self.report_due = None;
@@ -135,8 +126,7 @@ impl Controller {
         self.take_lines(now);
     }
 
-    /// Lets motion go on to `now`, and what follows from it.
-    pub(super) fn only_move(&mut self, now: Instant) {
+    fn only_move(&mut self, now: Instant) {
         if let Some(at) = self.limit_at.filter(|at| *at <= now) {
             self.alarm(ALARM_HARD_LIMIT, at);
         }
@@ -163,7 +153,7 @@ impl Controller {
         }
     }
 
-    pub(super) fn next_wake(&self) -> Option<Instant> {
+    fn next_wake(&self) -> Option<Instant> {
         let gives_up_at = if let Mode::Homing { gives_up_at } = self.mode { gives_up_at } else { None };
         let move_ends = self.world.lock().motion.next_end();
         [self.outbox.next_due(), self.report_due, self.busy_until, self.limit_at, gives_up_at, move_ends]
@@ -172,16 +162,15 @@ impl Controller {
             .min()
     }
 
-    pub(super) fn limit_at(&self) -> Option<Instant> {
+    fn limit_at(&self) -> Option<Instant> {
         self.limit_at
     }
 
-    pub(super) fn output(&mut self, now: Instant) -> Vec<u8> {
+    fn output(&mut self, now: Instant) -> Vec<u8> {
         self.outbox.take_due(now)
     }
 
-    /// Takes on a defect.
-    pub(super) fn fault(&mut self, fault: ControllerFault, now: Instant) {
+    fn fault(&mut self, fault: ControllerFault, now: Instant) {
         self.only_move(now);
         match fault {
             ControllerFault::Alarm(code) => self.alarm(code, now),
@@ -198,14 +187,37 @@ impl Controller {
         }
     }
 
-    /// Loses its defects.
-    pub(super) fn mend(&mut self) {
+    fn mend(&mut self) {
         self.defects = Defects::default();
+    }
+}
+
+impl GrblController {
+    pub(super) fn new(world: Shared, frame: Config, now: Instant) -> Self {
+        let truth = world.lock().truth().clone();
+        let mut controller = Self {
+            world,
+            frame,
+            settings: Settings::of(&truth.stage, &frame),
+            mode: Mode::Ready,
+            modal: Modal::default(),
+            input: Input::default(),
+            outbox: Outbox::default(),
+            report_due: None,
+            reports: 0,
+            busy_until: None,
+            limit_at: None,
+            rng: Draw::StageController.rng(truth.seed),
+            defects: Defects::default(),
+        };
+        controller.power_up(now);
+        controller
     }
 
     /// As after a power failure: the controller believes to be at 0.
     fn power_up(&mut self, now: Instant) {
-        self.world.lock().motion.believe([0.0; 3]);
+        let believed_mm = self.frame.to_stage([0.0; 3]);
+        self.world.lock().motion.believe(believed_mm);
         self.mode = if self.settings.has_homing() { Mode::Alarm { is_critical: false } } else { Mode::Ready };
         if self.rng.random() {
             // As seen on the real firmware, now and then: the stored settings could not be read.
@@ -329,7 +341,7 @@ impl Controller {
                 Mode::Homing { .. } => "Home",
                 Mode::Alarm { .. } => "Alarm",
             },
-            position_mm: [x, y, z + self.defects.lie_z_mm],
+            position_mm: self.frame.to_machine([x, y, z + self.defects.lie_z_mm]),
             is_machine_position: self.settings.reports_machine_position(),
             buffers: self
                 .settings
@@ -343,3 +355,7 @@ impl Controller {
         self.outbox.push(now, status.line());
     }
 }
+
+#[cfg(test)]
+#[path = "grbl_tests.rs"]
+mod tests;

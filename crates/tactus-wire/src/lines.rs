@@ -1,6 +1,6 @@
-//! Lines out of a stream of bytes.
+//! Lines out of a stream of bytes, for the protocols that speak in them.
 
-/// Longest line that is believed; Grbl's own are under 100 bytes.
+/// Longest line that is believed; controllers' own are under 100 bytes.
 const MAX_LINE_BYTES: usize = 256;
 
 /// Cuts a stream into lines, whatever way it arrives. A line ends at CR or LF; empty ones are passed over,

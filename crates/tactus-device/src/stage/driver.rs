@@ -1,15 +1,15 @@
-//! The task that owns the stage.
+//! The task that owns the stage, whatever protocol its controller speaks.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use tactus_schema::{Stamp, pb};
-use tactus_wire::grbl::{Action, Config, Failure, Report, Session, SessionError, Status, alarm_meaning};
+use tactus_wire::stage::{Action, Cause, Failure, Report, Session, Status};
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::sleep;
 
-use super::GrblOptions;
+use super::driven::{Connection, StageOptions};
 use super::stop::StopSwitch;
 use crate::backoff::Backoff;
 use crate::link::{Link, LinkEvent, since_start};
@@ -36,14 +36,17 @@ pub(super) enum Command {
 }
 
 /// Owns the stage: what it says goes to `reports` and `latest`, what it is to do comes by `requests` and `stop`.
-pub(super) struct Driver {
+pub(super) struct Driver<S> {
     pub(super) connect: Arc<dyn Connect>,
-    pub(super) options: GrblOptions,
+    /// Makes the session of a connection, or says why the rig has none.
+    pub(super) begin: Box<dyn Fn() -> Result<S, String> + Send + Sync>,
+    pub(super) options: StageOptions,
     pub(super) clock: Clock,
     pub(super) requests: mpsc::Receiver<Request>,
     pub(super) stop: Arc<StopSwitch>,
     pub(super) reports: mpsc::Sender<pb::StageState>,
     pub(super) latest: watch::Sender<pb::StageState>,
+    pub(super) connection: watch::Sender<Connection>,
     pub(super) progress: Progress,
 }
 
@@ -62,7 +65,10 @@ pub(super) struct Progress {
 /// Nobody holds the stage any more: the task is to end.
 struct Unused;
 
-impl Driver {
+impl<S: Session + Send> Driver<S>
+where
+    S::Error: Send + Sync,
+{
     pub(super) async fn run(mut self) {
         let mut backoff = Backoff::new();
         loop {
@@ -102,7 +108,10 @@ impl Driver {
 
     /// Talks over an open link until it fails; gives why.
     async fn converse(&mut self, mut link: Link, backoff: &mut Backoff) -> Result<DeviceError, Unused> {
-        let mut session = Session::new(Config { tolerance_mm: self.options.tolerance_mm });
+        let mut session = match (self.begin)() {
+            Ok(session) => session,
+            Err(why) => return Ok(DeviceError::new(self.device(), ErrorKind::Protocol, why)),
+        };
         let mut now = self.clock.now();
         let mut actions = session.start(since_start(now));
         loop {
@@ -145,7 +154,7 @@ impl Driver {
     }
 
     /// Begins a command, or answers why not.
-    fn begin(&mut self, now: Stamp, request: Request, session: &mut Session) -> Vec<Action> {
+    fn begin(&mut self, now: Stamp, request: Request, session: &mut S) -> Vec<Action<S::Error>> {
         let Request { command, stops_before, reply } = request;
         let refusal = if !self.progress.connected {
             self.not_connected()
@@ -170,33 +179,34 @@ impl Driver {
     async fn carry_out(
         &mut self,
         now: Stamp,
-        actions: Vec<Action>,
+        actions: Vec<Action<S::Error>>,
         link: &mut Link,
         backoff: &mut Backoff,
     ) -> Result<(), DeviceError> {
         for action in actions {
             match action {
                 Action::Send(bytes) => link.send(&bytes).await?,
-                Action::Connected { banner } => {
-                    tracing::info!(device = self.device(), banner, "stage connected");
+                Action::Connected(controller) => {
+                    tracing::info!(
+                        device = self.device(),
+                        controller = controller.identity,
+                        "stage connected"
+                    );
                     backoff.reset();
                     self.progress.logged = None;
                     self.progress.connected = true;
+                    self.connection.send_replace(Connection::Connected(controller));
                 }
                 Action::Report(report) => self.report(now, report),
-                Action::Reset { banner } => {
-                    tracing::warn!(
-                        device = self.device(),
-                        banner,
-                        "the stage was reset: its position is suspect"
-                    );
+                Action::Suspect { why } => {
+                    tracing::warn!(device = self.device(), why, "the stage's position is suspect");
                 }
                 Action::Done(result) => {
                     if let Some(reply) = self.progress.in_hand.take() {
                         answer(reply, result.map_err(stage_error));
                     }
                 }
-                Action::Failed(error) => return Err(self.describe(error)),
+                Action::Failed(error) => return Err(self.describe(&error)),
             }
         }
         Ok(())
@@ -211,7 +221,7 @@ impl Driver {
             Status::Homing => pb::StageStatus::Homing,
             Status::Alarm => pb::StageStatus::Alarm,
         };
-        self.publish(now, report.position_mm, status, report.alarm.map(u32::from));
+        self.publish(now, report.position_mm, status, report.alarm.map(|alarm| alarm.code.into()));
     }
 
     fn publish(
@@ -265,8 +275,9 @@ impl Driver {
         }
         self.progress.connected = false;
         if let Some(reply) = self.progress.in_hand.take() {
-            answer(reply, Err(error.into()));
+            answer(reply, Err(DeviceError::new(&error.device, error.kind, &error.what).into()));
         }
+        self.connection.send_replace(Connection::Seeking(Some(Arc::new(error))));
         if self.latest.borrow().status() != pb::StageStatus::Disconnected {
             self.publish(self.clock.now(), self.position_mm(), pb::StageStatus::Disconnected, None);
         }
@@ -281,17 +292,27 @@ impl Driver {
         format!("stage on {}", self.connect)
     }
 
+    /// That there is no stage, and what is known of why.
     fn not_connected(&self) -> StageError {
-        DeviceError::new(
-            self.device(),
-            ErrorKind::Disconnected,
-            "it is not connected; it is being looked for",
-        )
-        .into()
+        let what = "it is not connected; it is being looked for";
+        let error = match &*self.connection.borrow() {
+            Connection::Seeking(Some(why)) => {
+                DeviceError::new(self.device(), why.kind, format!("{what}: {}", why.what))
+            }
+            Connection::Seeking(None) | Connection::Connected(_) => {
+                DeviceError::new(self.device(), ErrorKind::Disconnected, what)
+            }
+        };
+        error.into()
     }
 
-    fn describe(&self, error: SessionError) -> DeviceError {
-        DeviceError::new(self.device(), ErrorKind::Timeout, error.to_string())
+    fn describe(&self, error: &S::Error) -> DeviceError {
+        let kind = match S::cause(error) {
+            Cause::Silent => ErrorKind::Timeout,
+            Cause::Protocol => ErrorKind::Protocol,
+            Cause::Mismatch => ErrorKind::DeviceFault,
+        };
+        DeviceError::new(self.device(), kind, error.to_string())
     }
 }
 
@@ -299,10 +320,15 @@ fn stage_error(failure: Failure) -> StageError {
     match failure {
         Failure::Stopped { position_mm } => StageError::Stopped { position_mm },
         Failure::Refused { command, reason } => StageError::Refused { command, reason },
-        Failure::Alarm { code } => {
-            StageError::Alarm { code: code.into(), meaning: alarm_meaning(code).to_owned() }
-        }
+        Failure::Alarm(alarm) => StageError::Alarm {
+            code: alarm.code.into(),
+            name: alarm.name(),
+            meaning: alarm.meaning.to_owned(),
+        },
         Failure::Unhomed => StageError::Unhomed,
+        Failure::Interrupted { axis, meaning, position_mm } => {
+            StageError::Interrupted { axis: axis.to_string(), meaning: meaning.to_owned(), position_mm }
+        }
         Failure::NotThere { target_mm, position_mm } => StageError::NotThere { target_mm, position_mm },
         Failure::Overdue { target_mm, position_mm, waited } => {
             StageError::Overdue { target_mm, position_mm, waited_s: waited.as_secs_f64() }

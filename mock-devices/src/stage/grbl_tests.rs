@@ -1,8 +1,8 @@
 use std::time::Duration;
 
-use super::*;
 use crate::bench::{Bench, sim_rig};
-use crate::faults::ControllerFault;
+use crate::faults::{ControllerFault, StageFault};
+use crate::stage::{GARBAGE_BYTES, VirtualStage};
 
 fn switched_on() -> Bench<VirtualStage> {
     Bench::new(&sim_rig(), 1, VirtualStage::new)

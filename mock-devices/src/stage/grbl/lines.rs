@@ -5,11 +5,11 @@ use std::time::Duration;
 use rand::RngExt;
 use tokio::time::Instant;
 
-use super::super::gcode::{Block, GrblError, MotionMode};
-use super::super::input::Line;
-use super::super::report;
-use super::{Controller, Modal, Mode};
+use super::gcode::{Block, GrblError, MotionMode};
+use super::input::Line;
+use super::{GrblController, Modal, Mode, report};
 use crate::motion::Point;
+use crate::stage::Controller as _;
 
 /// Writing a setting takes this long, in which nothing else is done.
 const SETTING_WRITE_MS: std::ops::RangeInclusive<u64> = 100..=220;
@@ -27,7 +27,7 @@ enum Reply {
     None,
 }
 
-impl Controller {
+impl GrblController {
     /// Takes the lines that wait, as far as it may.
     pub(super) fn take_lines(&mut self, now: Instant) {
         while self.input.has_line() && self.takes_a_line() {
@@ -160,12 +160,12 @@ impl Controller {
     }
 
     fn target(&self, block: &Block, relative: bool) -> Point {
-        let from_mm = self.world.lock().motion.destination_mm();
-        std::array::from_fn(|axis| match block.axes_mm[axis] {
+        let from_mm = self.frame.to_machine(self.world.lock().motion.destination_mm());
+        self.frame.to_stage(std::array::from_fn(|axis| match block.axes_mm[axis] {
             Some(way_mm) if relative => from_mm[axis] + way_mm,
             Some(place_mm) => place_mm,
             None => from_mm[axis],
-        })
+        }))
     }
 
     fn is_within_travel(&self, target_mm: Point) -> bool {

@@ -1,34 +1,38 @@
 #![expect(clippy::float_cmp, reason = "the controller prints positions with three decimals")]
 
-#[path = "grbl_tests/fake.rs"]
+#[path = "driven_tests/grbl.rs"]
 mod fake;
+#[path = "driven_tests/zaber.rs"]
+mod zaber;
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use fake::{Fault, Shared};
 use tactus_schema::pb::{StageState, StageStatus};
+use tactus_schema::rig::{GrblAxes, StageProtocol};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep};
 
-use super::{GrblOptions, GrblStage, REPORTS_MAX};
+use super::{Connection, DrivenStage, REPORTS_MAX, StageOptions};
 use crate::transport::memory::{MemoryPort, pair};
 use crate::{Clock, ErrorKind, Stage, StageError, Target};
 
-const OPTIONS: GrblOptions = GrblOptions { tolerance_mm: 0.005, simulated: true };
+const OPTIONS: StageOptions = StageOptions { tolerance_mm: 0.005, simulated: true };
 
 fn to(x_mm: f64, speed_mm_per_s: f64) -> Target {
     Target { position_mm: [x_mm, 1.0, 5.0], speed_mm_per_s }
 }
 
-fn start() -> (Arc<dyn Stage>, mpsc::Receiver<StageState>, MemoryPort) {
+fn start() -> (Arc<DrivenStage>, mpsc::Receiver<StageState>, MemoryPort) {
     let (connector, port) = pair("stage");
-    let (stage, reports) = GrblStage::start(Box::new(connector), OPTIONS, Clock::paused());
+    let protocol = StageProtocol::Grbl(GrblAxes::default());
+    let (stage, reports) = DrivenStage::start(Box::new(connector), &protocol, OPTIONS, Clock::paused());
     (stage, reports, port)
 }
 
 /// A stage that stands homed at (1, 1, 5), its controller, and a task that takes every report.
-async fn homed() -> (Arc<dyn Stage>, Shared) {
+async fn homed() -> (Arc<DrivenStage>, Shared) {
     let (stage, reports, port) = start();
     let shared = Shared::new();
     tokio::spawn(fake::run(port, shared.clone()));
@@ -47,13 +51,13 @@ async fn drain(mut reports: mpsc::Receiver<StageState>) {
     }
 }
 
-async fn until(stage: &Arc<dyn Stage>, status: StageStatus) {
+async fn until(stage: &Arc<DrivenStage>, status: StageStatus) {
     stage.state().wait_for(|state| state.status() == status).await.unwrap();
 }
 
 /// Begins a move, and lets it get under way for a time.
 async fn begin(
-    stage: &Arc<dyn Stage>,
+    stage: &Arc<DrivenStage>,
     target: Target,
     under_way: Duration,
 ) -> tokio::task::JoinHandle<Result<[f64; 3], StageError>> {
@@ -152,7 +156,7 @@ async fn an_alarm_is_told_and_cleared() {
     let (stage, shared) = homed().await;
     shared.set(Fault::HardLimit);
     let result = stage.move_to(to(11.0, 10.0)).await;
-    let Err(StageError::Alarm { code: 1, meaning }) = result else { panic!("{result:?}") };
+    let Err(StageError::Alarm { code: 1, meaning, .. }) = result else { panic!("{result:?}") };
     assert_eq!(meaning, "a hard limit switch was hit");
     let state = *stage.state().borrow();
     assert_eq!((state.status(), state.alarm), (StageStatus::Alarm, Some(1)));
@@ -252,4 +256,50 @@ async fn two_runs_are_alike() {
     }
     assert!(runs[0].len() > 30);
     assert_eq!(runs[0], runs[1]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_answers_is_told() {
+    let (stage, _shared) = homed().await;
+    let Connection::Connected(controller) = stage.connection().borrow().clone() else { panic!() };
+    assert_eq!(controller.identity, "Grbl 1.1h ['$' for help], VER:1.1h.20190830");
+    let settings: Vec<_> =
+        controller.settings.iter().map(|one| format!("{}={}", one.name, one.value)).collect();
+    assert_eq!(settings, ["$20=1", "$22=1", "$100=250.000"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_controller_that_is_not_the_rigs_is_refused_and_not_moved() {
+    let (connector, port) = pair("stage");
+    let mut axes = GrblAxes::default();
+    axes.axes[0].steps_per_mm = Some(80.0);
+    let protocol = StageProtocol::Grbl(axes);
+    let (stage, reports) = DrivenStage::start(Box::new(connector), &protocol, OPTIONS, Clock::paused());
+    tokio::spawn(drain(reports));
+    let shared = Shared::new();
+    tokio::spawn(fake::run(port, shared.clone()));
+    let mut connection = stage.connection();
+    let refused = connection.wait_for(|now| matches!(now, Connection::Seeking(Some(_)))).await;
+    assert!(refused.is_ok());
+    drop(refused);
+    let Err(StageError::Device(error)) = stage.home().await else { panic!() };
+    assert_eq!(error.kind, ErrorKind::DeviceFault);
+    let both = ["$100 = 250.000", "80 steps/mm", "not connected", "stage on memory:stage"];
+    assert!(both.iter().all(|part| error.to_string().contains(part)), "{error}");
+    assert_eq!(stage.state().borrow().status(), StageStatus::Disconnected);
+    assert_eq!(shared.count("$H") + shared.count("G") + shared.count("$100"), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_rig_that_makes_no_stage_is_told() {
+    let (connector, _port) = pair("stage");
+    let mut axes = GrblAxes::default();
+    axes.axes[0].machine_axis = axes.axes[1].machine_axis;
+    let protocol = StageProtocol::Grbl(axes);
+    let (stage, _reports) = DrivenStage::start(Box::new(connector), &protocol, OPTIONS, Clock::paused());
+    let mut connection = stage.connection();
+    let why = connection.wait_for(|now| matches!(now, Connection::Seeking(Some(_)))).await.unwrap().clone();
+    let Connection::Seeking(Some(error)) = why else { panic!() };
+    assert_eq!(error.kind, ErrorKind::Protocol);
+    assert!(error.what.contains("x and y are the same axis"), "{error}");
 }

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use tactus_schema::rig::SimulatedStage;
+use tactus_wire::grbl::Config;
+use tactus_wire::stage::AxisName;
 
 use super::gcode::GrblError;
 
@@ -23,10 +25,16 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    /// As delivered with a stage.
-    pub(super) fn of(stage: &SimulatedStage) -> Self {
+    /// As delivered with a stage whose axes lie so. Where the rig says how many steps a mm has, it has them.
+    pub(super) fn of(stage: &SimulatedStage, frame: &Config) -> Self {
         let rate_mm_per_min = stage.speed_max_mm_per_s * 60.0;
-        let length_mm = stage.travel_mm.map(|[least, greatest]| greatest - least);
+        let (mut steps_per_mm, mut length_mm) = ([0.0; 3], [0.0; 3]);
+        for (name, axis) in AxisName::ALL.into_iter().zip(frame.axes) {
+            let [least, greatest] = name.of(stage.travel_mm);
+            let step_mm = name.of([stage.lateral_step_mm, stage.lateral_step_mm, stage.vertical_step_mm]);
+            axis.machine.set(&mut length_mm, greatest - least);
+            axis.machine.set(&mut steps_per_mm, axis.steps_per_mm.unwrap_or(1.0 / step_mm));
+        }
         let values = [
             (REPORT_MASK, 3.0),
             (SOFT_LIMITS, 1.0),
@@ -37,9 +45,9 @@ impl Settings {
             (24, 60.0),
             (HOMING_SEEK, rate_mm_per_min.min(1500.0)),
             (HOMING_PULL_OFF, 1.0),
-            (100, 1.0 / stage.lateral_step_mm),
-            (101, 1.0 / stage.lateral_step_mm),
-            (102, 1.0 / stage.vertical_step_mm),
+            (100, steps_per_mm[0]),
+            (101, steps_per_mm[1]),
+            (102, steps_per_mm[2]),
             (110, rate_mm_per_min),
             (111, rate_mm_per_min),
             (112, rate_mm_per_min),

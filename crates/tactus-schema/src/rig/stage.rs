@@ -1,0 +1,294 @@
+//! The stage's link: how it speaks, over what, and how its axes lie in the robot's frame.
+
+use serde::Deserialize;
+
+use super::Transport;
+use super::transport::RawTransport;
+use crate::description::{WrongField, finite, positive, wrong};
+
+/// The stage's link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageLink {
+    /// How it speaks.
+    pub protocol: StageProtocol,
+    /// Over what.
+    pub transport: Transport,
+}
+
+/// Protocols of stages (devices.md), and what each has to know of the axes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StageProtocol {
+    /// `grbl`: Grbl 1.1 and grblHAL.
+    Grbl(GrblAxes),
+    /// `zaber-ascii`: Zaber's ASCII protocol.
+    Zaber(ZaberAxes),
+}
+
+/// The axes of a Grbl controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GrblAxes {
+    /// x, y and z of the robot's frame; no axis of the controller twice.
+    pub axes: [GrblAxis; 3],
+    /// The controller must have its soft limits on.
+    pub soft_limits: bool,
+}
+
+/// An axis of the robot's frame, as a Grbl controller has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GrblAxis {
+    /// The controller's axis.
+    pub machine_axis: MachineAxis,
+    /// False if the controller counts the other way.
+    pub is_forward: bool,
+    /// The controller's coordinate that is 0 in the robot's frame.
+    pub origin_mm: f64,
+    /// What the controller must have as its steps per mm, if the rig file says so.
+    pub steps_per_mm: Option<f64>,
+}
+
+/// An axis of a controller that has three.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MachineAxis {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third.
+    Z,
+}
+
+/// The axes of Zaber devices on one port.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZaberAxes {
+    /// x, y and z of the robot's frame; x and y may be missing, and stand at 0 then. No axis of a device twice.
+    pub axes: [Option<ZaberAxis>; 3],
+    /// Acceleration along the path; `None` leaves the axes' own.
+    pub accel_mm_per_s2: Option<f64>,
+    /// Speed of each axis while it is homed; `None` leaves that of the last move.
+    pub homing_speed_mm_per_s: Option<f64>,
+    /// Both sides send checksums: the devices' setting `comm.checksum` is switched on.
+    pub checksums: bool,
+    /// A stage that says that it has its reference counts as homed when it is connected.
+    pub trusts_reference: bool,
+}
+
+/// An axis of the robot's frame, as a Zaber device has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZaberAxis {
+    /// Address of the device, 1 to 99.
+    pub device: u8,
+    /// Number of the axis in the device, 1 to 9.
+    pub axis: u8,
+    /// Length of a microstep.
+    pub um_per_microstep: f64,
+    /// False if the device counts the other way.
+    pub is_forward: bool,
+    /// The device's position that is 0 in the robot's frame.
+    pub origin_microsteps: i32,
+    /// What the device must have as its `resolution`, microsteps a full step, if the rig file says so.
+    pub resolution: Option<u32>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(tag = "protocol", rename_all = "kebab-case", deny_unknown_fields)]
+pub(super) enum RawStageLink {
+    Grbl {
+        transport: RawTransport,
+        #[serde(default)]
+        axes: RawAxes<RawGrblAxis>,
+        soft_limits: Option<bool>,
+    },
+    ZaberAscii {
+        transport: RawTransport,
+        axes: RawAxes<RawZaberAxis>,
+        accel_mm_per_s2: Option<f64>,
+        homing_speed_mm_per_s: Option<f64>,
+        #[serde(default)]
+        checksums: bool,
+        #[serde(default)]
+        trusts_reference: bool,
+    },
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawAxes<A> {
+    x: Option<A>,
+    y: Option<A>,
+    z: Option<A>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawGrblAxis {
+    machine_axis: Option<MachineAxis>,
+    direction: Option<i64>,
+    origin_mm: Option<f64>,
+    steps_per_mm: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawZaberAxis {
+    device: i64,
+    axis: i64,
+    um_per_microstep: f64,
+    direction: Option<i64>,
+    origin_microsteps: Option<i32>,
+    resolution: Option<i64>,
+}
+
+/// Names of the axes of the robot's frame.
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
+impl StageProtocol {
+    /// Its name in the rig file.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Grbl(_) => "grbl",
+            Self::Zaber(_) => "zaber-ascii",
+        }
+    }
+}
+
+impl Default for GrblAxes {
+    /// A controller whose axes lie as the robot's, with soft limits.
+    fn default() -> Self {
+        let axes = [MachineAxis::X, MachineAxis::Y, MachineAxis::Z].map(|machine_axis| GrblAxis {
+            machine_axis,
+            is_forward: true,
+            origin_mm: 0.0,
+            steps_per_mm: None,
+        });
+        Self { axes, soft_limits: true }
+    }
+}
+
+impl RawStageLink {
+    pub(super) fn check(self) -> Result<StageLink, WrongField> {
+        let (protocol, transport) = match self {
+            Self::Grbl { transport, axes, soft_limits } => {
+                let soft_limits = soft_limits.unwrap_or(true);
+                (StageProtocol::Grbl(GrblAxes { axes: axes.check()?, soft_limits }), transport)
+            }
+            Self::ZaberAscii {
+                transport,
+                axes,
+                accel_mm_per_s2,
+                homing_speed_mm_per_s,
+                checksums,
+                trusts_reference,
+            } => {
+                let more_than_0 = |name: &str, value: Option<f64>| {
+                    value.map(|value| positive(format!("stage.{name}"), value)).transpose()
+                };
+                let zaber = ZaberAxes {
+                    axes: axes.check()?,
+                    accel_mm_per_s2: more_than_0("accel_mm_per_s2", accel_mm_per_s2)?,
+                    homing_speed_mm_per_s: more_than_0("homing_speed_mm_per_s", homing_speed_mm_per_s)?,
+                    checksums,
+                    trusts_reference,
+                };
+                (StageProtocol::Zaber(zaber), transport)
+            }
+        };
+        Ok(StageLink { protocol, transport: transport.check("stage.transport")? })
+    }
+}
+
+impl<A> Default for RawAxes<A> {
+    fn default() -> Self {
+        Self { x: None, y: None, z: None }
+    }
+}
+
+impl RawAxes<RawGrblAxis> {
+    fn check(self) -> Result<[GrblAxis; 3], WrongField> {
+        let plain = GrblAxes::default().axes;
+        let mut axes = plain;
+        for (at, raw) in [self.x, self.y, self.z].into_iter().enumerate() {
+            let field = |name: &str| format!("stage.axes.{}.{name}", NAMES[at]);
+            let raw = raw.unwrap_or_default();
+            axes[at] = GrblAxis {
+                machine_axis: raw.machine_axis.unwrap_or(plain[at].machine_axis),
+                is_forward: is_forward(field("direction"), raw.direction)?,
+                origin_mm: finite(field("origin_mm"), raw.origin_mm.unwrap_or(0.0))?,
+                steps_per_mm: match raw.steps_per_mm {
+                    Some(steps_per_mm) => Some(positive(field("steps_per_mm"), steps_per_mm)?),
+                    None => None,
+                },
+            };
+        }
+        if let Some([first, second]) = twins(|at| Some(axes[at].machine_axis)) {
+            let problem = format!(
+                "serves {first} already; if axes are exchanged, say `machine_axis` of each that is concerned"
+            );
+            return Err(wrong(format!("stage.axes.{second}.machine_axis"), problem));
+        }
+        Ok(axes)
+    }
+}
+
+impl RawAxes<RawZaberAxis> {
+    fn check(self) -> Result<[Option<ZaberAxis>; 3], WrongField> {
+        let mut axes = [None; 3];
+        for (at, raw) in [self.x, self.y, self.z].into_iter().enumerate() {
+            axes[at] = raw.map(|raw| raw.check(NAMES[at])).transpose()?;
+        }
+        if axes[2].is_none() {
+            return Err(wrong("stage.axes.z", "missing; it is the axis that presses"));
+        }
+        if let Some([first, second]) = twins(|at| axes[at].map(|axis| (axis.device, axis.axis))) {
+            let problem = format!("the same axis of the same device as {first}");
+            return Err(wrong(format!("stage.axes.{second}.axis"), problem));
+        }
+        Ok(axes)
+    }
+}
+
+impl RawZaberAxis {
+    fn check(self, axis: &str) -> Result<ZaberAxis, WrongField> {
+        let field = |name: &str| format!("stage.axes.{axis}.{name}");
+        Ok(ZaberAxis {
+            device: number(field("device"), self.device, 99)?,
+            axis: number(field("axis"), self.axis, 9)?,
+            um_per_microstep: positive(field("um_per_microstep"), self.um_per_microstep)?,
+            is_forward: is_forward(field("direction"), self.direction)?,
+            origin_microsteps: self.origin_microsteps.unwrap_or(0),
+            resolution: match self.resolution.map(u32::try_from) {
+                None => None,
+                Some(Ok(resolution)) if resolution > 0 => Some(resolution),
+                Some(_) => return Err(wrong(field("resolution"), "microsteps a full step, more than 0")),
+            },
+        })
+    }
+}
+
+/// The first two axes that are the same.
+fn twins<T: PartialEq>(axis: impl Fn(usize) -> Option<T>) -> Option<[&'static str; 2]> {
+    let pairs = [[0, 1], [0, 2], [1, 2]];
+    let same = pairs.into_iter().find(|[a, b]| axis(*a).is_some() && axis(*a) == axis(*b));
+    same.map(|pair| pair.map(|at| NAMES[at]))
+}
+
+fn is_forward(field: String, direction: Option<i64>) -> Result<bool, WrongField> {
+    match direction {
+        None | Some(1) => Ok(true),
+        Some(-1) => Ok(false),
+        Some(other) => {
+            Err(wrong(field, format!("1, or -1 if the controller counts the other way; not {other}")))
+        }
+    }
+}
+
+fn number(field: String, value: i64, max: u8) -> Result<u8, WrongField> {
+    match u8::try_from(value) {
+        Ok(number) if (1..=max).contains(&number) => Ok(number),
+        _ => Err(wrong(field, format!("1 to {max}, not {value}"))),
+    }
+}
+
+#[cfg(test)]
+#[path = "stage_tests.rs"]
+mod tests;
