@@ -5,10 +5,10 @@ cd "$(dirname "$0")/.."
 out=target/package
 command -v dpkg-shlibdeps >/dev/null || { apt-get update -qq && apt-get install -qq --no-install-recommends dpkg-dev; }
 
-mkdir -p $out
-target/release/tactus completions bash > $out/tactus.bash
-target/release/tactus completions zsh > $out/_tactus
-target/release/tactus completions fish > $out/tactus.fish
+mkdir -p $out target/release/completions
+target/release/tactus completions bash > target/release/completions/tactus.bash
+target/release/tactus completions zsh > target/release/completions/_tactus
+target/release/tactus completions fish > target/release/completions/tactus.fish
 target/tools/bin/cargo-deb deb --package tactus --no-build --compress-type gz --compress-system \
     --output $out/tactus.deb
 

@@ -54,6 +54,7 @@ class Machine:
         shutil.rmtree(self.root, ignore_errors=True)
         self.root.mkdir()
         subprocess.run(["tar", "-C", self.root, "-xf", self.folder / "base.tar"], check=True)
+        (self.root / "etc/hostname").write_text("bench\n")
         (self.root / "etc/fstab").write_text("")
         (self.root / "etc/machine-id").write_text("0123456789abcdef0123456789abcdef\n")
         for unit in UNWANTED:
@@ -68,6 +69,9 @@ class Machine:
             ready.bind(f"/proc/self/fd/{folder}/ready.socket")
             os.close(folder)
             ready.settimeout(DEADLINE_S)
+            for left in self.cgroup.parent.glob("tactus-systemd-boot-*"):
+                # Of a test that was killed, or of one that goes on.
+                _remove_cgroups(left, busy_is_fine=True)
             self.cgroup.mkdir()
             with self.console.open("wb") as console:
                 self.outer = subprocess.Popen(
@@ -92,8 +96,7 @@ class Machine:
             self.outer.wait()
         if self.pid is not None:
             _wait_for_end(self.pid)
-        for folder, _, _ in os.walk(self.cgroup, topdown=False):
-            os.rmdir(folder)
+        _remove_cgroups(self.cgroup, busy_is_fine=False)
         shutil.rmtree(self.root, ignore_errors=True)
 
     def _inside(self, command, user=None):
@@ -198,6 +201,16 @@ def _unified_cgroups():
         if kind == "cgroup2":
             return pathlib.Path(where)
     raise RuntimeError("no cgroup2 is mounted: systemd cannot be booted here")
+
+
+def _remove_cgroups(top, busy_is_fine):
+    """Removes a control group and those in it."""
+    for folder, _, _ in os.walk(top, topdown=False):
+        try:
+            os.rmdir(folder)
+        except OSError:
+            if not busy_is_fine:
+                raise
 
 
 def _wait_for_end(pid):

@@ -21,7 +21,6 @@ ln -s /proc/self/fd "$root/dev/fd"
 for number in 0:stdin 1:stdout 2:stderr; do ln -s "/proc/self/fd/${number%:*}" "$root/dev/${number#*:}"; done
 mount -t tmpfs -o mode=755 tmpfs "$root/run"
 mount -t tmpfs tmpfs "$root/tmp"
-hostname bench
 
 cd "$root"
 pivot_root . mnt
@@ -29,4 +28,4 @@ umount --lazy /mnt
 # What is mounted in a unit's sandbox stays there, but what is mounted here reaches it.
 mount --make-rshared /
 exec env -i container=tactus PATH=/usr/sbin:/usr/bin NOTIFY_SOCKET=/ready.socket \
-    /lib/systemd/systemd --log-target=console --show-status=no --unit=multi-user.target
+    /lib/systemd/systemd --log-target=journal-or-kmsg --show-status=no --unit=multi-user.target
