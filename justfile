@@ -63,7 +63,7 @@ package-tool:
         cargo install --locked cargo-deb --version 3.8.0 --no-default-features --features gzip \
         --root {{ tools }} --target-dir {{ tools }}/build
 
-# The package on a real systemd, booted in namespaces: readiness, watchdog, sandbox, removal. As root; under two minutes.
+# The package on a real systemd, booted in namespaces: readiness, watchdog, sandbox, removal. As root; some two minutes.
 systemd-boot: package
     tests/systemd/base.sh target/systemd-boot/base.tar
     python3 tests/systemd/checks.py target/systemd-boot target/package/tactus.deb
