@@ -9,7 +9,7 @@ command -v mmdebstrap >/dev/null || { apt-get update -qq && apt-get install -qq 
 suite=$(. /etc/os-release && echo "${VERSION_CODENAME:?a Debian release is needed}")
 sources=()
 [ ! -f /etc/apt/sources.list.d/debian.sources ] || sources=(/etc/apt/sources.list.d/debian.sources)
-mmdebstrap --quiet --mode=root --variant=essential \
+mmdebstrap --quiet --mode=root --format=tar --variant=essential \
     --include=systemd,systemd-sysv,udev,kmod,libnss-systemd,dbus,passwd \
     --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' \
     --dpkgopt='path-exclude=/usr/share/locale/*' --dpkgopt='path-exclude=/usr/lib/udev/hwdb.d/*' \
