@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd python fuzz-slice solid-check discovery-evidence-slice gpu
+ci: fmt lint docs deny test validate systemd systemd-boot python fuzz-slice solid-check discovery-evidence-slice gpu
 
 # The README's second command.
 test:
@@ -50,6 +50,23 @@ validate: build
 # The unit file: known keys only, and a sandbox.
 systemd:
     systemd/verify.sh
+
+# The Debian package, target/package/tactus.deb.
+package: package-tool
+    cargo build --release --package tactus --package tactus-daemon --package tactus-mock
+    packaging/build.sh
+
+# Build cargo-deb once.
+package-tool:
+    test -x {{ tools }}/bin/cargo-deb || \
+        CARGO_PROFILE_RELEASE_OPT_LEVEL=1 CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 \
+        cargo install --locked cargo-deb --version 3.8.0 --no-default-features --features gzip \
+        --root {{ tools }} --target-dir {{ tools }}/build
+
+# The package on a real systemd, booted in namespaces: readiness, watchdog, sandbox, removal. As root; some two minutes.
+systemd-boot: package
+    tests/systemd/base.sh target/systemd-boot/base.tar
+    python3 tests/systemd/checks.py target/systemd-boot target/package/tactus.deb
 
 # Stock Python tools read our recordings, tables and bus.
 python: build python-tools

@@ -37,7 +37,8 @@ enum Command {
     /// Serves a simulated rig at two pseudo-terminals, whose paths it prints.
     ///
     /// It then reads faults from standard input, one a line such as `sensor stall 2s`, answers each with
-    /// `ok` or `error: ...`, and runs until it is terminated.
+    /// `ok` or `error: ...`, the line `truth` with where the tip truly is, as one JSON object, and runs until it is
+    /// terminated.
     Rig(RigArgs),
     /// Test data for discovery: measurement tables with physics in them that the base model does not know.
     Hidden(HiddenArgs),
@@ -164,6 +165,15 @@ fn standard_input() -> Result<mpsc::Receiver<String>> {
 
 fn answer(control: &RigControl, line: &str) -> Result<()> {
     let mut out = io::stdout().lock();
+    if line.trim() == "truth" {
+        let [x_mm, y_mm, z_mm] = control.tip_mm();
+        let truth = json!({
+            "x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm,
+            "depth_mm": control.depth_mm(), "deepest_mm": control.deepest_mm(), "moving": control.is_moving(),
+        });
+        writeln!(out, "{truth}")?;
+        return Ok(out.flush()?);
+    }
     match line.parse::<Fault>().and_then(|fault| control.inject(fault)) {
         Ok(()) => writeln!(out, "ok")?,
         Err(error) => writeln!(out, "error: {error}")?,

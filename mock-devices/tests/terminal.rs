@@ -167,6 +167,10 @@ async fn the_production_drivers_work_with_it() {
     let target = Target { position_mm: [2.0, 2.0, 28.0], speed_mm_per_s: 20.0 };
     let reached = stage.move_to(target).await.unwrap();
     assert!(reached.iter().zip(target.position_mm).all(|(got, want)| (got - want).abs() < 0.005));
+    let truth: serde_json::Value = serde_json::from_str(&mock.command("truth")).unwrap();
+    let tip_mm = ["x_mm", "y_mm", "z_mm"].map(|axis| truth[axis].as_f64().unwrap());
+    assert!(tip_mm.iter().zip(reached).all(|(there, got)| (there - got).abs() < 0.001), "{truth}");
+    assert_eq!(truth["moving"], false);
 
     for (command, epochs) in [("sensor disconnect 200ms", 1), ("sensor renumber", 2)] {
         assert_eq!(mock.command(command), "ok");

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use sd_notify::NotifyState;
 use tactus_engine::{Engine, Pulse};
-use tokio::time::interval;
+use tokio::time::{Instant, interval_at};
 use tracing::{error, warn};
 
 /// Frames flow: the service is ready.
@@ -22,8 +22,9 @@ pub(crate) async fn feed_watchdog(engine: Engine) {
     let Some(limit) = sd_notify::watchdog_enabled() else { return };
     let pulse = engine.pulse();
     let mut fed = Pulse::default();
-    // Half the limit, as sd_watchdog_enabled(3) advises.
-    let mut tick = interval((limit / 2).max(Duration::from_millis(1)));
+    // Half the limit, as sd_watchdog_enabled(3) advises; nothing can have gone on before the first half is over.
+    let period = (limit / 2).max(Duration::from_millis(1));
+    let mut tick = interval_at(Instant::now() + period, period);
     loop {
         tick.tick().await;
         let now = *pulse.borrow();
