@@ -81,6 +81,11 @@ impl VirtualSensor {
         sensor
     }
 
+    /// The world that its elements feel.
+    pub(crate) fn world(&self) -> &Shared {
+        &self.world
+    }
+
     fn power_up(&mut self, now: Instant) {
         self.powered_up = now;
         self.clock_offset_ms = 0;
