@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd python solid-check discovery-evidence-slice gpu
+ci: fmt lint docs deny test validate systemd python vm solid-check discovery-evidence-slice gpu
 
 # The README's second command.
 test:
@@ -50,6 +50,11 @@ validate: build
 # The unit file: known keys only, and a sandbox.
 systemd:
     systemd/verify.sh
+
+# Virtual USB devices at a real kernel, in an emulated machine: tests/vm/README.md. Some five minutes the first time; names of checks
+# run only those.
+vm *checks: build
+    tests/vm/run.sh {{ checks }}
 
 # Stock Python tools read our recordings, tables and bus.
 python: build python-tools

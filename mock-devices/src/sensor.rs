@@ -31,6 +31,9 @@ const BOOT_MESSAGES: usize = 3;
 /// A clock that is about to wrap does so after this.
 const WRAPS_AFTER_MS: i64 = 1000;
 
+/// Samplings that are later than this are passed over: a machine too slow for the rate would otherwise never catch up.
+const BACKLOG: Duration = Duration::from_secs(1);
+
 const SERIAL_NUMBER: u32 = u32::from_le_bytes(*b"SIM\0");
 
 const MATRIX_UID: [u8; 6] = *b"SIMULA";
@@ -207,6 +210,9 @@ impl Device for VirtualSensor {
                 break;
             }
             self.acquisition = Some(Acquisition { next: acquisition.next + 1, ..acquisition });
+            if at + BACKLOG < now {
+                continue;
+            }
             self.take_frame(at, acquisition.run_length, Duration::from_secs_f64(1.0 / acquisition.rate_hz));
         }
     }

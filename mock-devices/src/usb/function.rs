@@ -42,7 +42,7 @@ pub(super) trait Function: Send {
     ///
     /// # Errors
     /// What it does not know.
-    fn control(&mut self, setup: &Setup, data: &[u8]) -> Result<Reply, Refused>;
+    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Reply, Refused>;
 
     /// Makes packets for the host of what the device behind sends.
     fn packets(&mut self, bytes: &[u8]) -> Vec<Vec<u8>>;

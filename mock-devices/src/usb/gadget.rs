@@ -77,7 +77,7 @@ impl Gadget {
     }
 
     /// A request that concerns no single endpoint; `data` are the host's.
-    pub(super) fn control(&mut self, setup: &Setup, data: &[u8]) -> Result<Outcome, Refused> {
+    pub(super) fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Outcome, Refused> {
         match (setup.kind(), setup.recipient()) {
             (Some(Kind::Standard), Some(Recipient::Device)) => self.standard(setup),
             (Some(Kind::Standard), Some(Recipient::Interface)) => match setup.request {
@@ -92,7 +92,7 @@ impl Gadget {
         }
     }
 
-    fn standard(&mut self, setup: &Setup) -> Result<Outcome, Refused> {
+    fn standard(&mut self, setup: Setup) -> Result<Outcome, Refused> {
         match setup.request {
             standard::GET_DESCRIPTOR => self.descriptor(setup).map(Outcome::Data),
             standard::GET_STATUS => Ok(Outcome::Data(STATUS.to_vec())),
@@ -106,7 +106,7 @@ impl Gadget {
         }
     }
 
-    fn descriptor(&self, setup: &Setup) -> Result<Vec<u8>, Refused> {
+    fn descriptor(&self, setup: Setup) -> Result<Vec<u8>, Refused> {
         match setup.descriptor() {
             (descriptor::kind::DEVICE, 0) => Ok(self.device.encode()),
             (descriptor::kind::CONFIGURATION, 0) => Ok(self.configuration.clone()),
@@ -119,7 +119,7 @@ impl Gadget {
         }
     }
 
-    fn ask_interface(&mut self, setup: &Setup, data: &[u8]) -> Result<Outcome, Refused> {
+    fn ask_interface(&mut self, setup: Setup, data: &[u8]) -> Result<Outcome, Refused> {
         let asked = setup.index_low();
         let has_it = |part: &Part| part.group.interfaces.iter().any(|interface| interface.number == asked);
         let number = self.parts.iter().position(has_it).ok_or(Refused)?;
@@ -127,11 +127,11 @@ impl Gadget {
     }
 
     /// The first function that knows the request takes it.
-    fn ask_all(&mut self, setup: &Setup, data: &[u8]) -> Result<Outcome, Refused> {
+    fn ask_all(&mut self, setup: Setup, data: &[u8]) -> Result<Outcome, Refused> {
         (0..self.parts.len()).find_map(|number| self.ask(number, setup, data).ok()).ok_or(Refused)
     }
 
-    fn ask(&mut self, number: usize, setup: &Setup, data: &[u8]) -> Result<Outcome, Refused> {
+    fn ask(&mut self, number: usize, setup: Setup, data: &[u8]) -> Result<Outcome, Refused> {
         let function = self.function(number).ok_or(Refused)?;
         Ok(match function.control(setup, data)? {
             Reply::Data(data) => Outcome::Data(data),

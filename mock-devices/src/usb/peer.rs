@@ -142,7 +142,7 @@ impl Peer {
     fn submit(&mut self, Transfer { seq, endpoint, flow, setup }: Transfer) {
         match (endpoint, flow) {
             (0, Flow::In(room)) => {
-                let data = self.control(&setup, &[]);
+                let data = self.control(setup, &[]);
                 match data {
                     Ok(mut data) => {
                         data.truncate(room);
@@ -151,7 +151,7 @@ impl Peer {
                     Err(Refused) => self.answers.sent(seq, Status::Stalled, &[]),
                 }
             }
-            (0, Flow::Out(data)) => match self.control(&setup, &data) {
+            (0, Flow::Out(data)) => match self.control(setup, &data) {
                 Ok(_) => self.answers.taken(seq, Status::Done, data.len()),
                 Err(Refused) => self.answers.taken(seq, Status::Stalled, 0),
             },
@@ -175,7 +175,7 @@ impl Peer {
         self.answers.unlinked(seq, if waited { Status::Unlinked } else { Status::Done });
     }
 
-    fn control(&mut self, setup: &Setup, data: &[u8]) -> Result<Vec<u8>, Refused> {
+    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Vec<u8>, Refused> {
         if (setup.kind(), setup.recipient()) == (Some(Kind::Standard), Some(Recipient::Endpoint)) {
             return self.endpoint_request(setup);
         }
@@ -202,7 +202,7 @@ impl Peer {
     }
 
     /// What concerns one endpoint: whether it has halted (USB 2.0, sections 9.4.1, 9.4.5 and 9.4.9).
-    fn endpoint_request(&mut self, setup: &Setup) -> Result<Vec<u8>, Refused> {
+    fn endpoint_request(&mut self, setup: Setup) -> Result<Vec<u8>, Refused> {
         let address = setup.index_low();
         let is_halt = setup.value == ENDPOINT_HALT;
         let change = match setup.request {

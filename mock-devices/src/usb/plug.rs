@@ -1,7 +1,5 @@
 //! A USB device on its cable: plugged into the kernel, pulled out, plugged in again.
 
-use std::io;
-
 use futures_util::FutureExt;
 use futures_util::future::select_all;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -183,7 +181,7 @@ impl Plug {
         match (command, &mut self.link) {
             (Command::Unplug, Link::In(_)) => self.pull_out(None),
             (Command::Plug, Link::Out(_)) => {
-                self.plug_in_again(Wish::Port(self.port)).await.map_err(refused)?
+                self.plug_in_again(Wish::Port(self.port)).await.map_err(refused)?;
             }
             (Command::PlugElsewhere, Link::Out(_)) => {
                 self.plug_in_again(Wish::NotPort(self.port)).await.map_err(refused)?;
@@ -230,18 +228,14 @@ impl Plug {
 /// Waits for bytes from the kernel, or until it is time to plug the device in again. Cancel-safe.
 async fn listen(listening: Result<&mut UnixStream, Option<Instant>>, buffer: &mut [u8]) -> Event {
     match listening {
-        Ok(stream) => bytes_or_end(stream.read(buffer).await),
+        Ok(stream) => match stream.read(buffer).await {
+            Ok(0) | Err(_) => Event::Closed,
+            Ok(count) => Event::Bytes(count),
+        },
         Err(replug) => {
             until(replug).await;
             Event::Replug
         }
-    }
-}
-
-fn bytes_or_end(read: io::Result<usize>) -> Event {
-    match read {
-        Ok(0) | Err(_) => Event::Closed,
-        Ok(count) => Event::Bytes(count),
     }
 }
 

@@ -12,6 +12,9 @@ use crate::cable::Device;
 use crate::faults::{LinkFault, SensorFault};
 use crate::world::Shared;
 
+/// Samplings that are later than this are passed over: a machine too slow for the rate would otherwise never catch up.
+const BACKLOG: Duration = Duration::from_secs(1);
+
 /// The format has no room for what the array reads.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -130,6 +133,10 @@ impl Device for DeclaredSensor {
     fn receive(&mut self, _bytes: &[u8], _now: Instant) {}
 
     fn wake(&mut self, now: Instant) {
+        while self.next_sampling() + BACKLOG < now {
+            self.next += 1;
+            self.encoder.lose_frame();
+        }
         while self.next_sampling() <= now {
             let at = self.next_sampling();
             self.next += 1;

@@ -44,13 +44,23 @@ fn it_says_nothing_for_a_while_and_drops_frames() {
 }
 
 #[test]
+fn too_late_it_passes_over_what_it_has_not_sampled() {
+    let mut bench = switched_on();
+    bench.now += Duration::from_secs(3);
+    let ticks: Vec<_> = frames(&bench.bytes(0)).iter().map(|(tick, _)| *tick).collect();
+    assert_eq!((ticks.len(), ticks[0]), (31, 2000));
+}
+
+#[test]
 fn elements_stick_and_saturate_until_cleared() {
     let mut bench = switched_on();
     bench.bytes(100);
     bench.fault(SensorFault::Stuck(7));
     bench.fault(SensorFault::Saturate(8));
     let found = frames(&bench.bytes(1000));
-    assert!(found.iter().all(|(_, counts)| counts[7] == found[0].1[7] && counts[8] == 4095.0));
+    let of = |element: usize| found.iter().map(move |(_, counts)| counts[element].to_bits());
+    let stuck = of(7).next();
+    assert!(of(7).all(|count| Some(count) == stuck) && of(8).all(|count| count == 4095_f32.to_bits()));
     bench.fault(SensorFault::Clear);
     assert!(frames(&bench.bytes(1000)).iter().all(|(_, counts)| counts[8] < 200.0));
 }

@@ -66,12 +66,12 @@ impl Setup {
     }
 
     /// True if the device is to answer with data.
-    pub(super) fn is_in(&self) -> bool {
+    pub(super) fn is_in(self) -> bool {
         self.request_type & 0x80 != 0
     }
 
     /// Who defines the request; `None` for what the specification reserves.
-    pub(super) fn kind(&self) -> Option<Kind> {
+    pub(super) fn kind(self) -> Option<Kind> {
         match self.request_type >> 5 & 0b11 {
             0 => Some(Kind::Standard),
             1 => Some(Kind::Class),
@@ -81,7 +81,7 @@ impl Setup {
     }
 
     /// Whom it concerns; `None` for what the specification reserves.
-    pub(super) fn recipient(&self) -> Option<Recipient> {
+    pub(super) fn recipient(self) -> Option<Recipient> {
         match self.request_type & 0b1_1111 {
             0 => Some(Recipient::Device),
             1 => Some(Recipient::Interface),
@@ -91,12 +91,12 @@ impl Setup {
     }
 
     /// The lower byte of the index: the number of an interface, the address of an endpoint.
-    pub(super) fn index_low(&self) -> u8 {
+    pub(super) fn index_low(self) -> u8 {
         self.index.to_le_bytes()[0]
     }
 
     /// Of a request for a descriptor: its type and its number.
-    pub(super) fn descriptor(&self) -> (u8, u8) {
+    pub(super) fn descriptor(self) -> (u8, u8) {
         let [number, kind] = self.value.to_le_bytes();
         (kind, number)
     }

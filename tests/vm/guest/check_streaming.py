@@ -2,7 +2,7 @@
 
 import json
 
-from lab import Folder, Service, check, at_least, plug, rig_file, until_gone
+from lab import Folder, Hung, Service, check, at_least, plug, rig_file, until_gone
 
 PRESSES = """
 def run(rig):
@@ -18,7 +18,9 @@ def run_on(folder, service, what):
     client = service.start_run(PRESSES)
     status = client.wait()
     summary = json.loads(client.until(lambda line: line.startswith("{"), "a summary"))
-    check(f"{what}: exit status of the run", 0, status)
+    if "error" in summary:
+        raise Hung(f"no run: {summary}")
+    check(f"{what}: exit status of the run, and what it says", [0, ""], [status, summary["message"]])
     check(f"{what}: how it ended, presses, dwells, frames lost", ["done", 2, 4, 0],
           [summary["exit_status"], summary["presses"], summary["dwells"], summary["frames_lost"]])
     check(f"{what}: frames recorded", at_least(100), summary["frames"])

@@ -182,7 +182,7 @@ class Service:
 
     def until_connected(self) -> dict:
         def is_up(said):
-            return said["sensor"]["connected"] and said["stage"]["status"] not in ("disconnected", "unknown")
+            return said["sensor"]["connected"] and said["stage"]["status"] not in ("DISCONNECTED", "unknown")
 
         return self.until("sensor and stage are connected", is_up)
 
@@ -192,11 +192,12 @@ class Service:
         return Program("tactus", "--json", "run", path, "--no-report", folder=self.folder)
 
     def __enter__(self):
+        self.failed_before = results["FAIL"]
         return self
 
     def __exit__(self, kind, *_):
         self.program.__exit__()
-        if kind is not None:
+        if kind is not None or results["FAIL"] > self.failed_before:
             while not self.program.said.empty():
                 self.program.seen.append(self.program.said.get())
             print("  the service said:\n    " + "\n    ".join(map(str, self.program.seen[-30:])), flush=True)

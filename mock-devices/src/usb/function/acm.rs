@@ -74,7 +74,7 @@ impl Function for Acm {
         }
     }
 
-    fn control(&mut self, setup: &Setup, data: &[u8]) -> Result<Reply, Refused> {
+    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Reply, Refused> {
         match setup.request {
             SET_LINE_CODING => {
                 self.line_coding = data.try_into().map_err(|_| Refused)?;

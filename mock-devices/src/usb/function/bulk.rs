@@ -35,7 +35,7 @@ impl Function for Bulk {
         Group { interfaces: vec![interface] }
     }
 
-    fn control(&mut self, _setup: &Setup, _data: &[u8]) -> Result<Reply, Refused> {
+    fn control(&mut self, _setup: Setup, _data: &[u8]) -> Result<Reply, Refused> {
         Err(Refused)
     }
 

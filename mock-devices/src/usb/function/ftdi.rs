@@ -73,7 +73,7 @@ impl Function for Ftdi {
         Group { interfaces: vec![interface] }
     }
 
-    fn control(&mut self, setup: &Setup, _data: &[u8]) -> Result<Reply, Refused> {
+    fn control(&mut self, setup: Setup, _data: &[u8]) -> Result<Reply, Refused> {
         if setup.kind() != Some(Kind::Vendor) {
             return Err(Refused);
         }

@@ -79,7 +79,7 @@ impl Function for Hid {
         Group { interfaces: vec![interface] }
     }
 
-    fn control(&mut self, setup: &Setup, data: &[u8]) -> Result<Reply, Refused> {
+    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Reply, Refused> {
         match (setup.kind(), setup.request) {
             (Some(Kind::Standard), standard::GET_DESCRIPTOR) => match setup.descriptor() {
                 (HID_DESCRIPTOR, 0) => Ok(Reply::Data(self.hid_descriptor())),
