@@ -19,11 +19,14 @@ def hidraw() -> Path:
 
 
 def read(file: int, counter: Counter, frames: int, limit_s: float = 60) -> None:
-    """Reads so many reports."""
-    for _ in range(frames):
+    """Reads so many reports, and only then looks at them: the kernel keeps no more than 64 for who is slow."""
+    reports = []
+    while len(reports) < frames:
         if not select.select([file], [], [], limit_s)[0]:
-            raise Hung(f"no report for {limit_s} s after {counter.frames}")
-        counter.take(os.read(file, 4096))
+            raise Hung(f"no report for {limit_s} s after {len(reports)}")
+        reports.append(os.read(file, 4096))
+    for report in reports:
+        counter.take(report)
 
 
 def check_reports():

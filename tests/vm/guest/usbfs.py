@@ -4,12 +4,34 @@ Linux, include/uapi/linux/usbdevice_fs.h; numbers as on 64-bit machines.
 """
 
 import ctypes
-import fcntl
 import os
-import struct
 from pathlib import Path
 
-CLAIM_INTERFACE, CLEAR_HALT, BULK = 0x8004550F, 0x80045515, 0xC0185502
+CLAIM_INTERFACE, CLEAR_HALT, BULK, SUBMIT, REAP = 0x8004550F, 0x80045515, 0xC0185502, 0x8038550A, 0x4008550C
+BULK_URB = 3
+
+libc = ctypes.CDLL(None, use_errno=True)
+
+
+class Bulk(ctypes.Structure):
+    _fields_ = [("endpoint", ctypes.c_uint), ("length", ctypes.c_uint), ("timeout_ms", ctypes.c_uint), ("data", ctypes.c_void_p)]
+
+
+class Urb(ctypes.Structure):
+    _fields_ = [
+        ("kind", ctypes.c_ubyte),
+        ("endpoint", ctypes.c_ubyte),
+        ("status", ctypes.c_int),
+        ("flags", ctypes.c_uint),
+        ("data", ctypes.c_void_p),
+        ("length", ctypes.c_int),
+        ("actual", ctypes.c_int),
+        ("start_frame", ctypes.c_int),
+        ("packets", ctypes.c_int),
+        ("errors", ctypes.c_int),
+        ("signal", ctypes.c_uint),
+        ("context", ctypes.c_void_p),
+    ]
 
 
 class Device:
@@ -21,21 +43,47 @@ class Device:
             if file.exists() and file.read_text().strip() == serial:
                 bus, number = (int((device / name).read_text()) for name in ("busnum", "devnum"))
                 self.file = os.open(f"/dev/bus/usb/{bus:03}/{number:03}", os.O_RDWR)
-                fcntl.ioctl(self.file, CLAIM_INTERFACE, struct.pack("I", 0))
+                self.call(CLAIM_INTERFACE, ctypes.c_uint(0))
                 return
         raise OSError(f"no device {serial}")
 
-    def bulk(self, endpoint: int, data: bytes | int, timeout_ms: int) -> bytes | int:
-        """Reads up to so many bytes, or writes; gives the bytes read, or how many were written."""
-        is_read = isinstance(data, int)
-        buffer = ctypes.create_string_buffer(data) if is_read else ctypes.create_string_buffer(data, len(data))
-        # Only of a buffer that it may change does Python give the call's own result: the bytes that went over.
-        request = bytearray(struct.pack("IIIxxxxP", endpoint, len(buffer), timeout_ms, ctypes.addressof(buffer)))
-        count = fcntl.ioctl(self.file, BULK, request, True)
-        return buffer.raw[:count] if is_read else count
+    def call(self, number: int, argument) -> int:
+        result = libc.ioctl(self.file, ctypes.c_ulong(number), ctypes.byref(argument))
+        if result < 0:
+            error = ctypes.get_errno()
+            raise OSError(error, os.strerror(error))
+        return result
+
+    def read(self, endpoint: int, room: int, timeout_ms: int) -> bytes:
+        buffer = ctypes.create_string_buffer(room)
+        count = self.call(BULK, Bulk(endpoint, room, timeout_ms, ctypes.addressof(buffer)))
+        return buffer.raw[:count]
+
+    def write(self, endpoint: int, data: bytes, timeout_ms: int) -> int:
+        buffer = ctypes.create_string_buffer(data, len(data))
+        return self.call(BULK, Bulk(endpoint, len(data), timeout_ms, ctypes.addressof(buffer)))
+
+    def stream(self, endpoint: int, room: int, count: int, at_once: int) -> list[bytes]:
+        """Reads so many transfers, `at_once` of which wait at any time, as programs do that are to lose nothing."""
+        buffers = [ctypes.create_string_buffer(room) for _ in range(at_once)]
+        urbs = {}
+        for buffer in buffers:
+            urb = Urb(kind=BULK_URB, endpoint=endpoint, data=ctypes.addressof(buffer), length=room)
+            urbs[ctypes.addressof(urb)] = (urb, buffer)
+            self.call(SUBMIT, urb)
+        found = []
+        while len(found) < count:
+            done = ctypes.c_void_p()
+            self.call(REAP, done)
+            urb, buffer = urbs[done.value]
+            if urb.status != 0:
+                raise OSError(-urb.status, os.strerror(-urb.status))
+            found.append(buffer.raw[: urb.actual])
+            self.call(SUBMIT, urb)
+        return found
 
     def clear_halt(self, endpoint: int) -> None:
-        fcntl.ioctl(self.file, CLEAR_HALT, struct.pack("I", endpoint))
+        self.call(CLEAR_HALT, ctypes.c_uint(endpoint))
 
     def close(self) -> None:
         os.close(self.file)
