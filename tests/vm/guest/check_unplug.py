@@ -87,10 +87,9 @@ def check_another_array_under_the_same_name():
     """unplug: an array of another size is refused, with words that say so"""
     smaller = {"rows = 6": "rows = 5", "6.9, 8.9, 10.9]": "6.9, 8.9]"}
     with Folder() as folder, Folder() as other:
-        with plug(*BOTH, rig=rig_file(other, **smaller)), Service(rig_file(folder)) as service:
-            said = service.program.until(lambda line: "40" in line and "48" in line, "that the array has another size")
-            print(f"     it says: {said}")
-            check("connected", False, service.status()["sensor"]["connected"])
+        refusal = "the frame has 40 elements, the rig's array has 48"
+        with plug(*BOTH, rig=rig_file(other, **smaller)), Service(rig_file(folder), says=refusal) as service:
+            check("what it says of it", that(f"{refusal!r}", lambda said: refusal in said), service.said.split("error=")[-1])
     until_gone()
 
 

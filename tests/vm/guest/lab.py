@@ -149,22 +149,29 @@ def plug(*arguments, rig: Path | None = None) -> Program:
 class Service:
     """`tactusd` with a rig file, in a folder of its own."""
 
-    def __init__(self, rig: Path):
+    def __init__(self, rig: Path, says: str = "ready"):
+        """Started, and waited for until it says so."""
         self.folder = rig.parent
         config = self.folder / "tactusd.toml"
         config.write_text('rig = "rig.toml"\nrecordings = "runs"\n')
         self.program = Program("tactusd", "--config", config, folder=self.folder)
-        self.program.until(lambda line: "ready" in line, "that it is ready")
+        try:
+            self.said = self.program.until(lambda line: says in line, repr(says))
+        except Hung:
+            self.program.__exit__()
+            raise
 
     def tactus(self, *arguments) -> subprocess.CompletedProcess:
         command = [str(BINARIES / "tactus"), "--json", *map(str, arguments)]
         return subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=LIMIT_S, stdin=subprocess.DEVNULL)
 
     def status(self) -> dict:
-        said = self.tactus("status")
-        if said.returncode != 0:
-            raise Hung(f"tactus status: {said.stderr}")
-        return json.loads(said.stdout)
+        # A client waits some seconds for a service, which here can be too few.
+        for _ in range(5):
+            said = self.tactus("status")
+            if said.returncode == 0:
+                return json.loads(said.stdout)
+        raise Hung(f"tactus status: {said.stdout} {said.stderr}")
 
     def until(self, what: str, is_it, limit_s: float = LIMIT_S) -> dict:
         """Asks until the answer is right."""
@@ -200,7 +207,8 @@ class Service:
         if kind is not None or results["FAIL"] > self.failed_before:
             while not self.program.said.empty():
                 self.program.seen.append(self.program.said.get())
-            print("  the service said:\n    " + "\n    ".join(map(str, self.program.seen[-30:])), flush=True)
+            said = [line for line in self.program.seen if line is not None]
+            print("  the service said:\n    " + "\n    ".join(said[-30:]), flush=True)
 
 
 class Folder:
