@@ -129,7 +129,7 @@ def check_the_stage_in_a_run():
         mock.do("stage unplug")
         status, summary = summary_of(client)
         check("exit status of the run, how it ended", [1, "failed"], [status, summary["exit_status"]])
-        print(f"     it says: {summary['message']}")
+        check("what it says", that("that the tip is not retracted", lambda said: "THE TIP IS NOT RETRACTED" in said), summary["message"])
         mock.do("stage plug")
         said = service.until_connected()
         check("plugged in again: sensor connected, stage", [True, "not homed"],
