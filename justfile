@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd systemd-boot python fuzz-slice solid-check discovery-evidence-slice gpu
+ci: fmt lint docs deny test validate systemd systemd-boot python fuzz-slice vm solid-check discovery-evidence-slice gpu
 
 # The README's second command.
 test:
@@ -67,6 +67,11 @@ package-tool:
 systemd-boot: package
     tests/systemd/base.sh target/systemd-boot/base.tar
     python3 tests/systemd/checks.py target/systemd-boot target/package/tactus.deb
+
+# Virtual USB devices at a real kernel, in an emulated machine: tests/vm/README.md. Some five minutes the first time; names of checks
+# run only those.
+vm *checks: build
+    tests/vm/run.sh {{ checks }}
 
 # Stock Python tools read our recordings, tables and bus.
 python: build python-tools

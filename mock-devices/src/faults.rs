@@ -9,6 +9,7 @@ mod script;
 use std::time::Duration;
 
 pub use parse::FaultError;
+pub(crate) use parse::duration;
 pub use script::{FaultScript, FaultScriptError, TimedFault};
 
 /// Something that goes wrong, or that is changed behind the service's back.

@@ -1,8 +1,8 @@
 //! Virtual sensor and stage that speak real device bytes, driven by the forward model.
 //!
 //! [`VirtualRig`] runs both in this process, for the production drivers to connect to, in real or virtual
-//! time; the program `tactus-mock` serves the same devices at pseudo-terminals. Behind both stands one
-//! world: where the tip truly is, what it presses, what the elements feel. The devices see no more of it
+//! time; the program `tactus-mock` serves the same devices at pseudo-terminals, or plugs them into the kernel
+//! as USB devices. Behind both stands one world: where the tip truly is, what it presses, what the elements feel. The devices see no more of it
 //! than real ones would. What they feel is the rig file's `[simulation]`, or a model or hidden
 //! physics in its place ([`TruthFile`]). [`RigControl`] sees all of it, and makes things go wrong ([`faults`]).
 //!
@@ -29,6 +29,7 @@ mod terminal;
 mod truth;
 mod truth_file;
 mod twin;
+mod usb;
 mod world;
 
 pub use control::RigControl;

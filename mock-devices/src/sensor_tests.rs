@@ -92,6 +92,14 @@ fn frames_are_sampled_on_an_exact_grid() {
 }
 
 #[test]
+fn too_late_it_passes_over_what_it_has_not_sampled() {
+    let mut bench = pushing(1);
+    bench.now += Duration::from_secs(3);
+    let stamps = timestamps_ms(&bench.bytes(0));
+    assert_eq!((stamps.len(), stamps[0]), (31, 2100));
+}
+
+#[test]
 fn one_seed_gives_the_same_bytes() {
     let ten_seconds = |seed| pushing(seed).bytes(10_000);
     assert_eq!(ten_seconds(1), ten_seconds(1));

@@ -184,10 +184,7 @@ impl Arguments<'_> {
     }
 
     fn duration(&mut self) -> Result<Duration, FaultError> {
-        self.argument("a duration such as 2s or 500ms", |word| {
-            let ms = milliseconds(word)?;
-            (0.0..=MAX_MS).contains(&ms).then(|| Duration::from_secs_f64(ms / 1000.0))
-        })
+        self.argument("a duration such as 2s or 500ms", duration)
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "within a year")]
@@ -244,6 +241,12 @@ impl Arguments<'_> {
     fn unknown(&self, device: &'static str, known: &'static str) -> FaultError {
         FaultError::Unknown { device, found: self.fault.to_owned(), known }
     }
+}
+
+/// A duration with its unit: `2s`, `500ms`.
+pub(crate) fn duration(word: &str) -> Option<Duration> {
+    let ms = milliseconds(word)?;
+    (0.0..=MAX_MS).contains(&ms).then(|| Duration::from_secs_f64(ms / 1000.0))
 }
 
 /// A year.

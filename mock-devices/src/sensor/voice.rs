@@ -155,6 +155,14 @@ impl Voice {
         asked
     }
 
+    /// A frame is not sent; a device that counts its frames counts it.
+    pub(super) fn pass_over(&mut self) {
+        match self {
+            Self::Declared { encoder, .. } => encoder.lose_frame(),
+            Self::Weiss { .. } | Self::SingleTact { .. } | Self::AnySkin => {}
+        }
+    }
+
     /// A frame that is pushed; `elements` is a wrong number of them.
     pub(super) fn frame(
         &mut self,

@@ -23,7 +23,7 @@ fn every_shipped_description_is_good() {
     for name in &names {
         shipped(name.to_str().unwrap());
     }
-    assert_eq!(names, ["digitacts", "pr2-fingertip"]);
+    assert_eq!(names, ["digitacts", "digitacts-hid", "pr2-fingertip"]);
 }
 
 #[test]
