@@ -23,7 +23,7 @@
 //!   An axis that starts without knowing where it is shows `WR` until it is homed.
 //!
 //! The words of the flags and rejections are ours. Nothing here has met a real device yet. Why this is not the `zproto`
-//! crate: `docs/decisions/0012-zabers-protocol-is-ours.md`.
+//! crate: `docs/decisions/0013-zabers-protocol-is-ours.md`.
 //!
 //! [`Decoder`] and [`Message`] read what devices say, [`Command`] is what a host says, [`Flag`] and
 //! [`Rejection`] are in words, [`Session`] is the host's side of the conversation. [`CommandDecoder`] and
