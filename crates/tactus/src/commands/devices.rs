@@ -62,7 +62,7 @@ impl Rigs {
             for file in FOLDERS.iter().flat_map(|folder| toml_files(Path::new(folder))) {
                 match config::load_rig(&file) {
                     Ok(RigFiles { rig: found, .. }) if rig.is_none_or(|name| name == found.name) => {
-                        rigs.add(&found)
+                        rigs.add(&found);
                     }
                     Ok(_) => {}
                     Err(error) => rigs.notes.push(error.to_string()),
