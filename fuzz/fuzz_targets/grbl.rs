@@ -1,47 +1,16 @@
 //! What a `grbl` stage may send, whatever is asked of it: no conversation panics, and every command ends once at most.
 #![no_main]
 
-use std::time::Duration;
-
 use libfuzzer_sys::fuzz_target;
-use tactus_fuzz::{Happening, happenings};
-use tactus_wire::grbl::{Action, Config, Session};
+use tactus_fuzz::converse;
+use tactus_wire::grbl::{Axis, Config, Session};
+use tactus_wire::stage::{AxisName, Direction};
 
 fuzz_target!(|input: &[u8]| {
-    let mut session = session();
-    let mut now = Duration::ZERO;
-    let (mut asked, mut done) = (0, 0);
-    let mut actions = session.start(now);
-    for happening in happenings(input) {
-        done += actions.iter().filter(|action| matches!(action, Action::Done(_))).count();
-        assert!(done <= asked, "a command ended twice, or one that was never given");
-        if actions.iter().any(|action| matches!(action, Action::Failed(_))) {
-            return;
-        }
-        actions = match happening {
-            Happening::Bytes(bytes) => session.receive(now, bytes),
-            Happening::Deadline => {
-                now = session.deadline().unwrap_or(now).max(now);
-                session.timer(now)
-            }
-            Happening::Pause(pause) => {
-                now += pause;
-                Vec::new()
-            }
-            Happening::Command(3) => session.stop(now),
-            Happening::Command(_) if !session.is_ready() => Vec::new(),
-            Happening::Command(kind) => {
-                asked += 1;
-                match kind {
-                    0 => session.home(now),
-                    1 => session.clear_alarm(now),
-                    _ => session.move_to(now, [f64::from(kind), 0.5, -0.25], 10.0),
-                }
-            }
-        };
+    let axis = |machine| Axis { machine, direction: Direction::Positive, origin_mm: 0.0, steps_per_mm: None };
+    let axes = [AxisName::X, AxisName::Y, AxisName::Z].map(axis);
+    match Session::new(Config { tolerance_mm: 0.005, axes, needs_soft_limits: true }) {
+        Ok(session) => converse(session, input),
+        Err(error) => unreachable!("three axes, each its own: {error}"),
     }
 });
-
-fn session() -> Session {
-    Session::new(Config { tolerance_mm: 0.005 })
-}

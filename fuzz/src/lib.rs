@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use tactus_wire::stage::{Action, Session};
+
 /// Bytes that arrive together, at most.
 const ARRIVAL_MAX_BYTES: usize = 64;
 
@@ -51,4 +53,42 @@ pub fn happenings(mut input: &[u8]) -> Vec<Happening<'_>> {
         });
     }
     happenings
+}
+
+/// Lets everything happen to a stage's session, whatever a person asks meanwhile.
+///
+/// # Panics
+/// If a command ends twice, or one that was never given.
+pub fn converse(mut session: impl Session, input: &[u8]) {
+    let mut now = Duration::ZERO;
+    let (mut asked, mut done) = (0, 0);
+    let mut actions = session.start(now);
+    for happening in happenings(input) {
+        done += actions.iter().filter(|action| matches!(action, Action::Done(_))).count();
+        assert!(done <= asked, "a command ended twice, or one that was never given");
+        if actions.iter().any(|action| matches!(action, Action::Failed(_))) {
+            return;
+        }
+        actions = match happening {
+            Happening::Bytes(bytes) => session.receive(now, bytes),
+            Happening::Deadline => {
+                now = session.deadline().unwrap_or(now).max(now);
+                session.timer(now)
+            }
+            Happening::Pause(pause) => {
+                now += pause;
+                Vec::new()
+            }
+            Happening::Command(3) => session.stop(now),
+            Happening::Command(_) if !session.is_ready() => Vec::new(),
+            Happening::Command(kind) => {
+                asked += 1;
+                match kind {
+                    0 => session.home(now),
+                    1 => session.clear_alarm(now),
+                    _ => session.move_to(now, [f64::from(kind), 0.5, -0.25], 10.0),
+                }
+            }
+        };
+    }
 }
