@@ -19,10 +19,9 @@ use hidapi::{BusType, HidApi, HidDevice, HidError};
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use tactus_schema::rig::{HidLink, MAX_REPORT_BYTES, UsbIdentity};
-use tokio::task::spawn_blocking;
 
 use super::identity::{ABSENT, Candidate, permission, the_one};
-use super::packets::{LastReader, PacketSink, PacketSource, StillOpen, stream};
+use super::packets::{LastReader, PacketSink, PacketSource, PacketStream, StillOpen, open_apart, stream_of};
 use super::{ByteStream, Connect};
 use crate::{DeviceError, ErrorKind};
 
@@ -45,7 +44,7 @@ impl HidConnector {
         Self { link, last: LastReader::default() }
     }
 
-    fn open(&self) -> Result<Box<dyn ByteStream>, DeviceError> {
+    fn open(&self) -> Result<PacketStream, DeviceError> {
         self.last.wait().map_err(|StillOpen| self.error(ErrorKind::Busy, "this program holds it already"))?;
         let nodes = nodes().map_err(|error| {
             let what = format!("human interface devices cannot be listed: {error}");
@@ -56,15 +55,7 @@ impl HidConnector {
         let reader = open(&node.path).map_err(|error| explain(self, &node, error))?;
         tracing::info!(device = %self, node = %node.path.display(), interface = ?node.interface, "opened");
         let source = HidSource::new(reader, self.link.report_bytes.unwrap_or(MAX_REPORT_BYTES));
-        match stream(&self.to_string(), source, Some(Box::new(HidSink(writer))), &self.last) {
-            Ok(stream) => Ok(Box::new(stream)),
-            Err(error) => Err(DeviceError::from_io(
-                self,
-                ErrorKind::DeviceFault,
-                format!("no thread to read it: {error}"),
-                error,
-            )),
-        }
+        stream_of(self, source, Some(Box::new(HidSink(writer))), &self.last)
     }
 
     fn error(&self, kind: ErrorKind, what: impl Into<String>) -> DeviceError {
@@ -75,16 +66,7 @@ impl HidConnector {
 impl Connect for HidConnector {
     fn connect(&self) -> BoxFuture<'_, Result<Box<dyn ByteStream>, DeviceError>> {
         let connector = self.clone();
-        async move {
-            match spawn_blocking(move || connector.open()).await {
-                Ok(opened) => opened,
-                Err(error) => {
-                    let what = format!("it could not be opened: {error}");
-                    Err(DeviceError::from_io(self, ErrorKind::DeviceFault, what, error.into()))
-                }
-            }
-        }
-        .boxed()
+        open_apart(self, move || connector.open()).boxed()
     }
 }
 

@@ -3,6 +3,7 @@
 //! A thread owns the reading, and ends when the stream is dropped. Packets keep their boundaries: each is handed out
 //! by one read, if the reader's buffer has room for it; else the rest comes with the next. Each write is one packet.
 
+use std::fmt;
 use std::io;
 use std::mem;
 use std::pin::Pin;
@@ -14,6 +15,9 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::sync::mpsc;
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::task::{JoinHandle, spawn_blocking};
+
+use super::ByteStream;
+use crate::{DeviceError, ErrorKind};
 
 /// Packets that may wait for the reader. With more than these the thread waits, and reads no further: a USB device
 /// then waits too, and of HID reports the system keeps a few more.
@@ -62,6 +66,36 @@ impl LastReader {
         }
         Ok(())
     }
+}
+
+/// Opens a device by a library that blocks, apart from what must not wait.
+pub(super) async fn open_apart<T>(
+    device: &impl fmt::Display,
+    open: impl FnOnce() -> Result<T, DeviceError> + Send + 'static,
+) -> Result<Box<dyn ByteStream>, DeviceError>
+where
+    T: ByteStream + 'static,
+{
+    match spawn_blocking(open).await {
+        Ok(opened) => Ok(Box::new(opened?)),
+        Err(error) => {
+            let what = format!("it could not be opened: {error}");
+            Err(DeviceError::from_io(device, ErrorKind::DeviceFault, what, error.into()))
+        }
+    }
+}
+
+/// As [`stream`], of a device that is told by its name in errors.
+pub(super) fn stream_of(
+    device: &impl fmt::Display,
+    source: impl PacketSource,
+    sink: Option<Box<dyn PacketSink>>,
+    last: &LastReader,
+) -> Result<PacketStream, DeviceError> {
+    stream(&device.to_string(), source, sink, last).map_err(|error| {
+        let what = format!("no thread to read it: {error}");
+        DeviceError::from_io(device, ErrorKind::DeviceFault, what, error)
+    })
 }
 
 /// Starts the thread that reads `source`; `sink` is `None` for a device that is only read.

@@ -18,10 +18,9 @@ use futures_util::future::BoxFuture;
 use rusb::{Context, DeviceHandle, UsbContext};
 use tactus_schema::rig::UsbLink;
 use tactus_wire::declared::MAX_FRAME_BYTES;
-use tokio::task::spawn_blocking;
 
 use super::identity::{ABSENT, Candidate, permission, the_one};
-use super::packets::{LastReader, PacketSink, PacketSource, StillOpen, stream};
+use super::packets::{LastReader, PacketSink, PacketSource, PacketStream, StillOpen, open_apart, stream_of};
 use super::{ByteStream, Connect};
 use crate::bus::{self, EndpointKind, UsbDevice, UsbEndpoint};
 use crate::{DeviceError, ErrorKind};
@@ -54,7 +53,7 @@ impl UsbConnector {
         Self { link, last: LastReader::default() }
     }
 
-    fn open(&self) -> Result<Box<dyn ByteStream>, DeviceError> {
+    fn open(&self) -> Result<PacketStream, DeviceError> {
         self.last.wait().map_err(|StillOpen| self.error(ErrorKind::Busy, "this program holds it already"))?;
         let device = the_one(self, &self.link.identity, bus::devices(Path::new(bus::ROOT)), APART)?;
         let endpoints =
@@ -73,15 +72,7 @@ impl UsbConnector {
             "opened"
         );
         let source = UsbSource::new(self.to_string(), pipe, endpoints.read);
-        match stream(&self.to_string(), source, sink, &self.last) {
-            Ok(stream) => Ok(Box::new(stream)),
-            Err(error) => Err(DeviceError::from_io(
-                self,
-                ErrorKind::DeviceFault,
-                format!("no thread to read it: {error}"),
-                error,
-            )),
-        }
+        stream_of(self, source, sink, &self.last)
     }
 
     /// Opens the device and takes the interface from whatever driver of the system has it.
@@ -119,16 +110,7 @@ impl UsbConnector {
 impl Connect for UsbConnector {
     fn connect(&self) -> BoxFuture<'_, Result<Box<dyn ByteStream>, DeviceError>> {
         let connector = self.clone();
-        async move {
-            match spawn_blocking(move || connector.open()).await {
-                Ok(opened) => opened,
-                Err(error) => {
-                    let what = format!("it could not be opened: {error}");
-                    Err(DeviceError::from_io(self, ErrorKind::DeviceFault, what, error.into()))
-                }
-            }
-        }
-        .boxed()
+        open_apart(self, move || connector.open()).boxed()
     }
 }
 
