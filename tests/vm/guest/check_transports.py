@@ -1,0 +1,77 @@
+"""The service reads every kind of USB device by its identity, and a newcomer finds what to write for it."""
+
+import json
+
+from check_enumeration import BULK_LINK, HID_LINK
+from check_streaming import run_on
+from lab import Folder, Service, check, plug, rig_file, until_gone
+
+SERIAL = '{ kind = "serial", usb = { vid = 0x1209, pid = 0x0001, serial = "SIM-SENSOR" }, baud = 115200 }'
+HID = '{ kind = "hid", vid = 0x1209, pid = 0x0003, serial = "SIM-SENSOR", interface = 0 }'
+BULK = (
+    '{ kind = "usb", vid = 0x1209, pid = 0x0004, serial = "SIM-SENSOR", interface = 0, endpoint_in = 0x81, '
+    "endpoint_out = 0x01 }"
+)
+
+
+def speaking(folder, transport, link=None):
+    """The shipped rig, its sensor at a transport, speaking by a description if there is one."""
+    changes = {'{ kind = "serial", path = "/dev/serial/by-id/usb-Tactus_SIM_virtual_sensor_SIM-SENSOR-if00", baud = 115200 }': transport}
+    if link:
+        changes['protocol = "weiss-dsa"'] = f'protocol = "declared"\nformat = "{link}"'
+    return rig_file(folder, **changes)
+
+
+def run_with(kind, transport, link=None):
+    with Folder() as folder:
+        rig = speaking(folder, transport, link)
+        with plug("--sensor", kind, "--stage", "cdc-acm", rig=rig), Service(rig) as service:
+            run_on(folder, service, kind)
+    until_gone()
+
+
+def check_a_run_over_hid():
+    """transports: an experiment whose sensor sends reports"""
+    run_with("hid", HID, HID_LINK)
+
+
+def check_a_run_over_bulk():
+    """transports: an experiment whose sensor has a bulk endpoint"""
+    run_with("bulk", BULK, BULK_LINK)
+
+
+def found_elsewhere(kind, transport, link=None):
+    with Folder() as folder:
+        rig = speaking(folder, transport, link)
+        with plug("--sensor", kind, "--stage", "cdc-acm", rig=rig) as mock, Service(rig) as service:
+            service.until_connected()
+            mock.do("sensor unplug")
+            gone = service.until("the sensor is gone", lambda said: not said["sensor"]["connected"])
+            before = gone["sensor"]["frames"]
+            mock.do("sensor plug elsewhere")
+            service.until("frames again", lambda said: said["sensor"]["connected"] and said["sensor"]["frames"] > before)
+            check(f"{kind}: unplugged and plugged in elsewhere, it is read again", True, True)
+    until_gone()
+
+
+def check_found_elsewhere():
+    """transports: by its identity a device is found wherever it is plugged in"""
+    found_elsewhere("cdc-acm", SERIAL)
+    found_elsewhere("hid", HID, HID_LINK)
+    found_elsewhere("bulk", BULK, BULK_LINK)
+
+
+def check_what_to_write():
+    """transports: `tactus devices` says what to write into a rig file for each, and whose it is"""
+    with Folder() as folder:
+        rig = speaking(folder, HID, HID_LINK)
+        with plug("--sensor", "hid", "--stage", "cdc-acm", rig=rig), Service(rig) as service:
+            service.until_connected()
+            said = json.loads(service.tactus("devices", "--rig", rig).stdout)
+            ours = [device for device in said["devices"] if (device["serial"] or "").startswith("SIM")]
+            check("lines for the rig file", True, HID in [device["transport"] for device in ours])
+            claimed = sorted(link["role"] for device in ours for link in device["rigs"])
+            check("whose they are", ["sensor", "stage"], claimed)
+            check("what is missing", [], said["missing"])
+            check("they are held by the service", {"held"}, {device["access"] for device in ours if device["rigs"]})
+    until_gone()
