@@ -62,8 +62,8 @@ pub(crate) struct Problem<'a> {
     /// Duration of the longest run.
     pub(crate) duration_s: f64,
     pub(crate) threads: &'a Threads,
-    /// How many times as much sums of squares scatter as those of noise without memory.
-    pub(crate) memory: f64,
+    /// By how much the variance of a sum of squares exceeds that of independent readings.
+    pub(crate) squares_inflation: f64,
 }
 
 /// A model that was fitted.
@@ -93,7 +93,6 @@ impl<'a> Problem<'a> {
         let weigh = |(weight, heldout): (&f64, &bool)| if *heldout { 0.0 } else { *weight };
         let train: Vec<f64> = rows.weight.iter().zip(&rows.heldout).map(weigh).collect();
         let inflation = noise.inflation(LONG_FRAMES);
-        let phi = ((inflation - 1.0) / (inflation + 1.0)).clamp(0.0, 0.98);
         let slow = |(row, weight): (usize, &f64)| {
             if *weight > 0.0 { rows.frames_in(row) as f64 / inflation } else { 0.0 }
         };
@@ -116,7 +115,7 @@ impl<'a> Problem<'a> {
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
             sensor,
             threads,
-            memory: (1.0 + phi * phi) / (1.0 - phi * phi),
+            squares_inflation: noise.squares_inflation(LONG_FRAMES),
         }
     }
 

@@ -115,9 +115,7 @@ impl Problem<'_> {
         let variance: f64 = blocks.iter().map(|[_, readings]| 2.0 * readings).sum();
         HeldOutGap { value, error: variance.sqrt() }
     }
-}
 
-impl Problem<'_> {
     /// What a model surely leaves of the held-out rows, in units of the noise's variance, summed: the readings with a signal
     /// of all rows, fitted or held out, against those without, which have the same noise.
     pub(crate) fn surely_left(&self, at: &Fitted) -> f64 {
@@ -148,7 +146,7 @@ impl Problem<'_> {
             return 0.0;
         }
         let value = loud[0] - quiet[0] / quiet[1] * loud[1];
-        let error = (2.0 * self.memory * (loud[1] + loud[1] * loud[1] / quiet[1])).sqrt();
+        let error = (2.0 * self.squares_inflation * (loud[1] + loud[1] * loud[1] / quiet[1])).sqrt();
         (value - SURE_Z * error).max(0.0) * held[1] / (held[0] + held[1])
     }
 }

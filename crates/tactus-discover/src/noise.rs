@@ -134,6 +134,15 @@ impl Noise {
         correlated + (count - 1.0) * self.rounding_share
     }
 
+    /// By how much the variance of a sum of squares of readings exceeds that of independent ones, if the noise forgets as
+    /// fast in each frame as its means of `frames` readings say: `(1 + phi^2) / (1 - phi^2)`, where they have the
+    /// inflation `(1 + phi) / (1 - phi)`.
+    pub(crate) fn squares_inflation(&self, frames: usize) -> f64 {
+        let inflation = self.inflation(frames);
+        let phi = ((inflation - 1.0) / (inflation + 1.0)).clamp(0.0, 0.98);
+        (1.0 + phi * phi) / (1.0 - phi * phi)
+    }
+
     /// After so many frames readings are independent.
     pub(crate) fn memory_frames(&self) -> usize {
         memory_frames(&self.correlation)

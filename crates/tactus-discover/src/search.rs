@@ -54,7 +54,7 @@ const EXCHANGES_MAX: usize = 3;
 const INSEPARABLE_Z: f64 = 3.0;
 const INSEPARABLE_SHARE: f64 = 0.9;
 /// An effect stays if the held-out presses are further off without it by so many standard errors, and by such a share
-/// of what the whole model leaves of them, where that depends on anything.
+/// of what the whole model surely leaves of them.
 const EARNS_Z: f64 = 2.0;
 const EARNS_SHARE: f64 = 0.3;
 /// Several effects must bring the held-out presses nearer than one alone does, by so many standard errors and by such a

@@ -218,33 +218,21 @@ fn explain(name: impl fmt::Display, device: &UsbDevice, interface: u8, error: ru
     {
         return refused;
     }
-    let (kind, what) = match error {
-        rusb::Error::Busy => (
-            ErrorKind::Busy,
-            format!(
-                "another program holds interface {interface}: end it; `fuser -v {}` shows it",
-                device.node().display()
-            ),
-        ),
-        rusb::Error::NoDevice => (ErrorKind::Absent, ABSENT.to_owned()),
-        rusb::Error::NotFound => (
-            ErrorKind::WrongDevice,
-            format!("it has no interface {interface} that can be claimed: is it the right device?"),
-        ),
-        rusb::Error::Io
-        | rusb::Error::InvalidParam
-        | rusb::Error::Access
-        | rusb::Error::Timeout
-        | rusb::Error::Overflow
-        | rusb::Error::Pipe
-        | rusb::Error::Interrupted
-        | rusb::Error::NoMem
-        | rusb::Error::NotSupported
-        | rusb::Error::BadDescriptor
-        | rusb::Error::Other => (
-            ErrorKind::DeviceFault,
-            "it is there and cannot be opened: unplug it and plug it in again".to_owned(),
-        ),
+    let (kind, what) = if error == rusb::Error::Busy {
+        let node = device.node();
+        let what = format!(
+            "another program holds interface {interface}: end it; `fuser -v {}` shows it",
+            node.display()
+        );
+        (ErrorKind::Busy, what)
+    } else if error == rusb::Error::NoDevice {
+        (ErrorKind::Absent, ABSENT.to_owned())
+    } else if error == rusb::Error::NotFound {
+        let what = format!("it has no interface {interface} that can be claimed: is it the right device?");
+        (ErrorKind::WrongDevice, what)
+    } else {
+        let what = "it is there and cannot be opened: unplug it and plug it in again";
+        (ErrorKind::DeviceFault, what.to_owned())
     };
     DeviceError::from_io(name, kind, format!("{what} ({error})"), io::Error::other(error))
 }
@@ -356,20 +344,12 @@ impl PacketSink for UsbSink {
 
 /// A link that was open and is no more.
 fn broken(error: rusb::Error) -> io::Error {
-    let kind = match error {
-        rusb::Error::NoDevice | rusb::Error::NotFound => io::ErrorKind::NotConnected,
-        rusb::Error::Timeout => io::ErrorKind::TimedOut,
-        rusb::Error::Io
-        | rusb::Error::InvalidParam
-        | rusb::Error::Access
-        | rusb::Error::Busy
-        | rusb::Error::Overflow
-        | rusb::Error::Pipe
-        | rusb::Error::Interrupted
-        | rusb::Error::NoMem
-        | rusb::Error::NotSupported
-        | rusb::Error::BadDescriptor
-        | rusb::Error::Other => io::ErrorKind::BrokenPipe,
+    let kind = if matches!(error, rusb::Error::NoDevice | rusb::Error::NotFound) {
+        io::ErrorKind::NotConnected
+    } else if error == rusb::Error::Timeout {
+        io::ErrorKind::TimedOut
+    } else {
+        io::ErrorKind::BrokenPipe
     };
     io::Error::new(kind, error)
 }
