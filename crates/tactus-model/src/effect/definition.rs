@@ -31,6 +31,8 @@ pub struct Parameter {
     pub range: [f64; 2],
     /// What kind of number it is.
     pub kind: Kind,
+    /// True if it is neutral where no value is given.
+    pub is_optional: bool,
 }
 
 /// Kinds of parameters.
@@ -170,27 +172,33 @@ impl Definition {
 impl Parameter {
     /// A real number within a range.
     pub const fn real(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
-        Self { name, neutral, range, kind: Kind::Real }
+        Self { name, neutral, range, kind: Kind::Real, is_optional: false }
+    }
+
+    /// The same, which may be left out: what an effect had from its beginning may not.
+    pub const fn or_neutral(self) -> Self {
+        Self { is_optional: true, ..self }
     }
 
     /// Index of an element.
     pub const fn element(name: &'static str) -> Self {
-        Self { name, neutral: 0.0, range: [0.0, u32::MAX as f64], kind: Kind::Element }
+        Self { name, neutral: 0.0, range: [0.0, u32::MAX as f64], kind: Kind::Element, is_optional: false }
     }
 
     /// Index of an element, or -1 for all of them.
     pub const fn element_or_all(name: &'static str) -> Self {
-        Self { name, neutral: -1.0, range: [-1.0, u32::MAX as f64], kind: Kind::ElementOrAll }
+        Self {
+            name,
+            neutral: -1.0,
+            range: [-1.0, u32::MAX as f64],
+            kind: Kind::ElementOrAll,
+            is_optional: true,
+        }
     }
 
     /// A number within a range that no fit varies.
     pub const fn given(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
-        Self { name, neutral, range, kind: Kind::Given }
-    }
-
-    /// True if it is neutral where no value is given.
-    const fn is_optional(&self) -> bool {
-        matches!(self.kind, Kind::ElementOrAll | Kind::Given)
+        Self { name, neutral, range, kind: Kind::Given, is_optional: true }
     }
 
     /// True if a value is the index of an element.
@@ -201,8 +209,8 @@ impl Parameter {
 }
 
 impl Effect {
-    /// The effect of a name in the [`REGISTRY`], with a value for each parameter, in any order; those of the kinds
-    /// [`Kind::ElementOrAll`] and [`Kind::Given`] may be left out.
+    /// The effect of a name in the [`REGISTRY`], with a value for each parameter, in any order; those that are
+    /// [`Parameter::is_optional`] may be left out.
     ///
     /// # Errors
     /// [`EffectError`] says what is unknown, missing or out of range.
@@ -234,7 +242,7 @@ impl Effect {
         }
         let value = |(parameter, value): (&Parameter, Option<f64>)| match value {
             Some(value) => definition.check(parameter, value),
-            None if parameter.is_optional() => Ok(parameter.neutral),
+            None if parameter.is_optional => Ok(parameter.neutral),
             None => Err(EffectError::Missing { effect, parameter: parameter.name }),
         };
         let values = definition.parameters.iter().zip(given).map(value).collect::<Result<_, _>>()?;

@@ -1,10 +1,15 @@
 //! `misregistration`: the sensor does not lie where the robot's calibration says.
 //!
 //! ```text
-//! p_sensor = (1 + scale_error) Rot(-(rotation + rotation_deg)) (p_robot - origin - offset)
+//! p_sensor = (1 + scale_error) Rot(-(rotation + rotation_deg)) S (p_robot - origin - offset)
+//!
+//!     | 1  tan(squareness_deg) |
+//! S = |                        |
+//!     | 0           1          |
 //! ```
 //!
-//! Shift and turn are those of the registration itself; the scale is the stage's, about the shifted origin.
+//! Shift and turn are those of the registration itself. Scale and squareness are the stage's, about the shifted origin: its steps are
+//! longer than it believes, and its y axis leans towards x.
 //!
 //! # Source
 //! The paper's Sec. 2.1: two touches near opposite corners set the registration, and so carry their errors.
@@ -13,12 +18,13 @@ use super::{Base, Definition, Make, Now, OnMotion, Parameter, Place, Shift};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "misregistration",
-    summary: "the transform from robot to sensor is off by a shift, a turn and a scale",
+    summary: "the transform from robot to sensor is off by a shift, a turn, a scale and a stage that is not square",
     parameters: &[
         Parameter::real("offset_x_mm", 0.0, [-5.0, 5.0]),
         Parameter::real("offset_y_mm", 0.0, [-5.0, 5.0]),
         Parameter::real("rotation_deg", 0.0, [-45.0, 45.0]),
         Parameter::real("scale_error", 0.0, [-0.2, 0.2]),
+        Parameter::real("squareness_deg", 0.0, [-10.0, 10.0]).or_neutral(),
     ],
     near_twins: &[
         "surface-tilt",
@@ -34,6 +40,7 @@ pub(super) static DEFINITION: Definition = Definition {
             offset_mm: [values[0], values[1]],
             rotation_deg: values[2],
             scale_error: values[3],
+            lean: values[4].to_radians().tan(),
         })
     }),
 };
@@ -43,6 +50,8 @@ struct Misregistration {
     offset_mm: [f64; 2],
     rotation_deg: f64,
     scale_error: f64,
+    /// mm of x a mm of y.
+    lean: f64,
 }
 
 impl OnMotion for Misregistration {
@@ -57,13 +66,22 @@ impl OnMotion for Misregistration {
         let (sin, cos) = place.registration.rotation_deg.to_radians().sin_cos();
         let [x, y] = place.position_mm();
         let degree = 1.0_f64.to_radians();
+        let along_y_mm = sin * x + cos * y;
+        let widening = degree * (1.0 + self.lean * self.lean);
         match parameter {
             0 => Some(Shift { position_mm: [-scale * cos, scale * sin], ..Shift::default() }),
-            1 => Some(Shift { position_mm: [-scale * sin, -scale * cos], ..Shift::default() }),
+            1 => Some(Shift {
+                position_mm: [-scale * (sin + self.lean * cos), -scale * (cos - self.lean * sin)],
+                ..Shift::default()
+            }),
             2 => {
                 Some(Shift { position_mm: [degree * y, -degree * x], rotation_deg: -1.0, ..Shift::default() })
             }
             3 => Some(Shift { position_mm: [x / scale, y / scale], ..Shift::default() }),
+            4 => Some(Shift {
+                position_mm: [widening * along_y_mm * cos, -widening * along_y_mm * sin],
+                ..Shift::default()
+            }),
             _ => None,
         }
     }
@@ -75,8 +93,10 @@ impl Misregistration {
         registration.rotation_deg += self.rotation_deg;
         for axis in 0..2 {
             registration.origin_mm[axis] += self.offset_mm[axis];
-            place.tip_mm[axis] += self.scale_error * (place.tip_mm[axis] - registration.origin_mm[axis]);
         }
+        let [x, y] = [0, 1].map(|axis| place.tip_mm[axis] - registration.origin_mm[axis]);
+        place.tip_mm[0] += self.scale_error * x + (1.0 + self.scale_error) * self.lean * y;
+        place.tip_mm[1] += self.scale_error * y;
     }
 }
 

@@ -28,9 +28,35 @@ fn a_stage_whose_steps_are_long_goes_further_from_the_origin() {
 }
 
 #[test]
+fn a_stage_that_is_not_square_goes_along_x_as_it_goes_along_y() {
+    let leaning = simulator([effect(
+        "misregistration",
+        [
+            ("offset_x_mm", 0.0),
+            ("offset_y_mm", 0.0),
+            ("rotation_deg", 0.0),
+            ("scale_error", 0.0),
+            ("squareness_deg", 5.0),
+        ],
+    )]);
+    let true_one = simulator([]);
+    let [x, y, z] = upon(&leaning, 21, 0.4);
+    let aside_mm = [x + 5.0_f64.to_radians().tan() * (y - 15.0), y, z];
+    for (got, want) in still(&leaning, [x, y, z]).iter().zip(still(&true_one, aside_mm)) {
+        assert!((got - want).abs() < 1e-9, "{got} {want}");
+    }
+}
+
+#[test]
+fn a_model_file_from_before_it_had_a_squareness_is_one_of_a_square_stage() {
+    let named = [("offset_x_mm", 0.3), ("offset_y_mm", -0.2), ("rotation_deg", 1.5), ("scale_error", 0.01)];
+    assert_eq!(effect("misregistration", named).value("squareness_deg"), Some(0.0));
+}
+
+#[test]
 fn derivatives_are_those_of_differences() {
-    let names = ["offset_x_mm", "offset_y_mm", "rotation_deg", "scale_error"];
-    let values = [0.2, -0.1, 2.0, 0.05];
+    let names = ["offset_x_mm", "offset_y_mm", "rotation_deg", "scale_error", "squareness_deg"];
+    let values = [0.2, -0.1, 2.0, 0.05, 3.0];
     let all: [_; 4] = std::array::from_fn(|k| (names[k], values[k]));
     assert_slopes(&effect("misregistration", all), &names);
 }
