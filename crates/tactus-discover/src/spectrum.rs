@@ -7,15 +7,20 @@ use crate::Frames;
 use crate::noise::median;
 use crate::rows::interval_s;
 
-/// A line stands out of what is around it by such a factor in power.
-const STANDS_OUT: f64 = 6.0;
+/// A line stands out of what is around it by so many times the scatter of that: the more elements there are whose noise is their own,
+/// the less do their powers, summed, scatter.
+const STANDS_OUT: f64 = 8.0;
+/// The rhythm of the presses stands out by such a factor.
+const RHYTHM_STANDS_OUT: f64 = 6.0;
+/// Standard deviation of a normal distribution whose median distance from its middle is 1.
+const OF_NORMAL: f64 = 1.482_602_2;
 /// What is around a line: so many frequencies each way.
 const AROUND: usize = 40;
 /// Slower than so many periods in the data is a drift, not a tone.
 const PERIODS_LEAST: f64 = 12.0;
 const LINES_MAX: usize = 3;
 
-/// Frequencies of the lines in the residual of the frames without contact, strongest first.
+/// Frequencies of the lines in the residual of the frames without contact, clearest first.
 ///
 /// `residual`: frame by frame, element by element.
 pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
@@ -76,19 +81,29 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
             continue;
         }
         let around = peak.saturating_sub(AROUND).max(1)..(peak + AROUND).min(power.len());
-        let stands_out = |of: &[f64], at: usize| of[at] / median(&of[around.clone()]).max(f64::MIN_POSITIVE);
-        let is_rhythm = || (peak - 1..=peak + 1).any(|at| stands_out(&rhythm, at) > STANDS_OUT);
-        if stands_out(&power, peak) > STANDS_OUT && !is_rhythm() {
+        let clearness = clearness(power[peak], &power[around.clone()]);
+        let is_rhythm = || {
+            let middle = median(&rhythm[around.clone()]);
+            rhythm[peak - 1..=peak + 1].iter().any(|one| *one > RHYTHM_STANDS_OUT * middle)
+        };
+        if clearness > STANDS_OUT && !is_rhythm() {
             // The top of a parabola through the logarithms of three.
             let [left, top, right] =
                 [power[peak - 1], power[peak], power[peak + 1]].map(|p| p.max(f64::MIN_POSITIVE).ln());
             let bend = left - 2.0 * top + right;
             let shift = if bend < 0.0 { 0.5 * (left - right) / bend } else { 0.0 };
-            lines.push((power[peak], (peak as f64 + shift) * step_hz));
+            lines.push((clearness, (peak as f64 + shift) * step_hz));
         }
     }
     lines.sort_by(|a, b| b.0.total_cmp(&a.0));
     lines.into_iter().take(LINES_MAX).map(|(_, hz)| hz).collect()
+}
+
+/// By how many times the scatter of what is around it a power is above that.
+fn clearness(power: f64, around: &[f64]) -> f64 {
+    let middle = median(around);
+    let off: Vec<f64> = around.iter().map(|one| (one - middle).abs()).collect();
+    (power - middle) / (OF_NORMAL * median(&off)).max(f64::MIN_POSITIVE)
 }
 
 /// The discrete Fourier transform, in place; a power of two of points.
