@@ -21,10 +21,13 @@ use crate::{DiscoverError, Options, Rule, not_shown};
 const EXPLAINED_SHARE: f64 = 0.1;
 /// What is left withdraws all names if it is certainly more than this share of the gap, or depends on any covariate and is
 /// more than this share of a gap that is well known,
-const UNEXPLAINED_SHARE: f64 = 0.35;
+const UNEXPLAINED_SHARE: f64 = 0.3;
 /// or, of one that is not, depends on one so clearly, and by so much of how clearly it did at first.
 const LEFT_Z: f64 = 5.2;
 const LEFT_SHARE: f64 = 0.45;
+/// A lone name is withdrawn, too, if it leaves more than this share and certainly more than is explained: several that are right may
+/// leave as much together.
+const LONE_SHARE: f64 = 0.5;
 
 /// What a search found.
 pub(crate) struct Found {
@@ -63,13 +66,16 @@ pub(crate) fn tell(
     let share = search.share_left(&base, &grown);
     let left = after.p_value <= ALPHA;
     let count = names(&grown.parameters, search.known_terms).len();
-    let certain = if count > 0 { search.certain_share_left(&base, &grown) } else { 0.0 };
+    // Coarse steps scatter readings that move, and no others: that is not left.
+    let certain = if count > 0 && lattice.is_none() { search.certain_share_left(&base, &grown) } else { 0.0 };
     // A small gap is known by what depends on what only; a large one by how much of it is left.
     let clear = after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic);
     let large = search.problem.heldout_gap(&base.predicted).is_large();
     // What one effect leaves, of which it closes most, is what its form lacks; several that leave as much are a patchwork.
     let is_form = count == 1 && search.likely_share_left(&base, &grown) <= UNEXPLAINED_SHARE;
+    let is_little = count == 1 && share > LONE_SHARE && certain > EXPLAINED_SHARE;
     let leaves_too_much = certain > UNEXPLAINED_SHARE
+        || is_little
         || left && if large { share > UNEXPLAINED_SHARE } else { clear && !is_form };
     if leaves_too_much && options.rule == Rule::Protocol {
         // A model that leaves so much is none of what it is named after.
