@@ -111,6 +111,8 @@ def installation(lab, package):
     shutil.copy(package, machine.root / "tactus.deb")
     check.succeeds("the package installs", machine.run("dpkg", "-i", "/tactus.deb"))
     check.equal("the unit is enabled", machine.run("systemctl", "is-enabled", UNIT).stdout.strip(), "enabled")
+    shown = machine.run("stat", "--format=%U:%G %a", RUNS).stdout.strip()
+    check.equal("the folder of recordings is there before the first start", shown, "tactus:tactus 755")
     check.equal("an installation starts nothing", machine.unit(UNIT, "ActiveState"), "inactive")
     done = machine.run("udevadm", "test", "--action=add", "/sys/devices/virtual/mem/null")
     said = [line for line in (done.stdout + done.stderr).splitlines() if "70-tactus.rules:" in line]
@@ -302,7 +304,7 @@ def termination(lab):
 
 
 def dynamic_user(lab):
-    """Decision 0021: the service would run as a dynamic user too, but nobody could read what it records."""
+    """Decision 0016: the service would run as a dynamic user too, but nobody could read what it records."""
     machine, check = lab.machine, lab.check
     lab.configure()
     recording = lab.recording()
