@@ -51,9 +51,12 @@ validate: build
 systemd:
     systemd/verify.sh
 
-# The Debian package, target/package/tactus.deb.
-package: package-tool
+# The programs as a lab gets them.
+programs:
     cargo build --release --package tactus --package tactus-daemon --package tactus-mock
+
+# The Debian package, target/package/tactus.deb.
+package: package-tool programs
     packaging/build.sh
 
 # Build cargo-deb once.
@@ -70,7 +73,7 @@ systemd-boot: package
 
 # Virtual USB devices at a real kernel, in an emulated machine: tests/vm/README.md. Some five minutes the first time; names of checks
 # run only those.
-vm *checks: build
+vm *checks: programs
     tests/vm/run.sh {{ checks }}
 
 # The part of it that CI runs.

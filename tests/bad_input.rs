@@ -57,6 +57,17 @@ fn a_misspelt_key_is_refused_with_its_line() {
 }
 
 #[test]
+fn what_is_wrong_is_said_once_with_the_files_name() {
+    let folder = TempDir::new().unwrap();
+    let rig = fs::read_to_string(repository("config/rigs/sim.toml")).unwrap();
+    let visible = rig.split("# What the virtual devices hide").next().unwrap();
+    fs::write(folder.path().join("my-rig.toml"), visible).unwrap();
+    let said = tactus(folder.path(), &["validate", "my-rig.toml"]);
+    assert_eq!(said.code, Some(1), "{said:?}");
+    assert_eq!(said.err.trim(), "my-rig.toml: simulation: missing; a simulated rig needs it");
+}
+
+#[test]
 fn a_recording_cut_short_is_told_and_recovered() {
     let folder = TempDir::new().unwrap();
     fs::write(

@@ -5,7 +5,7 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 repository=$(cd "$here/../.." && pwd)
 work=$repository/target/vm
-binaries=${TACTUS_BINARIES:-$repository/target/debug}
+binaries=${TACTUS_BINARIES:-$repository/target/release}
 
 # From Debian 12 and no other release: the machine is one too, and the programs are built against its C library.
 if ! command -v qemu-system-x86_64 >/dev/null || ! command -v mmdebstrap >/dev/null; then
@@ -24,7 +24,7 @@ mkdir "$stage/bin"
 for program in tactus tactusd tactus-mock; do
     strip --strip-all -o "$stage/bin/$program" "$binaries/$program"
 done
-cp -r "$repository/config" "$repository/experiments" "$here/guest" "$stage/"
+cp -r "$repository/README.md" "$repository/config" "$repository/experiments" "$here/guest" "$stage/"
 printf '%s\n' "$@" > "$stage/chosen"
 
 python3 "$here/machine.py" run "$work" "$stage"

@@ -8,7 +8,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
 use crate::commands;
-use crate::exit::Exit;
+use crate::exit::{Exit, in_words};
 
 /// A lab service for tactile arrays: run experiments, watch, record, export.
 #[derive(Debug, Parser)]
@@ -485,9 +485,9 @@ pub fn main() -> ExitCode {
         Err(error) => {
             let exit = Exit::of_error(&error);
             if common.json {
-                println!("{}", serde_json::json!({ "error": format!("{error:#}"), "exit_code": exit as u8 }));
+                println!("{}", serde_json::json!({ "error": in_words(&error), "exit_code": exit as u8 }));
             } else {
-                eprintln!("tactus: {error:#}");
+                eprintln!("tactus: {}", in_words(&error));
             }
             exit.into()
         }

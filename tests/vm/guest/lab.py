@@ -153,7 +153,8 @@ class Service:
         """Started, and waited for until it says so."""
         self.folder = rig.parent
         config = self.folder / "tactusd.toml"
-        config.write_text('rig = "rig.toml"\nrecordings = "runs"\n')
+        if not config.exists():
+            config.write_text('rig = "rig.toml"\nrecordings = "runs"\n')
         self.program = Program("tactusd", "--config", config, folder=self.folder)
         try:
             self.said = self.program.until(lambda line: says in line, repr(says))

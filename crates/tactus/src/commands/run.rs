@@ -12,7 +12,7 @@ use tactus_schema::pb;
 
 use crate::cli::{Common, ExperimentArgs, RunArgs};
 use crate::connection;
-use crate::exit::{self, Exit, Failure};
+use crate::exit::{self, Exit, Failure, in_words};
 use crate::output::{duration, print_fields};
 
 /// How a run ended, wherever it ran.
@@ -83,7 +83,8 @@ fn make_report(recording: &Path, folder: &Path) -> Option<PathBuf> {
     match made {
         Ok(path) => Some(path),
         Err(error) => {
-            eprintln!("tactus: no report: {error:#}; `tactus report {}` makes it", recording.display());
+            let (why, file) = (in_words(&error), recording.display());
+            eprintln!("tactus: no report: {why}; `tactus report {file}` makes it");
             None
         }
     }

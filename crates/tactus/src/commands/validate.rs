@@ -14,7 +14,7 @@ use tactus_wire::declared;
 
 use super::link;
 use crate::cli::{Common, ValidateArgs};
-use crate::exit::Exit;
+use crate::exit::{Exit, in_words};
 
 pub(crate) fn validate(common: &Common, args: &ValidateArgs) -> Exit {
     let results: Vec<_> = args.files.iter().map(|file| (file, check(file))).collect();
@@ -22,7 +22,7 @@ pub(crate) fn validate(common: &Common, args: &ValidateArgs) -> Exit {
         match result {
             _ if common.json => {}
             Ok(what) => println!("{}: ok, {what}", file.display()),
-            Err(error) => eprintln!("{}: {error:#}", file.display()),
+            Err(error) => eprintln!("{}: {}", file.display(), wrong(file, error)),
         }
     }
     if common.json {
@@ -30,12 +30,19 @@ pub(crate) fn validate(common: &Common, args: &ValidateArgs) -> Exit {
             .iter()
             .map(|(file, result)| match result {
                 Ok(what) => json!({ "file": file, "ok": true, "what": what }),
-                Err(error) => json!({ "file": file, "ok": false, "error": format!("{error:#}") }),
+                Err(error) => json!({ "file": file, "ok": false, "error": wrong(file, error) }),
             })
             .collect();
         println!("{}", json!({ "files": files }));
     }
     if results.iter().all(|(_, result)| result.is_ok()) { Exit::Done } else { Exit::Failed }
+}
+
+/// What is wrong with a file, without its name.
+fn wrong(file: &Path, error: &anyhow::Error) -> String {
+    let words = in_words(error);
+    let prefix = format!("{}: ", file.display());
+    words.strip_prefix(&prefix).map_or_else(|| words.clone(), str::to_owned)
 }
 
 /// What the file is, in words, if nothing is wrong with it.

@@ -15,7 +15,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use crate::cli::Common;
 use crate::connection::{self, PATIENCE};
-use crate::exit::Exit;
+use crate::exit::{Exit, in_words};
 use screen::Screen;
 
 /// The terminal is drawn at most this often; frames between two drawings are counted, not shown.
@@ -80,7 +80,7 @@ async fn show(client: &Client) -> anyhow::Result<Exit> {
                     let request = pb::CommandRequest { who: "watch".into(), reason: "key S".into(), abort: false };
                     screen.note = match connection::ask(client, Command::Stop, &request, PATIENCE).await {
                         Ok(_) => "STOP sent".into(),
-                        Err(error) => format!("STOP FAILED: {error:#}"),
+                        Err(error) => format!("STOP FAILED: {}", in_words(&error)),
                     };
                 }
                 Key::Tare => screen.tare(),

@@ -13,6 +13,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use super::Summary;
 use crate::cli::{Common, RunArgs};
 use crate::connection::{self, PATIENCE};
+use crate::exit::in_words;
 use crate::progress::Progress;
 
 /// How long the dry run may take before the service answers.
@@ -49,7 +50,7 @@ pub(super) async fn run(
                 progress.say("Ctrl-C: stopping and retracting");
                 let request = pb::CommandRequest { who: "cli".into(), reason: "Ctrl-C".into(), abort: false };
                 if let Err(error) = connection::ask(&client, Command::Stop, &request, PATIENCE).await {
-                    progress.say(&format!("STOP FAILED: {error:#}; Ctrl-C tries again"));
+                    progress.say(&format!("STOP FAILED: {}; Ctrl-C tries again", in_words(&error)));
                 }
             }
             there = alive.changed() => if there != Some(true) {

@@ -11,7 +11,7 @@ use tactus_scene::{GpuRenderer, Pose, Renderer};
 use tactus_schema::model::Model;
 
 use crate::cli::SimulateArgs;
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, in_words};
 
 /// The characterisation of the paper's sensor.
 const PAPER_MODEL: &str = include_str!("../../../../../config/models/digitacts.toml");
@@ -29,7 +29,7 @@ impl Scene {
     pub(super) fn of(args: &SimulateArgs) -> anyhow::Result<Self> {
         let usage = |error: &dyn std::fmt::Display| Failure::new(Exit::Usage, error);
         let model = model(args)?;
-        let indenter = indenter(args).map_err(|error| usage(&format!("{error:#}")))?;
+        let indenter = indenter(args).map_err(|error| usage(&in_words(&error)))?;
         let [[x0, x1], [y0, y1]] = model.base.array.extent_mm();
         let position_mm =
             [args.x_mm.unwrap_or(f64::midpoint(x0, x1)), args.y_mm.unwrap_or(f64::midpoint(y0, y1))];

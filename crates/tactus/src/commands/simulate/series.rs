@@ -13,7 +13,7 @@ use tactus_model::{Simulator, Trajectory};
 
 use super::scene::Scene;
 use crate::cli::{Common, SimulateArgs};
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, in_words};
 
 /// Most frames of one series: ten hours at 30 Hz.
 const FRAMES_MAX: f64 = 1_080_000.0;
@@ -84,7 +84,9 @@ pub(super) fn rate_hz(args: &SimulateArgs, scene: &Scene) -> anyhow::Result<f64>
 /// Reads a path: lines of `t_s,x_mm,y_mm,z_mm`, after one that names them.
 pub(super) fn read(path: &Path) -> anyhow::Result<Trajectory> {
     let text = std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
-    parse(&text).map_err(|error| Failure::new(Exit::Usage, format!("{}: {error:#}", path.display())).into())
+    parse(&text).map_err(|error| {
+        Failure::new(Exit::Usage, format!("{}: {}", path.display(), in_words(&error))).into()
+    })
 }
 
 fn parse(text: &str) -> anyhow::Result<Trajectory> {
