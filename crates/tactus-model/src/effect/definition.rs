@@ -176,6 +176,7 @@ impl Parameter {
     }
 
     /// The same, which may be left out: what an effect had from its beginning may not.
+    #[must_use]
     pub const fn or_neutral(self) -> Self {
         Self { is_optional: true, ..self }
     }
