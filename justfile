@@ -118,6 +118,7 @@ truth rigs="200":
 bench:
     cargo bench --package tactus-bench --bench forward -- --quick
     cargo bench --package tactus-bench --bench fem -- --quick
+    cargo bench --package tactus-bench --bench decode -- --quick
     cargo run --release --package tactus-bench -- growth
     cargo run --release --package tactus-bench -- limits
     cargo run --release --package tactus-bench -- acuity
