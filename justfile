@@ -77,7 +77,7 @@ vm *checks: programs
     tests/vm/run.sh {{ checks }}
 
 # The part of it that CI runs.
-vm-slice: (vm "enumeration" "streaming" "transports")
+vm-slice: (vm "enumeration" "streaming" "transports" "readme")
 
 # Stock Python tools read our recordings, tables and bus.
 python: build python-tools

@@ -137,7 +137,7 @@ impl Recipe {
         let bench = Bench::new(&base, courses, climate, noise);
         let (doses, mut physics) = self.doses(&chosen, &bench);
         let Readings { runs, counts, clean } = self.read(&bench, &doses);
-        let Separation { z, z_beyond_spread } = bench.separation_of(&clean);
+        let Separation { z, z_beyond_spread, .. } = bench.separation_of(&clean);
         // Of one alone it is that of the set.
         if let [only] = &mut physics[..] {
             (only.z, only.z_beyond_spread) = (z, z_beyond_spread);
@@ -304,6 +304,9 @@ struct Bench<'a> {
 
 /// The spread of [`Bench::wider`], as a multiple of the true one.
 const WIDER: f64 = 1.001;
+/// A spread that is off by less than this share is near enough, and this often one comes nearer.
+const SPREAD_CHANGE_LEAST: f64 = 5e-4;
+const SPREAD_ROUNDS: usize = 3;
 
 impl<'a> Bench<'a> {
     fn new(base: &'a Base, courses: Vec<Course>, climate: Climate, noise: Noise) -> Self {
@@ -340,7 +343,27 @@ impl<'a> Bench<'a> {
     fn separation_of(&self, with: &[f64]) -> Separation {
         let array = &self.base.rig.array;
         let sigma_counts = self.noise.effective_rms_counts(array.step_counts());
-        Separation::new(&self.clean, with, &self.wider, array.elements(), sigma_counts)
+        let from = |clean: &[f64], wider: &[f64]| {
+            Separation::new(clean, with, wider, array.elements(), sigma_counts)
+        };
+        let mut separation = from(&self.clean, &self.wider);
+        // Counts are linear in small changes of the spread only: what looks like a large one is held against that spread.
+        let mut spread = 1.0;
+        for _ in 0..SPREAD_ROUNDS {
+            let change = (WIDER - 1.0) * separation.spread_steps;
+            if change.abs() < SPREAD_CHANGE_LEAST {
+                break;
+            }
+            spread *= (1.0 + change).clamp(0.8, 1.25);
+            let (Ok(base), Ok(wider)) = (self.base.spread_by(spread), self.base.spread_by(WIDER * spread))
+            else {
+                break;
+            };
+            let nearer = from(&self.counts(&base, &[]), &self.counts(&wider, &[]));
+            let z_beyond_spread = nearer.z_beyond_spread.min(separation.z_beyond_spread);
+            separation = Separation { z_beyond_spread, spread_steps: nearer.spread_steps, ..separation };
+        }
+        separation
     }
 
     /// The strength at which a physics lies `wanted` from the base model: the dose, its separation, and whether it is

@@ -1,6 +1,7 @@
 //! How far physics lies from the base model: what an oracle could tell.
 
-/// A recalibration takes no more than this share off an element's gain: a dead element is no matter of calibration.
+/// A recalibration takes no more than this share off an element's gain, beside what all elements lose: a dead element is no matter of
+/// calibration, a tool that is half as wide is.
 const GAIN_LOSS_MAX: f64 = 0.5;
 
 /// Separation from the base model, in standard deviations of the noise.
@@ -10,7 +11,7 @@ const GAIN_LOSS_MAX: f64 = 0.5;
 /// ```
 ///
 /// `C` are the counts without physics, `D` what physics adds to them, `S` what a somewhat wider spread adds. Per
-/// element, `a_e` and `b_e >= -0.5` are the least-squares offset and gain.
+/// element, `a_e` and `b_e` are the least-squares offset and gain, `1 + b_e` at least half of their median.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Separation {
     /// After gains and baselines were recalibrated (`c = 0`).
@@ -18,6 +19,8 @@ pub struct Separation {
     /// After the spread was recalibrated too (`c` by least squares): where this is small, physics looks like another
     /// spread.
     pub z_beyond_spread: f64,
+    /// `c`: so many times the step to the wider spread.
+    pub spread_steps: f64,
 }
 
 impl Separation {
@@ -33,12 +36,13 @@ impl Separation {
                 fit.add([clean, with[element] - clean, wider[element] - clean]);
             }
         }
+        let least = (1.0 - GAIN_LOSS_MAX) * (1.0 + common_gain(&fits)) - 1.0;
         let [change, both, wider]: [f64; 3] = [(CHANGE, CHANGE), (CHANGE, WIDER), (WIDER, WIDER)]
-            .map(|(one, other)| fits.iter().map(|fit| fit.rest(one, other)).sum());
-        let taken = if wider > 0.0 { both * both / wider } else { 0.0 };
+            .map(|(one, other)| fits.iter().map(|fit| fit.rest(one, other, least)).sum());
+        let spread_steps = if wider > 0.0 { both / wider } else { 0.0 };
         let [z, z_beyond_spread] =
-            [change, change - taken].map(|squares| squares.max(0.0).sqrt() / sigma_counts);
-        Self { z, z_beyond_spread }
+            [change, change - spread_steps * both].map(|squares| squares.max(0.0).sqrt() / sigma_counts);
+        Self { z, z_beyond_spread, spread_steps }
     }
 }
 
@@ -68,18 +72,28 @@ impl Moments {
         }
     }
 
-    /// Product of what gain and offset leave of two.
-    fn rest(&self, one: usize, other: usize) -> f64 {
+    /// The gain that takes up most of one; none where nothing changes without physics.
+    fn gain(&self, of: usize) -> Option<f64> {
+        let clean = self.products[CLEAN][CLEAN];
+        (clean > 0.0).then(|| self.products[CLEAN][of] / clean)
+    }
+
+    /// Product of what gain, not below the least, and offset leave of two.
+    fn rest(&self, one: usize, other: usize, least: f64) -> f64 {
         let product = self.products[one][other];
         let clean = self.products[CLEAN][CLEAN];
-        if clean <= 0.0 {
-            return product;
-        }
-        let gain = |of: usize| (self.products[CLEAN][of] / clean).max(-GAIN_LOSS_MAX);
-        let [by_one, by_other] = [gain(one), gain(other)];
+        let (Some(by_one), Some(by_other)) = (self.gain(one), self.gain(other)) else { return product };
+        let [by_one, by_other] = [by_one, by_other].map(|gain| gain.max(least));
         let crossed = by_one * self.products[CLEAN][other] + by_other * self.products[CLEAN][one];
         product - crossed + by_one * by_other * clean
     }
+}
+
+/// What physics does to the gains of all elements: the median, the upper one of two.
+fn common_gain(fits: &[Moments]) -> f64 {
+    let mut gains: Vec<f64> = fits.iter().filter_map(|fit| fit.gain(CHANGE)).collect();
+    gains.sort_by(f64::total_cmp);
+    gains.get(gains.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

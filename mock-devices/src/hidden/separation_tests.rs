@@ -36,11 +36,19 @@ fn a_dead_element_is_no_recalibration() {
 }
 
 #[test]
+fn a_loss_of_all_elements_is_one() {
+    let clean = rows(|t| [t, 2.0 * t]);
+    let with = rows(|t| [0.3 * t, 0.6 * t]);
+    assert!(Separation::new(&clean, &with, &clean, 2, 1.0).z < 1e-6);
+}
+
+#[test]
 fn another_spread_separates_until_the_spread_too_is_recalibrated() {
     let clean = rows(|t| [t, t]);
     let wider = rows(|t| [t + 0.1 * sign(t), t - 0.1 * sign(t)]);
     let with = rows(|t| [t + 2.0 * sign(t), t - 2.0 * sign(t)]);
-    let Separation { z, z_beyond_spread } = Separation::new(&clean, &with, &wider, 2, 1.0);
+    let Separation { z, z_beyond_spread, spread_steps } = Separation::new(&clean, &with, &wider, 2, 1.0);
     assert!((z - 800.0_f64.sqrt()).abs() < 0.01, "{z}");
     assert!(z_beyond_spread < 1e-4, "{z_beyond_spread}");
+    assert!((spread_steps - 20.0).abs() < 0.1, "{spread_steps}");
 }
