@@ -19,15 +19,10 @@ fn main() -> Result<()> {
     let mut criterion = Criterion::default().configure_from_args();
     let full = |frame| weiss::encode_frame(time_ms(frame), &counts(frame), false);
     let run_length = |frame| weiss::encode_frame(time_ms(frame), &counts(frame), true);
-    bench(
-        &mut criterion,
-        "weiss-dsa",
-        &stream(|frame| weiss::encode_packet(0, &full(frame))),
-        weiss_dsa(Checksum::Crc),
-    );
-    let packed = stream(|frame| weiss::encode_packet(0, &run_length(frame)));
+    bench(&mut criterion, "weiss-dsa", &stream(full), weiss_dsa(Checksum::Crc));
+    let packed = stream(run_length);
     bench(&mut criterion, "weiss-dsa, run lengths", &packed, weiss_dsa(Checksum::Crc));
-    let summed = stream(|frame| Checksum::Sum8.close(weiss::encode_packet(0, &full(frame))));
+    let summed = stream(|frame| Checksum::Sum8.close(full(frame)));
     bench(&mut criterion, "weiss-dsa, sum8", &summed, weiss_dsa(Checksum::Sum8));
     bench(&mut criterion, "singletact", &stream(single_reply), take_replies);
     bench(&mut criterion, "anyskin", &stream(magnetic_frame), take_magnetic);
