@@ -74,7 +74,7 @@ fn time_ms(frame: u16) -> u32 {
     33 * u32::from(frame)
 }
 
-/// A bit flipped in every hundredth byte, at places that no frame's length divides.
+/// A bit flipped in every 101st byte, at places that no frame's length divides.
 fn corrupted(bytes: &[u8]) -> Vec<u8> {
     let flip = |(index, byte): (usize, &u8)| if index % 101 == 100 { byte ^ 0x10 } else { *byte };
     bytes.iter().enumerate().map(flip).collect()
@@ -89,19 +89,31 @@ fn counts(frame: u16) -> [u16; ELEMENTS] {
     })
 }
 
-fn weiss_dsa(checksum: Checksum) -> impl Fn(&[u8]) -> usize {
-    move |bytes| {
-        let mut decoder = weiss::Decoder::new().with_checksum(checksum);
-        let mut frames = 0;
-        for read in bytes.chunks(READ_BYTES) {
-            decoder.push(read);
-            while let Some(packet) = decoder.next_packet() {
-                frames += usize::from(
-                    packet.is_ok_and(|packet| weiss::Frame::parse(&packet, ELEMENTS).map(black_box).is_ok()),
-                );
-            }
+/// Pushes the bytes through a decoder, as reads bring them; the number of readings. `next` takes the next thing out, if there is one, and says
+/// whether it is a reading.
+fn readings<D>(
+    bytes: &[u8],
+    mut decoder: D,
+    push: impl Fn(&mut D, &[u8]),
+    next: impl Fn(&mut D) -> Option<bool>,
+) -> usize {
+    let mut readings = 0;
+    for read in bytes.chunks(READ_BYTES) {
+        push(&mut decoder, read);
+        while let Some(is_reading) = next(&mut decoder) {
+            readings += usize::from(is_reading);
         }
-        frames
+    }
+    readings
+}
+
+fn weiss_dsa(checksum: Checksum) -> impl Fn(&[u8]) -> usize {
+    let is_frame = |packet: weiss::Packet<'_>| weiss::Frame::parse(&packet, ELEMENTS).map(black_box).is_ok();
+    move |bytes| {
+        let decoder = weiss::Decoder::new().with_checksum(checksum);
+        readings(bytes, decoder, weiss::Decoder::push, |decoder| {
+            Some(decoder.next_packet()?.is_ok_and(is_frame))
+        })
     }
 }
 
@@ -113,15 +125,10 @@ fn single_reply(frame: u16) -> Vec<u8> {
 }
 
 fn take_replies(bytes: &[u8]) -> usize {
-    let mut decoder = singletact::Decoder::new();
-    let mut frames = 0;
-    for read in bytes.chunks(READ_BYTES) {
-        decoder.push(read);
-        while let Some(reply) = decoder.next_reply() {
-            frames += usize::from(reply.reading().map(black_box).is_ok());
-        }
-    }
-    frames
+    let decoder = singletact::Decoder::new();
+    readings(bytes, decoder, singletact::Decoder::push, |decoder| {
+        Some(decoder.next_reply()?.reading().map(black_box).is_ok())
+    })
 }
 
 fn magnetic_frame(frame: u16) -> Vec<u8> {
@@ -135,27 +142,15 @@ fn magnetic_frame(frame: u16) -> Vec<u8> {
 }
 
 fn take_magnetic(bytes: &[u8]) -> usize {
-    let mut decoder = anyskin::Decoder::new();
-    let mut frames = 0;
-    for read in bytes.chunks(READ_BYTES) {
-        decoder.push(read);
-        while let Some(frame) = decoder.next_frame() {
-            black_box(frame);
-            frames += 1;
-        }
-    }
-    frames
+    let decoder = anyskin::Decoder::new();
+    readings(bytes, decoder, anyskin::Decoder::push, |decoder| {
+        decoder.next_frame().map(black_box).map(|_| true)
+    })
 }
 
 fn take_declared(format: &Arc<declared::Format>, bytes: &[u8]) -> usize {
-    let mut decoder = declared::Decoder::new(format.clone());
-    let mut frames = 0;
-    for read in bytes.chunks(READ_BYTES) {
-        decoder.push(read);
-        while let Some(frame) = decoder.next_frame() {
-            black_box(frame);
-            frames += 1;
-        }
-    }
-    frames
+    let decoder = declared::Decoder::new(format.clone());
+    readings(bytes, decoder, declared::Decoder::push, |decoder| {
+        decoder.next_frame().map(black_box).map(|_| true)
+    })
 }

@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 from check_enumeration import BULK_LINK
-from check_streaming import PRESSES
+from check_streaming import run_on
 from lab import BINARIES, LIMIT_S, REPOSITORY, Folder, Service, at_least, check, plug, that, until_gone, wait
 
 SECTION = re.compile(r"^## Connect your hardware\n(.*?)^## ", re.MULTILINE | re.DOTALL)
@@ -82,8 +82,5 @@ def check_connect_your_hardware():
             check(begin, that("exit status 0", lambda seen: seen[0] == 0), (done.returncode, done.stdout + done.stderr))
 
         with Service(folder / "my-rig.toml") as service:
-            service.until_connected()
-            status = (run := service.start_run(PRESSES)).wait()
-            summary = json.loads(run.until(lambda line: line.startswith("{"), "a summary"))
-            check("and a run is done", [0, "done", 4], [status, summary["exit_status"], summary["dwells"]])
+            run_on(folder, service, "and a run")
     until_gone()

@@ -4,7 +4,7 @@ import json
 
 from check_enumeration import BULK_LINK, HID_LINK
 from check_streaming import run_on
-from lab import Folder, Service, check, plug, rig_file, until_gone
+from lab import SENSOR, Folder, Service, check, plug, rig_file, until_gone
 
 SERIAL = '{ kind = "serial", usb = { vid = 0x1209, pid = 0x0001, serial = "SIM-SENSOR" }, baud = 115200 }'
 HID = '{ kind = "hid", vid = 0x1209, pid = 0x0003, serial = "SIM-SENSOR", interface = 0 }'
@@ -16,7 +16,7 @@ BULK = (
 
 def speaking(folder, transport, link=None):
     """The shipped rig, its sensor at a transport, speaking by a description if there is one."""
-    changes = {'{ kind = "serial", path = "/dev/serial/by-id/usb-Tactus_SIM_virtual_sensor_SIM-SENSOR-if00", baud = 115200 }': transport}
+    changes = {f'{{ kind = "serial", path = "{SENSOR}", baud = 115200 }}': transport}
     if link:
         changes['protocol = "weiss-dsa"'] = f'protocol = "declared"\nformat = "{link}"'
     return rig_file(folder, **changes)
