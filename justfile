@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd systemd-boot python fuzz-check vm-slice solid-check discovery-evidence-slice gpu
+ci: fmt lint docs deny test validate systemd systemd-boot python browser fuzz-check vm-slice solid-check discovery-evidence-slice gpu
 
 # The README's second command.
 test:
@@ -53,7 +53,7 @@ systemd:
 
 # The programs as a lab gets them.
 programs:
-    cargo build --release --package tactus --package tactus-daemon --package tactus-mock
+    cargo build --release --package tactus --package tactus-daemon --package tactus-web --package tactus-mock
 
 # The Debian package, target/package/tactus.deb.
 package: package-tool programs
@@ -88,6 +88,13 @@ python: build python-tools
 python-tools:
     test -d {{ venv }} || python3 -m venv {{ venv }}
     {{ venv }}/bin/pip install --quiet --requirement tests/python/requirements.txt --editable clients/python
+
+# A real browser at the dashboard; Debian's chromium is installed where there is none. Pictures of it: target/browser.
+browser: build
+    command -v chromium >/dev/null || (apt-get update -qq && apt-get install -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null)
+    test -d {{ tools }}/browser || python3 -m venv {{ tools }}/browser
+    {{ tools }}/browser/bin/pip install --quiet --requirement tests/browser/requirements.txt
+    {{ tools }}/browser/bin/pytest -q tests/browser
 
 # The messages, after a change of tactus.proto.
 proto:
@@ -151,11 +158,11 @@ bench-discovery: bench-peers-tools
 # Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes.
 # What discovery finds and names of hidden physics, beside other ways to go about it: docs/discovery-evidence.md.
 discovery-evidence: bench-discovery
+    target/release/tactus-bench evidence run --size ablation --keep-tables
+    {{ tools }}/peers/bin/python bench/peers/discovery.py report --work target/evidence/work
+    target/release/tactus-bench evidence run --size ablation --work target/evidence/work/peers/bic --with=--ablation --with=bic
     target/release/tactus-bench evidence run
-    target/release/tactus-bench evidence run --size ablation --keep-tables --work target/evidence/ablation
-    {{ tools }}/peers/bin/python bench/peers/discovery.py report --work target/evidence/ablation
-    target/release/tactus-bench evidence run --size ablation --work target/evidence/ablation/peers/bic --with=--ablation --with=bic
-    target/release/tactus-bench evidence score --ablation target/evidence/ablation --costs target/evidence/costs.json \
+    target/release/tactus-bench evidence score --ablation target/evidence/work --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
 
 # Twins that one active round on the embedded rig decides or does not, some ten minutes: docs/discovery-evidence.md.

@@ -20,7 +20,7 @@ dpkg-deb --raw-extract $out/tactus.deb "$root"
 [ -z "$(find "$root" ! -path "$root/DEBIAN*" ! -path "$root" -printf '%u:%g\n' | grep -v '^root:root$')" ] || fail "files that are not root's"
 [ -z "$(find "$root" -type f -perm /022)" ] || fail "files that others may write"
 diff <(cd "$root" && find etc -type f -printf '/%p\n' | sort) <(sort "$root/DEBIAN/conffiles") || fail "files in /etc that are no conffiles"
-for program in tactus tactusd tactus-mock; do
+for program in tactus tactusd tactus-web tactus-mock; do
     [ "$("$root/usr/bin/$program" --version)" = "$program $(dpkg-deb --field $out/tactus.deb Version | sed 's/-[^-]*$//')" ] ||
         fail "$program has another version"
     ! readelf --sections "$root/usr/bin/$program" | grep -q '\.debug_info' || fail "$program is not stripped"

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Lab, repository, tactus};
+use tactus_e2e::{Lab, Process, repository, tactus};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb::{self, run_event::Event};
 
@@ -53,6 +53,13 @@ fn status(lab: &Lab) -> Value {
     let said = lab.tactus(&["--json", "status"]);
     assert_eq!(said.code, Some(0), "{said:?}");
     said.json()
+}
+
+/// Where the tip truly is, as the virtual stage knows.
+fn truth(lab: &mut Lab) -> Value {
+    lab.mock.type_line("truth");
+    let line = lab.mock.wait_until(|line| line.starts_with('{'));
+    serde_json::from_str(&line).unwrap()
 }
 
 #[test]
@@ -244,6 +251,33 @@ fn a_service_that_is_killed_leaves_a_recording_that_lacks_at_most_a_second() {
 }
 
 #[test]
+fn after_a_start_nothing_moves_before_an_explicit_reset() {
+    let mut lab = Lab::start_only(|rig| rig);
+    let presses = lab.script("presses.star", PRESSES);
+    let refused_before_a_reset = |lab: &mut Lab| {
+        let before = truth(lab);
+        let refused = lab.tactus(&["--json", "run", &presses, "--no-report"]);
+        assert_eq!(refused.code, Some(4), "{refused:?}");
+        assert!(refused.out.contains("nothing has been reset since the service started"), "{refused:?}");
+        assert_eq!(truth(lab), before);
+        let after = status(lab);
+        assert_eq!(after["run"]["phase"], "idle");
+        assert_eq!(after["fault"], "nothing has been reset since the service started");
+    };
+    refused_before_a_reset(&mut lab);
+    assert_eq!(lab.tactus(&["reset"]).code, Some(0));
+    assert_eq!(status(&lab)["fault"], Value::Null);
+    let done = lab.tactus(&["--json", "run", &presses, "--no-report"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+
+    // The stage knows where it is; the new service moves it none the less only when told so.
+    lab.daemon.signal(Signal::KILL);
+    lab.daemon = Process::start("tactusd", lab.folder.path(), &["--config", "tactusd.toml"]);
+    lab.daemon.wait_for("ready");
+    refused_before_a_reset(&mut lab);
+}
+
+#[test]
 fn an_alarm_fails_the_run_and_only_an_explicit_reset_makes_the_stage_move_again() {
     let mut lab = Lab::start(|rig| rig);
     let script = lab.script("hold.star", HOLD);
@@ -256,8 +290,11 @@ fn an_alarm_fails_the_run_and_only_an_explicit_reset_makes_the_stage_move_again(
 
     let presses = lab.script("presses.star", PRESSES);
     let refused = lab.tactus(&["--json", "run", &presses, "--no-report"]);
-    assert_eq!(refused.code, Some(1), "{refused:?}");
-    assert_eq!(refused.json()["presses"], 0, "nothing moves before the reset");
+    assert_eq!(refused.code, Some(4), "{refused:?}");
+    assert!(
+        refused.out.contains("the stage is in alarm") && refused.out.contains("`tactus reset`"),
+        "{refused:?}"
+    );
 
     let reset = lab.tactus(&["--json", "reset"]);
     assert_eq!(reset.code, Some(0), "{reset:?}");

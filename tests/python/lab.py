@@ -42,6 +42,7 @@ class Lab:
         self.mock.wait_for("stage")
         self.daemon = self.start("tactusd", "--config", "tactusd.toml")
         self.daemon.wait_for("ready")
+        tactus("--endpoint", self.endpoint, "reset")
 
     def start(self, name, *args):
         return Process(name, args, self.folder)

@@ -207,11 +207,22 @@ pub struct Lab {
 }
 
 impl Lab {
-    /// Starts both and waits until frames flow. `change` may rewrite the rig file.
+    /// Starts both, waits until frames flow, and resets, so that runs can start. `change` may rewrite the rig file.
     ///
     /// # Panics
     /// If one of them does not start.
     pub fn start(change: impl Fn(String) -> String) -> Self {
+        let lab = Self::start_only(change);
+        let reset = lab.tactus(&["reset"]);
+        assert_eq!(reset.code, Some(0), "{reset:?}");
+        lab
+    }
+
+    /// As [`Self::start`], but nothing has been reset.
+    ///
+    /// # Panics
+    /// If one of them does not start.
+    pub fn start_only(change: impl Fn(String) -> String) -> Self {
         let folder = TempDir::new().expect("a folder");
         let rig = fs::read_to_string(repository("config/rigs/pty.toml")).expect("the shipped rig");
         fs::write(folder.path().join("rig.toml"), change(rig)).expect("a writable folder");

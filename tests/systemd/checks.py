@@ -20,6 +20,9 @@ RUNS = "/var/lib/tactus/runs"
 HOLD = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.6], dwell_s = 600.0)\n"
 PRESS = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.2])\n"
 
+# Bash is a client of HTTP, too.
+ASK = "exec 3<>/dev/tcp/127.0.0.1/7480; printf 'GET / HTTP/1.0\\r\\nHost: localhost\\r\\n\\r\\n' >&3; cat <&3"
+
 
 class Checks:
     """Counts what held and what did not."""
@@ -129,8 +132,10 @@ def installation(lab, package):
     status = lab.status()
     check("tactus status: simulated frames come, no run", status.get("simulated") and status["sensor"]["frames"] > 0
           and status["run"]["phase"] == "idle", "simulated, frames, idle", status)
-    done = lab.tactus("--json", "run", "press.star")
-    check.succeeds("a scientist runs an experiment", done)
+    done = lab.tactus("run", "press.star")
+    check("nothing moves before a reset", done.returncode == 4 and "`tactus reset`" in done.stderr, "exit status 4", done)
+    check.succeeds("tactus reset", lab.tactus("reset"))
+    check.succeeds("a scientist runs an experiment", lab.tactus("--json", "run", "press.star"))
 
 
 def sandbox(lab):
@@ -235,6 +240,30 @@ def devices(lab):
     lab.journal.wait_for("ready: frames flow", before)
     machine.must("systemctl", "start", UNIT)
     check.equal("with them it becomes ready", machine.unit(UNIT, "ActiveState", "StatusText"), ["active", "rig bench: frames flow"])
+    check.succeeds("tactus reset homes the stage", lab.tactus("reset"))
+
+
+def dashboard(lab):
+    """The dashboard: a process of its own, without devices."""
+    machine, check = lab.machine, lab.check
+    unit = "tactus-web.service"
+    check.equal("the dashboard's unit is enabled", machine.run("systemctl", "is-enabled", unit).stdout.strip(), "enabled")
+    check.succeeds("systemctl start tactus-web", machine.run("systemctl", "start", unit))
+    done = machine.run("systemd-analyze", "security", "--no-pager", "--threshold=20", unit)
+    check.succeeds("its exposure is at most 2.0", done)
+    print("     " + next(line for line in done.stdout.splitlines() if "Overall" in line).strip())
+    pid = machine.unit(unit, "MainPID")
+    user = int(machine.must("stat", "--format=%u", f"/proc/{pid}"))
+    check("it is a user of the dynamic range", 61184 <= user <= 65519, "61184 to 65519", user)
+    names = set(machine.must("ls", f"/proc/{pid}/root/dev").split())
+    check("it sees no device", not any(name.startswith(("tty", "hidraw", "bus")) and name != "tty" for name in names), "pseudo-devices", names)
+    page = machine.run("bash", "-c", ASK)
+    check("it serves its page on loopback", "<title>Tactus</title>" in page.stdout, "the page", page.stdout + page.stderr)
+    before = lab.status()
+    machine.must("systemctl", "kill", "--kill-whom=main", "--signal=KILL", unit)
+    after = lab.frames_later(20)
+    check.equal("killed, it takes nothing with it", after["sensor"]["frames_lost"], before["sensor"]["frames_lost"])
+    machine.must("systemctl", "stop", unit)
 
 
 def watchdog(lab):
@@ -257,8 +286,8 @@ def watchdog(lab):
           f"z >= {stopped['z_mm'] - 0.1:.3f} mm", hung)
     status = lab.frames_later(20)
     check.equal("the restart moved nothing", lab.truth(), hung)
-    check.equal("no run goes on, and the stage wants to be homed", [status["run"]["phase"], status["run"]["run_id"], status["stage"]["status"]],
-                ["idle", "", "not homed"])
+    check.equal("no run goes on, and it says that it wants a reset", [status["run"]["phase"], status["run"]["run_id"], status["fault"]],
+                ["idle", "", "nothing has been reset since the service started"])
     print(f"     stopped at z = {stopped['z_mm']:.3f} mm, stood at {hung['z_mm']:.3f} mm")
 
     done = lab.tactus("record", "info", recording)
@@ -354,7 +383,7 @@ def main():
         lab = Lab(machine, check)
         try:
             installation(lab, package)
-            for part in (sandbox, journal, configuration, devices, watchdog, killed, termination, dynamic_user, removal):
+            for part in (sandbox, dashboard, journal, configuration, devices, watchdog, killed, termination, dynamic_user, removal):
                 print(f"-- {part.__doc__.strip()} [{time.monotonic() - started:.0f} s]", flush=True)
                 part(lab)
         except Exception:

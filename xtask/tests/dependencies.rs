@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 19] = [
+const ROWS: [&str; 20] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -22,6 +22,7 @@ const ROWS: [&str; 19] = [
     "tactus-bus",
     "tactus-mock",
     "tactus-daemon",
+    "tactus-web",
     "tactus",
     "tactus-e2e",
     "tactus-bench",

@@ -139,6 +139,8 @@ pub fn run(
         return Err(EmbeddedError::NotPossible(Box::new(plan)));
     }
     order.planned = Some(plan.promise());
+    // Who runs simulated devices of one's own has nobody else to ask.
+    order.resets = true;
     let texts = if truth.is_none() { texts.all() } else { texts.without_rig() };
     let (recording, path) = order::recording(&order, rig, texts, folder, clock.now().wall)?;
     order.recording = path.display().to_string();

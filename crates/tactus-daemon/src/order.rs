@@ -55,6 +55,7 @@ pub fn order(ask: Ask, rig: &Rig, at: WallTime) -> Result<RunOrder, ScriptError>
         planned: None,
         versions,
         recording: String::new(),
+        resets: false,
     })
 }
 

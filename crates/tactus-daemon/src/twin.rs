@@ -66,8 +66,9 @@ impl Plan {
 ///
 /// # Errors
 /// [`TwinError`] if there was no dry run; a refused step is a [`Plan`] that is not possible.
-pub fn dry_run(rig: &Rig, order: RunOrder) -> Result<Plan, TwinError> {
+pub fn dry_run(rig: &Rig, mut order: RunOrder) -> Result<Plan, TwinError> {
     let mut twin = twin_of(rig);
+    order.resets = true;
     if let Some(service) = &mut twin.service {
         service.sensor.transport = Transport::Embedded;
         service.stage.transport = Transport::Embedded;

@@ -88,7 +88,7 @@ pub enum StageError {
         position_mm: [f64; 3],
     },
     /// The position is not known: the stage has not been homed since it started, reset or stepped out.
-    #[error("the stage's position is not known: home it first")]
+    #[error("the stage's position is not known: `tactus reset` homes it")]
     Unhomed,
     /// The controller says idle, but stands elsewhere.
     #[error("the stage says it has arrived at {target_mm:?} mm, but stands at {position_mm:?} mm")]

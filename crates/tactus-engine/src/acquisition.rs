@@ -173,6 +173,7 @@ impl Shared {
     pub(crate) fn refresh_state(&self) {
         let now = self.clock.now();
         let tally = self.live().tally;
+        let fault = self.fault_text();
         self.state.send_if_modified(|state| {
             let active = !matches!(state.phase(), pb::RunPhase::Idle | pb::RunPhase::Finished);
             if active {
@@ -185,7 +186,9 @@ impl Shared {
                 state.frames = tally.frames;
                 state.frames_lost = tally.frames_lost;
             }
-            active
+            let is_news = state.fault != fault;
+            state.fault = fault;
+            active || is_news
         });
         self.publish.state(&self.state.borrow());
     }

@@ -1,6 +1,7 @@
 //! The engine: the devices for the life of the service, and at most one run at a time.
 
 use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -12,7 +13,7 @@ use tokio::task::JoinHandle;
 
 use crate::acquisition::{Live, acquire};
 use crate::outlet::{Publish, Record};
-use crate::run::{Ending, Run, RunOrder, RunOutcome};
+use crate::run::{Broken, Ending, Run, RunOrder, RunOutcome};
 
 /// Puts another covering in place, in mm; given by a simulated rig that can do it itself.
 pub type ChangeCovering = Arc<dyn Fn(f64) + Send + Sync>;
@@ -93,6 +94,20 @@ pub struct Stopped {
     pub reason: String,
 }
 
+/// Why nothing moves before an [`Engine::reset`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Fault {
+    /// The engine is new: nobody has said yet that the stage may move.
+    #[error("nothing has been reset since the service started")]
+    Started,
+    /// The stage's controller is in alarm.
+    #[error("the stage is in alarm")]
+    Alarm,
+    /// The stage does not know where it is, as after a reset of its controller.
+    #[error("the stage does not know where it is")]
+    Unhomed,
+}
+
 /// Why the stage could not be reset.
 #[derive(Debug, thiserror::Error)]
 pub enum ResetError {
@@ -105,6 +120,19 @@ pub enum ResetError {
     /// The stage.
     #[error(transparent)]
     Stage(#[from] StageError),
+    /// A device does not answer.
+    #[error("{0}")]
+    Silent(String),
+}
+
+impl ResetError {
+    /// Of a wait for a device.
+    fn of(broken: Broken) -> Self {
+        match broken {
+            Broken::Ended(_) => Self::Stopped(Stopped { reason: broken.to_string() }),
+            _ => Self::Silent(broken.to_string()),
+        }
+    }
 }
 
 /// Why an engine could not be started.
@@ -131,6 +159,7 @@ pub(crate) struct Shared {
     pub(crate) control: watch::Sender<Control>,
     pub(crate) state: watch::Sender<pb::RunState>,
     pub(crate) pulse: watch::Sender<Pulse>,
+    is_reset: AtomicBool,
     live: Mutex<Live>,
 }
 
@@ -170,6 +199,7 @@ impl Engine {
             phase: pb::RunPhase::Idle.into(),
             simulated: rig.simulated,
             remaining_s: -1.0,
+            fault: Fault::Started.to_string(),
             ..Default::default()
         };
         let shared = Arc::new(Shared {
@@ -183,6 +213,7 @@ impl Engine {
             control: watch::Sender::default(),
             state: watch::Sender::new(idle),
             pulse: watch::Sender::default(),
+            is_reset: AtomicBool::new(false),
         });
         let task = tokio::spawn(acquire(Arc::clone(&shared), devices.sensor, devices.stage_reports));
         Ok(Self { shared, acquisition: Arc::new(Acquisition(task)) })
@@ -246,13 +277,15 @@ impl Engine {
         self.shared.state.borrow().run_id.clone()
     }
 
-    /// Clears the stage's alarm, if there is one, homes it and raises the tip: the explicit act that a stage
-    /// needs after an alarm, a reset or an unfinished homing. A [`Engine::stop`] ends it.
+    /// Clears the stage's alarm, if there is one, homes it, raises the tip, and checks that frames flow: the
+    /// explicit act that a service wants after its start, and a stage after an alarm, a reset of its
+    /// controller or an unfinished homing. A [`Engine::stop`] ends it.
     ///
     /// # Errors
-    /// [`ResetError`] if a run is in progress, or what stands in the stage's way.
+    /// [`ResetError`] if a run is in progress, or what stands in the way.
     pub async fn reset(&self) -> Result<(), ResetError> {
         let claim = self.claim()?;
+        self.shared.wait_for_stage().await.map_err(ResetError::of)?;
         let status = self.shared.stage.state().borrow().status();
         if status == pb::StageStatus::Alarm {
             self.shared.stage.clear_alarm().await?;
@@ -261,7 +294,15 @@ impl Engine {
         self.shared.stage.home().await?;
         claim.check()?;
         self.shared.retract().await?;
+        self.shared.wait_for_sensor().await.map_err(ResetError::of)?;
+        self.shared.set_reset();
+        self.shared.refresh_state();
         Ok(())
+    }
+
+    /// What wants a [`Engine::reset`] before anything may move; a service starts no run until it is gone.
+    pub fn fault(&self) -> Option<Fault> {
+        self.shared.fault()
     }
 
     /// Holds the run in progress before its next step. A press ends at the safe height, so that a held run
@@ -288,6 +329,12 @@ impl Engine {
         self.shared.state.subscribe()
     }
 
+    /// Where the run stands, and what wants a reset, as of now.
+    pub fn run_state(&self) -> pb::RunState {
+        let state = self.shared.state.borrow().clone();
+        pb::RunState { fault: self.shared.fault_text(), ..state }
+    }
+
     /// How acquisition goes; changes with each frame.
     pub fn pulse(&self) -> watch::Receiver<Pulse> {
         self.shared.pulse.subscribe()
@@ -305,6 +352,27 @@ impl Engine {
 }
 
 impl Shared {
+    /// From here on the stage may move.
+    pub(crate) fn set_reset(&self) {
+        self.is_reset.store(true, Ordering::Relaxed);
+    }
+
+    /// [`Shared::fault`] in words; empty if there is none.
+    pub(crate) fn fault_text(&self) -> String {
+        self.fault().map_or_else(String::new, |fault| fault.to_string())
+    }
+
+    pub(crate) fn fault(&self) -> Option<Fault> {
+        let status = self.stage.state().borrow().status();
+        if status == pb::StageStatus::Alarm {
+            Some(Fault::Alarm)
+        } else if !self.is_reset.load(Ordering::Relaxed) {
+            Some(Fault::Started)
+        } else {
+            (status == pb::StageStatus::Unhomed).then_some(Fault::Unhomed)
+        }
+    }
+
     /// What the acquisition task and the run share. Held only for moments, never across an await.
     pub(crate) fn live(&self) -> MutexGuard<'_, Live> {
         // A panic elsewhere must not keep the supervisor from its work.

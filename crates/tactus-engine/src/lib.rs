@@ -16,7 +16,7 @@ mod script;
 mod supervisor;
 
 pub use engine::{
-    Busy, ChangeCovering, Claim, Devices, Engine, EngineError, Pulse, ResetError, StopOrder, Stopped,
+    Busy, ChangeCovering, Claim, Devices, Engine, EngineError, Fault, Pulse, ResetError, StopOrder, Stopped,
 };
 pub use envelope::{Bounds, Outside};
 pub use outlet::{Publish, Record, RecordFailure, Unpublished};

@@ -44,6 +44,9 @@ pub struct RunOrder {
     pub versions: BTreeMap<String, String>,
     /// Where the recording goes, for the run's state.
     pub recording: String,
+    /// The order stands for a [`crate::Engine::reset`] too, as on an engine that was made for this run alone: a
+    /// stage that does not know where it is, is homed. It clears no alarm.
+    pub resets: bool,
 }
 
 /// What a dry run on the simulated twin promises.
@@ -176,6 +179,12 @@ impl<'a> Run<'a> {
         self.shared.open_recording(record, self.order.run_id.clone());
         self.set_state(pb::RunPhase::Preparing, "preparing");
         self.shared.emit(Event::Started(self.describe_start()));
+        if let Some(fault) = self.shared.fault().filter(|_| !self.order.resets) {
+            // Nothing moves, not even up.
+            let refused = self.refused("reset", fault.to_string());
+            let z_mm = self.shared.position_mm()[2];
+            return self.conclude(&refused, Ok(z_mm));
+        }
         let mut result = self.prepare().await;
         if result.is_ok() {
             self.set_state(pb::RunPhase::Running, "");
@@ -202,8 +211,20 @@ impl<'a> Run<'a> {
             live.supervisor.begin(self.bounds.depth_max_mm());
             live.supervisor.rearm(now);
         }
-        self.wait_for_sensor().await?;
-        self.wait_for_stage().await?;
+        self.shared.wait_for_sensor().await?;
+        self.shared.wait_for_stage().await?;
+        if self.order.resets {
+            self.home().await?;
+        }
+        self.shared.retract().await?;
+        let reference = self.whole_average(REFERENCE).await?;
+        self.zero_counts.clone_from(&reference.mean_counts);
+        self.shared.live().supervisor.set_reference(reference.mean_counts);
+        Ok(())
+    }
+
+    /// Homes the stage if it does not know where it is.
+    async fn home(&self) -> Result<(), Broken> {
         if self.shared.stage.state().borrow().status() == pb::StageStatus::Unhomed {
             info!("homing the stage");
             let homed = self.shared.stage.home().await;
@@ -211,10 +232,7 @@ impl<'a> Run<'a> {
             self.shared.check_ended()?;
             homed?;
         }
-        self.shared.retract().await?;
-        let reference = self.whole_average(REFERENCE).await?;
-        self.zero_counts.clone_from(&reference.mean_counts);
-        self.shared.live().supervisor.set_reference(reference.mean_counts);
+        self.shared.set_reset();
         Ok(())
     }
 
@@ -241,7 +259,7 @@ impl<'a> Run<'a> {
                 Request::Ended(Err(error)) => {
                     self.shared.check_ended()?;
                     return Err(match broken {
-                        Some(Broken::Outside(_)) => return self.refused(error.to_string()),
+                        Some(Broken::Outside(_)) => return self.refused("envelope", error.to_string()),
                         _ => Broken::Script(error.to_string()),
                     });
                 }
@@ -250,8 +268,8 @@ impl<'a> Run<'a> {
         Err(Broken::Script("the script's thread died; this is a defect of Tactus".into()))
     }
 
-    fn refused(&mut self, message: String) -> Result<(), Broken> {
-        self.shared.emit_safety(pb::SafetyVerdict::Refused, "envelope", &message);
+    fn refused(&self, rule: &str, message: String) -> Result<(), Broken> {
+        self.shared.emit_safety(pb::SafetyVerdict::Refused, rule, &message);
         Err(Broken::Refused(message))
     }
 
@@ -322,32 +340,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Waits until frames flow, as long as the rig's policy says.
-    async fn wait_for_sensor(&self) -> Result<(), Broken> {
-        let patience = Duration::from_millis(self.shared.service.policy.reconnect_ms.into());
-        let since = self.shared.clock.now().mono;
-        let mut pulse = self.shared.pulse.subscribe();
-        let flowing = pulse.wait_for(|pulse| pulse.sensor_connected && pulse.last_frame > since);
-        match self.shared.unless_ended(timeout(patience, flowing)).await? {
-            Ok(_) => Ok(()),
-            Err(_) => Err(Broken::SensorSilent(patience.as_secs_f64())),
-        }
-    }
-
-    /// Waits until the stage answers, as long as the rig's policy says; what then stands in the way, the first
-    /// move says.
-    async fn wait_for_stage(&self) -> Result<(), Broken> {
-        let patience = Duration::from_millis(self.shared.service.policy.reconnect_ms.into());
-        let mut state = self.shared.stage.state();
-        let answering = state.wait_for(|report| {
-            !matches!(report.status(), pb::StageStatus::Unspecified | pb::StageStatus::Disconnected)
-        });
-        match self.shared.unless_ended(timeout(patience, answering)).await? {
-            Ok(_) => Ok(()),
-            Err(_) => Err(Broken::StageSilent(patience.as_secs_f64())),
-        }
-    }
-
     fn describe_start(&self) -> pb::RunStarted {
         let rig = &self.shared.rig;
         let planned = self.order.planned.unwrap_or(Planned { presses: 0, dwells: 0, duration_s: 0.0 });
@@ -397,12 +389,39 @@ impl<'a> Run<'a> {
             recording: self.order.recording.clone(),
             simulated: self.shared.rig.simulated,
             t_mono_ns: now.ns(),
+            fault: self.shared.fault_text(),
         });
         self.shared.publish.state(&self.shared.state.borrow());
     }
 }
 
 impl Shared {
+    /// Waits until frames flow, as long as the rig's policy says.
+    pub(crate) async fn wait_for_sensor(&self) -> Result<(), Broken> {
+        let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
+        let since = self.clock.now().mono;
+        let mut pulse = self.pulse.subscribe();
+        let flowing = pulse.wait_for(|pulse| pulse.sensor_connected && pulse.last_frame > since);
+        match self.unless_ended(timeout(patience, flowing)).await? {
+            Ok(_) => Ok(()),
+            Err(_) => Err(Broken::SensorSilent(patience.as_secs_f64())),
+        }
+    }
+
+    /// Waits until the stage answers, as long as the rig's policy says; what then stands in the way, the first
+    /// move says.
+    pub(crate) async fn wait_for_stage(&self) -> Result<(), Broken> {
+        let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
+        let mut state = self.stage.state();
+        let answering = state.wait_for(|report| {
+            !matches!(report.status(), pb::StageStatus::Unspecified | pb::StageStatus::Disconnected)
+        });
+        match self.unless_ended(timeout(patience, answering)).await? {
+            Ok(_) => Ok(()),
+            Err(_) => Err(Broken::StageSilent(patience.as_secs_f64())),
+        }
+    }
+
     /// An error if the run was asked to end.
     pub(crate) fn check_ended(&self) -> Result<(), Broken> {
         self.control.borrow().ending.clone().map_or(Ok(()), |ending| Err(Broken::Ended(ending)))

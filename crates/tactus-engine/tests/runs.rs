@@ -7,8 +7,8 @@ use pb::ExitStatus;
 use pb::Phase::{Approach, Hold, Idle, Load, Retract, Unload};
 use pb::run_event::Event;
 use rig::{Bench, Memory};
-use tactus_engine::StopOrder;
-use tactus_schema::pb::{self, RunPhase};
+use tactus_engine::{Fault, RunOrder, StopOrder};
+use tactus_schema::pb::{self, RunPhase, StageStatus};
 
 const PRESS: &str = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2, 0.4])\n";
 const PRESSES: &str =
@@ -126,7 +126,7 @@ async fn stop_works_while_preparing_moving_paused_and_retracting() {
     let run = start(&bench, HOLD, &Memory::default());
     bench
         .stage
-        .wait_for(|stage| stage.z_mm < 0.25 && stage.status() == pb::StageStatus::Moving)
+        .wait_for(|stage| stage.z_mm < 0.25 && stage.status() == StageStatus::Moving)
         .await
         .unwrap();
     bench.engine.stop(order(true));
@@ -367,4 +367,39 @@ async fn the_covering_in_place_stays_from_run_to_run() {
     assert!((bench.engine.rig().covering.thickness_mm - 0.5).abs() < 1e-12);
     let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
     assert_eq!(outcome.exit_status, ExitStatus::Refused, "0.4 mm is too deep under 0.5 mm: {outcome:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_new_engine_wants_a_reset_and_a_reset_wants_frames() {
+    let bench = Bench::start(|rig| rig);
+    assert_eq!(bench.engine.fault(), Some(Fault::Started));
+    assert!(bench.engine.run_state().fault.contains("since the service started"));
+
+    bench.trouble.lock().unwrap().silent = true;
+    let silent = bench.engine.reset().await.unwrap_err();
+    assert!(silent.to_string().contains("no frame from the sensor"), "{silent}");
+    assert_eq!(bench.engine.fault(), Some(Fault::Started));
+
+    bench.trouble.lock().unwrap().silent = false;
+    bench.engine.reset().await.unwrap();
+    assert_eq!(bench.engine.fault(), None);
+    assert_eq!(bench.engine.run_state().fault, "");
+    assert_eq!(bench.stage.borrow().status(), StageStatus::Idle);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_before_the_reset_moves_nothing_unless_its_order_stands_for_one() {
+    let bench = Bench::start(|rig| rig);
+    let before = *bench.stage.borrow();
+    let memory = Memory::default();
+    let order = RunOrder { resets: false, ..bench.order(PRESS) };
+    let outcome = bench.engine.run(order, memory.sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Refused, "{outcome:?}");
+    assert_eq!(*bench.stage.borrow(), before);
+    assert_eq!(memory.safety.lock().unwrap()[0].rule, "reset");
+    assert!(*memory.finished.lock().unwrap());
+
+    let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
+    assert_eq!(bench.engine.fault(), None);
 }

@@ -305,6 +305,8 @@ pub struct RunState {
     pub simulated: bool,
     #[prost(int64, tag = "16")]
     pub t_mono_ns: i64,
+    #[prost(string, tag = "17")]
+    pub fault: ::prost::alloc::string::String,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct SafetyEvent {

@@ -54,7 +54,7 @@ enum Command {
     Pause,
     /// Let a held run go on.
     Resume,
-    /// Clear the stage's alarm and home it.
+    /// Let runs start: clear the stage's alarm, home it, raise the tip. Wanted after each start of the service.
     Reset,
     /// Live view: the image, the stage, the run.
     Watch,

@@ -195,6 +195,10 @@ class Service:
         return self.until("sensor and stage are connected", is_up)
 
     def start_run(self, script: str) -> Program:
+        """After a start of the service nothing moves before a reset."""
+        said = self.tactus("reset")
+        if said.returncode != 0:
+            raise Hung(f"tactus reset: {said.stdout} {said.stderr}")
         path = self.folder / "script.star"
         path.write_text(script)
         return Program("tactus", "--json", "run", path, "--no-report", folder=self.folder)

@@ -99,7 +99,7 @@ class Client:
         return self._command("stop", messages.CommandRequest(who=_who(), reason=reason, abort=abort), timeout_s)
 
     def reset(self, timeout_s: float = 120.0):
-        """Clears the stage's alarm and homes it; not during a run. Raises ``Refused``, ``NoAnswer``."""
+        """Clears the stage's alarm, homes it and lets runs start; not during a run. Raises ``Refused``, ``NoAnswer``."""
         return self._command("reset", messages.CommandRequest(who=_who()), timeout_s)
 
     def close(self) -> None:

@@ -95,7 +95,7 @@ impl Desk {
         info!("reset: clearing the stage's alarm and homing");
         self.engine.reset().await.map_err(|error| match error {
             ResetError::Busy(busy) => No::not_now(busy),
-            ResetError::Stopped(_) | ResetError::Stage(_) => No::failed(error),
+            ResetError::Stopped(_) | ResetError::Stage(_) | ResetError::Silent(_) => No::failed(error),
         })
     }
 
@@ -103,6 +103,11 @@ impl Desk {
     async fn run(&self, request: pb::RunRequest) -> Result<(), No> {
         // From here on a stop ends this run, be it before the dry run is over.
         let claim = self.engine.claim().map_err(No::not_now)?;
+        if let Some(fault) = self.engine.fault() {
+            return Err(No::refused(format!(
+                "{fault}: see that the tip is free to move, then `tactus reset`"
+            )));
+        }
         let script = self.script(&request)?;
         let arguments = Arguments::from_json(&request.parameters_json).map_err(No::usage)?;
         let who = if request.who.is_empty() { "unknown".into() } else { request.who };
@@ -154,7 +159,7 @@ impl Desk {
             ok,
             error,
             exit_code,
-            state: Some(self.engine.state().borrow().clone()),
+            state: Some(self.engine.run_state()),
             rig: self.engine.rig().name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             stage: Some(*self.engine.stage_state().borrow()),
@@ -170,6 +175,10 @@ impl No {
 
     fn not_now(error: impl fmt::Display) -> Self {
         Self { exit_code: exit::NOT_NOW, error: format!("{error}") }
+    }
+
+    fn refused(error: impl fmt::Display) -> Self {
+        Self { exit_code: exit::REFUSED, error: format!("{error}") }
     }
 
     fn usage(error: impl fmt::Display) -> Self {

@@ -201,7 +201,7 @@ impl Run<'_> {
     /// A silence is no reason to end once frames flow again; then the supervisor watches again.
     async fn await_the_sensors_return(&self) -> Result<(), Broken> {
         self.shared.forgive_silence();
-        self.wait_for_sensor().await?;
+        self.shared.wait_for_sensor().await?;
         self.shared.live().supervisor.rearm(self.shared.clock.now().mono);
         Ok(())
     }

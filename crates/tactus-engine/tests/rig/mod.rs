@@ -221,6 +221,7 @@ impl Bench {
             planned: None,
             versions: std::collections::BTreeMap::new(),
             recording: String::new(),
+            resets: true,
         }
     }
 }

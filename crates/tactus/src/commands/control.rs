@@ -64,6 +64,7 @@ fn to_json(reply: &pb::CommandReply) -> Value {
         "rig": reply.rig,
         "version": reply.version,
         "simulated": health.simulated,
+        "fault": (!state.fault.is_empty()).then_some(&state.fault),
         "run": {
             "run_id": state.run_id,
             "experiment": state.experiment,
@@ -131,8 +132,14 @@ fn print(reply: &pb::CommandReply) {
         }
         _ => "no estimate of the device clock".into(),
     };
-    print_fields(&[
-        ("rig", format!("{}{simulated}", reply.rig)),
+    let mut fields = vec![("rig", format!("{}{simulated}", reply.rig))];
+    if !state.fault.is_empty() {
+        fields.push((
+            "fault",
+            format!("{}: see that the tip is free to move, then `tactus reset`", state.fault),
+        ));
+    }
+    fields.extend([
         ("run", run.trim_end().to_owned()),
         (
             "stage",
@@ -147,6 +154,7 @@ fn print(reply: &pb::CommandReply) {
         ("sensor", format!("{sensor}, {} frames, {} lost; {clock}", health.frames, health.frames_lost)),
         ("service", format!("version {}, up {}", reply.version, duration(health.uptime_s))),
     ]);
+    print_fields(&fields);
 }
 
 /// The word for where a run stands.

@@ -181,6 +181,11 @@ impl Screen {
                 stage.z_mm
             )));
         }
+        if !run.fault.is_empty() {
+            let text =
+                format!("fault   {}: see that the tip is free to move, then `tactus reset`", run.fault);
+            lines.push(Line::styled(text, Style::new().fg(Color::Yellow)));
+        }
         if let Some(event) = &self.safety {
             let stopped = event.verdict() == pb::SafetyVerdict::Stopped;
             let style = if stopped { Style::new().fg(Color::Red) } else { Style::new() };

@@ -1,0 +1,7 @@
+//! `tactus-web`: the dashboard.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    tactus_web::main()
+}

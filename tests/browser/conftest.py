@@ -1,0 +1,47 @@
+"""The dashboard in a real browser; pictures of what it showed go to target/browser."""
+
+import pathlib
+import shutil
+import sys
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "python"))
+from lab import REPOSITORY, Lab  # noqa: E402
+
+PICTURES = REPOSITORY / "target/browser"
+
+
+@pytest.fixture(scope="session")
+def browser():
+    with sync_playwright() as playwright:
+        # Chromium's own sandbox wants a user who is not root; the page is ours.
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def lab(tmp_path):
+    lab = Lab(tmp_path)
+    yield lab
+    lab.close()
+
+
+@pytest.fixture
+def dashboard(lab, browser):
+    """The page, which must have no error of its own, and a way to keep a picture of it."""
+    web = lab.start("tactus-web", "--endpoint", lab.endpoint, "--listen", "127.0.0.1:0")
+    address = web.wait_for("http://").split()[-1]
+    page = browser.new_page(viewport={"width": 1180, "height": 900})
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda message: message.type in ("error", "warning") and errors.append(message.text))
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    page.keep = lambda name: page.screenshot(path=PICTURES / f"{name}.png")
+    page.goto(address)
+    yield page
+    page.close()
+    web.end()
+    assert errors == []
