@@ -120,19 +120,9 @@ pub enum ResetError {
     /// The stage.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// A device does not answer.
+    /// A device did not answer, or somebody stopped the wait for it.
     #[error("{0}")]
-    Silent(String),
-}
-
-impl ResetError {
-    /// Of a wait for a device.
-    fn of(broken: Broken) -> Self {
-        match broken {
-            Broken::Ended(_) => Self::Stopped(Stopped { reason: broken.to_string() }),
-            _ => Self::Silent(broken.to_string()),
-        }
-    }
+    NotReady(String),
 }
 
 /// Why an engine could not be started.
@@ -284,8 +274,9 @@ impl Engine {
     /// # Errors
     /// [`ResetError`] if a run is in progress, or what stands in the way.
     pub async fn reset(&self) -> Result<(), ResetError> {
+        let not_ready = |why: Broken| ResetError::NotReady(why.to_string());
         let claim = self.claim()?;
-        self.shared.wait_for_stage().await.map_err(ResetError::of)?;
+        self.shared.wait_for_stage().await.map_err(not_ready)?;
         let status = self.shared.stage.state().borrow().status();
         if status == pb::StageStatus::Alarm {
             self.shared.stage.clear_alarm().await?;
@@ -294,7 +285,7 @@ impl Engine {
         self.shared.stage.home().await?;
         claim.check()?;
         self.shared.retract().await?;
-        self.shared.wait_for_sensor().await.map_err(ResetError::of)?;
+        self.shared.wait_for_sensor().await.map_err(not_ready)?;
         self.shared.set_reset();
         self.shared.refresh_state();
         Ok(())

@@ -124,11 +124,7 @@ async fn stop_works_while_preparing_moving_paused_and_retracting() {
     // Moving down.
     let mut bench = Bench::start(|rig| rig);
     let run = start(&bench, HOLD, &Memory::default());
-    bench
-        .stage
-        .wait_for(|stage| stage.z_mm < 0.25 && stage.status() == StageStatus::Moving)
-        .await
-        .unwrap();
+    bench.stage.wait_for(|stage| stage.z_mm < 0.25 && stage.status() == StageStatus::Moving).await.unwrap();
     bench.engine.stop(order(true));
     assert_eq!(run.await.unwrap().exit_status, ExitStatus::Aborted);
     assert!((height_mm(&bench) - 2.0).abs() < 1e-9);

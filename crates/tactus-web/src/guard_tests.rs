@@ -1,17 +1,17 @@
 use super::*;
 
-fn refusal(names: &[&str], method: Method, headers: &[(&'static str, &str)]) -> Option<&'static str> {
+fn refusal(names: &[&str], method: &Method, headers: &[(&'static str, &str)]) -> Option<&'static str> {
     let names = names.iter().map(|&name| name.to_owned()).collect();
     let hosts = Hosts::new("127.0.0.1:7480".parse().unwrap(), names);
     let headers =
         headers.iter().map(|(name, value)| (name.parse().unwrap(), value.parse().unwrap())).collect();
-    hosts.refusal(&method, &headers)
+    hosts.refusal(method, &headers)
 }
 
 #[test]
 fn this_machine_may_ask_under_each_of_its_names() {
     for host in ["127.0.0.1:7480", "127.0.0.1", "localhost:7480", "localhost", "[::1]:7480", "[::1]"] {
-        assert_eq!(refusal(&[], Method::GET, &[("host", host)]), None, "{host}");
+        assert_eq!(refusal(&[], &Method::GET, &[("host", host)]), None, "{host}");
     }
 }
 
@@ -25,16 +25,16 @@ fn a_name_that_only_points_here_is_refused_unless_it_is_ours() {
         "192.0.2.1:7480",
         "",
     ] {
-        assert!(refusal(&[], Method::GET, &[("host", host)]).is_some(), "{host}");
+        assert!(refusal(&[], &Method::GET, &[("host", host)]).is_some(), "{host}");
     }
-    assert!(refusal(&[], Method::GET, &[]).is_some());
-    assert_eq!(refusal(&["lab.example"], Method::GET, &[("host", "Lab.example:80")]), None);
+    assert!(refusal(&[], &Method::GET, &[]).is_some());
+    assert_eq!(refusal(&["lab.example"], &Method::GET, &[("host", "Lab.example:80")]), None);
 }
 
 #[test]
 fn commands_come_from_the_own_page_only() {
     let own = ("host", "127.0.0.1:7480");
-    let post = |more: &[(&'static str, &str)]| refusal(&[], Method::POST, &[&[own], more].concat());
+    let post = |more: &[(&'static str, &str)]| refusal(&[], &Method::POST, &[&[own], more].concat());
     assert_eq!(post(&[]), None, "a program of this machine, which reaches the bus anyway");
     assert_eq!(post(&[("origin", "http://127.0.0.1:7480"), ("sec-fetch-site", "same-origin")]), None);
     for origin in ["http://evil.example", "null", "http://127.0.0.1:8000", "http://localhost:7480"] {

@@ -6,10 +6,10 @@
 //! | path | what |
 //! |---|---|
 //! | `GET /` | the page; its script and style beside it |
-//! | `GET /live` | server-sent events, each the whole [`view::View`] as JSON, at most 20 a second |
+//! | `GET /live` | server-sent events, each the whole view as JSON, at most 20 a second |
 //! | `POST /stop`, `/pause`, `/resume`, `/reset` | the command of that name, for the service |
 //!
-//! A browser that is slow misses views, never delays one. Requests from pages of other sites are refused ([`guard`]).
+//! A browser that is slow misses views, never delays one. Requests from pages of other sites are refused.
 
 mod guard;
 mod live;
@@ -26,7 +26,7 @@ use sd_notify::NotifyState;
 use tactus_bus::Endpoint;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
-use tracing::info;
+use tracing::{error, info};
 use tracing_subscriber::EnvFilter;
 
 use live::Live;
@@ -58,7 +58,7 @@ pub fn main() -> ExitCode {
     match run(options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            error!("{error:#}");
             ExitCode::FAILURE
         }
     }

@@ -95,7 +95,7 @@ impl Desk {
         info!("reset: clearing the stage's alarm and homing");
         self.engine.reset().await.map_err(|error| match error {
             ResetError::Busy(busy) => No::not_now(busy),
-            ResetError::Stopped(_) | ResetError::Stage(_) | ResetError::Silent(_) => No::failed(error),
+            ResetError::Stopped(_) | ResetError::Stage(_) | ResetError::NotReady(_) => No::failed(error),
         })
     }
 
