@@ -331,9 +331,9 @@ impl Engine {
         self.shared.pulse.subscribe()
     }
 
-    /// The latest report of the stage.
-    pub fn stage_state(&self) -> watch::Receiver<pb::StageState> {
-        self.shared.stage.state()
+    /// The latest report of the stage. A copy: whoever looks holds up no report.
+    pub fn stage_state(&self) -> pb::StageState {
+        *self.shared.stage.state().borrow()
     }
 
     /// True while the acquisition task lives.

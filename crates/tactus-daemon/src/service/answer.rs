@@ -162,7 +162,7 @@ impl Desk {
             state: Some(self.engine.run_state()),
             rig: self.engine.rig().name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
-            stage: Some(*self.engine.stage_state().borrow()),
+            stage: Some(self.engine.stage_state()),
             health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()))),
         }
     }
@@ -185,3 +185,7 @@ impl No {
         Self { exit_code: exit::USAGE, error: format!("{error}") }
     }
 }
+
+#[cfg(test)]
+#[path = "answer_tests.rs"]
+mod tests;

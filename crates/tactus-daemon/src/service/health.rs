@@ -26,7 +26,7 @@ pub(super) fn health(engine: &Engine, publisher: &Publisher, before: (u64, MonoT
     let pulse = *engine.pulse().borrow();
     let (frames_before, at_before) = before;
     let seconds = now.mono.since(at_before).as_secs_f64();
-    let stage = engine.stage_state().borrow().status();
+    let stage = engine.stage_state().status();
     pb::Health {
         t_mono_ns: now.mono.ns(),
         t_wall_ns: now.wall.ns(),
