@@ -159,7 +159,14 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         rows.push(shrink("shrink, fifth percentile", 0.8, band.shrink.of, band.shrink.fifth));
     }
     rows.push(rate("two effects: both named", 0.85, false, scores.pairs.named));
+    rows.push(rate("two effects, each z 16 and more: both named", 0.85, false, scores.separate_pairs.named));
     rows.push(rate("three effects: all named", 0.7, false, scores.triples.named));
+    rows.push(rate(
+        "three effects, each z 16 and more: all named",
+        0.7,
+        false,
+        scores.separate_triples.named,
+    ));
     if let Some(all) = scores.outside.get("all") {
         rows.push(rate("outside the library: \"unexplained\"", 0.9, false, all.unexplained));
         rows.push(rate("outside the library: a wrong name", 0.05, true, all.wrong));
@@ -247,7 +254,13 @@ fn several(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         f,
         "## Several effects\n\n| | sets | all named | and nothing else | all in reported sets | a wrong name | shrink |\n|---|---|---|---|---|---|---|"
     )?;
-    for (name, several) in [("two", &scores.pairs), ("three", &scores.triples)] {
+    let rows = [
+        ("two", &scores.pairs),
+        ("two, each z 16 and more", &scores.separate_pairs),
+        ("three", &scores.triples),
+        ("three, each z 16 and more", &scores.separate_triples),
+    ];
+    for (name, several) in rows {
         let Several { named, exact, in_set, wrong, shrink } = several;
         writeln!(
             f,

@@ -48,6 +48,11 @@ pub struct Scores {
     pub pairs: Several,
     /// Sets of three.
     pub triples: Several,
+    /// Those sets of two in which each effect is from [`Z_SEPARATE`] on: some physics shows in some sets hardly or not at all,
+    /// however strong it is made.
+    pub separate_pairs: Several,
+    /// The same of three.
+    pub separate_triples: Several,
     /// Outside the library: `all` and by physics.
     pub outside: BTreeMap<String, OutsideScore>,
     /// Seconds of a set on one thread: median and 95th percentile.
@@ -175,6 +180,8 @@ impl Scores {
             confusion: confusion(&[&separate[..], &outside[..], &false_alarms[..]].concat()),
             pairs: Several::new(&pairs),
             triples: Several::new(&triples),
+            separate_pairs: Several::new(&within(&pairs, BANDS[3].1)),
+            separate_triples: Several::new(&within(&triples, BANDS[3].1)),
             outside: by_physics(&outside),
             seconds: quantile(seconds.clone(), 0.5).zip(quantile(seconds, 0.95)).map(|(a, b)| [a, b]),
         }
