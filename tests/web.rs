@@ -1,4 +1,4 @@
-//! The dashboard over HTTP, as a browser speaks it; `just web` has a real one.
+//! The dashboard over HTTP, as a browser speaks it; `just browser` has a real one.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -82,7 +82,9 @@ fn the_page_shows_live_frames_and_stops_a_run() {
 
     let script = lab.script("hold.star", HOLD);
     let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
-    web.until(|view| view["run"]["phase"] == "running" && view["stage"]["z_mm"].as_f64() < Some(-0.2));
+    web.until(|view| {
+        view["run"]["phase"] == "running" && view["stage"]["z_mm"].as_f64().is_some_and(|z_mm| z_mm < -0.2)
+    });
     let (status, answer) = web.ask("POST /pause", "");
     assert_eq!(status, 204, "{answer}");
     let (status, answer) =

@@ -32,7 +32,7 @@ def test_a_run_is_watched_and_stopped(lab, dashboard):
     page.keep("pressing")
 
     page.locator("#stop").click()
-    expect(page.locator("#answer")).to_have_text("stop: done")
+    expect(page.locator("#stopped")).to_have_text("stop: done")
     expect(page.locator("#run")).to_contain_text("finished: stopped")
     expect(page.locator("#stage")).to_contain_text("z 2.000 mm")
     assert "stopped by dashboard" in client.wait_for("exit_status")
@@ -44,10 +44,13 @@ def test_stop_is_a_key_too_and_a_reset_is_asked_for_twice(lab, dashboard):
     page = dashboard
     expect(page.locator("#array > div")).to_have_count(48)
     page.keyboard.press("s")
-    expect(page.locator("#answer")).to_have_text("stop: done")
+    expect(page.locator("#stopped")).to_have_text("stop: done")
     page.locator("#reset").click()
     page.get_by_role("button", name="No", exact=True).click()
-    expect(page.locator("#answer")).to_have_text("stop: done")
+    expect(page.locator("#sure")).to_be_hidden()
+    # Were it on its way, it would say so before the pause is answered.
+    page.locator("#pause").click()
+    expect(page.locator("#answer")).to_contain_text("PAUSE FAILED: no run is in progress")
     page.locator("#reset").click()
     page.get_by_role("button", name="Yes, reset").click()
     expect(page.locator("#answer")).to_have_text("reset: done", timeout=60_000)

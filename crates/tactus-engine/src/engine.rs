@@ -1,7 +1,6 @@
 //! The engine: the devices for the life of the service, and at most one run at a time.
 
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -100,6 +99,9 @@ pub enum Fault {
     /// The engine is new: nobody has said yet that the stage may move.
     #[error("nothing has been reset since the service started")]
     Started,
+    /// A reset is under way, or the last one failed.
+    #[error("the last reset was not finished")]
+    Unfinished,
     /// The stage's controller is in alarm.
     #[error("the stage is in alarm")]
     Alarm,
@@ -149,7 +151,8 @@ pub(crate) struct Shared {
     pub(crate) control: watch::Sender<Control>,
     pub(crate) state: watch::Sender<pb::RunState>,
     pub(crate) pulse: watch::Sender<Pulse>,
-    is_reset: AtomicBool,
+    /// What only a reset ends.
+    latched: watch::Sender<Option<Fault>>,
     live: Mutex<Live>,
 }
 
@@ -203,7 +206,7 @@ impl Engine {
             control: watch::Sender::default(),
             state: watch::Sender::new(idle),
             pulse: watch::Sender::default(),
-            is_reset: AtomicBool::new(false),
+            latched: watch::Sender::new(Some(Fault::Started)),
         });
         let task = tokio::spawn(acquire(Arc::clone(&shared), devices.sensor, devices.stage_reports));
         Ok(Self { shared, acquisition: Arc::new(Acquisition(task)) })
@@ -276,18 +279,28 @@ impl Engine {
     pub async fn reset(&self) -> Result<(), ResetError> {
         let not_ready = |why: Broken| ResetError::NotReady(why.to_string());
         let claim = self.claim()?;
-        self.shared.wait_for_stage().await.map_err(not_ready)?;
-        let status = self.shared.stage.state().borrow().status();
+        let shared = &self.shared;
+        shared.latch(Some(Fault::Unfinished));
+        shared.wait_for_stage().await.map_err(not_ready)?;
+        let status = self.stage_state().status();
         if status == pb::StageStatus::Alarm {
-            self.shared.stage.clear_alarm().await?;
+            shared.stage.clear_alarm().await?;
         }
+        // The order is made before the check: a stop between the two still counts as later than the order.
+        let homing = shared.stage.home();
         claim.check()?;
-        self.shared.stage.home().await?;
+        homing.await?;
         claim.check()?;
-        self.shared.retract().await?;
-        self.shared.wait_for_sensor().await.map_err(not_ready)?;
-        self.shared.set_reset();
-        self.shared.refresh_state();
+        shared.retract().await?;
+        shared.wait_for_sensor().await.map_err(not_ready)?;
+        claim.check()?;
+        let status = self.stage_state().status();
+        if status != pb::StageStatus::Idle {
+            let what = format!("homed, the stage did not stay idle: {}", status.as_str_name());
+            return Err(ResetError::NotReady(what));
+        }
+        shared.latch(None);
+        shared.refresh_state();
         Ok(())
     }
 
@@ -343,9 +356,9 @@ impl Engine {
 }
 
 impl Shared {
-    /// From here on the stage may move.
-    pub(crate) fn set_reset(&self) {
-        self.is_reset.store(true, Ordering::Relaxed);
+    /// From here on the stage may move, or not.
+    pub(crate) fn latch(&self, fault: Option<Fault>) {
+        self.latched.send_replace(fault);
     }
 
     /// [`Shared::fault`] in words; empty if there is none.
@@ -356,12 +369,10 @@ impl Shared {
     pub(crate) fn fault(&self) -> Option<Fault> {
         let status = self.stage.state().borrow().status();
         if status == pb::StageStatus::Alarm {
-            Some(Fault::Alarm)
-        } else if !self.is_reset.load(Ordering::Relaxed) {
-            Some(Fault::Started)
-        } else {
-            (status == pb::StageStatus::Unhomed).then_some(Fault::Unhomed)
+            return Some(Fault::Alarm);
         }
+        let latched = *self.latched.borrow();
+        latched.or((status == pb::StageStatus::Unhomed).then_some(Fault::Unhomed))
     }
 
     /// What the acquisition task and the run share. Held only for moments, never across an await.

@@ -179,13 +179,15 @@ impl<'a> Run<'a> {
         self.shared.open_recording(record, self.order.run_id.clone());
         self.set_state(pb::RunPhase::Preparing, "preparing");
         self.shared.emit(Event::Started(self.describe_start()));
-        if let Some(fault) = self.shared.fault().filter(|_| !self.order.resets) {
+        let mut result = self.admit().await;
+        if matches!(result, Err(Broken::Refused(_))) {
             // Nothing moves, not even up.
-            let refused = self.refused("reset", fault.to_string());
             let z_mm = self.shared.position_mm()[2];
-            return self.conclude(&refused, Ok(z_mm));
+            return self.conclude(&result, Ok(z_mm));
         }
-        let mut result = self.prepare().await;
+        if result.is_ok() {
+            result = self.prepare().await;
+        }
         if result.is_ok() {
             self.set_state(pb::RunPhase::Running, "");
             result = self.run_script().await;
@@ -202,7 +204,16 @@ impl<'a> Run<'a> {
         self.conclude(&result, retracted)
     }
 
-    /// Sensor and stage answer, the stage knows where it is, the tip is up, the zero is taken.
+    /// The stage answers, and nothing wants a reset.
+    async fn admit(&self) -> Result<(), Broken> {
+        self.shared.wait_for_stage().await?;
+        match self.shared.fault().filter(|_| !self.order.resets) {
+            Some(fault) => self.refused("reset", fault.to_string()),
+            None => Ok(()),
+        }
+    }
+
+    /// The sensor answers, the stage knows where it is, the tip is up, the zero is taken.
     async fn prepare(&mut self) -> Result<(), Broken> {
         self.set_phase(Phase::Idle, -1);
         let now = self.shared.clock.now().mono;
@@ -212,7 +223,6 @@ impl<'a> Run<'a> {
             live.supervisor.rearm(now);
         }
         self.shared.wait_for_sensor().await?;
-        self.shared.wait_for_stage().await?;
         if self.order.resets {
             self.home().await?;
         }
@@ -227,12 +237,15 @@ impl<'a> Run<'a> {
     async fn home(&self) -> Result<(), Broken> {
         if self.shared.stage.state().borrow().status() == pb::StageStatus::Unhomed {
             info!("homing the stage");
-            let homed = self.shared.stage.home().await;
+            // As in a reset: first the order, then the check.
+            let homing = self.shared.stage.home();
+            self.shared.check_ended()?;
+            let homed = homing.await;
             // If it was stopped, the reason of the stop is the error.
             self.shared.check_ended()?;
             homed?;
         }
-        self.shared.set_reset();
+        self.shared.latch(None);
         Ok(())
     }
 

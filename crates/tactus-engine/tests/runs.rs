@@ -374,13 +374,17 @@ async fn a_new_engine_wants_a_reset_and_a_reset_wants_frames() {
     bench.trouble.lock().unwrap().silent = true;
     let silent = bench.engine.reset().await.unwrap_err();
     assert!(silent.to_string().contains("no frame from the sensor"), "{silent}");
-    assert_eq!(bench.engine.fault(), Some(Fault::Started));
+    assert_eq!(bench.engine.fault(), Some(Fault::Unfinished));
 
     bench.trouble.lock().unwrap().silent = false;
     bench.engine.reset().await.unwrap();
     assert_eq!(bench.engine.fault(), None);
     assert_eq!(bench.engine.run_state().fault, "");
     assert_eq!(bench.stage.borrow().status(), StageStatus::Idle);
+
+    bench.trouble.lock().unwrap().silent = true;
+    bench.engine.reset().await.unwrap_err();
+    assert_eq!(bench.engine.fault(), Some(Fault::Unfinished), "one that fails undoes the one before it");
 }
 
 #[tokio::test(start_paused = true)]

@@ -5,6 +5,7 @@ const TRACE_S = 60;
 const POINTS_MAX = 20 * TRACE_S;
 // A rise that fills the colours, in counts, when nothing rises more.
 const SPAN_MIN_COUNTS = 50;
+const SILENCE_MS = 4000;
 // Dark blue over green to yellow: five anchors of the viridis map (van der Walt and Smith, 2015, CC0).
 const COLOURS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 
@@ -146,37 +147,61 @@ function show(view) {
   showRun(view.run);
 }
 
-async function command(name) {
-  at("answer").textContent = `${name} ...`;
+async function command(name, answer, patience_s) {
+  answer.textContent = `${name} ...`;
   try {
-    const answer = await fetch(name, { method: "POST" });
-    at("answer").textContent = answer.ok ? `${name}: done` : `${name.toUpperCase()} FAILED: ${await answer.text()}`;
+    const reply = await fetch(name, { method: "POST", signal: AbortSignal.timeout(1000 * patience_s) });
+    answer.textContent = reply.ok ? `${name}: done` : `${name.toUpperCase()} FAILED: ${await reply.text()}`;
   } catch {
-    at("answer").textContent = `${name.toUpperCase()} FAILED: the dashboard does not answer`;
+    answer.textContent = `${name.toUpperCase()} FAILED: the dashboard does not answer`;
   }
 }
 
-for (const name of ["stop", "pause", "resume"]) at(name).addEventListener("click", () => command(name));
+function stop() {
+  // A browser opens few connections to one place, and other windows may hold the rest: this one's goes to the stop.
+  views?.close();
+  command("stop", at("stopped"), 15).finally(open);
+}
+
+at("stop").addEventListener("click", stop);
+for (const name of ["pause", "resume"]) at(name).addEventListener("click", () => command(name, at("answer"), 15));
 at("reset").addEventListener("click", () => at("sure").showModal());
 at("sure").addEventListener("close", () => {
-  if (at("sure").returnValue === "yes") command("reset");
+  if (at("sure").returnValue === "yes") command("reset", at("answer"), 130);
   at("sure").returnValue = "";
 });
 at("tare").addEventListener("click", () => { zero = null; });
 document.addEventListener("keydown", (event) => {
-  if (event.key.toLowerCase() === "s" && !event.ctrlKey && !event.metaKey && !event.altKey) command("stop");
+  const isPlain = !event.repeat && !event.ctrlKey && !event.metaKey && !event.altKey;
+  if (event.key.toLowerCase() === "s" && isPlain) stop();
 });
 
-const views = new EventSource("live");
+let views = null;
 let latest = null;
-views.addEventListener("message", (event) => {
-  const isFirst = latest === null;
-  latest = JSON.parse(event.data);
-  // Drawn when the screen is: what comes in between is not.
-  if (isFirst) requestAnimationFrame(() => { const view = latest; latest = null; show(view); drawTrace(); });
-});
-views.addEventListener("error", () => {
+let heard = Date.now();
+
+/** Takes up the views; a window that nobody sees has none. */
+function open() {
+  views?.close();
+  if (document.hidden) return;
+  views = new EventSource("live");
+  heard = Date.now();
+  views.addEventListener("message", (event) => {
+    heard = Date.now();
+    const isFirst = latest === null;
+    latest = JSON.parse(event.data);
+    // Drawn when the screen is: what comes in between is not.
+    if (isFirst) requestAnimationFrame(() => { const view = latest; latest = null; show(view); drawTrace(); });
+  });
+}
+
+document.addEventListener("visibilitychange", open);
+// The service tells of its health every second: whoever says nothing for longer is not there.
+setInterval(() => {
+  if (document.hidden || Date.now() - heard < SILENCE_MS) return;
   at("problem").hidden = false;
   at("problem").textContent = "the dashboard does not answer; trying again";
   at("array").classList.add("stale");
-});
+  open();
+}, 1000);
+open();

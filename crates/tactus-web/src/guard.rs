@@ -8,9 +8,11 @@ use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, Method, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+
+const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 /// The names under which this site may be asked for.
 #[derive(Debug)]
@@ -29,13 +31,17 @@ impl Hosts {
         let name = name_of(authority);
         let address = name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
         name == "localhost"
-            || address.is_ok_and(|address| address.is_loopback() || address == self.listens_on)
+            // A name can be made to point here; an address of this machine is one of this machine.
+            || address.is_ok_and(|address| {
+                address.is_loopback() || address == self.listens_on || self.listens_on.is_unspecified()
+            })
             || self.names.iter().any(|known| known.eq_ignore_ascii_case(name))
     }
 
     /// Why a request is refused, if it is.
     fn refusal(&self, method: &Method, headers: &HeaderMap) -> Option<&'static str> {
-        let text = |name| headers.get(name).and_then(|value: &header::HeaderValue| value.to_str().ok());
+        let text =
+            |name: HeaderName| headers.get(name).and_then(|value: &header::HeaderValue| value.to_str().ok());
         let Some(host) = text(header::HOST) else { return Some("the request names no host") };
         if !self.has(host) {
             return Some("this dashboard is not known by that name: start it with --host NAME");
@@ -43,15 +49,17 @@ impl Hosts {
         if method == Method::GET {
             return None;
         }
-        let is_own_page = headers.get("sec-fetch-site").is_none_or(|site| site == "same-origin");
-        let is_own_origin = headers.get(header::ORIGIN).is_none_or(|origin| {
-            origin
-                .to_str()
-                .ok()
-                .and_then(|origin| origin.split_once("://"))
-                .is_some_and(|(_, from)| from == host)
-        });
-        (!is_own_page || !is_own_origin).then_some("commands come from the dashboard's own page only")
+        // A browser that says where a request comes from is believed; behind a proxy the two names may differ.
+        let is_own = match (text(SEC_FETCH_SITE), headers.get(header::ORIGIN)) {
+            (Some(site), _) => site == "same-origin",
+            (None, Some(origin)) => {
+                origin.to_str().ok().and_then(|origin| origin.split_once("://")).is_some_and(|(_, from)| {
+                    from == host || self.names.iter().any(|known| known == name_of(from))
+                })
+            }
+            (None, None) => true,
+        };
+        (!is_own).then_some("commands come from the dashboard's own page only")
     }
 }
 

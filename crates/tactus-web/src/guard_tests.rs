@@ -1,8 +1,17 @@
 use super::*;
 
 fn refusal(names: &[&str], method: &Method, headers: &[(&'static str, &str)]) -> Option<&'static str> {
+    refusal_at("127.0.0.1:7480", names, method, headers)
+}
+
+fn refusal_at(
+    listen: &str,
+    names: &[&str],
+    method: &Method,
+    headers: &[(&'static str, &str)],
+) -> Option<&'static str> {
     let names = names.iter().map(|&name| name.to_owned()).collect();
-    let hosts = Hosts::new("127.0.0.1:7480".parse().unwrap(), names);
+    let hosts = Hosts::new(listen.parse().unwrap(), names);
     let headers =
         headers.iter().map(|(name, value)| (name.parse().unwrap(), value.parse().unwrap())).collect();
     hosts.refusal(method, &headers)
@@ -43,4 +52,16 @@ fn commands_come_from_the_own_page_only() {
     for site in ["cross-site", "same-site", "none"] {
         assert!(post(&[("sec-fetch-site", site)]).is_some(), "{site}");
     }
+}
+
+#[test]
+fn a_proxy_in_front_and_a_place_on_every_network_are_known() {
+    let proxied = [("host", "127.0.0.1:7480"), ("origin", "https://lab.example")];
+    assert!(refusal(&[], &Method::POST, &proxied).is_some());
+    assert_eq!(refusal(&["lab.example"], &Method::POST, &proxied), None);
+    let said = [&proxied[..], &[("sec-fetch-site", "same-origin")]].concat();
+    assert_eq!(refusal(&[], &Method::POST, &said), None);
+    let by_address = [("host", "192.0.2.1:7480")];
+    assert_eq!(refusal_at("0.0.0.0:7480", &[], &Method::GET, &by_address), None);
+    assert!(refusal_at("0.0.0.0:7480", &[], &Method::GET, &[("host", "elsewhere.example")]).is_some());
 }

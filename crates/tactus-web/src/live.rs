@@ -7,7 +7,7 @@ use tactus_bus::{BusError, Client, Endpoint, History};
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tokio::sync::watch;
-use tokio::time::sleep;
+use tokio::time::{sleep, timeout};
 use tracing::{info, warn};
 
 use crate::view::View;
@@ -16,6 +16,8 @@ use crate::view::View;
 const AGAIN: Duration = Duration::from_secs(1);
 /// How long an answer may take; homing takes longer.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// A command that comes while the connection is made anew waits for it this long.
+const RECONNECTED: Duration = Duration::from_secs(2);
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
 
 /// The rig as it is now.
@@ -37,17 +39,20 @@ impl Live {
                     Ok(client) => {
                         let client = Arc::new(client);
                         info!(rig = client.rig(), "connected");
+                        to_view.send_replace(View { rig: client.rig().to_owned(), ..View::default() });
                         to_client.send_replace(Some(Arc::clone(&client)));
                         let ended = follow(&client, &to_view).await;
-                        to_client.send_replace(None);
-                        let problem =
-                            ended.map_or_else(|error| error.to_string(), |()| "the service went away".into());
+                        let problem = ended.map_or_else(
+                            |error| error.to_string(),
+                            |()| format!("the service of rig {} is not there", client.rig()),
+                        );
                         warn!(problem, "connection lost");
                         problem
                     }
                     Err(error) => error.to_string(),
                 };
                 to_view.send_replace(View { problem, ..View::default() });
+                to_client.send_replace(None);
                 sleep(AGAIN).await;
             }
         });
@@ -64,7 +69,11 @@ impl Live {
     /// # Errors
     /// Why it was not done, for a person.
     pub(crate) async fn command(&self, command: Command) -> Result<(), String> {
-        let client = self.client.borrow().clone();
+        let mut clients = self.client.clone();
+        let client = match timeout(RECONNECTED, clients.wait_for(Option::is_some)).await {
+            Ok(Ok(client)) => client.clone(),
+            Ok(Err(_)) | Err(_) => None,
+        };
         let Some(client) = client else { return Err(self.view.borrow().problem.clone()) };
         let request =
             pb::CommandRequest { who: "dashboard".into(), reason: "button".into(), ..Default::default() };
@@ -76,14 +85,16 @@ impl Live {
 
 /// Keeps `view` up to date until the service goes away.
 async fn follow(client: &Client, view: &watch::Sender<View>) -> Result<(), BusError> {
+    let mut alive = client.alive();
+    if !alive.now() {
+        return Ok(());
+    }
     let mut frames = client.subscribe::<pb::Frame>(History::Last).await?;
     let mut infos = client.subscribe::<pb::SensorInfo>(History::Last).await?;
     let mut stages = client.subscribe::<pb::StageState>(History::Last).await?;
     let mut runs = client.subscribe::<pb::RunState>(History::Last).await?;
     let mut safety = client.subscribe::<pb::SafetyEvent>(History::Last).await?;
     let mut health = client.subscribe::<pb::Health>(History::Last).await?;
-    let mut alive = client.alive();
-    view.send_replace(View { rig: client.rig().to_owned(), ..View::default() });
     loop {
         tokio::select! {
             Some(frame) = frames.recv() => {

@@ -126,7 +126,10 @@ async fn follow(engine: &Engine, progress: &Progress) {
                 engine.stop(StopOrder { by: "cli".into(), reason: "Ctrl-C".into(), abort: false });
             }
             _ = ended.wait_for(|state| state.phase() == RunPhase::Finished) => return progress.clear(),
-            _ = redraw.tick() => progress.show(&state.borrow().clone()),
+            _ = redraw.tick() => {
+                let now = state.borrow().clone();
+                progress.show(&now);
+            }
         }
     }
 }
