@@ -10,7 +10,7 @@ default:
     @just --list --unsorted
 
 # Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd systemd-boot python browser fuzz-check vm-slice solid-check discovery-evidence-slice gpu
+ci: fmt lint docs deny test validate systemd systemd-boot python browser fuzz-check vm solid-check discovery-evidence-slice gpu
 
 # The README's second command.
 test:
@@ -75,9 +75,6 @@ systemd-boot: package
 # run only those.
 vm *checks: programs
     tests/vm/run.sh {{ checks }}
-
-# The part of it that CI runs.
-vm-slice: (vm "enumeration" "streaming" "transports" "readme")
 
 # Stock Python tools read our recordings, tables and bus.
 python: build python-tools
