@@ -30,10 +30,16 @@ def lab(tmp_path):
 
 
 @pytest.fixture
-def dashboard(lab, browser):
+def web(lab):
+    """Where the dashboard listens."""
+    process = lab.start("tactus-web", "--endpoint", lab.endpoint, "--listen", "127.0.0.1:0")
+    yield process.wait_for("http://").split()[-1]
+    process.end()
+
+
+@pytest.fixture
+def dashboard(web, browser):
     """The page, which must have no error of its own, and a way to keep a picture of it."""
-    web = lab.start("tactus-web", "--endpoint", lab.endpoint, "--listen", "127.0.0.1:0")
-    address = web.wait_for("http://").split()[-1]
     page = browser.new_page(viewport={"width": 1180, "height": 900})
     errors = []
     page.on("pageerror", lambda error: errors.append(str(error)))
@@ -42,8 +48,7 @@ def dashboard(lab, browser):
     page.on("console", lambda message: message.type in ("error", "warning") and refused not in message.text and errors.append(message.text))
     PICTURES.mkdir(parents=True, exist_ok=True)
     page.keep = lambda name: page.screenshot(path=PICTURES / f"{name}.png")
-    page.goto(address)
+    page.goto(web)
     yield page
     page.close()
-    web.end()
     assert errors == []
