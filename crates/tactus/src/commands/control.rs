@@ -134,10 +134,7 @@ fn print(reply: &pb::CommandReply) {
     };
     let mut fields = vec![("rig", format!("{}{simulated}", reply.rig))];
     if !state.fault.is_empty() {
-        fields.push((
-            "fault",
-            format!("{}: see that the tip is free to move, then `tactus reset`", state.fault),
-        ));
+        fields.push(("fault", fault_words(&state.fault)));
     }
     fields.extend([
         ("run", run.trim_end().to_owned()),
@@ -155,6 +152,11 @@ fn print(reply: &pb::CommandReply) {
         ("service", format!("version {}, up {}", reply.version, duration(health.uptime_s))),
     ]);
     print_fields(&fields);
+}
+
+/// What wants a reset, and how it is done.
+pub(crate) fn fault_words(fault: &str) -> String {
+    format!("{fault}: see that the tip is free to move, then `tactus reset`")
 }
 
 /// The word for where a run stands.

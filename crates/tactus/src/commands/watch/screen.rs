@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Gauge, Paragraph};
 use tactus_schema::pb;
 
-use crate::commands::control::{phase_word, stage_word};
+use crate::commands::control::{fault_words, phase_word, stage_word};
 use crate::exit;
 use crate::output::duration;
 
@@ -182,8 +182,7 @@ impl Screen {
             )));
         }
         if !run.fault.is_empty() {
-            let text =
-                format!("fault   {}: see that the tip is free to move, then `tactus reset`", run.fault);
+            let text = format!("fault   {}", fault_words(&run.fault));
             lines.push(Line::styled(text, Style::new().fg(Color::Yellow)));
         }
         if let Some(event) = &self.safety {
