@@ -9,16 +9,38 @@ venv := tools / "venv"
 default:
     @just --list --unsorted
 
-# Everything that CI checks, quick things first.
-ci: fmt lint docs deny test validate systemd systemd-boot python browser fuzz-check vm solid-check discovery-evidence-slice gpu
+# Everything that CI checks, as CI does it.
+ci:
+    .ci/run
+
+# What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
+nightly: systemd-boot vm discovery-evidence-slice gpu (fuzz "600") (truth "20") bare advisories
+
+# Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
+quick:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    cargo fmt --all --check
+    crates=()
+    for manifest in $( (git diff --name-only HEAD; git ls-files --others --exclude-standard) | grep -v '^fuzz/' |
+        while read -r path; do
+            while [ "$path" != . ] && [ ! -f "$path/Cargo.toml" ]; do path=$(dirname "$path"); done
+            [ "$path" = . ] || echo "$path/Cargo.toml"
+        done | sort -u); do
+        crates+=(--package "$(sed -n 's/^name = "\(.*\)"/\1/p' "$manifest" | head -1)")
+    done
+    [ ${#crates[@]} -gt 0 ] || { echo "no crate differs from the last commit"; exit 0; }
+    echo "${crates[@]}"
+    cargo clippy "${crates[@]}" --all-targets -- -D warnings
+    cargo test "${crates[@]}" --lib
 
 # The README's second command.
 test:
     cargo test --workspace
 
-# The programs, with the very features that the tests use, so that nothing is built twice.
+# The programs, with the features that the tests use, so that nothing is built twice. CI says in TACTUS_BUILT that they are there.
 build:
-    cargo test --workspace --no-run --quiet
+    test -n "${TACTUS_BUILT:-}" || cargo test --workspace --no-run --quiet
 
 # Formatting.
 fmt:
@@ -36,10 +58,21 @@ docs:
 deny: deny-tool
     PATH="{{ tools }}/bin:$PATH" cargo deny check licenses bans sources
 
-# Build cargo-deny once.
+# Known vulnerabilities of the dependencies. Needs a network that reaches the advisory database, or a clone of it in $CARGO_HOME/advisory-dbs.
+advisories: deny-tool
+    #!/usr/bin/env bash
+    set -euo pipefail
+    export PATH="{{ tools }}/bin:$PATH"
+    if ! cargo deny fetch db; then
+        echo "no advisory database at hand: advisories are not checked"
+        exit 0
+    fi
+    cargo deny check advisories
+
+# Build cargo-deny once, unless the machine has it.
 deny-tool:
-    test -x {{ tools }}/bin/cargo-deny || \
-        CARGO_PROFILE_RELEASE_OPT_LEVEL=1 CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 \
+    command -v cargo-deny >/dev/null || test -x {{ tools }}/bin/cargo-deny || \
+        CARGO_PROFILE_RELEASE_OPT_LEVEL=0 CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 \
         cargo install --locked cargo-deny --version 0.20.2 --no-default-features \
         --root {{ tools }} --target-dir {{ tools }}/build
 
@@ -51,30 +84,37 @@ validate: build
 systemd:
     systemd/verify.sh
 
-# The programs as a lab gets them.
+# The programs as a lab gets them, in target/dist.
 programs:
-    cargo build --release --package tactus --package tactus-daemon --package tactus-web --package tactus-mock
+    cargo build --profile dist --package tactus --package tactus-daemon --package tactus-web --package tactus-mock
 
 # The Debian package, target/package/tactus.deb.
-package: package-tool programs
-    packaging/build.sh
+package: programs (package-of "target/dist")
 
-# Build cargo-deb once.
-package-tool:
-    test -x {{ tools }}/bin/cargo-deb || \
-        CARGO_PROFILE_RELEASE_OPT_LEVEL=1 CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 \
-        cargo install --locked cargo-deb --version 3.8.0 --no-default-features --features gzip \
-        --root {{ tools }} --target-dir {{ tools }}/build
+# The same package of the programs in another folder.
+[private]
+package-of folder:
+    packaging/build.sh {{ folder }}
 
-# The package on a real systemd, booted in namespaces: readiness, watchdog, sandbox, removal. As root; some two minutes.
-systemd-boot: package
+# The package on a real systemd, booted in namespaces: readiness, watchdog, sandbox, removal. As root; some two minutes. CI tries the
+# programs that the tests have built.
+systemd-boot folder="target/dist": (package-of folder)
     tests/systemd/base.sh target/systemd-boot/base.tar
     python3 tests/systemd/checks.py target/systemd-boot target/package/tactus.deb
+
+# What CI's other steps need besides cargo: Debian's packages, Python's, and the machines that they boot. As root.
+prepare: python-tools browser-tools solid-tools
+    tests/systemd/base.sh target/systemd-boot/base.tar
+    tests/vm/run.sh --prepare
 
 # Virtual USB devices at a real kernel, in an emulated machine: tests/vm/README.md. Some five minutes the first time; names of checks
 # run only those.
 vm *checks: programs
-    tests/vm/run.sh {{ checks }}
+    TACTUS_BINARIES={{ justfile_directory() }}/target/dist tests/vm/run.sh {{ checks }}
+
+# The part of it that CI runs, with the programs that the tests have built.
+vm-slice: build
+    TACTUS_BINARIES={{ justfile_directory() }}/target/debug tests/vm/run.sh enumeration streaming
 
 # Stock Python tools read our recordings, tables and bus.
 python: build python-tools
@@ -87,11 +127,14 @@ python-tools:
     {{ venv }}/bin/pip install --quiet --requirement tests/python/requirements.txt --editable clients/python
 
 # A real browser at the dashboard; Debian's chromium is installed where there is none. Pictures of it: target/browser.
-browser: build
+browser: build browser-tools
+    {{ tools }}/browser/bin/pytest -q tests/browser
+
+# The browser, and a virtual environment with what drives it.
+browser-tools:
     command -v chromium >/dev/null || (apt-get update -qq && apt-get install -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null)
     test -d {{ tools }}/browser || python3 -m venv {{ tools }}/browser
     {{ tools }}/browser/bin/pip install --quiet --requirement tests/browser/requirements.txt
-    {{ tools }}/browser/bin/pytest -q tests/browser
 
 # The messages, after a change of tactus.proto.
 proto:
@@ -102,8 +145,7 @@ assets:
     cargo xtask assets
 
 # The finite element model of the covering against scikit-fem, on small meshes: equal reactions, or it fails.
-solid-check: solid-tools
-    cargo build --quiet --workspace --bin tactus-bench
+solid-check: build solid-tools
     {{ tools }}/solid/bin/python bench/peers/fem.py --binary target/debug/tactus-bench --peers scikit-fem --sides rollers \
         --meshes 12x3 16x4 --poisson-ratios 0.3 0.45 0.4999 --rounds 1 --within 1e-10
 
@@ -113,10 +155,10 @@ solid-tools:
     {{ tools }}/solid/bin/pip install --quiet --requirement bench/peers/fem-requirements.txt
 
 # Truth comes back: the paper's experiments on many simulated rigs whose truth varies, calibrated, all by the real binary; the table of
-# coverage. 200 rigs take about 20 minutes on two cores; tests/truth.rs does two of them, coarsely, with every other test.
+# coverage. 200 rigs take about 20 minutes on two cores; tests/e2e/truth.rs does two of them, coarsely, with every other test.
 truth rigs="200":
     cargo build --release --package tactus
-    TACTUS_TRUTH_RIGS={{ rigs }} TACTUS_TRUTH_POINTS=15 cargo test --release --package tactus-e2e --test truth -- --nocapture
+    TACTUS_TRUTH_RIGS={{ rigs }} TACTUS_TRUTH_POINTS=15 cargo test --release --package tactus-e2e --test e2e truth:: -- --nocapture
 
 # How fast the models are, how they grow, how far from the machine's limits: bench/README.md.
 bench:
@@ -167,11 +209,11 @@ discovery-active:
     cargo build --release --package tactus --package tactus-bench
     target/release/tactus-bench evidence active --document docs/discovery-evidence.md
 
-# The part of it that CI runs, always the same 46 sets, some two minutes on two cores: it fails if discovery has become worse.
-discovery-evidence-slice:
-    cargo build --release --package tactus --package tactus-bench
+# The part of it that fails if discovery has become worse: always the same 46 sets, some two minutes on two cores.
+discovery-evidence-slice folder="target/release":
+    {{ if folder == "target/release" { "cargo build --release --package tactus --package tactus-bench" } else { "" } }}
     rm -rf target/evidence/slice
-    target/release/tactus-bench evidence run --size slice --check \
+    {{ folder }}/tactus-bench evidence run --size slice --check \
         --work target/evidence/slice/work --sealed target/evidence/slice/sealed
 
 # A virtual environment with the peers.
@@ -187,28 +229,34 @@ fem-peers *arguments: solid-tools
 
 # Build times from nothing, and the slowest crates.
 build-times:
-    cargo build --release --timings
+    cargo build --release --timings --target-dir target/build-times
 
 # The shaders against the processor. They need a Vulkan driver; where none is, one in software is installed.
 gpu:
     compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null || \
         (apt-get update -qq && apt-get install -qq --no-install-recommends mesa-vulkan-drivers)
     cargo clippy -p tactus-scene --features gpu --all-targets -- -D warnings
-    cargo test -p tactus-scene --features gpu --test gpu
+    cargo test -p tactus-scene --features gpu --test it gpu::
     cargo run --quiet -p tactus --features gpu -- simulate --scene wrench --roll-deg 10 --gpu
 
-# Every target of `fuzz/` for so many seconds, from nothing or from where the last time ended (target/fuzz/corpus).
-# What makes one panic is kept in fuzz/artifacts; `cargo fuzz run TARGET FILE` shows it again.
-fuzz seconds="600": fuzz-tools
-    for target in $({{ tools }}/bin/cargo-fuzz list); do \
-        mkdir -p target/fuzz/corpus/$target && \
-        {{ tools }}/bin/cargo-fuzz run --sanitizer none --target-dir target/fuzz $target target/fuzz/corpus/$target config/links config/rigs config/models \
-            -- -max_total_time={{ seconds }} -max_len=4096 -print_final_stats=1 || exit 1; \
+# Every target of `fuzz/` for so many seconds, from nothing or from where the last time ended (target/fuzz/corpus). An input that makes
+# one panic is kept in target/fuzz/artifacts; the target's program takes it as its argument and shows the panic again.
+fuzz seconds="600":
+    #!/usr/bin/env bash
+    set -euo pipefail
+    # fuzz/.cargo/config.toml has the fuzzer's instruments.
+    (cd fuzz && cargo build --quiet --release)
+    fuzzed() {
+        mkdir -p target/fuzz/corpus/$1 target/fuzz/artifacts/$1
+        target/fuzz/*/release/$1 target/fuzz/corpus/$1 config/links config/rigs config/models -artifact_prefix=target/fuzz/artifacts/$1/ \
+            -max_total_time={{ seconds }} -max_len=4096 -print_final_stats=1 > target/fuzz/$1.log 2>&1 ||
+            { cat target/fuzz/$1.log; return 1; }
+        grep -E 'number_of_executed_units|DONE' target/fuzz/$1.log | sed "s/^/$1: /"
+    }
+    for source in fuzz/fuzz_targets/*.rs; do
+        fuzzed "$(basename "$source" .rs)"
     done
 
-# The part of it that CI runs: the targets still are programs. (Their properties are tested on random dialogues by `cargo test` too.)
-fuzz-check:
-    cargo check --quiet --manifest-path fuzz/Cargo.toml --target-dir target/fuzz
-
-fuzz-tools:
-    test -x {{ tools }}/bin/cargo-fuzz || cargo install cargo-fuzz --locked --quiet --root {{ tools }}
+# A bare Debian 12 with cargo, gcc and git: both of the README's commands in it, timed. As root; the first time some 20 minutes.
+bare:
+    tests/bare/run.sh

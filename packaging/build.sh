@@ -1,29 +1,68 @@
 #!/usr/bin/env bash
-# Makes target/package/tactus.deb of the programs in target/release, and looks into it.
+# Makes target/package/tactus.deb of the programs in a folder (target/dist if none is named), and checks it: build.sh [FOLDER]
 set -euo pipefail
 cd "$(dirname "$0")/.."
+programs=${1:-target/dist}
 out=target/package
-command -v dpkg-shlibdeps >/dev/null || { apt-get update -qq && apt-get install -qq --no-install-recommends dpkg-dev; }
+made=$out/made
+for tool in dpkg-shlibdeps:dpkg-dev readelf:binutils; do
+    command -v "${tool%:*}" >/dev/null || { apt-get update -qq && apt-get install -qq --no-install-recommends "${tool#*:}" >/dev/null; }
+done
 
-mkdir -p $out target/release/completions
-target/release/tactus completions bash > target/release/completions/tactus.bash
-target/release/tactus completions zsh > target/release/completions/_tactus
-target/release/tactus completions fish > target/release/completions/tactus.fish
-target/tools/bin/cargo-deb deb --package tactus --no-build --compress-type gz --compress-system \
-    --output $out/tactus.deb
+mkdir -p $made
+"$programs/tactus" completions bash > $made/tactus.bash
+"$programs/tactus" completions zsh > $made/_tactus
+"$programs/tactus" completions fish > $made/tactus.fish
+cargo xtask licences $made/third-party-licences.txt
 
-# What a reviewer of packages would look at first.
-fail() { echo "$out/tactus.deb: $1"; exit 1; }
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
+chmod 755 "$root"
+while read -r source destination mode; do
+    source=${source//@programs@/$programs}
+    source=${source//@made@/$made}
+    for file in $source; do
+        case $destination in
+        */) target=$root/$destination${file##*/} ;;
+        *) target=$root/$destination ;;
+        esac
+        install -D --mode="$mode" "$file" "$target"
+    done
+done < <(grep -v '^#' packaging/files)
+strip --strip-unneeded "$root"/usr/bin/*
+
+# The packages of the shared libraries that the programs load. dpkg-shlibdeps wants to stand beside a debian/control.
+scratch=$(mktemp -d)
+trap 'rm -rf "$root" "$scratch"' EXIT
+mkdir "$scratch/debian"
+echo "Source: tactus" > "$scratch/debian/control"
+libraries=$(cd "$scratch" && dpkg-shlibdeps -O "$root"/usr/bin/* 2>/dev/null | sed -n 's/^shlibs:Depends=//p')
+[ -n "$libraries" ] || { echo "dpkg-shlibdeps names no libraries"; exit 1; }
+
+mkdir "$root/DEBIAN"
+version=$("$programs/tactus" --version | cut -d' ' -f2)
+sed -e "s/@VERSION@/$version/" -e "s/@ARCHITECTURE@/$(dpkg --print-architecture)/" -e "s/@LIBRARIES@/$libraries/" \
+    -e "s/@SIZE_KIB@/$(du --summarize --block-size=1024 "$root" | cut -f1)/" packaging/control > "$root/DEBIAN/control"
+(cd "$root" && find etc -type f -printf '/%p\n' | sort) > "$root/DEBIAN/conffiles"
+(cd "$root" && find usr -type f -print0 | sort -z | xargs -0 md5sum) > "$root/DEBIAN/md5sums"
+chmod 644 "$root/DEBIAN"/*
+install --mode=755 packaging/postinst packaging/prerm packaging/postrm "$root/DEBIAN/"
+dpkg-deb --root-owner-group -Zgzip --build "$root" $out/tactus.deb
+
+# A reviewer of packages would look at this first.
+fail() { echo "$out/tactus.deb: $1"; exit 1; }
+rm -rf "$root"
 dpkg-deb --raw-extract $out/tactus.deb "$root"
-[ -z "$(find "$root" ! -path "$root/DEBIAN*" ! -path "$root" -printf '%u:%g\n' | grep -v '^root:root$')" ] || fail "files that are not root's"
-[ -z "$(find "$root" -type f -perm /022)" ] || fail "files that others may write"
-diff <(cd "$root" && find etc -type f -printf '/%p\n' | sort) <(sort "$root/DEBIAN/conffiles") || fail "files in /etc that are no conffiles"
+[ -z "$(dpkg-deb --contents $out/tactus.deb | awk '$2 != "root/root"')" ] || fail "some files do not belong to root"
+[ -z "$(find "$root" -type f -perm /022)" ] || fail "others may write some files"
+diff <(cd "$root" && find etc -type f -printf '/%p\n' | sort) <(sort "$root/DEBIAN/conffiles") || fail "some files in /etc are no conffiles"
 for program in tactus tactusd tactus-web tactus-mock; do
     [ "$("$root/usr/bin/$program" --version)" = "$program $(dpkg-deb --field $out/tactus.deb Version | sed 's/-[^-]*$//')" ] ||
         fail "$program has another version"
     ! readelf --sections "$root/usr/bin/$program" | grep -q '\.debug_info' || fail "$program is not stripped"
+done
+for crate in zenoh libusb1-sys zstd-sys tokio; do
+    grep -q "^# .*\b$crate " "$root/usr/share/doc/tactus/third-party-licences.txt" || fail "the licence of $crate is missing"
 done
 for script in postinst prerm postrm; do sh -n "$root/DEBIAN/$script" || fail "$script does not parse"; done
 bash -n "$root/usr/share/bash-completion/completions/tactus" || fail "bash's completions do not parse"

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # A real kernel's USB stack without hardware: makes the machine where it is not made yet, copies our programs into it, runs the checks.
-# Names of checks as arguments run only those: `tests/vm/run.sh ftdi hid`. README.md says the rest.
+# Names of checks as arguments run only those: `tests/vm/run.sh ftdi hid`; `--prepare` only makes the machine. README.md says the rest.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 repository=$(cd "$here/../.." && pwd)
 work=$repository/target/vm
-binaries=${TACTUS_BINARIES:-$repository/target/release}
+binaries=${TACTUS_BINARIES:-$repository/target/dist}
 
 # From Debian 12 and no other release: the machine is one too, and the programs are built against its C library.
 if ! command -v qemu-system-x86_64 >/dev/null || ! command -v mmdebstrap >/dev/null; then
@@ -16,6 +16,7 @@ if ! command -v qemu-system-x86_64 >/dev/null || ! command -v mmdebstrap >/dev/n
 fi
 
 "$here/build.sh" "$work"
+[ "${1:-}" != --prepare ] || exit 0
 
 # What the checks need, as a disk that the machine reads: our programs without their symbols, the shipped files, the checks.
 stage=$(mktemp -d "$work/stage.XXXXXX")

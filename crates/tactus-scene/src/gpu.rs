@@ -80,7 +80,7 @@ type Words = [u32; 16];
 ///
 /// The processor turns the tool and cuts it into facets, in double precision and then in integers; the device
 /// draws, blurs, integrates and answers, in single precision. As both draw the same integers, the images of the
-/// two differ by rounding only: by less than 1e-5 of the peak, measured 1.3e-6 (`tests/gpu.rs` prints it).
+/// two differ by rounding only: by less than 1e-5 of the peak, measured 1.3e-6 (`tests/it/gpu.rs` prints it).
 ///
 /// Any number of poses may be asked for at once; thousands at a time keep a device busy.
 #[derive(Debug)]

@@ -71,7 +71,7 @@ pub enum RenderError {
 ///
 /// Accuracy: within 1e-3 of the image's peak of what [`ForwardModel::image`] makes without a raster. Measured:
 /// at most 7.5e-4 for the scenes of Fig. 10 under the three shipped arrays, 4.5e-4 for a box, 8e-5 for a tilted
-/// frustum; it falls with the power 1.6 of the cells (`tests/accuracy.rs` prints these). A tool of which only a
+/// frustum; it falls with the power 1.6 of the cells (`tests/it/accuracy.rs` prints these). A tool of which only a
 /// tip touches has fewer cells under it: give it finer ones.
 #[derive(Debug, Clone)]
 pub struct Renderer {

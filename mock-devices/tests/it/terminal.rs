@@ -7,6 +7,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
+use rustix::process::{Pid, Signal, kill_process};
 use tactus_device::transport::Connect;
 use tactus_device::transport::serial::SerialConnector;
 use tactus_device::{
@@ -54,8 +55,8 @@ impl Mock {
 
     /// SIGTERM; true if it ended well.
     fn terminate(&mut self) -> bool {
-        let killed = Command::new("kill").args(["-TERM", &self.child.id().to_string()]).status().unwrap();
-        assert!(killed.success());
+        let process = Pid::from_child(&self.child);
+        kill_process(process, Signal::TERM).unwrap();
         self.child.wait().unwrap().success()
     }
 }

@@ -26,7 +26,7 @@ struct Lab {
 }
 
 fn sim_rig() -> Rig {
-    Rig::from_toml(include_str!("../../config/rigs/sim.toml")).unwrap()
+    Rig::from_toml(include_str!("../../../config/rigs/sim.toml")).unwrap()
 }
 
 /// The rig without what it hides but the kinematics, so that the declared model holds.
@@ -272,7 +272,7 @@ async fn garbage_on_every_link_harms_no_frame_and_no_move() {
 
 /// The declared format that is shipped.
 fn declared() -> SensorCodec {
-    let toml = include_str!("../../config/links/digitacts.toml");
+    let toml = include_str!("../../../config/links/digitacts.toml");
     let format = toml::from_str::<RawFormat>(toml).unwrap().check().unwrap();
     SensorCodec::Declared { format: Arc::new(format) }
 }
@@ -280,7 +280,7 @@ fn declared() -> SensorCodec {
 /// The simulated rig with another number of rows and columns, and no faulty elements.
 fn rig_of(rows: usize, cols: usize) -> Rig {
     let centres = |count: usize| (0..count).map(|place| 0.9 + 2.0 * place as f64).collect::<Vec<_>>();
-    let toml = include_str!("../../config/rigs/sim.toml")
+    let toml = include_str!("../../../config/rigs/sim.toml")
         .replace("rows = 6", &format!("rows = {rows}"))
         .replace("cols = 8", &format!("cols = {cols}"))
         .replace("[0.9, 2.9, 5.1, 7.1, 9.1, 11.1, 13.3, 15.3]", &format!("{:?}", centres(cols)))
@@ -396,9 +396,9 @@ async fn polls_that_are_not_answered_are_counted() {
 #[test]
 fn every_shipped_rig_is_one_that_can_be_simulated() {
     for text in [
-        include_str!("../../config/rigs/sim.toml"),
-        include_str!("../../config/rigs/pty.toml"),
-        include_str!("../../config/rigs/pty-declared.toml"),
+        include_str!("../../../config/rigs/sim.toml"),
+        include_str!("../../../config/rigs/pty.toml"),
+        include_str!("../../../config/rigs/pty-declared.toml"),
     ] {
         let rig = Rig::from_toml(text).unwrap();
         assert!(rig.simulated && rig.simulation.is_some() && rig.service.is_some());

@@ -4,11 +4,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-mod made_up;
-
 use std::{env, fs, path::Path};
 
-use made_up::{CURVATURE_PER_MM, FAULTY, empty, fault, report, sure, whole};
+use crate::made_up::{CURVATURE_PER_MM, FAULTY, empty, fault, report, sure, whole};
 use tactus_calibrate::{Calibration, FaultKind, Form};
 use tactus_model::{Array, Registration};
 use tactus_report::calibration::{

@@ -2,15 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-#[path = "../examples/synthetic/mod.rs"]
-mod synthetic;
-
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use synthetic::{Fed, Plan, Run, TICK_NS};
+use crate::synthetic::{Fed, Plan, Run, TICK_NS};
 use tactus_record::{
     Recording, RowsError, export,
     table::{self, Table},

@@ -1,8 +1,6 @@
 //! Clients see a rig come, go and die.
 
-mod lab;
-
-use lab::{Link, event, open};
+use crate::lab::{Link, event, open};
 use tactus_bus::{Bus, BusConfig, BusError, Client, History, Losses};
 use tactus_schema::{key::Keys, pb};
 

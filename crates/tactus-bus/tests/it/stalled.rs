@@ -1,10 +1,8 @@
 //! A client that stands still harms nobody else, and what it lost is counted.
 
-mod lab;
-
 use std::time::Duration;
 
-use lab::{Link, event, frame, open, raw_session};
+use crate::lab::{Link, event, frame, open, raw_session};
 use tactus_bus::{Client, History};
 use tactus_schema::{key::Command, pb};
 use zenoh::query::{ConsolidationMode, ReplyKeyExpr};

@@ -1,10 +1,8 @@
 //! Commands reach the service and answers come back; a stop waits for nothing.
 
-mod lab;
-
 use std::time::Duration;
 
-use lab::{free_endpoint, open, raw_session};
+use crate::lab::{free_endpoint, open, raw_session};
 use prost::Message as _;
 use tactus_bus::{BusError, Client, CommandCall, Request};
 use tactus_schema::{key::Command, pb};

@@ -4,12 +4,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-#[path = "made_up/discovery.rs"]
-mod made_up;
-
 use std::{env, fs, path::Path};
 
-use made_up::{data, empty, explained, nothing_missing, report, unexplained};
+use crate::made_up::discovery::{data, empty, explained, nothing_missing, report, unexplained};
 use serde_json::Value;
 use tactus_discover::{Discovery, NextExperiment, Unexplained, Verdict};
 use tactus_model::Array;

@@ -1,8 +1,6 @@
 //! A client that comes late gets what went before, once and in order.
 
-mod lab;
-
-use lab::{event, frame, open, settled};
+use crate::lab::{event, frame, open, settled};
 use tactus_bus::{Client, History, Losses};
 use tactus_schema::pb;
 

@@ -2,12 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-#[path = "../examples/synthetic/mod.rs"]
-mod synthetic;
-
 use std::fs;
 
-use synthetic::{Fed, Plan, RIG_TOML, SCRIPT, STARTED_NS};
+use crate::synthetic::{Fed, Plan, RIG_TOML, SCRIPT, STARTED_NS};
 use tactus_record::{Completeness, Entry, Message, RecordError, Recording, Tally, info, read};
 use tactus_schema::{Rig, WallTime, pb};
 

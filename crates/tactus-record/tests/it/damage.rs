@@ -2,13 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-#[path = "../examples/synthetic/mod.rs"]
-mod synthetic;
-
 use std::{fs, path::Path};
 
+use crate::synthetic::{Fed, Plan};
 use proptest::prelude::*;
-use synthetic::{Fed, Plan};
 use tactus_record::{Completeness, Entry, Message, Reader, RecordError, Recording, info, recover};
 use tactus_schema::pb::{self, run_event::Event};
 
@@ -91,7 +88,8 @@ fn a_killed_recording_lacks_at_most_a_second() {
             Fed::Stage(state) => state.t_wall_ns,
             Fed::Event(event) => event.t_wall_ns,
         };
-        let durable_ns = if written.is_empty() { synthetic::STARTED_NS } else { last_time_ns(&written) };
+        let durable_ns =
+            if written.is_empty() { crate::synthetic::STARTED_NS } else { last_time_ns(&written) };
         assert!(last_fed_ns - durable_ns <= 1_000_000_000, "after {messages} messages");
     }
 }

@@ -8,12 +8,9 @@
     reason = "what is made up here is known to fit"
 )]
 
-#[path = "../../tactus-record/examples/synthetic/mod.rs"]
-mod synthetic;
-
 use std::{env, fs, path::Path};
 
-use synthetic::{Fed, Plan, Press, Run};
+use crate::synthetic::{Fed, Plan, Press, Run};
 use tactus_report::{RunReport, render_html, run_report};
 use tactus_schema::pb::{self, run_event::Event};
 

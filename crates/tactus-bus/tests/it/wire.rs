@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod lab;
-
 use std::{collections::BTreeMap, fs};
 
-use lab::{event, frame, open, raw_session};
+use crate::lab::{event, frame, open, raw_session};
 use prost::Message as _;
 use tactus_bus::{Bus, BusConfig, BusError, Client, History};
 use tactus_schema::{DeviceTick, Frame, FrameFlags, MonoTime, Stamp, WallTime, key::Keys, pb};

@@ -2,15 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-#[path = "../examples/synthetic/mod.rs"]
-mod synthetic;
-
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use synthetic::{Plan, Run};
+use crate::synthetic::{Plan, Run};
 use tactus_record::{
     RowsError, export,
     rows::{self, Source},

@@ -14,7 +14,7 @@ use tactus_schema::rig::StageProtocol;
 use tokio::task::JoinHandle;
 use tokio::time::sleep;
 
-const SIM: &str = include_str!("../../config/rigs/sim.toml");
+const SIM: &str = include_str!("../../../config/rigs/sim.toml");
 
 /// Each stage under test, as the rig file writes it: axes as they come, and axes that are exchanged, turned and shifted.
 const STAGES: [&str; 4] = [

@@ -1,5 +1,7 @@
 //! A calibration whose every number is known, as the pages are to show it.
 
+pub(crate) mod discovery;
+
 use tactus_calibrate::{
     Calibration, CoveringSpread, Curve, Data, ElementResponse, Estimate, Fault, FaultKind, Form, Health,
     RegistrationFit, ResponseFit, SpreadFit, ThicknessFit, Trial,

@@ -1,0 +1,6 @@
+//! Images of meshes, through the public interface.
+
+mod accuracy;
+mod files;
+#[cfg(feature = "gpu")]
+mod gpu;

@@ -1,0 +1,6 @@
+//! Virtual devices, through the production drivers.
+
+mod hidden;
+mod rig;
+mod stages;
+mod terminal;
