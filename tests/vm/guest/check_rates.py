@@ -48,7 +48,7 @@ def check_the_service_at_1_khz():
             frames, lost = (end[key] - begin[key] for key in ("frames", "frames_lost"))
             # Frames in transit, at most those of a second, are neither.
             bounds = between(round(1000 * (shortest_s - 1)), round(1000 * (longest_s + 1)))
-            check("frames received or lost, by the elapsed time", bounds, frames + lost)
+            check("frames received or lost in the elapsed time", bounds, frames + lost)
             check("connected", True, end["connected"])
     until_gone()
 

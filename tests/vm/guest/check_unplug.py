@@ -42,7 +42,7 @@ def check_idle():
             mock.do(back)
             said = service.until_connected()
             lost = said["sensor"]["frames_lost"] - lost_before
-            check(f"{back}: frames lost, by the time it was unplugged", between(round(down_s * RATE_HZ) - 15, lost_in(out)), lost)
+            check(f"{back}: frames lost while it was unplugged", between(round(down_s * RATE_HZ) - 15, lost_in(out)), lost)
         lost = service.status()["sensor"]["frames_lost"]
         service.until("frames come", lambda now: now["sensor"]["frames"] > said["sensor"]["frames"] + 60)
         check("frames lost after that", lost, service.status()["sensor"]["frames_lost"])
