@@ -1,4 +1,4 @@
-"""The dashboard in a real browser; pictures of what it showed go to target/browser."""
+"""The dashboard in a real browser. Screenshots go to target/browser."""
 
 import pathlib
 import shutil
@@ -16,7 +16,7 @@ PICTURES = REPOSITORY / "target/browser"
 @pytest.fixture(scope="session")
 def browser():
     with sync_playwright() as playwright:
-        # Chromium's own sandbox wants a user who is not root; the page is ours.
+        # Chromium's sandbox does not work as root. Without it only our own page is opened.
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         yield browser
         browser.close()
@@ -31,7 +31,7 @@ def lab(tmp_path):
 
 @pytest.fixture
 def web(lab):
-    """Where the dashboard listens."""
+    """The address of the dashboard."""
     process = lab.start("tactus-web", "--endpoint", lab.endpoint, "--listen", "127.0.0.1:0")
     yield process.wait_for("http://").split()[-1]
     process.end()
@@ -39,11 +39,11 @@ def web(lab):
 
 @pytest.fixture
 def dashboard(web, browser):
-    """The page, which must have no error of its own, and a way to keep a picture of it."""
+    """The page, with `keep` for a screenshot. Fails on script errors and on console errors or warnings."""
     page = browser.new_page(viewport={"width": 1180, "height": 900})
     errors = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    # What the service refuses, the console calls an error, too.
+    # The console also reports a command that the service refuses as an error.
     refused = "the server responded with a status of 409"
     page.on("console", lambda message: message.type in ("error", "warning") and refused not in message.text and errors.append(message.text))
     PICTURES.mkdir(parents=True, exist_ok=True)

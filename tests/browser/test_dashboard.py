@@ -1,4 +1,4 @@
-"""What a person does at the dashboard."""
+"""A person uses the dashboard."""
 
 import re
 
@@ -25,7 +25,7 @@ def test_a_run_is_watched_and_stopped(lab, dashboard):
     (lab.folder / "hold.star").write_text(HOLD)
     client = lab.start("tactus", "--json", "--endpoint", lab.endpoint, "run", "hold.star", "--no-report")
     expect(page.locator("#run")).to_contain_text(re.compile("running, 3 of 4 presses"), timeout=60_000)
-    # Deep enough that many rise: the brightest cell is next to where the tip is.
+    # At this depth many elements respond; the brightest cell is next to the tip.
     expect(page.locator("#depth")).to_have_text("0.400", timeout=60_000)
     rises = [int(text) for text in page.locator("#array > div").all_text_contents()]
     assert max(rises) > 100
@@ -40,7 +40,7 @@ def test_a_run_is_watched_and_stopped(lab, dashboard):
     page.keep("stopped")
 
 
-def test_stop_is_a_key_too_and_a_reset_is_asked_for_twice(lab, dashboard):
+def test_stop_has_a_key_and_a_reset_asks_for_confirmation(lab, dashboard):
     page = dashboard
     expect(page.locator("#array > div")).to_have_count(48)
     page.keyboard.press("s")
@@ -48,7 +48,7 @@ def test_stop_is_a_key_too_and_a_reset_is_asked_for_twice(lab, dashboard):
     page.locator("#reset").click()
     page.get_by_role("button", name="No", exact=True).click()
     expect(page.locator("#sure")).to_be_hidden()
-    # Were it on its way, it would say so before the pause is answered.
+    # If a reset had been sent, the page would show it before the answer to the pause.
     page.locator("#pause").click()
     expect(page.locator("#answer")).to_contain_text("PAUSE FAILED: no run is in progress")
     page.locator("#reset").click()
@@ -56,7 +56,7 @@ def test_stop_is_a_key_too_and_a_reset_is_asked_for_twice(lab, dashboard):
     expect(page.locator("#answer")).to_have_text("reset: done", timeout=60_000)
 
 
-def test_a_restarted_service_says_that_it_wants_a_reset(lab, dashboard):
+def test_a_restarted_service_says_that_it_needs_a_reset(lab, dashboard):
     page = dashboard
     expect(page.locator("#array > div")).to_have_count(48)
     lab.daemon.end()

@@ -1,10 +1,10 @@
-"""Opens a recording and its measurement table with the stock Python packages and holds them against what Tactus says.
+"""Opens a recording and its measurement table with stock Python packages, and compares them with the output of Tactus.
 
     pip install mcap mcap-protobuf-support pyarrow
     cargo run -p tactus-record --example sample_recording -- DIR
     python tests/python/check_recording.py DIR/sample.mcap DIR/sample.json DIR/sample.parquet
 
-The second file is the output of `tactus record info --json`; any recording will do, with or without a table.
+The second file is the output of `tactus record info --json`. Any recording works, with or without a table.
 """
 
 import argparse
@@ -23,7 +23,7 @@ PHASES = {"idle", "approach", "load", "hold", "unload", "retract"}
 
 
 def check_recording(path, info):
-    """Reads the MCAP file; gives its frames and its rig."""
+    """Reads the MCAP file; returns its frames and its rig."""
     from mcap.reader import make_reader
     from mcap_protobuf.decoder import DecoderFactory
 
@@ -77,7 +77,7 @@ def check_recording(path, info):
 
 
 def check_table(path, info, frames, rig):
-    """Reads the measurement table of that recording alone."""
+    """Reads the measurement table of this one recording."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -121,10 +121,10 @@ def main():
     with open(arguments.info, encoding="utf-8") as stream:
         info = json.load(stream)
     frames, rig = check_recording(arguments.recording, info)
-    print(f"{arguments.recording}: {len(frames)} frames, {info['frames_lost']} lost, {info['dwells']} dwells: as said")
+    print(f"{arguments.recording}: {len(frames)} frames, {info['frames_lost']} lost, {info['dwells']} dwells: agrees")
     if arguments.table:
         check_table(arguments.table, info, frames, rig)
-        print(f"{arguments.table}: {len(frames)} rows: as said")
+        print(f"{arguments.table}: {len(frames)} rows: agrees")
     return 0
 
 

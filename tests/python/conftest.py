@@ -1,4 +1,4 @@
-"""The runs that the tests look at."""
+"""The runs that the tests use."""
 
 import pytest
 from lab import Lab, tactus
@@ -6,7 +6,7 @@ from lab import Lab, tactus
 
 @pytest.fixture(scope="session")
 def element_centres(tmp_path_factory):
-    """An element-centre run on the embedded rig: its summary."""
+    """The summary of an element-centre run on the embedded rig."""
     folder = tmp_path_factory.mktemp("embedded")
     return tactus("run", "element-centres", "--embedded", "--seed", 3, "--no-report", cwd=folder)
 

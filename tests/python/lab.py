@@ -1,4 +1,4 @@
-"""Starts the real binaries for tests of what stock Python tools see."""
+"""Starts the real binaries for tests with stock Python tools."""
 
 import json
 import os
@@ -53,7 +53,7 @@ class Lab:
 
 
 class Process:
-    """One of our binaries beside a test. What it says is kept, and printed when it ends."""
+    """One of our binaries, running beside a test. Its output is kept and printed."""
 
     def __init__(self, name, args, folder):
         self.name = name

@@ -1,4 +1,4 @@
-"""Stock tools open what a run leaves: mcap, mcap-protobuf-support and pyarrow."""
+"""Stock tools open the files of a run: mcap, mcap-protobuf-support and pyarrow."""
 
 import json
 import math
@@ -20,7 +20,7 @@ def table(element_centres, tmp_path_factory):
     return path
 
 
-def test_every_message_and_row_agrees_with_what_tactus_says(element_centres, table, tmp_path):
+def test_every_message_and_row_agrees_with_the_output_of_tactus(element_centres, table, tmp_path):
     info = tmp_path / "info.json"
     info.write_text(json.dumps(tactus("record", "info", element_centres["recording"])))
     checker = Path(__file__).with_name("check_recording.py")

@@ -1,4 +1,4 @@
-"""A stock zenoh client beside a run: every frame arrives, and nothing is missing."""
+"""A stock zenoh client beside a run: every frame arrives."""
 
 import json
 import subprocess

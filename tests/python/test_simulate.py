@@ -1,4 +1,4 @@
-"""A stock zenoh client beside a simulated sensor: it cannot tell it from a real one, but for what it says of itself."""
+"""A stock zenoh client of a simulated sensor. The sensor behaves like a real one, but marks its frames as simulated."""
 
 import socket
 
@@ -29,9 +29,9 @@ def test_a_subscriber_follows_live_frames_at_one_kilohertz(tmp_path):
         sensor.end()
     assert all(frame.simulated for frame in frames)
     assert (len(frames[0].image), len(frames[0].image[0])) == (14, 20)
-    # Every sequence number is a frame that came, or one of those that were said to be lost.
+    # Every sequence number is a frame that arrived or one that was reported as lost.
     assert frames[-1].seq - frames[0].seq == len(frames) - 1 + lost - frames[0].lost_before
-    # 2,000 frames are two seconds of a sensor's time, by its own clock.
+    # 2,000 frames are two seconds on the sensor's clock.
     assert frames[-1].device_tick - frames[0].device_tick == 1000 * (frames[-1].seq - frames[0].seq)
     peaks = [max(map(max, frame.image)) for frame in frames]
     assert max(peaks) > min(peaks) + 50, "the tool moves up and down"

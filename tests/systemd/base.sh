@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Makes the root file system of the booted test once, from Debian's packages: base.sh FILE.tar
+# Makes the root file system of the boot test from Debian's packages, if it does not exist yet: base.sh FILE.tar
 set -euo pipefail
 [ ! -f "$1" ] || exit 0
 mkdir -p "$(dirname "$1")"
 command -v mmdebstrap >/dev/null || { apt-get update -qq && apt-get install -qq --no-install-recommends mmdebstrap >/dev/null; }
 
-# The programs were linked here: the same release of Debian runs them, from the same mirrors.
+# The programs were linked on this machine, so the root file system uses the same Debian release, from the same mirrors.
 suite=$(. /etc/os-release && echo "${VERSION_CODENAME:?a Debian release is needed}")
 sources=()
 [ ! -f /etc/apt/sources.list.d/debian.sources ] || sources=(/etc/apt/sources.list.d/debian.sources)

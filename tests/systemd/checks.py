@@ -1,7 +1,7 @@
-"""The Debian package and its unit on a booted systemd, from installation to removal: checks.py FOLDER PACKAGE.deb
+"""Tests the Debian package and its units on a booted systemd, from installation to removal: checks.py FOLDER PACKAGE.deb
 
-FOLDER holds `base.tar` (base.sh makes it) and gets the console's log. Every check prints what it is and whether it holds; the exit
-status is 1 if one does not. The tip is that of `tactus-mock`, a process of its own which outlives the service.
+FOLDER contains `base.tar` (made by base.sh) and gets the console's log. Every check prints its title and its result; the exit
+status is 1 if one fails. The tip is that of `tactus-mock`, a separate process that outlives the service.
 """
 
 import json
@@ -16,16 +16,16 @@ from machine import Journal, Machine
 
 UNIT = "tactusd.service"
 RUNS = "/var/lib/tactus/runs"
-# Presses to 0.6 mm and stays there until somebody ends it.
+# Presses to 0.6 mm and stays there until it is ended.
 HOLD = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.6], dwell_s = 600.0)\n"
 PRESS = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.2])\n"
 
-# Bash is a client of HTTP, too.
+# An HTTP request in plain bash.
 ASK = "exec 3<>/dev/tcp/127.0.0.1/7480; printf 'GET / HTTP/1.0\\r\\nHost: localhost\\r\\n\\r\\n' >&3; cat <&3"
 
 
 class Checks:
-    """Counts what held and what did not."""
+    """Counts passed and failed checks."""
 
     def __init__(self):
         self.passed = self.failed = 0
@@ -46,7 +46,7 @@ class Checks:
 
 
 class Lab:
-    """The machine with the package in it, and what people do there."""
+    """The machine with the package, and the actions of its users."""
 
     def __init__(self, machine, check):
         self.machine = machine
@@ -62,18 +62,18 @@ class Lab:
         return json.loads(done.stdout) if done.returncode == 0 else {"error": done.stderr}
 
     def frames_later(self, count):
-        """What the service says when so many more frames have come."""
+        """The status of the service when `count` more frames have arrived."""
         first = status = self.status()
         while status["sensor"]["frames"] < first["sensor"]["frames"] + count:
             status = self.status()
         return status
 
     def truth(self):
-        """Where the tip truly is."""
+        """The true position of the tip."""
         return json.loads(self.mock.ask("truth"))
 
     def press(self):
-        """Starts the long press, and returns once the array feels the tip on its way down."""
+        """Starts the long press, and returns when the array responds to the tip on its way down."""
         client = self.machine.start("tactus", "run", "hold.star", user="scientist")
         viewer = self.machine.start("tactus", "watch", "--json", user="scientist")
         viewer.wait_for(lambda line: max(json.loads(line)["counts"]) > 250)
@@ -98,7 +98,7 @@ class Lab:
         path.write_text(text)
 
     def drop_in(self, text):
-        """Puts a drop-in of the unit in place, or takes it away."""
+        """Installs a drop-in of the unit, or removes it if `text` is None."""
         path = self.machine.root / f"etc/systemd/system/{UNIT}.d/test.conf"
         if text is None:
             shutil.rmtree(path.parent)
@@ -109,17 +109,17 @@ class Lab:
 
 
 def installation(lab, package):
-    """`dpkg -i`, then the README's commands."""
+    """Installation: `dpkg -i`, then the README's commands."""
     machine, check = lab.machine, lab.check
     shutil.copy(package, machine.root / "tactus.deb")
     check.succeeds("the package installs", machine.run("dpkg", "-i", "/tactus.deb"))
     check.equal("the unit is enabled", machine.run("systemctl", "is-enabled", UNIT).stdout.strip(), "enabled")
     shown = machine.run("stat", "--format=%U:%G %a", RUNS).stdout.strip()
-    check.equal("the folder of recordings is there before the first start", shown, "tactus:tactus 755")
+    check.equal("the folder for recordings exists before the first start", shown, "tactus:tactus 755")
     check.equal("an installation starts nothing", machine.unit(UNIT, "ActiveState"), "inactive")
     done = machine.run("udevadm", "test", "--action=add", "/sys/devices/virtual/mem/null")
     said = [line for line in (done.stdout + done.stderr).splitlines() if "70-tactus.rules:" in line]
-    check.equal("udev reads the rules without a complaint", said, [])
+    check.equal("udev reads the rules without a message", said, [])
 
     check.succeeds("tactus validate /etc/tactus/tactusd.toml", machine.run("tactus", "validate", "/etc/tactus/tactusd.toml"))
     machine.must("useradd", "--create-home", "scientist")
@@ -128,9 +128,9 @@ def installation(lab, package):
     lab.journal = Journal(machine, UNIT)
     check.succeeds("systemctl start tactusd", machine.run("systemctl", "start", "tactusd"))
     state = machine.unit(UNIT, "ActiveState", "SubState", "StatusText")
-    check.equal("it is ready, and says why", state, ["active", "running", "rig sim: frames flow"])
+    check.equal("it is ready, and its status says why", state, ["active", "running", "rig sim: frames flow"])
     status = lab.status()
-    check("tactus status: simulated frames come, no run", status.get("simulated") and status["sensor"]["frames"] > 0
+    check("tactus status: simulated frames arrive, no run", status.get("simulated") and status["sensor"]["frames"] > 0
           and status["run"]["phase"] == "idle", "simulated, frames, idle", status)
     done = lab.tactus("run", "press.star")
     check("nothing moves before a reset", done.returncode == 4 and "`tactus reset`" in done.stderr, "exit status 4", done)
@@ -139,13 +139,13 @@ def installation(lab, package):
 
 
 def sandbox(lab):
-    """Who the service is, and what it cannot reach."""
+    """Sandbox: the user of the service, and what it cannot reach."""
     machine, check = lab.machine, lab.check
     pid = machine.unit(UNIT, "MainPID")
     fields = dict(line.split(":\t", 1) for line in machine.must("cat", f"/proc/{pid}/status").splitlines() if ":\t" in line)
     user = machine.must("id", "-u", "tactus").strip()
-    check.equal("the service is the user tactus", set(fields["Uid"].split()), {user})
-    check("that is a system user, not root", 0 < int(user) < 1000, "1 to 999", user)
+    check.equal("the service runs as the user tactus", set(fields["Uid"].split()), {user})
+    check("this is a system user, not root", 0 < int(user) < 1000, "1 to 999", user)
     limits = [fields["CapEff"], fields["CapBnd"], fields["NoNewPrivs"], fields["Seccomp"]]
     check.equal("without capabilities, with a filter of system calls", limits, ["0" * 16, "0" * 16, "1", "2"])
     shown = machine.must("stat", "--format=%U:%G %a", "/var/lib/tactus", RUNS, str(pathlib.Path(lab.recording()).parent), lab.recording())
@@ -153,13 +153,14 @@ def sandbox(lab):
     check.equal("owner and modes of the state directory and a recording", shown.splitlines(), wanted)
     check.succeeds("a scientist reads the recording", lab.tactus("record", "info", lab.recording()))
     done = machine.run("touch", f"{RUNS}/mine", user="scientist")
-    check("and cannot write among them", "Permission denied" in done.stderr, "Permission denied", done.stderr)
+    check("and cannot write there", "Permission denied" in done.stderr, "Permission denied", done.stderr)
 
     done = machine.run("systemd-analyze", "security", "--no-pager", "--threshold=20", UNIT)
     check.succeeds("the exposure of the installed unit is at most 2.0", done)
     print("     " + next(line for line in done.stdout.splitlines() if "Overall" in line).strip())
 
-    # Plugged in after the start, so to say. Allowed means that the kernel is asked: it has no such driver or device here.
+    # These nodes stand for devices that are plugged in after the start. If the filter allows one, the kernel itself answers that it
+    # has no such driver or device.
     drivers = [line.split() for line in pathlib.Path("/proc/devices").read_text().splitlines()]
     hidraw = next((fields[0] for fields in drivers if fields[1:] == ["hidraw"]), None)
     nodes = [("ttyACM7", 166, True), ("ttyUSB7", 188, True), ("usb7", 189, True), ("full-again", 1, True),
@@ -172,13 +173,13 @@ def sandbox(lab):
         held = machine.run("dd", "count=0", f"if=/dev/{name}", unit=UNIT).stderr
         refused = "Operation not permitted" in held and "Operation not permitted" not in free
         check(f"the device filter {'allows' if allowed else 'refuses'} {name} ({major}:{minor})", refused != allowed,
-              "refused inside the unit only" if not allowed else "the same as outside the unit", f"{held!r}; outside {free!r}")
+              "refused only inside the unit" if not allowed else "the same as outside the unit", f"{held!r}; outside {free!r}")
     if not hidraw:
-        print("     this kernel has no hidraw: its allowance is not tried")
+        print("     this kernel has no hidraw: the filter is not tested for it")
 
 
 def journal(lab):
-    """Logs as journald has them."""
+    """Logs in the journal."""
     machine, check = lab.machine, lab.check
     lines = machine.must("journalctl", "--unit", UNIT, "_COMM=tactusd", "--output=json").splitlines()
     entries = [json.loads(line) for line in lines]
@@ -189,27 +190,28 @@ def journal(lab):
     check("they are text without control characters", all(isinstance(text, str) for text in texts), "text", texts)
     accepted = next((text for text in texts if "run accepted" in text), "")
     check("with their fields", "recording=/var/lib/tactus/runs/" in accepted, "run accepted ... recording=...", accepted)
-    check("a level is a priority, which is not part of the text", all((entry["PRIORITY"], str(entry["MESSAGE"])[:6]) == ("6", " INFO ") for entry in entries),
-          "6 and INFO: nothing went wrong so far", {(entry["PRIORITY"], str(entry["MESSAGE"])) for entry in entries})
+    check("the level is the entry's priority and not part of the text", all((entry["PRIORITY"], str(entry["MESSAGE"])[:6]) == ("6", " INFO ") for entry in entries),
+          "6 and INFO: no problem so far", {(entry["PRIORITY"], str(entry["MESSAGE"])) for entry in entries})
 
     before = time.monotonic()
     lab.configure(format="json")
     machine.must("systemctl", "restart", UNIT)
     message = lab.journal.wait_for("ready: frames flow", before)["MESSAGE"]
-    check("with format = \"json\" each is an object", json.loads(message)["message"] == "ready: frames flow", "an object", message)
+    check("with format = \"json\" each message is an object", json.loads(message)["message"] == "ready: frames flow", "an object", message)
     lab.configure()
     machine.must("systemctl", "restart", UNIT)
 
 
 def configuration(lab):
-    """A configuration that cannot be used."""
+    """A bad configuration."""
     machine, check = lab.machine, lab.check
     machine.must("systemctl", "stop", UNIT)
     before = time.monotonic()
     lab.configure(rig="rigs/none.toml")
     done = machine.run("systemctl", "start", UNIT)
     state = machine.unit(UNIT, "ActiveState", "ExecMainStatus", "NRestarts")
-    check.equal("a bad configuration ends it with status 2, without another try", [done.returncode, *state], [1, "failed", "2", "0"])
+    check.equal("a bad configuration ends the service with status 2, and systemd does not start it again",
+                [done.returncode, *state], [1, "failed", "2", "0"])
     entry = lab.journal.wait_for("none.toml", before)
     check.equal("the journal has the file's name, as an error (3)", entry["PRIORITY"], "3")
     lab.configure()
@@ -217,12 +219,13 @@ def configuration(lab):
 
 
 def devices(lab):
-    """Devices at the ends of serial ports, in a process of their own: the service waits for them."""
+    """Devices on serial ports, in a separate process: the service waits for them."""
     machine, check = lab.machine, lab.check
     rig = (machine.root / "usr/share/tactus/rigs/pty.toml").read_text()
-    # Slow enough to be caught on its way down.
+    # Slow loading, so that the press can be interrupted on its way down.
     rig = rig.replace('"mock/', '"/run/bench/').replace("load_speed_mm_per_s = 1.0", "load_speed_mm_per_s = 0.1")
-    # Frames come in real time, and the supervisor stops the stage if three are late: a busy machine is not to be the reason.
+    # Frames arrive in real time, and the supervisor stops the stage if three are late. With a low rate a busy machine does not cause
+    # this.
     rig = rig.replace("rate_hz = 30.0", "rate_hz = 10.0")
     (machine.root / "etc/tactus/rigs/bench.toml").write_text(rig)
     lab.configure(rig="rigs/bench.toml")
@@ -233,18 +236,18 @@ def devices(lab):
     lab.mock = machine.start("tactus-mock", "rig", "--config", "/etc/tactus/rigs/bench.toml", "--link-dir", "/run/bench")
     ports = [lab.mock.wait_for(lambda line: line.startswith(device)).split()[1] for device in ("sensor ", "stage ")]
     lab.journal.wait_for("this user may not open the port", before)
-    check.equal("nor is it with ports that it may not open", machine.unit(UNIT, "ActiveState"), "activating")
-    # A serial port is its group's.
+    check.equal("it is not ready either with ports that it may not open", machine.unit(UNIT, "ActiveState"), "activating")
+    # Serial ports normally belong to this group.
     machine.must("chgrp", "dialout", *ports)
     machine.must("chmod", "660", *ports)
     lab.journal.wait_for("ready: frames flow", before)
     machine.must("systemctl", "start", UNIT)
-    check.equal("with them it becomes ready", machine.unit(UNIT, "ActiveState", "StatusText"), ["active", "rig bench: frames flow"])
+    check.equal("with ports that it may open it becomes ready", machine.unit(UNIT, "ActiveState", "StatusText"), ["active", "rig bench: frames flow"])
     check.succeeds("tactus reset homes the stage", lab.tactus("reset"))
 
 
 def dashboard(lab):
-    """The dashboard: a process of its own, without devices."""
+    """The dashboard: a separate process without devices."""
     machine, check = lab.machine, lab.check
     unit = "tactus-web.service"
     check.equal("the dashboard's unit is enabled", machine.run("systemctl", "is-enabled", unit).stdout.strip(), "enabled")
@@ -254,7 +257,7 @@ def dashboard(lab):
     print("     " + next(line for line in done.stdout.splitlines() if "Overall" in line).strip())
     pid = machine.unit(unit, "MainPID")
     user = int(machine.must("stat", "--format=%u", f"/proc/{pid}"))
-    check("it is a user of the dynamic range", 61184 <= user <= 65519, "61184 to 65519", user)
+    check("its user is in the dynamic range", 61184 <= user <= 65519, "61184 to 65519", user)
     names = set(machine.must("ls", f"/proc/{pid}/root/dev").split())
     check("it sees no device", not any(name.startswith(("tty", "hidraw", "bus")) and name != "tty" for name in names), "pseudo-devices", names)
     page = machine.run("bash", "-c", ASK)
@@ -262,12 +265,12 @@ def dashboard(lab):
     before = lab.status()
     machine.must("systemctl", "kill", "--kill-whom=main", "--signal=KILL", unit)
     after = lab.frames_later(20)
-    check.equal("killed, it takes nothing with it", after["sensor"]["frames_lost"], before["sensor"]["frames_lost"])
+    check.equal("if it is killed, the service loses no frame", after["sensor"]["frames_lost"], before["sensor"]["frames_lost"])
     machine.must("systemctl", "stop", unit)
 
 
 def watchdog(lab):
-    """The service hangs while the tip is on its way down."""
+    """Watchdog: the service hangs while the tip is on its way down."""
     machine, check = lab.machine, lab.check
     client = lab.press()
     before = time.monotonic()
@@ -281,17 +284,17 @@ def watchdog(lab):
     machine.must("systemctl", "start", UNIT)
     state = machine.unit(UNIT, "ActiveState", "NRestarts")
     check.equal("a service that hangs is killed and restarted", state, ["active", "1"])
-    # On the way down the last confirmed depth is above the true one.
-    check("the tip went at most 0.1 mm deeper, and stood", hung["z_mm"] >= stopped["z_mm"] - 0.1 and not hung["moving"],
+    # On the way down, the true tip is below the last confirmed depth.
+    check("the tip went at most 0.1 mm deeper, and stopped", hung["z_mm"] >= stopped["z_mm"] - 0.1 and not hung["moving"],
           f"z >= {stopped['z_mm'] - 0.1:.3f} mm", hung)
     status = lab.frames_later(20)
     check.equal("the restart moved nothing", lab.truth(), hung)
-    check.equal("no run goes on, and it says that it wants a reset", [status["run"]["phase"], status["run"]["run_id"], status["fault"]],
-                ["idle", "", "nothing has been reset since the service started"])
-    print(f"     stopped at z = {stopped['z_mm']:.3f} mm, stood at {hung['z_mm']:.3f} mm")
+    check.equal("no run continues, and the status says that a reset is needed",
+                [status["run"]["phase"], status["run"]["run_id"], status["fault"]], ["idle", "", "nothing has been reset since the service started"])
+    print(f"     service stopped at z = {stopped['z_mm']:.3f} mm, tip at rest at {hung['z_mm']:.3f} mm")
 
     done = lab.tactus("record", "info", recording)
-    check.equal("the recording is said to be cut off", done.returncode, 3)
+    check.equal("tactus record info reports that the recording is cut off", done.returncode, 3)
     check.succeeds("and a scientist recovers it", lab.tactus("recover", recording, "--out", "whole.mcap"))
     done = lab.tactus("--json", "reset")
     check.succeeds("an explicit reset", done)
@@ -311,7 +314,7 @@ def killed(lab):
     client.wait()
     lab.frames_later(20)
     after = lab.truth()
-    check("kill -9: the tip went at most 0.1 mm deeper, and stands after the restart",
+    check("kill -9: the tip went at most 0.1 mm deeper, and does not move after the restart",
           after["z_mm"] >= stopped["z_mm"] - 0.1 and not after["moving"], f"z >= {stopped['z_mm'] - 0.1:.3f} mm", after)
     lab.machine.must("tactus", "reset")
 
@@ -324,7 +327,7 @@ def termination(lab):
     machine.must("systemctl", "stop", UNIT)
     client.wait()
     state = machine.unit(UNIT, "ActiveState", "Result", "ExecMainStatus")
-    check.equal("systemctl stop in a press ends within the limit, with status 0", state, ["inactive", "success", "0"])
+    check.equal("systemctl stop during a press ends the service within the limit, with status 0", state, ["inactive", "success", "0"])
     truth = lab.truth()
     check("the tip is up", truth["z_mm"] > 1.9 and not truth["moving"], "z = 2 mm", truth)
     done = lab.tactus("--json", "record", "info", recording)
@@ -333,7 +336,7 @@ def termination(lab):
 
 
 def dynamic_user(lab):
-    """Decision 0016: the service would run as a dynamic user too, but nobody could read what it records."""
+    """Decision 0016: the service also works as a dynamic user, but then nobody can read what it records."""
     machine, check = lab.machine, lab.check
     lab.configure()
     recording = lab.recording()
@@ -342,34 +345,34 @@ def dynamic_user(lab):
     check.succeeds("with DynamicUser=yes it becomes ready", machine.run("systemctl", "start", UNIT))
     pid = machine.unit(UNIT, "MainPID")
     user = int(machine.must("stat", "--format=%u", f"/proc/{pid}"))
-    check("as a user of the dynamic range", 61184 <= user <= 65519, "61184 to 65519", user)
+    check("its user is in the dynamic range then", 61184 <= user <= 65519, "61184 to 65519", user)
     done = lab.tactus("record", "info", recording)
     check("and a scientist cannot reach the recordings", "ermission denied" in done.stderr, "Permission denied", done.stderr)
     machine.must("systemctl", "stop", UNIT)
     lab.drop_in(None)
     machine.must("systemctl", "start", UNIT)
     owner = machine.must("stat", "--format=%U", recording).strip()
-    check.equal("back without it, the recordings are where they were, and tactus's", owner, "tactus")
+    check.equal("without it again, the recordings are in their place and belong to tactus", owner, "tactus")
     check.succeeds("and a scientist reads them", lab.tactus("record", "info", recording))
 
 
 def removal(lab):
-    """An upgrade, removal and purge."""
+    """Upgrade, removal and purge."""
     machine, check = lab.machine, lab.check
     recording = lab.recording()
     before = machine.unit(UNIT, "MainPID", "InvocationID")
     done = machine.run("dpkg", "-i", "/tactus.deb")
     check.succeeds("the package installs over itself", done)
-    check.equal("the service goes on meanwhile", machine.unit(UNIT, "MainPID", "InvocationID"), before)
-    check("and one is told to restart it", "systemctl restart tactusd" in done.stdout, "a hint", done.stdout)
+    check.equal("the service keeps running meanwhile", machine.unit(UNIT, "MainPID", "InvocationID"), before)
+    check("the output says how to restart it", "systemctl restart tactusd" in done.stdout, "a hint", done.stdout)
     check.succeeds("the package is removed", machine.run("dpkg", "-r", "tactus"))
     ended = machine.run("systemctl", "is-active", UNIT).stdout.strip()
     left = machine.run("ls", "/etc/tactus/tactusd.toml", recording)
     check.equal("the service has ended", ended, "inactive")
-    check.succeeds("configuration and recordings stay", left)
-    check.succeeds("and purged", machine.run("dpkg", "-P", "tactus"))
-    check.succeeds("recordings stay even then", machine.run("ls", recording))
-    check("the configuration does not", machine.run("ls", "/etc/tactus/tactusd.toml").returncode != 0, "gone", "there")
+    check.succeeds("configuration and recordings remain", left)
+    check.succeeds("the package is purged", machine.run("dpkg", "-P", "tactus"))
+    check.succeeds("recordings remain even then", machine.run("ls", recording))
+    check("the configuration is removed", machine.run("ls", "/etc/tactus/tactusd.toml").returncode != 0, "gone", "there")
 
 
 def main():
@@ -387,7 +390,7 @@ def main():
                 print(f"-- {part.__doc__.strip()} [{time.monotonic() - started:.0f} s]", flush=True)
                 part(lab)
         except Exception:
-            check("the checks go on to their end", False, "no error", traceback.format_exc())
+            check("the checks run to their end", False, "no error", traceback.format_exc())
             print(machine.run("journalctl", "--no-pager", "--lines=60").stdout)
     print(f"{check.passed} passed, {check.failed} failed in {time.monotonic() - started:.0f} s")
     return 1 if check.failed else 0

@@ -1,6 +1,6 @@
-"""A machine of Debian's packages whose first process is systemd, in namespaces of this one: no kernel of its own, no emulation.
+"""A machine made of Debian's packages, with systemd as its first process. It runs in namespaces, on this kernel, without emulation.
 
-Needs root. Whatever happens, nothing of it stays: its processes end with this one, and its mounts with its processes.
+Needs root. It always cleans up: its processes end with this process, and its mounts end with its processes.
 """
 
 import json
@@ -18,7 +18,7 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 # Only a hang takes this long.
 DEADLINE_S = 90
-# Of Debian's own; they would look for hardware, the network or updates.
+# Units of Debian that would look for hardware, the network or updates.
 UNWANTED = """
     systemd-udevd.service systemd-udevd-control.socket systemd-udevd-kernel.socket systemd-udev-trigger.service
     systemd-networkd.service systemd-networkd.socket systemd-logind.service systemd-modules-load.service
@@ -28,7 +28,7 @@ UNWANTED = """
 
 
 class Machine:
-    """Boots on entering, and is gone on leaving."""
+    """Boots when the `with` block is entered, and ends when it is left."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -57,7 +57,7 @@ class Machine:
         (self.root / "etc/hostname").write_text("bench\n")
         (self.root / "etc/fstab").write_text("")
         (self.root / "etc/machine-id").write_text("0123456789abcdef0123456789abcdef\n")
-        # What does not outlive the test need not reach the disk.
+        # The root file system is temporary, so nothing has to be synced to the disk.
         (self.root / "etc/dpkg/dpkg.cfg.d/unsafe-io").write_text("force-unsafe-io\n")
         for unit in UNWANTED:
             link = self.root / "etc/systemd/system" / unit
@@ -66,18 +66,18 @@ class Machine:
 
     def _boot(self):
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as ready:
-            # A socket's path must be short, and this one may not be.
+            # The path of a socket must be short, and this one may be long.
             folder = os.open(self.root, os.O_DIRECTORY)
             ready.bind(f"/proc/self/fd/{folder}/ready.socket")
             os.close(folder)
             ready.settimeout(DEADLINE_S)
             for left in self.cgroup.parent.glob("tactus-systemd-boot-*"):
-                # Of a test that was killed, or of one that goes on.
+                # Left by a test that was killed, or used by one that is still running.
                 _remove_cgroups(left, busy_is_fine=True)
             self.cgroup.mkdir()
             with self.console.open("wb") as console:
                 self.outer = subprocess.Popen(
-                    # `setpriv` and `--kill-child` tie all of it to this process.
+                    # With `setpriv` and `--kill-child`, everything ends with this process.
                     ["setpriv", "--pdeathsig", "KILL"]
                     + "unshare --mount --uts --ipc --net --pid --cgroup --fork --kill-child --propagation private".split()
                     + [HERE / "pid1.sh", self.root],
@@ -93,7 +93,7 @@ class Machine:
 
     def close(self):
         if self.outer is not None:
-            # With the first process of its namespace every other one ends.
+            # When the first process of a namespace ends, all others end too.
             self.outer.kill()
             self.outer.wait()
         if self.pid is not None:
@@ -108,35 +108,35 @@ class Machine:
         return enter + ["env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "LC_ALL=C.UTF-8"] + list(map(str, command))
 
     def run(self, *command, user=None, unit=None):
-        """Runs a command inside, to its end; with `unit`, behind that unit's device filter."""
+        """Runs a command in the machine to its end; with `unit`, behind that unit's device filter."""
         join = None if unit is None else lambda: self._cgroup_of(unit).write_text("0")
         return subprocess.run(
             self._inside(command, user), stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=DEADLINE_S, preexec_fn=join
         )
 
     def must(self, *command, user=None):
-        """Runs a command inside that is no check, but must succeed for the checks to go on; returns what it printed."""
+        """Runs a command in the machine that must succeed for the checks to continue; returns its output."""
         done = self.run(*command, user=user)
         if done.returncode != 0:
             raise RuntimeError(f"{shlex.join(map(str, command))}: exit status {done.returncode}: {done.stdout}{done.stderr}")
         return done.stdout
 
     def start(self, *command, user=None):
-        """Starts a command inside."""
+        """Starts a command in the machine."""
         return Process(self._inside(command, user))
 
     def _cgroup_of(self, unit):
         return self.cgroup / "system.slice" / unit / "cgroup.procs"
 
     def unit(self, name, *properties):
-        """Properties of a unit."""
+        """Properties of a unit: one value, or a list if several are asked for."""
         lines = self.must("systemctl", "show", name, *(f"--property={property}" for property in properties)).splitlines()
         shown = dict(line.split("=", 1) for line in lines)
         return shown[properties[0]] if len(properties) == 1 else [shown[property] for property in properties]
 
 
 class Process:
-    """A process inside that goes on beside the checks; what it says are its lines."""
+    """A process in the machine that runs beside the checks. Its output is read line by line."""
 
     def __init__(self, command):
         self.lines = queue.Queue()
@@ -151,45 +151,45 @@ class Process:
         self.lines.put(None)
 
     def wait_for(self, is_it):
-        """Waits for a line that `is_it`, and returns it."""
+        """Waits for a line for which `is_it` is true, and returns it."""
         seen = []
         until = time.monotonic() + DEADLINE_S
         while True:
             try:
                 line = self.lines.get(timeout=max(0.0, until - time.monotonic()))
             except queue.Empty:
-                raise RuntimeError(f"what was waited for never came; the last lines: {seen[-5:]}") from None
+                raise RuntimeError(f"the expected line never came; the last lines: {seen[-5:]}") from None
             if line is None:
-                raise RuntimeError(f"it ended before it said what was waited for; its last lines: {seen[-5:]}")
+                raise RuntimeError(f"the process ended before the expected line; its last lines: {seen[-5:]}")
             if is_it(line):
                 return line
             seen.append(line)
 
     def ask(self, line):
-        """Types a line, and returns the next line it says."""
+        """Types a line, and returns the next line of output."""
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
         return self.wait_for(lambda _: True)
 
     def wait(self):
-        """Waits for its end; returns its exit status and all lines that nobody has read."""
+        """Waits for its end; returns its exit status and all lines that were not read yet."""
         status = self.process.wait(DEADLINE_S)
         return status, list(iter(self.lines.get, None))
 
     def end(self):
-        """Ends it."""
+        """Terminates it and waits for its end."""
         self.process.terminate()
         self.process.wait(DEADLINE_S)
 
 
 class Journal:
-    """The journal of a unit, from its beginning, as it comes."""
+    """The journal of a unit, from its beginning, followed live."""
 
     def __init__(self, machine, unit):
         self.process = machine.start("journalctl", "--follow", "--no-tail", "--output=json", f"--unit={unit}")
 
     def wait_for(self, text, after):
-        """Waits for a message that contains the text and came `after` that moment (`time.monotonic()`); returns the entry."""
+        """Waits for a message that contains the text and is later than `after` (`time.monotonic()`); returns the entry."""
         def is_it(line):
             entry = json.loads(line)
             return text in str(entry["MESSAGE"]) and int(entry["__MONOTONIC_TIMESTAMP"]) > after * 1e6
@@ -197,7 +197,7 @@ class Journal:
 
 
 def _unified_cgroups():
-    """Where the unified hierarchy of control groups is mounted."""
+    """The mount point of the unified control group hierarchy."""
     for line in pathlib.Path("/proc/mounts").read_text().splitlines():
         _, where, kind, *_ = line.split()
         if kind == "cgroup2":
@@ -206,7 +206,7 @@ def _unified_cgroups():
 
 
 def _remove_cgroups(top, busy_is_fine):
-    """Removes a control group and those in it."""
+    """Removes a control group and all groups in it."""
     for folder, _, _ in os.walk(top, topdown=False):
         try:
             os.rmdir(folder)
@@ -216,7 +216,7 @@ def _remove_cgroups(top, busy_is_fine):
 
 
 def _wait_for_end(pid):
-    """Waits until a process that is no child of ours has ended."""
+    """Waits until a process has ended that is not our child."""
     try:
         there = os.pidfd_open(pid)
     except ProcessLookupError:

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Becomes the first process of a machine: pid1.sh ROOT, in new namespaces (machine.py makes them).
+# Becomes the first process of the machine: pid1.sh ROOT, in new namespaces that machine.py makes.
 set -euo pipefail
 root=$1
 
 mount --bind "$root" "$root"
 mount -t proc proc "$root/proc"
-# Units see the kernel's description of itself, and cannot change it.
+# Units can read the kernel's /sys and cannot change it.
 mount -t sysfs -o ro sysfs "$root/sys"
 mount -t cgroup2 cgroup2 "$root/sys/fs/cgroup"
 mount -t tmpfs -o mode=755 tmpfs "$root/dev"
@@ -25,7 +25,7 @@ mount -t tmpfs tmpfs "$root/tmp"
 cd "$root"
 pivot_root . mnt
 umount --lazy /mnt
-# What is mounted in a unit's sandbox stays there, but what is mounted here reaches it.
+# Mounts in a unit's sandbox stay there; mounts made here also appear in the sandbox.
 mount --make-rshared /
 exec env -i container=tactus PATH=/usr/sbin:/usr/bin NOTIFY_SOCKET=/ready.socket \
     /lib/systemd/systemd --log-target=journal-or-kmsg --show-status=no --unit=multi-user.target

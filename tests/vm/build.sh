@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Makes the machine in the folder given: a kernel, a small Debian, and both booted and saved. Does nothing where what it is made from
-# has not changed; remove the folder to have Debian's updates.
+# Makes the machine in the given folder: a kernel and a small Debian, booted and saved. Does nothing if the inputs have not changed.
+# Remove the folder to get Debian's updates.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 work=$1
 
-# The saved state is this qemu's, and holds what stands in these files.
+# The saved state depends on this version of qemu and on the content of these files.
 inputs=$(cat "$here/build.sh" "$here/machine.py" "$here/unpack-kernel.py" "$here/boot" <(qemu-system-x86_64 --version) | sha256sum)
 if [ -f "$work/made" ] && [ "$(cat "$work/made")" = "$inputs" ]; then
     exit 0
@@ -13,7 +13,7 @@ fi
 rm -rf "$work"
 mkdir -p "$work"
 log=$work/build.log
-echo "making the machine (some two minutes, once); its log is target/vm/build.log"
+echo "making the machine (about two minutes, once); the log is target/vm/build.log"
 trap 'tail -n 30 "$log" >&2; echo "the machine was not made" >&2' ERR
 
 step() {
@@ -22,8 +22,8 @@ step() {
     echo "  $1: $((SECONDS - start)) s"
 }
 
-# The kernel, without the initial file system and the boot loader's tools that its package asks for. It is unpacked here, which
-# under emulation would take half a minute, and needs no root file system for itself.
+# The kernel, without the initial file system and the boot loader tools that its package depends on. It is unpacked here; under
+# emulation this would take half a minute.
 kernel() {
     apt-get update -qq
     local version
@@ -37,7 +37,7 @@ kernel() {
     echo "$version" > "$work/kernel-version"
 }
 
-# Debian's essential packages, systemd and udev for what real machines do with devices, and Python for the checks.
+# Debian's essential packages, systemd and udev to handle devices as real machines do, and Python for the checks.
 files() {
     TMPDIR=$work mmdebstrap --mode=root --variant=essential --architectures=amd64 \
         --include=systemd,systemd-sysv,udev,kmod,python3 \
@@ -49,7 +49,7 @@ files() {
     rm -rf "$work"/root/var/lib/apt/lists/* "$work"/root/var/cache/apt/*
 }
 
-# Of the kernel's modules those that the machine's disks and our devices need, with all that they depend on.
+# The kernel modules for the machine's disks and our devices, with all their dependencies.
 modules() {
     local version kernel root=$work/root
     version=$(cat "$work/kernel-version")
@@ -72,14 +72,14 @@ modules() {
     chroot "$root" depmod "$version"
 }
 
-# Paths of modules below their version's folder, each after those that it depends on.
+# Paths of modules below their version's folder, each after its dependencies.
 needed() {
     for module in "$@"; do
         chroot "$work/root" modprobe -d /all -S "$(cat "$work/kernel-version")" --show-depends "$module"
     done | sed -n "s|^insmod /all/lib/modules/[^/]*/\([^ ]*\).*|\1|p" | awk '!seen[$0]++'
 }
 
-# The machine's first and only task is /usr/local/sbin/boot, once devices are handled; of what Debian starts besides, nothing.
+# Once udev runs, the machine's only task is /usr/local/sbin/boot. Nothing else of Debian is started.
 setup() {
     local root=$work/root units=$work/root/etc/systemd/system
     echo guest > "$root/etc/hostname"
@@ -110,7 +110,7 @@ UNIT
     done
 }
 
-# The root file system, and the small one that the kernel begins with to find it.
+# The root file system, and the small initial file system from which the kernel finds it.
 disks() {
     local version first=$work/first
     version=$(cat "$work/kernel-version")

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The emulated machine: boots it and saves it booted, resumes it and has it run the checks.
+"""The emulated machine: boots and saves it, or resumes it and lets it run the checks.
 
-    machine.py save WORK           boots what build.sh made in WORK and saves the state there
-    machine.py run WORK STAGE      resumes it, gives it the folder STAGE as a disk, prints its console; its status is the checks'
+    machine.py save WORK           boots what build.sh made in WORK, and saves the state there
+    machine.py run WORK STAGE      resumes it with the folder STAGE as a disk and prints its console; exits with the checks' status
 
-Nothing here needs hardware acceleration, a network or root, and none of it is looked for: results would depend on the host.
+It needs no hardware virtualisation, network or root, and does not look for them: results would then depend on the host.
 """
 
 import atexit
@@ -21,9 +21,9 @@ import time
 from pathlib import Path
 
 MEMORY_MB = 1024
-# The disk of the checks: of one size, or the saved machine would not know it again.
+# The disk of the checks. Its size must not change, or the saved machine would not recognise it.
 STAGE_BYTES = 400 << 20
-# Only a hang takes so long.
+# Only a hang takes this long.
 BOOT_LIMIT_S, RUN_LIMIT_S = 600, 1200
 READY = "GUEST ready"
 STATUS = re.compile(r"GUEST status (\d+)")
@@ -35,14 +35,14 @@ KERNEL_ARGUMENTS = (
 
 
 class Machine:
-    """A running qemu: its console, its monitor, the serial line on which the guest waits."""
+    """A running qemu with its console, its monitor and the serial line on which the guest waits."""
 
     def __init__(self, work: Path, root: str, stage: Path, extra: tuple[str, ...] = ()):
         self.folder = Path(tempfile.mkdtemp(prefix="vm-"))
         atexit.register(shutil.rmtree, self.folder, ignore_errors=True)
         command = [
             "qemu-system-x86_64",
-            # The microvm machine has hung, and the default accelerator is whatever the host has.
+            # The microvm machine type has hung. The default accelerator would depend on the host.
             *("-M", "pc,hpet=off", "-accel", "tcg,thread=multi,tb-size=256", "-cpu", "max,la57=off"),
             *("-smp", "2", "-m", str(MEMORY_MB)),
             *("-nodefaults", "-no-user-config", "-display", "none", "-no-reboot"),
@@ -64,7 +64,7 @@ class Machine:
         self.read_monitor()
 
     def connect(self, name: str) -> socket.socket:
-        """The socket that qemu makes some time after its start."""
+        """Connects to a socket that qemu makes some time after its start."""
         path = self.folder / name
         while self.qemu.poll() is None:
             try:
@@ -89,7 +89,7 @@ class Machine:
         return self.read_monitor()
 
     def lines(self, limit_s: float):
-        """The console's lines, until it ends or the limit has come."""
+        """The lines of the console, until it ends or the time limit is reached."""
         watch = threading.Timer(limit_s, self.end)
         watch.daemon = True
         watch.start()
@@ -155,7 +155,7 @@ def run(work: Path, folder: Path) -> int:
 
 
 def main() -> None:
-    # Whoever ends this ends the machine.
+    # If this process is terminated, the machine ends too.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     os.environ["LC_ALL"] = "C"
     match sys.argv[1:]:

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
-# A real kernel's USB stack without hardware: makes the machine where it is not made yet, copies our programs into it, runs the checks.
-# Names of checks as arguments run only those: `tests/vm/run.sh ftdi hid`; `--prepare` only makes the machine. README.md says the rest.
+# Tests a real kernel's USB stack without hardware: makes the machine if there is none, copies our programs into it, runs the checks.
+# Names of checks as arguments run only those: `tests/vm/run.sh ftdi hid`; `--prepare` only makes the machine. README.md has the details.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 repository=$(cd "$here/../.." && pwd)
 work=$repository/target/vm
 binaries=${TACTUS_BINARIES:-$repository/target/dist}
 
-# From Debian 12 and no other release: the machine is one too, and the programs are built against its C library.
+# Only Debian 12 works: the machine is Debian 12 too, and the programs are built against its C library.
 if ! command -v qemu-system-x86_64 >/dev/null || ! command -v mmdebstrap >/dev/null; then
     apt-get update -qq
-    # A newer qemu-utils than that release's would forbid its qemu.
+    # A qemu-utils newer than this release's would conflict with its qemu.
     apt-get install -qq --no-install-recommends --allow-downgrades \
         qemu-system-x86/bookworm qemu-utils/bookworm mmdebstrap/bookworm e2fsprogs/bookworm
 fi
@@ -18,7 +18,7 @@ fi
 "$here/build.sh" "$work"
 [ "${1:-}" != --prepare ] || exit 0
 
-# What the checks need, as a disk that the machine reads: our programs without their symbols, the shipped files, the checks.
+# A disk with what the checks need: our programs without symbols, the shipped files, the checks.
 stage=$(mktemp -d "$work/stage.XXXXXX")
 trap 'rm -rf "$stage"' EXIT
 mkdir "$stage/bin"

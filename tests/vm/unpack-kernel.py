@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""unpack-kernel.py VMLINUZ VMLINUX: takes the kernel out of its compressed file.
+"""unpack-kernel.py VMLINUZ VMLINUX: unpacks a compressed kernel.
 
-Where in the file it lies stands in the header of the boot protocol: Linux, Documentation/x86/boot.rst.
+The header of the boot protocol gives its position in the file: Linux, Documentation/x86/boot.rst.
 """
 
 import lzma
@@ -16,21 +16,21 @@ UNPACK = {b"\xfd7zXZ\0": lzma.decompress, b"\x1f\x8b": lambda data: zlib.decompr
 def main(packed: str, unpacked: str) -> None:
     with open(packed, "rb") as file:
         image = file.read()
-    # No sectors means four, for the oldest loaders' sake; the boot sector comes before them.
+    # 0 means four sectors, for compatibility with old boot loaders. The boot sector comes before them.
     sectors = (image[SETUP_SECTORS] or 4) + 1
     offset, length = struct.unpack_from("<II", image, PAYLOAD_OFFSET)
     begin = sectors * SECTOR + offset
     payload = image[begin : begin + length]
     for magic, unpack in UNPACK.items():
         if payload.startswith(magic):
-            # The unpacked length follows the compressed data, which the unpackers leave alone.
+            # The last four bytes are the unpacked length, not compressed data.
             kernel = unpack(payload[:-4])
             if not kernel.startswith(b"\x7fELF"):
-                sys.exit(f"{packed}: what it holds is no kernel")
+                sys.exit(f"{packed}: the content is not a kernel")
             with open(unpacked, "wb") as file:
                 file.write(kernel)
             return
-    sys.exit(f"{packed}: compressed in a way unknown here, it begins with {payload[:6].hex()}")
+    sys.exit(f"{packed}: unknown compression, which starts with {payload[:6].hex()}")
 
 
 main(*sys.argv[1:])

@@ -1,4 +1,4 @@
-"""Counts frames and tells what is missing: one line of JSON; exit status 1 if the bus lost any or none came.
+"""Counts frames and lost frames; prints one line of JSON. Exit status 1 if the bus lost any or too few came.
 
 python count_frames.py --frames 300
 python count_frames.py --seconds 10
@@ -11,7 +11,7 @@ import time
 
 import tactus_client
 
-#: A service that sends no frame for so long is not waited for any more.
+#: Give up after this time without a frame.
 PATIENCE_S = 10.0
 
 
@@ -20,8 +20,8 @@ def main() -> int:
     parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447")
     parser.add_argument("--rig", help="default: the one that is ready")
     length = parser.add_mutually_exclusive_group(required=True)
-    length.add_argument("--frames", type=int, help="end after so many frames")
-    length.add_argument("--seconds", type=float, help="end after so long")
+    length.add_argument("--frames", type=int, help="stop after this number of frames")
+    length.add_argument("--seconds", type=float, help="stop after this time")
     options = parser.parse_args()
 
     try:

@@ -1,4 +1,4 @@
-"""Shows the live image in a terminal: the denser the character, the higher the counts. Ctrl-C ends it."""
+"""Shows the live image in a terminal: denser characters are higher counts. Ctrl-C ends it."""
 
 import argparse
 import sys
@@ -21,7 +21,7 @@ def main() -> int:
     with client:
         info = client.sensor_info()
         full_scale = info.full_scale_counts if info and info.full_scale_counts > 0 else 4095.0
-        # From the present on; the past is of no use to a viewer.
+        # A viewer needs no past frames.
         frames = client.frames(history=1)
         try:
             for frame in frames:
@@ -32,9 +32,9 @@ def main() -> int:
 
 
 def show(frame, missing, full_scale: float) -> None:
-    """Draws one frame over the one before."""
+    """Draws one frame over the last one."""
     lines = []
-    # Row 0 lies at the origin corner, which is drawn below.
+    # Row 0 is at the origin corner, which is drawn at the bottom.
     for row in reversed(list(frame.image)):
         shades = (SHADES[min(int(max(counts, 0) / full_scale * len(SHADES)), len(SHADES) - 1)] for counts in row)
         lines.append("".join(shade * 2 for shade in shades))

@@ -1,4 +1,4 @@
-"""What the tests stand on: golden bytes, free ports, and the service's example publisher."""
+"""Fixtures: golden bytes, free ports, and the example publisher in place of a service."""
 
 import json
 import os
@@ -52,7 +52,7 @@ def pulse_program() -> str:
 
 @pytest.fixture
 def pulse(pulse_program, free_endpoint):
-    """Starts a service at 200 Hz that loses each tenth frame at the device, and gives its endpoint."""
+    """Starts a publisher at 200 Hz that loses every tenth frame at the device, and gives its endpoint."""
     process = subprocess.Popen([pulse_program, free_endpoint, "200", "10"], stdout=subprocess.PIPE, text=True)
     try:
         ready = json.loads(process.stdout.readline())

@@ -4,7 +4,7 @@ from tactus_client import frames, messages
 from tactus_client.frames import Frame, Tally
 
 
-def test_a_frame_is_the_message_under_the_same_names(golden):
+def test_a_frame_has_the_fields_of_the_message(golden):
     frame = Frame.of(messages.Frame.FromString(golden("frame.hex")), shape=(1, 2))
     assert (frame.seq, frame.epoch, frame.device_tick) == (300, 2, 7)
     assert (frame.t_mono_ns, frame.t_wall_ns) == (1_000_000_000, 5)
@@ -26,7 +26,7 @@ def test_the_image_is_row_major_with_and_without_numpy(monkeypatch):
     assert frame.image == [[0, 1, 2], [3, 4, 5]]
 
 
-def test_an_image_that_cannot_be_made_says_why():
+def test_an_impossible_image_says_why():
     message = messages.Frame(counts=range(6))
     with pytest.raises(ValueError, match="has not told"):
         _ = Frame.of(message, shape=None).image
@@ -39,19 +39,19 @@ def test_an_image_that_cannot_be_made_says_why():
     [
         # Pairs of seq and lost_before.
         ([(5, 0), (6, 0), (7, 0)], 0, 0, 0),
-        # Lost before the first frame is not between the first and the last.
+        # Losses before the first frame are not between the first and the last.
         ([(5, 4), (6, 0)], 0, 0, 0),
         ([(5, 0), (9, 3)], 3, 0, 0),
         ([(5, 0), (9, 0)], 0, 3, 0),
         ([(5, 0), (9, 1), (10, 0)], 1, 2, 0),
-        # A count that claims more than is absent is not believed.
+        # `lost_before` cannot exceed the number of missing frames.
         ([(5, 0), (7, 9)], 1, 0, 0),
-        # The service began again: nothing is known to be missing.
+        # The service was restarted: nothing is known to be missing.
         ([(5, 0), (0, 0), (1, 0)], 0, 0, 1),
         ([(5, 0), (5, 0)], 0, 0, 1),
     ],
 )
-def test_device_losses_are_told_from_bus_losses(arrived, device_lost, bus_missing, restarts):
+def test_device_losses_and_bus_losses_are_counted_separately(arrived, device_lost, bus_missing, restarts):
     tally = Tally()
     for seq, lost_before in arrived:
         tally.count(seq, lost_before)

@@ -1,4 +1,4 @@
-"""Against a running publisher of synthetic frames: see ``pulse`` in ``conftest.py``."""
+"""Tests with a running publisher of synthetic frames: see ``pulse`` in ``conftest.py``."""
 
 import json
 import subprocess
@@ -19,12 +19,12 @@ def client(pulse):
         yield client
 
 
-def test_frames_arrive_whole_and_the_losses_are_the_devices(client):
+def test_frames_arrive_complete_and_all_losses_are_at_the_device(client):
     assert client.rig == "pulse"
     frames = client.frames()
     seen = [next(frames) for _ in range(500)]
     seqs = [frame.seq for frame in seen]
-    # The publisher leaves out each tenth.
+    # The publisher leaves out every tenth frame.
     assert seqs == [seq for seq in range(seqs[0], seqs[-1] + 1) if seq % 10 != 9]
     assert frames.missing == (seqs[-1] - seqs[0] + 1 - 500, 0)
     assert (frames.overrun, frames.unreadable) == (0, 0)
@@ -35,12 +35,12 @@ def test_frames_arrive_whole_and_the_losses_are_the_devices(client):
         assert all(100 <= counts <= 1000 for counts in frame.counts)
 
 
-def test_a_late_joiner_gets_the_past_and_the_present(client):
+def test_a_late_subscriber_gets_past_and_live_frames(client):
     with client.frames() as early:
         while next(early).seq < 100:
             pass
         with client.frames() as late:
-            # 10 s of frames are kept, and fewer have been since the start.
+            # The service keeps 10 s of frames, and has run for less.
             assert next(late).seq == 0
             while next(late).seq <= early.tally.last_seq:
                 pass
@@ -54,7 +54,7 @@ def test_a_run_is_followed_by_its_events(client):
     assert reply.state.experiment == "corners"
     client.pause("to look")
     client.resume()
-    # Late, and yet from the beginning.
+    # A late subscriber gets the events from the beginning.
     with client.events() as events:
         client.stop("enough")
         seen = [next(events) for _ in range(4)]
@@ -75,7 +75,7 @@ def test_a_refusal_is_an_error_that_says_why(client):
     assert refused.value.exit_code == 1
 
 
-def test_a_rig_that_is_not_there_does_not_answer(pulse):
+def test_an_absent_rig_does_not_answer(pulse):
     no_answer = pytest.raises(tactus_client.NoAnswer, match="tactus/elsewhere/cmd/status")
     with tactus_client.connect(pulse, "elsewhere") as stranger, no_answer:
         stranger.status(timeout_s=3_600)

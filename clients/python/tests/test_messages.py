@@ -20,7 +20,7 @@ def test_a_run_event_is_read_from_golden_bytes(golden):
     assert event.finished.message == "ok"
 
 
-def test_every_message_of_the_bus_is_there_under_its_own_name():
+def test_every_message_of_the_bus_has_a_class_of_its_name():
     for name in [
         "Frame",
         "SensorInfo",
@@ -36,11 +36,11 @@ def test_every_message_of_the_bus_is_there_under_its_own_name():
         assert messages.encoding(getattr(messages, name)) == f"application/protobuf;tactus.v1.{name}"
 
 
-def test_a_value_of_a_later_version_is_given_as_its_number():
+def test_a_value_of_a_later_version_is_returned_as_its_number():
     state = messages.RunState(phase=99)
     assert messages.name_of(state, "phase") == "99"
 
 
-def test_bytes_that_are_no_message_are_refused():
+def test_invalid_bytes_are_refused():
     with pytest.raises(messages.DecodeError):
         messages.Frame.FromString(b"\x0a\x7f\x00")

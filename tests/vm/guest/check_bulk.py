@@ -1,4 +1,4 @@
-"""Frames at a bulk endpoint, read as libraries read it."""
+"""Frames from a bulk endpoint, read as USB libraries read it."""
 
 import errno
 import time
@@ -12,7 +12,7 @@ IN, OUT = 0x81, 0x01
 
 
 def outcome(transfer) -> str:
-    """Name of the error, or what came."""
+    """The name of the error, or the number of bytes that arrived."""
     try:
         return f"{len(transfer())} bytes"
     except OSError as error:
@@ -20,15 +20,15 @@ def outcome(transfer) -> str:
 
 
 def device() -> Device:
-    wait("it is enumerated", lambda: "SIM-SENSOR" in usb_devices(), 30)
-    return wait("it can be opened", opened, 30)
+    wait("the sensor is enumerated", lambda: "SIM-SENSOR" in usb_devices(), 30)
+    return wait("the sensor can be opened", opened, 30)
 
 
 def opened():
     try:
         return Device("SIM-SENSOR")
     except OSError:
-        # The kernel tells of a device before it lets anybody in.
+        # The kernel lists a device before it can be opened.
         return None
 
 
@@ -38,7 +38,7 @@ def read(usb: Device, counter: Counter, frames: int) -> None:
 
 
 def check_frames():
-    """bulk: each transfer is a frame; one for which there is nothing waits, and can be taken back"""
+    """bulk: each transfer is a frame; a read without data waits, and can be cancelled"""
     with plug("--sensor", "bulk", "--link", BULK_LINK) as mock:
         usb, counter = device(), Counter("bulk")
         read(usb, counter, 60)
@@ -48,9 +48,9 @@ def check_frames():
             pass
         start = time.monotonic()
         check("a read for 500 ms while the sensor is silent", "ETIMEDOUT", outcome(lambda: usb.read(IN, 512, 500)))
-        check("and it waited, s", between(0.5, 2.5), round(time.monotonic() - start, 1))
-        check("a read that has time waits for the next frame", "106 bytes", outcome(lambda: usb.read(IN, 512, 60_000)))
-        check("what the host writes is taken", 7, usb.write(OUT, b"acquire", 1000))
+        check("seconds that it waited", between(0.5, 2.5), round(time.monotonic() - start, 1))
+        check("a read with a long timeout waits for the next frame", "106 bytes", outcome(lambda: usb.read(IN, 512, 60_000)))
+        check("bytes taken of what the host writes", 7, usb.write(OUT, b"acquire", 1000))
         usb.close()
     until_gone("SIM-SENSOR")
 
@@ -70,13 +70,13 @@ def check_a_stalled_endpoint():
 
 
 def check_unplugged_while_read():
-    """bulk: unplugged, a read fails at once; plugged in again, another program finds it"""
+    """bulk: after unplugging a read fails at once; after plugging in again another program finds the device"""
     with plug("--sensor", "bulk", "--link", BULK_LINK) as mock:
         usb, counter = device(), Counter("bulk")
         read(usb, counter, 5)
         mock.do("sensor unplug")
         until_gone("SIM-SENSOR")
-        check("a read of what is gone", "ENODEV", outcome(lambda: usb.read(IN, 512, 5000)))
+        check("a read of an unplugged device", "ENODEV", outcome(lambda: usb.read(IN, 512, 5000)))
         usb.close()
         mock.do("sensor plug elsewhere")
         usb, again = device(), Counter("bulk")

@@ -1,4 +1,4 @@
-"""The kernel and udev know our devices for what they are."""
+"""The kernel and udev recognise our devices."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ BULK_LINK = REPOSITORY / "config/links/digitacts.toml"
 
 
 def check_each_device_has_its_numbers_and_its_name():
-    """enumeration: each device has its numbers, its serial number and a name that stays"""
+    """enumeration: each device has its ids, its serial number and a permanent name"""
     with (
         plug("--sensor", "cdc-acm", "--stage", "cdc-acm"),
         plug("--sensor", "ftdi", "--serial", "SIM-FTDI"),
@@ -25,7 +25,7 @@ def check_each_device_has_its_numbers_and_its_name():
             "SIM-BULK": ("1209:0004", "virtual sensor"),
             "SIM-RIG": ("1209:0005", "virtual rig"),
         }
-        wait("all are enumerated", lambda: len(usb_devices()) == len(wanted), 30)
+        wait("all devices are enumerated", lambda: len(usb_devices()) == len(wanted), 30)
         check("what the kernel enumerates", wanted, usb_devices())
         names = [
             SENSOR,
@@ -37,7 +37,7 @@ def check_each_device_has_its_numbers_and_its_name():
         for name in names:
             wait(f"udev names {name}", Path(name).exists, 30)
         nodes = sorted(Path(name).resolve().name for name in names)
-        check("serial ports behind the names that stay", ["ttyACM0", "ttyACM1", "ttyACM2", "ttyACM3", "ttyUSB0"], nodes)
+        check("serial ports behind the permanent names", ["ttyACM0", "ttyACM1", "ttyACM2", "ttyACM3", "ttyUSB0"], nodes)
         wait("the report device", Path("/dev/hidraw0").exists, 30)
     until_gone(*wanted)
-    check("unplugged, all are gone", {}, usb_devices())
+    check("devices after unplugging", {}, usb_devices())

@@ -1,4 +1,4 @@
-"""The same rig behind FTDI's chips."""
+"""The same rig behind FTDI chips."""
 
 from check_streaming import run_on
 from lab import Folder, Service, check, plug, rig_file, until_gone
@@ -8,7 +8,7 @@ SENSOR, STAGE = PORT.format("sensor", "SENSOR"), PORT.format("stage", "STAGE")
 
 
 def check_a_run():
-    """ftdi: an experiment over two adapters with FTDI's chip"""
+    """ftdi: an experiment over two adapters with FTDI chips"""
     with (
         Folder() as folder,
         plug("--sensor", "ftdi", "--stage", "ftdi"),
@@ -20,7 +20,7 @@ def check_a_run():
 
 
 def check_unplugged_and_plugged_in_again():
-    """ftdi: the sensor's adapter is unplugged and comes back in another port"""
+    """ftdi: the sensor's adapter is unplugged and plugged into another port"""
     with (
         Folder() as folder,
         plug("--sensor", "ftdi", "--stage", "ftdi") as mock,

@@ -1,4 +1,4 @@
-"""Frames as reports, read from /dev/hidraw as any program does."""
+"""Frames as HID reports, read from /dev/hidraw."""
 
 import os
 import select
@@ -19,7 +19,7 @@ def hidraw() -> Path:
 
 
 def read(file: int, counter: Counter, frames: int, limit_s: float = 60) -> None:
-    """Reads so many reports, and only then looks at them: the kernel keeps no more than 64 for who is slow."""
+    """Reads this number of reports and decodes them afterwards, because the kernel keeps at most 64 for a slow reader."""
     reports = []
     while len(reports) < frames:
         if not select.select([file], [], [], limit_s)[0]:
@@ -30,12 +30,12 @@ def read(file: int, counter: Counter, frames: int, limit_s: float = 60) -> None:
 
 
 def check_reports():
-    """hid: each report is a frame, none is lost, and nobody but the vendor's programs takes them for input"""
+    """hid: each report is a frame, none is lost, and the kernel does not treat them as input"""
     with plug("--sensor", "hid", "--link", HID_LINK):
         node = hidraw()
-        check("it is no keyboard and no mouse", [], [str(path) for path in Path("/dev").glob("input/event*")])
+        check("input devices (keyboard, mouse) that it makes", [], [str(path) for path in Path("/dev").glob("input/event*")])
         descriptor = (Path("/sys/class/hidraw") / node.name / "device/report_descriptor").read_bytes()
-        check("report descriptor: vendor's page, report 1 of 104 bytes",
+        check("report descriptor: vendor page, report 1 of 104 bytes",
               "0600ff0901a10185010901150026ff0075089668008102c0", descriptor.hex())
         counter = Counter("hid")
         file = os.open(node, os.O_RDONLY)
@@ -60,7 +60,7 @@ def check_reports_at_100_hz():
 
 
 def check_reports_at_1_khz():
-    """hid: 1000 reports a second; each is there or counted as missing (the driver asks for one at a time, too slow under emulation)"""
+    """hid: 1000 reports a second; each arrives or is counted as missing (the driver requests one at a time, too slow under emulation)"""
     with Folder() as folder, plug("--sensor", "hid", "--link", HID_LINK, rig=rig_file(folder, rate_hz=1000.0)):
         counter = Counter("hid")
         file = os.open(hidraw(), os.O_RDONLY)
@@ -73,7 +73,7 @@ def check_reports_at_1_khz():
 
 
 def check_unplugged_while_read():
-    """hid: a program that reads is told that the device is gone, and finds it again under another name"""
+    """hid: a reading program gets an error when the device is unplugged, and finds it again under another name"""
     with plug("--sensor", "hid", "--link", HID_LINK) as mock:
         before, counter = hidraw(), Counter("hid")
         file = os.open(before, os.O_RDONLY)
@@ -84,7 +84,7 @@ def check_unplugged_while_read():
             check("the read", "fails", "goes on")
         except OSError as error:
             check("the read fails", "EIO" if error.errno == 5 else error.errno, "EIO")
-        # While the old one is open its number is taken.
+        # While the old node is open, its number is in use.
         until_gone("SIM-SENSOR")
         mock.do("sensor plug")
         after = hidraw()
@@ -93,13 +93,13 @@ def check_unplugged_while_read():
         again, file = Counter("hid"), os.open(after, os.O_RDONLY)
         read(file, again, 30)
         os.close(file)
-        check("and sends: broken, missing", [0, 0], [again.broken, again.missing])
-        check("first reading by its new clock, ms", at_least(1), again.ticks_ms[0])
+        check("after that: broken, missing", [0, 0], [again.broken, again.missing])
+        check("first time on its new clock, ms", at_least(1), again.ticks_ms[0])
     until_gone("SIM-SENSOR")
 
 
 def check_a_stalled_endpoint():
-    """hid: after a stall the kernel clears the halt, and reports go on"""
+    """hid: after a stall the kernel clears the halt, and reports continue"""
     with plug("--sensor", "hid", "--link", HID_LINK) as mock:
         counter, file = Counter("hid"), os.open(hidraw(), os.O_RDONLY)
         read(file, counter, 5)

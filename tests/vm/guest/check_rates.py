@@ -11,7 +11,7 @@ from lab import SENSOR, Folder, Service, at_least, between, check, plug, rig_fil
 
 
 def read(file: int, count: int) -> bytes:
-    """So many bytes, and only then looked at."""
+    """Reads this number of bytes, to be decoded afterwards."""
     pieces, length = [], 0
     while length < count:
         pieces.append(os.read(file, 65536))
@@ -22,7 +22,7 @@ def read(file: int, count: int) -> bytes:
 def check_a_serial_port_at_1_khz():
     """rates: 1000 frames a second from a serial port, none lost"""
     with Folder() as folder, plug("--sensor", "cdc-acm", rig=rig_file(folder, rate_hz=1000.0)):
-        wait("it has its name", Path(SENSOR).exists, 30)
+        wait("udev names the sensor", Path(SENSOR).exists, 30)
         file = os.open(SENSOR, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(file, termios.TCSANOW)
         os.write(file, weiss.acquire(1000))
@@ -34,7 +34,7 @@ def check_a_serial_port_at_1_khz():
 
 
 def check_the_service_at_1_khz():
-    """rates: the service at 1000 frames a second; it takes each or counts it as lost (it is too slow under emulation to take all)"""
+    """rates: the service at 1000 frames a second; it receives or counts as lost each frame (under emulation it is too slow for all)"""
     with Folder() as folder:
         rig = rig_file(folder, rate_hz=1000.0)
         with plug("--sensor", "cdc-acm", "--stage", "cdc-acm", rig=rig), Service(rig) as service:
@@ -46,9 +46,9 @@ def check_the_service_at_1_khz():
             end = service.status()["sensor"]
             longest_s = time.monotonic() - earliest
             frames, lost = (end[key] - begin[key] for key in ("frames", "frames_lost"))
-            # What is on its way, a second's at most, is neither.
+            # Frames in transit, at most those of a second, are neither.
             bounds = between(round(1000 * (shortest_s - 1)), round(1000 * (longest_s + 1)))
-            check("frames taken or lost, by the time that passed", bounds, frames + lost)
+            check("frames received or lost in the elapsed time", bounds, frames + lost)
             check("connected", True, end["connected"])
     until_gone()
 

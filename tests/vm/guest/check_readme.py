@@ -1,5 +1,5 @@
-"""README, "Connect your hardware", step by step: a kit that sends packets, and a stage. Its commands are taken from there; what is
-changed in them is which device and which file."""
+"""README, "Connect your hardware", step by step, with a kit that sends packets and a stage. The commands are taken from the README;
+only devices and files are changed in them."""
 
 import json
 import re
@@ -21,7 +21,7 @@ def commands() -> list[str]:
 
 
 def do(folder: Path, begin: str, *also: str, **changes: str) -> subprocess.CompletedProcess:
-    """The README's command that begins so; `changes` are what stands in it, and what it is here."""
+    """Runs the README's command that starts with `begin`; `changes` maps texts of the command to their replacements."""
     command = next((line for line in commands() if line.startswith(begin)), None)
     if command is None:
         raise ValueError(f"the README has no command {begin!r}")
@@ -34,7 +34,7 @@ def do(folder: Path, begin: str, *also: str, **changes: str) -> subprocess.Compl
 
 
 def rig_of(transports: dict[str, str]) -> str:
-    """A copy of the shipped rig with other links. Only `simulated` stays as it is: so are the devices here."""
+    """A copy of the shipped rig with other links. `simulated` stays true, because the devices here are simulated."""
     text = (REPOSITORY / "config/rigs/sim.toml").read_text()
     embedded = 'transport = { kind = "embedded" }'
     sensor, stage = f'protocol = "weiss-dsa"\n{embedded}', f'protocol = "grbl"\n{embedded}'
@@ -44,7 +44,7 @@ def rig_of(transports: dict[str, str]) -> str:
 
 
 def check_connect_your_hardware():
-    """readme: from two devices that were just plugged in to a run"""
+    """readme: from two newly plugged-in devices to a run"""
     with Folder() as folder, plug("--sensor", "bulk", "--link", BULK_LINK, "--stage", "cdc-acm"):
         transports = {}
 
@@ -58,19 +58,19 @@ def check_connect_your_hardware():
         check("tactus devices shows both", ["sensor", "stage"], sorted(transports))
 
         done = do(folder, "tactus link sniff usb:", **{"1209:0020/A1:3:85": "1209:0004/SIM-SENSOR:0:81"})
-        check("tactus link sniff says what frames may be", that("106 bytes, sync 0xAA 0x55", lambda said:
+        check("tactus link sniff estimates the format of the frames", that("106 bytes, sync 0xAA 0x55", lambda said:
               "frames of 106 bytes that begin with [0xAA, 0x55]" in said), done.stdout + done.stderr)
 
         kit = BULK_LINK.read_text()
         (folder / "my-kit.toml").write_text(kit.replace("init = 0xFFFF", "init = 0x0000").replace("0x29B1", "0x31C3"))
         done = do(folder, "tactus link check", "--json")
         report = json.loads(done.stdout)["capture"]
-        check("with a wrong checksum in the description no frame decodes, and it says so", [1, 0, True],
+        check("with a wrong checksum in the description no frame decodes, and the report says so", [1, 0, True],
               [done.returncode, report["frames"], report["first_bad_checksum"] is not None])
         (folder / "my-kit.toml").write_text(kit)
         done = do(folder, "tactus link check", "--json")
         report = json.loads(done.stdout)["capture"]
-        check("with the right one every byte is part of a frame", [0, 0], [done.returncode, report["skipped_bytes"]])
+        check("with the right checksum every byte is part of a frame", [0, 0], [done.returncode, report["skipped_bytes"]])
         check("frames in the capture", at_least(60), report["frames"])
 
         (folder / "my-rig.toml").write_text(rig_of(transports))

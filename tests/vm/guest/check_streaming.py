@@ -13,14 +13,14 @@ def run(rig):
 
 
 def run_on(folder, service, what):
-    """Runs the experiment; the summary."""
+    """Runs the experiment and checks its summary."""
     service.until_connected()
     client = service.start_run(PRESSES)
     status = client.wait()
     summary = json.loads(client.until(lambda line: line.startswith("{"), "a summary"))
     if "error" in summary:
         raise Hung(f"no run: {summary}")
-    check(f"{what}: exit status of the run, and what it says", [0, ""], [status, summary["message"]])
+    check(f"{what}: exit status of the run, and its message", [0, ""], [status, summary["message"]])
     check(f"{what}: how it ended, presses, dwells, frames lost", ["done", 2, 4, 0],
           [summary["exit_status"], summary["presses"], summary["dwells"], summary["frames_lost"]])
     check(f"{what}: frames recorded", at_least(100), summary["frames"])
@@ -35,7 +35,7 @@ def check_a_run():
 
 
 def check_a_run_on_one_cable():
-    """streaming: the same with both on one cable, as a composite device"""
+    """streaming: the same with sensor and stage on one cable, as a composite device"""
     port = "/dev/serial/by-id/usb-Tactus_SIM_virtual_rig_SIM-RIG-if0"
     with (
         Folder() as folder,

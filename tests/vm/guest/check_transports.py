@@ -1,4 +1,4 @@
-"""The service reads every kind of USB device by its identity, and a newcomer finds what to write for it."""
+"""The service finds every kind of USB device by its identity, and `tactus devices` says what to write for it."""
 
 import json
 
@@ -15,7 +15,7 @@ BULK = (
 
 
 def speaking(folder, transport, link=None):
-    """The shipped rig, its sensor at a transport, speaking by a description if there is one."""
+    """The shipped rig with its sensor on another transport, and with a described frame format if there is a link file."""
     changes = {f'{{ kind = "serial", path = "{SENSOR}", baud = 115200 }}': transport}
     if link:
         changes['protocol = "weiss-dsa"'] = f'protocol = "declared"\nformat = "{link}"'
@@ -31,7 +31,7 @@ def run_with(kind, transport, link=None):
 
 
 def check_a_run_over_hid():
-    """transports: an experiment whose sensor sends reports"""
+    """transports: an experiment whose sensor sends HID reports"""
     run_with("hid", HID, HID_LINK)
 
 
@@ -50,28 +50,28 @@ def found_elsewhere(kind, transport, link=None):
             before = gone["sensor"]["frames"]
             mock.do("sensor plug elsewhere")
             service.until("frames again", lambda said: said["sensor"]["connected"] and said["sensor"]["frames"] > before)
-            check(f"{kind}: unplugged and plugged in elsewhere, it is read again", True, True)
+            check(f"{kind}: read again after it was unplugged and plugged in elsewhere", True, True)
     until_gone()
 
 
 def check_found_elsewhere():
-    """transports: by its identity a device is found wherever it is plugged in"""
+    """transports: a device that is named by its identity is found at any port"""
     found_elsewhere("cdc-acm", SERIAL)
     found_elsewhere("hid", HID, HID_LINK)
     found_elsewhere("bulk", BULK, BULK_LINK)
 
 
 def check_what_to_write():
-    """transports: `tactus devices` says what to write into a rig file for each, and whose it is"""
+    """transports: `tactus devices` says what to write into a rig file for each device, and which rig uses it"""
     with Folder() as folder:
         rig = speaking(folder, HID, HID_LINK)
         with plug("--sensor", "hid", "--stage", "cdc-acm", rig=rig), Service(rig) as service:
             service.until_connected()
             said = json.loads(service.tactus("devices", "--rig", rig).stdout)
             ours = [device for device in said["devices"] if (device["serial"] or "").startswith("SIM")]
-            check("lines for the rig file", True, HID in [device["transport"] for device in ours])
+            check("the line for the rig file is shown", True, HID in [device["transport"] for device in ours])
             claimed = sorted(link["role"] for device in ours for link in device["rigs"])
-            check("whose they are", ["sensor", "stage"], claimed)
-            check("what is missing", [], said["missing"])
-            check("they are held by the service", {"held"}, {device["access"] for device in ours if device["rigs"]})
+            check("roles of the devices in the rig", ["sensor", "stage"], claimed)
+            check("missing devices", [], said["missing"])
+            check("the service holds them", {"held"}, {device["access"] for device in ours if device["rigs"]})
     until_gone()

@@ -1,4 +1,4 @@
-"""Endpoints that stall and devices that are slow, while the service looks on."""
+"""The service with endpoints that stall and devices that are slow."""
 
 from lab import Folder, Service, at_least, between, check, plug, rig_file, until_gone
 
@@ -6,7 +6,7 @@ BOTH = ("--sensor", "cdc-acm", "--stage", "cdc-acm")
 
 
 def check_a_stalled_endpoint():
-    """trouble: after a stall the kernel clears the halt, and the service has frames again"""
+    """trouble: after a stall the kernel clears the halt, and the service receives frames again"""
     with Folder() as folder, plug(*BOTH) as mock, Service(rig_file(folder)) as service:
         before = service.until_connected()["sensor"]
         for _ in range(3):
@@ -20,26 +20,26 @@ def check_a_stalled_endpoint():
 
 
 def check_a_slow_sensor():
-    """trouble: a sensor that answers too seldom loses frames, which are counted; no longer slow it loses none"""
+    """trouble: a slow sensor loses frames, which are counted; at its normal speed it loses none"""
     with Folder() as folder, plug(*BOTH) as mock, Service(rig_file(folder)) as service:
         before = service.until_connected()["sensor"]
-        # 20 transfers a second for 30 frames: a third is too much.
+        # 20 transfers a second for 30 frames a second: a third of them is lost.
         mock.do("sensor slow 50ms")
         slow = service.until(
             "frames are lost", lambda said: said["sensor"]["frames_lost"] >= before["frames_lost"] + 10
         )["sensor"]
         check("connected while it is slow", True, slow["connected"])
         mock.do("sensor slow 0s")
-        # What had not been fetched comes now.
+        # First, frames that had not been fetched arrive.
         begin = service.until("frames come", lambda said: said["sensor"]["frames"] >= slow["frames"] + 90)["sensor"]
         end = service.until("frames come", lambda said: said["sensor"]["frames"] >= begin["frames"] + 90)["sensor"]
         check("frames", at_least(90), end["frames"] - begin["frames"])
-        check("frames lost when it is no longer slow", 0, end["frames_lost"] - begin["frames_lost"])
+        check("frames lost at normal speed", 0, end["frames_lost"] - begin["frames_lost"])
     until_gone()
 
 
 def check_a_silent_sensor():
-    """trouble: a sensor that says nothing for two seconds is a gap of as many frames"""
+    """trouble: a sensor that is silent for two seconds causes a gap of at least 59 frames"""
     with Folder() as folder, plug(*BOTH) as mock, Service(rig_file(folder)) as service:
         before = service.until_connected()["sensor"]
         mock.do("sensor stall 2s")

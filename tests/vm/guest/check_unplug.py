@@ -1,4 +1,4 @@
-"""Cables that come out and go in again, while the service looks on."""
+"""The service with cables that are unplugged and plugged in again."""
 
 import json
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 from lab import REPOSITORY, SENSOR, Folder, Service, between, check, plug, rig_file, that, until_gone, wait
 
 RATE_HZ = 30
-# The press is long enough that the cable comes out in it.
+# The press is long enough to unplug the cable during it.
 HOLD = """
 def run(rig):
     tare()
@@ -23,12 +23,12 @@ def is_lost(said) -> bool:
 
 
 def lost_in(since: float) -> int:
-    """Frames at most of the time since then, by the host's clock, and a second's more for what was on its way."""
+    """The most frames since then, by the host's clock; one second is added for frames in transit."""
     return round((time.monotonic() - since + 1) * RATE_HZ)
 
 
 def check_idle():
-    """unplug: without a run, the same port, another port"""
+    """unplug: without a run; back in the same port, then in another port"""
     with Folder() as folder, plug(*BOTH) as mock, Service(rig_file(folder)) as service:
         service.until_connected()
         for back in ("sensor plug", "sensor plug elsewhere"):
@@ -36,13 +36,13 @@ def check_idle():
             out = time.monotonic()
             mock.do("sensor unplug")
             said = service.until("the sensor is lost", is_lost)
-            check(f"{back}: before it, sensor connected, stage", [False, "not homed"],
+            check(f"before {back!r}: sensor connected, stage", [False, "not homed"],
                   [said["sensor"]["connected"], said["stage"]["status"]])
             down_s = time.monotonic() - out
             mock.do(back)
             said = service.until_connected()
             lost = said["sensor"]["frames_lost"] - lost_before
-            check(f"{back}: frames lost, by the time it was gone", between(round(down_s * RATE_HZ) - 15, lost_in(out)), lost)
+            check(f"{back}: frames lost while it was unplugged", between(round(down_s * RATE_HZ) - 15, lost_in(out)), lost)
         lost = service.status()["sensor"]["frames_lost"]
         service.until("frames come", lambda now: now["sensor"]["frames"] > said["sensor"]["frames"] + 60)
         check("frames lost after that", lost, service.status()["sensor"]["frames_lost"])
@@ -50,7 +50,7 @@ def check_idle():
 
 
 def check_as_another_node():
-    """unplug: back as another node, because a program holds the old one open; the name that stays finds it"""
+    """unplug: back as another node, because a program holds the old one open; the permanent name finds it"""
     with Folder() as folder, plug(*BOTH) as mock, Service(rig_file(folder)) as service:
         service.until_connected()
         before = Path(SENSOR).resolve()
@@ -61,12 +61,12 @@ def check_as_another_node():
         service.until_connected()
         after = Path(SENSOR).resolve()
         os.close(holder)
-        check("it comes back as another node", that(f"not {before}", lambda seen: seen != str(before)), str(after))
+        check("the node after plugging in again", that(f"not {before}", lambda seen: seen != str(before)), str(after))
     until_gone()
 
 
 def check_the_wrong_one():
-    """unplug: another sensor in its place is not taken for it"""
+    """unplug: another sensor in its place is not used"""
     with Folder() as folder, plug(*BOTH) as mock, Service(rig_file(folder)) as service:
         service.until_connected()
         node = Path(SENSOR).resolve()
@@ -84,12 +84,12 @@ def check_the_wrong_one():
 
 
 def check_another_array_under_the_same_name():
-    """unplug: an array of another size is refused, with words that say so"""
+    """unplug: an array of another size is refused with a message that says so"""
     smaller = {"rows = 6": "rows = 5", "6.9, 8.9, 10.9]": "6.9, 8.9]"}
     with Folder() as folder, Folder() as other:
         refusal = "the frame has 40 elements, the rig's array has 48"
         with plug(*BOTH, rig=rig_file(other, **smaller)), Service(rig_file(folder), says=refusal) as service:
-            check("what it says of it", that(f"{refusal!r}", lambda said: refusal in said), service.said.split("error=")[-1])
+            check("the message of the service", that(f"{refusal!r}", lambda said: refusal in said), service.said.split("error=")[-1])
     until_gone()
 
 
@@ -103,7 +103,7 @@ def summary_of(client) -> tuple[int, dict]:
 
 
 def check_in_a_run():
-    """unplug: in the middle of a press; it is repeated, and the gap counted"""
+    """unplug: the sensor, in the middle of a press; the press is repeated, and the gap is counted"""
     with Folder() as folder, plug(*BOTH) as mock, Service(rig_file(folder, **PATIENT)) as service:
         service.until_connected()
         client = service.start_run(HOLD)
@@ -116,12 +116,12 @@ def check_in_a_run():
         check("exit status of the run, how it ended, presses", [3, "degraded", 1],
               [status, summary["exit_status"], summary["presses"]])
         check("frames lost in the run", between(1, lost_in(out)), summary["frames_lost"])
-        check("the tip is up, mm", that("at least 1.9", lambda seen: seen >= 1.9), service.status()["stage"]["z_mm"])
+        check("height of the tip, mm", that("at least 1.9", lambda seen: seen >= 1.9), service.status()["stage"]["z_mm"])
     until_gone()
 
 
 def check_the_stage_in_a_run():
-    """unplug: the stage, in the middle of a press; the run fails and says that the tip is not known to be up"""
+    """unplug: the stage, in the middle of a press; the run fails and says that the tip is not retracted"""
     with Folder() as folder, plug(*BOTH) as mock, Service(rig_file(folder, **PATIENT)) as service:
         service.until_connected()
         client = service.start_run(HOLD)
@@ -129,7 +129,8 @@ def check_the_stage_in_a_run():
         mock.do("stage unplug")
         status, summary = summary_of(client)
         check("exit status of the run, how it ended", [1, "failed"], [status, summary["exit_status"]])
-        check("what it says", that("that the tip is not retracted", lambda said: "THE TIP IS NOT RETRACTED" in said), summary["message"])
+        check("message of the run", that("that the tip is not retracted", lambda said: "THE TIP IS NOT RETRACTED" in said),
+              summary["message"])
         mock.do("stage plug")
         said = service.until_connected()
         check("plugged in again: sensor connected, stage", [True, "not homed"],

@@ -1,4 +1,4 @@
-"""Frames of the shipped descriptions config/links/digitacts*.toml, as far as the checks look into them."""
+"""Decodes the frames of config/links/digitacts*.toml as far as the checks need it."""
 
 import struct
 from binascii import crc_hqx
@@ -9,7 +9,7 @@ CRC_INIT = 0xFFFF
 
 
 class Counter:
-    """Counts frames, those whose form or checksum is wrong, and those that their numbers say are missing."""
+    """Counts good frames, broken frames (wrong form or checksum), and frames missing by their sequence numbers."""
 
     def __init__(self, kind: str):
         self.is_hid = kind == "hid"

@@ -1,4 +1,4 @@
-"""What every check needs: results, programs that are waited for, a rig on USB with the service that owns it."""
+"""Tools for the checks: results, programs with output to wait for, a rig on USB and the service that owns it."""
 
 import json
 import os
@@ -12,7 +12,7 @@ from pathlib import Path
 
 REPOSITORY = Path("/lab")
 BINARIES = REPOSITORY / "bin"
-# Only a hang takes so long: under emulation everything does.
+# Only a hang takes this long. Under emulation everything is slow.
 LIMIT_S = 120
 
 SENSOR = "/dev/serial/by-id/usb-Tactus_SIM_virtual_sensor_SIM-SENSOR-if00"
@@ -22,7 +22,7 @@ results = {"ok": 0, "FAIL": 0}
 
 
 def check(what: str, wanted, seen) -> bool:
-    """One result, printed: `wanted` is a value, or a function that is true of the right ones, whose name or text says what it wants."""
+    """Prints one result. `wanted` is a value, or a function that returns true for right values; its docstring or name is printed."""
     right = wanted(seen) if callable(wanted) else wanted == seen
     words = (wanted.__doc__ or wanted.__name__) if callable(wanted) else repr(wanted)
     word = "ok" if right else "FAIL"
@@ -32,7 +32,7 @@ def check(what: str, wanted, seen) -> bool:
 
 
 def that(words: str, is_right):
-    """A condition for `check` that says what it wants."""
+    """A condition for `check`, with the words that describe it."""
     is_right.__doc__ = words
     return is_right
 
@@ -46,11 +46,11 @@ def between(low, high):
 
 
 class Hung(Exception):
-    """What was waited for has not come."""
+    """An awaited event has not happened."""
 
 
 def wait(what: str, condition, limit_s: float = LIMIT_S):
-    """Waits until `condition` gives something true, and returns that. For what tells nobody that it has happened."""
+    """Polls until `condition` returns something true, and returns that. For events without a notification."""
     deadline = time.monotonic() + limit_s
     while not (found := condition()):
         if time.monotonic() > deadline:
@@ -60,7 +60,7 @@ def wait(what: str, condition, limit_s: float = LIMIT_S):
 
 
 class Program:
-    """A program that runs beside the check; what it writes are its lines."""
+    """A program that runs beside the check. Its output is read line by line."""
 
     def __init__(self, name: str, *arguments, folder: Path | None = None):
         self.name = name
@@ -84,7 +84,7 @@ class Program:
         self.said.put(None)
 
     def until(self, is_it, what: str, limit_s: float = LIMIT_S) -> str:
-        """The first line not seen yet that `is_it`."""
+        """The next line for which `is_it` is true."""
         deadline = time.monotonic() + limit_s
         while True:
             try:
@@ -99,13 +99,13 @@ class Program:
                 return line
 
     def say(self, line: str) -> str:
-        """Types a line; gives the answer."""
+        """Types a line and returns the answer."""
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
         return self.until(lambda said: said == "ok" or said.startswith("error"), f"an answer to {line!r}")
 
     def do(self, line: str) -> None:
-        """Types a line that is to be done."""
+        """Types a command that must succeed."""
         if (answer := self.say(line)) != "ok":
             raise Hung(f"{self.name}, told {line!r}: {answer}")
 
@@ -125,7 +125,7 @@ class Program:
 
 
 def rig_file(folder: Path, sensor: str = SENSOR, stage: str = STAGE, rate_hz: float = 30.0, **changes: str) -> Path:
-    """The shipped rig at other ports; `changes` are texts of the file, and what stands in their places."""
+    """The shipped rig at other ports; `changes` maps texts of the file to their replacements."""
     text = (REPOSITORY / "config/rigs/pty.toml").read_text()
     edits = {'"mock/sensor"': f'"{sensor}"', '"mock/stage"': f'"{stage}"', "rate_hz = 30.0": f"rate_hz = {rate_hz}", **changes}
     for old, new in edits.items():
@@ -138,7 +138,7 @@ def rig_file(folder: Path, sensor: str = SENSOR, stage: str = STAGE, rate_hz: fl
 
 
 def plug(*arguments, rig: Path | None = None) -> Program:
-    """Plugs virtual devices in, and waits until the kernel has taken them."""
+    """Plugs in virtual devices, and waits until the kernel has accepted them."""
     mock = Program("tactus-mock", "usb", "--config", rig or REPOSITORY / "config/rigs/pty.toml", *arguments)
     wanted = sum(argument in ("--sensor", "--stage") for argument in arguments)
     for _ in range(wanted):
@@ -147,10 +147,10 @@ def plug(*arguments, rig: Path | None = None) -> Program:
 
 
 class Service:
-    """`tactusd` with a rig file, in a folder of its own."""
+    """`tactusd` with a rig file, in its own folder."""
 
     def __init__(self, rig: Path, says: str = "ready"):
-        """Started, and waited for until it says so."""
+        """Starts the service and waits for a line that contains `says`."""
         self.folder = rig.parent
         config = self.folder / "tactusd.toml"
         if not config.exists():
@@ -167,7 +167,7 @@ class Service:
         return subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=LIMIT_S, stdin=subprocess.DEVNULL)
 
     def status(self) -> dict:
-        # A client waits some seconds for a service, which here can be too few.
+        # A client waits some seconds for a service. Under emulation this can be too short.
         for _ in range(5):
             said = self.tactus("status")
             if said.returncode == 0:
@@ -175,7 +175,7 @@ class Service:
         raise Hung(f"tactus status: {said.stdout} {said.stderr}")
 
     def until(self, what: str, is_it, limit_s: float = LIMIT_S) -> dict:
-        """Asks until the answer is right."""
+        """Asks for the status until `is_it` is true of it."""
         last = {}
 
         def asked():
@@ -195,7 +195,7 @@ class Service:
         return self.until("sensor and stage are connected", is_up)
 
     def start_run(self, script: str) -> Program:
-        """After a start of the service nothing moves before a reset."""
+        """Resets first: after a start of the service nothing moves before a reset."""
         said = self.tactus("reset")
         if said.returncode != 0:
             raise Hung(f"tactus reset: {said.stdout} {said.stderr}")
@@ -217,7 +217,7 @@ class Service:
 
 
 class Folder:
-    """A folder that is gone at the end."""
+    """A temporary folder."""
 
     def __enter__(self) -> Path:
         self.path = Path(tempfile.mkdtemp(dir="/run"))
@@ -228,7 +228,7 @@ class Folder:
 
 
 def usb_devices() -> dict[str, tuple[str, str]]:
-    """What the kernel has enumerated besides its own hubs: serial number, and id and product."""
+    """Our devices that the kernel has enumerated: by serial number, their id and product."""
     found = {}
     for device in Path("/sys/bus/usb/devices").iterdir():
         try:
@@ -236,7 +236,7 @@ def usb_devices() -> dict[str, tuple[str, str]]:
                 (device / file).read_text().strip() for file in ("idVendor", "idProduct", "serial", "product")
             )
         except OSError:
-            # An interface, or a device that is just going.
+            # An interface, or a device that is being removed.
             continue
         if serial.startswith("SIM"):
             found[serial] = (f"{vendor}:{product}", name)

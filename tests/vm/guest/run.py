@@ -1,4 +1,4 @@
-"""Runs the checks, all or those named in /lab/chosen: each is a module `check_NAME`, whose functions `check_...` run in their order."""
+"""Runs all checks or those named in /lab/chosen. Each is a module `check_NAME`; its functions `check_...` run in order."""
 
 import importlib
 import sys
@@ -25,7 +25,7 @@ def main(chosen: list[str]) -> int:
             try:
                 function()
             except Exception as error:
-                # A check that cannot go on has failed, the others have not.
+                # A check that cannot continue has failed; the others still run.
                 lab.results["FAIL"] += 1
                 where = "" if isinstance(error, lab.Hung) else traceback.format_exc()
                 print(f"FAIL {function.__name__}: {error}\n{where}", flush=True)

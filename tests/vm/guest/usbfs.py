@@ -1,4 +1,4 @@
-"""Transfers without a driver: the kernel's /dev/bus/usb, as libraries use it.
+"""USB transfers without a driver, through the kernel's /dev/bus/usb, as libraries make them.
 
 Linux, include/uapi/linux/usbdevice_fs.h; numbers as on 64-bit machines.
 """
@@ -35,7 +35,7 @@ class Urb(ctypes.Structure):
 
 
 class Device:
-    """A device by its serial number, its interface 0 claimed."""
+    """A device, found by its serial number, with interface 0 claimed."""
 
     def __init__(self, serial: str):
         for device in Path("/sys/bus/usb/devices").iterdir():
@@ -64,7 +64,7 @@ class Device:
         return self.call(BULK, Bulk(endpoint, len(data), timeout_ms, ctypes.addressof(buffer)))
 
     def stream(self, endpoint: int, room: int, count: int, at_once: int) -> list[bytes]:
-        """Reads so many transfers, `at_once` of which wait at any time, as programs do that are to lose nothing."""
+        """Reads `count` transfers. `at_once` of them are always pending, as in programs that must lose nothing."""
         buffers = [ctypes.create_string_buffer(room) for _ in range(at_once)]
         urbs = {}
         for buffer in buffers:

@@ -1,4 +1,4 @@
-"""As much of weiss-dsa as a program needs that counts frames: crates/tactus-wire/src/weiss.rs has all of it."""
+"""The part of weiss-dsa that is needed to count frames; crates/tactus-wire/src/weiss.rs has the whole protocol."""
 
 import struct
 
@@ -7,7 +7,7 @@ SYNC = b"\xaa\xaa\xaa"
 
 
 def crc(data: bytes) -> int:
-    """Of the polynomial 0x1021, its table not reflected, its register shifted to the right."""
+    """The CRC with polynomial 0x1021; the table is not reflected, the register shifts to the right."""
     value = 0xFFFF
     for byte in data:
         entry = ((value ^ byte) & 0xFF) << 8
@@ -18,13 +18,13 @@ def crc(data: bytes) -> int:
 
 
 def acquire(rate_hz: int) -> bytes:
-    """The command to push frames."""
+    """The command that makes the sensor send frames."""
     body = struct.pack("<BHBH", 3, 3, 0x80, rate_hz)
     return SYNC + body + struct.pack("<H", crc(body))
 
 
 def times_ms(stream: bytes) -> list[int]:
-    """The clock's times in whole frames, in their order."""
+    """The device times of the complete frames, in order."""
     head = SYNC + struct.pack("<BH", 0, FRAME_BYTES - 8)
     found, at = [], stream.find(head)
     while at >= 0 and at + FRAME_BYTES <= len(stream):

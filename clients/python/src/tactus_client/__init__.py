@@ -6,7 +6,7 @@
         for frame in client.frames():
             print(frame.seq, frame.image)
 
-Messages are those of ``tactus.v1``, with their own names: see ``tactus_client.messages``.
+The messages are those of ``tactus.v1``, under the same names: see ``tactus_client.messages``.
 """
 
 from tactus_client import messages

@@ -14,30 +14,30 @@ from tactus_client.errors import NoAnswer, NoRig, NoService, Refused
 from tactus_client.frames import FrameStream
 from tactus_client.stream import Stream, past_samples
 
-#: How long a machine that does not answer at all is waited for.
+#: How long to wait for a machine that does not answer at all.
 REACH_TIMEOUT_S = 2.0
-#: How long rigs are waited for that do not say that they are there.
+#: How long to wait for rigs to announce themselves.
 ROLL_CALL_TIMEOUT_S = 3.0
-#: Events that may wait to be read: twice what the service keeps.
+#: Number of events that may wait to be read: twice what the service keeps.
 EVENT_CAPACITY = 131_072
 
 
 def connect(endpoint: str = "tcp/127.0.0.1:7447", rig: str | None = None) -> Client:
     """Connects to the service at ``endpoint``, ``tcp/HOST:PORT``.
 
-    Without ``rig`` it takes the one that is ready there.
+    Without ``rig`` it takes the rig that is ready there.
 
-    Raises ``NoService`` at once if nothing listens there, ``NoRig`` if no rig is ready or several are and none was
-    named, and ``ValueError`` if the endpoint or the name is none.
+    Raises ``NoService`` at once if nothing listens there, ``NoRig`` if no rig is ready, or if several are ready and
+    none was named, and ``ValueError`` if the endpoint or the rig's name is not valid.
     """
     if rig is not None and not re.fullmatch(r"[A-Za-z0-9_-]+", rig):
-        # A wildcard would command every rig on the bus.
+        # With a wildcard, a command would go to every rig on the bus.
         raise ValueError(f"rig name {rig!r}: letters, digits, '-' and '_' only")
     _reach(endpoint)
     try:
         session = zenoh.open(_config(endpoint))
     except zenoh.ZError as error:
-        raise NoService(f"what listens at {endpoint} does not answer as a Tactus service: {error}") from error
+        raise NoService(f"the program at {endpoint} does not answer as a Tactus service: {error}") from error
     try:
         return Client(session, rig or _the_only_rig(session, endpoint))
     except BaseException:
@@ -53,21 +53,24 @@ class Client:
         self.rig = rig
 
     def frames(self, history: int | None = None) -> FrameStream:
-        """Frames from the past on: the last ``history`` ones that the service keeps, or all (10 s) if None."""
+        """Past frames, then live ones.
+
+        Starts with the last ``history`` frames, or with all that the service keeps (10 s) if None.
+        """
         info = self.sensor_info()
         shape = (info.rows, info.cols) if info else None
         return FrameStream(self._session, self._key("sensor/frame"), history, shape)
 
     def events(self, history: int | None = None) -> Stream:
-        """Events of runs (``RunEvent``) from the past on: as ``frames``; all are the last 65,536."""
+        """Events of runs (``RunEvent``), past ones first, as in ``frames``. The service keeps the last 65,536."""
         return Stream(self._session, self._key("run/event"), messages.RunEvent, history, EVENT_CAPACITY)
 
     def states(self) -> Stream:
-        """States of the run (``RunState``), from the present one on."""
+        """States of the run (``RunState``): the present one, then each new one."""
         return Stream(self._session, self._key("run/state"), messages.RunState, 1, 1_024)
 
     def sensor_info(self):
-        """What the sensor last said of itself (``SensorInfo``); None if it was not there yet."""
+        """The sensor's last description of itself (``SensorInfo``); None if no sensor has connected yet."""
         samples = past_samples(self._session, self._key("sensor/info"), 1)
         return messages.SensorInfo.FromString(samples[-1].payload.to_bytes()) if samples else None
 
@@ -76,10 +79,10 @@ class Client:
         return self._command("status", messages.CommandRequest(who=_who()), timeout_s)
 
     def run(self, experiment: str, /, *, seed: int | None = None, timeout_s: float = 60.0, **parameters):
-        """Starts an experiment of the service's own with these parameters; returns a ``CommandReply``.
+        """Starts an experiment that the service knows by name, with these parameters; returns a ``CommandReply``.
 
-        The answer comes after the dry run, before anything moves; follow the run by ``events`` or ``states``. Raises
-        ``Refused`` with the reason, ``NoAnswer``.
+        The answer comes after the dry run, before anything moves. Follow the run with ``events`` or ``states``. Raises
+        ``Refused`` with the reason, or ``NoAnswer``.
         """
         request = messages.RunRequest(
             experiment=experiment, parameters_json=json.dumps(parameters), seed=seed, who=_who()
@@ -87,23 +90,23 @@ class Client:
         return self._command("run", request, timeout_s)
 
     def pause(self, reason: str = "", timeout_s: float = 5.0):
-        """Holds the run after the step in hand. Raises ``Refused``, ``NoAnswer``."""
+        """Holds the run after its present step. Raises ``Refused``, ``NoAnswer``."""
         return self._command("pause", messages.CommandRequest(who=_who(), reason=reason), timeout_s)
 
     def resume(self, reason: str = "", timeout_s: float = 5.0):
-        """Goes on after a pause. Raises ``Refused``, ``NoAnswer``."""
+        """Continues a run that is held. Raises ``Refused``, ``NoAnswer``."""
         return self._command("resume", messages.CommandRequest(who=_who(), reason=reason), timeout_s)
 
     def stop(self, reason: str = "", abort: bool = False, timeout_s: float = 5.0):
-        """Stops motion now, retracts and ends the run; goes before all else. Raises ``NoAnswer``, ``Refused``."""
+        """Stops motion now, retracts, ends the run; has priority over all else. Raises ``NoAnswer``, ``Refused``."""
         return self._command("stop", messages.CommandRequest(who=_who(), reason=reason, abort=abort), timeout_s)
 
     def reset(self, timeout_s: float = 120.0):
-        """Clears the stage's alarm, homes it and lets runs start; not during a run. Raises ``Refused``, ``NoAnswer``."""
+        """Clears the stage's alarm, homes it, lets runs start. Refused in a run. Raises ``Refused``, ``NoAnswer``."""
         return self._command("reset", messages.CommandRequest(who=_who()), timeout_s)
 
     def close(self) -> None:
-        """Takes leave of the service; streams end."""
+        """Closes the connection; streams end."""
         self._session.close()
 
     def __enter__(self):
@@ -134,11 +137,11 @@ class Client:
                 if not answer.ok:
                     raise Refused(answer)
                 return answer
-        raise NoAnswer(f"nobody answered {key} (waited at most {timeout_s} s): the rig's service is gone or busy")
+        raise NoAnswer(f"no answer to {key} (waited at most {timeout_s} s): the rig's service is gone or busy")
 
 
 def _reach(endpoint: str) -> None:
-    """Finds out by a plain connection whether anything listens, which zenoh takes seconds to tell."""
+    """Tests with a plain connection whether anything listens. zenoh would need seconds for this."""
     match = re.fullmatch(r"tcp/(?:\[([0-9A-Fa-f:.%]+)\]|([^:\[\]/?#;]+)):(\d+)", endpoint)
     if not match:
         raise ValueError(f"endpoint {endpoint!r} should read tcp/HOST:PORT, such as tcp/127.0.0.1:7447")
@@ -156,7 +159,7 @@ def _config(endpoint: str):
         "connect/endpoints": [endpoint],
         "connect/timeout_ms": 0,
         "transport/unicast/open_timeout": 3_000,
-        # Nobody is looked for and nobody is told where we are.
+        # Do not search for other peers, and do not announce this one.
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
     }.items():
@@ -178,5 +181,5 @@ def _who() -> str:
     try:
         return f"python:{getpass.getuser()}"
     except (OSError, KeyError, ImportError):
-        # No such user, or a system without users.
+        # The user has no name, or the system has no users.
         return "python"

@@ -1,4 +1,4 @@
-"""What can go wrong between client and service."""
+"""Errors between client and service."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ class TactusError(Exception):
 
 
 class NoService(TactusError, ConnectionError):
-    """Nothing listens at the endpoint, or not a Tactus service."""
+    """Nothing listens at the endpoint, or the listener is not a Tactus service."""
 
 
 class NoRig(TactusError):
-    """No rig is ready at the endpoint, or several are and none was named."""
+    """No rig is ready at the endpoint, or several are ready and none was named."""
 
 
 class NoAnswer(TactusError, TimeoutError):
@@ -20,9 +20,9 @@ class NoAnswer(TactusError, TimeoutError):
 
 
 class Refused(TactusError):
-    """The service answered a command with no.
+    """The service refused a command.
 
-    ``str()`` says why and what to do about it; ``reply`` is the whole ``CommandReply``, ``exit_code`` its code.
+    ``str()`` gives the reason and what to do; ``reply`` is the whole ``CommandReply``, ``exit_code`` its code.
     """
 
     def __init__(self, reply):

@@ -1,4 +1,4 @@
-"""Frames as objects, and what is missing between them."""
+"""Frames as objects, and counts of missing frames."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ except ImportError:
 class Frame:
     """One reading of all elements; the fields of ``tactus.v1.Frame`` under the same names."""
 
-    #: Counts every frame that the sensor took, those that were lost included.
+    #: Counts every frame that the sensor took, including lost ones.
     seq: int
     #: Rises by one with every (re)connection of the device.
     epoch: int
-    #: The device's own clock, in its ticks; None if it has none.
+    #: The device's clock in its own ticks; None if it has no clock.
     device_tick: int | None
-    #: When the frame reached the service: its monotonic clock, and UTC since 1970.
+    #: When the frame reached the service, in ns: by the service's monotonic clock, and as UTC since 1970.
     t_mono_ns: int
     t_wall_ns: int
     #: Raw counts, row-major, row 0 column 0 at the origin corner.
@@ -35,16 +35,16 @@ class Frame:
     lost_before: int
     #: True if no physical sensor was read.
     simulated: bool
-    #: How the elements lie; None if the service has not said.
+    #: Rows and columns of the array; None if the service has not told them.
     shape: tuple | None
-    #: Elements that were not read; each stands in ``counts`` with its last reading, or with 0.
+    #: Indices of elements that were not read; ``counts`` holds their last reading, or 0.
     bad_elements: tuple = ()
 
     @property
     def image(self):
-        """The counts as rows x columns: a numpy array of float32 where numpy is installed, else a list of lists."""
+        """The counts as rows x columns: a numpy array of float32 if numpy is installed, else a list of lists."""
         if self.shape is None:
-            raise ValueError("the service has not told how the elements lie; take .counts, which are row-major")
+            raise ValueError("the service has not told the array's rows and columns; use .counts, which are row-major")
         rows, cols = self.shape
         if rows * cols != len(self.counts):
             raise ValueError(f"{len(self.counts)} counts do not make {rows} x {cols} elements")
@@ -73,20 +73,20 @@ class Frame:
 class Missing(NamedTuple):
     """Frames that did not arrive between the first and the last that did."""
 
-    #: Lost at the device or on its link; the service never had them.
+    #: Lost at the device or on its link; the service never received them.
     device: int
-    #: Lost between service and this program, by a slow network or a slow reader.
+    #: Lost between the service and this program, by a slow network or a slow reader.
     bus: int
 
 
 class Tally:
-    """Counts frames, and those that are missing between them."""
+    """Counts frames, and the frames that are missing between them."""
 
     def __init__(self):
         self.received = 0
         self.device_lost = 0
         self.bus_missing = 0
-        #: How often the numbers began again: the service was restarted.
+        #: How often ``seq`` started again, because the service was restarted.
         self.restarts = 0
         self.first_seq: int | None = None
         self.last_seq: int | None = None
@@ -101,14 +101,14 @@ class Tally:
             absent = seq - self.last_seq - 1
             at_device = min(lost_before, absent)
             self.device_lost += at_device
-            # A frame that fell out on the bus took its own `lost_before` along: that, too, counts here.
+            # The `lost_before` of a frame that the bus lost is lost too, so those device losses also count here.
             self.bus_missing += absent - at_device
         self.received += 1
         self.last_seq = seq
 
 
 class FrameStream(Stream):
-    """Iterates over frames as objects and counts them: see ``tally`` and ``missing``."""
+    """Iterates over frames as objects and counts them in ``tally`` and ``missing``."""
 
     #: Frames that may wait to be read: 5 minutes at 30 Hz.
     CAPACITY = 9_000
@@ -128,5 +128,5 @@ class FrameStream(Stream):
 
     @property
     def missing(self) -> Missing:
-        """What is missing so far."""
+        """Frames that are missing so far."""
         return Missing(device=self.tally.device_lost, bus=self.tally.bus_missing)

@@ -1,4 +1,4 @@
-"""Joins a topic's past to its present: each message once and in order."""
+"""Joins the past and live messages of a topic: each message once and in order."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ class Numbered(NamedTuple):
 
 
 class Merge:
-    """Puts past and present together and passes each message on.
+    """Joins past and live messages and passes each message on.
 
-    The two come by different ways and overlap. zenoh's advanced subscriber has a merge of its own, which is
-    not used: asked for both history and recovery, it may pass a present message on first and then throw the
-    past away as outdated.
+    The two arrive on different paths and overlap. The merge of zenoh's advanced subscriber is not used: if asked
+    for both history and recovery, it may pass a live message on first and then discard the past as outdated.
     """
 
     def __init__(self, pass_on: Callable[[Any], None]):
@@ -30,7 +29,7 @@ class Merge:
         self._held: list[Numbered] | None = []
 
     def present(self, message: Numbered) -> None:
-        """Takes a message of the present; holds it back until the past is there."""
+        """Takes a live message; holds it back until the past has arrived."""
         if self._held is None:
             self._pass(message)
         else:
@@ -45,7 +44,7 @@ class Merge:
     def _pass(self, message: Numbered) -> None:
         if message.number is not None:
             last = self._last.get(message.publisher)
-            # Numbers wrap around; whatever lies in the half behind the last one is old.
+            # Numbers wrap around; a number in the half before the last one is old.
             if last is not None and not 0 < (message.number - last) % 2**32 < 2**31:
                 return
             self._last[message.publisher] = message.number

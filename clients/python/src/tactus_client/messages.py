@@ -1,7 +1,7 @@
 """The messages of ``tactus.v1``.
 
-The classes are made at import from the descriptors that come with this package (``tactus.binpb``, compiled
-from ``tactus.proto``), so that no generated code has to fit the protobuf runtime. A class is named as its
+The classes are made at import from the descriptors in this package (``tactus.binpb``, compiled from
+``tactus.proto``), so no generated code has to match the protobuf runtime. A class has the name of its
 message: ``Frame``, ``RunEvent``, ``CommandReply`` ...
 """
 
@@ -16,7 +16,7 @@ PACKAGE = "tactus.v1"
 
 
 def _load():
-    # A pool of its own: other packages may bring other versions of the same messages.
+    # A separate pool: other packages may bring other versions of the same messages.
     pool = descriptor_pool.DescriptorPool()
     files = descriptor_pb2.FileDescriptorSet.FromString(
         resources.files(__package__).joinpath("tactus.binpb").read_bytes()
@@ -36,14 +36,14 @@ __all__ = [*_CLASSES, "DecodeError", "encoding", "name_of"]  # pyright: ignore[r
 
 
 def encoding(message_class) -> str:
-    """The encoding that names a message on the bus, such as ``application/protobuf;tactus.v1.Frame``."""
+    """The encoding string of a message on the bus, such as ``application/protobuf;tactus.v1.Frame``."""
     return f"application/protobuf;{message_class.DESCRIPTOR.full_name}"
 
 
 def name_of(message, field: str) -> str:
-    """The name of an enumeration's value: ``name_of(state, "phase")`` is such as ``RUN_PHASE_RUNNING``.
+    """The name of an enum value: ``name_of(state, "phase")`` gives, for example, ``RUN_PHASE_RUNNING``.
 
-    A value that this version does not know is given as its number.
+    A value that this version does not know is returned as its number.
     """
     number = getattr(message, field)
     value = message.DESCRIPTOR.fields_by_name[field].enum_type.values_by_number.get(number)

@@ -12,19 +12,19 @@ import zenoh.ext
 from tactus_client import messages
 from tactus_client.merge import Merge, Numbered
 
-#: How long the past is waited for; what has come by then is what there is.
+#: How long to wait for past messages. Those that arrive later are not used.
 PAST_TIMEOUT_S = 10.0
 
 
 class Stream:
-    """Iterates over the messages of one topic, waiting for each.
+    """Iterates over the messages of one topic, and waits for each.
 
-    Lost messages are fetched again as long as the service keeps them. At most ``capacity`` messages wait to be
-    read; then the oldest is dropped and counted in ``overrun``.
+    A lost message is fetched again if the service still keeps it. At most ``capacity`` messages wait to be read.
+    If there are more, the oldest is dropped and counted in ``overrun``.
     """
 
     def __init__(self, session, key: str, message_class, history: int | None, capacity: int):
-        """``history``: how many past messages to begin with; None for all that the service keeps."""
+        """``history``: the number of past messages to start with; None for all that the service keeps."""
         self._message_class = message_class
         self._encoding = messages.encoding(message_class)
         self._capacity = capacity
@@ -34,7 +34,7 @@ class Stream:
         self._merge = Merge(self._keep)
         #: Messages dropped because they were read too slowly.
         self.overrun = 0
-        #: Messages that were not what belongs on the topic.
+        #: Messages that did not have the topic's type.
         self.unreadable = 0
         self._subscriber = zenoh.ext.declare_advanced_subscriber(
             session,
@@ -42,7 +42,7 @@ class Stream:
             zenoh.handlers.Callback(self._hear, self._end),
             recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
         )
-        # Asked for after the present is listened to, so that no message falls between the two.
+        # Request the past only after subscribing, so that no message is lost in between.
         past = [_numbered(sample) for sample in past_samples(session, key, history)]
         with self._changed:
             self._merge.join(past)
@@ -63,7 +63,7 @@ class Stream:
                 return message
 
     def close(self) -> None:
-        """Stops listening; what has arrived can still be read."""
+        """Stops listening; messages that have arrived can still be read."""
         self._end()
         self._subscriber.undeclare()
 
@@ -109,7 +109,7 @@ class Stream:
 
 
 def past_samples(session, key: str, history: int | None):
-    """What the topic's publishers still keep of it: each answers on a key of zenoh's below the topic."""
+    """The messages that the topic's publishers still keep. Each answers on one of zenoh's keys below the topic."""
     limit = "" if history is None else f"?_max={history}"
     replies = session.get(
         f"{key}/@adv/pub/**{limit}",
