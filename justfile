@@ -126,6 +126,25 @@ python-tools:
     test -d {{ venv }} || python3 -m venv {{ venv }}
     {{ venv }}/bin/pip install --quiet --requirement tests/python/requirements.txt --editable clients/python
 
+# Runs the programs of `examples/`, and plans every shipped experiment.
+examples: build
+    #!/usr/bin/env bash
+    set -euo pipefail
+    target/debug/examples/image
+    port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+    coproc PULSE { exec target/debug/examples/pulse "tcp/127.0.0.1:$port"; }
+    trap 'kill $PULSE_PID' EXIT
+    read -r <&"${PULSE[0]}"
+    target/debug/examples/subscribe "tcp/127.0.0.1:$port" 30
+    for experiment in experiments/*.star; do
+        target/debug/tactus plan "$experiment" > /dev/null
+    done
+
+# Runs `just quick` before every commit. Git's hook is a file of this clone only; remove it to be rid of it.
+hook:
+    printf '#!/bin/sh\nexec just quick\n' > "$(git rev-parse --git-path hooks)/pre-commit"
+    chmod +x "$(git rev-parse --git-path hooks)/pre-commit"
+
 # A real browser at the dashboard; Debian's chromium is installed where there is none. Pictures of it: target/browser.
 browser: build browser-tools
     {{ tools }}/browser/bin/pytest -q tests/browser

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 20] = [
+const ROWS: [&str; 21] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -25,6 +25,7 @@ const ROWS: [&str; 20] = [
     "tactus-web",
     "tactus",
     "tactus-e2e",
+    "tactus-examples",
     "tactus-bench",
     "xtask",
 ];
