@@ -13,7 +13,7 @@ mkdir -p $made
 "$programs/tactus" completions bash > $made/tactus.bash
 "$programs/tactus" completions zsh > $made/_tactus
 "$programs/tactus" completions fish > $made/tactus.fish
-cargo xtask licences $made/third-party-licences.txt
+packaging/licences.py tactus tactus-daemon tactus-web tactus-mock > $made/third-party-licences.txt
 
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
@@ -47,7 +47,7 @@ sed -e "s/@VERSION@/$version/" -e "s/@ARCHITECTURE@/$(dpkg --print-architecture)
 (cd "$root" && find usr -type f -print0 | sort -z | xargs -0 md5sum) > "$root/DEBIAN/md5sums"
 chmod 644 "$root/DEBIAN"/*
 install --mode=755 packaging/postinst packaging/prerm packaging/postrm "$root/DEBIAN/"
-dpkg-deb --root-owner-group -Zgzip --build "$root" $out/tactus.deb
+dpkg-deb --root-owner-group -Zgzip -z1 --build "$root" $out/tactus.deb
 
 # A reviewer of packages would look at this first.
 fail() { echo "$out/tactus.deb: $1"; exit 1; }

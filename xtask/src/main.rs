@@ -2,11 +2,8 @@
 //!
 //! - `cargo xtask proto` compiles the messages.
 //! - `cargo xtask assets` makes the tools.
-//! - `cargo xtask licences FILE` collects the licence texts of what is linked into the programs.
 
 mod assets;
-#[cfg(feature = "licences")]
-mod licences;
 #[cfg(any(test, feature = "proto"))]
 mod messages;
 
@@ -20,14 +17,7 @@ fn main() -> Result<()> {
         #[cfg(feature = "proto")]
         Some("proto") => messages::compile(&repository(), &repository()),
         Some("assets") => assets::write(&repository()),
-        #[cfg(feature = "licences")]
-        Some("licences") => {
-            let Some(out) = std::env::args().nth(2) else {
-                bail!("name the file to write: cargo xtask licences FILE")
-            };
-            licences::write(&repository(), Path::new(&out))
-        }
-        other => bail!("unknown task {other:?}; there are: proto, assets, licences"),
+        other => bail!("unknown task {other:?}; there are: proto, assets"),
     }
 }
 
