@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: systemd-boot vm discovery-evidence-slice gpu (fuzz "600") (truth "20") bare advisories
+nightly: systemd-boot vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -229,11 +229,17 @@ discovery-active:
     target/release/tactus-bench evidence active --document docs/discovery-evidence.md
 
 # The part of it that fails if discovery has become worse: always the same 46 sets, some two minutes on two cores.
-discovery-evidence-slice folder="target/release":
-    {{ if folder == "target/release" { "cargo build --release --package tactus --package tactus-bench" } else { "" } }}
+discovery-slice:
+    cargo build --release --package tactus --package tactus-bench
     rm -rf target/evidence/slice
-    {{ folder }}/tactus-bench evidence run --size slice --check \
+    target/release/tactus-bench evidence run --size slice --check \
         --work target/evidence/slice/work --sealed target/evidence/slice/sealed
+
+# The part of that which CI runs, 11 sets, with the programs that the tests have built.
+discovery-sample: build
+    rm -rf target/evidence/sample
+    target/debug/tactus-bench evidence run --size sample --check --tactus target/debug/tactus \
+        --work target/evidence/sample/work --sealed target/evidence/sample/sealed
 
 # A virtual environment with the peers.
 bench-peers-tools:

@@ -27,7 +27,7 @@ fn no_two_sets_share_an_id_or_a_seed() {
 #[test]
 fn a_set_is_the_same_in_a_small_campaign_and_in_the_whole() {
     let whole = all(&Sizes::whole());
-    for set in all(&Sizes::slice()) {
+    for set in all(&Sizes::slice()).into_iter().chain(all(&Sizes::sample())) {
         let twin = whole.iter().find(|other| other.id == set.id);
         assert_eq!(twin.map(|twin| twin.recipe.seed), Some(set.recipe.seed), "{}", set.id);
     }
@@ -39,6 +39,7 @@ fn the_table_is_not_told_what_is_in_it() {
 }
 
 #[test]
-fn the_slice_is_as_small_as_ci_can_bear() {
+fn the_sample_is_as_small_as_ci_can_bear() {
     assert_eq!(all(&Sizes::slice()).len(), 12 + 24 + 4 + 6);
+    assert_eq!(all(&Sizes::sample()).len(), 3 + 6 + 1 + 1);
 }
