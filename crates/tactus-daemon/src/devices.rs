@@ -8,10 +8,10 @@ use tactus_device::transport::serial::SerialConnector;
 use tactus_device::transport::tcp::TcpConnector;
 use tactus_device::{ArrayExpectation, Clock, DrivenStage, SensorCodec, SensorDriver, StageOptions};
 use tactus_engine::Devices;
-use tactus_mock::{RigControl, Truth, VirtualRig};
 use tactus_schema::Rig;
 use tactus_schema::pb::StageState;
 use tactus_schema::rig::{Service, Transport, UsbLink};
+use tactus_virtual::{RigControl, Truth, VirtualRig};
 use tokio::sync::mpsc;
 
 /// Started devices, and the truth behind the virtual ones among them.

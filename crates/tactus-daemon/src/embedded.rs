@@ -17,7 +17,7 @@ use crate::recorder::{InPlace, OnThread};
 use crate::twin::{self, Plan, TwinError};
 use crate::{devices, virtual_time};
 
-pub use tactus_mock::{HIDDEN_SCHEMA, Truth, TruthError, TruthFile};
+pub use tactus_virtual::{HIDDEN_SCHEMA, Truth, TruthError, TruthFile};
 
 /// The rig that needs no hardware, as it is shipped in `config/rigs/sim.toml`.
 pub const SIMULATED_RIG: &str = include_str!("../../../config/rigs/sim.toml");

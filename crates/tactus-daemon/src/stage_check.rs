@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use tactus_device::{Clock, Connection, Controller, DrivenStage, SensorCodec, Stage, StageError, Target};
-use tactus_mock::{RigControl, Truth, VirtualRig};
 use tactus_schema::Rig;
 use tactus_schema::pb::{StageState, StageStatus};
 use tactus_schema::rig::{Service, StageProtocol, Transport};
+use tactus_virtual::{RigControl, Truth, VirtualRig};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout};
 

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use tactus_device::{Clock, SensorCodec};
 use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, Unpublished};
-use tactus_mock::{Truth, twin_of};
 use tactus_schema::rig::Transport;
 use tactus_schema::{Frame, Rig, Stamp, pb};
+use tactus_virtual::{Truth, twin_of};
 use tokio::time::timeout;
 use tracing::subscriber::NoSubscriber;
 

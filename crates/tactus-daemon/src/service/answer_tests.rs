@@ -5,8 +5,8 @@ use std::time::Duration;
 use tactus_bus::{Bus, BusConfig};
 use tactus_device::Clock;
 use tactus_engine::Unpublished;
-use tactus_mock::Truth;
 use tactus_schema::key::Keys;
+use tactus_virtual::Truth;
 
 use super::*;
 use crate::config::RigFiles;
