@@ -14,7 +14,7 @@ use tactus_schema::Rig;
 use tactus_virtual::cable::{self, Port};
 use tactus_virtual::faults::{Fault, FaultScript};
 use tactus_virtual::{RigControl, Started, TerminalPort, Truth, TruthFile, simulation_of, start_devices};
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::Instant;
@@ -151,6 +151,7 @@ fn in_runtime(serving: impl Future<Output = Result<()>>) -> Result<()> {
 
 async fn serve(args: RigArgs) -> Result<()> {
     let source = args.source.read()?;
+    let termination = Termination::listen()?;
     let sensor_port = open(args.link_dir.as_deref(), "sensor")?;
     let stage_port = open(args.link_dir.as_deref(), "stage")?;
     announce(&sensor_port, &stage_port, args.json)?;
@@ -160,7 +161,7 @@ async fn serve(args: RigArgs) -> Result<()> {
     let mut devices = JoinSet::new();
     devices.spawn(cable::run(started.sensor, Port::Terminal(sensor_port), started.faults.sensor));
     devices.spawn(cable::run(started.stage, Port::Terminal(stage_port), started.faults.stage));
-    until_terminated(&mut devices, &control, &script, async |line| {
+    until_terminated(termination, &mut devices, &control, &script, async |line| {
         line.parse::<Fault>().and_then(|fault| control.inject(fault)).map_err(|error| error.to_string())
     })
     .await?;
@@ -168,18 +169,29 @@ async fn serve(args: RigArgs) -> Result<()> {
     Ok(())
 }
 
-/// Lets the devices run until the program is terminated, and meanwhile does what is typed, answering each line.
+/// SIGTERM and SIGINT, which end the program in order from when it listens to them: before it says that it is ready.
+pub(crate) struct Termination {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+impl Termination {
+    pub(crate) fn listen() -> io::Result<Self> {
+        Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
+    }
+}
+
+/// Lets the devices run until the program is terminated. Meanwhile does what is typed, and answers each line.
 ///
 /// # Errors
 /// If a device ends, or the script has a fault that the rig cannot have.
 pub(crate) async fn until_terminated<E: std::error::Error + Send + Sync + 'static>(
+    Termination { mut terminate, mut interrupt }: Termination,
     devices: &mut JoinSet<Result<(), E>>,
     control: &RigControl,
     script: &FaultScript,
     mut obey: impl AsyncFnMut(&str) -> Result<(), String>,
 ) -> Result<()> {
-    let mut terminate = signal(SignalKind::terminate())?;
-    let mut interrupt = signal(SignalKind::interrupt())?;
     let mut lines = standard_input()?;
     let played = control.play(script);
     tokio::pin!(played);

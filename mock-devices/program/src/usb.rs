@@ -15,7 +15,7 @@ use tactus_wire::declared::{Format, RawFormat};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinSet;
 
-use crate::cli::{Source, SourceArgs, read, until_terminated};
+use crate::cli::{Source, SourceArgs, Termination, read, until_terminated};
 
 /// Orders that may wait for a plug: one line is answered before the next is read.
 const ORDERS_WAITING: usize = 1;
@@ -92,6 +92,7 @@ impl UsbArgs {
             SensorCodec::WeissDsa { .. } | SensorCodec::SingleTact { .. } | SensorCodec::AnySkin => None,
         };
         let vhci = Vhci::open()?;
+        let termination = Termination::listen()?;
         let (Started { sensor, stage, faults, control }, script) = source.start();
         let mut devices = Vec::new();
         if let Some(kind) = self.sensor {
@@ -126,7 +127,7 @@ impl UsbArgs {
         }
         announce(&said, self.json)?;
         let sends_packets = self.sends_packets();
-        let outcome = until_terminated(&mut running, &control, &script, async |line| {
+        let outcome = until_terminated(termination, &mut running, &control, &script, async |line| {
             obey(line, &plugged, &control, sends_packets).await
         });
         outcome.await?;

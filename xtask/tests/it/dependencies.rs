@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 24] = [
+const ROWS: [&str; 25] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -25,6 +25,7 @@ const ROWS: [&str; 24] = [
     "tactus-usbip",
     "tactus-sets",
     "tactus-mock",
+    "tactus-runner",
     "tactus-daemon",
     "tactus-web",
     "tactus",
@@ -48,7 +49,7 @@ const NEVER: [(&str, &[&str]); 7] = [
 /// benchmarks score on sets, and only `tactus-mock` has all of it.
 const MAY_USE_MOCK: [(&str, &[&str]); 5] = [
     ("tactus-hidden", &["tactus-virtual", "tactus-sets", "tactus-mock", "tactus-bench"]),
-    ("tactus-virtual", &["tactus-usbip", "tactus-mock", "tactus-daemon"]),
+    ("tactus-virtual", &["tactus-usbip", "tactus-mock", "tactus-runner"]),
     ("tactus-usbip", &["tactus-mock"]),
     ("tactus-sets", &["tactus-mock", "tactus-bench"]),
     ("tactus-mock", &[]),

@@ -1,4 +1,4 @@
-//! The lab service: composition root of `tactusd`, and the same composition embedded in the CLI.
+//! From a rig file and an experiment to a run: what the service `tactusd` and the embedded rig of the CLI share.
 //!
 //! | module | what it composes |
 //! |---|---|
@@ -9,7 +9,6 @@
 //! | [`recorder`] | the recording behind the engine |
 //! | [`twin`] | the dry run on a simulated twin |
 //! | [`embedded`] | one run in this process, without a service |
-//! | [`service`] | the service: bus, commands, health, systemd |
 //! | [`stage_check`] | a look at a rig's stage alone: what it is, and whether it moves as it says |
 
 pub mod config;
@@ -19,9 +18,7 @@ pub mod experiments;
 pub mod logging;
 pub mod order;
 pub mod recorder;
-pub mod service;
 pub mod stage_check;
 pub mod twin;
 
-mod notify;
 mod virtual_time;

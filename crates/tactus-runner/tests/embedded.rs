@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use tactus_daemon::config::RigFiles;
-use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, Truth};
-use tactus_daemon::order::Ask;
-use tactus_daemon::{devices, experiments};
 use tactus_device::{Clock, SensorCodec};
 use tactus_plan::{Arguments, Script};
+use tactus_runner::config::RigFiles;
+use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, Truth};
+use tactus_runner::order::Ask;
+use tactus_runner::{devices, experiments};
 use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
 use tactus_schema::rig::ElementFault;
