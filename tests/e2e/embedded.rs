@@ -5,9 +5,9 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use tactus_daemon::embedded::SIMULATED_RIG;
 use tactus_e2e::{repository, tactus};
 use tactus_record::{Entry, Message, rows};
+use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_schema::WallTime;
 use tempfile::TempDir;
 

@@ -1,7 +1,8 @@
 //! Which sets there are.
 
 use serde::{Deserialize, Serialize};
-use tactus_mock::hidden::{Amount, CATALOGUE, Content, Definition, NoiseKind, Recipe};
+use tactus_hidden::{CATALOGUE, Definition};
+use tactus_sets::{Amount, Content, NoiseKind, Recipe};
 
 /// What a set is made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]

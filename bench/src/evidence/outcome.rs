@@ -4,7 +4,7 @@ use std::fs;
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, de::DeserializeOwned};
-use tactus_mock::hidden::Label;
+use tactus_sets::Label;
 
 use super::campaign::{Campaign, Planned};
 use super::run::{Places, Ran};
@@ -180,7 +180,7 @@ fn one(set: &Planned, places: &Places) -> Result<Outcome> {
 }
 
 fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<Report>) -> Outcome {
-    let truth = |dosed: &tactus_mock::hidden::Dosed| Truth {
+    let truth = |dosed: &tactus_sets::Dosed| Truth {
         physics: dosed.id.clone(),
         effect: dosed.effect.clone(),
         z: dosed.z_beyond_spread,

@@ -1,5 +1,5 @@
 use serde_json::json;
-use tactus_mock::hidden::{Content, Recipe};
+use tactus_sets::{Content, Recipe};
 
 use super::*;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use tactus_mock::hidden::CATALOGUE;
+use tactus_hidden::CATALOGUE;
 use tactus_report::plot::{Axis, Figure, Ink, Label, Panel, Series, Sheet};
 
 use super::rate::Rate;

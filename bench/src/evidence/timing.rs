@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
-use tactus_mock::hidden::{Content, Plan, Recipe};
+use tactus_sets::{Content, Plan, Recipe};
 
 use super::rate::quantile;
 use crate::Growth;

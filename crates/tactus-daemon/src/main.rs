@@ -1,7 +1,10 @@
-//! `tactusd`: the lab service.
+//! `tactusd`: the lab service. [`service`] composes it of the bus, the engine and `tactus-runner`.
+
+mod notify;
+mod service;
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    tactus_daemon::service::main()
+    service::main()
 }

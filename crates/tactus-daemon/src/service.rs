@@ -23,14 +23,15 @@ use clap::Parser;
 use tactus_bus::{Bus, BusConfig, BusError, Calls};
 use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
-use tactus_mock::Truth;
+use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles};
+use tactus_runner::embedded::Truth;
+use tactus_runner::{devices, logging};
 use tactus_schema::key::Keys;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::timeout;
 use tracing::{error, info, warn};
 
-use crate::config::{Config, ConfigError, LogFormat, RigFiles};
-use crate::{devices, logging, notify};
+use crate::notify;
 use answer::Desk;
 use watch::OnBus;
 
@@ -68,7 +69,7 @@ enum ServiceError {
 }
 
 /// Runs `tactusd` with the process's arguments.
-pub fn main() -> ExitCode {
+pub(crate) fn main() -> ExitCode {
     let options = Options::parse();
     let config = match Config::load(&options.config) {
         Ok(config) => config,

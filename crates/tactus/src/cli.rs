@@ -476,8 +476,8 @@ pub(crate) struct ValidateArgs {
 pub fn main() -> ExitCode {
     let Cli { common, command } = Cli::parse();
     // Scripts log through the service's own lines; a person at the terminal needs warnings only.
-    tactus_daemon::logging::start(
-        tactus_daemon::config::LogFormat::Text,
+    tactus_runner::logging::start(
+        tactus_runner::config::LogFormat::Text,
         "warn,zenoh=error,zenoh_transport=error",
     );
     match dispatch(&common, command) {

@@ -6,16 +6,16 @@ use std::sync::Arc;
 use tactus_bus::{CommandCall, Publisher, Request};
 use tactus_engine::{Engine, ResetError, StopOrder};
 use tactus_plan::{Arguments, Script};
+use tactus_runner::config::Config;
+use tactus_runner::order::{self, Ask};
+use tactus_runner::recorder::OnThread;
+use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
 use tactus_schema::{MonoTime, pb};
 use tokio::sync::mpsc;
 use tracing::{info, warn};
 
 use super::health::health;
-use crate::config::Config;
-use crate::order::{self, Ask};
-use crate::recorder::OnThread;
-use crate::{experiments, twin};
 
 /// The CLI's exit codes for what can go wrong with a command.
 mod exit {

@@ -5,12 +5,12 @@ use std::time::Duration;
 use tactus_bus::{Bus, BusConfig};
 use tactus_device::Clock;
 use tactus_engine::Unpublished;
-use tactus_mock::Truth;
+use tactus_runner::config::RigFiles;
+use tactus_runner::devices;
+use tactus_runner::embedded::Truth;
 use tactus_schema::key::Keys;
 
 use super::*;
-use crate::config::RigFiles;
-use crate::devices;
 
 /// A guard held across a second look at the stage would block for good as soon as a report of the stage comes in between.
 #[test]

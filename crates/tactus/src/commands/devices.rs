@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde_json::{Value, json};
-use tactus_daemon::config::{self, Config, RigFiles};
 use tactus_device::{Access, Found, inventory};
+use tactus_runner::config::{self, Config, RigFiles};
 use tactus_schema::Rig;
 use tactus_schema::rig::{SerialPort, Transport};
 

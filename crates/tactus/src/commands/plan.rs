@@ -1,11 +1,11 @@
 //! `plan`: what an experiment would do, found by a dry run on the rig's simulated twin.
 
 use serde_json::json;
-use tactus_daemon::config;
-use tactus_daemon::embedded::SIMULATED_RIG;
-use tactus_daemon::order::{self, Ask};
-use tactus_daemon::twin::{self, Plan};
 use tactus_plan::{Parameter, RigView};
+use tactus_runner::config;
+use tactus_runner::embedded::SIMULATED_RIG;
+use tactus_runner::order::{self, Ask};
+use tactus_runner::twin::{self, Plan};
 use tactus_schema::{Rig, WallTime};
 
 use super::run::experiment;

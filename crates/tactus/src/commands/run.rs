@@ -65,7 +65,7 @@ pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<Summary
 
 /// The script and the parameters that were asked for.
 pub(super) fn experiment(args: &ExperimentArgs) -> anyhow::Result<(Script, Arguments)> {
-    let script = tactus_daemon::experiments::find(&args.experiment, None)
+    let script = tactus_runner::experiments::find(&args.experiment, None)
         .map_err(|error| Failure::new(Exit::Usage, error))?;
     let mut arguments = Arguments::default();
     for parameter in &args.parameters {

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde_json::{Value, json};
-use tactus_daemon::config;
-use tactus_daemon::embedded::SIMULATED_RIG;
-use tactus_daemon::stage_check::{self, CheckedMove, STEP_MM, StageCheck};
+use tactus_runner::config;
+use tactus_runner::embedded::SIMULATED_RIG;
+use tactus_runner::stage_check::{self, CheckedMove, STEP_MM, StageCheck};
 use tactus_schema::Rig;
 use tactus_schema::rig::{StageLink, Transport};
 

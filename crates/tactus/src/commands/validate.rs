@@ -4,11 +4,11 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use serde_json::json;
-use tactus_daemon::config::{self, Config};
-use tactus_daemon::embedded::{HIDDEN_SCHEMA, SIMULATED_RIG, TruthFile};
-use tactus_daemon::experiments;
 use tactus_plan::RigView;
 use tactus_record::Completeness;
+use tactus_runner::config::{self, Config};
+use tactus_runner::embedded::{HIDDEN_SCHEMA, SIMULATED_RIG, TruthFile};
+use tactus_runner::experiments;
 use tactus_schema::{Model, Rig, model, rig};
 use tactus_wire::declared;
 

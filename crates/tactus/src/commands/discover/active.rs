@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use anyhow::bail;
-use tactus_daemon::config;
-use tactus_daemon::embedded::SIMULATED_RIG;
 use tactus_discover::{Discovery, NextExperiment, Verdict};
 use tactus_report::discovery::{ActiveRun, Undecided, command};
+use tactus_runner::config;
+use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use serde_json::{Value, json};
-use tactus_daemon::devices;
+use tactus_runner::devices;
 use tactus_schema::rig::{HidLink, SerialPort, Transport, UsbIdentity, UsbLink};
 use tactus_wire::declared::{MAX_FRAME_BYTES, Proposal, propose};
 use tokio::io::AsyncReadExt;

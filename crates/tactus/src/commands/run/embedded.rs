@@ -5,11 +5,11 @@ use std::path::Path;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use tactus_daemon::config;
-use tactus_daemon::embedded::{self, EmbeddedError, Finished, Pace, TruthError, TruthFile};
-use tactus_daemon::order::Ask;
 use tactus_engine::{Engine, StopOrder};
 use tactus_plan::{Arguments, Script};
+use tactus_runner::config;
+use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, TruthError, TruthFile};
+use tactus_runner::order::Ask;
 use tactus_schema::pb::{self, RunPhase};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::{MissedTickBehavior, interval};

@@ -9,11 +9,11 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use tactus_calibrate::Readings;
-use tactus_daemon::embedded::SIMULATED_RIG;
 use tactus_model::{Covering, Indenter, Mesh, Trajectory};
 use tactus_record::rows;
 use tactus_report::figures::{COVERINGS, SideBySide, inches, side_by_side};
 use tactus_report::study::StudyFigure;
+use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_scene::shapes::Scene;
 use toml::{Table, Value};
 

@@ -7,11 +7,11 @@ use serde_json::{Value, json};
 use tactus_calibrate::acuity::NYQUIST_SIGMA;
 use tactus_calibrate::design::Wanted;
 use tactus_calibrate::{Estimate, Fault, FaultKind, Form};
-use tactus_daemon::embedded::{self, Truth};
 use tactus_model::{DIGITACTS_PITCH_MM, Psf};
 use tactus_record::Timeline;
 use tactus_report::figures::Widening;
 use tactus_report::study::{Found, StudyRow};
+use tactus_runner::embedded::{self, Truth};
 use tactus_schema::Rig;
 use tactus_schema::rig::ElementFault;
 

@@ -1,0 +1,160 @@
+//! One run in this process, without a service: the embedded simulated rig.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tactus_device::Clock;
+use tactus_engine::{Engine, EngineError, Record, RunOrder, RunOutcome, Unpublished};
+use tactus_plan::ScriptError;
+use tactus_record::RecordError;
+use tactus_schema::rig::Transport;
+use tactus_schema::{Rig, RigError};
+
+use crate::config::{ConfigError, RigFiles};
+use crate::order::{self, Ask};
+use crate::recorder::{InPlace, OnThread};
+use crate::twin::{self, Plan, TwinError};
+use crate::{devices, virtual_time};
+
+pub use tactus_virtual::{HIDDEN_SCHEMA, Truth, TruthError, TruthFile};
+
+/// The rig that needs no hardware, as it is shipped in `config/rigs/sim.toml`.
+pub const SIMULATED_RIG: &str = include_str!("../../../config/rigs/sim.toml");
+
+/// [`SIMULATED_RIG`], read.
+///
+/// # Errors
+/// None, unless the shipped file is wrong.
+pub fn simulated_rig() -> Result<RigFiles, ConfigError> {
+    RigFiles::of(SIMULATED_RIG, Path::new("sim.toml"))
+}
+
+/// How time passes in an embedded run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// Nobody waits.
+    Virtual,
+    /// As on a real rig.
+    Real,
+}
+
+/// A run that was done, well or badly.
+#[derive(Debug, Clone)]
+pub struct Finished {
+    /// How it ended.
+    pub outcome: RunOutcome,
+    /// Its recording.
+    pub recording: PathBuf,
+}
+
+/// Why there was no run.
+#[derive(Debug, thiserror::Error)]
+pub enum EmbeddedError {
+    /// The rig is not one.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The rig has no service part.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// Its devices are not in this process.
+    #[error(
+        "the devices of rig {rig:?} are not embedded (transport.kind): they are run by the service, `tactusd`"
+    )]
+    NotEmbedded {
+        /// The rig's name.
+        rig: String,
+    },
+    /// The truth is not one of this rig.
+    #[error(transparent)]
+    Truth(#[from] TruthError),
+    /// The script or its parameters.
+    #[error(transparent)]
+    Script(#[from] ScriptError),
+    /// The dry run.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    /// The dry run found a step that cannot be done; nothing was moved.
+    #[error("{}", .0.outcome.message)]
+    NotPossible(Box<Plan>),
+    /// The recording could not be opened.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The system gave no thread or runtime.
+    #[error("no run: {0}")]
+    System(#[from] io::Error),
+}
+
+/// What a simulated rig hides from the service, the same in all its runs: what comparisons hold findings against.
+/// The virtual devices are made of this very [`Truth`].
+///
+/// `None` for a rig that hides nothing: one with physical devices, or a description that came with data. A run with a
+/// [`TruthFile`] hides that instead, and its recording holds no rig file that says otherwise.
+pub fn truth(rig: &Rig) -> Option<Truth> {
+    let simulation = rig.simulation.as_ref().filter(|_| rig.simulated)?;
+    Some(Truth::of(rig, simulation, simulation.seed))
+}
+
+/// Dry-runs the experiment on the rig's twin and then runs it on the rig, whose devices must be embedded.
+/// Blocks until it is over.
+///
+/// With a `truth`, the devices hide that in the place of what the rig file says of the sensor. Neither the dry run nor
+/// the recording knows it: the recording then has the rig's description, but not its file.
+///
+/// `started` gets the engine and the recording's path as soon as the run is about to begin.
+///
+/// # Errors
+/// [`EmbeddedError`] if there was no run at all; how a run ended is in [`Finished`].
+pub fn run(
+    RigFiles { rig, codec, texts }: &RigFiles,
+    truth: Option<&TruthFile>,
+    ask: Ask,
+    folder: &Path,
+    pace: Pace,
+    started: impl FnOnce(&Engine, &RunOrder),
+) -> Result<Finished, EmbeddedError> {
+    let Some(service) = rig.service.clone() else {
+        return Err(EngineError::NoService { rig: rig.name.clone() }.into());
+    };
+    if service.sensor.transport != Transport::Embedded || service.stage.transport != Transport::Embedded {
+        return Err(EmbeddedError::NotEmbedded { rig: rig.name.clone() });
+    }
+    let runtime = match pace {
+        Pace::Virtual => virtual_time::runtime()?,
+        Pace::Real => tokio::runtime::Builder::new_multi_thread().enable_all().build()?,
+    };
+    let clock = runtime.block_on(async {
+        match pace {
+            Pace::Virtual => Clock::paused(),
+            Pace::Real => Clock::real(),
+        }
+    });
+    let mut order = order::order(ask, rig, clock.now().wall)?;
+    let hidden = match truth {
+        Some(truth) => truth.behind(rig, order.seed)?,
+        None => Truth::of_rig(rig, order.seed),
+    };
+    let plan = twin::dry_run(rig, order.clone())?;
+    if !plan.is_possible() {
+        return Err(EmbeddedError::NotPossible(Box::new(plan)));
+    }
+    order.planned = Some(plan.promise());
+    // Who runs simulated devices of one's own has nobody else to ask.
+    order.resets = true;
+    let texts = if truth.is_none() { texts.all() } else { texts.without_rig() };
+    let (recording, path) = order::recording(&order, rig, texts, folder, clock.now().wall)?;
+    order.recording = path.display().to_string();
+    let record: Box<dyn Record> = match pace {
+        Pace::Virtual => Box::new(InPlace(recording)),
+        Pace::Real => Box::new(OnThread::start(recording)?),
+    };
+    runtime.block_on(async {
+        let opened = devices::open(rig, &service, codec.clone(), || hidden, clock);
+        let engine = Engine::start(rig.clone(), opened.devices, clock, Arc::new(Unpublished))?;
+        started(&engine, &order);
+        match engine.run(order, record).await {
+            Ok(outcome) => Ok(Finished { outcome, recording: path }),
+            Err(busy) => unreachable!("a new engine has no other run: {busy}"),
+        }
+    })
+}

@@ -1,0 +1,342 @@
+//! `stage check`: whether a rig's stage is the one that the rig file describes, and does what it says.
+//!
+//! It opens the stage itself, without a service and without the sensor. What it believes is what the controller
+//! reports. A stage that stands below the safe height rises to it; there each axis goes [`STEP_MM`] and back.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use tactus_device::{Clock, Connection, Controller, DrivenStage, SensorCodec, Stage, StageError, Target};
+use tactus_schema::Rig;
+use tactus_schema::pb::{StageState, StageStatus};
+use tactus_schema::rig::{Service, StageProtocol, Transport};
+use tactus_virtual::{RigControl, Truth, VirtualRig};
+use tokio::sync::mpsc;
+use tokio::time::{Instant, timeout};
+
+use crate::{devices, virtual_time};
+
+/// How far each axis goes.
+pub const STEP_MM: f64 = 0.01;
+
+/// An axis that has gone less than this of its way has not gone it.
+const WAY_SHARE_MIN: f64 = 0.5;
+
+/// How long the first word of the controller is waited for; a driver that finds none says so earlier.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Names of the axes.
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// What a check found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageCheck {
+    /// What answered.
+    pub controller: Option<Controller>,
+    /// Where it stands, as last reported, robot frame.
+    pub position_mm: [f64; 3],
+    /// True if it knows where it is.
+    pub is_homed: bool,
+    /// The moves that were made.
+    pub moves: Vec<CheckedMove>,
+    /// Why the check did not come to its end, or what must be done first.
+    pub trouble: Option<String>,
+}
+
+/// A move of the check.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckedMove {
+    /// Which axis moves.
+    pub axis: &'static str,
+    /// Where along it the stage was sent.
+    pub asked_mm: f64,
+    /// Where along it the stage then reported to stand; `None` if it did not arrive.
+    pub reported_mm: Option<f64>,
+    /// How far the reported place is from that which was asked for, all axes together.
+    pub error_mm: Option<f64>,
+    /// How long it took.
+    pub took: Duration,
+    /// What is wrong with it.
+    pub trouble: Option<String>,
+}
+
+/// Why there was no check.
+#[derive(Debug, thiserror::Error)]
+pub enum StageCheckError {
+    /// The rig describes data, not a service.
+    #[error(
+        "rig {rig:?} has no stage: a rig file for a service needs envelope, motion, policy, sensor and stage"
+    )]
+    NoService {
+        /// The rig's name.
+        rig: String,
+    },
+    /// The system gave no runtime.
+    #[error("no check: {0}")]
+    System(#[from] io::Error),
+}
+
+impl StageCheck {
+    /// True if the stage is there, knows where it is, and made every move.
+    pub fn is_good(&self) -> bool {
+        self.trouble.is_none() && self.moves.iter().all(|one| one.trouble.is_none())
+    }
+}
+
+impl CheckedMove {
+    /// What a stage is to be believed about a move from a place to another of which one axis differs.
+    fn judge(axis: usize, from_mm: [f64; 3], asked_mm: [f64; 3], took: Duration, end: Ended) -> Self {
+        let mut checked = Self {
+            axis: NAMES[axis],
+            asked_mm: asked_mm[axis],
+            reported_mm: None,
+            error_mm: None,
+            took,
+            trouble: None,
+        };
+        match end {
+            Err(error) => checked.trouble = Some(error.to_string()),
+            Ok(reached_mm) => {
+                let (way_mm, asked_way_mm) =
+                    (reached_mm[axis] - from_mm[axis], asked_mm[axis] - from_mm[axis]);
+                if way_mm * asked_way_mm.signum() < WAY_SHARE_MIN * asked_way_mm.abs() {
+                    // The rig's tolerance may be wider than the way.
+                    checked.trouble = Some(format!(
+                        "it reports {:+.1} um of {:+.1} um: it has not moved, or not that way",
+                        way_mm * 1000.0,
+                        asked_way_mm * 1000.0
+                    ));
+                }
+                checked.reported_mm = Some(reached_mm[axis]);
+                checked.error_mm = Some(distance_mm(reached_mm, asked_mm));
+            }
+        }
+        checked
+    }
+}
+
+/// How a move ended.
+type Ended = Result<[f64; 3], StageError>;
+
+/// Checks the stage of a rig; with `home` it is homed first. An embedded stage is a virtual one, in virtual time;
+/// `started` gets its control. Blocks until it is over; an interrupt (Ctrl-C) stops the stage and ends the check.
+///
+/// # Errors
+/// [`StageCheckError`] if there was no check at all; what it found is in [`StageCheck`].
+pub fn run(rig: &Rig, home: bool, started: impl FnOnce(&RigControl)) -> Result<StageCheck, StageCheckError> {
+    let Some(service) = &rig.service else {
+        return Err(StageCheckError::NoService { rig: rig.name.clone() });
+    };
+    if service.stage.transport != Transport::Embedded {
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+        return Ok(runtime.block_on(async {
+            let (stage, reports) = devices::open_stage(rig, service, || None, Clock::real());
+            check_until_interrupted(stage, reports, service, home).await
+        }));
+    }
+    let runtime = virtual_time::runtime()?;
+    Ok(runtime.block_on(async {
+        let seed = rig.simulation.as_ref().map_or(0, |simulation| simulation.seed);
+        let mut virtual_rig = VirtualRig::of(Truth::of_rig(rig, seed), rig.covering, &SensorCodec::default());
+        started(&virtual_rig.control());
+        let embedded = || Some(virtual_rig.stage_connector());
+        let (stage, reports) = devices::open_stage(rig, service, embedded, Clock::paused());
+        let never = AtomicBool::new(false);
+        check(&stage, reports, service, home, &never).await
+    }))
+}
+
+/// Ctrl-C stops the stage; the check then ends with the move that was stopped.
+async fn check_until_interrupted(
+    stage: Arc<DrivenStage>,
+    reports: mpsc::Receiver<StageState>,
+    service: &Service,
+    home: bool,
+) -> StageCheck {
+    let interrupted = AtomicBool::new(false);
+    let checked = check(&stage, reports, service, home, &interrupted);
+    tokio::pin!(checked);
+    loop {
+        tokio::select! {
+            biased;
+            Ok(()) = tokio::signal::ctrl_c() => {
+                // First the mark, then the stop: whoever moves looks at the mark after giving the order.
+                interrupted.store(true, Ordering::SeqCst);
+                stage.stop();
+            }
+            checked = &mut checked => return checked,
+        }
+    }
+}
+
+async fn check(
+    stage: &DrivenStage,
+    mut reports: mpsc::Receiver<StageState>,
+    service: &Service,
+    home: bool,
+    interrupted: &AtomicBool,
+) -> StageCheck {
+    // The driver waits for whoever takes its reports. The task ends with the driver.
+    tokio::spawn(async move { while reports.recv().await.is_some() {} });
+    let mut checking = Checking { stage, service, interrupted, controller: None, moves: Vec::new() };
+    let trouble = checking.go_through(home).await.err();
+    let Checking { controller, moves, .. } = checking;
+    let state = *stage.state().borrow();
+    StageCheck {
+        controller,
+        position_mm: [state.x_mm, state.y_mm, state.z_mm],
+        is_homed: state.status() == StageStatus::Idle,
+        moves,
+        trouble,
+    }
+}
+
+/// A check under way.
+struct Checking<'a> {
+    stage: &'a DrivenStage,
+    service: &'a Service,
+    interrupted: &'a AtomicBool,
+    controller: Option<Controller>,
+    moves: Vec<CheckedMove>,
+}
+
+impl Checking<'_> {
+    async fn go_through(&mut self, home: bool) -> Result<(), String> {
+        self.controller = Some(self.connect().await?);
+        let mut state = self.stage.state();
+        let reported = state.wait_for(|state| state.status() != StageStatus::Disconnected).await;
+        let status = reported.map_err(|_| "the driver has ended".to_owned())?.status();
+        match status {
+            StageStatus::Alarm => {
+                return Err(
+                    "the stage is in alarm: see to it, clear it (`tactus reset` with the service, or the \
+                            controller's own tools), and check again"
+                        .into(),
+                );
+            }
+            StageStatus::Idle | StageStatus::Unhomed => {}
+            StageStatus::Unspecified
+            | StageStatus::Disconnected
+            | StageStatus::Moving
+            | StageStatus::Hold
+            | StageStatus::Homing => {
+                return Err(format!("the stage does not stand still: it says {status:?}"));
+            }
+        }
+        if home {
+            let order = self.stage.home();
+            self.check_interrupted()?;
+            order.await.map_err(|error| format!("homing: {error}"))?;
+        } else if status != StageStatus::Idle {
+            return Err(
+                "the stage does not know where it is, so that nothing was moved: add --home, and it is \
+                        homed first"
+                    .into(),
+            );
+        }
+        self.rise().await?;
+        for axis in 0..3 {
+            if self.has_axis(axis) {
+                self.there_and_back(axis).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for the controller, or for the first reason why there is none.
+    async fn connect(&self) -> Result<Controller, String> {
+        let mut connection = self.stage.connection();
+        let settled = connection.wait_for(|now| !matches!(now, Connection::Seeking(None)));
+        match timeout(PATIENCE, settled).await {
+            Err(_) => Err(format!("nothing was heard of the stage for {} s", PATIENCE.as_secs())),
+            Ok(Err(_)) => Err("the driver has ended".to_owned()),
+            Ok(Ok(now)) => match &*now {
+                Connection::Connected(controller) => Ok(controller.clone()),
+                Connection::Seeking(Some(error)) => Err(error.to_string()),
+                Connection::Seeking(None) => Err("the stage is still being looked for".to_owned()),
+            },
+        }
+    }
+
+    /// Straight up to the safe height, if it stands lower.
+    async fn rise(&mut self) -> Result<(), String> {
+        let motion = &self.service.motion;
+        let [x_mm, y_mm, z_mm] = self.position_mm();
+        if z_mm >= motion.safe_height_mm - motion.tolerance_mm {
+            return Ok(());
+        }
+        let up_mm = [x_mm, y_mm, motion.safe_height_mm];
+        self.go(up_mm, motion.travel_speed_mm_per_s)
+            .await?
+            .map(drop)
+            .map_err(|error| format!("to the safe height: {error}"))
+    }
+
+    /// Moves one axis a step, and back.
+    async fn there_and_back(&mut self, axis: usize) -> Result<(), String> {
+        let from_mm = self.position_mm();
+        let mut there_mm = from_mm;
+        there_mm[axis] += self.step_mm(axis, from_mm[axis]);
+        self.checked(axis, there_mm).await?;
+        self.checked(axis, from_mm).await
+    }
+
+    /// A step that stays clear of the ends of the travel, and of what is below: z goes up where there is room.
+    fn step_mm(&self, axis: usize, at_mm: f64) -> f64 {
+        let envelope = &self.service.envelope;
+        let grows = match axis {
+            0 | 1 => {
+                let [least, greatest] = if axis == 0 { envelope.x_mm } else { envelope.y_mm };
+                at_mm < f64::midpoint(least, greatest)
+            }
+            _ => at_mm + STEP_MM < envelope.z_max_mm,
+        };
+        if grows { STEP_MM } else { -STEP_MM }
+    }
+
+    async fn checked(&mut self, axis: usize, asked_mm: [f64; 3]) -> Result<(), String> {
+        let (from_mm, began) = (self.position_mm(), Instant::now());
+        let ended = self.go(asked_mm, self.service.motion.load_speed_mm_per_s).await?;
+        let has_failed = ended.is_err();
+        self.moves.push(CheckedMove::judge(axis, from_mm, asked_mm, began.elapsed(), ended));
+        if has_failed {
+            return Err("a move was not made; nothing more was moved".into());
+        }
+        Ok(())
+    }
+
+    /// One straight move; the outer error is an interrupt before it.
+    async fn go(&self, position_mm: [f64; 3], speed_mm_per_s: f64) -> Result<Ended, String> {
+        // The order is given before the look: a stop between the two still counts as later than the order.
+        let order = self.stage.move_to(Target { position_mm, speed_mm_per_s });
+        self.check_interrupted()?;
+        Ok(order.await)
+    }
+
+    fn check_interrupted(&self) -> Result<(), String> {
+        if self.interrupted.load(Ordering::SeqCst) { Err("interrupted".into()) } else { Ok(()) }
+    }
+
+    fn position_mm(&self) -> [f64; 3] {
+        let state = self.stage.state();
+        let report = state.borrow();
+        [report.x_mm, report.y_mm, report.z_mm]
+    }
+
+    fn has_axis(&self, axis: usize) -> bool {
+        match &self.service.stage.protocol {
+            StageProtocol::Grbl(_) => true,
+            StageProtocol::Zaber(zaber) => zaber.axes.get(axis).is_some_and(Option::is_some),
+        }
+    }
+}
+
+fn distance_mm(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+#[path = "stage_check_tests.rs"]
+mod tests;

@@ -1,0 +1,134 @@
+//! The dry run: the same engine and drivers on a simulated twin of the rig, in virtual time.
+
+use std::thread;
+use std::time::Duration;
+
+use tactus_device::{Clock, SensorCodec};
+use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, Unpublished};
+use tactus_schema::rig::Transport;
+use tactus_schema::{Frame, Rig, Stamp, pb};
+use tactus_virtual::{Truth, twin_of};
+use tokio::time::timeout;
+use tracing::subscriber::NoSubscriber;
+
+use crate::devices;
+use crate::virtual_time;
+
+/// No experiment lasts longer.
+const LONGEST: Duration = Duration::from_hours(72);
+
+/// What an experiment will do, as a dry run found it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// How the dry run ended; anything but done means that the experiment would not be done either.
+    pub outcome: RunOutcome,
+}
+
+/// Why there was no dry run.
+#[derive(Debug, thiserror::Error)]
+pub enum TwinError {
+    /// The system gave no thread or no runtime.
+    #[error("no dry run: {0}")]
+    System(#[from] std::io::Error),
+    /// The rig describes data, not a service.
+    #[error(transparent)]
+    Engine(#[from] tactus_engine::EngineError),
+    /// The experiment would take longer than any run may.
+    #[error("the experiment would take more than {} h", LONGEST.as_secs() / 3600)]
+    TooLong,
+    /// The dry run's thread panicked.
+    #[error("the dry run panicked; this is a defect of Tactus")]
+    Panicked,
+}
+
+impl Plan {
+    /// True if the twin did everything that was asked.
+    pub fn is_possible(&self) -> bool {
+        self.outcome.exit_status == pb::ExitStatus::Done
+    }
+
+    /// The promise for the run's progress.
+    pub fn promise(&self) -> Planned {
+        Planned {
+            presses: self.outcome.presses,
+            dwells: self.outcome.dwells,
+            duration_s: self.outcome.duration_s,
+        }
+    }
+
+    /// Greatest depth that was commanded, in mm; 0 if nothing was pressed.
+    pub fn deepest_mm(&self) -> f64 {
+        (-self.outcome.travel_mm[2][0]).max(0.0)
+    }
+}
+
+/// Runs an experiment on the rig's twin. Blocks for as long as that takes to compute.
+///
+/// # Errors
+/// [`TwinError`] if there was no dry run; a refused step is a [`Plan`] that is not possible.
+pub fn dry_run(rig: &Rig, mut order: RunOrder) -> Result<Plan, TwinError> {
+    let mut twin = twin_of(rig);
+    order.resets = true;
+    if let Some(service) = &mut twin.service {
+        service.sensor.transport = Transport::Embedded;
+        service.stage.transport = Transport::Embedded;
+    }
+    // A runtime of its own, on a thread of its own: the caller may live in another runtime.
+    thread::Builder::new()
+        .name("twin".into())
+        .spawn(move || {
+            // What happens on the twin is no event of the service.
+            tracing::subscriber::with_default(NoSubscriber::new(), || {
+                let runtime = virtual_time::runtime()?;
+                let outcome = runtime.block_on(run(twin, order))?;
+                Ok(Plan { outcome })
+            })
+        })?
+        .join()
+        .map_err(|_| TwinError::Panicked)?
+}
+
+async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
+    let clock = Clock::paused();
+    let Some(service) = twin.service.clone() else {
+        return Err(tactus_engine::EngineError::NoService { rig: twin.name }.into());
+    };
+    // What a step does is the same by every codec: the twin has one that needs no description.
+    let codec = SensorCodec::default();
+    let opened = devices::open(&twin, &service, codec, || Truth::of_rig(&twin, order.seed), clock);
+    let engine = Engine::start(twin, opened.devices, clock, std::sync::Arc::new(Unpublished))?;
+    match timeout(LONGEST, engine.run(order, Box::new(Unrecorded))).await {
+        Ok(Ok(outcome)) => Ok(outcome),
+        Ok(Err(busy)) => unreachable!("a new engine has no other run: {busy}"),
+        Err(_) => Err(TwinError::TooLong),
+    }
+}
+
+/// A dry run leaves nothing behind.
+struct Unrecorded;
+
+impl Record for Unrecorded {
+    fn sensor_info(&mut self, _: &pb::SensorInfo, _: Stamp) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn frame(&mut self, _: &Frame) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn stage(&mut self, _: &pb::StageState) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn event(&mut self, _: &pb::RunEvent) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn safety(&mut self, _: &pb::SafetyEvent) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+}

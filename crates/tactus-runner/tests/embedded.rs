@@ -1,0 +1,103 @@
+//! The embedded rig: production drivers and engine against virtual devices, in virtual time.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use tactus_device::{Clock, SensorCodec};
+use tactus_plan::{Arguments, Script};
+use tactus_runner::config::RigFiles;
+use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, Truth};
+use tactus_runner::order::Ask;
+use tactus_runner::{devices, experiments};
+use tactus_schema::Rig;
+use tactus_schema::pb::ExitStatus;
+use tactus_schema::rig::ElementFault;
+use tempfile::TempDir;
+
+fn run(script: Script, arguments: Arguments, rig_toml: &str) -> Result<(Finished, TempDir), EmbeddedError> {
+    let folder = TempDir::new().unwrap();
+    let rig = RigFiles::of(rig_toml, Path::new("rig.toml")).unwrap();
+    let ask = Ask { script, arguments, seed: Some(1), who: "test".into() };
+    let finished = embedded::run(&rig, None, ask, folder.path(), Pace::Virtual, |_, _| {})?;
+    Ok((finished, folder))
+}
+
+#[test]
+fn element_centres_presses_every_element_five_deep() {
+    let script = experiments::find("element-centres", None).unwrap();
+    let (Finished { outcome, recording }, _folder) =
+        run(script, Arguments::default(), SIMULATED_RIG).unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
+    assert_eq!((outcome.presses, outcome.dwells, outcome.frames_lost), (48, 240, 0));
+    assert!((outcome.travel_mm[2][0] + 0.6).abs() < 1e-9, "{:?}", outcome.travel_mm);
+    assert!(recording.is_file());
+}
+
+#[test]
+fn what_the_twin_refuses_leaves_nothing_behind() {
+    let script = Script::parse("deep", "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.9])\n").unwrap();
+    let Err(EmbeddedError::NotPossible(plan)) = run(script, Arguments::default(), SIMULATED_RIG) else {
+        unreachable!("0.9 mm is deeper than the covering allows");
+    };
+    assert_eq!(plan.outcome.exit_status, ExitStatus::Refused);
+    assert!(plan.outcome.message.contains("deep.star:2"), "{}", plan.outcome.message);
+}
+
+#[test]
+fn the_truth_is_the_rig_files_and_the_devices_own() {
+    let toml = SIMULATED_RIG
+        .replace("surface_mm = 0.0", "surface_mm = 0.05\nstuck = [{ element = 5, counts = 812 }]");
+    let rig = Rig::from_toml(&toml).unwrap();
+    let truth = embedded::truth(&rig).unwrap();
+    assert_eq!((truth.surface_mm, truth.noise_rms_counts, truth.model.psf()), (0.05, 2.0, rig.psf));
+    assert!((truth.registration.origin_mm[0] - 20.06).abs() < 1e-12);
+    let response = truth.model.response();
+    assert_eq!(response.quadratic_per_mm, [0.15; 48]);
+    assert!(response.sensitivity_counts_per_mm.iter().all(|gain| (600.0..1400.0).contains(gain)));
+    let faults = [
+        (5, ElementFault::Stuck { counts: 812 }),
+        (18, ElementFault::Miswired { answers_for: 19 }),
+        (22, ElementFault::Miswired { answers_for: 23 }),
+    ];
+    assert_eq!(truth.faults, BTreeMap::from(faults));
+
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
+    let of_the_devices = runtime.unwrap().block_on(async {
+        let service = rig.service.as_ref().unwrap();
+        let codec = SensorCodec::default();
+        devices::open(&rig, service, codec, || Truth::of_rig(&rig, truth.seed), Clock::paused())
+            .control
+            .unwrap()
+            .truth()
+    });
+    assert_eq!(format!("{truth:?}"), format!("{of_the_devices:?}"));
+}
+
+#[test]
+fn a_rig_that_hides_nothing_has_no_truth() {
+    let simulated = Rig::from_toml(SIMULATED_RIG).unwrap();
+    let real = Rig { simulated: false, ..simulated.clone() };
+    let of_data = Rig::from_json(&simulated.to_json()).unwrap();
+    assert!(embedded::truth(&real).is_none() && embedded::truth(&of_data).is_none());
+}
+
+#[test]
+fn a_run_on_a_stage_that_speaks_zaber_is_done_and_goes_no_deeper_than_it_may() {
+    let toml = SIMULATED_RIG.replace(
+        "protocol = \"grbl\"\n",
+        "protocol = \"zaber-ascii\"
+axes.x = { device = 1, axis = 1, um_per_microstep = 0.047625 }
+axes.y = { device = 1, axis = 2, um_per_microstep = 0.047625 }
+axes.z = { device = 2, axis = 1, um_per_microstep = 0.047625, direction = -1, origin_microsteps = 629_921 }
+",
+    );
+    let script = Script::parse(
+        "two",
+        "def run(rig):\n    for x in (5.0, 9.0):\n        press(x, 5.0, depths_mm = [0.2, 0.6])\n",
+    );
+    let (Finished { outcome, .. }, _folder) = run(script.unwrap(), Arguments::default(), &toml).unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
+    assert_eq!((outcome.presses, outcome.dwells, outcome.frames_lost), (2, 4, 0));
+    assert!((outcome.travel_mm[2][0] + 0.6).abs() < 1e-3, "{:?}", outcome.travel_mm);
+}

@@ -1,0 +1,208 @@
+//! A virtual device on its cable: bytes in and out over memory or a pseudo-terminal, faults from its control.
+
+use std::io;
+use std::time::Duration;
+
+use tactus_device::transport::ByteStream;
+use tactus_device::transport::memory::MemoryPort;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::sync::mpsc;
+use tokio::time::{Instant, sleep_until, timeout};
+
+use crate::faults::CableFault;
+use crate::terminal::TerminalPort;
+
+/// How long a device's output waits for a host that does not read; then bytes are lost, as in an
+/// overrun serial port.
+const OVERRUN: Duration = Duration::from_millis(20);
+
+/// A device as bytes and times; it neither waits nor reads a clock.
+///
+/// Times never go back. After every call, what is due of [`output`](Self::output) is to be sent, and
+/// [`wake`](Self::wake) called when [`next_wake`](Self::next_wake) has come.
+pub trait Device: Send {
+    /// What can go wrong with it.
+    type Fault: Send;
+
+    /// Bytes from the host.
+    fn receive(&mut self, bytes: &[u8], now: Instant);
+
+    /// Time has passed.
+    fn wake(&mut self, now: Instant);
+
+    /// When it wants to be woken.
+    fn next_wake(&self) -> Option<Instant>;
+
+    /// The bytes that leave it by now.
+    fn output(&mut self, now: Instant) -> Vec<u8>;
+
+    /// Something goes wrong with it.
+    fn fault(&mut self, fault: Self::Fault, now: Instant);
+
+    /// The cable has been plugged in again.
+    fn plugged_in(&mut self, now: Instant);
+}
+
+/// Something goes wrong on either end of the cable.
+#[derive(Debug, Clone, Copy)]
+pub enum InjectedFault<F> {
+    /// The cable.
+    Cable(CableFault),
+    /// The device.
+    Device(F),
+}
+
+/// Where hosts find the device.
+#[derive(Debug)]
+pub enum Port {
+    /// In this process.
+    Memory(MemoryPort),
+    /// At a pseudo-terminal.
+    Terminal(TerminalPort),
+}
+
+impl Port {
+    /// Waits for a host (a pseudo-terminal does not: it gives its stream at once). Cancel-safe.
+    async fn accept(&mut self) -> io::Result<Box<dyn ByteStream>> {
+        match self {
+            Self::Memory(port) => Ok(Box::new(port.accept().await)),
+            Self::Terminal(port) => port.open(),
+        }
+    }
+
+    /// False if bytes that leave the device would find nobody.
+    fn has_host(&self) -> bool {
+        match self {
+            Self::Memory(_) => true,
+            Self::Terminal(port) => port.has_host(),
+        }
+    }
+
+    /// Bytes came.
+    fn heard_host(&self) {
+        match self {
+            Self::Memory(_) => {}
+            Self::Terminal(port) => port.heard_host(),
+        }
+    }
+
+    /// The device is gone until the next [`accept`](Self::accept).
+    fn unplug(&mut self) {
+        match self {
+            Self::Memory(port) => port.unplug(),
+            Self::Terminal(port) => port.close(),
+        }
+    }
+
+    /// Gone from its place; the next [`accept`](Self::accept) is in another.
+    fn move_away(&mut self) -> io::Result<()> {
+        match self {
+            Self::Memory(port) => {
+                port.unplug();
+                Ok(())
+            }
+            Self::Terminal(port) => port.reopen_elsewhere(),
+        }
+    }
+}
+
+/// Runs a device for ever: its time goes on whether or not a host is connected.
+///
+/// # Errors
+/// If the system gives no pseudo-terminal.
+pub async fn run<D: Device>(
+    mut device: D,
+    mut port: Port,
+    mut strikes: mpsc::Receiver<InjectedFault<D::Fault>>,
+) -> io::Result<()> {
+    let mut link = Link::Waiting;
+    let mut buffer = [0; 1024];
+    loop {
+        let now = Instant::now();
+        device.wake(now);
+        let output = device.output(now);
+        if let Link::Up(stream) = &mut link
+            && port.has_host()
+            && !send(stream, &output).await
+        {
+            link = Link::Waiting;
+        }
+        let wake = device.next_wake();
+        let event = tokio::select! {
+            biased;
+            Some(strike) = strikes.recv() => Event::Strike(strike),
+            event = listen(&mut link, &mut port, &mut buffer) => event?,
+            () = until(wake) => continue,
+        };
+        let now = Instant::now();
+        match event {
+            Event::Connected(stream) => link = Link::Up(stream),
+            Event::Bytes(count) => {
+                port.heard_host();
+                device.receive(buffer.get(..count).unwrap_or_default(), now);
+            }
+            Event::Closed => link = Link::Waiting,
+            Event::Replugged => {
+                link = Link::Waiting;
+                device.plugged_in(now);
+            }
+            Event::Strike(InjectedFault::Device(fault)) => device.fault(fault, now),
+            Event::Strike(InjectedFault::Cable(CableFault::Disconnect(duration))) => {
+                link = Link::Out(now + duration);
+                port.unplug();
+            }
+            Event::Strike(InjectedFault::Cable(CableFault::Renumber)) => {
+                link = Link::Out(now);
+                port.move_away()?;
+            }
+        }
+    }
+}
+
+enum Link {
+    /// Plugged in, no host.
+    Waiting,
+    Up(Box<dyn ByteStream>),
+    /// Unplugged until then.
+    Out(Instant),
+}
+
+enum Event<F> {
+    Connected(Box<dyn ByteStream>),
+    Bytes(usize),
+    Closed,
+    Replugged,
+    Strike(InjectedFault<F>),
+}
+
+/// Waits for what comes over the cable. Cancel-safe.
+async fn listen<F>(link: &mut Link, port: &mut Port, buffer: &mut [u8]) -> io::Result<Event<F>> {
+    match link {
+        Link::Waiting => Ok(Event::Connected(port.accept().await?)),
+        Link::Up(stream) => Ok(match stream.read(buffer).await {
+            Ok(0) | Err(_) => Event::Closed,
+            Ok(count) => Event::Bytes(count),
+        }),
+        Link::Out(until) => {
+            sleep_until(*until).await;
+            Ok(Event::Replugged)
+        }
+    }
+}
+
+/// False if the host has gone.
+async fn send(stream: &mut dyn ByteStream, bytes: &[u8]) -> bool {
+    let sent = timeout(OVERRUN, stream.write_all(bytes)).await;
+    sent.unwrap_or_else(|_| {
+        tracing::debug!(bytes = bytes.len(), "the host does not read: bytes are lost");
+        Ok(())
+    })
+    .is_ok()
+}
+
+async fn until(wake: Option<Instant>) {
+    match wake {
+        Some(wake) => sleep_until(wake).await,
+        None => std::future::pending().await,
+    }
+}

@@ -1,0 +1,141 @@
+//! The handle to a virtual rig: what is true in it, and what goes wrong.
+
+use std::sync::Arc;
+
+use tokio::sync::mpsc;
+use tokio::time::{Instant, sleep_until};
+
+use crate::cable::InjectedFault;
+use crate::faults::{Fault, FaultError, FaultScript, RigFault, SensorFault, StageFault};
+use crate::truth::Truth;
+use crate::world::Shared;
+
+/// Faults that may wait for a device; it takes them whenever it is awake, so that more than these mean
+/// that it has ended. An overflow is refused with [`FaultError::NotTaken`].
+const FAULTS_WAITING: usize = 64;
+
+/// Looks at and changes the truth of a virtual rig. Clones are handles to the same rig.
+///
+/// All positions are the robot's frame; all values are those of the present instant.
+#[derive(Debug, Clone)]
+pub struct RigControl {
+    world: Shared,
+    started: Instant,
+    sensor: mpsc::Sender<InjectedFault<SensorFault>>,
+    stage: mpsc::Sender<InjectedFault<StageFault>>,
+}
+
+/// Where the devices' faults come out.
+#[derive(Debug)]
+pub struct FaultReceivers {
+    /// For the sensor and its cable.
+    pub sensor: mpsc::Receiver<InjectedFault<SensorFault>>,
+    /// For the stage and its cable.
+    pub stage: mpsc::Receiver<InjectedFault<StageFault>>,
+}
+
+impl RigControl {
+    pub(crate) fn new(world: Shared, started: Instant) -> (Self, FaultReceivers) {
+        let (sensor, sensor_tap) = mpsc::channel(FAULTS_WAITING);
+        let (stage, stage_tap) = mpsc::channel(FAULTS_WAITING);
+        (Self { world, started, sensor, stage }, FaultReceivers { sensor: sensor_tap, stage: stage_tap })
+    }
+
+    /// Makes something go wrong now.
+    ///
+    /// # Errors
+    /// An element that the array does not have, or a device that takes no more faults.
+    pub fn inject(&self, fault: Fault) -> Result<(), FaultError> {
+        match fault {
+            Fault::Sensor(fault) => {
+                self.check_element(fault)?;
+                strike(&self.sensor, InjectedFault::Device(fault))
+            }
+            Fault::SensorCable(fault) => strike(&self.sensor, InjectedFault::Cable(fault)),
+            Fault::Stage(fault) => strike(&self.stage, InjectedFault::Device(fault)),
+            Fault::StageCable(fault) => strike(&self.stage, InjectedFault::Cable(fault)),
+            Fault::Rig(RigFault::Covering { thickness_mm }) => {
+                self.set_covering_mm(thickness_mm);
+                Ok(())
+            }
+            Fault::Rig(RigFault::Surface { z_mm }) => {
+                self.world.lock().set_surface_mm(z_mm, Instant::now());
+                Ok(())
+            }
+            Fault::Rig(RigFault::Stiffness(factor)) => {
+                self.world.lock().set_stiffness(factor);
+                Ok(())
+            }
+        }
+    }
+
+    /// Makes a script's faults happen, each at its time since the rig was switched on.
+    ///
+    /// # Errors
+    /// As [`inject`](Self::inject), at the first fault that is refused.
+    pub async fn play(&self, script: &FaultScript) -> Result<(), FaultError> {
+        for timed in &script.faults {
+            sleep_until(self.started + timed.at).await;
+            self.inject(timed.fault)?;
+        }
+        Ok(())
+    }
+
+    /// Puts another covering in place, its surface where the former one's was; a negative thickness is none.
+    pub fn set_covering_mm(&self, thickness_mm: f64) {
+        self.world.lock().set_covering_mm(thickness_mm);
+    }
+
+    /// Thickness of the covering in place.
+    pub fn covering_mm(&self) -> f64 {
+        self.world.lock().covering_mm()
+    }
+
+    /// Where the tip truly is.
+    pub fn tip_mm(&self) -> [f64; 3] {
+        self.world.lock().tip_mm(Instant::now())
+    }
+
+    /// How far the tip truly stands below the covering's true surface; negative above it.
+    pub fn depth_mm(&self) -> f64 {
+        self.world.lock().depth_mm(Instant::now())
+    }
+
+    /// The greatest true depth since the rig was switched on, at any instant, seen or not; negative while
+    /// the tip has never touched.
+    pub fn deepest_mm(&self) -> f64 {
+        self.world.lock().deepest_mm(Instant::now())
+    }
+
+    /// True while the tip touches the covering.
+    pub fn is_in_contact(&self) -> bool {
+        self.depth_mm() > 0.0
+    }
+
+    /// True while the tip moves.
+    pub fn is_moving(&self) -> bool {
+        let mut world = self.world.lock();
+        world.settle(Instant::now());
+        world.is_moving()
+    }
+
+    /// What every element reads at present but for noise and quantisation, in counts, row-major.
+    pub fn image_counts(&self) -> Vec<f64> {
+        self.world.lock().image(Instant::now())
+    }
+
+    /// What the rig hides from the service.
+    pub fn truth(&self) -> Arc<Truth> {
+        Arc::clone(self.world.lock().truth())
+    }
+
+    fn check_element(&self, fault: SensorFault) -> Result<(), FaultError> {
+        let (SensorFault::Stuck(element) | SensorFault::Saturate(element)) = fault else { return Ok(()) };
+        let last = self.truth().model.array().elements() - 1;
+        if element > last { Err(FaultError::Element { element, last }) } else { Ok(()) }
+    }
+}
+
+fn strike<F>(tap: &mpsc::Sender<InjectedFault<F>>, strike: InjectedFault<F>) -> Result<(), FaultError> {
+    tap.try_send(strike).map_err(|_| FaultError::NotTaken)
+}

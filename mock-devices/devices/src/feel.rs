@@ -1,0 +1,80 @@
+//! What feels: from where the tip is to what the elements read.
+
+use std::fmt::Debug;
+
+use tactus_model::{Covering, Moment, Pipeline, Trail};
+
+use tactus_hidden::Sensor;
+
+/// A sensor in time, as the world asks it.
+pub(crate) trait Feel: Debug + Send {
+    /// Counts of every element at a moment, row-major, before noise and converter.
+    fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64];
+
+    /// Those of the last moment.
+    fn counts(&self) -> &[f64];
+
+    /// What is read of counts when noise comes upon them.
+    fn read(&self, counts: f64, noise_counts: f64) -> f64;
+
+    /// Puts another covering in place.
+    fn set_covering(&mut self, covering: Covering);
+
+    /// Moves the covering's surface, robot frame.
+    fn set_surface_mm(&mut self, surface_mm: f64);
+
+    /// Makes the covering answer `stiffness` times as strongly.
+    fn set_stiffness(&mut self, stiffness: f64);
+}
+
+impl Feel for Pipeline {
+    fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64] {
+        self.step(moment, trail)
+    }
+
+    fn counts(&self) -> &[f64] {
+        self.counts()
+    }
+
+    fn read(&self, counts: f64, noise_counts: f64) -> f64 {
+        self.read(counts, noise_counts)
+    }
+
+    fn set_covering(&mut self, covering: Covering) {
+        self.set_covering(covering);
+    }
+
+    fn set_surface_mm(&mut self, surface_mm: f64) {
+        self.set_surface_mm(surface_mm);
+    }
+
+    fn set_stiffness(&mut self, stiffness: f64) {
+        self.set_stiffness(stiffness);
+    }
+}
+
+impl Feel for Sensor {
+    fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64] {
+        self.step(moment.t_s, trail)
+    }
+
+    fn counts(&self) -> &[f64] {
+        self.counts()
+    }
+
+    fn read(&self, counts: f64, noise_counts: f64) -> f64 {
+        self.read(counts, noise_counts)
+    }
+
+    fn set_covering(&mut self, covering: Covering) {
+        self.set_covering(covering);
+    }
+
+    fn set_surface_mm(&mut self, surface_mm: f64) {
+        self.set_surface_mm(surface_mm);
+    }
+
+    fn set_stiffness(&mut self, stiffness: f64) {
+        self.set_stiffness(stiffness);
+    }
+}

@@ -1,0 +1,38 @@
+//! Virtual sensor and stage that speak real device bytes, driven by the forward model.
+//!
+//! [`VirtualRig`] runs both in this process, for the production drivers to connect to, in real or virtual time.
+//! [`start_devices`] starts the same devices for other links: [`cable::run`] serves one at a pseudo-terminal, and
+//! `tactus-usbip` plugs one into the kernel. Both devices share one world: where the tip truly is, what it presses, and
+//! what the elements read. The devices see no more of it than real ones would. What the sensor hides is the rig file's
+//! `[simulation]`, or a model or hidden physics in its place ([`TruthFile`]). [`RigControl`] sees all of it, and makes
+//! things go wrong ([`faults`]).
+//!
+//! Everything random follows from one seed, so that two runs in virtual time are identical to the byte.
+
+pub mod cable;
+pub mod faults;
+
+#[cfg(test)]
+mod bench;
+mod control;
+mod feel;
+mod kinematics;
+mod motion;
+mod outbox;
+mod rig;
+mod sensor;
+mod stage;
+mod terminal;
+mod truth;
+mod truth_file;
+mod twin;
+mod world;
+
+pub use control::{FaultReceivers, RigControl};
+pub use rig::{Started, VirtualRig, start_devices};
+pub use sensor::VirtualSensor;
+pub use stage::VirtualStage;
+pub use terminal::TerminalPort;
+pub use truth::Truth;
+pub use truth_file::{HIDDEN_SCHEMA, TruthError, TruthFile};
+pub use twin::{simulation_of, twin_of};

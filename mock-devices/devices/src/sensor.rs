@@ -1,0 +1,277 @@
+//! The device's side of a sensor's protocol: a tactile array whose elements feel the virtual world.
+//!
+//! A `weiss-dsa` controller answers the queries and the acquisition command and pushes frames on an exact grid of
+//! its rate; `declared` and `anyskin` devices push them from power-up on; `singletact` elements answer polls. Where
+//! the protocol has room for it, the device says that it is simulated: the controller's serial numbers spell `SIM`,
+//! its matrix's unique id `SIMULA`, the element's register `SIMULATED`. The other two have no room.
+
+mod tamper;
+mod voice;
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use tactus_device::SensorCodec;
+use tactus_wire::weiss::{BOOT_MESSAGE, Command, CommandError, ErrorCode, acknowledge, id};
+use tokio::time::Instant;
+
+use crate::cable::Device;
+use crate::faults::SensorFault;
+use crate::outbox::Outbox;
+use crate::world::Shared;
+use tamper::Tamper;
+use voice::{Asked, Register, Voice};
+
+/// From power-up to the boot message. The real controller needs about 8 s; a simulated rig would make
+/// everybody wait for nothing, and a shorter pause takes the driver through the same states.
+const BOOT: Duration = Duration::from_millis(100);
+
+/// The boot message comes this often, as from the real controller.
+const BOOT_MESSAGES: usize = 3;
+
+/// A clock that is about to wrap does so after this.
+const WRAPS_AFTER: Duration = Duration::from_secs(1);
+
+/// Samplings that are later than this are passed over: a machine too slow for the rate would otherwise never catch up.
+const BACKLOG: Duration = Duration::from_secs(1);
+
+/// A virtual tactile array and its electronics.
+#[derive(Debug)]
+pub struct VirtualSensor {
+    world: Shared,
+    /// The clock's zero.
+    powered_up: Instant,
+    clock_offset_ticks: i128,
+    is_booting: bool,
+    voice: Voice,
+    acquisition: Option<Acquisition>,
+    counts: Vec<u16>,
+    /// Elements that do not read what they feel, with what they read instead.
+    overridden: BTreeMap<usize, u16>,
+    tamper: Tamper,
+    outbox: Outbox,
+}
+
+/// Frames are being pushed.
+#[derive(Debug, Clone, Copy)]
+struct Acquisition {
+    run_length: bool,
+    rate_hz: f64,
+    /// Number of the next sampling on the grid.
+    next: u64,
+}
+
+impl VirtualSensor {
+    /// A device that is switched on now and speaks by `codec`.
+    pub(crate) fn new(world: Shared, codec: &SensorCodec, now: Instant) -> Self {
+        let seed = world.lock().truth().seed;
+        let mut sensor = Self {
+            world,
+            powered_up: now,
+            clock_offset_ticks: 0,
+            is_booting: true,
+            voice: Voice::of(codec),
+            acquisition: None,
+            counts: Vec::new(),
+            overridden: BTreeMap::new(),
+            tamper: Tamper::new(seed),
+            outbox: Outbox::default(),
+        };
+        sensor.power_up(now);
+        sensor
+    }
+
+    fn power_up(&mut self, now: Instant) {
+        self.powered_up = now;
+        self.clock_offset_ticks = 0;
+        self.voice.power_up();
+        self.outbox.clear();
+        self.is_booting = self.voice.boots();
+        if self.is_booting {
+            self.outbox.push(now + BOOT, BOOT_MESSAGE.repeat(BOOT_MESSAGES));
+        }
+        let rate_hz = self.own_rate_hz();
+        self.acquisition =
+            self.voice.streams().then_some(Acquisition { run_length: false, rate_hz, next: 1 });
+    }
+
+    fn answer(&mut self, asked: Asked, now: Instant) -> Vec<u8> {
+        match asked {
+            Asked::Weiss(command) => {
+                let answer = self.obey(command, now);
+                self.voice.close(answer)
+            }
+            Asked::SingleTact { address, id, asked } => {
+                let element = self.voice.element_at(address);
+                if element.is_some() && asked == Register::Reading {
+                    self.sample(now);
+                }
+                let counts = element.and_then(|element| self.counts.get(element).copied().or(Some(0)));
+                let (tick, rate_hz) = (self.tick(now), self.own_rate_hz());
+                let running = now.duration_since(self.powered_up);
+                self.tamper.frame(now, |_| voice::reply((address, id, asked), tick, running, rate_hz, counts))
+            }
+        }
+    }
+
+    fn obey(&mut self, command: Result<Command, CommandError>, now: Instant) -> Vec<u8> {
+        match command {
+            Ok(Command::QueryController) => voice::controller(),
+            Ok(Command::QuerySensor) => voice::sensor(),
+            Ok(Command::QueryMatrix { matrix }) => voice::matrix(matrix, self.world.lock().truth()),
+            Ok(Command::Acquire { run, run_length, fps }) => {
+                let rate_hz = rate(f64::from(fps), self.own_rate_hz());
+                self.acquisition =
+                    run.then(|| Acquisition { run_length, rate_hz, next: self.after(now, rate_hz) });
+                acknowledge(id::ACQUIRE, ErrorCode::SUCCESS)
+            }
+            Err(CommandError::Unknown { id }) => acknowledge(id, ErrorCode::UNKNOWN_COMMAND),
+            Err(CommandError::Length { id, .. }) => acknowledge(id, ErrorCode::FORMAT),
+        }
+    }
+
+    fn own_rate_hz(&self) -> f64 {
+        self.world.lock().truth().model.array().rate_hz()
+    }
+
+    /// Number of the first sampling after `now`.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count from 0 on")]
+    fn after(&self, now: Instant, rate_hz: f64) -> u64 {
+        (now.duration_since(self.powered_up).as_secs_f64() * rate_hz).floor() as u64 + 1
+    }
+
+    /// When a sampling takes place: computed from the grid's beginning, so that nothing adds up.
+    fn instant(&self, acquisition: Acquisition) -> Instant {
+        self.powered_up + Duration::from_secs_f64(acquisition.next as f64 / acquisition.rate_hz)
+    }
+
+    fn take_frame(&mut self, at: Instant, run_length: bool, period: Duration) {
+        self.sample(at);
+        let tick = self.tick(at);
+        let Self { voice, tamper, counts, .. } = self;
+        let bytes = tamper.frame(at, |elements| voice.frame(tick, counts, run_length, elements));
+        if self.tamper.is_dripping(at) {
+            self.outbox.drip(at, period, &bytes);
+        } else {
+            self.outbox.push(at, bytes);
+        }
+    }
+
+    fn sample(&mut self, at: Instant) {
+        self.world.lock().sample(at, &mut self.counts);
+        for (element, reading) in &self.overridden {
+            if let Some(count) = self.counts.get_mut(*element) {
+                *count = *reading;
+            }
+        }
+    }
+
+    /// What the device's clock shows; 0 if it has none.
+    fn tick(&self, at: Instant) -> u64 {
+        let running = at.duration_since(self.powered_up);
+        self.voice.clock().map_or(0, |clock| clock.shows(running, self.clock_offset_ticks))
+    }
+
+    /// What an element reads at present.
+    fn reading(&mut self, element: usize, now: Instant) -> u16 {
+        if self.counts.is_empty() {
+            self.world.lock().sample(now, &mut self.counts);
+        }
+        self.counts.get(element).copied().unwrap_or(0)
+    }
+}
+
+impl Device for VirtualSensor {
+    type Fault = SensorFault;
+
+    fn receive(&mut self, bytes: &[u8], now: Instant) {
+        if self.is_booting {
+            return;
+        }
+        for asked in self.voice.hear(bytes) {
+            let answer = self.answer(asked, now);
+            if !self.tamper.is_stalled(now) {
+                self.outbox.push(now, answer);
+            }
+        }
+    }
+
+    fn wake(&mut self, now: Instant) {
+        if now >= self.powered_up + BOOT {
+            self.is_booting = false;
+        }
+        while let Some(acquisition) = self.acquisition {
+            let at = self.instant(acquisition);
+            if at > now {
+                break;
+            }
+            self.acquisition = Some(Acquisition { next: acquisition.next + 1, ..acquisition });
+            if at + BACKLOG < now {
+                self.voice.pass_over();
+                continue;
+            }
+            self.take_frame(at, acquisition.run_length, Duration::from_secs_f64(1.0 / acquisition.rate_hz));
+        }
+    }
+
+    fn next_wake(&self) -> Option<Instant> {
+        let sampling = self.acquisition.map(|acquisition| self.instant(acquisition));
+        let booted = self.is_booting.then_some(self.powered_up + BOOT);
+        [sampling, booted, self.outbox.next_due()].into_iter().flatten().min()
+    }
+
+    fn output(&mut self, now: Instant) -> Vec<u8> {
+        let bytes = self.outbox.take_due(now);
+        self.tamper.pass(bytes)
+    }
+
+    fn fault(&mut self, fault: SensorFault, now: Instant) {
+        match fault {
+            SensorFault::Link(fault) => self.tamper.arm(fault, now),
+            SensorFault::ClockJump { ms } => {
+                let by = Duration::from_millis(ms.unsigned_abs());
+                let ticks = self.voice.clock().map_or(0, |clock| clock.ticks(by));
+                self.clock_offset_ticks += if ms < 0 { -ticks } else { ticks };
+            }
+            SensorFault::ClockWrap => {
+                let shown = self.tick(now);
+                if let Some(clock) = self.voice.clock() {
+                    self.clock_offset_ticks += clock.until_wrap(shown, WRAPS_AFTER);
+                }
+            }
+            SensorFault::Stuck(element) => {
+                let reading = self.reading(element, now);
+                self.overridden.insert(element, reading);
+            }
+            SensorFault::Saturate(element) => {
+                let full_scale_counts = self.world.lock().truth().readout.read(f64::INFINITY, 0.0);
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "whole and positive"
+                )]
+                self.overridden.insert(element, full_scale_counts.min(f64::from(u16::MAX)) as u16);
+            }
+            SensorFault::Clear => {
+                self.overridden.clear();
+                self.tamper.clear();
+            }
+        }
+    }
+
+    fn plugged_in(&mut self, now: Instant) {
+        self.power_up(now);
+    }
+}
+
+/// The rate that the controller keeps when asked for one: its own, but for slower ones.
+fn rate(asked_hz: f64, own_hz: f64) -> f64 {
+    // A whole number of frames per second that stands for the own rate is taken as it.
+    let kept_hz = if asked_hz > own_hz - 1.0 || asked_hz == 0.0 { own_hz } else { asked_hz };
+    // What the link could carry, and what a person could wait for.
+    kept_hz.clamp(0.001, 10_000.0)
+}
+
+#[cfg(test)]
+#[path = "sensor_tests.rs"]
+mod tests;

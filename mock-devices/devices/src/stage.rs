@@ -1,0 +1,168 @@
+//! The device's side of a stage: a controller that moves the virtual world's tip, and the line to it.
+//!
+//! Which protocol it speaks is the rig's: [`grbl`] or [`zaber`]. Kinematics and faults are the same.
+
+mod grbl;
+mod zaber;
+
+use std::time::Duration;
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use tactus_device::{grbl_config, zaber_config};
+use tactus_schema::rig::StageProtocol;
+use tokio::time::Instant;
+
+use crate::cable::Device;
+use crate::faults::{ControllerFault, StageFault};
+use crate::truth::Draw;
+use crate::world::Shared;
+use grbl::GrblController;
+use zaber::ZaberController;
+
+/// A session judges what it is told by its own tolerance; a controller has none.
+const NO_MATTER_MM: f64 = 1.0;
+
+/// Garbage behind each echoed line.
+const GARBAGE_BYTES: usize = 8;
+
+/// A virtual stage controller and what is wrong with it.
+#[derive(Debug)]
+pub struct VirtualStage {
+    controller: Box<dyn Controller>,
+    /// It neither listens nor speaks until then; what arrives waits.
+    hung_until: Option<Instant>,
+    unheard: Vec<u8>,
+    echoes: bool,
+    echo: Vec<u8>,
+    rng: ChaCha8Rng,
+}
+
+/// What a controller does with bytes and time. Times never go back.
+trait Controller: std::fmt::Debug + Send {
+    /// Takes bytes from the host.
+    fn receive(&mut self, bytes: &[u8], now: Instant);
+
+    /// Does what is due.
+    fn wake(&mut self, now: Instant);
+
+    /// Lets motion go on to `now`, and what follows from it.
+    fn only_move(&mut self, now: Instant);
+
+    /// When something is due.
+    fn next_wake(&self) -> Option<Instant>;
+
+    /// When the tip runs into a limit, whether or not the controller listens.
+    fn limit_at(&self) -> Option<Instant>;
+
+    /// The bytes that leave it by now.
+    fn output(&mut self, now: Instant) -> Vec<u8>;
+
+    /// Takes on a defect.
+    fn fault(&mut self, fault: ControllerFault, now: Instant);
+
+    /// Loses its defects.
+    fn mend(&mut self);
+}
+
+impl VirtualStage {
+    /// A controller that is switched on now.
+    pub(crate) fn new(world: Shared, now: Instant) -> Self {
+        let (seed, protocol) = {
+            let world = world.lock();
+            (world.truth().seed, world.truth().stage_protocol.clone())
+        };
+        let controller: Box<dyn Controller> = match protocol {
+            StageProtocol::Grbl(axes) => {
+                Box::new(GrblController::new(world, grbl_config(&axes, NO_MATTER_MM), now))
+            }
+            StageProtocol::Zaber(axes) => {
+                Box::new(ZaberController::new(world, &zaber_config(&axes, NO_MATTER_MM), now))
+            }
+        };
+        Self {
+            controller,
+            hung_until: None,
+            unheard: Vec::new(),
+            echoes: false,
+            echo: Vec::new(),
+            rng: Draw::StageLink.rng(seed),
+        }
+    }
+
+    fn is_hung(&self, now: Instant) -> bool {
+        self.hung_until.is_some_and(|until| now < until)
+    }
+
+    /// A line comes back as it went out, with garbage behind it.
+    fn echo(&mut self, bytes: &[u8]) {
+        for byte in bytes.iter().filter(|byte| **byte != b'?' && byte.is_ascii()) {
+            self.echo.push(*byte);
+            if *byte == b'\n' {
+                let mut garbage = [0; GARBAGE_BYTES];
+                self.rng.fill_bytes(&mut garbage);
+                self.echo.extend(garbage);
+                self.echo.extend(b"\r\n");
+            }
+        }
+    }
+}
+
+impl Device for VirtualStage {
+    type Fault = StageFault;
+
+    fn receive(&mut self, bytes: &[u8], now: Instant) {
+        if self.is_hung(now) {
+            self.unheard.extend_from_slice(bytes);
+            return;
+        }
+        if self.echoes {
+            self.echo(bytes);
+        }
+        self.controller.receive(bytes, now);
+    }
+
+    fn wake(&mut self, now: Instant) {
+        if self.is_hung(now) {
+            self.controller.only_move(now);
+            return;
+        }
+        self.controller.wake(now);
+        if self.hung_until.take().is_some() {
+            let unheard = std::mem::take(&mut self.unheard);
+            self.controller.receive(&unheard, now);
+        }
+    }
+
+    fn next_wake(&self) -> Option<Instant> {
+        match self.hung_until {
+            Some(until) => [Some(until), self.controller.limit_at()].into_iter().flatten().min(),
+            None => self.controller.next_wake(),
+        }
+    }
+
+    fn output(&mut self, now: Instant) -> Vec<u8> {
+        if self.is_hung(now) {
+            return Vec::new();
+        }
+        let mut bytes = std::mem::take(&mut self.echo);
+        bytes.extend(self.controller.output(now));
+        bytes
+    }
+
+    fn fault(&mut self, fault: StageFault, now: Instant) {
+        match fault {
+            StageFault::Controller(fault) => self.controller.fault(fault, now),
+            StageFault::EchoGarbage => self.echoes = true,
+            StageFault::Stall(duration) => {
+                self.hung_until = Some(now + duration.max(Duration::from_millis(1)));
+            }
+            StageFault::Clear => {
+                self.echoes = false;
+                self.controller.mend();
+            }
+        }
+    }
+
+    fn plugged_in(&mut self, _now: Instant) {}
+}

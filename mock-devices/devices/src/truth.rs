@@ -1,0 +1,175 @@
+//! What a simulated rig hides from the service: the truth that calibration is to find.
+
+use std::collections::BTreeMap;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use tactus_hidden::{Climate, Dose, Sensor};
+use tactus_model::{
+    Covering, Effect, EffectError, ForwardModel, Indenter, Pipeline, Readout, Registration, Response,
+    Simulator,
+};
+use tactus_schema::Rig;
+use tactus_schema::rig::{ElementFault, GrblAxes, SimulatedStage, Simulation, StageProtocol};
+
+use crate::feel::Feel;
+use crate::twin::simulation_of;
+
+/// The true sensor, stage and tool behind a rig description; all of it follows from the description and a seed.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    /// The seed of everything random.
+    pub seed: u64,
+    /// The base model with each element's true sensitivity.
+    pub model: ForwardModel,
+    /// What the base model lacks, but for the faults.
+    pub effects: Vec<Effect>,
+    /// Physics in other forms than the library's, in the place of effects.
+    pub physics: Vec<Dose>,
+    /// The converter.
+    pub readout: Readout,
+    /// What is wrong with elements, by index.
+    pub faults: BTreeMap<usize, ElementFault>,
+    /// Standard deviation of an element's noise, unless it is noisy.
+    pub noise_rms_counts: f64,
+    /// Where the sensor really lies in the robot's frame.
+    pub registration: Registration,
+    /// Height of the covering's surface where the service believes 0, when the rig is switched on.
+    pub surface_mm: f64,
+    /// The tool on the stage.
+    pub indenter: Indenter,
+    /// The stage.
+    pub stage: SimulatedStage,
+    /// How its controller speaks, and how its axes lie.
+    pub stage_protocol: StageProtocol,
+}
+
+/// What draws random numbers: each has a stream of its own, so that one does not disturb the others.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Draw {
+    Gains,
+    Noise,
+    SensorLink,
+    StageLink,
+    StageController,
+}
+
+impl Draw {
+    /// The stream's generator for a seed.
+    pub(crate) fn rng(self, seed: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(self as u64);
+        rng
+    }
+}
+
+impl Truth {
+    /// The truth of a rig by its own simulation, or of its twin if it has none.
+    ///
+    /// # Panics
+    /// As [`Truth::of`].
+    pub fn of_rig(rig: &Rig, seed: u64) -> Self {
+        Self::of(rig, &simulation_of(rig), seed)
+    }
+
+    /// The truth of a rig whose simulation is `simulation`.
+    ///
+    /// # Panics
+    /// If the rig was not made by its own constructors, which check what is needed here.
+    #[expect(clippy::expect_used, reason = "a checked rig lists its tools, and makes a model")]
+    pub fn of(rig: &Rig, simulation: &Simulation, seed: u64) -> Self {
+        let tool = |id: &str| rig.indenters.get(id).cloned().expect("a rig's tools are listed");
+        let response = Response {
+            sensitivity_counts_per_mm: spread(
+                &rig.sensitivity_counts_per_mm,
+                simulation.gain_spread,
+                simulation.seed,
+            ),
+            baseline_counts: rig.baseline_counts.clone(),
+            quadratic_per_mm: vec![simulation.quadratic_per_mm; rig.array.elements()],
+            reference_indenter: tool(&rig.sensitivity_reference.indenter),
+            reference_covering: rig.sensitivity_reference.covering,
+        };
+        let model = ForwardModel::new(rig.array.clone(), rig.psf, response).expect("a rig makes a model");
+        let error = simulation.registration_error;
+        Self {
+            seed,
+            model,
+            effects: Vec::new(),
+            physics: Vec::new(),
+            readout: Readout::of(&rig.array),
+            faults: simulation.faults.clone(),
+            noise_rms_counts: simulation.noise_rms_counts,
+            registration: Registration {
+                origin_mm: std::array::from_fn(|axis| {
+                    rig.registration.origin_mm[axis] + error.origin_mm[axis]
+                }),
+                rotation_deg: rig.registration.rotation_deg + error.rotation_deg,
+            },
+            surface_mm: simulation.surface_mm,
+            indenter: tool(&rig.indenter),
+            stage: simulation.stage,
+            stage_protocol: rig.service.as_ref().map_or_else(
+                || StageProtocol::Grbl(GrblAxes::default()),
+                |service| service.stage.protocol.clone(),
+            ),
+        }
+    }
+
+    /// What feels, under a covering. Stuck and noisy elements are not in it: their faults come after the signal,
+    /// where they are read.
+    pub(crate) fn feel(&self, covering: Covering) -> Result<Box<dyn Feel>, EffectError> {
+        let sensor = self.sensor(covering)?;
+        if self.physics.is_empty() {
+            return Ok(Box::new(Pipeline::new(&sensor)?));
+        }
+        let mut sensor = Sensor::new(&sensor, &self.physics, Climate::new(self.seed), self.seed);
+        sensor.wire(self.wiring().collect());
+        Ok(Box::new(sensor))
+    }
+
+    /// Elements that do not answer for themselves: which, for which other, and with what share of its signal.
+    fn wiring(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        self.faults.iter().filter_map(|(element, fault)| match fault {
+            ElementFault::Miswired { answers_for } => Some((*element, *answers_for, 1.0)),
+            ElementFault::Dead => Some((*element, *element, 0.0)),
+            ElementFault::Stuck { .. } | ElementFault::Noisy { .. } => None,
+        })
+    }
+
+    fn sensor(&self, covering: Covering) -> Result<Simulator, EffectError> {
+        let faults = self.wiring().map(|(element, answers_for, share)| answers(element, answers_for, share));
+        Ok(Simulator {
+            model: self.model.clone(),
+            registration: self.registration,
+            surface_mm: self.surface_mm,
+            covering,
+            indenter: self.indenter.clone(),
+            effects: self.effects.iter().cloned().map(Ok).chain(faults).collect::<Result<_, _>>()?,
+            noise_rms_counts: self.noise_rms_counts,
+        })
+    }
+}
+
+/// Each declared sensitivity times one plus a normal deviate of standard deviation `spread`.
+fn spread(declared: &[f64], spread: f64, seed: u64) -> Vec<f64> {
+    let mut rng = Draw::Gains.rng(seed);
+    let deviates = StandardNormal.sample_iter(&mut rng);
+    declared
+        .iter()
+        .zip(deviates)
+        .map(|(declared, deviate): (_, f64)| declared * (1.0 + spread * deviate))
+        .collect()
+}
+
+/// An element that gives a share of another's signal in place of its own.
+fn answers(element: usize, answers_for: usize, share: f64) -> Result<Effect, EffectError> {
+    let parameters = [
+        ("element", element as f64),
+        ("answers_for", answers_for as f64),
+        ("own_share", 0.0),
+        ("other_share", share),
+    ];
+    Effect::new("miswired", parameters)
+}

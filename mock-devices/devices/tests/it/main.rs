@@ -1,0 +1,4 @@
+//! Virtual devices, through the production drivers.
+
+mod rig;
+mod stages;

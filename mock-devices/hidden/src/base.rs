@@ -1,0 +1,122 @@
+//! The sensor below the physics: what a lab declares, and what is true.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use tactus_model::{
+    Array, Covering, ForwardModel, Indenter, ModelError, Psf, Registration, Response, Simulator,
+};
+use tactus_schema::Rig;
+use tactus_schema::rig::SensitivityReference;
+
+/// A rig as declared, and the true sensor behind it. The difference is for recalibration to find: gains differ by 10 %
+/// from element to element, baselines lie in 80-120 counts, both parameters of the spread are off by up to 5 %.
+#[derive(Debug, Clone)]
+pub struct Base {
+    /// What stands in the table.
+    pub rig: Rig,
+    /// What makes the counts: the true base model, no effects.
+    pub sensor: Simulator,
+}
+
+/// The room's temperature: a mean, a slow trend and a slow swing.
+#[derive(Debug, Clone, Copy)]
+pub struct Climate {
+    mean_c: f64,
+    trend_c: f64,
+    swing_c: f64,
+    period_s: f64,
+    phase_rad: f64,
+}
+
+impl Base {
+    /// The base of a seed. Registration and surface are as declared.
+    ///
+    /// # Errors
+    /// None for any seed: the parameters are within the model's ranges.
+    pub fn new(seed: u64) -> Result<Self, ModelError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let array = Array::digitacts();
+        let indenter = Indenter::Cylinder { diameter_mm: 1.0 };
+        let covering = Covering { thickness_mm: 1.016 };
+        let registration = Registration {
+            origin_mm: [20.0 + rng.random_range(-2.0..2.0), 15.0 + rng.random_range(-2.0..2.0)],
+            rotation_deg: rng.random_range(-3.0..3.0),
+        };
+        let declared = Response::uniform(array.elements(), 1000.0, 100.0);
+        let mut gain = || {
+            let deviate: f64 = StandardNormal.sample(&mut rng);
+            1.0 + 0.1 * deviate.clamp(-3.0, 3.0)
+        };
+        let sensitivities =
+            declared.sensitivity_counts_per_mm.iter().map(|declared| declared * gain()).collect();
+        let baseline_counts = (0..array.elements()).map(|_| rng.random_range(80.0..120.0)).collect();
+        let response =
+            Response { sensitivity_counts_per_mm: sensitivities, baseline_counts, ..declared.clone() };
+        let psf = Psf {
+            sigma_intercept_mm: Psf::PAPER.sigma_intercept_mm * rng.random_range(0.95..1.05),
+            sigma_per_mm: Psf::PAPER.sigma_per_mm * rng.random_range(0.95..1.05),
+        };
+        let rig = Rig {
+            name: "sim".into(),
+            simulated: true,
+            array: array.clone(),
+            registration,
+            psf: Psf::PAPER,
+            sensitivity_counts_per_mm: declared.sensitivity_counts_per_mm,
+            sensitivity_reference: SensitivityReference { indenter: "cyl1".into(), covering },
+            baseline_counts: declared.baseline_counts,
+            indenters: [("cyl1".to_owned(), indenter.clone())].into(),
+            indenter: "cyl1".into(),
+            covering,
+            service: None,
+            simulation: None,
+        };
+        let sensor = Simulator {
+            model: ForwardModel::new(array, psf, response)?,
+            registration,
+            surface_mm: 0.0,
+            covering,
+            indenter,
+            effects: Vec::new(),
+            noise_rms_counts: 0.0,
+        };
+        Ok(Self { rig, sensor })
+    }
+}
+
+impl Base {
+    /// The same sensor under a spread so many times as wide.
+    ///
+    /// # Errors
+    /// If the spread is then out of the model's range.
+    pub fn spread_by(&self, by: f64) -> Result<Self, ModelError> {
+        let model = &self.sensor.model;
+        let Psf { sigma_intercept_mm, sigma_per_mm } = model.psf();
+        let psf = Psf { sigma_intercept_mm: by * sigma_intercept_mm, sigma_per_mm: by * sigma_per_mm };
+        let model = ForwardModel::new(model.array().clone(), psf, model.response().clone())?;
+        Ok(Self { rig: self.rig.clone(), sensor: Simulator { model, ..self.sensor.clone() } })
+    }
+}
+
+impl Climate {
+    /// The climate of a seed.
+    pub fn new(seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        Self {
+            mean_c: rng.random_range(19.0..25.0),
+            trend_c: rng.random_range(-2.0..2.0),
+            swing_c: rng.random_range(0.3..1.2),
+            period_s: rng.random_range(80.0..400.0),
+            phase_rad: rng.random_range(0.0..std::f64::consts::TAU),
+        }
+    }
+
+    /// Temperature at a time.
+    pub fn at(&self, t_s: f64) -> f64 {
+        let Self { mean_c, trend_c, swing_c, period_s, phase_rad } = self;
+        // The trend is spent over a quarter of an hour.
+        let trend = trend_c * (1.0 - (-t_s / 300.0).exp());
+        mean_c + trend + swing_c * (std::f64::consts::TAU * t_s / period_s + phase_rad).sin()
+    }
+}

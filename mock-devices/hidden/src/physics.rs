@@ -1,0 +1,375 @@
+//! The catalogue: every physics, its knobs, and what it does at its stage.
+
+mod contact;
+mod drift;
+mod element;
+mod hardening;
+mod hysteresis;
+mod memory;
+mod motion;
+mod outside;
+mod rate;
+mod readout;
+mod relaxation;
+mod spread;
+
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tactus_model::{Path, Simulator};
+
+/// One physics that a simulated sensor may have.
+#[derive(Debug, Clone, Copy)]
+pub struct Definition {
+    /// Its name, unique.
+    pub id: &'static str,
+    /// The effect of the library that it is an instance of; `None` if the library has nothing like it.
+    pub effect: Option<&'static str>,
+    /// What it does: equation and source.
+    pub about: &'static str,
+    /// True if it needs time steps finer than a frame.
+    pub(crate) is_fine: bool,
+    pub(crate) make: fn(&mut Knobs<'_>) -> Stage,
+}
+
+/// A physics at a strength.
+#[derive(Debug, Clone, Copy)]
+pub struct Dose {
+    /// What.
+    pub physics: &'static Definition,
+    /// How much: 0 is nothing, 1 what a bad rig has.
+    pub strength: f64,
+    /// Seed of its shape: time constants, directions, which elements.
+    pub seed: u64,
+}
+
+/// Beyond this strength no rig is.
+pub const STRENGTH_MAX: f64 = 8.0;
+
+/// Every physics, those of the library's effects first.
+pub static CATALOGUE: &[&Definition] = &[
+    &motion::SHIFTED_MOUNT,
+    &motion::TURNED_MOUNT,
+    &motion::STRETCHED_STAGE,
+    &motion::SHEARED_STAGE,
+    &motion::LATE_TOUCH,
+    &motion::DEAD_BAND,
+    &motion::SLOPING_SURFACE,
+    &motion::LATE_FRAMES,
+    &motion::LOST_MOTION,
+    &contact::WORN_TOOL,
+    &contact::COCKED_TOOL,
+    &hardening::EXPONENTIAL,
+    &hardening::POWER,
+    &hardening::QUADRATIC,
+    &spread::LAYERED_TAIL,
+    &spread::EXPONENTIAL_TAIL,
+    &spread::POWER_TAIL,
+    &spread::STRETCHED,
+    &spread::WIDER_WITH_DEPTH,
+    &spread::NARROWER_AT_FIRST,
+    &spread::SOFT_EDGE,
+    &spread::SEAM,
+    &relaxation::PRONY,
+    &relaxation::POWER_LAW,
+    &relaxation::LOGARITHMIC,
+    &hysteresis::PRANDTL_ISHLINSKII,
+    &hysteresis::PREISACH,
+    &hysteresis::BOUC_WEN,
+    &rate::POWER,
+    &rate::LOGARITHMIC,
+    &memory::IMPRINT_POWER_LAW,
+    &memory::IMPRINT_TWO_EXPONENTIALS,
+    &memory::MULLINS_EXPONENTIAL,
+    &memory::MULLINS_DISCONTINUOUS,
+    &element::LADDER,
+    &element::NEIGHBOURS,
+    &element::COLUMN_SUM,
+    &element::DEAD,
+    &element::ANSWERS_FOR_NEIGHBOUR,
+    &element::RATIONAL,
+    &element::EXPONENTIAL,
+    &element::KNEE,
+    &drift::COMMON_WALK,
+    &drift::ORNSTEIN_UHLENBECK,
+    &drift::WARM_UP,
+    &drift::GAIN_WARM_UP,
+    &drift::GAIN_WALK,
+    &drift::GAIN_TEMPERATURE,
+    &readout::SECOND_ORDER,
+    &readout::MOVING_AVERAGE,
+    &readout::ROWS,
+    &readout::ELEMENTS,
+    &readout::SINE,
+    &readout::HARMONICS,
+    &readout::COARSE_STEPS,
+    &outside::SUPPLY_DROOP,
+    &outside::DRAGGED_SPREAD,
+    &outside::STICK_SLIP,
+    &outside::ADHESION,
+    &outside::CONVERTER_RIPPLE,
+    &outside::RINGING,
+    &outside::STAGE_PICKUP,
+    &outside::PROXIMITY,
+    &outside::GROUNDING,
+    &outside::ELECTRODE_TEXTURE,
+    &outside::BULGE,
+];
+
+impl Definition {
+    /// The physics of that id.
+    pub fn find(id: &str) -> Option<&'static Self> {
+        CATALOGUE.iter().copied().find(|definition| definition.id == id)
+    }
+}
+
+/// One instant, as physics sees it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Now {
+    pub(crate) t_s: f64,
+    /// Since the step before; 0 at the first.
+    pub(crate) dt_s: f64,
+    /// Of the tip, robot frame.
+    pub(crate) velocity_mm_per_s: [f64; 3],
+    pub(crate) temperature_c: f64,
+    /// Where the tool stands; complete after the stage of motion.
+    pub(crate) touch: Touch,
+}
+
+/// The tool's place against the covering.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Touch {
+    /// Sensor frame.
+    pub(crate) point_mm: [f64; 2],
+    /// Below the surface; negative above it.
+    pub(crate) depth_mm: f64,
+}
+
+/// The tool's face and how the covering spreads it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tool {
+    pub(crate) diameter_mm: f64,
+    /// Rise of the face per mm along the sensor's x and y.
+    pub(crate) lean: [f64; 2],
+    /// Along x and y.
+    pub(crate) sigma_mm: [f64; 2],
+}
+
+type OnPath = Box<dyn FnMut(&Now, &dyn Path, &mut [f64; 3]) + Send>;
+type OnTouch = Box<dyn FnMut(&Now, &mut Touch) + Send>;
+type OnTool = Box<dyn FnMut(&Now, &mut Tool) + Send>;
+type OnElements = Box<dyn FnMut(&Now, &mut [f64]) + Send>;
+type OnCount = Box<dyn Fn(f64) -> f64 + Send>;
+
+/// What physics changes, in the order in which it acts.
+pub(crate) enum Stage {
+    /// Where the tip is, robot frame.
+    Path(OnPath),
+    /// Where the tool stands against the covering.
+    Touch(OnTouch),
+    /// The tool's face and the spread.
+    Tool(OnTool),
+    /// Equivalent indentation of every element, mm.
+    Covering(OnElements),
+    /// Signal of every element above its baseline, counts.
+    Element(OnElements),
+    /// Reading of every element, counts.
+    Readout(OnElements),
+    /// One reading with its noise, before the declared converter.
+    Converter(OnCount),
+}
+
+impl Stage {
+    fn path(f: impl FnMut(&Now, &dyn Path, &mut [f64; 3]) + Send + 'static) -> Self {
+        Self::Path(Box::new(f))
+    }
+    fn touch(f: impl FnMut(&Now, &mut Touch) + Send + 'static) -> Self {
+        Self::Touch(Box::new(f))
+    }
+    fn tool(f: impl FnMut(&Now, &mut Tool) + Send + 'static) -> Self {
+        Self::Tool(Box::new(f))
+    }
+    fn covering(f: impl FnMut(&Now, &mut [f64]) + Send + 'static) -> Self {
+        Self::Covering(Box::new(f))
+    }
+    fn element(f: impl FnMut(&Now, &mut [f64]) + Send + 'static) -> Self {
+        Self::Element(Box::new(f))
+    }
+    fn readout(f: impl FnMut(&Now, &mut [f64]) + Send + 'static) -> Self {
+        Self::Readout(Box::new(f))
+    }
+    fn converter(f: impl Fn(f64) -> f64 + Send + 'static) -> Self {
+        Self::Converter(Box::new(f))
+    }
+
+    /// A covering that answers as if the tool stood at another depth: the image keeps its form.
+    fn depth(mut f: impl FnMut(&Now, f64) -> f64 + Send + 'static) -> Self {
+        Self::covering(move |now, indentation_mm| {
+            let depth_mm = now.touch.depth_mm.max(0.0);
+            // Asked out of contact too, so that it knows of the release.
+            let answers_mm = f(now, depth_mm).max(0.0);
+            if depth_mm > 0.0 {
+                scale(indentation_mm, answers_mm / depth_mm);
+            }
+        })
+    }
+
+    /// Each element's signal or indentation by a function of itself.
+    fn each(f: impl Fn(f64) -> f64 + Send + 'static) -> OnElements {
+        Box::new(move |_, values| values.iter_mut().for_each(|value| *value = f(*value)))
+    }
+}
+
+/// What a physics is made from: its strength, the sensor it sits in, and random numbers for its shape. What is drawn
+/// is kept for the label.
+pub(crate) struct Knobs<'a> {
+    pub(crate) sensor: &'a Simulator,
+    strength: f64,
+    shape: ChaCha8Rng,
+    seed: u64,
+    run: u64,
+    drawn: Vec<(String, f64)>,
+}
+
+impl<'a> Knobs<'a> {
+    pub(crate) fn new(dose: &Dose, sensor: &'a Simulator, run: u64) -> Self {
+        let Dose { strength, seed, .. } = *dose;
+        Self { sensor, strength, shape: ChaCha8Rng::seed_from_u64(seed), seed, run, drawn: Vec::new() }
+    }
+
+    /// What was drawn, by name.
+    pub(crate) fn into_drawn(self) -> Vec<(String, f64)> {
+        self.drawn
+    }
+
+    /// A parameter that is proportional to strength.
+    fn scaled(&mut self, name: &str, at_one: f64) -> f64 {
+        self.keep(name, self.strength * at_one)
+    }
+
+    /// A parameter that is `at_one / strength`: endless without strength.
+    fn shrinking(&mut self, name: &str, at_one: f64) -> f64 {
+        // An endless limit has no place in a JSON label; 1e30 of anything here is as good.
+        self.keep(name, (at_one / self.strength).min(1e30))
+    }
+
+    /// A share that is proportional to strength until all of it is taken.
+    fn share(&mut self, name: &str, at_one: f64) -> f64 {
+        self.keep(name, (self.strength * at_one).min(1.0))
+    }
+
+    /// A parameter of the shape, evenly between two values.
+    fn between(&mut self, name: &str, least: f64, greatest: f64) -> f64 {
+        let value = self.shape.random_range(least..greatest);
+        self.keep(name, value)
+    }
+
+    /// A parameter of the shape, evenly on a logarithmic scale.
+    fn decade(&mut self, name: &str, least: f64, greatest: f64) -> f64 {
+        let value = self.shape.random_range(least.ln()..greatest.ln()).exp();
+        self.keep(name, value)
+    }
+
+    /// -1 or 1.
+    fn sign(&mut self, name: &str) -> f64 {
+        let value = if self.shape.random() { 1.0 } else { -1.0 };
+        self.keep(name, value)
+    }
+
+    /// A unit vector in the plane.
+    fn direction(&mut self, name: &str) -> [f64; 2] {
+        let (sin, cos) = self.between(name, 0.0, 360.0).to_radians().sin_cos();
+        [cos, sin]
+    }
+
+    /// Different elements of the array.
+    fn several(&mut self, name: &str, count: usize) -> Vec<usize> {
+        let mut elements: Vec<usize> = (0..self.elements()).collect();
+        elements.shuffle(&mut self.shape);
+        elements.truncate(count);
+        for (place, element) in elements.iter().enumerate() {
+            self.keep(&format!("{name}_{place}"), *element as f64);
+        }
+        elements
+    }
+
+    /// An element of the array.
+    fn which(&mut self, name: &str) -> usize {
+        let element = self.shape.random_range(0..self.elements());
+        self.keep(name, element as f64);
+        element
+    }
+
+    /// One number per element, evenly between two values; not kept.
+    fn per_element(&mut self, least: f64, greatest: f64) -> Vec<f64> {
+        (0..self.elements()).map(|_| self.shape.random_range(least..greatest)).collect()
+    }
+
+    /// Random numbers for what goes on in time: other ones in each run.
+    fn chance(&self) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(self.run + 1);
+        rng
+    }
+
+    fn elements(&self) -> usize {
+        self.sensor.model.array().elements()
+    }
+
+    /// Centres of the elements, sensor frame.
+    fn centres_mm(&self) -> Vec<[f64; 2]> {
+        let array = self.sensor.model.array();
+        (0..array.elements()).filter_map(|element| array.centre_mm(element)).collect()
+    }
+
+    /// Middle of the array, sensor frame.
+    fn middle_mm(&self) -> [f64; 2] {
+        self.sensor.model.array().extent_mm().map(|[least, greatest]| f64::midpoint(least, greatest))
+    }
+
+    fn sigma_mm(&self) -> f64 {
+        self.sensor.model.psf().sigma_mm(self.sensor.covering)
+    }
+
+    fn baselines_counts(&self) -> Vec<f64> {
+        self.sensor.model.response().baseline_counts.clone()
+    }
+
+    fn keep(&mut self, name: &str, value: f64) -> f64 {
+        self.drawn.push((name.to_owned(), value));
+        value
+    }
+}
+
+/// What is left of something after a time.
+fn left(dt_s: f64, time_constant_s: f64) -> f64 {
+    (-dt_s / time_constant_s).exp()
+}
+
+/// Every value times `by`.
+fn scale(values: &mut [f64], by: f64) {
+    for value in values {
+        *value *= by;
+    }
+}
+
+/// Every value and `by`.
+fn shift(values: &mut [f64], by: f64) {
+    for value in values {
+        *value += by;
+    }
+}
+
+/// `p - q`.
+fn minus([px, py]: [f64; 2], [qx, qy]: [f64; 2]) -> [f64; 2] {
+    [px - qx, py - qy]
+}
+
+/// Scalar product.
+fn dot([px, py]: [f64; 2], [qx, qy]: [f64; 2]) -> f64 {
+    px * qx + py * qy
+}
+
+#[cfg(test)]
+#[path = "physics_tests.rs"]
+mod tests;

@@ -1,0 +1,153 @@
+//! Covering: how far the press spreads, and where.
+
+use std::f64::consts::PI;
+
+use tactus_solid::layered::{Base, Layer};
+
+use super::{Definition, Knobs, Stage, left, minus, scale};
+
+pub(super) const LAYERED_TAIL: Definition = Definition {
+    id: "layered-tail",
+    effect: Some("heavy-tail"),
+    about: "G' = (1 - w) G + w p(r), p the elastic layer's pressure (Hankel transform): a thick soft bed below the sensor",
+    is_fine: false,
+    make: |knobs| {
+        // A layer's pressure is most like a Gaussian of 0.48 of its thickness (nu 0.3).
+        let thickness_mm = knobs.between("wider_by", 1.8, 2.5) * knobs.sigma_mm() / 0.48;
+        let layer = Layer::new(thickness_mm, 0.3, Base::Bonded).map(|layer| layer.under_point());
+        tail(knobs, |distance_mm| layer.as_ref().map_or(0.0, |under| under.pressure_per_mm2(distance_mm)))
+    },
+};
+
+pub(super) const EXPONENTIAL_TAIL: Definition = Definition {
+    id: "exponential-tail",
+    effect: Some("heavy-tail"),
+    about: "G' = (1 - w) G + w exp(-r/l) / (2 pi l^2): the skin over the covering is taut and carries load far out",
+    is_fine: false,
+    make: |knobs| {
+        let length_mm = knobs.between("length_mm", 2.5, 4.0);
+        tail(knobs, |distance_mm| left(distance_mm, length_mm) / (2.0 * PI * length_mm * length_mm))
+    },
+};
+
+pub(super) const POWER_TAIL: Definition = Definition {
+    id: "power-tail",
+    effect: Some("heavy-tail"),
+    about: "G' = (1 - w) G + w / (2 pi a^2) (1 + (r/a)^2)^(-3/2): the field of a charge at height a over the array",
+    is_fine: false,
+    make: |knobs| {
+        let height_mm = knobs.between("height_mm", 2.5, 4.0);
+        tail(knobs, |distance_mm| {
+            (1.0 + (distance_mm / height_mm).powi(2)).powf(-1.5) / (2.0 * PI * height_mm * height_mm)
+        })
+    },
+};
+
+pub(super) const STRETCHED: Definition = Definition {
+    id: "stretched-spread",
+    effect: Some("anisotropic-spread"),
+    about: "sigma_x' = sigma (1 + e), sigma_y' = sigma / (1 + e): the covering was laid on under tension",
+    is_fine: false,
+    make: |knobs| {
+        let along_x = knobs.sign("along_x") > 0.0;
+        let stretch = 1.0 + knobs.scaled("stretch", 0.08);
+        let by = if along_x { [stretch, 1.0 / stretch] } else { [1.0 / stretch, stretch] };
+        Stage::tool(move |_, tool| tool.sigma_mm = [tool.sigma_mm[0] * by[0], tool.sigma_mm[1] * by[1]])
+    },
+};
+
+pub(super) const WIDER_WITH_DEPTH: Definition = Definition {
+    id: "wider-with-depth",
+    effect: Some("depth-dependent-spread"),
+    about: "sigma' = sigma sqrt(1 + a depth/t): the covering bulges beside the tool the more the deeper it stands",
+    is_fine: false,
+    make: |knobs| {
+        let growth = knobs.scaled("growth", 0.5);
+        let thickness_mm = knobs.sensor.covering.thickness_mm;
+        Stage::tool(move |now, tool| {
+            let widened = (1.0 + growth * now.touch.depth_mm.clamp(0.0, thickness_mm) / thickness_mm).sqrt();
+            tool.sigma_mm = tool.sigma_mm.map(|sigma_mm| sigma_mm * widened);
+        })
+    },
+};
+
+pub(super) const NARROWER_AT_FIRST: Definition = Definition {
+    id: "narrower-at-first",
+    effect: Some("depth-dependent-spread"),
+    about: "sigma' = sigma (1 - a exp(-depth/d0)): light presses stay in the skin",
+    is_fine: false,
+    make: |knobs| {
+        let scale_mm = knobs.between("scale_mm", 0.15, 0.3);
+        let narrowed = knobs.share("narrowed_share", 0.2).min(0.9);
+        Stage::tool(move |now, tool| {
+            let by = 1.0 - narrowed * left(now.touch.depth_mm.max(0.0), scale_mm);
+            tool.sigma_mm = tool.sigma_mm.map(|sigma_mm| sigma_mm * by);
+        })
+    },
+};
+
+pub(super) const SOFT_EDGE: Definition = Definition {
+    id: "soft-edge",
+    effect: Some("edge-effect"),
+    about: "u' = u (1 + a exp(-d/l)), d the press's distance to the array's edge: the covering gives way there",
+    is_fine: false,
+    make: |knobs| {
+        let length_mm = knobs.between("length_mm", 0.8, 2.5);
+        let change = (knobs.sign("side") * knobs.scaled("change", 0.2)).max(-1.0);
+        let extent_mm = knobs.sensor.model.array().extent_mm();
+        Stage::covering(move |now, indentation_mm| {
+            let to_edge_mm = |axis: usize| {
+                let at_mm = now.touch.point_mm[axis];
+                (at_mm - extent_mm[axis][0]).min(extent_mm[axis][1] - at_mm)
+            };
+            let by = 1.0 + change * left(to_edge_mm(0).min(to_edge_mm(1)).max(0.0), length_mm);
+            scale(indentation_mm, by);
+        })
+    },
+};
+
+pub(super) const SEAM: Definition = Definition {
+    id: "seam",
+    effect: Some("edge-effect"),
+    about: "u' = u (1 - a max(0, 1 - |x - x_s|/w)): the covering is cut along the seam between the two sensors",
+    is_fine: false,
+    make: |knobs| {
+        let width_mm = knobs.between("width_mm", 1.2, 2.5);
+        let loss = knobs.share("loss", 0.2);
+        let seam_mm = knobs.middle_mm()[0];
+        Stage::covering(move |now, indentation_mm| {
+            let by = 1.0 - loss * (1.0 - (now.touch.point_mm[0] - seam_mm).abs() / width_mm).max(0.0);
+            scale(indentation_mm, by);
+        })
+    },
+};
+
+/// A share of the press that spreads by another kernel, of unit volume, evaluated at the elements' centres.
+fn tail(knobs: &mut Knobs<'_>, per_mm2: impl Fn(f64) -> f64) -> Stage {
+    const STEP_MM: f64 = 0.05;
+    const REACH_MM: f64 = 30.0;
+    let weight = knobs.share("weight", 0.1);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a table of 600 places")]
+    let table: Vec<f64> =
+        (0..=(REACH_MM / STEP_MM) as u32 + 1).map(|place| per_mm2(f64::from(place) * STEP_MM)).collect();
+    let centres_mm = knobs.centres_mm();
+    let [width_mm, height_mm] = knobs.sensor.model.array().element_mm();
+    let face_mm2 = crate::sensor::diameter_mm(&knobs.sensor.indenter).powi(2) * PI / 4.0;
+    let per_mm = face_mm2 * width_mm * height_mm / knobs.sensor.model.reference_mm2();
+    let thickness_mm = knobs.sensor.covering.thickness_mm;
+    Stage::covering(move |now, indentation_mm| {
+        let depth_mm = now.touch.depth_mm.clamp(0.0, thickness_mm);
+        if depth_mm <= 0.0 {
+            return;
+        }
+        for (value, centre_mm) in indentation_mm.iter_mut().zip(&centres_mm) {
+            let [x, y] = minus(*centre_mm, now.touch.point_mm);
+            let place = x.hypot(y).min(REACH_MM) / STEP_MM;
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the table")]
+            let before = place as usize;
+            let between = place - place.floor();
+            let kernel = table[before] + between * (table[before + 1] - table[before]);
+            *value += weight * (depth_mm * per_mm * kernel - *value);
+        }
+    })
+}

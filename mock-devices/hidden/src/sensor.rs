@@ -1,0 +1,321 @@
+//! A sensor with physics in it, stepped along a path.
+
+mod face;
+
+use std::fmt;
+
+use tactus_model::{Contact, Covering, Indenter, Path, Readout, Simulator};
+
+use crate::base::Climate;
+use crate::physics::{Dose, Knobs, Now, Stage, Tool, Touch};
+use face::Face;
+
+/// A virtual sensor with hidden physics: the base model's image of every instant, changed on its way by each dose.
+///
+/// ```text
+/// path -> tool's place -> tool's face and spread -> indentations -> signals -> readings -> noise, converter
+/// ```
+///
+/// Without doses it reads what [`tactus_model::ForwardModel`] does (to 1e-12 of a reading). Steps must go forward in
+/// time (one back in time counts as none); the first is a sensor at rest without a past.
+pub struct Sensor {
+    base: Simulator,
+    readout: Readout,
+    climate: Climate,
+    doses: Vec<Dose>,
+    run: u64,
+    stages: Vec<Stage>,
+    stiffness: f64,
+    parameters: Vec<Vec<(String, f64)>>,
+    /// Steps within one asked for are no longer than this.
+    longest_step_s: f64,
+    last_s: Option<f64>,
+    now: Option<Now>,
+    imprint: Option<Imprint>,
+    counts: Vec<f64>,
+}
+
+/// What is kept of a cylinder's image while only its depth changes.
+#[derive(Debug)]
+struct Imprint {
+    point_mm: [f64; 2],
+    tool: Tool,
+    image: Kept,
+}
+
+impl Imprint {
+    /// True if it is of this place and tool, to the bit: what is kept is not for a place nearby.
+    fn touches(&self, point_mm: [f64; 2], tool: &Tool) -> bool {
+        let is_same = |one: [f64; 2], other: [f64; 2]| one.map(f64::to_bits) == other.map(f64::to_bits);
+        is_same(self.point_mm, point_mm) && self.tool == *tool
+    }
+}
+
+#[derive(Debug)]
+enum Kept {
+    /// As declared: the base model's own image at this depth, to which others are proportional.
+    Declared { depth_mm: f64, indentation_mm: Vec<f64> },
+    /// Any other.
+    Changed(Face),
+}
+
+/// Physics that needs finer steps gets these.
+const FINE_STEP_S: f64 = 1.0 / 240.0;
+/// However long nothing was asked, no more steps than these are made.
+const STEPS_MAX: f64 = 64.0;
+/// Speeds are taken over this time, backwards.
+const SPEED_OVER_S: f64 = 0.002;
+
+impl Sensor {
+    /// A sensor at rest with doses in it. `run` chooses among random courses of the same physics.
+    ///
+    /// `base.effects` and `base.noise_rms_counts` are not used: physics here is what `doses` say.
+    pub fn new(base: &Simulator, doses: &[Dose], climate: Climate, run: u64) -> Self {
+        let mut parameters = Vec::new();
+        let mut make = |dose: &Dose| {
+            let mut knobs = Knobs::new(dose, base, run);
+            let stage = (dose.physics.make)(&mut knobs);
+            parameters.push(knobs.into_drawn());
+            stage
+        };
+        let stages = doses.iter().map(&mut make).collect();
+        let is_fine = doses.iter().any(|dose| dose.physics.is_fine);
+        let elements = base.model.array().elements();
+        Self {
+            base: base.clone(),
+            readout: Readout::of(base.model.array()),
+            climate,
+            doses: doses.to_vec(),
+            run,
+            stages,
+            parameters,
+            longest_step_s: if is_fine { FINE_STEP_S } else { f64::INFINITY },
+            last_s: None,
+            now: None,
+            imprint: None,
+            stiffness: 1.0,
+            counts: vec![0.0; elements],
+        }
+    }
+
+    /// What each dose drew, by name, in the order of the doses.
+    pub fn parameters(&self) -> &[Vec<(String, f64)>] {
+        &self.parameters
+    }
+
+    /// Makes elements answer for others: which, for which, and with what share of its indentation.
+    pub fn wire(&mut self, wiring: Vec<(usize, usize, f64)>) {
+        self.stages.push(Stage::Covering(Box::new(move |_, indentation_mm| {
+            let felt_mm = indentation_mm.to_vec();
+            for (element, answers_for, share) in &wiring {
+                indentation_mm[*element] = share * felt_mm[*answers_for];
+            }
+        })));
+    }
+
+    /// Puts another covering in place, which has no past.
+    pub fn set_covering(&mut self, covering: Covering) {
+        self.base.covering = covering;
+        self.imprint = None;
+        for (stage, dose) in self.stages.iter_mut().zip(&self.doses) {
+            if let Stage::Covering(_) | Stage::Tool(_) = stage {
+                *stage = (dose.physics.make)(&mut Knobs::new(dose, &self.base, self.run));
+            }
+        }
+    }
+
+    /// Moves the covering's surface.
+    pub fn set_surface_mm(&mut self, surface_mm: f64) {
+        self.base.surface_mm = surface_mm;
+    }
+
+    /// Makes the covering answer so many times as strongly.
+    pub fn set_stiffness(&mut self, stiffness: f64) {
+        self.stiffness = stiffness;
+    }
+
+    /// Goes on to a time, in s; the counts of every element there, row-major, without noise.
+    pub fn step(&mut self, t_s: f64, path: &impl Path) -> &[f64] {
+        let last_s = self.last_s.unwrap_or(t_s);
+        let steps = ((t_s - last_s) / self.longest_step_s).ceil().clamp(1.0, STEPS_MAX);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to 64")]
+        for step in 1..=steps as u32 {
+            let at_s = last_s + (t_s - last_s) * f64::from(step) / steps;
+            self.advance(at_s, (at_s - self.last_s.unwrap_or(at_s)).max(0.0), path);
+            self.last_s = Some(at_s);
+        }
+        &self.counts
+    }
+
+    /// Counts of every element at the last step, row-major, without noise.
+    pub fn counts(&self) -> &[f64] {
+        &self.counts
+    }
+
+    /// Temperature at the last step.
+    pub fn temperature_c(&self) -> Option<f64> {
+        self.now.map(|now| now.temperature_c)
+    }
+
+    /// What the converter gives of clean counts when noise comes upon them.
+    pub fn read(&self, counts: f64, noise_counts: f64) -> f64 {
+        self.readout.read(self.convert(counts + noise_counts), 0.0)
+    }
+
+    /// What the converter makes of counts before it takes whole steps of them: exact but for its own physics.
+    pub fn convert(&self, counts: f64) -> f64 {
+        self.stages.iter().fold(counts, |counts, stage| match stage {
+            Stage::Converter(convert) => convert(counts),
+            Stage::Path(_)
+            | Stage::Touch(_)
+            | Stage::Tool(_)
+            | Stage::Covering(_)
+            | Stage::Element(_)
+            | Stage::Readout(_) => counts,
+        })
+    }
+
+    fn advance(&mut self, t_s: f64, dt_s: f64, path: &dyn Path) {
+        let mut tip_mm = path.at(t_s);
+        let before_mm = path.at(t_s - SPEED_OVER_S);
+        let mut now = Now {
+            t_s,
+            dt_s,
+            velocity_mm_per_s: [0, 1, 2].map(|axis| speed(before_mm[axis], tip_mm[axis])),
+            temperature_c: self.climate.at(t_s),
+            touch: Touch { point_mm: [0.0; 2], depth_mm: 0.0 },
+        };
+        for stage in &mut self.stages {
+            if let Stage::Path(on_path) = stage {
+                on_path(&now, path, &mut tip_mm);
+            }
+        }
+        now.touch = Touch {
+            point_mm: self.base.registration.to_sensor([tip_mm[0], tip_mm[1]]),
+            depth_mm: self.base.surface_mm - tip_mm[2],
+        };
+        for stage in &mut self.stages {
+            if let Stage::Touch(on_touch) = stage {
+                let mut touch = now.touch;
+                on_touch(&now, &mut touch);
+                now.touch = touch;
+            }
+        }
+        let mut tool = self.tool();
+        for stage in &mut self.stages {
+            if let Stage::Tool(on_tool) = stage {
+                on_tool(&now, &mut tool);
+            }
+        }
+        self.press(now.touch, tool);
+        for stage in &mut self.stages {
+            if let Stage::Covering(on_covering) = stage {
+                on_covering(&now, &mut self.counts);
+            }
+        }
+        self.counts.iter_mut().for_each(|value| *value *= self.stiffness);
+        self.base.model.respond(&mut self.counts);
+        self.amplify(&now);
+        for stage in &mut self.stages {
+            if let Stage::Readout(on_readout) = stage {
+                on_readout(&now, &mut self.counts);
+            }
+        }
+        self.now = Some(now);
+    }
+
+    /// The stage of elements: on the signal above the baseline.
+    fn amplify(&mut self, now: &Now) {
+        let baselines = &self.base.model.response().baseline_counts;
+        let mut signal: Option<Vec<f64>> = None;
+        for stage in &mut self.stages {
+            if let Stage::Element(on_element) = stage {
+                let signal = signal
+                    .get_or_insert_with(|| self.counts.iter().zip(baselines).map(|(c, b)| c - b).collect());
+                on_element(now, signal);
+            }
+        }
+        if let Some(signal) = signal {
+            for ((count, signal), baseline) in self.counts.iter_mut().zip(signal).zip(baselines) {
+                *count = baseline + signal;
+            }
+        }
+    }
+
+    /// The tool as it is declared.
+    fn tool(&self) -> Tool {
+        let sigma_mm = self.base.model.psf().sigma_mm(self.base.covering);
+        Tool { diameter_mm: diameter_mm(&self.base.indenter), lean: [0.0; 2], sigma_mm: [sigma_mm; 2] }
+    }
+
+    /// Equivalent indentations of the tool where it stands, into `counts`.
+    fn press(&mut self, touch: Touch, tool: Tool) {
+        let Touch { point_mm, depth_mm } = touch;
+        if depth_mm <= 0.0 {
+            self.counts.fill(0.0);
+            return;
+        }
+        let Indenter::Cylinder { .. } = self.base.indenter else {
+            // Physics of the tool's face is known for cylinders only.
+            return self.exact(point_mm, depth_mm);
+        };
+        // A cylinder goes no deeper than the covering.
+        let depth_mm = depth_mm.min(self.base.covering.thickness_mm);
+        let kept = self.imprint.take().filter(|kept| kept.touches(point_mm, &tool));
+        let imprint =
+            kept.unwrap_or_else(|| Imprint { point_mm, tool, image: self.imprint_of(point_mm, &tool) });
+        match &imprint.image {
+            Kept::Declared { depth_mm: of_depth_mm, indentation_mm } => {
+                for (value, image_mm) in self.counts.iter_mut().zip(indentation_mm) {
+                    *value = image_mm * (depth_mm / of_depth_mm);
+                }
+            }
+            Kept::Changed(face) => face.indentation(depth_mm, &mut self.counts),
+        }
+        self.imprint = Some(imprint);
+    }
+
+    fn imprint_of(&mut self, point_mm: [f64; 2], tool: &Tool) -> Kept {
+        if *tool != self.tool() {
+            return Kept::Changed(Face::new(&self.base.model, point_mm, tool));
+        }
+        let depth_mm = self.base.covering.thickness_mm / 2.0;
+        self.exact(point_mm, depth_mm);
+        Kept::Declared { depth_mm, indentation_mm: self.counts.clone() }
+    }
+
+    fn exact(&mut self, position_mm: [f64; 2], depth_mm: f64) {
+        let rotation_deg = -self.base.registration.rotation_deg;
+        let contact = Contact { indenter: self.base.indenter.clone(), position_mm, rotation_deg, depth_mm };
+        self.base.model.indentation(&contact, self.base.covering, &mut self.counts);
+    }
+}
+
+impl fmt::Debug for Sensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Sensor")
+            .field("parameters", &self.parameters)
+            .field("now", &self.now)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Speeds below a nanometre a second are rounding.
+fn speed(before_mm: f64, after_mm: f64) -> f64 {
+    let mm_per_s = (after_mm - before_mm) / SPEED_OVER_S;
+    if mm_per_s.abs() < 1e-6 { 0.0 } else { mm_per_s }
+}
+
+/// Diameter of a round tool; 0 of another.
+pub(crate) fn diameter_mm(indenter: &Indenter) -> f64 {
+    match indenter {
+        Indenter::Cylinder { diameter_mm }
+        | Indenter::Sphere { diameter_mm }
+        | Indenter::Cone { diameter_mm, .. } => *diameter_mm,
+        Indenter::Box { .. } | Indenter::Mesh(_) => 0.0,
+    }
+}
+
+#[cfg(test)]
+#[path = "sensor_tests.rs"]
+mod tests;

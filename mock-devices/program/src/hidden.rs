@@ -1,0 +1,176 @@
+//! `tactus-mock hidden`: lists the physics, makes sets.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use anyhow::{Context, Result, anyhow};
+use clap::{Args, Subcommand};
+use serde_json::json;
+use tactus_hidden::{CATALOGUE, Definition};
+use tactus_sets::{Amount, Content, Label, NoiseKind, Plan, Recipe};
+
+#[derive(Debug, Args)]
+pub(crate) struct HiddenArgs {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Lists every physics, the library's effect that it is an instance of, and what it does.
+    List {
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Makes measurement tables with hidden physics in them, and apart from them their labels.
+    Make(MakeArgs),
+}
+
+#[derive(Debug, Args)]
+struct MakeArgs {
+    /// Folder for the tables `set-0000.parquet`, ...
+    #[arg(long)]
+    out: PathBuf,
+    /// Folder for the labels `set-0000.json`, ...: for the scorer only.
+    #[arg(long)]
+    sealed: PathBuf,
+    /// Number of sets.
+    #[arg(long, default_value_t = 1)]
+    count: usize,
+    /// Seed of everything random; set k has the seed plus k.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Physics by id, several with commas.
+    #[arg(long, value_delimiter = ',')]
+    physics: Vec<String>,
+    /// Any physics that is an instance of this effect; may be given several times.
+    #[arg(long)]
+    effect: Vec<String>,
+    /// So many different effects of the library, by chance.
+    #[arg(long)]
+    combine: Option<usize>,
+    /// A physics that the library has nothing like, by chance.
+    #[arg(long)]
+    outside: bool,
+    /// No physics at all.
+    #[arg(long, conflicts_with_all = ["physics", "effect", "combine", "outside"])]
+    none: bool,
+    /// As much of each physics as an oracle tells from the base model by this many standard deviations.
+    #[arg(long, conflicts_with = "strength")]
+    z: Option<f64>,
+    /// As `--z`, after the spread was recalibrated too.
+    #[arg(long, conflicts_with_all = ["strength", "z"])]
+    z_beyond_spread: Option<f64>,
+    /// Strength of each physics: 1 is what a bad rig has.
+    #[arg(long, default_value_t = 1.0)]
+    strength: f64,
+    /// What the stage does.
+    #[arg(long, value_enum, default_value_t)]
+    plan: Plan,
+    /// Frames of a set, if not the plan's own number.
+    #[arg(long)]
+    frames: Option<usize>,
+    /// What noise comes upon the readings.
+    #[arg(long, value_enum, default_value_t)]
+    noise: NoiseKind,
+}
+
+impl HiddenArgs {
+    pub(crate) fn run(self) -> Result<()> {
+        match self.command {
+            Command::List { json } => list(json),
+            Command::Make(args) => args.run(),
+        }
+    }
+}
+
+fn list(as_json: bool) -> Result<()> {
+    let mut out = io::stdout().lock();
+    if as_json {
+        let all: Vec<_> = CATALOGUE
+            .iter()
+            .map(|Definition { id, effect, about, .. }| json!({ "id": id, "effect": effect, "about": about }))
+            .collect();
+        writeln!(out, "{}", json!(all))?;
+    } else {
+        for Definition { id, effect, about, .. } in CATALOGUE {
+            writeln!(out, "{id:32}{:24}{about}", effect.unwrap_or("-"))?;
+        }
+    }
+    Ok(out.flush()?)
+}
+
+impl MakeArgs {
+    fn run(&self) -> Result<()> {
+        for folder in [&self.out, &self.sealed] {
+            fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        }
+        let next = AtomicUsize::new(0);
+        let work = || -> Result<()> {
+            loop {
+                let index = next.fetch_add(1, Ordering::Relaxed);
+                if index >= self.count {
+                    return Ok(());
+                }
+                self.make(index)?;
+            }
+        };
+        let threads = thread::available_parallelism().map_or(1, usize::from).min(self.count.max(1));
+        thread::scope(|scope| {
+            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+            workers
+                .into_iter()
+                .try_for_each(|worker| worker.join().map_err(|_| anyhow!("a worker panicked"))?)
+        })
+    }
+
+    fn make(&self, index: usize) -> Result<()> {
+        let name = format!("set-{index:04}");
+        let recipe = Recipe {
+            name: name.clone(),
+            seed: self.seed.wrapping_add(index as u64),
+            plan: self.plan,
+            frames: self.frames,
+            noise: self.noise,
+            content: self.content(),
+            amount: self.amount(),
+        };
+        let set = recipe.make()?;
+        set.write(self.out.join(format!("{name}.parquet")))?;
+        let sealed = self.sealed.join(format!("{name}.json"));
+        fs::write(&sealed, serde_json::to_string_pretty(&set.label)?)
+            .with_context(|| sealed.display().to_string())?;
+        warn_of_unreached(&set.label)
+    }
+
+    fn amount(&self) -> Amount {
+        match (self.z, self.z_beyond_spread) {
+            (Some(z), _) => Amount::Separation(z),
+            (None, Some(z)) => Amount::BeyondSpread(z),
+            (None, None) => Amount::Strength(self.strength),
+        }
+    }
+
+    fn content(&self) -> Content {
+        Content {
+            physics: self.physics.clone(),
+            effects: self.effect.clone(),
+            combine: self.combine,
+            outside: self.outside,
+            none: self.none,
+        }
+    }
+}
+
+/// Says that a separation was out of reach, but not of what: the label says that.
+fn warn_of_unreached(label: &Label) -> Result<()> {
+    let mut err = io::stderr().lock();
+    for _ in label.physics.iter().filter(|dosed| !dosed.reached) {
+        writeln!(err, "{}: the separation asked for is out of reach; its label has the nearest", label.set)?;
+    }
+    Ok(())
+}

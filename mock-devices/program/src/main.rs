@@ -1,0 +1,11 @@
+//! The program `tactus-mock`: a virtual rig at pseudo-terminals or on USB; test data with hidden physics.
+
+mod cli;
+mod hidden;
+mod usb;
+
+use clap::Parser;
+
+fn main() -> anyhow::Result<()> {
+    cli::Cli::parse().run()
+}

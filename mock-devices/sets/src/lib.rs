@@ -1,0 +1,36 @@
+//! Test data for discovery: measurement tables of sensors with hidden physics, and their labels.
+//!
+//! A [`Recipe`] makes a whole [`Set`]: the measurement table of an experiment ([`plan`]) on a sensor of its own with
+//! physics of `tactus-hidden` in it, with noise, and apart from it the [`Label`] that says what is in it. The table
+//! contains nothing of the label.
+//!
+//! ```
+//! use tactus_sets::{Content, NoiseKind, Plan, Recipe};
+//!
+//! let recipe = Recipe {
+//!     plan: Plan::Bundle,
+//!     frames: Some(600),
+//!     noise: NoiseKind::White,
+//!     content: Content { physics: vec!["relaxation-prony".into()], ..Content::default() },
+//!     ..Recipe::new(7)
+//! };
+//! let set = recipe.make()?;
+//! assert_eq!(set.counts.len(), 600 * 48);
+//! assert_eq!(set.label.effects(), ["relaxation"]);
+//! # Ok::<(), tactus_sets::RecipeError>(())
+//! ```
+
+pub mod plan;
+
+mod label;
+mod noise;
+mod recipe;
+mod separation;
+mod set;
+
+pub use label::{Dosed, Label};
+pub use noise::{Noise, NoiseKind};
+pub use plan::Plan;
+pub use recipe::{Amount, Content, Recipe, RecipeError};
+pub use separation::Separation;
+pub use set::{Row, Run, Set};

@@ -1,0 +1,412 @@
+//! From what is asked for to a set.
+
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tactus_hidden::{Base, CATALOGUE, Climate, Definition, Dose, STRENGTH_MAX, Sensor};
+use tactus_model::{ModelError, Simulator, TrajectoryError};
+use tactus_schema::Rig;
+
+use crate::label::{Dosed, Label};
+use crate::noise::{Noise, NoiseKind};
+use crate::plan::{Course, Plan};
+use crate::separation::Separation;
+use crate::set::{Row, Run, Set};
+
+/// How to make one set. All of it follows from this.
+#[derive(Debug, Clone)]
+pub struct Recipe {
+    /// Name of the set; its runs are named after it.
+    pub name: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// What the stage does.
+    pub plan: Plan,
+    /// Frames, if not the plan's own number.
+    pub frames: Option<usize>,
+    /// What noise comes upon the readings.
+    pub noise: NoiseKind,
+    /// Which physics.
+    pub content: Content,
+    /// How much of each.
+    pub amount: Amount,
+}
+
+/// Which physics a set has. Without anything asked for: one of the library's effects by chance.
+#[derive(Debug, Clone, Default)]
+pub struct Content {
+    /// These, by id.
+    pub physics: Vec<String>,
+    /// One instance by chance of each of these effects.
+    pub effects: Vec<String>,
+    /// So many further effects of the library, all different; 1 if nothing else is asked for.
+    pub combine: Option<usize>,
+    /// One that the library has nothing like.
+    pub outside: bool,
+    /// None.
+    pub none: bool,
+}
+
+/// How much of each physics.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Amount {
+    /// At this strength.
+    Strength(f64),
+    /// As much as lies this far from the base model, each taken alone: [`Separation::z`].
+    Separation(f64),
+    /// The same after the spread was recalibrated too: [`Separation::z_beyond_spread`].
+    BeyondSpread(f64),
+}
+
+/// Why a set cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RecipeError {
+    /// No such physics.
+    #[error("no physics {0:?}; `tactus-mock hidden list` names all of them")]
+    UnknownPhysics(String),
+    /// No physics of that effect.
+    #[error("no physics is an instance of the effect {0:?}; `tactus-mock hidden list` names those that are")]
+    UnknownEffect(String),
+    /// A number is out of its range.
+    #[error("{field} must be {range}, not {value}")]
+    Range {
+        /// Which.
+        field: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it was.
+        value: f64,
+    },
+    /// The base model refused its parameters.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The plan made no trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+}
+
+const STRENGTH_MIN: f64 = 1e-5;
+const TRIALS_MAX: usize = 24;
+/// A separation is met within this share of it.
+const CLOSE: f64 = 0.01;
+
+/// What draws random numbers, each from a stream of its own.
+#[derive(Debug, Clone, Copy)]
+enum Draw {
+    Content,
+    Shape,
+    Base,
+    Plan,
+    Climate,
+    Thermometer,
+    NoiseKind,
+    Noise,
+}
+
+impl Recipe {
+    /// A bundle of white, coloured or quantised noise with one effect of the library, by chance, at strength 1.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            name: "set-0000".into(),
+            seed,
+            plan: Plan::Bundle,
+            frames: None,
+            noise: NoiseKind::Any,
+            content: Content::default(),
+            amount: Amount::Strength(1.0),
+        }
+    }
+
+    /// Makes the set.
+    ///
+    /// # Errors
+    /// [`RecipeError`] if something is asked for that there is not.
+    pub fn make(&self) -> Result<Set, RecipeError> {
+        self.check()?;
+        let chosen = self.content.choose(&mut self.rng(Draw::Content))?;
+        let base = Base::new(self.seed_of(Draw::Base))?;
+        let Rig { array, registration, covering, .. } = &base.rig;
+        let courses =
+            self.plan.courses(array, *registration, *covering, self.frames, self.seed_of(Draw::Plan))?;
+        let climate = Climate::new(self.seed_of(Draw::Climate));
+        let noise = Noise::draw(self.noise, &mut self.rng(Draw::NoiseKind));
+        let bench = Bench::new(&base, courses, climate, noise);
+        let (doses, mut physics) = self.doses(&chosen, &bench);
+        let Readings { runs, counts, clean } = self.read(&bench, &doses);
+        let Separation { z, z_beyond_spread, .. } = bench.separation_of(&clean);
+        // Of one alone it is that of the set.
+        if let [only] = &mut physics[..] {
+            (only.z, only.z_beyond_spread) = (z, z_beyond_spread);
+        }
+        let response = base.sensor.model.response();
+        let psf = base.sensor.model.psf();
+        let label = Label {
+            set: self.name.clone(),
+            seed: self.seed,
+            plan: self.plan,
+            frames: runs.iter().map(|run| run.rows.len()).sum(),
+            physics,
+            z,
+            z_beyond_spread,
+            noise,
+            sensitivity_counts_per_mm: response.sensitivity_counts_per_mm.clone(),
+            baseline_counts: response.baseline_counts.clone(),
+            sigma_intercept_mm: psf.sigma_intercept_mm,
+            sigma_per_mm: psf.sigma_per_mm,
+        };
+        Ok(Set { rig: base.rig, runs, counts, label })
+    }
+
+    /// How much of each physics, and what the label says of it.
+    fn doses(&self, chosen: &[&'static Definition], bench: &Bench<'_>) -> (Vec<Dose>, Vec<Dosed>) {
+        let mut seeds = self.rng(Draw::Shape);
+        let dose_of = |physics: &&'static Definition| {
+            let dose = Dose { physics, strength: 1.0, seed: seeds.random() };
+            let (dose, separation, reached) = match self.amount {
+                Amount::Strength(strength) => {
+                    let dose = Dose { strength, ..dose };
+                    let is_alone = chosen.len() == 1;
+                    (dose, if is_alone { Separation::default() } else { bench.separation(dose) }, true)
+                }
+                Amount::Separation(z) => bench.dose(dose, z, |separation| separation.z),
+                Amount::BeyondSpread(z) => bench.dose(dose, z, |separation| separation.z_beyond_spread),
+            };
+            let dosed = Dosed {
+                id: physics.id.into(),
+                effect: physics.effect.map(Into::into),
+                strength: dose.strength,
+                z: separation.z,
+                z_beyond_spread: separation.z_beyond_spread,
+                reached,
+                seed: dose.seed,
+                parameters: bench.sensor(bench.base, &[dose], 0).parameters().concat().into_iter().collect(),
+            };
+            (dose, dosed)
+        };
+        chosen.iter().map(dose_of).unzip()
+    }
+
+    /// What the sensor reads in all runs.
+    fn read(&self, bench: &Bench<'_>, doses: &[Dose]) -> Readings {
+        let array = &bench.base.rig.array;
+        let has_thermometer = self.rng(Draw::Thermometer).random_bool(0.7);
+        let mut rng = self.rng(Draw::Noise);
+        let mut noise_of = bench.noise.series(&mut rng, array.elements());
+        let mut noise_counts = vec![0.0; array.elements()];
+        let mut readings = Readings::default();
+        for (index, course) in bench.courses.iter().enumerate() {
+            let mut sensor = bench.sensor(bench.base, doses, index);
+            let mut rows = Vec::with_capacity(course.frames);
+            for (frame, (press, phase)) in course.doing(array.rate_hz()).enumerate() {
+                let t_s = frame as f64 / array.rate_hz();
+                sensor.step(t_s, &course.trajectory);
+                noise_of(&mut noise_counts);
+                for (clean, noise) in sensor.counts().iter().zip(&noise_counts) {
+                    #[expect(clippy::cast_possible_truncation, reason = "whole counts below 4096")]
+                    readings.counts.push(sensor.read(*clean, *noise) as f32);
+                    readings.clean.push(sensor.convert(*clean));
+                }
+                #[expect(clippy::cast_possible_truncation, reason = "a run of some minutes")]
+                let t_ns = (t_s * 1e9).round() as i64;
+                let temperature_c = sensor.temperature_c().filter(|_| has_thermometer);
+                rows.push(Row { press, phase, t_ns, position_mm: course.trajectory.at(t_s), temperature_c });
+            }
+            let id =
+                if bench.courses.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
+            readings.runs.push(Run { id, covering_mm: course.covering.thickness_mm, rows });
+        }
+        readings
+    }
+
+    fn check(&self) -> Result<(), RecipeError> {
+        let (field, range, value) = match self.amount {
+            Amount::Strength(value) => ("strength", "0 or more", value),
+            Amount::Separation(value) | Amount::BeyondSpread(value) => ("z", "above 0", value),
+        };
+        let is_zero_right = matches!(self.amount, Amount::Strength(_));
+        if !(value.is_finite() && (value > 0.0 || (is_zero_right && value >= 0.0))) {
+            return Err(RecipeError::Range { field, range, value });
+        }
+        match self.frames {
+            Some(0) => Err(RecipeError::Range { field: "frames", range: "1 or more", value: 0.0 }),
+            _ => Ok(()),
+        }
+    }
+
+    fn rng(&self, draw: Draw) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(draw as u64);
+        rng
+    }
+
+    fn seed_of(&self, draw: Draw) -> u64 {
+        self.rng(draw).random()
+    }
+}
+
+impl Content {
+    /// The physics, in the order of the catalogue.
+    fn choose(&self, rng: &mut ChaCha8Rng) -> Result<Vec<&'static Definition>, RecipeError> {
+        let mut chosen: Vec<&'static Definition> = Vec::new();
+        if self.none {
+            return Ok(chosen);
+        }
+        for id in &self.physics {
+            let found = Definition::find(id).ok_or_else(|| RecipeError::UnknownPhysics(id.clone()))?;
+            chosen.push(found);
+        }
+        for effect in &self.effects {
+            let found = one_of(rng, |definition| definition.effect == Some(effect.as_str()));
+            chosen.push(found.ok_or_else(|| RecipeError::UnknownEffect(effect.clone()))?);
+        }
+        if self.outside {
+            chosen.extend(one_of(rng, |definition| definition.effect.is_none()));
+        }
+        for _ in 0..self.combine.unwrap_or(usize::from(chosen.is_empty())) {
+            let mut effects: Vec<&str> =
+                CATALOGUE.iter().filter_map(|definition| definition.effect).collect();
+            effects.sort_unstable();
+            effects.dedup();
+            effects.retain(|effect| chosen.iter().all(|other| other.effect != Some(effect)));
+            if let Some(effect) = effects.choose(rng) {
+                chosen.extend(one_of(rng, |definition| definition.effect == Some(effect)));
+            }
+        }
+        chosen.sort_by_key(|one| CATALOGUE.iter().position(|other| other.id == one.id));
+        Ok(chosen)
+    }
+}
+
+/// What is read of a sensor.
+#[derive(Debug, Default)]
+struct Readings {
+    runs: Vec<Run>,
+    counts: Vec<f32>,
+    /// The same without noise and before whole steps.
+    clean: Vec<f64>,
+}
+
+/// What a set is made on.
+struct Bench<'a> {
+    base: &'a Base,
+    courses: Vec<Course>,
+    climate: Climate,
+    noise: Noise,
+    /// Counts of all frames, without physics and noise.
+    clean: Vec<f64>,
+    /// The same under a spread that is wider by [`WIDER`].
+    wider: Vec<f64>,
+}
+
+/// The spread of [`Bench::wider`], as a multiple of the true one.
+const WIDER: f64 = 1.001;
+/// A spread that is off by less than this share is near enough, and this often one comes nearer.
+const SPREAD_CHANGE_LEAST: f64 = 5e-4;
+const SPREAD_ROUNDS: usize = 3;
+
+impl<'a> Bench<'a> {
+    fn new(base: &'a Base, courses: Vec<Course>, climate: Climate, noise: Noise) -> Self {
+        let mut bench = Self { base, courses, climate, noise, clean: Vec::new(), wider: Vec::new() };
+        bench.clean = bench.counts(base, &[]);
+        bench.wider =
+            base.spread_by(WIDER).map_or_else(|_| bench.clean.clone(), |wider| bench.counts(&wider, &[]));
+        bench
+    }
+
+    fn sensor(&self, base: &Base, doses: &[Dose], run: usize) -> Sensor {
+        let covering = self.courses[run].covering;
+        Sensor::new(&Simulator { covering, ..base.sensor.clone() }, doses, self.climate, run as u64)
+    }
+
+    /// Counts of all frames without noise.
+    fn counts(&self, base: &Base, doses: &[Dose]) -> Vec<f64> {
+        let rate_hz = base.rig.array.rate_hz();
+        let mut counts = Vec::new();
+        for (run, course) in self.courses.iter().enumerate() {
+            let mut sensor = self.sensor(base, doses, run);
+            for frame in 0..course.frames {
+                sensor.step(frame as f64 / rate_hz, &course.trajectory);
+                counts.extend(sensor.counts().iter().map(|count| sensor.convert(*count)));
+            }
+        }
+        counts
+    }
+
+    fn separation(&self, dose: Dose) -> Separation {
+        self.separation_of(&self.counts(self.base, &[dose]))
+    }
+
+    fn separation_of(&self, with: &[f64]) -> Separation {
+        let array = &self.base.rig.array;
+        let sigma_counts = self.noise.effective_rms_counts(array.step_counts());
+        let from = |clean: &[f64], wider: &[f64]| {
+            Separation::new(clean, with, wider, array.elements(), sigma_counts)
+        };
+        let mut separation = from(&self.clean, &self.wider);
+        // Counts are linear in small changes of the spread only: what looks like a large one is held against that spread.
+        let mut spread = 1.0;
+        for _ in 0..SPREAD_ROUNDS {
+            let change = (WIDER - 1.0) * separation.spread_steps;
+            if change.abs() < SPREAD_CHANGE_LEAST {
+                break;
+            }
+            spread *= (1.0 + change).clamp(0.8, 1.25);
+            let (Ok(base), Ok(wider)) = (self.base.spread_by(spread), self.base.spread_by(WIDER * spread))
+            else {
+                break;
+            };
+            let nearer = from(&self.counts(&base, &[]), &self.counts(&wider, &[]));
+            let z_beyond_spread = nearer.z_beyond_spread.min(separation.z_beyond_spread);
+            separation = Separation { z_beyond_spread, spread_steps: nearer.spread_steps, ..separation };
+        }
+        separation
+    }
+
+    /// The strength at which a physics lies `wanted` from the base model: the dose, its separation, and whether it is
+    /// the one wanted. Where it cannot be (an element is dead or it is not), the nearest that is any.
+    ///
+    /// Separation grows about in proportion to strength, which makes the first guess of each step.
+    fn dose(&self, dose: Dose, wanted: f64, z_of: fn(&Separation) -> f64) -> (Dose, Separation, bool) {
+        let (mut low, mut high) = (STRENGTH_MIN, STRENGTH_MAX);
+        let mut strength: f64 = 1.0;
+        let mut nearest = (dose, Separation::default(), f64::INFINITY);
+        for _ in 0..TRIALS_MAX {
+            let tried = Dose { strength, ..dose };
+            let separation = self.separation(tried);
+            let z = z_of(&separation);
+            let off = (z / wanted).ln().abs();
+            if off < nearest.2 {
+                nearest = (tried, separation, off);
+            }
+            if off <= CLOSE || low >= 0.999 * high {
+                break;
+            }
+            if z < wanted {
+                low = strength;
+            } else {
+                high = strength;
+            }
+            let guess = strength * (wanted / z).clamp(0.05, 20.0);
+            strength = if guess > low * 1.001 && guess < high * 0.999 {
+                guess
+            } else if guess >= STRENGTH_MAX && high >= STRENGTH_MAX {
+                STRENGTH_MAX
+            } else {
+                (low * high).sqrt()
+            };
+        }
+        let (dose, separation, off) = nearest;
+        (dose, separation, off <= 2.0 * CLOSE)
+    }
+}
+
+/// One physics by chance, of those that a condition lets through.
+fn one_of(rng: &mut ChaCha8Rng, is_right: impl Fn(&Definition) -> bool) -> Option<&'static Definition> {
+    let fitting: Vec<&'static Definition> =
+        CATALOGUE.iter().copied().filter(|definition| is_right(definition)).collect();
+    fitting.choose(rng).copied()
+}
+
+#[cfg(test)]
+#[path = "recipe_tests.rs"]
+mod tests;

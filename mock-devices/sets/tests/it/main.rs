@@ -1,0 +1,3 @@
+//! The catalogue of hidden physics, held against the base model.
+
+mod catalogue;

@@ -1,0 +1,49 @@
+//! Vendor bulk: a pair of endpoints with an interface of the vendor's class, for programs that read USB themselves.
+//!
+//! Each frame is a transfer of its own, which a short packet ends.
+//!
+//! # Source
+//! USB 2.0, section 5.8.
+
+use super::{Function, Place, Reply, ended_by_short};
+use crate::descriptor::{Carrier, Class, Endpoint, Group, IN, Interface, Speed};
+use crate::setup::{Refused, Setup};
+
+/// Frames at a bulk endpoint.
+#[derive(Debug)]
+pub(crate) struct Bulk {
+    packet_bytes: u16,
+    frame_bytes: usize,
+}
+
+impl Bulk {
+    /// Frames of so many bytes, at least 1.
+    pub(crate) fn new(speed: Speed, frame_bytes: usize) -> Self {
+        Self { packet_bytes: speed.bulk_packet_bytes(), frame_bytes }
+    }
+}
+
+impl Function for Bulk {
+    fn group(&self, Place { interface, endpoint }: Place) -> Group {
+        let bulk = |address| Endpoint { address, carrier: Carrier::Bulk, packet_bytes: self.packet_bytes };
+        let interface = Interface {
+            number: interface,
+            class: Class::VENDOR,
+            class_descriptors: Vec::new(),
+            endpoints: vec![bulk(IN | endpoint), bulk(endpoint)],
+        };
+        Group { interfaces: vec![interface] }
+    }
+
+    fn control(&mut self, _setup: Setup, _data: &[u8]) -> Result<Reply, Refused> {
+        Err(Refused)
+    }
+
+    fn packets(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
+        bytes.chunks(self.frame_bytes).flat_map(|frame| ended_by_short(frame, self.packet_bytes)).collect()
+    }
+}
+
+#[cfg(test)]
+#[path = "bulk_tests.rs"]
+mod tests;
