@@ -1,16 +1,17 @@
-//! What an `anyskin` board may send: frames do not depend on how they arrive.
+//! Any bytes from an `anyskin` board: frames do not depend on how they arrive, and no session panics.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tactus_fuzz::arrivals;
-use tactus_wire::anyskin::Decoder;
+use tactus_fuzz::{arrivals, run_sensor};
+use tactus_wire::anyskin::{Decoder, MAGNETOMETERS, Session};
 
 fuzz_target!(|input: &[u8]| {
     let (whole, pieces) = arrivals(input);
     assert_eq!(frames([whole]), frames(pieces));
+    run_sensor(Session::new(), 3 * MAGNETOMETERS, input);
 });
 
-/// As text, in which a number that is none equals itself.
+/// As text, so that NaN equals itself.
 fn frames<'a>(arrivals: impl IntoIterator<Item = &'a [u8]>) -> Vec<String> {
     let mut decoder = Decoder::new();
     let mut frames = Vec::new();

@@ -1,19 +1,19 @@
-//! Any description with any bytes: it is refused, or what it decodes does not depend on how it arrives, and a capture
-//! can be held against it.
+//! Any description with any bytes. A description that is accepted decodes the same frames however the bytes arrive, and
+//! neither its session nor the check of a capture panics.
 //!
-//! The input is a description in TOML, a zero byte, and what a device sends.
+//! The input is a description in TOML, a zero byte, and the device's bytes.
 #![no_main]
 
 use std::sync::Arc;
 
 use libfuzzer_sys::fuzz_target;
-use tactus_fuzz::arrivals;
-use tactus_wire::declared::{Decoder, Format, Framing, RawFormat, check_capture, propose};
+use tactus_fuzz::{arrivals, run_sensor};
+use tactus_wire::declared::{Decoder, Format, Framing, RawFormat, Session, check_capture, propose};
 
-/// What is searched for strides and checksums: a search of more would leave time for nothing else.
+/// Bytes that are searched for strides and checksums. A longer search would leave no time for the rest.
 const SEARCHED_BYTES: usize = 256;
 
-/// What a description that is shipped decodes.
+/// A description that is shipped.
 const SHIPPED: &str = include_str!("../../config/links/digitacts.toml");
 
 fuzz_target!(|input: &[u8]| {
@@ -29,6 +29,7 @@ fuzz_target!(|input: &[u8]| {
         } else {
             frames(&format, pieces);
         }
+        run_sensor(Session::new(&format), format.samples().elements(), bytes);
         check_capture(&format, searched);
     }
     propose(searched);
@@ -38,7 +39,7 @@ fn format(text: &str) -> Option<Format> {
     toml::from_str::<RawFormat>(text).ok()?.check().ok()
 }
 
-/// As text, in which a number that is none equals itself.
+/// As text, so that NaN equals itself.
 fn frames<'a>(format: &Arc<Format>, arrivals: impl IntoIterator<Item = &'a [u8]>) -> Vec<String> {
     let mut decoder = Decoder::new(Arc::clone(format));
     let mut frames = Vec::new();

@@ -1,4 +1,4 @@
-//! Rig files, models and descriptions of links as somebody may write them: refused or read, without a panic.
+//! Any text as a rig file, a model or a description of a link: it is read or refused without a panic.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -7,8 +7,8 @@ use tactus_schema::model::Model;
 use tactus_wire::declared::RawFormat;
 
 fuzz_target!(|text: &str| {
-    // The errors are for a person: they must be printable too.
-    let told = [
+    // Formatting an error must not panic either.
+    let messages = [
         Rig::from_toml(text).err().map(|error| error.to_string()),
         Rig::from_json(text).err().map(|error| error.to_string()),
         Model::from_toml(text).err().map(|error| error.to_string()),
@@ -17,5 +17,5 @@ fuzz_target!(|text: &str| {
             .and_then(|raw| raw.check().err())
             .map(|error| error.to_string()),
     ];
-    assert!(told.iter().flatten().all(|error| !error.is_empty()));
+    assert!(messages.iter().flatten().all(|message| !message.is_empty()));
 });

@@ -1,9 +1,8 @@
-//! What a `zaber-ascii` stage may send, whatever is asked of it: no conversation panics, and every command ends once at
-//! most.
+//! Any bytes from a `zaber-ascii` stage while it is given commands: no session panics, and every command ends at most once.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tactus_fuzz::converse;
+use tactus_fuzz::run_stage;
 use tactus_wire::stage::Direction;
 use tactus_wire::zaber::{Axis, Config, Session};
 
@@ -27,7 +26,7 @@ fuzz_target!(|input: &[u8]| {
         trusts_reference: true,
     };
     match Session::new(config) {
-        Ok(session) => converse(session, input),
+        Ok(session) => run_stage(session, input),
         Err(error) => unreachable!("three axes of one device: {error}"),
     }
 });

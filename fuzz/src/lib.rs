@@ -1,15 +1,15 @@
-//! What the fuzz targets share: how a fuzzer's input becomes arrivals on a link.
+//! Shared by the fuzz targets: turns a fuzzer's input into reads of a link and into events of a session.
 
 use std::time::Duration;
 
-use tactus_wire::stage::{Action, Session};
+use tactus_wire::{sensor, stage};
 
-/// Bytes that arrive together, at most.
+/// Most bytes that arrive together.
 const ARRIVAL_MAX_BYTES: usize = 64;
 
-/// Cuts what is behind the first half of the input into arrivals whose lengths the first half tells.
+/// Cuts the second half of the input into arrivals. The bytes of the first half give their lengths.
 ///
-/// The whole that they make up stands first.
+/// Returns the uncut second half, and the arrivals.
 pub fn arrivals(input: &[u8]) -> (&[u8], Vec<&[u8]>) {
     let (lengths, whole) = input.split_at(input.len() / 2);
     let mut rest = whole;
@@ -23,65 +23,93 @@ pub fn arrivals(input: &[u8]) -> (&[u8], Vec<&[u8]>) {
     (whole, arrivals)
 }
 
-/// One thing that happens to a session.
+/// One event of a session.
 #[derive(Debug, Clone, Copy)]
-pub enum Happening<'a> {
-    /// These bytes come.
+pub enum SessionEvent<'a> {
+    /// These bytes arrive.
     Bytes(&'a [u8]),
     /// Time passes until the session's deadline.
     Deadline,
-    /// A person or a run asks for something; which, the number says.
+    /// A stage is given a command; the number selects which. A sensor's session takes it as a deadline.
     Command(u8),
     /// Time passes.
     Pause(Duration),
 }
 
-/// Reads the input as a list of what happens.
-pub fn happenings(mut input: &[u8]) -> Vec<Happening<'_>> {
-    let mut happenings = Vec::new();
+/// Reads the input as a list of events.
+pub fn events(mut input: &[u8]) -> Vec<SessionEvent<'_>> {
+    let mut events = Vec::new();
     while let [kind, rest @ ..] = input {
         input = rest;
-        happenings.push(match kind {
-            0..=31 => Happening::Deadline,
-            32..=63 => Happening::Pause(Duration::from_millis(u64::from(*kind))),
-            64..=95 => Happening::Command(*kind - 64),
+        events.push(match kind {
+            0..=31 => SessionEvent::Deadline,
+            32..=63 => SessionEvent::Pause(Duration::from_millis(u64::from(*kind))),
+            64..=95 => SessionEvent::Command(*kind - 64),
             _ => {
                 let (bytes, rest) = input.split_at(usize::from(*kind - 95).min(input.len()));
                 input = rest;
-                Happening::Bytes(bytes)
+                SessionEvent::Bytes(bytes)
             }
         });
     }
-    happenings
+    events
 }
 
-/// Lets everything happen to a stage's session, whatever a person asks meanwhile.
+/// Runs a sensor's session through the events.
 ///
 /// # Panics
-/// If a command ends twice, or one that was never given.
-pub fn converse(mut session: impl Session, input: &[u8]) {
+/// If a reading has another number of elements, or lists a bad one that does not exist.
+pub fn run_sensor(mut session: impl sensor::Session, elements: usize, input: &[u8]) {
     let mut now = Duration::ZERO;
-    let (mut asked, mut done) = (0, 0);
     let mut actions = session.start(now);
-    for happening in happenings(input) {
-        done += actions.iter().filter(|action| matches!(action, Action::Done(_))).count();
-        assert!(done <= asked, "a command ended twice, or one that was never given");
-        if actions.iter().any(|action| matches!(action, Action::Failed(_))) {
-            return;
-        }
-        actions = match happening {
-            Happening::Bytes(bytes) => session.receive(now, bytes),
-            Happening::Deadline => {
-                now = session.deadline().unwrap_or(now).max(now);
-                session.timer(now)
+    for event in events(input) {
+        for action in actions {
+            if let sensor::Action::Reading(reading) = action {
+                assert_eq!(reading.counts.len(), elements);
+                assert!(reading.bad.iter().all(|bad| usize::try_from(*bad).is_ok_and(|bad| bad < elements)));
             }
-            Happening::Pause(pause) => {
+        }
+        actions = match event {
+            SessionEvent::Bytes(bytes) => session.receive(now, bytes),
+            SessionEvent::Pause(pause) => {
                 now += pause;
                 Vec::new()
             }
-            Happening::Command(3) => session.stop(now),
-            Happening::Command(_) if !session.is_ready() => Vec::new(),
-            Happening::Command(kind) => {
+            SessionEvent::Deadline | SessionEvent::Command(_) => {
+                now = session.deadline().unwrap_or(now).max(now);
+                session.timer(now)
+            }
+        };
+    }
+}
+
+/// Runs a stage's session through the events, with commands at any time.
+///
+/// # Panics
+/// If a command ends twice, or one that was never given.
+pub fn run_stage(mut session: impl stage::Session, input: &[u8]) {
+    let mut now = Duration::ZERO;
+    let (mut asked, mut done) = (0, 0);
+    let mut actions = session.start(now);
+    for event in events(input) {
+        done += actions.iter().filter(|action| matches!(action, stage::Action::Done(_))).count();
+        assert!(done <= asked, "a command ended twice, or one that was never given");
+        if actions.iter().any(|action| matches!(action, stage::Action::Failed(_))) {
+            return;
+        }
+        actions = match event {
+            SessionEvent::Bytes(bytes) => session.receive(now, bytes),
+            SessionEvent::Deadline => {
+                now = session.deadline().unwrap_or(now).max(now);
+                session.timer(now)
+            }
+            SessionEvent::Pause(pause) => {
+                now += pause;
+                Vec::new()
+            }
+            SessionEvent::Command(3) => session.stop(now),
+            SessionEvent::Command(_) if !session.is_ready() => Vec::new(),
+            SessionEvent::Command(kind) => {
                 asked += 1;
                 match kind {
                     0 => session.home(now),

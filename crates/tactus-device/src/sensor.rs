@@ -1,18 +1,12 @@
 //! The tactile array.
 //!
-//! One driver reads every array: it connects, reconnects, numbers frames and tells of losses. How a device is
-//! spoken to is a [`SensorCodec`], behind which stands a conversation without I/O for each protocol.
+//! One driver reads every array. It connects, reconnects, numbers frames and reports losses. The protocol itself is a
+//! [`tactus_wire::sensor::Session`], which a [`SensorCodec`] makes for each connection.
 
-mod anyskin;
 mod codec;
-mod conversation;
-mod declared;
 mod driver;
 mod link_file;
-mod listening;
 mod sequence;
-mod singletact;
-mod weiss;
 
 use futures_util::future::BoxFuture;
 use tactus_schema::{Frame, pb};

@@ -14,6 +14,8 @@
 
 mod decoder;
 mod frame;
+mod session;
 
 pub use decoder::{CONFIRMING_FRAMES, Decoder, DecoderStats};
 pub use frame::{FRAME_BYTES, Frame, MAGNETOMETERS, Magnetometer};
+pub use session::Session;

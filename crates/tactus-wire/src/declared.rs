@@ -52,7 +52,7 @@
 //! [`RawFormat`] is the description as written, for serde only: whoever reads a file knows its path and shows
 //! where in the file an error lies, and a description can come in other ways than as TOML.
 //! [`RawFormat::check`] makes a [`Format`], or names the field that contradicts the others. [`Decoder`] is
-//! the host's side, [`Encoder`] a virtual device's.
+//! the host's side, [`Encoder`] a virtual device's. [`Session`] reads one connection to a device.
 //!
 //! To match a description to a device, record what it sends: [`propose`] says what bytes of an unknown format
 //! may be, [`check_capture`] holds them against a description, and says how to correct it.
@@ -72,7 +72,9 @@ mod inspect;
 mod layout;
 mod raw;
 mod samples;
+mod session;
 mod sniff;
+mod ticks;
 
 pub use capture::{CaptureReport, Hint, Mismatch, Stride, check_capture};
 pub use checksum::{Algorithm, CRC32, Crc, CrcParameters, CrcWidth};
@@ -85,6 +87,7 @@ pub use raw::{
     RawSamples, RawSequence, RawTimestamp, RawUsb, SCHEMA, SampleType,
 };
 pub use samples::Samples;
+pub use session::Session;
 pub use sniff::{MAX_STRIDE_BYTES, Proposal, propose};
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ pub mod anyskin;
 pub mod declared;
 pub mod grbl;
 pub mod lines;
+pub mod sensor;
 pub mod singletact;
 pub mod stage;
 pub mod weiss;

@@ -32,9 +32,7 @@ mod session;
 pub use decoder::{Decoder, DecoderStats};
 pub use reply::{ElementReading, Reply, ReplyError, Via};
 pub use request::{Operation, Request, RequestError};
-pub use session::{
-    ANSWER_TIMEOUT, Action, Config, ConfigError, Loss, Reading, SILENT_POLLS, STALE_AFTER, Session, TICK,
-};
+pub use session::{ANSWER_TIMEOUT, Config, ConfigError, SILENT_POLLS, STALE_AFTER, Session, TICK};
 
 /// The address that every element answers at.
 pub const DEFAULT_ADDRESS: u8 = 4;

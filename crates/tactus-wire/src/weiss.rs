@@ -14,7 +14,7 @@
 //! [`Decoder`] and [`Config`] are told which to expect.
 //!
 //! [`Decoder`] serves both ends of the link: the host reads replies and frames with it, a virtual
-//! device reads [`Command`]s. [`Session`] is the host's side of the conversation.
+//! device reads [`Command`]s. [`Session`] is the host's side.
 
 mod checksum;
 mod command;
@@ -35,7 +35,7 @@ pub use decoder::{ChecksumError, Decoder, DecoderStats};
 pub use frame::{Frame, FrameError, encode_frame};
 pub use info::{ControllerInfo, ErrorCode, InfoError, MatrixInfo, SensorInfo};
 pub use packet::{MAX_PAYLOAD_BYTES, Packet, encode_packet, id};
-pub use session::{ANSWER_TIMEOUT, Action, Config, Device, Loss, Reading, Session, SessionError};
+pub use session::{ANSWER_TIMEOUT, Config, Session, SessionError, TICK};
 
 /// What the controller sends three times about 7 s after power-up: a terminal's status query.
 /// It takes commands only from about 8 s on.

@@ -1,54 +1,50 @@
-//! How a sensor is spoken to.
+//! The factory that makes a protocol session from a rig file.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use tactus_schema::rig::{SensorProtocol, WeissChecksum};
-use tactus_wire::declared::{Format, Framing};
-use tactus_wire::singletact;
+use tactus_wire::declared::Format;
+use tactus_wire::sensor::{Cause, Loss, Session};
 use tactus_wire::weiss::Checksum;
+use tactus_wire::{anyskin, declared, singletact, weiss};
 
-use super::anyskin::Board;
-use super::conversation::{Conversation, Loss};
-use super::declared::{Listener, TickLength};
 use super::driver::ArrayExpectation;
-use super::singletact::Poller;
-use super::weiss::{self, Controller};
-use crate::ErrorKind;
 
-/// How a sensor is spoken to: a rig file's `[sensor]` and the file that it may name.
+/// The protocol of a sensor: a rig file's `[sensor]`, with the format file that it may name.
 ///
-/// | codec | speaks first | device's clock | frames lost on the way are counted by |
+/// | codec | speaks first | device's clock | lost frames are counted by |
 /// |---|---|---|---|
 /// | `WeissDsa` | the host, once | 1 ms | the device's clock |
 /// | `SingleTact` | the host, for each reading | 0.1 ms | rounds of polls without a reading |
 /// | `AnySkin` | the device | none | damage among the bytes, and the host's clock |
 /// | `Declared` | the device | as described | its count of frames, or its clock, or as `AnySkin` |
 ///
-/// By the host's clock alone, a frame behind a loss looks like one that was held up: the gap is told with the next
-/// frame, one too late.
+/// By the host's clock alone, a frame after a loss looks like a delayed one. The gap is therefore reported one frame
+/// late.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SensorCodec {
     /// `weiss-dsa`.
     WeissDsa {
-        /// How packets are closed.
+        /// Which checksum the controller's firmware uses.
         checksum: Checksum,
     },
-    /// `singletact`; an element for each address.
+    /// `singletact`.
     SingleTact {
-        /// Of the elements, on the board's bus.
+        /// I2C addresses, one for each element.
         addresses: Vec<u8>,
     },
     /// `anyskin`: counts are microteslas, by magnetometer and axis.
     AnySkin,
-    /// Frames that are described.
+    /// `declared`.
     Declared {
-        /// The description.
+        /// The format as the file describes it.
         format: Arc<Format>,
     },
 }
 
 impl Default for SensorCodec {
-    /// That of the simulated rig.
+    /// The codec of the simulated rig.
     fn default() -> Self {
         Self::WeissDsa { checksum: Checksum::default() }
     }
@@ -72,50 +68,33 @@ impl SensorCodec {
         }
     }
 
-    /// Its name in [`SensorInfo.link`](tactus_schema::pb::SensorInfo::link).
-    pub(super) fn name(&self) -> String {
-        match self {
-            Self::WeissDsa { checksum: Checksum::Crc } => "weiss-dsa".to_owned(),
-            Self::WeissDsa { checksum: Checksum::Sum8 } => "weiss-dsa, sum8".to_owned(),
-            Self::SingleTact { .. } => "singletact".to_owned(),
-            Self::AnySkin => "anyskin".to_owned(),
-            Self::Declared { format } => format!("declared, {}", format.name()),
-        }
-    }
-
-    /// Length of the device's tick in ns; 0 if it has no clock.
-    pub(super) fn tick_ns(&self) -> u64 {
-        let ns = |tick: std::time::Duration| u64::try_from(tick.as_nanos()).unwrap_or(u64::MAX);
-        match self {
-            Self::WeissDsa { .. } => ns(weiss::TICK),
-            Self::SingleTact { .. } => ns(singletact::TICK),
-            Self::AnySkin => 0,
-            Self::Declared { format } => TickLength::of(format).told_ns,
-        }
-    }
-
-    /// The longest packet of which one read must hold all; `None` where bytes are a stream.
-    pub(super) fn packet_bytes(&self) -> Option<usize> {
-        match self {
-            Self::Declared { format } if format.framing() == Framing::Packet => Some(format.frame_bytes()),
-            Self::WeissDsa { .. } | Self::SingleTact { .. } | Self::AnySkin | Self::Declared { .. } => None,
-        }
-    }
-
-    /// A conversation that has not started.
-    pub(super) fn converse(
-        &self,
-        expect: &ArrayExpectation,
-        device: &str,
-    ) -> Result<Box<dyn Conversation>, Loss> {
+    /// A session for one connection.
+    ///
+    /// # Errors
+    /// Addresses that cannot be polled.
+    pub(super) fn session(&self, expect: &ArrayExpectation) -> Result<Box<dyn Session + Send>, Loss> {
         Ok(match self {
-            Self::WeissDsa { checksum } => Box::new(Controller::new(*checksum, expect, device)),
-            Self::SingleTact { addresses } => Box::new(
-                Poller::new(addresses, expect.rate_hz)
-                    .map_err(|error| Loss::new(ErrorKind::Protocol, error.to_string()))?,
-            ),
-            Self::AnySkin => Box::new(Board::default()),
-            Self::Declared { format } => Box::new(Listener::new(format)),
+            Self::WeissDsa { checksum } => Box::new(weiss::Session::new(weiss::Config {
+                rows: expect.rows,
+                cols: expect.cols,
+                fps: whole_hz(expect.rate_hz),
+                run_length: false,
+                checksum: *checksum,
+            })),
+            Self::SingleTact { addresses } => {
+                let interval = Duration::try_from_secs_f64(expect.rate_hz.recip()).unwrap_or(Duration::ZERO);
+                let config = singletact::Config { addresses: addresses.clone(), interval };
+                let session = singletact::Session::new(config)
+                    .map_err(|error| Loss { cause: Cause::Protocol, what: error.to_string() })?;
+                Box::new(session)
+            }
+            Self::AnySkin => Box::new(anyskin::Session::new()),
+            Self::Declared { format } => Box::new(declared::Session::new(format)),
         })
     }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, as it should")]
+fn whole_hz(rate_hz: f64) -> u16 {
+    rate_hz.round() as u16
 }

@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use tactus_schema::{Frame, FrameFlags, Rig, Stamp, pb};
+use tactus_schema::{DeviceTick, Frame, FrameFlags, Rig, Stamp, pb};
+use tactus_wire::sensor::{Action, Cause, Loss, Reading, Session};
 use tokio::sync::mpsc;
 use tokio::time::sleep;
 
-use super::conversation::{Action, Before, Loss, Reading};
-use super::sequence::{Arrival, Cause, Sequence};
+use super::sequence::{Arrival, GapCause, Sequence};
 use super::{Sensor, SensorCodec, SensorEvent};
 use crate::backoff::Backoff;
 use crate::link::{Link, LinkEvent, since_start};
@@ -63,7 +63,7 @@ impl SensorDriver {
         let driver = Driver {
             device: format!("sensor on {connect}"),
             transport: connect.to_string(),
-            sequence: Sequence::new(expect.rate_hz, Duration::from_nanos(codec.tick_ns())),
+            sequence: Sequence::new(expect.rate_hz),
             held: vec![0.0; expect.elements()],
             codec,
             connect,
@@ -137,7 +137,7 @@ impl Driver {
             let lost = match self.connect.connect().await {
                 Ok(stream) => {
                     let link = Link::new(stream, self.clock, self.device.clone());
-                    self.converse(link, &mut backoff).await
+                    self.read_link(link, &mut backoff).await
                 }
                 Err(error) => Ok(error),
             };
@@ -154,19 +154,20 @@ impl Driver {
     }
 
     /// Reads from an open link until it fails; gives why.
-    async fn converse(&mut self, link: Link, backoff: &mut Backoff) -> Result<DeviceError, Unread> {
-        let mut link = match self.codec.packet_bytes() {
+    async fn read_link(&mut self, link: Link, backoff: &mut Backoff) -> Result<DeviceError, Unread> {
+        let mut session = match self.codec.session(&self.expect) {
+            Ok(session) => session,
+            Err(loss) => return Ok(self.error(loss)),
+        };
+        let mut link = match session.packet_bytes() {
             // Room for one byte more: a longer packet must not look like a whole one.
             Some(bytes) => link.reading_at_least(bytes + 1),
             None => link,
         };
-        let mut conversation = match self.codec.converse(&self.expect, &self.device) {
-            Ok(conversation) => conversation,
-            Err(loss) => return Ok(self.error(loss)),
-        };
-        let mut cause = Cause::Reconnected;
+        self.sequence.set_tick(Duration::from_nanos(session.tick_ns()));
+        let mut cause = GapCause::Reconnected;
         let mut now = self.clock.now();
-        let mut actions = conversation.start(since_start(now));
+        let mut actions = session.start(since_start(now));
         loop {
             let mut together = actions.iter().filter(|action| matches!(action, Action::Reading(_))).count();
             for action in actions {
@@ -176,17 +177,19 @@ impl Driver {
                             return Ok(error);
                         }
                     }
-                    Action::Connected => {
+                    Action::Connected { identity } => {
                         backoff.reset();
-                        self.connected().await?;
+                        let info = self.describe(&*session);
+                        self.connected(info, identity).await?;
                     }
                     Action::Reading(reading) => {
                         self.reading(now, reading, together, &mut cause)?;
                         together -= 1;
                     }
+                    Action::Warning(what) => tracing::warn!(device = self.device, "{what}"),
                     Action::Lost(loss) => {
-                        if loss.restarted {
-                            cause = Cause::Reconnected;
+                        if loss.cause == Cause::Restarted {
+                            cause = GapCause::Reconnected;
                         }
                         let error = self.error(loss);
                         self.lost(error).await?;
@@ -197,41 +200,44 @@ impl Driver {
             let event = tokio::select! {
                 biased;
                 () = self.events.closed() => return Err(Unread),
-                event = link.next(conversation.deadline()) => event,
+                event = link.next(session.deadline()) => event,
             };
             actions = match event {
                 Ok((stamp, LinkEvent::Received(bytes))) => {
                     now = stamp;
-                    conversation.receive(since_start(now), bytes)
+                    session.receive(since_start(now), bytes)
                 }
                 Ok((stamp, LinkEvent::Deadline)) => {
                     now = stamp;
-                    conversation.timer(since_start(now))
+                    session.timer(since_start(now))
                 }
                 Err(error) => {
-                    tracing::info!(device = self.device, met = conversation.quality(), "sensor link ended");
+                    tracing::info!(device = self.device, met = session.quality(), "sensor link ended");
                     return Ok(error);
                 }
             };
         }
     }
 
-    async fn connected(&mut self) -> Result<(), Unread> {
+    async fn connected(&mut self, info: pb::SensorInfo, identity: Option<String>) -> Result<(), Unread> {
         self.told = None;
-        tracing::info!(device = self.device, "sensor connected");
-        let info = pb::SensorInfo {
+        tracing::info!(device = self.device, identity, "sensor connected");
+        self.tell(SensorEvent::Connected(info)).await
+    }
+
+    fn describe(&self, session: &dyn Session) -> pb::SensorInfo {
+        pb::SensorInfo {
             rig: self.expect.rig.clone(),
             array: self.expect.array.clone(),
             rows: count(self.expect.rows),
             cols: count(self.expect.cols),
             rate_hz: self.expect.rate_hz,
             full_scale_counts: self.expect.full_scale_counts,
-            tick_ns: self.codec.tick_ns(),
-            link: self.codec.name(),
+            tick_ns: session.tick_ns(),
+            link: session.name(),
             transport: self.transport.clone(),
             simulated: self.expect.simulated,
-        };
-        self.tell(SensorEvent::Connected(info)).await
+        }
     }
 
     /// Makes a frame of a reading, the first of `together` that came at once.
@@ -240,10 +246,10 @@ impl Driver {
         now: Stamp,
         reading: Reading,
         together: usize,
-        cause: &mut Cause,
+        cause: &mut GapCause,
     ) -> Result<(), Unread> {
-        if reading.new_clock && *cause != Cause::Reconnected {
-            *cause = Cause::ClockJumped;
+        if reading.new_clock && *cause != GapCause::Reconnected {
+            *cause = GapCause::ClockJumped;
         }
         // Room for the frame and for a gap before it.
         let Ok(room) = self.events.try_reserve_many(2) else {
@@ -253,22 +259,23 @@ impl Driver {
             if self.passed_over == 0 {
                 tracing::warn!(device = self.device, "frames are not taken: they are passed over");
             }
-            self.passed_over += 1 + reading.before.missing();
+            self.passed_over += 1 + reading.evidence.counted();
             return Ok(());
         };
         if self.passed_over > 0 {
             tracing::warn!(device = self.device, frames = self.passed_over, "frames were passed over");
-            if *cause == Cause::Link {
-                *cause = Cause::HostTooSlow;
+            if *cause == GapCause::Link {
+                *cause = GapCause::HostTooSlow;
             }
         }
+        let device_tick = reading.tick.map(DeviceTick);
         let place = self.sequence.place(Arrival {
-            tick: reading.tick,
-            before: reading.before,
+            tick: device_tick,
+            evidence: reading.evidence,
             received: now.mono,
             together,
             passed_over: std::mem::take(&mut self.passed_over),
-            cause: std::mem::replace(cause, Cause::Link),
+            cause: std::mem::replace(cause, GapCause::Link),
         });
         let mut flags = place.flags;
         if flags.contains(FrameFlags::NEW_EPOCH) {
@@ -289,7 +296,7 @@ impl Driver {
         let frame = Frame {
             seq: place.seq,
             epoch: place.epoch,
-            device_tick: reading.tick,
+            device_tick,
             received: now,
             counts,
             flags,
@@ -319,17 +326,13 @@ impl Driver {
     }
 
     fn error(&self, loss: Loss) -> DeviceError {
-        DeviceError::new(&self.device, loss.kind, loss.what)
-    }
-}
-
-impl Before {
-    /// What the device itself says is missing.
-    fn missing(self) -> u64 {
-        match self {
-            Self::Numbers { lost, .. } => lost,
-            Self::Times | Self::Damage => 0,
-        }
+        let kind = match loss.cause {
+            Cause::Silent => ErrorKind::Timeout,
+            Cause::Restarted => ErrorKind::Disconnected,
+            Cause::Protocol => ErrorKind::Protocol,
+            Cause::DeviceFault => ErrorKind::DeviceFault,
+        };
+        DeviceError::new(&self.device, kind, loss.what)
     }
 }
 

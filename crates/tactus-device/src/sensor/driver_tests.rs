@@ -1,3 +1,10 @@
+#[path = "driver_tests/anyskin.rs"]
+mod anyskin;
+#[path = "driver_tests/declared.rs"]
+mod declared;
+#[path = "driver_tests/singletact.rs"]
+mod singletact;
+
 use std::fmt;
 use std::sync::Mutex;
 use std::time::Duration;

@@ -69,11 +69,9 @@ impl SensorCodec {
     /// [`LinkFileError`] names the file and the field, and of a contradiction both fields.
     pub fn load(rig: &Rig, rig_file: &Path) -> Result<(Self, Option<LinkFile>), LinkFileError> {
         let Some(service) = &rig.service else { return Ok((Self::default(), None)) };
-        let format = match &service.sensor.protocol {
-            SensorProtocol::Declared { format } => format,
-            protocol @ (SensorProtocol::WeissDsa { .. }
-            | SensorProtocol::SingleTact { .. }
-            | SensorProtocol::AnySkin) => return Ok((Self::of(protocol).unwrap_or_default(), None)),
+        let protocol = &service.sensor.protocol;
+        let SensorProtocol::Declared { format } = protocol else {
+            return Ok((Self::of(protocol).unwrap_or_default(), None));
         };
         let path = rig_file.parent().unwrap_or(Path::new("")).join(format);
         let text = fs::read_to_string(&path).map_err(|source| LinkFileError::Read {

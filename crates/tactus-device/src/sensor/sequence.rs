@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 use tactus_schema::{DeviceTick, FrameFlags, MonoTime, pb};
-
-use super::conversation::Before;
+use tactus_wire::sensor::LossEvidence;
 
 /// By the host's clock alone, a frame this many periods behind its time may be one behind a loss.
 const BEHIND_PERIODS: f64 = 0.5;
@@ -42,13 +41,13 @@ pub(super) struct Arrival {
     /// By the device's clock; comparable with the last frame's unless `cause` says otherwise.
     pub(super) tick: Option<DeviceTick>,
     /// What else is known of the way from the last frame.
-    pub(super) before: Before,
+    pub(super) evidence: LossEvidence,
     pub(super) received: MonoTime,
     /// Frames that came at once, this one and those behind it: by their arrival, they stand for as many periods.
     pub(super) together: usize,
     /// Frames that came between the last one and this, and were not taken.
     pub(super) passed_over: u64,
-    pub(super) cause: Cause,
+    pub(super) cause: GapCause,
 }
 
 /// A frame's place.
@@ -64,7 +63,7 @@ pub(super) struct Place {
 
 /// Why frames may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Cause {
+pub(super) enum GapCause {
     /// They were lost on the way, or never sent.
     Link,
     /// The connection is another one.
@@ -76,11 +75,16 @@ pub(super) enum Cause {
 }
 
 impl Sequence {
-    /// No frames yet. A device without a clock has a tick of zero.
-    pub(super) fn new(rate_hz: f64, tick: Duration) -> Self {
-        // Of frames closer than two ticks a clock cannot tell how many there were.
-        let tells_apart = !tick.is_zero() && 2.0 * tick.as_secs_f64() * rate_hz <= 1.0;
-        Self { rate_hz, tick: tells_apart.then_some(tick), epoch: 0, last: None }
+    /// No frames yet, and no device's clock.
+    pub(super) fn new(rate_hz: f64) -> Self {
+        Self { rate_hz, tick: None, epoch: 0, last: None }
+    }
+
+    /// Sets the length of the device's tick; zero for a device without a clock.
+    pub(super) fn set_tick(&mut self, tick: Duration) {
+        // Between frames closer than two ticks, a clock cannot count the missing ones.
+        let resolves_frames = !tick.is_zero() && 2.0 * tick.as_secs_f64() * self.rate_hz <= 1.0;
+        self.tick = resolves_frames.then_some(tick);
     }
 
     /// Places the next frame.
@@ -96,7 +100,7 @@ impl Sequence {
                 gap: None,
             };
         };
-        let new_epoch = matches!(cause, Cause::Reconnected | Cause::ClockJumped);
+        let new_epoch = matches!(cause, GapCause::Reconnected | GapCause::ClockJumped);
         self.epoch += u32::from(new_epoch);
         let (lost_before, late_periods) = self.missing(last, &arrival);
         let seq = last.seq + u64::from(lost_before) + 1;
@@ -129,17 +133,20 @@ impl Sequence {
         };
         let passed_over = arrival.passed_over as f64;
         let mut late_periods = 0.0;
-        let missing = match (arrival.cause, arrival.before) {
-            (Cause::Link | Cause::HostTooSlow | Cause::ClockJumped, Before::Numbers { lost, wrap }) => {
+        let missing = match (arrival.cause, arrival.evidence) {
+            (
+                GapCause::Link | GapCause::HostTooSlow | GapCause::ClockJumped,
+                LossEvidence::Counted { lost, wrap },
+            ) => {
                 let lost = lost as f64 + passed_over;
                 // Whole rounds of the count, which it cannot tell itself.
                 lost + ((by_host - lost) / wrap as f64).round().max(0.0) * wrap as f64
             }
-            (Cause::Reconnected | Cause::ClockJumped, _) => by_host,
-            (Cause::Link | Cause::HostTooSlow, before) => by_ticks().unwrap_or_else(|| {
+            (GapCause::Reconnected | GapCause::ClockJumped, _) => by_host,
+            (GapCause::Link | GapCause::HostTooSlow, evidence) => by_ticks().unwrap_or_else(|| {
                 let late = last.late_periods + periods - 1.0 - passed_over;
                 let lost =
-                    self.missing_by_arrivals(last.late_periods, late, periods, before, arrival.together);
+                    self.missing_by_arrivals(last.late_periods, late, periods, evidence, arrival.together);
                 late_periods = settled(late - lost);
                 lost + passed_over
             }),
@@ -161,11 +168,11 @@ impl Sequence {
         was_late: f64,
         late: f64,
         periods: f64,
-        before: Before,
+        evidence: LossEvidence,
         together: usize,
     ) -> f64 {
         let alone = late - (together.max(1) - 1) as f64;
-        if before == Before::Damage || alone >= BUFFERED_S * self.rate_hz {
+        if evidence == LossEvidence::Damage || alone >= BUFFERED_S * self.rate_hz {
             alone.round().max(0.0)
         } else if periods >= BEHIND_PERIODS && was_late >= BEHIND_PERIODS && late >= BEHIND_PERIODS {
             was_late.min(late).round()
@@ -180,7 +187,7 @@ fn settled(late_periods: f64) -> f64 {
     if late_periods < BEHIND_PERIODS { late_periods.max(0.0) * (1.0 - FORGOTTEN) } else { late_periods }
 }
 
-impl Cause {
+impl GapCause {
     fn reason(self) -> &'static str {
         match self {
             Self::Link => "they never came from the device",

@@ -2,26 +2,33 @@ use std::time::Duration;
 
 use tactus_schema::{DeviceTick, FrameFlags, MonoTime};
 
-use super::{Arrival, Before, Cause, Place, Sequence};
+use super::{Arrival, GapCause, LossEvidence, Place, Sequence};
+
+/// 30 Hz.
+fn sequence_with(tick: Duration) -> Sequence {
+    let mut sequence = Sequence::new(30.0);
+    sequence.set_tick(tick);
+    sequence
+}
 
 /// 30 Hz, a tick a millisecond.
 fn sequence() -> Sequence {
-    Sequence::new(30.0, Duration::from_millis(1))
+    sequence_with(Duration::from_millis(1))
 }
 
 /// One frame, without a device's clock or count.
 fn arrival(received_ms: i64) -> Arrival {
     Arrival {
         tick: None,
-        before: Before::Times,
+        evidence: LossEvidence::TimesOnly,
         received: MonoTime::from_ns(received_ms * 1_000_000),
         together: 1,
         passed_over: 0,
-        cause: Cause::Link,
+        cause: GapCause::Link,
     }
 }
 
-fn place(sequence: &mut Sequence, tick_ms: u64, received_ms: i64, cause: Cause) -> Place {
+fn place(sequence: &mut Sequence, tick_ms: u64, received_ms: i64, cause: GapCause) -> Place {
     let tick = Some(DeviceTick(tick_ms));
     sequence.place(Arrival { tick, cause, ..arrival(received_ms) })
 }
@@ -31,7 +38,7 @@ fn a_steady_device_loses_nothing() {
     let mut sequence = sequence();
     for frame in 0..10_000u64 {
         // 33, 33, 34 ms; and however late they come.
-        let placed = place(&mut sequence, frame * 1000 / 30, 0, Cause::Link);
+        let placed = place(&mut sequence, frame * 1000 / 30, 0, GapCause::Link);
         assert_eq!((placed.seq, placed.lost_before, placed.gap), (frame, 0, None));
     }
 }
@@ -40,9 +47,9 @@ fn a_steady_device_loses_nothing() {
 fn lost_frames_are_counted_by_the_devices_clock() {
     for lost in [1u32, 2, 59, 1000] {
         let mut sequence = sequence();
-        place(&mut sequence, 0, 0, Cause::Link);
+        place(&mut sequence, 0, 0, GapCause::Link);
         let tick_ms = u64::from(lost + 1) * 1000 / 30;
-        let placed = place(&mut sequence, tick_ms, 5, Cause::Link);
+        let placed = place(&mut sequence, tick_ms, 5, GapCause::Link);
         assert_eq!((placed.seq, placed.lost_before), (u64::from(lost) + 1, lost));
         assert_eq!(placed.flags, FrameFlags::GAP_BEFORE);
         let gap = placed.gap.unwrap();
@@ -53,19 +60,19 @@ fn lost_frames_are_counted_by_the_devices_clock() {
 #[test]
 fn across_a_reconnection_the_hosts_clock_counts() {
     let mut sequence = sequence();
-    assert_eq!(place(&mut sequence, 70_000, 0, Cause::Reconnected).flags, FrameFlags::NEW_EPOCH);
-    place(&mut sequence, 70_033, 33, Cause::Link);
-    let placed = place(&mut sequence, 12, 2066, Cause::Reconnected);
+    assert_eq!(place(&mut sequence, 70_000, 0, GapCause::Reconnected).flags, FrameFlags::NEW_EPOCH);
+    place(&mut sequence, 70_033, 33, GapCause::Link);
+    let placed = place(&mut sequence, 12, 2066, GapCause::Reconnected);
     assert_eq!((placed.seq, placed.epoch, placed.lost_before), (62, 1, 60));
     assert_eq!(placed.flags, FrameFlags::NEW_EPOCH.with(FrameFlags::GAP_BEFORE));
-    assert_eq!(place(&mut sequence, 45, 2099, Cause::Link).seq, 63);
+    assert_eq!(place(&mut sequence, 45, 2099, GapCause::Link).seq, 63);
 }
 
 #[test]
 fn a_jumping_clock_loses_nothing_by_itself() {
     let mut sequence = sequence();
-    place(&mut sequence, 1000, 0, Cause::Link);
-    let placed = place(&mut sequence, 99_000, 33, Cause::ClockJumped);
+    place(&mut sequence, 1000, 0, GapCause::Link);
+    let placed = place(&mut sequence, 99_000, 33, GapCause::ClockJumped);
     assert_eq!((placed.seq, placed.epoch, placed.gap), (1, 1, None));
     assert_eq!(placed.flags, FrameFlags::NEW_EPOCH);
 }
@@ -73,36 +80,36 @@ fn a_jumping_clock_loses_nothing_by_itself() {
 #[test]
 fn the_reason_is_told() {
     let mut sequence = sequence();
-    place(&mut sequence, 0, 0, Cause::Link);
-    let placed = place(&mut sequence, 100, 100, Cause::HostTooSlow);
+    place(&mut sequence, 0, 0, GapCause::Link);
+    let placed = place(&mut sequence, 100, 100, GapCause::HostTooSlow);
     assert_eq!(placed.gap.unwrap().reason, "the service was too slow to take them");
 }
 
 /// What is missing before a frame that comes `after_ms` behind the first.
 fn missing(tick: Duration, second: Arrival) -> u32 {
-    let mut sequence = Sequence::new(30.0, tick);
+    let mut sequence = sequence_with(tick);
     sequence.place(Arrival { tick: second.tick.map(|_| DeviceTick(0)), ..arrival(0) });
     sequence.place(second).lost_before
 }
 
 #[test]
 fn the_devices_own_count_is_exact_but_for_whole_rounds_which_times_tell() {
-    let numbers = |lost| Before::Numbers { lost, wrap: 256 };
+    let numbers = |lost| LossEvidence::Counted { lost, wrap: 256 };
     for (lost, after_ms, want) in
         [(0, 0, 0), (0, 900, 0), (3, 10, 3), (3, 133, 3), (3, 8_667, 259), (0, 17_100, 512)]
     {
-        let second = Arrival { before: numbers(lost), ..arrival(after_ms) };
+        let second = Arrival { evidence: numbers(lost), ..arrival(after_ms) };
         assert_eq!(missing(Duration::ZERO, second), want, "{lost} after {after_ms} ms");
     }
-    let jumped = Arrival { before: numbers(2), cause: Cause::ClockJumped, ..arrival(100) };
+    let jumped = Arrival { evidence: numbers(2), cause: GapCause::ClockJumped, ..arrival(100) };
     assert_eq!(missing(Duration::ZERO, jumped), 2, "a clock that jumps does not change the count");
-    let slow = Arrival { before: numbers(2), passed_over: 5, cause: Cause::HostTooSlow, ..arrival(267) };
+    let slow = Arrival { evidence: numbers(2), passed_over: 5, cause: GapCause::HostTooSlow, ..arrival(267) };
     assert_eq!(missing(Duration::ZERO, slow), 7);
 }
 
 /// What is missing before each frame that comes at these times, by the host's clock alone.
 fn missing_by_arrivals(arrivals_ms: &[i64]) -> Vec<u32> {
-    let mut sequence = Sequence::new(30.0, Duration::ZERO);
+    let mut sequence = sequence_with(Duration::ZERO);
     arrivals_ms.iter().map(|ms| sequence.place(arrival(*ms)).lost_before).collect()
 }
 
@@ -131,11 +138,12 @@ fn by_the_hosts_clock_alone_a_loss_is_told_from_a_delay_by_the_frame_after_it() 
 
 #[test]
 fn damage_on_the_way_is_a_loss_if_there_was_time_for_one() {
-    let damaged = |after_ms, together| Arrival { before: Before::Damage, together, ..arrival(after_ms) };
+    let damaged =
+        |after_ms, together| Arrival { evidence: LossEvidence::Damage, together, ..arrival(after_ms) };
     for (after_ms, together, want) in [(67, 1, 1), (33, 1, 0), (133, 3, 1), (100, 3, 0)] {
         assert_eq!(missing(Duration::ZERO, damaged(after_ms, together)), want, "{after_ms} ms, {together}");
     }
-    let slow = Arrival { passed_over: 5, cause: Cause::HostTooSlow, ..arrival(200) };
+    let slow = Arrival { passed_over: 5, cause: GapCause::HostTooSlow, ..arrival(200) };
     assert_eq!(missing(Duration::ZERO, slow), 5, "they came, and were not taken");
 }
 

@@ -1,8 +1,9 @@
-//! The host's side of the conversation: asks one element after the other.
+//! The host's side: polls one element after the other, a reading of all elements a round.
 
 use core::time::Duration;
 
-use super::{Decoder, DecoderStats, Reply, ReplyError, Request};
+use super::{Decoder, Reply, ReplyError, Request};
+use crate::sensor::{self, Action, Cause, Loss, LossEvidence, Reading};
 use crate::wrapping::{Step, Wrapping};
 
 /// Length of a tick of the board's clock.
@@ -17,12 +18,11 @@ pub const SILENT_POLLS: u32 = 3;
 /// An element that answers, but with no fresh reading for this long, is lost.
 pub const STALE_AFTER: Duration = Duration::from_secs(1);
 
-/// A conversation over one connection: polls the elements in turn, a round in every interval.
+/// Polls the elements over one connection, a round in every interval.
 ///
-/// Call [`start`](Self::start) once, [`receive`](Self::receive) with what arrives and [`timer`](Self::timer)
-/// when [`deadline`](Self::deadline) has come; do what the actions say, in their order. Times never go back.
-/// There is one request on the way at any time; a round that takes longer than the interval is followed by
-/// the next at once. A lost element is still polled, and found again when it answers.
+/// At most one request is on the way. A round that takes longer than the interval is followed by the next at once.
+/// A round gives one reading, if any element answered with a fresh value. A lost element is still polled, and is found
+/// again when it answers; the array is lost with its last element.
 #[derive(Debug)]
 pub struct Session {
     interval: Duration,
@@ -32,20 +32,27 @@ pub struct Session {
     state: State,
     next_id: u8,
     round_begun: Duration,
+    round: Round,
+    /// Intervals since the last reading, the present round included.
+    intervals: u64,
+    flows: bool,
+    /// Replies that came too late, or to no request of this session.
     unexpected_replies: u64,
+    /// Skipped bytes and unexpected replies, as of the last reading.
+    strays_before: u64,
 }
 
 /// What is polled.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Config {
-    /// I2C addresses, each below 128 and once; a reading names its place in this list. Every element answers
-    /// at 4 too, so that 4 serves only where there is one.
+    /// I2C addresses in the order of the elements, each below 128 and unique. Every element also answers at 4, so 4 can
+    /// be used only for a single element.
     pub addresses: Vec<u8>,
     /// From the beginning of one round to that of the next; zero for as fast as they answer.
     pub interval: Duration,
 }
 
-/// Why nothing can be polled.
+/// Why these elements cannot be polled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
     /// The list is empty.
@@ -65,61 +72,35 @@ pub enum ConfigError {
     },
 }
 
-/// What the session wants done, or tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Ask this.
-    Send(Request<'static>),
-    /// A fresh reading.
-    Reading(Reading),
-    /// No more readings from an element; told once, until one comes again.
-    Lost {
-        /// Its place in [`Config::addresses`].
-        element: usize,
-        /// Its address.
-        address: u8,
-        /// Why.
-        loss: Loss,
-    },
-}
-
-/// One reading of one element.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Reading {
-    /// Its place in [`Config::addresses`].
-    pub element: usize,
-    /// The board's clock at the answer, unwrapped, in units of [`TICK`].
-    pub tick: u64,
-    /// The ticks of earlier readings are from another clock: this is the first reading, or the board has
-    /// restarted.
-    pub new_clock: bool,
-    /// The element's own count of its readings, as received; wraps at 65 536.
-    pub counter: u16,
-    /// Readings of the element that lie between the one before and this, unseen. An element that reads faster
-    /// than it is polled passes some over as a rule. 0 for the first.
-    pub passed_over: u64,
-    /// The value.
-    pub counts: u16,
-}
-
 /// Why an element gives no more readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Loss {
+enum ElementLoss {
     /// The interface board leaves requests unanswered.
     #[error("the interface board did not answer {SILENT_POLLS} times: check the cable and the port")]
     Silent,
     /// The answers hold no reading.
     #[error("{0}")]
     Reply(#[from] ReplyError),
-    /// The element's counter stands still.
+    /// The element's counter does not advance.
     #[error("no fresh reading for {} s: the element's counter stands still", STALE_AFTER.as_secs())]
     Stale,
+}
+
+/// The values of the round in progress.
+#[derive(Debug)]
+struct Round {
+    /// By element; `None` for one that has not answered with a fresh value.
+    counts: Vec<Option<u16>>,
+    tick: u64,
+    new_clock: bool,
 }
 
 #[derive(Debug)]
 struct Element {
     address: u8,
+    /// The element's own count of its readings.
     counter: Wrapping,
+    /// When its counter last advanced.
     fresh: Option<Duration>,
     /// Polls in a row without an answer, or with one that is no reading.
     failed: u32,
@@ -151,6 +132,7 @@ impl Session {
                 return Err(ConfigError::Twice { address });
             }
         }
+        let round = Round { counts: vec![None; addresses.len()], tick: 0, new_clock: false };
         Ok(Self {
             interval,
             elements: addresses.into_iter().map(Element::new).collect(),
@@ -159,60 +141,12 @@ impl Session {
             state: State::Unstarted,
             next_id: 0,
             round_begun: Duration::ZERO,
+            round,
+            intervals: 0,
+            flows: false,
             unexpected_replies: 0,
+            strays_before: 0,
         })
-    }
-
-    /// When [`timer`](Self::timer) is due; `None` before the start.
-    pub fn deadline(&self) -> Option<Duration> {
-        match self.state {
-            State::Unstarted => None,
-            State::Waiting { deadline, .. } => Some(deadline),
-            State::Resting { until } => Some(until),
-        }
-    }
-
-    /// What the decoder met beside good packets.
-    pub fn decoder_stats(&self) -> DecoderStats {
-        self.decoder.stats()
-    }
-
-    /// Replies that came too late, or to no request of this session.
-    pub fn unexpected_replies(&self) -> u64 {
-        self.unexpected_replies
-    }
-
-    /// Begins the first round.
-    pub fn start(&mut self, now: Duration) -> Vec<Action> {
-        self.round_begun = now;
-        vec![self.ask(now, 0)]
-    }
-
-    /// Takes what arrived.
-    pub fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
-        let mut actions = Vec::new();
-        self.decoder.push(bytes);
-        // The decoder is set aside while its replies, which borrow from it, are handled.
-        let mut decoder = core::mem::take(&mut self.decoder);
-        while let Some(reply) = decoder.next_reply() {
-            self.handle(now, &reply, &mut actions);
-        }
-        self.decoder = decoder;
-        actions
-    }
-
-    /// Does what is due at [`deadline`](Self::deadline).
-    pub fn timer(&mut self, now: Duration) -> Vec<Action> {
-        let mut actions = Vec::new();
-        match self.state {
-            State::Waiting { element, deadline, .. } if now >= deadline => {
-                self.fail(element, Loss::Silent, &mut actions);
-                self.go_on(now, element, &mut actions);
-            }
-            State::Resting { until } if now >= until => actions.push(self.begin_round(now)),
-            State::Unstarted | State::Waiting { .. } | State::Resting { .. } => {}
-        }
-        actions
     }
 
     fn handle(&mut self, now: Duration, reply: &Reply<'_>, actions: &mut Vec<Action>) {
@@ -230,31 +164,65 @@ impl Session {
             Ok(reading) => {
                 let clock = self.clock.advance(reply.timestamp_ticks.into());
                 element.failed = 0;
-                let fresh = element.take(now, reading.counter);
-                if let Some(passed_over) = fresh {
-                    actions.push(Action::Reading(Reading {
-                        element: place,
-                        tick: clock.total(),
-                        new_clock: matches!(clock, Step::Anew { .. }),
-                        counter: reading.counter,
-                        passed_over,
-                        counts: reading.counts,
-                    }));
+                if element.is_fresh(now, reading.counter) {
+                    self.round.take(place, reading.counts, clock);
+                    if place + 1 == self.elements.len() {
+                        self.end_round(actions);
+                    }
                 } else if element.is_stale(now) {
-                    actions.extend(element.lose(place, Loss::Stale));
+                    self.lose(place, ElementLoss::Stale, actions);
                 }
             }
-            Err(error) => self.fail(place, Loss::Reply(error), actions),
+            Err(error) => self.fail(place, ElementLoss::Reply(error), actions),
         }
         self.go_on(now, place, actions);
     }
 
-    fn fail(&mut self, place: usize, loss: Loss, actions: &mut Vec<Action>) {
+    fn fail(&mut self, place: usize, loss: ElementLoss, actions: &mut Vec<Action>) {
         let Some(element) = self.elements.get_mut(place) else { return };
         element.failed = element.failed.saturating_add(1);
         if element.failed >= SILENT_POLLS {
-            actions.extend(element.lose(place, loss));
+            self.lose(place, loss, actions);
         }
+    }
+
+    /// An element is lost; reported once, until it answers again.
+    fn lose(&mut self, place: usize, loss: ElementLoss, actions: &mut Vec<Action>) {
+        let Some(element) = self.elements.get_mut(place) else { return };
+        if core::mem::replace(&mut element.lost, true) {
+            return;
+        }
+        let address = element.address;
+        if self.elements.iter().all(|element| element.lost) {
+            self.flows = false;
+            actions.push(Action::Lost(self.describe(loss)));
+        } else {
+            actions.push(Action::Warning(format!(
+                "element {place} at address {address} is no longer read: {loss}"
+            )));
+        }
+    }
+
+    fn describe(&self, loss: ElementLoss) -> Loss {
+        let cause = match loss {
+            ElementLoss::Silent if self.strays() > self.strays_before => {
+                let quality = sensor::Session::quality(self);
+                let what = format!(
+                    "bytes come, but no answer to a poll ({quality}): is it the board that the rig file describes, and is \
+                     the bit rate right?"
+                );
+                return Loss::new(Cause::Protocol, what);
+            }
+            ElementLoss::Silent | ElementLoss::Stale => Cause::Silent,
+            ElementLoss::Reply(ReplyError::TimedOut { .. }) => Cause::DeviceFault,
+            ElementLoss::Reply(ReplyError::Length { .. }) => Cause::Protocol,
+        };
+        Loss::new(cause, loss.to_string())
+    }
+
+    /// Skipped bytes and unexpected replies since the start.
+    fn strays(&self) -> u64 {
+        self.decoder.stats().skipped_bytes + self.unexpected_replies
     }
 
     /// The next element of the round, or a rest until the next round.
@@ -265,16 +233,31 @@ impl Session {
         } else if now < until {
             self.state = State::Resting { until };
         } else {
-            actions.push(self.begin_round(now));
+            self.begin_round(now, actions);
         }
     }
 
-    fn begin_round(&mut self, now: Duration) -> Action {
-        // Rounds keep their beat; beats that were missed are not made up for.
+    fn begin_round(&mut self, now: Duration, actions: &mut Vec<Action>) {
+        // The last element of the round before may not have answered.
+        self.end_round(actions);
+        // Rounds begin at multiples of the interval. A round that is late by an interval or more begins a new series.
         let due = self.round_begun.saturating_add(self.interval);
-        let missed = now.saturating_sub(due) >= self.interval;
-        self.round_begun = if missed { now } else { due };
-        self.ask(now, 0)
+        let late = now.saturating_sub(due).as_nanos();
+        let skipped = late.checked_div(self.interval.as_nanos()).unwrap_or(0);
+        self.intervals = self.intervals.saturating_add(1 + u64::try_from(skipped).unwrap_or(u64::MAX));
+        self.round_begun = if skipped > 0 { now } else { due };
+        actions.push(self.ask(now, 0));
+    }
+
+    /// Gives the round's reading, if any element was read.
+    fn end_round(&mut self, actions: &mut Vec<Action>) {
+        let lost = self.intervals.saturating_sub(1);
+        let Some(reading) = self.round.finish(lost) else { return };
+        self.intervals = 0;
+        if !core::mem::replace(&mut self.flows, true) {
+            actions.push(Action::Connected { identity: None });
+        }
+        actions.push(Action::Reading(reading));
     }
 
     fn ask(&mut self, now: Duration, element: usize) -> Action {
@@ -282,7 +265,100 @@ impl Session {
         self.next_id = self.next_id.wrapping_add(1);
         self.state = State::Waiting { element, id, deadline: now.saturating_add(ANSWER_TIMEOUT) };
         let address = self.elements.get(element).map_or(super::DEFAULT_ADDRESS, |element| element.address);
-        Action::Send(Request::reading(address, id))
+        match Request::reading(address, id).encode() {
+            Ok(bytes) => Action::Send(bytes),
+            Err(error) => Action::Failed(Loss::new(Cause::Protocol, error.to_string())),
+        }
+    }
+
+    /// Remembers how many strays came up to the reading that is among `actions`.
+    fn note_strays(&mut self, actions: &[Action]) {
+        if actions.iter().any(|action| matches!(action, Action::Reading(_))) {
+            self.strays_before = self.strays();
+        }
+    }
+}
+
+impl sensor::Session for Session {
+    fn name(&self) -> String {
+        "singletact".to_owned()
+    }
+
+    fn tick_ns(&self) -> u64 {
+        sensor::whole_ns(TICK)
+    }
+
+    fn start(&mut self, now: Duration) -> Vec<Action> {
+        self.round_begun = now;
+        self.intervals = 1;
+        vec![self.ask(now, 0)]
+    }
+
+    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
+        let mut actions = Vec::new();
+        self.decoder.push(bytes);
+        // The decoder is set aside while its replies, which borrow from it, are handled.
+        let mut decoder = core::mem::take(&mut self.decoder);
+        while let Some(reply) = decoder.next_reply() {
+            self.handle(now, &reply, &mut actions);
+        }
+        self.decoder = decoder;
+        self.note_strays(&actions);
+        actions
+    }
+
+    fn timer(&mut self, now: Duration) -> Vec<Action> {
+        let mut actions = Vec::new();
+        match self.state {
+            State::Waiting { element, deadline, .. } if now >= deadline => {
+                self.fail(element, ElementLoss::Silent, &mut actions);
+                self.go_on(now, element, &mut actions);
+            }
+            State::Resting { until } if now >= until => self.begin_round(now, &mut actions),
+            State::Unstarted | State::Waiting { .. } | State::Resting { .. } => {}
+        }
+        self.note_strays(&actions);
+        actions
+    }
+
+    fn deadline(&self) -> Option<Duration> {
+        match self.state {
+            State::Unstarted => None,
+            State::Waiting { deadline, .. } => Some(deadline),
+            State::Resting { until } => Some(until),
+        }
+    }
+
+    fn quality(&self) -> String {
+        let (stats, unexpected) = (self.decoder.stats(), self.unexpected_replies);
+        format!("{} bytes skipped, {unexpected} replies to no request", stats.skipped_bytes)
+    }
+}
+
+impl Round {
+    fn take(&mut self, place: usize, counts: u16, clock: Step) {
+        if let Some(to) = self.counts.get_mut(place) {
+            *to = Some(counts);
+        }
+        self.tick = clock.total();
+        self.new_clock |= matches!(clock, Step::Anew { .. });
+    }
+
+    /// The reading, if any element was read, with `lost` readings missing before it; empties the round.
+    fn finish(&mut self, lost: u64) -> Option<Reading> {
+        if self.counts.iter().all(Option::is_none) {
+            return None;
+        }
+        let unread = (0..).zip(&self.counts).filter(|(_, counts)| counts.is_none());
+        let bad = unread.map(|(element, _)| element).collect();
+        let counts = self.counts.iter_mut().map(|counts| counts.take().map_or(0.0, f32::from)).collect();
+        Some(Reading {
+            tick: Some(self.tick),
+            new_clock: core::mem::take(&mut self.new_clock),
+            evidence: LossEvidence::Counted { lost, wrap: u64::MAX },
+            counts,
+            bad,
+        })
     }
 }
 
@@ -291,25 +367,18 @@ impl Element {
         Self { address, counter: Wrapping::new(1 << 16), fresh: None, failed: 0, lost: false }
     }
 
-    /// How many readings were passed over, if this one is fresh.
-    fn take(&mut self, now: Duration, counter: u16) -> Option<u64> {
-        let passed_over = match self.counter.advance(counter.into()) {
-            Step::Anew { .. } => 0,
-            Step::Ahead { by, .. } => by - 1,
-            Step::Same { .. } => return None,
-        };
+    /// Whether its counter has advanced; then it is no longer lost.
+    fn is_fresh(&mut self, now: Duration, counter: u16) -> bool {
+        if matches!(self.counter.advance(counter.into()), Step::Same { .. }) {
+            return false;
+        }
         self.fresh = Some(now);
         self.lost = false;
-        Some(passed_over)
+        true
     }
 
     fn is_stale(&self, now: Duration) -> bool {
         self.fresh.is_some_and(|fresh| now.saturating_sub(fresh) >= STALE_AFTER)
-    }
-
-    fn lose(&mut self, element: usize, loss: Loss) -> Option<Action> {
-        let already = core::mem::replace(&mut self.lost, true);
-        (!already).then_some(Action::Lost { element, address: self.address, loss })
     }
 }
 

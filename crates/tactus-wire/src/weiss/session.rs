@@ -4,9 +4,13 @@ use core::time::Duration;
 
 use super::ticks::{Placed, Ticks};
 use super::{
-    Checksum, ControllerInfo, Decoder, DecoderStats, ErrorCode, Frame, FrameError, InfoError, MatrixInfo,
-    Packet, SensorInfo, acquire, id, query_controller, query_matrix, query_sensor,
+    Checksum, ControllerInfo, Decoder, ErrorCode, Frame, FrameError, InfoError, MatrixInfo, Packet,
+    SensorInfo, acquire, id, query_controller, query_matrix, query_sensor,
 };
+use crate::sensor::{self, Action, Cause, Loss, LossEvidence, Reading};
+
+/// Length of a tick of the controller's clock.
+pub const TICK: Duration = Duration::from_millis(1);
 
 /// A question that is not answered is asked again after this; an acquisition without fresh frames too.
 pub const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
@@ -14,11 +18,8 @@ pub const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 /// How often a question is asked before the link is given up: well over the 8 s that the controller takes to boot.
 const ASKED_MAX: u32 = 15;
 
-/// A conversation over one connection: switch the acquisition off, ask who is there, switch it on, read frames.
-///
-/// Call [`start`](Self::start) once, [`receive`](Self::receive) with what arrives and
-/// [`timer`](Self::timer) when [`deadline`](Self::deadline) has come; do what the actions say, in their
-/// order. Times never go back. After [`Action::Failed`] it does nothing more: open the link anew.
+/// Reads one connection to a controller: switches the acquisition off, queries the controller, its sensor and matrix,
+/// switches the acquisition on, and reads frames.
 #[derive(Debug)]
 pub struct Session {
     config: Config,
@@ -26,14 +27,17 @@ pub struct Session {
     ticks: Ticks,
     state: State,
     device: Device,
+    /// Frames that were dropped because they came twice or late.
     stale_frames: u64,
 }
 
 /// What is asked of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Config {
-    /// Elements of a frame; a frame with another number ends the session.
-    pub elements: usize,
+    /// Rows of the array. A frame with another number of elements than rows times columns ends the session.
+    pub rows: usize,
+    /// Columns of the array.
+    pub cols: usize,
     /// Frames per second.
     pub fps: u16,
     /// Have frames run-length encoded.
@@ -42,52 +46,13 @@ pub struct Config {
     pub checksum: Checksum,
 }
 
-/// What is there, as it says.
+/// What the controller reports about itself.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Device {
-    /// The controller.
-    pub controller: ControllerInfo,
-    /// The sensor.
-    pub sensor: SensorInfo,
+struct Device {
+    controller: ControllerInfo,
+    sensor: SensorInfo,
     /// The sensor's first matrix.
-    pub matrix: MatrixInfo,
-}
-
-/// What the session wants done, or tells.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Action {
-    /// Write these bytes.
-    Send(Vec<u8>),
-    /// Frames flow from here on; comes just before the first, and again before the first after [`Action::Lost`].
-    Connected(Box<Device>),
-    /// A fresh reading.
-    Frame(Reading),
-    /// Frames have ceased; the session tries to have them again.
-    Lost(Loss),
-    /// The session is over.
-    Failed(SessionError),
-}
-
-/// One reading.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Reading {
-    /// The controller's clock at the sampling, unwrapped.
-    pub tick_ms: u64,
-    /// The ticks of earlier readings are from another clock: this is the first reading, or the clock has jumped.
-    pub new_clock: bool,
-    /// Raw counts, row-major.
-    pub counts: Vec<u16>,
-}
-
-/// Why frames have ceased.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Loss {
-    /// None came.
-    #[error("no fresh frame for {} s", ANSWER_TIMEOUT.as_secs())]
-    Silent,
-    /// The controller sent its boot message.
-    #[error("the controller has restarted")]
-    Restarted,
+    matrix: MatrixInfo,
 }
 
 /// Why a session is over.
@@ -139,7 +104,7 @@ impl Session {
     /// A session that has not started.
     pub fn new(config: Config) -> Self {
         // Room for the longest reply and for other arrays, so that those can be named in the error.
-        let max_payload_bytes = (5 + 4 * config.elements).max(1024);
+        let max_payload_bytes = (5 + 4 * config.elements()).max(1024);
         Self {
             config,
             decoder: Decoder::with_max_payload(max_payload_bytes).with_checksum(config.checksum),
@@ -147,68 +112,6 @@ impl Session {
             state: State::Over,
             device: Device::default(),
             stale_frames: 0,
-        }
-    }
-
-    /// When [`timer`](Self::timer) is due; `None` once the session is over.
-    pub fn deadline(&self) -> Option<Duration> {
-        match self.state {
-            State::Asking { deadline, .. } | State::Running { deadline } => Some(deadline),
-            State::Over => None,
-        }
-    }
-
-    /// What the decoder met beside good packets.
-    pub fn decoder_stats(&self) -> DecoderStats {
-        self.decoder.stats()
-    }
-
-    /// Frames that were dropped because they came twice or late.
-    pub fn stale_frames(&self) -> u64 {
-        self.stale_frames
-    }
-
-    /// Begins the conversation.
-    pub fn start(&mut self, now: Duration) -> Vec<Action> {
-        vec![self.ask(now, Question::SwitchOff, 1)]
-    }
-
-    /// Takes what arrived.
-    pub fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
-        let mut actions = Vec::new();
-        let boots_before = self.decoder.stats().boot_messages;
-        self.decoder.push(bytes);
-        // The decoder is set aside while its packets, which borrow from it, are handled.
-        let mut decoder = core::mem::take(&mut self.decoder);
-        while let Some(packet) = decoder.next_packet() {
-            // A packet with a wrong checksum is counted there; a lost reply is asked for again.
-            let Ok(packet) = packet else { continue };
-            if let Err(error) = self.handle(now, &packet, &mut actions) {
-                self.state = State::Over;
-                actions.push(Action::Failed(error));
-            }
-        }
-        self.decoder = decoder;
-        if self.decoder.stats().boot_messages > boots_before {
-            self.restart(now, &mut actions);
-        }
-        actions
-    }
-
-    /// Does what is due at [`deadline`](Self::deadline).
-    pub fn timer(&mut self, now: Duration) -> Vec<Action> {
-        match self.state {
-            State::Asking { question, asked, deadline } if now >= deadline => {
-                if asked < ASKED_MAX {
-                    return vec![self.ask(now, question, asked + 1)];
-                }
-                self.state = State::Over;
-                vec![Action::Failed(SessionError::Silent { question: question.name(), asked })]
-            }
-            State::Running { deadline } if now >= deadline => {
-                vec![Action::Lost(Loss::Silent), self.ask(now, Question::SwitchOn, 1)]
-            }
-            State::Asking { .. } | State::Running { .. } | State::Over => Vec::new(),
         }
     }
 
@@ -271,7 +174,7 @@ impl Session {
         packet: &Packet<'_>,
         actions: &mut Vec<Action>,
     ) -> Result<(), SessionError> {
-        let Frame { timestamp_ms, counts, .. } = Frame::parse(packet, self.config.elements)?;
+        let Frame { timestamp_ms, counts, .. } = Frame::parse(packet, self.config.elements())?;
         let (tick_ms, new_clock) = match self.ticks.place(now, timestamp_ms) {
             Placed::Next { tick_ms } => (tick_ms, false),
             Placed::NewClock { tick_ms } => (tick_ms, true),
@@ -281,10 +184,17 @@ impl Session {
             }
         };
         if matches!(self.state, State::Asking { .. }) {
-            actions.push(Action::Connected(Box::new(self.device.clone())));
+            actions.push(Action::Connected { identity: Some(self.device.identity()) });
+            actions.extend(self.device.mismatch(self.config).map(Action::Warning));
         }
         self.state = State::Running { deadline: now + ANSWER_TIMEOUT };
-        actions.push(Action::Frame(Reading { tick_ms, new_clock, counts }));
+        actions.push(Action::Reading(Reading {
+            tick: Some(tick_ms),
+            new_clock,
+            evidence: LossEvidence::TimesOnly,
+            counts: counts.into_iter().map(f32::from).collect(),
+            bad: Vec::new(),
+        }));
         Ok(())
     }
 
@@ -292,12 +202,129 @@ impl Session {
     fn restart(&mut self, now: Duration, actions: &mut Vec<Action>) {
         match self.state {
             State::Over => return,
-            State::Running { .. } => actions.push(Action::Lost(Loss::Restarted)),
+            State::Running { .. } => actions.push(Action::Lost(restarted())),
             State::Asking { .. } => {}
         }
         self.ticks = Ticks::default();
         actions.push(self.ask(now, Question::SwitchOff, 1));
     }
+}
+
+impl sensor::Session for Session {
+    fn name(&self) -> String {
+        match self.config.checksum {
+            Checksum::Crc => "weiss-dsa".to_owned(),
+            Checksum::Sum8 => "weiss-dsa, sum8".to_owned(),
+        }
+    }
+
+    fn tick_ns(&self) -> u64 {
+        sensor::whole_ns(TICK)
+    }
+
+    fn start(&mut self, now: Duration) -> Vec<Action> {
+        vec![self.ask(now, Question::SwitchOff, 1)]
+    }
+
+    fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
+        let mut actions = Vec::new();
+        let boots_before = self.decoder.stats().boot_messages;
+        self.decoder.push(bytes);
+        // The decoder is set aside while its packets, which borrow from it, are handled.
+        let mut decoder = core::mem::take(&mut self.decoder);
+        while let Some(packet) = decoder.next_packet() {
+            // A packet with a wrong checksum is counted there; a lost reply is asked for again.
+            let Ok(packet) = packet else { continue };
+            if let Err(error) = self.handle(now, &packet, &mut actions) {
+                self.state = State::Over;
+                actions.push(Action::Failed(error.into()));
+            }
+        }
+        self.decoder = decoder;
+        if self.decoder.stats().boot_messages > boots_before {
+            self.restart(now, &mut actions);
+        }
+        actions
+    }
+
+    fn timer(&mut self, now: Duration) -> Vec<Action> {
+        match self.state {
+            State::Asking { question, asked, deadline } if now >= deadline => {
+                if asked < ASKED_MAX {
+                    return vec![self.ask(now, question, asked + 1)];
+                }
+                self.state = State::Over;
+                let error = SessionError::Silent { question: question.name(), asked };
+                vec![Action::Failed(error.into())]
+            }
+            State::Running { deadline } if now >= deadline => {
+                vec![Action::Lost(silent()), self.ask(now, Question::SwitchOn, 1)]
+            }
+            State::Asking { .. } | State::Running { .. } | State::Over => Vec::new(),
+        }
+    }
+
+    fn deadline(&self) -> Option<Duration> {
+        match self.state {
+            State::Asking { deadline, .. } | State::Running { deadline } => Some(deadline),
+            State::Over => None,
+        }
+    }
+
+    fn quality(&self) -> String {
+        let (stats, stale) = (self.decoder.stats(), self.stale_frames);
+        format!(
+            "{} bad checksums, {} bytes skipped, {stale} stale frames",
+            stats.bad_checksums, stats.skipped_bytes
+        )
+    }
+}
+
+impl Config {
+    fn elements(&self) -> usize {
+        self.rows * self.cols
+    }
+}
+
+impl Device {
+    fn identity(&self) -> String {
+        let Self { controller, sensor, .. } = self;
+        format!(
+            "controller serial {}, software {}, sensor serial {}",
+            controller.serial_number, controller.software_version, sensor.serial_number
+        )
+    }
+
+    /// That the matrix reports another shape than the rig file.
+    fn mismatch(&self, Config { rows, cols, .. }: Config) -> Option<String> {
+        let (own_rows, own_cols) = (usize::from(self.matrix.cells_y), usize::from(self.matrix.cells_x));
+        ((own_rows, own_cols) != (rows, cols)).then(|| {
+            format!("the matrix reports {own_rows} rows and {own_cols} columns, the rig's array has {rows} and {cols}")
+        })
+    }
+}
+
+impl From<SessionError> for Loss {
+    fn from(error: SessionError) -> Self {
+        let (cause, remedy) = match error {
+            SessionError::Silent { .. } => {
+                (Cause::Silent, "is it the sensor, is it switched on, and is the bit rate right?")
+            }
+            SessionError::Refused { .. } => (Cause::DeviceFault, "see the controller's manual"),
+            SessionError::Answer(_) | SessionError::Frame(_) => {
+                (Cause::Protocol, "is it the sensor that the rig file describes?")
+            }
+        };
+        Self::new(cause, format!("{error}: {remedy}"))
+    }
+}
+
+fn silent() -> Loss {
+    Loss::new(Cause::Silent, format!("no fresh frame for {} s", ANSWER_TIMEOUT.as_secs()))
+}
+
+fn restarted() -> Loss {
+    Loss::new(Cause::Restarted, "the controller has restarted")
 }
 
 impl Question {

@@ -1,6 +1,7 @@
 use core::time::Duration;
 
-use super::{Action, Config, Device, Loss, Reading, Session, SessionError};
+use super::{Config, Device, Session, SessionError, restarted, silent};
+use crate::sensor::{Action, LossEvidence, Reading, Session as _};
 use crate::weiss::{
     BOOT_MESSAGE, Checksum, ControllerInfo, ErrorCode, FrameError, InfoError, MatrixInfo, SensorInfo,
     acknowledge, acquire, encode_frame, encode_packet, id, query_controller, query_matrix, query_sensor,
@@ -17,7 +18,7 @@ enum Input {
 use Input::{Hear, Start, Timer};
 
 fn config(checksum: Checksum) -> Config {
-    Config { elements: 2, fps: 30, run_length: false, checksum }
+    Config { rows: 1, cols: 2, fps: 30, run_length: false, checksum }
 }
 
 /// Plays a dialogue: at each line's time the input must lead to exactly these actions.
@@ -59,11 +60,17 @@ fn frame(timestamp_ms: u32) -> Input {
 }
 
 fn reading(tick_ms: u64, new_clock: bool) -> Action {
-    Action::Frame(Reading { tick_ms, new_clock, counts: vec![1, 2] })
+    Action::Reading(Reading {
+        tick: Some(tick_ms),
+        new_clock,
+        evidence: LossEvidence::TimesOnly,
+        counts: vec![1.0, 2.0],
+        bad: vec![],
+    })
 }
 
 fn connected() -> Action {
-    Action::Connected(Box::new(device()))
+    Action::Connected { identity: Some("controller serial 7, software 300, sensor serial 0".to_owned()) }
 }
 
 /// From nothing to the first frame, at `ms` throughout.
@@ -121,7 +128,7 @@ fn silence_is_given_up_in_the_end() {
     let mut dialogue = vec![(0, Start, send(acquire(false, false, 0)))];
     dialogue.extend((1..15).map(|s| (s * 1000, Timer, send(acquire(false, false, 0)))));
     let error = SessionError::Silent { question: "switching the acquisition off", asked: 15 };
-    dialogue.push((15_000, Timer, vec![Action::Failed(error)]));
+    dialogue.push((15_000, Timer, vec![Action::Failed(error.into())]));
     dialogue.push((15_001, acknowledged(), vec![]));
     assert_eq!(check(dialogue).deadline(), None);
 }
@@ -159,7 +166,7 @@ fn a_missing_acknowledgement_is_no_matter_if_frames_come() {
 #[test]
 fn a_stall_is_told_and_the_same_clock_goes_on() {
     after_greeting(vec![
-        (1000, Timer, vec![Action::Lost(Loss::Silent), Action::Send(acquire(true, false, 30))]),
+        (1000, Timer, vec![Action::Lost(silent()), Action::Send(acquire(true, false, 30))]),
         (2000, Timer, send(acquire(true, false, 30))),
         (2500, frame(3500), vec![connected(), reading(3500, false)]),
     ]);
@@ -170,11 +177,11 @@ fn a_stopped_clock_is_silence() {
     let session = after_greeting(vec![
         (500, frame(1000), vec![]),
         (999, frame(1000), vec![]),
-        (1000, Timer, vec![Action::Lost(Loss::Silent), Action::Send(acquire(true, false, 30))]),
+        (1000, Timer, vec![Action::Lost(silent()), Action::Send(acquire(true, false, 30))]),
         (1033, frame(1000), vec![]),
         (1066, frame(1033), vec![connected(), reading(1033, false)]),
     ]);
-    assert_eq!(session.stale_frames(), 3);
+    assert_eq!(session.stale_frames, 3);
 }
 
 #[test]
@@ -182,7 +189,7 @@ fn a_restart_is_told_and_everything_asked_anew() {
     let mut dialogue = vec![(
         40,
         Hear(BOOT_MESSAGE.to_vec()),
-        vec![Action::Lost(Loss::Restarted), Action::Send(acquire(false, false, 0))],
+        vec![Action::Lost(restarted()), Action::Send(acquire(false, false, 0))],
     )];
     dialogue.extend(answers(50));
     after_greeting(dialogue);
@@ -202,7 +209,7 @@ fn a_frame_of_another_array_ends_the_session() {
     for elements in [1, 3, 48, 500] {
         let error = SessionError::Frame(FrameError::Elements { expected: 2, found: elements });
         let other = Hear(encode_frame(1033, &vec![0; elements], false));
-        let session = after_greeting(vec![(33, other, vec![Action::Failed(error)])]);
+        let session = after_greeting(vec![(33, other, vec![Action::Failed(error.into())])]);
         assert_eq!(session.deadline(), None);
     }
 }
@@ -217,7 +224,7 @@ fn a_refusal_ends_the_session() {
     };
     let mut refused = dialogue(5);
     let question = "switching the acquisition on";
-    refused[5].2 = vec![Action::Failed(SessionError::Refused { question, code: ErrorCode(5) })];
+    refused[5].2 = vec![Action::Failed(SessionError::Refused { question, code: ErrorCode(5) }.into())];
     check(refused);
     check(dialogue(0));
     let error = SessionError::Refused { question, code: ErrorCode(5) };
@@ -233,8 +240,22 @@ fn a_reply_of_another_form_ends_the_session() {
     check([
         (0, Start, send(acquire(false, false, 0))),
         (0, acknowledged(), send(query_controller())),
-        (0, Hear(encode_packet(id::CONTROLLER, &[0; 3])), vec![Action::Failed(SessionError::Answer(error))]),
+        (
+            0,
+            Hear(encode_packet(id::CONTROLLER, &[0; 3])),
+            vec![Action::Failed(SessionError::Answer(error).into())],
+        ),
     ]);
+}
+
+#[test]
+fn a_matrix_of_another_shape_is_a_warning() {
+    let other = MatrixInfo { cells_x: 1, cells_y: 2, ..Default::default() };
+    let mut dialogue = greeting(0);
+    dialogue[4].1 = Hear(other.encode());
+    let warning = "the matrix reports 2 rows and 1 columns, the rig's array has 1 and 2";
+    dialogue[6].2.insert(1, Action::Warning(warning.to_owned()));
+    check(dialogue);
 }
 
 #[test]
@@ -255,5 +276,5 @@ fn older_firmware_is_spoken_to_in_its_form() {
         }
         assert_eq!(actions, expected);
     }
-    assert_eq!(session.decoder_stats().bad_checksums, 0);
+    assert_eq!(session.decoder.stats().bad_checksums, 0);
 }

@@ -1,55 +1,56 @@
-//! Boards that speak `anyskin`: they stream by themselves, without clock or count.
+//! The host's side: it only listens, because the board streams by itself.
 
-use std::time::Duration;
+use core::time::Duration;
 
-use tactus_wire::anyskin::{Decoder, DecoderStats, Frame};
+use super::{Decoder, DecoderStats, Frame};
+use crate::sensor::{
+    self, Action, Cause, Loss, LossEvidence, NO_FRAME_AFTER, Reading, SILENT_AFTER, StreamFault, Watchdog,
+};
 
-use super::conversation::{Action, Before, Conversation, Loss, Reading};
-use super::listening::{Heard, Listening, NO_FRAME_AFTER, SILENT_AFTER};
-use crate::ErrorKind;
-
-/// A board that is listened to.
+/// Reads one connection to a board. Counts are microteslas, by magnetometer and axis.
 #[derive(Debug, Default)]
-pub(super) struct Board {
+pub struct Session {
     decoder: Decoder,
-    listening: Listening,
+    watchdog: Watchdog,
     /// As of the last frame.
-    met: DecoderStats,
+    last_stats: DecoderStats,
     any_frame: bool,
 }
 
-impl Board {
+impl Session {
+    /// A session that has not started.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
     fn read(&mut self, frame: &Frame) -> Reading {
-        let met = std::mem::replace(&mut self.met, self.decoder.stats());
-        let damaged = std::mem::replace(&mut self.any_frame, true) && met != self.met;
+        let last_stats = core::mem::replace(&mut self.last_stats, self.decoder.stats());
+        let damaged = core::mem::replace(&mut self.any_frame, true) && last_stats != self.last_stats;
         let counts: Vec<f32> =
             frame.magnetometers.iter().flat_map(|magnetometer| magnetometer.field_ut).collect();
+        let is_bad = |(_, count): &(u32, &f32)| !count.is_finite();
         Reading {
             tick: None,
             new_clock: false,
-            before: if damaged { Before::Damage } else { Before::Times },
-            bad: (0..)
-                .zip(&counts)
-                .filter(|(_, count)| !count.is_finite())
-                .map(|(element, _)| element)
-                .collect(),
+            evidence: if damaged { LossEvidence::Damage } else { LossEvidence::TimesOnly },
+            bad: (0..).zip(&counts).filter(is_bad).map(|(element, _)| element).collect(),
             counts,
         }
     }
 
-    fn describe(&self, heard: Heard) -> Loss {
+    fn describe(&self, fault: StreamFault) -> Loss {
         let DecoderStats { skipped_bytes, lost_steps } = self.decoder.stats();
-        match heard {
-            // No frame of this protocol is stale.
-            Heard::Nothing | Heard::NothingNew => Loss::new(
-                ErrorKind::Timeout,
+        match fault {
+            // Every frame of this protocol counts as fresh.
+            StreamFault::Silent | StreamFault::Stale => Loss::new(
+                Cause::Silent,
                 format!(
                     "nothing has come for {} s: is it switched on, and does its firmware stream in binary mode?",
                     SILENT_AFTER.as_secs()
                 ),
             ),
-            Heard::NoFrame => Loss::new(
-                ErrorKind::Protocol,
+            StreamFault::NoFrame => Loss::new(
+                Cause::Protocol,
                 format!(
                     "bytes come, but no AnySkin frame for {} s ({skipped_bytes} bytes skipped, out of step {lost_steps} \
                      times): is it the board that the rig file describes, in binary mode, and is the bit rate right? \
@@ -62,19 +63,27 @@ impl Board {
     }
 }
 
-impl Conversation for Board {
+impl sensor::Session for Session {
+    fn name(&self) -> String {
+        "anyskin".to_owned()
+    }
+
+    fn tick_ns(&self) -> u64 {
+        0
+    }
+
     fn start(&mut self, now: Duration) -> Vec<Action> {
-        self.listening.start(now);
+        self.watchdog.start(now);
         Vec::new()
     }
 
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
         let mut actions = Vec::new();
-        self.listening.bytes(now);
+        self.watchdog.bytes(now);
         self.decoder.push(bytes);
         while let Some(frame) = self.decoder.next_frame() {
-            if self.listening.fresh_frame(now) {
-                actions.push(Action::Connected);
+            if self.watchdog.fresh_frame(now) {
+                actions.push(Action::Connected { identity: None });
             }
             actions.push(Action::Reading(self.read(&frame)));
         }
@@ -82,12 +91,12 @@ impl Conversation for Board {
     }
 
     fn timer(&mut self, now: Duration) -> Vec<Action> {
-        let heard = self.listening.timer(now);
-        heard.map(|heard| Action::Lost(self.describe(heard))).into_iter().collect()
+        let fault = self.watchdog.timer(now);
+        fault.map(|fault| Action::Lost(self.describe(fault))).into_iter().collect()
     }
 
     fn deadline(&self) -> Option<Duration> {
-        self.listening.deadline()
+        self.watchdog.deadline()
     }
 
     fn quality(&self) -> String {
@@ -97,5 +106,5 @@ impl Conversation for Board {
 }
 
 #[cfg(test)]
-#[path = "anyskin_tests.rs"]
+#[path = "session_tests.rs"]
 mod tests;
