@@ -20,7 +20,7 @@
 //!     ..Recipe::new(7)
 //! };
 //! let set = recipe.make()?;
-//! assert_eq!(set.counts.len(), 600 * 48);
+//! assert_eq!(set.rows.len(), 600);
 //! assert_eq!(set.label.effects(), ["relaxation"]);
 //! # Ok::<(), tactus_mock::hidden::HiddenError>(())
 //! ```
@@ -47,4 +47,4 @@ pub(crate) use recipe::STRENGTH_MAX;
 pub use recipe::{Amount, Content, HiddenError, Recipe};
 pub use sensor::Sensor;
 pub use separation::Separation;
-pub use set::{Row, Run, Set};
+pub use set::Set;
