@@ -33,7 +33,7 @@ pub use clock::{EpochClock, NoClock};
 pub use error::{RecordError, RowsError};
 pub use export::{ExportSummary, export};
 pub use header::{Attachment, Header, RunMetadata, Script};
-pub use info::{AttachmentInfo, Info, exit_status_name, info};
+pub use info::{AttachmentInfo, Info, info};
 pub use reader::{Entry, Message, Reader, read};
 pub use recording::{Recording, Summary};
 pub use recover::{Recovery, recover};
