@@ -46,10 +46,10 @@ fn calibration_gives_back_what_simulated_rigs_hide() {
     let tally = Tally::of(&found);
     tally.print(rigs, points);
     assert_eq!((tally.missed, tally.accused), (0, 0), "faults missed, elements falsely accused");
-    for (name, row) in &tally.rows {
+    for (name, row) in &tally.quantities {
         assert!(row.worst < 5.5, "{name}: {} standard errors off", row.worst);
         if rigs >= 100 {
-            assert!((0.90..=0.98).contains(&row.coverage()), "{name}: {:.3}", row.coverage());
+            assert!((0.90..=0.98).contains(&row.share()), "{name}: {:.3}", row.share());
         }
     }
 }
@@ -219,14 +219,14 @@ fn compare(rig: &Rig, found: &Value) -> Found {
 
 /// Over all rigs.
 struct Tally {
-    rows: BTreeMap<String, Row>,
+    quantities: BTreeMap<String, Coverage>,
     missed: usize,
     accused: usize,
     planted: usize,
 }
 
 #[derive(Default)]
-struct Row {
+struct Coverage {
     intervals: u32,
     covering: u32,
     sum: f64,
@@ -234,17 +234,17 @@ struct Row {
     worst: f64,
 }
 
-impl Row {
-    fn coverage(&self) -> f64 {
+impl Coverage {
+    fn share(&self) -> f64 {
         f64::from(self.covering) / f64::from(self.intervals)
     }
 }
 
 impl Tally {
     fn of(found: &[Found]) -> Self {
-        let mut rows: BTreeMap<String, Row> = BTreeMap::new();
+        let mut quantities: BTreeMap<String, Coverage> = BTreeMap::new();
         for (name, error) in found.iter().flat_map(|found| &found.errors) {
-            let row = rows.entry(name.clone()).or_default();
+            let row = quantities.entry(name.clone()).or_default();
             row.intervals += 1;
             row.covering += u32::from(error.abs() <= Z_95);
             row.sum += error;
@@ -253,7 +253,7 @@ impl Tally {
         }
         let sum = |of: fn(&Found) -> usize| found.iter().map(of).sum();
         Self {
-            rows,
+            quantities,
             missed: sum(|found| found.missed),
             accused: sum(|found| found.accused),
             planted: sum(|found| found.planted),
@@ -266,12 +266,12 @@ impl Tally {
             "{:<18}{:>10}{:>10}{:>10}{:>10}{:>10}",
             "quantity", "intervals", "covered", "bias", "scatter", "worst"
         );
-        for (name, row) in &self.rows {
+        for (name, row) in &self.quantities {
             let count = f64::from(row.intervals);
             println!(
                 "{name:<18}{:>10}{:>9.1}%{:>10.2}{:>10.2}{:>10.2}",
                 row.intervals,
-                100.0 * row.coverage(),
+                100.0 * row.share(),
                 row.sum / count,
                 (row.squares / count).sqrt(),
                 row.worst

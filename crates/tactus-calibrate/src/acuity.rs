@@ -37,11 +37,9 @@
 
 use std::f64::consts::{FRAC_1_PI, FRAC_1_SQRT_2, PI};
 use std::iter;
-use std::panic::resume_unwind;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use libm::{erfc, exp, pow};
+use rayon::prelude::*;
 
 /// Elements that are read: the pressed one and two on either side.
 pub const ELEMENTS: usize = 5;
@@ -266,7 +264,8 @@ impl Grid {
         }
     }
 
-    /// What holds of the sensor of every cell, row-major, one row a force resolution. All cores take part.
+    /// What holds of the sensor of every cell, row-major, one row a force resolution. The threads of rayon's pool in
+    /// force share the work; the result does not depend on their number.
     ///
     /// # Errors
     /// As [`DiscretisingSensor::new`], of the first cell that is none.
@@ -274,24 +273,8 @@ impl Grid {
         let cells = self.force_resolutions.iter().flat_map(|f| self.sigmas.iter().map(|sigma| [*sigma, *f]));
         let sensors = cells.map(|[sigma, f]| DiscretisingSensor::new(sigma, f));
         let sensors = sensors.collect::<Result<Vec<_>, _>>()?;
-        let next = AtomicUsize::new(0);
-        let work = || {
-            let mut done = Vec::new();
-            loop {
-                let cell = next.fetch_add(1, Ordering::Relaxed);
-                let Some(sensor) = sensors.get(cell) else { return done };
-                done.push((cell, of(*sensor)));
-            }
-        };
-        let threads = thread::available_parallelism().map_or(1, usize::from);
-        let mut done = thread::scope(|scope| {
-            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-            let joined =
-                workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
-            joined.flatten().collect::<Vec<_>>()
-        });
-        done.sort_unstable_by_key(|(cell, _)| *cell);
-        Ok(done.into_iter().map(|(_, value)| value).collect())
+        // One cell a job: fine force resolutions take far longer than coarse ones.
+        Ok(sensors.into_par_iter().with_max_len(1).map(&of).collect())
     }
 }
 

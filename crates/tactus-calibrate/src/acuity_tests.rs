@@ -170,3 +170,12 @@ fn panels_are_in_order_and_name_what_they_cannot_do() {
     let steps: Vec<_> = Grid::whole().force_resolutions.iter().map(|f| 1.0 / f).collect();
     assert_eq!((steps.len(), steps[0].round(), steps[24].round()), (25, 4.0, 256.0));
 }
+
+#[test]
+fn the_number_of_threads_changes_no_cell_of_a_map() {
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Grid::even(7).map(|sensor| sensor.separation(0.3).map(f64::to_bits)).unwrap())
+    };
+    assert_eq!(on(1), on(3));
+}

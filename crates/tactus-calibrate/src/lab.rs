@@ -1,13 +1,14 @@
-//! A sensor made up for tests, and experiments on it that give the samples of a measurement table.
+//! A sensor made up for tests, and experiments on it that give the rows of a measurement table.
 
 use std::collections::BTreeMap;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::{Array, Contact, Covering, ForwardModel, Indenter, Phase, Psf, Registration, Response};
+use tactus_model::{Array, Contact, Covering, ForwardModel, Indenter, Psf, Registration, Response};
+use tactus_schema::table::{Phase, RowView};
 
-use crate::{Declared, Gather, Readings, Sample};
+use crate::{Declared, Gather, Readings};
 
 /// The paper's cylinder.
 pub(crate) const TOOL: Indenter = Indenter::Cylinder { diameter_mm: 1.0 };
@@ -136,13 +137,15 @@ impl Lab {
             })
             .collect();
         let run = self.run.clone();
-        self.gather.take(Sample {
+        self.gather.take(RowView {
             run: &run,
             press,
             phase,
+            t_ns: 0,
             position_mm,
             covering_mm,
             indenter: "cyl1",
+            temperature_c: None,
             counts: &read,
         });
     }

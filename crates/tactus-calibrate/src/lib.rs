@@ -29,7 +29,7 @@ mod thickness;
 pub use calibration::{Calibration, Data, calibrate};
 pub use estimate::Estimate;
 pub use faults::{Fault, FaultKind, Health};
-pub use readings::{Dwell, Gather, Press, Readings, Rest, Sample, distinct_places};
+pub use readings::{Dwell, Gather, Press, Readings, Rest, distinct_places};
 pub use registration::RegistrationFit;
 pub use response::{ElementResponse, Form, ResponseFit, Trial};
 pub use setting::Declared;

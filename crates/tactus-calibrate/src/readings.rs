@@ -4,7 +4,8 @@ mod segment;
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use tactus_model::{Array, Phase};
+use tactus_model::Array;
+use tactus_schema::table::RowView;
 
 use segment::{Kind, Segment};
 
@@ -12,25 +13,6 @@ use segment::{Kind, Segment};
 const CLEAR_MM: f64 = 0.3;
 /// A press that holds so many depths shows by these how an element answers.
 const STEPS_LEAST: usize = 3;
-
-/// One row of the measurement table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample<'a> {
-    /// Run id; the samples of a run come one after the other, in order of time.
-    pub run: &'a str,
-    /// Press index in the run; -1 outside a press.
-    pub press: i32,
-    /// What the stage was doing.
-    pub phase: Phase,
-    /// Stage position, robot frame.
-    pub position_mm: [f64; 3],
-    /// Thickness of the covering in place.
-    pub covering_mm: f64,
-    /// Id of the tool on the stage.
-    pub indenter: &'a str,
-    /// Raw counts, row-major, one per element.
-    pub counts: &'a [f32],
-}
 
 /// Frames gathered into what calibration works on.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,7 +79,7 @@ pub struct Dwell {
     pub held: bool,
 }
 
-/// Gathers samples into [`Readings`].
+/// Gathers rows into [`Readings`].
 #[derive(Debug)]
 pub struct Gather {
     elements: usize,
@@ -168,24 +150,24 @@ impl Gather {
         }
     }
 
-    /// Takes the next sample.
+    /// Takes the next row.
     ///
     /// # Panics
     /// If it has not one count per element.
-    pub fn take(&mut self, sample: Sample<'_>) {
-        assert_eq!(sample.counts.len(), self.elements, "one count per element");
+    pub fn take(&mut self, row: RowView<'_>) {
+        assert_eq!(row.counts.len(), self.elements, "one count per element");
         self.readings.frames += 1;
-        for (range, count) in self.range_counts.iter_mut().zip(sample.counts) {
+        for (range, count) in self.range_counts.iter_mut().zip(row.counts) {
             let [least, most] = range.unwrap_or([*count; 2]);
             *range = Some([least.min(*count), most.max(*count)]);
         }
-        if self.readings.runs.last().is_none_or(|run| run != sample.run) {
+        if self.readings.runs.last().is_none_or(|run| run != row.run) {
             self.close();
             self.end_press();
             self.rest = None;
-            self.readings.runs.push(sample.run.to_owned());
+            self.readings.runs.push(row.run.to_owned());
         }
-        let kind = Kind::of(&sample);
+        let kind = Kind::of(&row);
         if kind != self.segment.kind {
             self.close();
             self.segment.kind = kind;
@@ -198,10 +180,10 @@ impl Gather {
                 .is_none_or(|last| last.index != press || last.run + 1 != self.readings.runs.len())
         {
             self.end_press();
-            self.begin_press(&sample);
+            self.begin_press(&row);
         }
         if kind != Kind::Between {
-            self.segment.push(sample.position_mm, sample.counts);
+            self.segment.push(row.position_mm, row.counts);
         }
     }
 
@@ -264,16 +246,16 @@ impl Gather {
         }
     }
 
-    fn begin_press(&mut self, sample: &Sample<'_>) {
-        let [x_mm, y_mm, _] = sample.position_mm;
-        let name = sample.indenter;
+    fn begin_press(&mut self, row: &RowView<'_>) {
+        let [x_mm, y_mm, _] = row.position_mm;
+        let name = row.indenter;
         let indenter = self.indenters.entry(name.to_owned()).or_insert_with(|| name.into());
         let indenter = Arc::clone(indenter);
         self.readings.presses.push(Press {
             run: self.readings.runs.len() - 1,
-            index: sample.press,
+            index: row.press,
             place_mm: [x_mm, y_mm],
-            covering_mm: sample.covering_mm,
+            covering_mm: row.covering_mm,
             indenter,
             rest: self.rest.clone(),
             dwells: Vec::new(),

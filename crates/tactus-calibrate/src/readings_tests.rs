@@ -1,15 +1,18 @@
 use tactus_model::Array;
+use tactus_schema::table::Phase;
 
 use super::*;
 
-fn sample(press: i32, phase: Phase, z_mm: f64, counts: &[f32]) -> Sample<'_> {
-    Sample {
+fn row(press: i32, phase: Phase, z_mm: f64, counts: &[f32]) -> RowView<'_> {
+    RowView {
         run: "a",
         press,
         phase,
+        t_ns: 0,
         position_mm: [1.0, 2.0, z_mm],
         covering_mm: 1.016,
         indenter: "cyl1",
+        temperature_c: None,
         counts,
     }
 }
@@ -22,13 +25,13 @@ fn array() -> Array {
 fn one_press(gather: &mut Gather) {
     for frame in 0..10 {
         let odd = if frame % 2 == 0 { 1.0 } else { -1.0 };
-        gather.take(sample(-1, Phase::Idle, 2.0, &[100.0 + odd, 50.0]));
+        gather.take(row(-1, Phase::Idle, 2.0, &[100.0 + odd, 50.0]));
     }
-    gather.take(sample(0, Phase::Approach, 0.1, &[999.0, 999.0]));
+    gather.take(row(0, Phase::Approach, 0.1, &[999.0, 999.0]));
     for (z_mm, count) in [(-0.2, 300.0), (-0.4, 500.0), (-0.6, 700.0)] {
-        gather.take(sample(0, Phase::Load, z_mm + 0.05, &[9.0, 9.0]));
+        gather.take(row(0, Phase::Load, z_mm + 0.05, &[9.0, 9.0]));
         for _ in 0..8 {
-            gather.take(sample(0, Phase::Hold, z_mm, &[count, 60.0]));
+            gather.take(row(0, Phase::Hold, z_mm, &[count, 60.0]));
         }
     }
 }
@@ -62,11 +65,11 @@ fn a_frame_that_no_noise_explains_is_left_out() {
     let mut gather = Gather::new(&array());
     for frame in 0..10 {
         let counts = if frame == 4 { [4000.0, 50.0] } else { [100.0, 50.0] };
-        gather.take(sample(-1, Phase::Idle, 2.0, &counts));
+        gather.take(row(-1, Phase::Idle, 2.0, &counts));
     }
     for frame in 0..9 {
         let counts = if frame == 5 { [0.0, 4095.0] } else { [400.0, 60.0] };
-        gather.take(sample(0, Phase::Hold, -0.3, &counts));
+        gather.take(row(0, Phase::Hold, -0.3, &counts));
     }
     let readings = gather.finish();
     assert_eq!(readings.frames_left_out, 2);
@@ -78,14 +81,14 @@ fn a_frame_that_no_noise_explains_is_left_out() {
 fn frames_taken_on_the_way_count_where_nothing_else_is_there() {
     let mut gather = Gather::new(&array());
     for _ in 0..10 {
-        gather.take(sample(-1, Phase::Idle, 0.0, &[100.0, 50.0]));
+        gather.take(row(-1, Phase::Idle, 0.0, &[100.0, 50.0]));
     }
     for step in 1..=20 {
         let depth = f64::from(step) * 0.1;
-        gather.take(sample(0, Phase::Load, -depth, &[100.0 + 10.0 * step as f32, 50.0]));
+        gather.take(row(0, Phase::Load, -depth, &[100.0 + 10.0 * step as f32, 50.0]));
     }
     for _ in 0..4 {
-        gather.take(sample(0, Phase::Hold, -2.0, &[300.0, 50.0]));
+        gather.take(row(0, Phase::Hold, -2.0, &[300.0, 50.0]));
     }
     let readings = gather.finish();
     assert_eq!(readings.presses[0].dwells.len(), 21);
@@ -103,7 +106,7 @@ fn nothing_gathered_is_nothing_read() {
 fn a_press_before_any_rest_has_none() {
     let mut gather = Gather::new(&array());
     for _ in 0..6 {
-        gather.take(sample(0, Phase::Hold, -0.3, &[400.0, 60.0]));
+        gather.take(row(0, Phase::Hold, -0.3, &[400.0, 60.0]));
     }
     let readings = gather.finish();
     assert_eq!(readings.presses[0].rest, None);

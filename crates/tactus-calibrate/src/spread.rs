@@ -12,9 +12,8 @@
 //! (the sandwich estimate, which asks for no model of the noise), and what the errors of the elements' responses and of
 //! the sensor's place do to it, which is common to many presses and coverings, by first derivatives.
 
-use std::{num::NonZero, thread};
-
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use serde::Serialize;
 use tactus_model::{Contact, Covering, effect};
 
@@ -81,24 +80,9 @@ pub(crate) fn spreads(
 ) -> (Spreads, Vec<String>) {
     let groups = groups(declared, readings);
     let one = |group: &Group<'_>| Search::new(declared, gains, place, group)?.run(readings, group);
-    let threads = thread::available_parallelism().map_or(1, NonZero::get).min(groups.len().max(1));
-    // Every thread takes each so-and-so-many-th group, so that thick and thin coverings are shared out.
-    let results = thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads)
-            .map(|first| {
-                let mine = groups.iter().enumerate().skip(first).step_by(threads);
-                scope.spawn(move || mine.map(|(index, group)| (index, one(group))).collect::<Vec<_>>())
-            })
-            .collect();
-        let results = workers
-            .into_iter()
-            .flat_map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        let mut results: Vec<_> = results.collect();
-        results.sort_by_key(|(index, _)| *index);
-        results
-    });
+    let results: Vec<_> = groups.par_iter().with_max_len(1).map(one).collect();
     let (mut found, mut refused) = (Vec::new(), Vec::new());
-    for ((_, result), group) in results.into_iter().zip(&groups) {
+    for (result, group) in results.into_iter().zip(&groups) {
         match result {
             Ok(one) => found.push(one),
             Err(problem) => refused.push(format!(

@@ -75,3 +75,13 @@ fn nothing_measured_is_said_and_no_number_given() {
         found.psf(declared.model.psf()).is_none() && found.responses(declared.model.response()).is_none()
     );
 }
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        // Debug output of a number names all of its bits.
+        pool.install(|| format!("{:?}", whole(5, |_, _| ())))
+    };
+    assert_eq!(on(1), on(3));
+}

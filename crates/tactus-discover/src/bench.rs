@@ -2,9 +2,10 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::{Array, Covering, Effect, Indenter, Phase, Psf, Registration, Response};
+use tactus_model::{Array, Covering, Effect, Indenter, Psf, Registration, Response};
+use tactus_schema::table::{Phase, RowView};
 
-use crate::{Base, Discovery, Frame, Frames, Known, Options, Rule, discover, predict};
+use crate::{Base, Discovery, Frames, Known, Options, Rule, discover, predict};
 
 pub(crate) const ELEMENTS: usize = 48;
 pub(crate) const INTERVAL_S: f64 = 0.1;
@@ -40,7 +41,7 @@ fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
         let depth_mm = if press % 2 == 0 { depth_mm } else { 0.7 * depth_mm };
         #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
         let counts: Vec<f32> = counts(frame).into_iter().map(|counts| counts as f32).collect();
-        frames.push(Frame {
+        frames.push(RowView {
             run: "a",
             press: if phase == Phase::Idle { -1 } else { i32::try_from(press).unwrap() },
             phase,

@@ -1,29 +1,6 @@
 //! The measured frames, gathered for analysis.
 
-use tactus_model::Phase;
-
-/// One row of the measurement table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame<'a> {
-    /// Run id; the frames of a run come one after the other, in order of time.
-    pub run: &'a str,
-    /// Press index in the run; -1 outside a press.
-    pub press: i32,
-    /// What the stage was doing.
-    pub phase: Phase,
-    /// Time of sampling.
-    pub t_ns: i64,
-    /// Stage position, robot frame.
-    pub position_mm: [f64; 3],
-    /// Thickness of the covering in place.
-    pub covering_mm: f64,
-    /// Id of the tool on the stage.
-    pub indenter: &'a str,
-    /// Temperature, where it was measured.
-    pub temperature_c: Option<f64>,
-    /// Raw counts, row-major, one per element.
-    pub counts: &'a [f32],
-}
+use tactus_schema::table::{Phase, RowView};
 
 /// Frames of one or more runs, column by column.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -55,11 +32,11 @@ impl Frames {
         Self { elements, ..Self::default() }
     }
 
-    /// Takes the next frame.
+    /// Takes the next row of the measurement table; the rows of a run come one after the other, in order of time.
     ///
     /// # Panics
     /// If it has not one count per element.
-    pub fn push(&mut self, frame: Frame<'_>) {
+    pub fn push(&mut self, frame: RowView<'_>) {
         assert_eq!(frame.counts.len(), self.elements, "one count per element");
         if self.runs.last().is_none_or(|(run, _)| run != frame.run) {
             self.first_ns = frame.t_ns;

@@ -1,12 +1,12 @@
-use tactus_model::Phase;
+use tactus_schema::table::{Phase, RowView};
 
 use super::wider_step;
-use crate::{Frame, Frames};
+use crate::Frames;
 
 fn readings(counts: impl Iterator<Item = f32>) -> Frames {
     let mut frames = Frames::new(1);
     for (t_ns, counts) in (0..).step_by(33_000_000).zip(counts) {
-        frames.push(Frame {
+        frames.push(RowView {
             run: "a",
             press: -1,
             phase: Phase::Idle,

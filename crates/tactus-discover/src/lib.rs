@@ -36,4 +36,4 @@ pub use discovery::{
     Base, Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment,
     NotShown, Point, Round, RunWander, Split, Step, Unexplained, Verdict,
 };
-pub use frames::{Frame, Frames};
+pub use frames::Frames;

@@ -1,8 +1,9 @@
-use tactus_model::{Phase, Registration};
+use tactus_model::Registration;
+use tactus_schema::table::{Phase, RowView};
 
 use super::*;
+use crate::bench;
 use crate::parallel::Threads;
-use crate::{Frame, bench};
 
 /// A sensor that lies where the sample rig has it.
 fn known() -> Known {
@@ -14,7 +15,7 @@ fn measured() -> Frames {
     let mut frames = Frames::new(48);
     for frame in 0..30 {
         let t_s = f64::from(frame) / 30.0;
-        frames.push(Frame {
+        frames.push(RowView {
             run: "r",
             press: 0,
             phase: Phase::Load,

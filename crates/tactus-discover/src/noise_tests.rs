@@ -1,11 +1,11 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_model::Phase;
+use tactus_schema::table::{Phase, RowView};
 
 use super::Noise;
+use crate::Frames;
 use crate::rows::still;
-use crate::{Frame, Frames};
 
 /// A tip at rest under first-order autoregressive noise of standard deviation 3, beside a slow ramp.
 fn resting(phi: f64) -> Frames {
@@ -20,7 +20,7 @@ fn resting(phi: f64) -> Frames {
         let ramp = 0.002 * f64::from(index);
         #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
         let counts = noise.map(|noise| (100.0 + ramp + noise) as f32);
-        frames.push(Frame {
+        frames.push(RowView {
             run: "a",
             press: -1,
             phase: Phase::Idle,

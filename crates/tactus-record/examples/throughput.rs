@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         frame.seq = seq;
         frame.received.mono = MonoTime::from_ns(at_ns);
         frame.received.wall = WallTime::from_ns(at_ns);
-        recording.write_frame(&frame)?;
+        recording.write(&frame)?;
     }
     let summary = recording.finish()?;
     let elapsed_s = started.elapsed().as_secs_f64();

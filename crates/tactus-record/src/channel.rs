@@ -7,13 +7,9 @@ use std::{
 };
 
 use mcap::{Compression, McapError, WriteOptions, records::MessageHeader, write::NoSeek};
-use tactus_schema::{
-    DESCRIPTOR_SET, Message, Stamp,
-    key::{Keys, Topic},
-    pb,
-};
+use tactus_schema::{DESCRIPTOR_SET, Stamp, key::Keys};
 
-use crate::header::Header;
+use crate::{MessageKind, header::Header, message::Recorded};
 
 /// A chunk is closed and handed to the system once it spans this much time. A reader can do nothing with half a
 /// chunk, so this is what a killed process loses.
@@ -30,19 +26,11 @@ type Output<W> = NoSeek<BufWriter<W>>;
 /// Writes the messages of one run into an MCAP stream.
 pub(crate) struct ChannelWriter<W: Write> {
     mcap: mcap::Writer<Output<W>>,
-    ids: Ids,
+    /// Channels by kind of message.
+    ids: [u16; MessageKind::ALL.len()],
     encoded: Vec<u8>,
     chunk_began: Option<Stamp>,
     failed: bool,
-}
-
-#[derive(Clone, Copy)]
-struct Ids {
-    frame: u16,
-    sensor_info: u16,
-    stage: u16,
-    event: u16,
-    safety: u16,
 }
 
 /// How recordings are written.
@@ -90,34 +78,9 @@ impl<W: Write> ChannelWriter<W> {
                 data: attachment.data.into(),
             })?;
         }
-        let ids = Ids::declare(&mut mcap, &Keys::new(header.rig.name.clone()))?;
+        let ids = declare(&mut mcap, &Keys::new(header.rig.name.clone()))?;
         mcap.flush()?;
         Ok(Self { mcap, ids, encoded: Vec::new(), chunk_began: None, failed: false })
-    }
-
-    pub(crate) fn frame(&mut self, message: &pb::Frame, at: Stamp) -> Result<(), McapError> {
-        self.write(self.ids.frame, message.seq, at, message)
-    }
-
-    pub(crate) fn sensor_info(
-        &mut self,
-        message: &pb::SensorInfo,
-        nth: u64,
-        at: Stamp,
-    ) -> Result<(), McapError> {
-        self.write(self.ids.sensor_info, nth, at, message)
-    }
-
-    pub(crate) fn stage(&mut self, message: &pb::StageState, at: Stamp) -> Result<(), McapError> {
-        self.write(self.ids.stage, message.seq, at, message)
-    }
-
-    pub(crate) fn event(&mut self, message: &pb::RunEvent, at: Stamp) -> Result<(), McapError> {
-        self.write(self.ids.event, message.seq, at, message)
-    }
-
-    pub(crate) fn safety(&mut self, message: &pb::SafetyEvent, at: Stamp) -> Result<(), McapError> {
-        self.write(self.ids.safety, message.seq, at, message)
     }
 
     /// Closes the chunk in hand and gives it to the system.
@@ -137,13 +100,8 @@ impl<W: Write> ChannelWriter<W> {
         buffered.into_inner().map_err(|error| McapError::Io(error.into_error()))
     }
 
-    fn write<M: Message>(
-        &mut self,
-        channel_id: u16,
-        seq: u64,
-        at: Stamp,
-        message: &M,
-    ) -> Result<(), McapError> {
+    /// Writes a message to the channel of its kind, and closes the chunk in hand first if it spans enough time.
+    pub(crate) fn write<M: Recorded>(&mut self, message: &M, seq: u64, at: Stamp) -> Result<(), McapError> {
         self.once_failed_always()?;
         // A clock that runs backwards closes the chunk, too.
         let spans = |began: Stamp| at.mono < began.mono || at.mono.since(began.mono) >= CHUNK_SPAN;
@@ -152,7 +110,8 @@ impl<W: Write> ChannelWriter<W> {
         }
         self.chunk_began.get_or_insert(at);
         self.encoded.clear();
-        message.encode_raw(&mut self.encoded);
+        message.encode(&mut self.encoded);
+        let channel_id = self.ids[M::KIND as usize];
         let log_time = unsigned(at.wall.ns());
         let header = MessageHeader { channel_id, sequence: wrapped(seq), log_time, publish_time: log_time };
         let written = self.mcap.write_to_known_channel(&header, &self.encoded);
@@ -166,25 +125,17 @@ impl<W: Write> ChannelWriter<W> {
     }
 }
 
-impl Ids {
-    fn declare<W: Write>(mcap: &mut mcap::Writer<Output<W>>, keys: &Keys) -> Result<Self, McapError> {
-        Ok(Self {
-            frame: declare::<pb::Frame, W>(mcap, keys, Topic::SensorFrame)?,
-            sensor_info: declare::<pb::SensorInfo, W>(mcap, keys, Topic::SensorInfo)?,
-            stage: declare::<pb::StageState, W>(mcap, keys, Topic::StageState)?,
-            event: declare::<pb::RunEvent, W>(mcap, keys, Topic::RunEvent)?,
-            safety: declare::<pb::SafetyEvent, W>(mcap, keys, Topic::SafetyState)?,
-        })
-    }
-}
-
-fn declare<M: Message, W: Write>(
+/// Declares the channel of every kind of message; their ids, in the order of [`MessageKind::ALL`].
+fn declare<W: Write>(
     mcap: &mut mcap::Writer<Output<W>>,
     keys: &Keys,
-    topic: Topic,
-) -> Result<u16, McapError> {
-    let schema = mcap.add_schema(M::NAME, PROTOBUF, DESCRIPTOR_SET)?;
-    mcap.add_channel(schema, &keys.topic(topic), PROTOBUF, &BTreeMap::new())
+) -> Result<[u16; MessageKind::ALL.len()], McapError> {
+    let mut ids = [0; MessageKind::ALL.len()];
+    for (id, kind) in ids.iter_mut().zip(MessageKind::ALL) {
+        let schema = mcap.add_schema(kind.schema(), PROTOBUF, DESCRIPTOR_SET)?;
+        *id = mcap.add_channel(schema, &keys.topic(kind.topic()), PROTOBUF, &BTreeMap::new())?;
+    }
+    Ok(ids)
 }
 
 /// MCAP has no times before 1970.

@@ -5,7 +5,7 @@ use std::{
 };
 
 use mcap::McapError;
-use tactus_schema::{MonoTime, Rig, Stamp, WallTime, pb};
+use tactus_schema::{Frame, MonoTime, Rig, Stamp, WallTime, pb};
 
 use super::{CHUNK_SPAN, ChannelWriter};
 use crate::{Entry, Header, Message, Reader, Script};
@@ -62,8 +62,8 @@ fn begin(disk: Disk) -> Result<ChannelWriter<Disk>, McapError> {
     ChannelWriter::new(disk, &header)
 }
 
-fn frame(seq: u64) -> pb::Frame {
-    pb::Frame { seq, counts: vec![100.0; 48], ..pb::Frame::default() }
+fn frame(seq: u64) -> Frame {
+    pb::Frame { seq, counts: vec![100.0; 48], ..pb::Frame::default() }.into()
 }
 
 fn at(seq: u64) -> Stamp {
@@ -83,7 +83,7 @@ fn a_killed_process_loses_at_most_one_chunk_span() {
     let mut writer = begin(disk.clone()).unwrap();
     let spanned = u64::try_from(CHUNK_SPAN.as_millis() * 30 / 1000).unwrap() + 1;
     for seq in 0..100 {
-        writer.frame(&frame(seq), at(seq)).unwrap();
+        writer.write(&frame(seq), seq, at(seq)).unwrap();
         // What the disk has is what a kill would leave.
         let lost = seq + 1 - durable_frames(&disk);
         assert!(lost <= spanned, "{lost} frames at risk after frame {seq}");
@@ -116,8 +116,8 @@ fn the_header_is_durable_before_the_first_message() {
 fn a_clock_that_runs_backwards_does_not_hold_messages_back() {
     let disk = Disk::new(usize::MAX);
     let mut writer = begin(disk.clone()).unwrap();
-    writer.frame(&frame(0), at(1000)).unwrap();
-    writer.frame(&frame(1), at(10)).unwrap();
+    writer.write(&frame(0), 0, at(1000)).unwrap();
+    writer.write(&frame(1), 1, at(10)).unwrap();
     assert_eq!(durable_frames(&disk), 1);
 }
 
@@ -132,10 +132,10 @@ fn a_full_disk_fails_loudly_and_for_good() {
 
     let disk = Disk::new(header_bytes + 2000);
     let mut writer = begin(disk.clone()).unwrap();
-    let failed = (0..1000).find(|seq| writer.frame(&frame(*seq), at(*seq)).is_err()).unwrap();
+    let failed = (0..1000).find(|seq| writer.write(&frame(*seq), *seq, at(*seq)).is_err()).unwrap();
     assert!(failed > durable_frames(&disk));
     assert!(
-        writer.frame(&frame(failed + 1), at(failed + 1)).is_err(),
+        writer.write(&frame(failed + 1), failed + 1, at(failed + 1)).is_err(),
         "a failed recording takes nothing more"
     );
     assert!(writer.finish().is_err());

@@ -81,20 +81,6 @@ pub fn info(path: impl AsRef<Path>) -> Result<Info, RecordError> {
     Ok(counts.into_info(path, run, completeness))
 }
 
-/// The word for an exit status, such as `done`.
-pub fn exit_status_name(status: pb::ExitStatus) -> &'static str {
-    match status {
-        pb::ExitStatus::Unspecified => "unspecified",
-        pb::ExitStatus::Done => "done",
-        pb::ExitStatus::Degraded => "degraded",
-        pb::ExitStatus::Failed => "failed",
-        pb::ExitStatus::Stopped => "stopped",
-        pb::ExitStatus::Aborted => "aborted",
-        pb::ExitStatus::Refused => "refused",
-        pb::ExitStatus::Crashed => "crashed",
-    }
-}
-
 #[derive(Default)]
 struct Counts {
     tally: Tally,
@@ -139,7 +125,7 @@ impl Counts {
             simulated: run.simulated,
             started: rfc3339(run.started),
             duration_s: tally.duration().as_secs_f64(),
-            exit_status: tally.exit_status().map(exit_status_name),
+            exit_status: tally.exit_status().map(pb::ExitStatus::word),
             message: tally.finished().map(|finished| finished.message.clone()).unwrap_or_default(),
             frames: tally.frames(),
             frames_lost: tally.frames_lost(),

@@ -8,10 +8,10 @@ use std::{
     sync::Arc,
 };
 
-use tactus_schema::{Frame, Message as _, WallTime, pb};
+use tactus_schema::WallTime;
 
 use crate::{
-    Completeness, RecordError,
+    Completeness, Message, RecordError,
     header::{Attachment, METADATA_NAME, RunMetadata},
     scan::{Item, RawMessage, Scan},
 };
@@ -32,23 +32,6 @@ pub enum Entry {
         /// What it says.
         message: Message,
     },
-}
-
-/// A recorded message.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Message {
-    /// One reading of all elements.
-    Frame(Frame),
-    /// A report of the stage.
-    Stage(pb::StageState),
-    /// An event of the run.
-    Event(Box<pb::RunEvent>),
-    /// An act of the safety supervisor.
-    Safety(pb::SafetyEvent),
-    /// What the sensor says of itself.
-    SensorInfo(pb::SensorInfo),
-    /// A message that this version does not know; its schema's name.
-    Unknown(String),
 }
 
 /// Gives a recording's entries in order, up to its end or to where it is damaged. It never holds more than one
@@ -161,18 +144,6 @@ impl<R> std::fmt::Debug for Reader<R> {
 }
 
 pub(crate) fn decode(raw: &RawMessage) -> Result<Message, prost::DecodeError> {
-    let data = raw.data.as_slice();
     let schema = raw.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
-    Ok(match schema {
-        pb::Frame::NAME => Message::Frame(decoded::<pb::Frame>(data)?.into()),
-        pb::StageState::NAME => Message::Stage(decoded(data)?),
-        pb::RunEvent::NAME => Message::Event(Box::new(decoded(data)?)),
-        pb::SafetyEvent::NAME => Message::Safety(decoded(data)?),
-        pb::SensorInfo::NAME => Message::SensorInfo(decoded(data)?),
-        other => Message::Unknown(other.to_owned()),
-    })
-}
-
-fn decoded<M: tactus_schema::Message>(data: &[u8]) -> Result<M, prost::DecodeError> {
-    M::decode(data)
+    Message::decode(schema, &raw.data)
 }

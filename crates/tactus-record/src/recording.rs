@@ -6,9 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use tactus_schema::{Frame, MonoTime, Stamp, WallTime, pb};
+use tactus_schema::{Stamp, pb};
 
-use crate::{RecordError, Tally, channel::ChannelWriter, header::Header};
+use crate::{RecordError, Tally, Timed, channel::ChannelWriter, header::Header};
 
 /// One run being written to an MCAP file.
 ///
@@ -72,64 +72,33 @@ impl Recording {
         &self.tally
     }
 
-    /// Records one frame.
+    /// Records a message at its own time: a frame, a report of the stage, an event of the run, an act of the safety
+    /// supervisor.
     ///
     /// # Errors
     /// If the chunk before it could not be written; so with all that follow.
-    pub fn write_frame(&mut self, frame: &Frame) -> Result<(), RecordError> {
-        self.tally.frame(frame);
-        let written = self.writer.frame(&frame.into(), frame.received);
-        self.checked(written)
-    }
-
-    /// Records one report of the stage.
-    ///
-    /// # Errors
-    /// As [`Recording::write_frame`].
-    pub fn write_stage(&mut self, state: &pb::StageState) -> Result<(), RecordError> {
-        let at = stamp(state.t_mono_ns, state.t_wall_ns);
-        self.tally.time(at.mono);
-        let written = self.writer.stage(state, at);
-        self.checked(written)
-    }
-
-    /// Records one event of the run.
-    ///
-    /// # Errors
-    /// As [`Recording::write_frame`].
-    pub fn write_event(&mut self, event: &pb::RunEvent) -> Result<(), RecordError> {
-        self.tally.event(event);
-        let written = self.writer.event(event, stamp(event.t_mono_ns, event.t_wall_ns));
-        self.checked(written)
-    }
-
-    /// Records one act of the safety supervisor.
-    ///
-    /// # Errors
-    /// As [`Recording::write_frame`].
-    pub fn write_safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordError> {
-        let at = stamp(event.t_mono_ns, event.t_wall_ns);
-        self.tally.time(at.mono);
-        let written = self.writer.safety(event, at);
+    pub fn write<M: Timed>(&mut self, message: &M) -> Result<(), RecordError> {
+        message.count(&mut self.tally);
+        let written = self.writer.write(message, message.seq(), message.at());
         self.checked(written)
     }
 
     /// Records what the sensor says of itself.
     ///
     /// # Errors
-    /// As [`Recording::write_frame`].
+    /// As [`Recording::write`].
     pub fn write_sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordError> {
         self.tally.time(at.mono);
         let nth = self.sensor_infos;
         self.sensor_infos += 1;
-        let written = self.writer.sensor_info(info, nth, at);
+        let written = self.writer.write(info, nth, at);
         self.checked(written)
     }
 
     /// Gives everything taken in so far to the system. For quiet times: while messages come, they do it.
     ///
     /// # Errors
-    /// As [`Recording::write_frame`].
+    /// As [`Recording::write`].
     pub fn flush(&mut self) -> Result<(), RecordError> {
         let flushed = self.writer.flush();
         self.checked(flushed)
@@ -174,8 +143,4 @@ impl fmt::Debug for Recording {
             .field("tally", &self.tally)
             .finish_non_exhaustive()
     }
-}
-
-fn stamp(mono_ns: i64, wall_ns: i64) -> Stamp {
-    Stamp { mono: MonoTime::from_ns(mono_ns), wall: WallTime::from_ns(wall_ns) }
 }

@@ -10,13 +10,13 @@ use std::{
 
 use mcap::McapError;
 use tactus_schema::{
-    DESCRIPTOR_SET, Message as _,
-    key::{Keys, Topic},
+    DESCRIPTOR_SET, Stamp,
+    key::Keys,
     pb::{self, run_event::Event},
 };
 
 use crate::{
-    Completeness, Info, Message, RecordError, RunMetadata, Tally,
+    Completeness, Info, Message, MessageKind, RecordError, RunMetadata, Tally,
     channel::{PROTOBUF, unsigned, wrapped, writer},
     header::METADATA_NAME,
     info,
@@ -124,7 +124,7 @@ struct Copy<W: Write> {
     tally: Tally,
     run: Option<RunMetadata>,
     last_event: Option<u64>,
-    last_time: (i64, i64),
+    last_time: Stamp,
 }
 
 impl<W: Write> Copy<W> {
@@ -135,7 +135,7 @@ impl<W: Write> Copy<W> {
             tally: Tally::default(),
             run: None,
             last_event: None,
-            last_time: (0, 0),
+            last_time: Stamp::default(),
         })
     }
 
@@ -149,15 +149,9 @@ impl<W: Write> Copy<W> {
     fn message(&mut self, raw: RawMessage, message: &Message) -> Result<(), McapError> {
         self.messages += 1;
         self.tally.take(message);
-        match message {
-            Message::Frame(frame) => self.last_time = (frame.received.mono.ns(), frame.received.wall.ns()),
-            Message::Stage(state) => self.last_time = (state.t_mono_ns, state.t_wall_ns),
-            Message::Safety(event) => self.last_time = (event.t_mono_ns, event.t_wall_ns),
-            Message::Event(event) => {
-                self.last_time = (event.t_mono_ns, event.t_wall_ns);
-                self.last_event = Some(event.seq);
-            }
-            Message::SensorInfo(_) | Message::Unknown(_) => {}
+        self.last_time = message.at().unwrap_or(self.last_time);
+        if let Message::Event(event) = message {
+            self.last_event = Some(event.seq);
         }
         self.mcap.write(&mcap::Message {
             channel: Arc::clone(&raw.channel),
@@ -173,7 +167,7 @@ impl<W: Write> Copy<W> {
         let Some(run) = self.run.as_ref().filter(|_| self.tally.finished().is_none()) else {
             return Ok(false);
         };
-        let (t_mono_ns, t_wall_ns) = self.last_time;
+        let (t_mono_ns, t_wall_ns) = (self.last_time.mono.ns(), self.last_time.wall.ns());
         let event = pb::RunEvent {
             seq: self.last_event.map_or(0, |seq| seq + 1),
             run_id: run.run_id.clone(),
@@ -189,8 +183,9 @@ impl<W: Write> Copy<W> {
                 duration_s: self.tally.duration().as_secs_f64(),
             })),
         };
-        let schema = self.mcap.add_schema(pb::RunEvent::NAME, PROTOBUF, DESCRIPTOR_SET)?;
-        let topic = Keys::new(run.rig.clone()).topic(Topic::RunEvent);
+        let kind = MessageKind::Event;
+        let schema = self.mcap.add_schema(kind.schema(), PROTOBUF, DESCRIPTOR_SET)?;
+        let topic = Keys::new(run.rig.clone()).topic(kind.topic());
         let channel_id = self.mcap.add_channel(schema, &topic, PROTOBUF, &BTreeMap::new())?;
         let log_time = unsigned(t_wall_ns);
         let sequence = wrapped(event.seq);

@@ -6,13 +6,13 @@ use std::{
     time::Duration,
 };
 
-use tactus_calibrate::{Gather, Readings, Sample};
-use tactus_schema::{Frame, MonoTime, Rig};
+use tactus_calibrate::{Gather, Readings};
+use tactus_schema::{Frame, MonoTime, Rig, table::RowView};
 
 use crate::{
     Completeness, Entry, Message, RowsError, Sampling, Timeline,
     reader::{first_bytes, io_error, read_run},
-    table::{Checker, RowView, TableReader},
+    table::{Checker, TableReader},
 };
 
 /// The first bytes of a Parquet file.
@@ -80,15 +80,7 @@ pub fn visit<P: AsRef<Path>>(
 pub fn readings<P: AsRef<Path>>(paths: &[P]) -> Result<(Source, Readings), RowsError> {
     let mut gather = None;
     let source = visit(paths, |rig, row| {
-        gather.get_or_insert_with(|| Gather::new(&rig.array)).take(Sample {
-            run: row.run,
-            press: row.press,
-            phase: row.phase,
-            position_mm: row.position_mm,
-            covering_mm: row.covering_mm,
-            indenter: row.indenter,
-            counts: row.counts,
-        });
+        gather.get_or_insert_with(|| Gather::new(&rig.array)).take(row);
     })?;
     let readings = gather.unwrap_or_else(|| Gather::new(&source.rig.array)).finish();
     Ok((source, readings))

@@ -17,7 +17,7 @@ use std::{collections::BTreeMap, ops::Range, path::Path, sync::Arc};
 
 use tactus_schema::{
     Rig,
-    table::{Phase, Row},
+    table::{Phase, RowView},
 };
 
 pub use error::TableError;
@@ -58,29 +58,6 @@ pub struct RunRows {
     pub run: Arc<str>,
     /// Its rows, contiguous and in order of time.
     pub rows: Range<usize>,
-}
-
-/// One row, borrowed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RowView<'a> {
-    /// Run id.
-    pub run: &'a str,
-    /// Press index in the run; -1 outside a press.
-    pub press: i32,
-    /// What the stage was doing.
-    pub phase: Phase,
-    /// Time of the frame's sampling.
-    pub t_ns: i64,
-    /// Stage position at `t_ns`, robot frame.
-    pub position_mm: [f64; 3],
-    /// Covering thickness.
-    pub covering_mm: f64,
-    /// Id of an indenter of the rig.
-    pub indenter: &'a str,
-    /// Temperature, if it was measured.
-    pub temperature_c: Option<f64>,
-    /// Raw counts, row-major, one per element.
-    pub counts: &'a [f32],
 }
 
 /// What a valid table holds.
@@ -171,22 +148,6 @@ impl Table {
     /// Raw counts of all rows, one after the other; as many a row as the array has elements.
     pub fn counts(&self) -> &[f32] {
         &self.counts
-    }
-}
-
-impl<'a> From<&'a Row> for RowView<'a> {
-    fn from(row: &'a Row) -> Self {
-        Self {
-            run: &row.run,
-            press: row.press,
-            phase: row.phase,
-            t_ns: row.t_ns,
-            position_mm: row.position_mm,
-            covering_mm: row.covering_mm,
-            indenter: &row.indenter,
-            temperature_c: row.temperature_c,
-            counts: &row.counts,
-        }
     }
 }
 

@@ -25,15 +25,7 @@ pub struct Tally {
 impl Tally {
     /// Takes in any message as it was read back.
     pub fn take(&mut self, message: &Message) {
-        match message {
-            Message::Frame(frame) => {
-                self.frame(frame);
-            }
-            Message::Event(event) => self.event(event),
-            Message::Stage(state) => self.time(MonoTime::from_ns(state.t_mono_ns)),
-            Message::Safety(event) => self.time(MonoTime::from_ns(event.t_mono_ns)),
-            Message::SensorInfo(_) | Message::Unknown(_) => {}
-        }
+        message.count(self);
     }
 
     /// Takes in a frame; returns how many are missing between it and the one before.

@@ -47,19 +47,19 @@ impl Record for InPlace {
     }
 
     fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure> {
-        self.0.write_frame(frame).map_err(failure)
+        self.0.write(frame).map_err(failure)
     }
 
     fn stage(&mut self, state: &pb::StageState) -> Result<(), RecordFailure> {
-        self.0.write_stage(state).map_err(failure)
+        self.0.write(state).map_err(failure)
     }
 
     fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure> {
-        self.0.write_event(event).map_err(failure)
+        self.0.write(event).map_err(failure)
     }
 
     fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure> {
-        self.0.write_safety(event).map_err(failure)
+        self.0.write(event).map_err(failure)
     }
 
     fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
@@ -125,10 +125,10 @@ fn write_all(mut recording: Recording, queue: &Receiver<Entry>) -> Result<(), Re
     for entry in queue {
         match &entry {
             Entry::SensorInfo(info, at) => recording.write_sensor_info(info, *at),
-            Entry::Frame(frame) => recording.write_frame(frame),
-            Entry::Stage(state) => recording.write_stage(state),
-            Entry::Event(event) => recording.write_event(event),
-            Entry::Safety(event) => recording.write_safety(event),
+            Entry::Frame(frame) => recording.write(frame),
+            Entry::Stage(state) => recording.write(state),
+            Entry::Event(event) => recording.write(event),
+            Entry::Safety(event) => recording.write(event),
         }?;
     }
     recording.finish().map(drop)

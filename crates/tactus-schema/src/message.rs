@@ -30,3 +30,62 @@ name_messages! {
     Frame, SensorInfo, StageState, RunEvent, RunState, SafetyEvent, Health,
     RunRequest, CommandRequest, CommandReply,
 }
+
+macro_rules! words {
+    ($($(#[$doc:meta])* $enumeration:ident { $($value:ident => $word:literal),* $(,)? })*) => {
+        $(impl pb::$enumeration {
+            $(#[$doc])*
+            pub const fn word(self) -> &'static str {
+                match self {
+                    $(Self::$value => $word,)*
+                }
+            }
+        })*
+    };
+}
+
+words! {
+    /// The word for what the stage does, on the terminal, in JSON and on the dashboard; capitals where a person has to act.
+    StageStatus {
+        Unspecified => "unknown",
+        Disconnected => "DISCONNECTED",
+        Unhomed => "not homed",
+        Idle => "idle",
+        Moving => "moving",
+        Hold => "hold",
+        Homing => "homing",
+        Alarm => "ALARM",
+    }
+    /// The word for the state of a run, on the terminal, in JSON and on the dashboard.
+    RunPhase {
+        Unspecified => "unknown",
+        Idle => "idle",
+        Preparing => "preparing",
+        Running => "running",
+        Paused => "paused",
+        Stopping => "stopping",
+        Finished => "finished",
+    }
+    /// The word for how a run ended, on the terminal, in JSON, in reports and on the dashboard; `unknown` while it runs.
+    ExitStatus {
+        Unspecified => "unknown",
+        Done => "done",
+        Degraded => "degraded",
+        Failed => "failed",
+        Stopped => "stopped",
+        Aborted => "aborted",
+        Refused => "refused",
+        Crashed => "crashed",
+    }
+    /// The word for a verdict of the safety supervisor, on the dashboard.
+    SafetyVerdict {
+        Unspecified => "unknown",
+        Clear => "clear",
+        Refused => "refused",
+        Stopped => "stopped",
+    }
+}
+
+#[cfg(test)]
+#[path = "message_tests.rs"]
+mod tests;

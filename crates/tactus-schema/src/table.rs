@@ -34,7 +34,7 @@ pub const COLUMNS: [&str; 11] = [
     "counts",
 ];
 
-/// One row.
+/// One row, owned; the fields are the table's columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Run id.
@@ -43,11 +43,11 @@ pub struct Row {
     pub press: i32,
     /// What the stage was doing.
     pub phase: Phase,
-    /// Time of the frame's sampling.
+    /// Time of the frame's sampling, monotonic within a run.
     pub t_ns: i64,
     /// Stage position at `t_ns`, robot frame.
     pub position_mm: [f64; 3],
-    /// Covering thickness.
+    /// Thickness of the covering in place.
     pub covering_mm: f64,
     /// Id of an indenter in the rig description.
     pub indenter: String,
@@ -55,6 +55,64 @@ pub struct Row {
     pub temperature_c: Option<f64>,
     /// Raw counts, row-major, one per element.
     pub counts: Vec<f32>,
+}
+
+/// A borrowed [`Row`]: what readers, writers and analyses of the table pass on frame by frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowView<'a> {
+    /// As [`Row::run`].
+    pub run: &'a str,
+    /// As [`Row::press`].
+    pub press: i32,
+    /// As [`Row::phase`].
+    pub phase: Phase,
+    /// As [`Row::t_ns`].
+    pub t_ns: i64,
+    /// As [`Row::position_mm`].
+    pub position_mm: [f64; 3],
+    /// As [`Row::covering_mm`].
+    pub covering_mm: f64,
+    /// As [`Row::indenter`].
+    pub indenter: &'a str,
+    /// As [`Row::temperature_c`].
+    pub temperature_c: Option<f64>,
+    /// As [`Row::counts`].
+    pub counts: &'a [f32],
+}
+
+impl<'a> From<&'a Row> for RowView<'a> {
+    fn from(row: &'a Row) -> Self {
+        let Row { run, press, phase, t_ns, position_mm, covering_mm, indenter, temperature_c, counts } = row;
+        Self {
+            run,
+            press: *press,
+            phase: *phase,
+            t_ns: *t_ns,
+            position_mm: *position_mm,
+            covering_mm: *covering_mm,
+            indenter,
+            temperature_c: *temperature_c,
+            counts,
+        }
+    }
+}
+
+impl From<RowView<'_>> for Row {
+    fn from(view: RowView<'_>) -> Self {
+        let RowView { run, press, phase, t_ns, position_mm, covering_mm, indenter, temperature_c, counts } =
+            view;
+        Self {
+            run: run.to_owned(),
+            press,
+            phase,
+            t_ns,
+            position_mm,
+            covering_mm,
+            indenter: indenter.to_owned(),
+            temperature_c,
+            counts: counts.to_vec(),
+        }
+    }
 }
 
 impl From<Phase> for pb::Phase {

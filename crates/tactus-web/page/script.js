@@ -114,7 +114,7 @@ function duration(seconds) {
 }
 
 function showRun(run) {
-  const active = run && !["idle", "finished", "unspecified"].includes(run.phase);
+  const active = run && !["idle", "finished", "unknown"].includes(run.phase);
   at("fault").hidden = !run?.fault;
   at("fault").textContent = run?.fault ? `${run.fault}: nothing moves before a reset` : "";
   at("progress").hidden = !active;

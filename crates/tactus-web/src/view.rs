@@ -35,7 +35,7 @@ impl View {
             })),
             "missed": self.missed,
             "stage": self.stage.as_ref().map(|stage| json!({
-                "status": word(stage.status().as_str_name(), "STAGE_STATUS_"),
+                "status": stage.status().word(),
                 "x_mm": stage.x_mm,
                 "y_mm": stage.y_mm,
                 "z_mm": stage.z_mm,
@@ -43,8 +43,8 @@ impl View {
             "run": self.run.as_ref().map(|run| json!({
                 "run_id": run.run_id,
                 "experiment": run.experiment,
-                "phase": word(run.phase().as_str_name(), "RUN_PHASE_"),
-                "exit_status": word(run.exit_status().as_str_name(), "EXIT_STATUS_"),
+                "phase": run.phase().word(),
+                "exit_status": run.exit_status().word(),
                 "presses": run.presses,
                 "presses_planned": run.presses_planned,
                 "remaining_s": (run.remaining_s >= 0.0).then_some(run.remaining_s),
@@ -55,7 +55,7 @@ impl View {
                 "fault": run.fault,
             })),
             "safety": self.safety.as_ref().map(|event| json!({
-                "verdict": word(event.verdict().as_str_name(), "SAFETY_VERDICT_"),
+                "verdict": event.verdict().word(),
                 "rule": event.rule,
                 "detail": event.detail,
             })),
@@ -69,9 +69,4 @@ impl View {
             })),
         })
     }
-}
-
-/// The word of an enumeration's value, without what all its values begin with.
-fn word(name: &str, prefix: &str) -> String {
-    name.strip_prefix(prefix).unwrap_or(name).to_lowercase()
 }

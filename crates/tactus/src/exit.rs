@@ -83,9 +83,3 @@ impl From<Exit> for ExitCode {
         Self::from(exit as u8)
     }
 }
-
-/// The word for an exit status, as it stands in JSON and on the terminal.
-pub(crate) fn word(status: ExitStatus) -> &'static str {
-    // A recording always has a status; a run in progress has none yet.
-    if status == ExitStatus::Unspecified { "unknown" } else { tactus_record::exit_status_name(status) }
-}

@@ -15,7 +15,7 @@
 //!     ..Recipe::new(7)
 //! };
 //! let set = recipe.make()?;
-//! assert_eq!(set.counts.len(), 600 * 48);
+//! assert_eq!(set.rows.len(), 600);
 //! assert_eq!(set.label.effects(), ["relaxation"]);
 //! # Ok::<(), tactus_sets::RecipeError>(())
 //! ```
@@ -33,4 +33,4 @@ pub use noise::{Noise, NoiseKind};
 pub use plan::Plan;
 pub use recipe::{Amount, Content, Recipe, RecipeError};
 pub use separation::Separation;
-pub use set::{Row, Run, Set};
+pub use set::Set;

@@ -6,12 +6,13 @@ use rand_chacha::ChaCha8Rng;
 use tactus_hidden::{Base, CATALOGUE, Climate, Definition, Dose, STRENGTH_MAX, Sensor};
 use tactus_model::{ModelError, Simulator, TrajectoryError};
 use tactus_schema::Rig;
+use tactus_schema::table::Row;
 
 use crate::label::{Dosed, Label};
 use crate::noise::{Noise, NoiseKind};
 use crate::plan::{Course, Plan};
 use crate::separation::Separation;
-use crate::set::{Row, Run, Set};
+use crate::set::Set;
 
 /// How to make one set. All of it follows from this.
 #[derive(Debug, Clone)]
@@ -132,7 +133,7 @@ impl Recipe {
         let noise = Noise::draw(self.noise, &mut self.rng(Draw::NoiseKind));
         let bench = Bench::new(&base, courses, climate, noise);
         let (doses, mut physics) = self.doses(&chosen, &bench);
-        let Readings { runs, counts, clean } = self.read(&bench, &doses);
+        let Readings { rows, clean } = self.read(&bench, &doses);
         let Separation { z, z_beyond_spread, .. } = bench.separation_of(&clean);
         // Of one alone it is that of the set.
         if let [only] = &mut physics[..] {
@@ -144,7 +145,7 @@ impl Recipe {
             set: self.name.clone(),
             seed: self.seed,
             plan: self.plan,
-            frames: runs.iter().map(|run| run.rows.len()).sum(),
+            frames: rows.len(),
             physics,
             z,
             z_beyond_spread,
@@ -154,7 +155,7 @@ impl Recipe {
             sigma_intercept_mm: psf.sigma_intercept_mm,
             sigma_per_mm: psf.sigma_per_mm,
         };
-        Ok(Set { rig: base.rig, runs, counts, label })
+        Ok(Set { rig: base.rig, rows, label })
     }
 
     /// How much of each physics, and what the label says of it.
@@ -196,24 +197,33 @@ impl Recipe {
         let mut readings = Readings::default();
         for (index, course) in bench.courses.iter().enumerate() {
             let mut sensor = bench.sensor(bench.base, doses, index);
-            let mut rows = Vec::with_capacity(course.frames);
+            let run =
+                if bench.courses.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
             for (frame, (press, phase)) in course.doing(array.rate_hz()).enumerate() {
                 let t_s = frame as f64 / array.rate_hz();
                 sensor.step(t_s, &course.trajectory);
                 noise_of(&mut noise_counts);
+                let mut counts = Vec::with_capacity(array.elements());
                 for (clean, noise) in sensor.counts().iter().zip(&noise_counts) {
                     #[expect(clippy::cast_possible_truncation, reason = "whole counts below 4096")]
-                    readings.counts.push(sensor.read(*clean, *noise) as f32);
+                    counts.push(sensor.read(*clean, *noise) as f32);
                     readings.clean.push(sensor.convert(*clean));
                 }
                 #[expect(clippy::cast_possible_truncation, reason = "a run of some minutes")]
                 let t_ns = (t_s * 1e9).round() as i64;
                 let temperature_c = sensor.temperature_c().filter(|_| has_thermometer);
-                rows.push(Row { press, phase, t_ns, position_mm: course.trajectory.at(t_s), temperature_c });
+                readings.rows.push(Row {
+                    run: run.clone(),
+                    press,
+                    phase,
+                    t_ns,
+                    position_mm: course.trajectory.at(t_s),
+                    covering_mm: course.covering.thickness_mm,
+                    indenter: bench.base.rig.indenter.clone(),
+                    temperature_c,
+                    counts,
+                });
             }
-            let id =
-                if bench.courses.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
-            readings.runs.push(Run { id, covering_mm: course.covering.thickness_mm, rows });
         }
         readings
     }
@@ -280,9 +290,8 @@ impl Content {
 /// What is read of a sensor.
 #[derive(Debug, Default)]
 struct Readings {
-    runs: Vec<Run>,
-    counts: Vec<f32>,
-    /// The same without noise and before whole steps.
+    rows: Vec<Row>,
+    /// The counts of all rows without noise and before rounding.
     clean: Vec<f64>,
 }
 

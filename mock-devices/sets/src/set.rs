@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use tactus_record::table::{RowView, TableError, TableWriter};
+use tactus_record::table::{TableError, TableWriter};
 use tactus_schema::Rig;
-use tactus_schema::table::Phase;
+use tactus_schema::table::Row;
 
 use crate::label::Label;
 
@@ -13,38 +13,10 @@ use crate::label::Label;
 pub struct Set {
     /// The rig as declared.
     pub rig: Rig,
-    /// The runs, one after the other.
-    pub runs: Vec<Run>,
-    /// Counts of all rows of all runs, one value per element.
-    pub counts: Vec<f32>,
+    /// The rows of all runs, run after run.
+    pub rows: Vec<Row>,
     /// The truth, which does not stand in the table.
     pub label: Label,
-}
-
-/// One run of a set.
-#[derive(Debug, Clone)]
-pub struct Run {
-    /// Its id.
-    pub id: String,
-    /// Thickness of the covering in place.
-    pub covering_mm: f64,
-    /// Its rows, in order of time.
-    pub rows: Vec<Row>,
-}
-
-/// One frame of a run, but for its counts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row {
-    /// Press index; -1 outside a press.
-    pub press: i32,
-    /// What the stage does.
-    pub phase: Phase,
-    /// Time of sampling since the run began.
-    pub t_ns: i64,
-    /// Stage position.
-    pub position_mm: [f64; 3],
-    /// Temperature, if it is measured.
-    pub temperature_c: Option<f64>,
 }
 
 impl Set {
@@ -54,22 +26,8 @@ impl Set {
     /// If it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), TableError> {
         let mut table = TableWriter::create(path.as_ref(), &self.rig.to_json())?;
-        let mut counts = self.counts.chunks_exact(self.rig.array.elements());
-        for run in &self.runs {
-            for (row, counts) in run.rows.iter().zip(&mut counts) {
-                let &Row { press, phase, t_ns, position_mm, temperature_c } = row;
-                table.push(RowView {
-                    run: &run.id,
-                    press,
-                    phase,
-                    t_ns,
-                    position_mm,
-                    covering_mm: run.covering_mm,
-                    indenter: &self.rig.indenter,
-                    temperature_c,
-                    counts,
-                })?;
-            }
+        for row in &self.rows {
+            table.push(row.into())?;
         }
         table.finish().map(drop)
     }

@@ -1,8 +1,8 @@
 //! A stretch of frames of one kind, and its mean without outlying frames.
 
-use tactus_model::Phase;
+use tactus_schema::table::{Phase, RowView};
 
-use super::{CLEAR_MM, Dwell, Sample};
+use super::{CLEAR_MM, Dwell};
 use crate::order::median;
 
 /// A frame is left out if an element is so many robust standard deviations away from its median.
@@ -27,12 +27,12 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub(super) fn of(sample: &Sample<'_>) -> Self {
-        match sample.phase {
+    pub(super) fn of(row: &RowView<'_>) -> Self {
+        match row.phase {
             Phase::Idle => Self::Rest,
-            Phase::Approach | Phase::Retract if sample.position_mm[2] >= CLEAR_MM => Self::Rest,
-            Phase::Load if sample.press >= 0 => Self::Load(sample.press),
-            Phase::Hold if sample.press >= 0 => Self::Hold(sample.press),
+            Phase::Approach | Phase::Retract if row.position_mm[2] >= CLEAR_MM => Self::Rest,
+            Phase::Load if row.press >= 0 => Self::Load(row.press),
+            Phase::Hold if row.press >= 0 => Self::Hold(row.press),
             Phase::Approach | Phase::Retract | Phase::Load | Phase::Hold | Phase::Unload => Self::Between,
         }
     }

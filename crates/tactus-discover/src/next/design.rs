@@ -3,11 +3,12 @@
 //!
 //! Places, depths and times are those of the scripts in `experiments/`; a random order is some order.
 
-use tactus_model::{Phase, Registration};
+use tactus_model::Registration;
+use tactus_schema::table::{Phase, RowView};
 
 use crate::chance::Chance;
 use crate::rows::interval_s;
-use crate::{Frame, Frames, Known};
+use crate::{Frames, Known};
 
 /// An experiment that could be made.
 #[derive(Debug, Clone)]
@@ -435,7 +436,7 @@ impl<'a> Stage<'a> {
             let share = ((t_s - begin_s) / duration_s).clamp(0.0, 1.0);
             #[expect(clippy::cast_possible_truncation, reason = "some minutes")]
             let t_ns = (t_s * 1e9).round() as i64;
-            self.frames.push(Frame {
+            self.frames.push(RowView {
                 run: "next",
                 press,
                 phase,

@@ -157,9 +157,9 @@ impl Fed {
     pub fn write(&self, recording: &mut Recording) -> Result<(), RecordError> {
         match self {
             Self::Info(info, at) => recording.write_sensor_info(info, *at),
-            Self::Frame(frame) => recording.write_frame(frame),
-            Self::Stage(state) => recording.write_stage(state),
-            Self::Event(event) => recording.write_event(event),
+            Self::Frame(frame) => recording.write(frame),
+            Self::Stage(state) => recording.write(state),
+            Self::Event(event) => recording.write(event),
         }
     }
 

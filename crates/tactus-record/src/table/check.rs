@@ -2,9 +2,9 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use tactus_schema::Rig;
+use tactus_schema::{Rig, table::RowView};
 
-use super::{RowView, TableError};
+use super::TableError;
 
 /// Checks rows in the order in which they stand in the table.
 pub(crate) struct Checker {

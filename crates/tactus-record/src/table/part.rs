@@ -17,8 +17,9 @@ use parquet::{
     },
     schema::{parser::parse_message_type, types::ColumnPath},
 };
+use tactus_schema::table::RowView;
 
-use super::{RowView, TableError};
+use super::TableError;
 
 /// Rows of a row group: half an hour of one sensor, some 10 MB in memory.
 pub(super) const GROUP_ROWS: usize = 65_536;

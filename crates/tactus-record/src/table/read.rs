@@ -16,11 +16,11 @@ use parquet::{
 };
 use tactus_schema::{
     Rig,
-    table::{Phase, RIG_METADATA_KEY},
+    table::{Phase, RIG_METADATA_KEY, RowView},
 };
 
 use super::{
-    Head, RowView, TableError,
+    Head, TableError,
     check::Checker,
     column::{Column, Source},
     layout::{CONTRACT, find},

@@ -7,10 +7,13 @@ use parquet::{
     errors::ParquetError,
     file::writer::SerializedRowGroupWriter,
 };
-use tactus_schema::{Rig, table::RIG_METADATA_KEY};
+use tactus_schema::{
+    Rig,
+    table::{RIG_METADATA_KEY, RowView},
+};
 
 use super::{
-    RowView, TableError,
+    TableError,
     part::{FrameColumns, GROUP_ROWS, Part, column, repetition},
 };
 

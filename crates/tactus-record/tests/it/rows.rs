@@ -32,19 +32,7 @@ fn exported(recording: &Path) -> PathBuf {
 
 fn visited(paths: &[&PathBuf]) -> (Source, Vec<Row>) {
     let mut rows = Vec::new();
-    let source = rows::visit(paths, |_, row| {
-        rows.push(Row {
-            run: row.run.into(),
-            press: row.press,
-            phase: row.phase,
-            t_ns: row.t_ns,
-            position_mm: row.position_mm,
-            covering_mm: row.covering_mm,
-            indenter: row.indenter.into(),
-            temperature_c: row.temperature_c,
-            counts: row.counts.into(),
-        });
-    });
+    let source = rows::visit(paths, |_, row| rows.push(Row::from(row)));
     (source.unwrap(), rows)
 }
 

@@ -8,8 +8,11 @@ use std::{
 };
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use tactus_record::table::{self, ResidualWriter, RowView, TableError, TableWriter};
-use tactus_schema::{Rig, table::Phase};
+use tactus_record::table::{self, ResidualWriter, TableError, TableWriter};
+use tactus_schema::{
+    Rig,
+    table::{Phase, RowView},
+};
 
 /// A folder that may stand beside the repository, with measured data that is not in it.
 const MEASURED: &str = "../../../shared/data/eflesh-normal-20250401_014340.parquet";

@@ -1,6 +1,6 @@
 //! The events of a run as lines of text.
 
-use tactus_record::{Timeline, exit_status_name};
+use tactus_record::Timeline;
 use tactus_schema::{
     MonoTime,
     pb::{self, run_event::Event},
@@ -77,7 +77,7 @@ fn describe(event: &Event) -> (&'static str, String) {
             let retracted = if e.retracted { "retracted" } else { "NOT retracted" };
             ("clean-up", format!("{retracted}, z = {:.3} mm {}", e.z_mm, e.detail))
         }
-        Event::Finished(e) => ("finished", format!("{} {}", exit_status_name(e.exit_status()), e.message)),
+        Event::Finished(e) => ("finished", format!("{} {}", e.exit_status().word(), e.message)),
     }
 }
 

@@ -1,8 +1,8 @@
 //! What run it was, and what it came to.
 
 use tactus_model::Indenter;
-use tactus_record::{Timeline, exit_status_name};
-use tactus_schema::WallTime;
+use tactus_record::Timeline;
+use tactus_schema::{WallTime, pb};
 
 use super::presses::Presses;
 
@@ -77,7 +77,7 @@ impl Summary {
             started: rfc3339(run.started),
             duration_s: tally.duration().as_secs_f64(),
             duration_planned_s: started.map(|s| s.duration_planned_s).filter(|seconds| *seconds > 0.0),
-            exit_status: tally.exit_status().map(exit_status_name),
+            exit_status: tally.exit_status().map(pb::ExitStatus::word),
             message: tally.finished().map(|finished| finished.message.clone()).unwrap_or_default(),
             covering_mm: started.map_or(rig.covering.thickness_mm, |started| started.covering_mm),
             indenter: format!("{indenter}{}", shape.unwrap_or_default()),

@@ -8,7 +8,7 @@ use tactus_schema::pb;
 
 use crate::cli::{Common, StopArgs};
 use crate::connection::{self, PATIENCE};
-use crate::exit::{self, Exit};
+use crate::exit::Exit;
 use crate::output::{duration, print_fields};
 
 /// How long a stage may take to home.
@@ -68,8 +68,8 @@ fn to_json(reply: &pb::CommandReply) -> Value {
         "run": {
             "run_id": state.run_id,
             "experiment": state.experiment,
-            "phase": phase_word(state.phase()),
-            "exit_status": exit::word(state.exit_status()),
+            "phase": state.phase().word(),
+            "exit_status": state.exit_status().word(),
             "presses": state.presses,
             "presses_planned": state.presses_planned,
             "dwells": state.dwells,
@@ -82,7 +82,7 @@ fn to_json(reply: &pb::CommandReply) -> Value {
             "recording": state.recording,
         },
         "stage": {
-            "status": stage_word(stage.status()),
+            "status": stage.status().word(),
             "x_mm": stage.x_mm,
             "y_mm": stage.y_mm,
             "z_mm": stage.z_mm,
@@ -108,7 +108,7 @@ fn print(reply: &pb::CommandReply) {
     let run = match state.phase() {
         pb::RunPhase::Idle | pb::RunPhase::Unspecified => "none since the start".into(),
         pb::RunPhase::Finished => {
-            format!("{}: {} {}", state.run_id, exit::word(state.exit_status()), state.message)
+            format!("{}: {} {}", state.run_id, state.exit_status().word(), state.message)
         }
         phase @ (pb::RunPhase::Preparing
         | pb::RunPhase::Running
@@ -116,7 +116,7 @@ fn print(reply: &pb::CommandReply) {
         | pb::RunPhase::Stopping) => format!(
             "{}: {}, {}/{} presses, {} frames, {} lost, {} left {}",
             state.run_id,
-            phase_word(phase),
+            phase.word(),
             state.presses,
             state.presses_planned,
             state.frames,
@@ -142,7 +142,7 @@ fn print(reply: &pb::CommandReply) {
             "stage",
             format!(
                 "{} at x {:.3}, y {:.3}, z {:.3} mm",
-                stage_word(stage.status()),
+                stage.status().word(),
                 stage.x_mm,
                 stage.y_mm,
                 stage.z_mm
@@ -157,31 +157,4 @@ fn print(reply: &pb::CommandReply) {
 /// What wants a reset, and how it is done.
 pub(crate) fn fault_words(fault: &str) -> String {
     format!("{fault}: see that the tip is free to move, then `tactus reset`")
-}
-
-/// The word for where a run stands.
-pub(crate) fn phase_word(phase: pb::RunPhase) -> &'static str {
-    match phase {
-        pb::RunPhase::Unspecified => "unknown",
-        pb::RunPhase::Idle => "idle",
-        pb::RunPhase::Preparing => "preparing",
-        pb::RunPhase::Running => "running",
-        pb::RunPhase::Paused => "paused",
-        pb::RunPhase::Stopping => "stopping",
-        pb::RunPhase::Finished => "finished",
-    }
-}
-
-/// The word for what the stage does.
-pub(crate) fn stage_word(status: pb::StageStatus) -> &'static str {
-    match status {
-        pb::StageStatus::Unspecified => "unknown",
-        pb::StageStatus::Disconnected => "DISCONNECTED",
-        pb::StageStatus::Unhomed => "not homed",
-        pb::StageStatus::Idle => "idle",
-        pb::StageStatus::Moving => "moving",
-        pb::StageStatus::Hold => "hold",
-        pb::StageStatus::Homing => "homing",
-        pb::StageStatus::Alarm => "ALARM",
-    }
 }

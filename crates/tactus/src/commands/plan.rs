@@ -10,7 +10,7 @@ use tactus_schema::{Rig, WallTime};
 
 use super::run::experiment;
 use crate::cli::{Common, PlanArgs};
-use crate::exit::{self, Exit, Failure};
+use crate::exit::{Exit, Failure};
 use crate::output::{duration, print_fields, print_table};
 
 /// The seed of a plan, so that it does not change from one look to the next.
@@ -52,7 +52,7 @@ fn to_json(
         "rig": rig.name,
         "possible": plan.is_possible(),
         "refused": (!plan.is_possible()).then_some(&outcome.message),
-        "exit_status": exit::word(outcome.exit_status),
+        "exit_status": outcome.exit_status.word(),
         "presses": outcome.presses,
         "dwells": outcome.dwells,
         "duration_s": outcome.duration_s,

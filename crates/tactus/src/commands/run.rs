@@ -12,7 +12,7 @@ use tactus_schema::pb;
 
 use crate::cli::{Common, ExperimentArgs, RunArgs};
 use crate::connection;
-use crate::exit::{self, Exit, Failure, in_words};
+use crate::exit::{Exit, Failure, in_words};
 use crate::output::{duration, print_fields};
 
 /// How a run ended, wherever it ran.
@@ -101,7 +101,7 @@ fn to_json(summary: &Summary, report: Option<&Path>) -> serde_json::Value {
     json!({
         "run_id": summary.run_id,
         "experiment": summary.experiment,
-        "exit_status": exit::word(summary.exit_status),
+        "exit_status": summary.exit_status.word(),
         "message": summary.message,
         "simulated": summary.simulated,
         "embedded": summary.embedded,
@@ -119,7 +119,7 @@ fn print(summary: &Summary, report: Option<&Path>) {
     let simulated = if summary.simulated { " (SIMULATED)" } else { "" };
     let mut fields = vec![
         ("run", format!("{}{simulated}", summary.run_id)),
-        ("ended", format!("{} {}", exit::word(summary.exit_status), summary.message).trim_end().to_owned()),
+        ("ended", format!("{} {}", summary.exit_status.word(), summary.message).trim_end().to_owned()),
         ("presses", format!("{}, {} dwells", summary.presses, summary.dwells)),
         ("frames", format!("{}, {} lost", summary.frames, summary.frames_lost)),
         ("duration", duration(summary.duration_s)),

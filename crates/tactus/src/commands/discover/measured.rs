@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use anyhow::bail;
-use tactus_discover::{Frame, Frames};
+use tactus_discover::Frames;
 use tactus_record::rows;
 use tactus_report::discovery::DataSource;
 use tactus_schema::Rig;
@@ -27,17 +27,7 @@ impl Measured {
         let mut frames: Option<Frames> = None;
         let mut runs: BTreeMap<String, (u64, BTreeSet<i32>)> = BTreeMap::new();
         let source = rows::visit(files, |rig, row| {
-            frames.get_or_insert_with(|| Frames::new(rig.array.elements())).push(Frame {
-                run: row.run,
-                press: row.press,
-                phase: row.phase,
-                t_ns: row.t_ns,
-                position_mm: row.position_mm,
-                covering_mm: row.covering_mm,
-                indenter: row.indenter,
-                temperature_c: row.temperature_c,
-                counts: row.counts,
-            });
+            frames.get_or_insert_with(|| Frames::new(rig.array.elements())).push(row);
             if !runs.contains_key(row.run) {
                 runs.insert(row.run.to_owned(), Default::default());
             }

@@ -161,7 +161,7 @@ impl Steps {
             let error = format!(
                 "step {:?} ended as {}: {}; the same command goes on from there",
                 step.name,
-                tactus_record::exit_status_name(summary.exit_status),
+                summary.exit_status.word(),
                 summary.message
             );
             return Err(Failure::new(Exit::of_run(summary.exit_status), error).into());

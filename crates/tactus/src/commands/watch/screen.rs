@@ -7,8 +7,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Gauge, Paragraph};
 use tactus_schema::pb;
 
-use crate::commands::control::{fault_words, phase_word, stage_word};
-use crate::exit;
+use crate::commands::control::fault_words;
 use crate::output::duration;
 
 /// Width and height of an element's cell, in characters.
@@ -164,18 +163,18 @@ impl Screen {
 
     fn lines(&self, run: &pb::RunState) -> Vec<Line<'static>> {
         let ended = if run.phase() == pb::RunPhase::Finished {
-            format!(": {}", exit::word(run.exit_status()))
+            format!(": {}", run.exit_status().word())
         } else {
             String::new()
         };
         let mut lines = vec![
-            Line::from(format!("run     {} {}{ended} {}", run.run_id, phase_word(run.phase()), run.message)),
+            Line::from(format!("run     {} {}{ended} {}", run.run_id, run.phase().word(), run.message)),
             Line::from(format!("frames  {} received, {} lost in this run", run.frames, run.frames_lost)),
         ];
         if let Some(stage) = &self.stage {
             lines.push(Line::from(format!(
                 "stage   {}  x {:.3}  y {:.3}  z {:+.3} mm",
-                stage_word(stage.status()),
+                stage.status().word(),
                 stage.x_mm,
                 stage.y_mm,
                 stage.z_mm

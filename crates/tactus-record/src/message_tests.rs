@@ -1,0 +1,54 @@
+use std::collections::BTreeMap;
+
+use tactus_schema::{MonoTime, Rig, Stamp, WallTime};
+
+use super::{Message, MessageKind};
+use crate::{Entry, Header, Reader, Script, channel::ChannelWriter};
+
+const RIG_TOML: &str = include_str!("../../../config/rigs/sim.toml");
+
+#[test]
+fn every_kind_of_the_list_is_written_to_its_channel_and_read_back() {
+    let rig = Rig::from_toml(RIG_TOML).unwrap();
+    let header = Header {
+        run_id: "r1",
+        experiment: "corners",
+        who: "ada",
+        rig: &rig,
+        rig_toml: None,
+        link_toml: None,
+        script: Script { name: "corners.star", source: "" },
+        versions: &BTreeMap::new(),
+        parameters_json: "{}",
+        started: WallTime::from_ns(1),
+        simulated: true,
+    };
+    let mut writer = ChannelWriter::new(Vec::new(), &header).unwrap();
+    let at = Stamp { mono: MonoTime::from_ns(1), wall: WallTime::from_ns(2) };
+    for message in Message::empty() {
+        message.write(&mut writer, at).unwrap();
+    }
+    let bytes = writer.finish().unwrap();
+
+    let read: Vec<(String, Message)> = Reader::new(bytes.as_slice())
+        .filter_map(|entry| match entry.unwrap() {
+            Entry::Message { topic, message, .. } => Some((topic.to_string(), message)),
+            Entry::Run(_) | Entry::Attachment(_) => None,
+        })
+        .collect();
+    let written = MessageKind::ALL.into_iter().zip(Message::empty());
+    let expected: Vec<(String, Message)> =
+        written.map(|(kind, message)| (format!("tactus/sim/{}", kind.topic().suffix()), message)).collect();
+    assert_eq!(read, expected);
+
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let mut channels: Vec<_> = summary.channels.values().map(|channel| (channel.id, channel)).collect();
+    channels.sort_by_key(|(id, _)| *id);
+    let schemas = channels.iter().map(|(_, channel)| channel.schema.as_ref().unwrap().name.clone());
+    assert_eq!(schemas.collect::<Vec<_>>(), MessageKind::ALL.map(MessageKind::schema));
+}
+
+#[test]
+fn a_schema_that_is_not_listed_is_unknown() {
+    assert_eq!(Message::decode("tactus.v9.Odour", &[1]).unwrap(), Message::Unknown("tactus.v9.Odour".into()));
+}
