@@ -2,8 +2,6 @@
 
 use std::fmt;
 
-use serde_json::{Value, json};
-
 use super::words::list;
 use crate::{
     document::{Column, Table},
@@ -49,10 +47,6 @@ impl Undecided {
         let either = |one: &Self| [&[one.effect][..], &one.equivalent].concat().join(" or ");
         undecided.iter().map(either).collect::<Vec<_>>().join("; ")
     }
-
-    fn json(&self) -> Value {
-        json!({ "effect": self.effect, "equivalent": self.equivalent })
-    }
 }
 
 /// What to type to run an experiment.
@@ -62,27 +56,6 @@ pub fn command(experiment: &str, parameters: &[(&'static str, String)]) -> Strin
         if is_plain { format!(" -p {name}={value}") } else { format!(" -p '{name}={value}'") }
     });
     format!("tactus run {experiment}{}", parameters.collect::<String>())
-}
-
-/// Parameters as an object of texts.
-pub(super) fn named(parameters: &[(&'static str, String)]) -> Value {
-    parameters.iter().map(|(name, value)| ((*name).to_owned(), Value::from(value.as_str()))).collect()
-}
-
-pub(super) fn json(runs: &[ActiveRun]) -> Vec<Value> {
-    let run = |run: &ActiveRun| {
-        json!({
-            "experiment": run.experiment,
-            "parameters": named(&run.parameters),
-            "recording": run.recording,
-            "duration_s": run.duration_s,
-            "separates": run.separates,
-            "expected_z": run.expected_z,
-            "before_equivalent": run.before.iter().map(Undecided::json).collect::<Vec<_>>(),
-            "after_equivalent": run.after.iter().map(Undecided::json).collect::<Vec<_>>(),
-        })
-    };
-    runs.iter().map(run).collect()
 }
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, runs: &[ActiveRun]) -> fmt::Result {

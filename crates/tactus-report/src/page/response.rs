@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::{
-    fit::{Estimate, Polynomial},
+    fit::{Coefficient, Polynomial},
     markup::Text,
     numbers::{plural, with_error},
     plot::{Axis, Figure, Ink, Series, number},
@@ -131,7 +131,7 @@ fn table(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
         let Some(fit) = fit else { continue };
         write!(f, "<tr><td>{name}</td>")?;
         for k in 0..3 {
-            let text = fit.coefficients.get(k).map(estimate).unwrap_or_default();
+            let text = fit.coefficients.get(k).map(coefficient).unwrap_or_default();
             write!(f, "<td class=\"n\">{}</td>", Text(text))?;
         }
         let residual = fit.residual.map_or_else(|| "\u{2013}".into(), |residual| number(residual, 2));
@@ -143,9 +143,7 @@ fn table(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
     )
 }
 
-/// With its standard error where it has one.
-fn estimate(estimate: &Estimate) -> String {
-    estimate
-        .standard_error
-        .map_or_else(|| number(estimate.value, 2), |error| with_error(estimate.value, error))
+/// Value and, where known, standard error.
+fn coefficient(found: &Coefficient) -> String {
+    found.standard_error.map_or_else(|| number(found.value, 2), |error| with_error(found.value, error))
 }
