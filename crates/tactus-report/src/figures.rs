@@ -85,10 +85,7 @@ pub struct Progress {
 ///
 /// # Errors
 /// [`FigureError::Write`] names the file that cannot be written.
-pub fn draw_all(
-    out_dir: &Path,
-    progress: impl FnMut(Progress) + Send,
-) -> Result<Vec<PathBuf>, FigureError> {
+pub fn draw_all(out_dir: &Path, progress: impl FnMut(Progress) + Send) -> Result<Vec<PathBuf>, FigureError> {
     fs::create_dir_all(out_dir).map_err(|source| FigureError::Write { path: out_dir.into(), source })?;
     let write = |name: &str, text: String| {
         let path = out_dir.join(name);

@@ -1,4 +1,4 @@
-//! The exit codes: 0 done; 1 failed; 2 usage; 3 done but something was lost; 4 refused by safety; 5 not now.
+//! The exit codes: 0 done; 1 failed; 2 usage; 3 done, but something was lost; 4 refused by safety; 5 not possible now.
 
 use std::fmt;
 use std::process::ExitCode;
@@ -16,7 +16,7 @@ pub(crate) enum Exit {
     NotNow = 5,
 }
 
-/// An error with the exit code that belongs to it. Errors without one are failures.
+/// An error with an exit code. Other errors exit with [`Exit::Failed`].
 #[derive(Debug)]
 pub(crate) struct Failure {
     pub(crate) exit: Exit,
@@ -38,7 +38,7 @@ impl fmt::Display for Failure {
 impl std::error::Error for Failure {}
 
 impl Exit {
-    /// The exit code of a run that ended so.
+    /// The exit code of a run.
     pub(crate) fn of_run(status: ExitStatus) -> Self {
         match status {
             ExitStatus::Done => Self::Done,
@@ -52,7 +52,7 @@ impl Exit {
         }
     }
 
-    /// The exit code that the service put into an answer.
+    /// The exit code in the service's answer.
     pub(crate) fn of_reply(code: u32) -> Self {
         [Self::Done, Self::Failed, Self::Usage, Self::Degraded, Self::Refused, Self::NotNow]
             .into_iter()
@@ -66,7 +66,7 @@ impl Exit {
     }
 }
 
-/// An error with its causes, each once: many say their cause themselves.
+/// An error with its causes. A cause that the text contains already is not repeated.
 pub(crate) fn in_words(error: &anyhow::Error) -> String {
     let mut words = String::new();
     for cause in error.chain().map(ToString::to_string).filter(|cause| !cause.is_empty()) {
@@ -84,8 +84,8 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// The word for an exit status, as it stands in JSON and on the terminal.
+/// Name of an exit status in JSON and on the terminal.
 pub(crate) fn word(status: ExitStatus) -> &'static str {
-    // A recording always has a status; a run in progress has none yet.
+    // A run in progress has no status yet.
     if status == ExitStatus::Unspecified { "unknown" } else { tactus_record::exit_status_name(status) }
 }

@@ -24,21 +24,21 @@ pub struct ActiveRun {
     /// By how many standard errors, if that could be foreseen.
     pub expected_z: Option<f64>,
     /// The effects that had been added before, each with those that could not be told from it.
-    pub before: Vec<Undecided>,
+    pub before: Vec<AmbiguousEffect>,
     /// The same with this experiment among the data.
-    pub after: Vec<Undecided>,
+    pub after: Vec<AmbiguousEffect>,
 }
 
 /// An effect, and those that the data cannot tell from it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Undecided {
+pub struct AmbiguousEffect {
     /// The effect that was added.
     pub effect: &'static str,
     /// What would do as well.
     pub equivalent: Vec<&'static str>,
 }
 
-impl Undecided {
+impl AmbiguousEffect {
     /// Such as `relaxation` or `relaxation or imprint`.
     pub fn in_words(undecided: &[Self]) -> String {
         if undecided.is_empty() {
@@ -77,8 +77,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, runs: &[ActiveRun]) -> fmt::Re
             list(&run.separates),
             run.expected_z.map_or_else(String::new, |z| digits(z, 2)),
             format!("{:.0}", run.duration_s),
-            Undecided::in_words(&run.before),
-            Undecided::in_words(&run.after),
+            AmbiguousEffect::in_words(&run.before),
+            AmbiguousEffect::in_words(&run.after),
         ]);
     }
     writeln!(f, "{table}\n<p>All these recordings are among the data of this report.</p>\n</section>")

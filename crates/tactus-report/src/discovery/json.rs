@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tactus_discover::{Candidate, Curve, Discovery, Estimated, Gap, Level, NextExperiment, Round, Step};
 
-use super::{ActiveRun, DataSource, DiscoveryReport, Undecided, in_words};
+use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
 
 /// Name of the form of `report.json`.
 const SCHEMA: &str = "tactus.discovery/1";
@@ -187,12 +187,12 @@ struct ActiveRunJson<'a> {
     duration_s: f64,
     separates: &'a [String; 2],
     expected_z: Option<f64>,
-    before_equivalent: Vec<UndecidedJson<'a>>,
-    after_equivalent: Vec<UndecidedJson<'a>>,
+    before_equivalent: Vec<AmbiguousEffectJson<'a>>,
+    after_equivalent: Vec<AmbiguousEffectJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct UndecidedJson<'a> {
+struct AmbiguousEffectJson<'a> {
     effect: &'a str,
     equivalent: &'a [&'static str],
 }
@@ -349,14 +349,14 @@ impl<'a> ActiveRunJson<'a> {
             duration_s: run.duration_s,
             separates: &run.separates,
             expected_z: run.expected_z,
-            before_equivalent: run.before.iter().map(UndecidedJson::of).collect(),
-            after_equivalent: run.after.iter().map(UndecidedJson::of).collect(),
+            before_equivalent: run.before.iter().map(AmbiguousEffectJson::of).collect(),
+            after_equivalent: run.after.iter().map(AmbiguousEffectJson::of).collect(),
         }
     }
 }
 
-impl<'a> UndecidedJson<'a> {
-    fn of(undecided: &'a Undecided) -> Self {
+impl<'a> AmbiguousEffectJson<'a> {
+    fn of(undecided: &'a AmbiguousEffect) -> Self {
         Self { effect: undecided.effect, equivalent: &undecided.equivalent }
     }
 }

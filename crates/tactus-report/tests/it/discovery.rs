@@ -11,8 +11,8 @@ use serde_json::Value;
 use tactus_discover::{Discovery, NextExperiment, Unexplained, Verdict};
 use tactus_model::Array;
 use tactus_report::discovery::{
-    ActiveRun, DiscoveryReport, Undecided, discovery_html, discovery_json, element_maps, in_words, levels, not_shown, proposals,
-    residual_against,
+    ActiveRun, AmbiguousEffect, DiscoveryReport, discovery_html, discovery_json, element_maps, in_words,
+    levels, not_shown, proposals, residual_against,
 };
 
 const HOSTILE: &str = "<img src=x onerror='alert(\"1\")'>";
@@ -88,7 +88,7 @@ fn the_json_keeps_its_form_to_the_byte() {
     discovery.heldout_frames.clear();
     discovery.global.statistic = f64::NAN;
     discovery.base.heldout_chi2 = f64::INFINITY;
-    let undecided = |equivalent| Undecided { effect: "hysteresis", equivalent };
+    let undecided = |equivalent| AmbiguousEffect { effect: "hysteresis", equivalent };
     let active = [ActiveRun {
         experiment: "diagnose".into(),
         parameters: vec![("parts", "hold".into()), ("depth_mm", "0.5".into())],
