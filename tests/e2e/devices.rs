@@ -20,7 +20,7 @@ fn what_is_there_is_told_for_machines_and_for_people() {
     }
     let aloud = tactus(folder.path(), &["devices"]);
     assert_eq!(aloud.code, Some(0), "{aloud:?}");
-    let begins = if devices.is_empty() { "nothing that could be a rig's was found" } else { "KIND" };
+    let begins = if devices.is_empty() { "no device was found that a rig could use" } else { "KIND" };
     assert!(aloud.out.starts_with(begins), "{aloud:?}");
 }
 

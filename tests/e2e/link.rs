@@ -155,7 +155,7 @@ fn listening_ends_well_with_an_interrupt_and_when_the_device_goes() {
     sniff.signal(Signal::INT);
     let (code, said) = sniff.wait();
     assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("next: nothing came: is the device switched on"), "{said}");
+    assert!(said.contains("next: no bytes arrived: is the device switched on"), "{said}");
 
     let mut sniff = Process::start("tactus", folder.path(), &["link", "sniff", &path]);
     sniff.wait_for("listening");

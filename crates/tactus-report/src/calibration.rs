@@ -55,16 +55,16 @@ pub fn calibration_html(report: &CalibrationReport<'_>) -> String {
         sensor_header(f, "Calibration", "Rig", report.rig, report.array, report.simulated)?;
         basis(f, report)?;
         remarks(f, report)?;
-        sections(f, report, Figures::Here)
+        sections(f, report, FigurePlacement::Inline)
     });
     document(format!("Calibration \u{b7} {}", report.rig), page)
 }
 
 /// Where the paper's figures stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Figures {
+pub(crate) enum FigurePlacement {
     /// In their sections.
-    Here,
+    Inline,
     /// Elsewhere on the page.
     Elsewhere,
 }
@@ -88,7 +88,7 @@ pub(crate) fn drawings(report: &CalibrationReport<'_>) -> Vec<Drawing> {
 pub(crate) fn sections(
     f: &mut fmt::Formatter<'_>,
     report: &CalibrationReport<'_>,
-    figures: Figures,
+    figures: FigurePlacement,
 ) -> fmt::Result {
     registration::section(f, report)?;
     health::section(f, report)?;

@@ -27,7 +27,7 @@ use crate::{
     plot::number,
 };
 
-pub use active::{ActiveRun, Undecided, command};
+pub use active::{ActiveRun, AmbiguousEffect, command};
 pub use figures::{element_maps, levels, residual_against};
 pub use json::discovery_json;
 pub use next::{Proposal, proposals};

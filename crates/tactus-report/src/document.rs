@@ -11,11 +11,11 @@ use crate::{
 };
 
 /// Said of whatever no physical sensor was read for.
-pub(crate) const SIMULATED: &str =
+pub(crate) const SIMULATED_BADGE: &str =
     "<span class=\"badge warn\" title=\"No physical sensor was read.\">SIMULATED</span>";
 
 /// The same as the badge, in words.
-pub(crate) const UNREAL: &str = "<p class=\"message warn\"><strong>No physical sensor was read: everything on this page is about \
+pub(crate) const SIMULATED_NOTICE: &str = "<p class=\"message warn\"><strong>No physical sensor was read: everything on this page is about \
                                  a simulated one.</strong></p>";
 
 /// The head of a page about one sensor: what it is, `about` before the rig's name (markup), and which array.
@@ -29,7 +29,7 @@ pub(crate) fn sensor_header(
 ) -> fmt::Result {
     writeln!(f, "<header>\n<div class=\"headline\"><h1>{title}</h1>")?;
     if simulated {
-        writeln!(f, "{SIMULATED}")?;
+        writeln!(f, "{SIMULATED_BADGE}")?;
     }
     writeln!(
         f,
@@ -41,7 +41,7 @@ pub(crate) fn sensor_header(
         short(array.pitch_mm(), 3),
     )?;
     if simulated {
-        writeln!(f, "{UNREAL}")?;
+        writeln!(f, "{SIMULATED_NOTICE}")?;
     }
     writeln!(f, "</header>")
 }

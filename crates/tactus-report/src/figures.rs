@@ -1,8 +1,8 @@
-//! The paper's figures, drawn again from the model: Figures 3, 4, 5b, 6, 8, 9b and 10.
+//! The paper's Figures 3, 4, 5b, 6, 8, 9b and 10, computed from the model.
 //!
-//! [`draw_all`] computes and writes them all. Each figure is also a function from plain inputs to a
-//! [`Sheet`], which displays itself as SVG. Where the paper shows its sensor, a virtual sensor stands in, with
-//! elements that differ, noise and a converter; every caption says so.
+//! [`draw_all`] computes and writes them all. Each figure is also a function from plain inputs to a [`Sheet`], which
+//! displays itself as SVG. A virtual sensor replaces the paper's sensor; its elements differ, and it has noise and a
+//! converter. Every caption says so.
 
 mod acuity;
 mod imaging_models;
@@ -17,10 +17,11 @@ mod virtual_sensor;
 
 use std::{
     fs, io,
-    panic::resume_unwind,
     path::{Path, PathBuf},
-    thread,
+    sync::{Mutex, PoisonError},
 };
+
+use rayon::prelude::*;
 
 use tactus_calibrate::acuity::AcuityError;
 use tactus_model::{Array, Covering, ForwardModel, Indenter, ModelError, Psf, Response};
@@ -66,77 +67,66 @@ pub enum FigureError {
     },
 }
 
-/// A figure that [`draw_all`] has written, and how far that is.
+/// A figure that [`draw_all`] has written, and the number written so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// What it shows.
+    /// Title of the figure.
     pub title: &'static str,
-    /// Figures written.
+    /// Figures written so far, this one included.
     pub written: usize,
-    /// Figures in all.
+    /// Figures to write.
     pub figures: usize,
 }
 
-/// Computes every figure and writes it into `out_dir`, each as an SVG file, and all of them with captions as
-/// `index.html`. Returns the files. Drawn again, they are the same bytes.
+/// Computes the figures in parallel and writes each into `out_dir` as an SVG file, and all of them with captions as
+/// `index.html`. Returns the files in the paper's order. The files are the same, byte for byte, each time.
 ///
-/// `progress` is called after each figure. The figures are computed side by side, each in a thread of its own.
+/// `progress` is called after each figure, in the order in which they finish.
 ///
 /// # Errors
 /// [`FigureError::Write`] names the file that cannot be written.
-pub fn draw_all(out_dir: &Path, mut progress: impl FnMut(Progress)) -> Result<Vec<PathBuf>, FigureError> {
+pub fn draw_all(out_dir: &Path, progress: impl FnMut(Progress) + Send) -> Result<Vec<PathBuf>, FigureError> {
     fs::create_dir_all(out_dir).map_err(|source| FigureError::Write { path: out_dir.into(), source })?;
-    let mut paths = Vec::new();
-    let mut write = |name: &str, text: String| {
+    let write = |name: &str, text: String| {
         let path = out_dir.join(name);
-        fs::write(&path, text).map_err(|source| FigureError::Write { path: path.clone(), source })?;
-        paths.push(path);
-        Ok::<_, FigureError>(())
+        match fs::write(&path, text) {
+            Ok(()) => Ok(path),
+            Err(source) => Err(FigureError::Write { path, source }),
+        }
     };
-    let mut written = 0;
-    let drawings = drawn(&FIGURES.each_ref(), |figure, drawing| {
-        write(&format!("figure-{}.svg", figure.number), drawing.sheet.to_string())?;
-        written += 1;
-        progress(Progress { title: figure.title, written, figures: FIGURES.len() });
-        Ok(())
-    })?;
-    write("index.html", page::page(&drawings))?;
+    let reporting = Mutex::new((0, progress));
+    let draw = |figure: &PaperFigure| {
+        let drawing = (figure.draw)()?;
+        let path = write(&format!("figure-{}.svg", figure.number), drawing.sheet.to_string())?;
+        let mut reporting = reporting.lock().unwrap_or_else(PoisonError::into_inner);
+        let (written, progress) = &mut *reporting;
+        *written += 1;
+        progress(Progress { title: figure.title, written: *written, figures: FIGURES.len() });
+        Ok((path, drawing))
+    };
+    let drawn: Result<Vec<_>, FigureError> = FIGURES.par_iter().map(draw).collect();
+    let (mut paths, drawings): (Vec<PathBuf>, Vec<Drawing>) = drawn?.into_iter().unzip();
+    paths.push(write("index.html", page::page(&drawings))?);
     Ok(paths)
 }
 
-/// Computes the figures of these numbers, in this order, such as `["3", "6a"]`; numbers that are none are left out.
-///
-/// The figures are computed side by side, each in a thread of its own.
+/// Computes the figures with these numbers, such as `["3", "6a"]`, in parallel; unknown numbers are ignored.
 ///
 /// # Errors
 /// If a figure's model cannot be made, which no shipped one does.
 pub fn finished(numbers: &[&str]) -> Result<Vec<StudyFigure>, FigureError> {
-    let figure = |number: &&str| FIGURES.iter().find(|figure| figure.number == *number);
-    let wanted: Vec<&PaperFigure> = numbers.iter().filter_map(figure).collect();
-    let drawings = drawn(&wanted, |_, _| Ok(()))?;
-    let finish = |(figure, drawing): (&PaperFigure, Drawing)| StudyFigure {
-        number: figure.number.into(),
-        title: figure.title.into(),
-        caption: drawing.caption,
-        svg: drawing.sheet.to_string(),
+    let find = |number: &&str| FIGURES.iter().find(|figure| figure.number == *number);
+    let wanted: Vec<&PaperFigure> = numbers.iter().filter_map(find).collect();
+    let draw = |figure: &PaperFigure| {
+        let drawing = (figure.draw)()?;
+        Ok(StudyFigure {
+            number: figure.number.into(),
+            title: figure.title.into(),
+            caption: drawing.caption,
+            svg: drawing.sheet.to_string(),
+        })
     };
-    Ok(wanted.into_iter().zip(drawings).map(finish).collect())
-}
-
-/// Draws figures side by side, each in a thread of its own, and shows each to `take`, in order.
-fn drawn(
-    figures: &[&PaperFigure],
-    mut take: impl FnMut(&PaperFigure, &Drawing) -> Result<(), FigureError>,
-) -> Result<Vec<Drawing>, FigureError> {
-    thread::scope(|scope| {
-        let threads: Vec<_> = figures.iter().map(|figure| (*figure, scope.spawn(figure.draw))).collect();
-        let drawings = threads.into_iter().map(|(figure, thread)| {
-            let drawing = thread.join().unwrap_or_else(|panic| resume_unwind(panic))?;
-            take(figure, &drawing)?;
-            Ok(drawing)
-        });
-        drawings.collect()
-    })
+    wanted.into_par_iter().map(draw).collect()
 }
 
 /// One figure of the paper.
@@ -147,7 +137,7 @@ struct PaperFigure {
     draw: fn() -> Result<Drawing, FigureError>,
 }
 
-/// A figure and what is to be said of it.
+/// A figure and its caption.
 struct Drawing {
     sheet: Sheet,
     caption: String,

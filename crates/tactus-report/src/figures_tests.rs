@@ -15,7 +15,9 @@ fn every_figure_is_drawn_whole_and_loads_nothing() {
     let mut steps = Vec::new();
     let paths = draw_all(&dir.path().join("figures"), |step| steps.push(step)).unwrap();
     assert_eq!(steps.len(), 10);
-    assert_eq!(steps[9], Progress { title: "Wrench and spaceship", written: 10, figures: 10 });
+    let written: Vec<usize> = steps.iter().map(|step: &Progress| step.written).collect();
+    assert_eq!(written, (1..=10).collect::<Vec<_>>());
+    assert!(steps.iter().any(|step| step.title == "Wrench and spaceship" && step.figures == 10));
 
     let names: Vec<_> = paths.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
     // Images and colour bars.

@@ -1,4 +1,4 @@
-use super::{Estimate, Polynomial};
+use super::{Coefficient, Polynomial};
 
 /// NIST Statistical Reference Datasets, linear regression, Norris: `(y, x)`.
 const NORRIS: [(f64, f64); 36] = [
@@ -52,7 +52,7 @@ fn assert_close(got: f64, expected: f64, relative: f64) {
     assert!((got - expected).abs() <= relative * expected.abs(), "{got:e} is not {expected:e}");
 }
 
-fn assert_estimate(got: Estimate, value: f64, standard_error: f64) {
+fn assert_estimate(got: Coefficient, value: f64, standard_error: f64) {
     assert_close(got.value, value, 1e-9);
     assert_close(got.standard_error.unwrap(), standard_error, 1e-9);
 }

@@ -25,6 +25,6 @@ mod run;
 
 pub use page::render_html;
 pub use run::{
-    Baseline, Dwell, ElementCurve, Intervals, LoggedEvent, Loss, Press, ReportError, Response, RunReport,
-    Silent, Summary, Timing, Trace, run_report,
+    Baseline, DwellSummary, ElementCurve, FrameLoss, Intervals, LoggedEvent, PressSummary, ReportError,
+    ResponseCurves, RunReport, RunSummary, Timing, Trace, UnresponsiveElement, run_report,
 };

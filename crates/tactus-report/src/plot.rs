@@ -17,7 +17,7 @@ mod axis;
 mod colour;
 mod decimate;
 mod figure;
-mod heat;
+mod heat_map;
 mod picture;
 mod series;
 mod sheet;
@@ -27,11 +27,11 @@ pub use axis::Axis;
 pub use colour::{ColourBar, Scale};
 pub use decimate::{extremes, steps};
 pub use figure::Figure;
-pub use heat::{Heat, Image, Mosaic, Tile};
+pub use heat_map::{HeatMap, Image, Mosaic, Tile};
 pub use picture::png;
 pub use series::{Ink, Series};
 pub use sheet::{Label, Panel, Sheet};
-pub use view::{Face, Paint, View};
+pub use view::{Face, ObliqueView, Paint};
 
 pub(crate) use axis::{number, round_step};
 

@@ -11,34 +11,34 @@ use std::path::Path;
 use tactus_model::Array;
 use tactus_record::{Completeness, RecordError, Timeline};
 
-pub use frames::{Intervals, Loss, Timing, Trace};
+pub use frames::{FrameLoss, Intervals, Timing, Trace};
 pub use log::LoggedEvent;
-pub use presses::{Baseline, Dwell, Press};
-pub use response::{ElementCurve, Response, Silent};
-pub use summary::Summary;
+pub use presses::{Baseline, DwellSummary, PressSummary};
+pub use response::{ElementCurve, ResponseCurves, UnresponsiveElement};
+pub use summary::RunSummary;
 
-use frames::Frames;
+use frames::FrameStatistics;
 use presses::Presses;
 
 /// Everything that a report says of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunReport {
     /// What run it was, and what it came to.
-    pub summary: Summary,
+    pub summary: RunSummary,
     /// What is missing, damaged or left out; a sentence each.
     pub notes: Vec<String>,
     /// The elements.
     pub array: Array,
     /// The presses that count, in order, each with its dwells.
-    pub presses: Vec<Press>,
+    pub presses: Vec<PressSummary>,
     /// What the rises of the dwells are against.
     pub baseline: Baseline,
     /// The response curves, if elements were pressed at their centres through several depths.
-    pub response: Option<Response>,
+    pub response: Option<ResponseCurves>,
     /// Depth and signal over time.
     pub trace: Trace,
     /// Where frames are missing.
-    pub losses: Vec<Loss>,
+    pub losses: Vec<FrameLoss>,
     /// The time between frames.
     pub timing: Timing,
     /// All events of the run and acts of the safety supervisor, in order of time.
@@ -68,10 +68,10 @@ pub enum ReportError {
 /// is missing beyond that is no error: [`RunReport::notes`] says it.
 pub fn run_report(recording: &Path) -> Result<RunReport, ReportError> {
     let timeline = Timeline::read(recording)?;
-    let frames = Frames::read(recording, &timeline)?;
+    let frames = FrameStatistics::read(recording, &timeline)?;
     let presses = Presses::of(&timeline, &frames);
-    let response = Response::of(timeline.rig(), &presses.done);
-    let summary = Summary::of(&timeline, &presses);
+    let response = ResponseCurves::of(timeline.rig(), &presses.done);
+    let summary = RunSummary::of(&timeline, &presses);
     let notes = notes(&timeline, &presses, &summary);
     Ok(RunReport {
         summary,
@@ -87,7 +87,7 @@ pub fn run_report(recording: &Path) -> Result<RunReport, ReportError> {
     })
 }
 
-fn notes(timeline: &Timeline, presses: &Presses, summary: &Summary) -> Vec<String> {
+fn notes(timeline: &Timeline, presses: &Presses, summary: &RunSummary) -> Vec<String> {
     let mut notes = Vec::new();
     if let Completeness::Truncated { at_byte, reason } = timeline.completeness() {
         notes.push(format!(
@@ -129,10 +129,10 @@ fn notes(timeline: &Timeline, presses: &Presses, summary: &Summary) -> Vec<Strin
             list.join(", ")
         ));
     }
-    if presses.misfits > 0 {
+    if presses.malformed_dwells > 0 {
         notes.push(format!(
             "{} dwells are left out, because they do not hold one finite number per element.",
-            presses.misfits
+            presses.malformed_dwells
         ));
     }
     if summary.dwells > 0 {

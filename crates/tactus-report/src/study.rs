@@ -8,8 +8,8 @@ use std::fmt;
 use tactus_calibrate::Estimate;
 
 use crate::{
-    calibration::{self, CalibrationReport, Drawing, Figures},
-    document::{Column, SIMULATED, Table, UNREAL, document, notes},
+    calibration::{self, CalibrationReport, Drawing, FigurePlacement},
+    document::{Column, SIMULATED_BADGE, SIMULATED_NOTICE, Table, document, notes},
     markup::Text,
     numbers::{count, duration, estimate, interval, plural, short},
 };
@@ -24,7 +24,7 @@ pub struct StudyReport<'a> {
     /// The runs that were made, in order.
     pub runs: &'a [StudyRun],
     /// What there is to compare, in the paper's order.
-    pub rows: &'a [StudyRow],
+    pub rows: &'a [ComparedQuantity],
     /// The calibration, if there is one. Its Figures 2a, 2b, 5a and 5b take their places among the others.
     pub calibration: Option<CalibrationReport<'a>>,
     /// The other figures, in any order.
@@ -52,7 +52,7 @@ pub struct StudyRun {
 
 /// One quantity: what the paper says of it, and what this rig does.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StudyRow {
+pub struct ComparedQuantity {
     /// What it is.
     pub quantity: String,
     /// Its unit; empty for a pure number.
@@ -60,7 +60,7 @@ pub struct StudyRow {
     /// The paper's figure, in its words.
     pub paper: Option<String>,
     /// This rig's.
-    pub found: Found,
+    pub found: FoundValue,
     /// What it is by construction; known of simulated rigs only.
     pub truth: Option<f64>,
     /// Whether the truth (where none is known, the paper's figure) lies inside the 95 % interval.
@@ -71,7 +71,7 @@ pub struct StudyRow {
 
 /// What was found of a quantity.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Found {
+pub enum FoundValue {
     /// A number with its standard error.
     Estimate(Estimate),
     /// Something that has none, in words.
@@ -110,7 +110,7 @@ pub fn study_html(report: &StudyReport<'_>) -> String {
 }
 
 fn header(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Result {
-    let (badge, unreal) = if report.simulated { (SIMULATED, UNREAL) } else { ("", "") };
+    let (badge, unreal) = if report.simulated { (SIMULATED_BADGE, SIMULATED_NOTICE) } else { ("", "") };
     let presses: u64 = report.runs.iter().map(|run| run.presses).sum();
     let seconds: f64 = report.runs.iter().map(|run| run.duration_s).sum();
     writeln!(
@@ -155,11 +155,11 @@ fn comparison(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Resu
     writeln!(f, "</section>")
 }
 
-fn compared(f: &mut fmt::Formatter<'_>, row: &StudyRow, truths: bool) -> fmt::Result {
+fn compared(f: &mut fmt::Formatter<'_>, row: &ComparedQuantity, truths: bool) -> fmt::Result {
     let (found, range) = match &row.found {
-        Found::Estimate(found) => (estimate(found), interval(found)),
-        Found::Text(text) => (text.clone(), String::new()),
-        Found::Nothing => ("not determined".into(), String::new()),
+        FoundValue::Estimate(found) => (estimate(found), interval(found)),
+        FoundValue::Text(text) => (text.clone(), String::new()),
+        FoundValue::Nothing => ("not determined".into(), String::new()),
     };
     let unit = if row.unit.is_empty() { String::new() } else { format!(" / {}", row.unit) };
     write!(
@@ -246,7 +246,7 @@ fn details(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Result 
             calibration::basis(f, calibration)?;
             calibration::remarks(f, calibration)?;
             writeln!(f, "</section>")?;
-            calibration::sections(f, calibration, Figures::Elsewhere)
+            calibration::sections(f, calibration, FigurePlacement::Elsewhere)
         }
     }
 }

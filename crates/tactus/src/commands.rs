@@ -1,4 +1,4 @@
-//! One module a command, or a family of them.
+//! One module for each command or group of commands.
 
 pub(crate) mod calibrate;
 pub(crate) mod control;

@@ -1,4 +1,4 @@
-//! The way to the service.
+//! The connection to the service.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use tokio::runtime::Runtime;
 use crate::cli::Common;
 use crate::exit::{Exit, Failure};
 
-/// How long an answer may take; a run is answered after its dry run.
+/// How long to wait for an answer to any command but `run` and `reset`.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
 
 /// A runtime for the bus, which needs threads.
@@ -20,10 +20,10 @@ pub(crate) fn runtime() -> anyhow::Result<Runtime> {
         .worker_threads(2)
         .enable_all()
         .build()
-        .context("the system gives no runtime")
+        .context("cannot start the async runtime")
 }
 
-/// The service, or `None` if nothing listens where it should.
+/// The service, or `None` if nothing listens at the endpoint.
 pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
     let endpoint: Endpoint =
         common.endpoint.parse().map_err(|error: BusError| Failure::new(Exit::Usage, error))?;
@@ -35,17 +35,20 @@ pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
     }
 }
 
-/// The service, which must be there.
+/// The service.
+///
+/// # Errors
+/// If nothing listens at the endpoint.
 pub(crate) async fn require(common: &Common) -> anyhow::Result<Client> {
     find(common).await?.with_context(|| {
         format!(
-            "no service at {}: start `tactusd --config FILE`, or name its place with --endpoint",
+            "no service at {}: start `tactusd --config FILE`, or give its address with --endpoint",
             common.endpoint
         )
     })
 }
 
-/// Asks the service. An answer that says no is an error with the service's own exit code.
+/// Sends a command to the service. A refusal is an error with the service's own exit code.
 pub(crate) async fn ask<M: Message>(
     client: &Client,
     command: Command,

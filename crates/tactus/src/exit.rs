@@ -1,4 +1,4 @@
-//! The exit codes: 0 done; 1 failed; 2 usage; 3 done but something was lost; 4 refused by safety; 5 not now.
+//! The exit codes: 0 done; 1 failed; 2 usage; 3 done, but something was lost; 4 refused by safety; 5 not possible now.
 
 use std::fmt;
 use std::process::ExitCode;
@@ -16,7 +16,7 @@ pub(crate) enum Exit {
     NotNow = 5,
 }
 
-/// An error with the exit code that belongs to it. Errors without one are failures.
+/// An error with an exit code. Other errors exit with [`Exit::Failed`].
 #[derive(Debug)]
 pub(crate) struct Failure {
     pub(crate) exit: Exit,
@@ -38,7 +38,7 @@ impl fmt::Display for Failure {
 impl std::error::Error for Failure {}
 
 impl Exit {
-    /// The exit code of a run that ended so.
+    /// The exit code of a run.
     pub(crate) fn of_run(status: ExitStatus) -> Self {
         match status {
             ExitStatus::Done => Self::Done,
@@ -52,7 +52,7 @@ impl Exit {
         }
     }
 
-    /// The exit code that the service put into an answer.
+    /// The exit code in the service's answer.
     pub(crate) fn of_reply(code: u32) -> Self {
         [Self::Done, Self::Failed, Self::Usage, Self::Degraded, Self::Refused, Self::NotNow]
             .into_iter()
@@ -66,7 +66,7 @@ impl Exit {
     }
 }
 
-/// An error with its causes, each once: many say their cause themselves.
+/// An error with its causes. A cause that the text contains already is not repeated.
 pub(crate) fn in_words(error: &anyhow::Error) -> String {
     let mut words = String::new();
     for cause in error.chain().map(ToString::to_string).filter(|cause| !cause.is_empty()) {

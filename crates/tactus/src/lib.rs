@@ -1,4 +1,4 @@
-//! The command line of Tactus: a client of the service, and everything that works on files.
+//! The command line of Tactus: a client of the service, and the commands that work on files.
 #![expect(clippy::print_stdout, reason = "standard output is this program's interface")]
 #![expect(clippy::print_stderr, reason = "errors and hints go to standard error, results to standard output")]
 

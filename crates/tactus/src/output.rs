@@ -1,4 +1,4 @@
-//! What people read: aligned tables, and durations in words.
+//! Output for people: aligned tables and durations.
 
 use std::fmt::Write as _;
 use std::io::{ErrorKind, Write as _};
@@ -33,12 +33,12 @@ pub(crate) fn print_table(header: &[&str], rows: &[Vec<String>]) {
     }
 }
 
-/// Prints a line. A reader that has seen enough and goes away, such as `head`, is no reason to end what is being done.
+/// Prints a line. If the reader closed the pipe, as `head` does, the program continues.
 pub(crate) fn say(line: &str) {
     let _gone = writeln!(std::io::stdout().lock(), "{line}");
 }
 
-/// Writes much to standard output; a reader that has seen enough and goes away is no error.
+/// Writes a long text to standard output. A closed pipe is not an error.
 pub(crate) fn write(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

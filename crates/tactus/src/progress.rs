@@ -1,4 +1,4 @@
-//! Progress on the terminal: of a run, with presses done, frames, losses and time left; of a computation.
+//! Progress bars for runs and for computations.
 
 use std::time::Instant;
 
@@ -7,11 +7,12 @@ use tactus_schema::pb::{RunPhase, RunState};
 
 use crate::output::duration;
 
-/// A progress bar on standard error; silent where that is no terminal or a machine reads.
+/// Progress bar of a run on standard error: presses, frames, losses, time left. Hidden with `--json` and without a
+/// terminal.
 #[derive(Debug)]
-pub(crate) struct Progress(ProgressBar);
+pub(crate) struct RunProgress(ProgressBar);
 
-impl Progress {
+impl RunProgress {
     pub(crate) fn new(silent: bool) -> Self {
         let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(None, target);
@@ -21,7 +22,7 @@ impl Progress {
         Self(bar)
     }
 
-    /// Shows where the run stands.
+    /// Shows the state of the run.
     pub(crate) fn show(&self, state: &RunState) {
         self.0.set_length(state.presses_planned.into());
         self.0.set_position(state.presses.into());
@@ -43,33 +44,33 @@ impl Progress {
         });
     }
 
-    /// Takes the bar away, to make room for the summary.
+    /// Removes the bar.
     pub(crate) fn clear(&self) {
         self.0.finish_and_clear();
     }
 
-    /// Says something above the bar.
+    /// Prints a line above the bar.
     pub(crate) fn say(&self, line: &str) {
         self.0.suspend(|| eprintln!("{line}"));
     }
 }
 
-/// The bar of a computation: the share that is done, what is being done, time left; silent where [`Progress`] is.
+/// Progress bar of a computation: share done, current step, time left. Hidden where [`RunProgress`] is.
 #[derive(Debug)]
-pub(crate) struct Computation {
+pub(crate) struct ComputationProgress {
     bar: ProgressBar,
     start: Instant,
 }
 
-impl Computation {
-    /// Steps of the bar.
+impl ComputationProgress {
+    /// Resolution of the bar.
     const STEPS: u64 = 1000;
-    /// Before that, time left is a guess.
+    /// Below this share the time left is not shown: it would be a guess.
     const SHARE_MIN: f64 = 0.02;
 
     pub(crate) fn new(silent: bool) -> Self {
         let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        // Also out of the way of an error that ends the computation.
+        // Cleared, too, when an error ends the computation.
         let bar =
             ProgressBar::with_draw_target(Some(Self::STEPS), target).with_finish(ProgressFinish::AndClear);
         if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/dim} {percent:>3} %  {msg}") {
@@ -78,7 +79,7 @@ impl Computation {
         Self { bar, start: Instant::now() }
     }
 
-    /// Shows what is being done, and the share of the whole that is done.
+    /// Shows the current step and the share done, 0 to 1.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to STEPS")]
     pub(crate) fn show(&self, what: &str, share: f64) {
         let share = share.clamp(0.0, 1.0);
@@ -92,7 +93,7 @@ impl Computation {
         self.bar.set_message(format!("{what}{left}"));
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
     }

@@ -1,4 +1,4 @@
-//! What tells that a file is still the same.
+//! Checksums of files.
 
 use std::fs::File;
 use std::io;

@@ -7,7 +7,7 @@ use tactus_model::Array;
 
 use crate::{
     numbers::digits,
-    plot::{ColourBar, Heat, Image, Label, Panel, Scale, Sheet},
+    plot::{ColourBar, HeatMap, Image, Label, Panel, Scale, Sheet},
 };
 
 /// Room for a map.
@@ -18,14 +18,17 @@ const NUMBERED_PX: f64 = 18.0;
 /// Every element where it stands on the sensor: faulty ones marked at their corners, those not judged dashed; a line goes from a
 /// cross-wired element to the one whose signal it gives.
 pub fn health_map(array: &Array, health: &Health) -> Sheet {
-    let map = Map { array, health };
+    let map = HealthMap { array, health };
     let [width, height] = map.size_px();
     let mut sheet = Sheet::new("Health of the elements", [width.max(MAP_PX[0]), height + 44.0]);
     sheet.put([0.0, 0.0], &map);
-    for (nth, (state, name)) in
-        [(State::Sound, "sound"), (State::Faulty, "faulty"), (State::NotJudged, "not judged")]
-            .into_iter()
-            .enumerate()
+    for (nth, (state, name)) in [
+        (ElementState::Sound, "sound"),
+        (ElementState::Faulty, "faulty"),
+        (ElementState::NotJudged, "not judged"),
+    ]
+    .into_iter()
+    .enumerate()
     {
         let x = 104.0 * nth as f64;
         sheet.put([x, height + 22.0], &state);
@@ -54,24 +57,24 @@ pub fn sensitivity_map(array: &Array, response: &ResponseFit) -> Sheet {
     let title = format!("{} to {} counts/mm", digits(lo, 4), digits(hi, 4));
     let (width, height) = (cell_px * cols as f64, cell_px * rows as f64);
     let mut sheet = Sheet::new("Sensitivity of the elements", [width.max(440.0), height + 48.0]);
-    sheet.put([0.0, 0.0], &Image { heat: Heat { values: &values, rows, cols }, cell_px, scale, title });
+    sheet.put([0.0, 0.0], &Image { heat: HeatMap { values: &values, rows, cols }, cell_px, scale, title });
     sheet.put([-12.0, height + 12.0], &ColourBar { scale, title: "counts per mm".into() });
     sheet
 }
 
-struct Map<'a> {
+struct HealthMap<'a> {
     array: &'a Array,
     health: &'a Health,
 }
 
 #[derive(Clone, Copy)]
-enum State {
+enum ElementState {
     Sound,
     Faulty,
     NotJudged,
 }
 
-impl Map<'_> {
+impl HealthMap<'_> {
     fn px_per_mm(&self) -> f64 {
         let [width, height] = self.array.extent_mm().map(|[least, most]| most - least);
         (MAP_PX[0] / width).min(MAP_PX[1] / height)
@@ -88,18 +91,18 @@ impl Map<'_> {
         Some([(x - left) * self.px_per_mm(), (back - y) * self.px_per_mm()])
     }
 
-    fn state(&self, element: usize) -> State {
+    fn state(&self, element: usize) -> ElementState {
         if self.health.faults.iter().any(|fault| fault.element == element) {
-            State::Faulty
+            ElementState::Faulty
         } else if self.health.not_judged.contains(&element) {
-            State::NotJudged
+            ElementState::NotJudged
         } else {
-            State::Sound
+            ElementState::Sound
         }
     }
 }
 
-impl Panel for Map<'_> {
+impl Panel for HealthMap<'_> {
     fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // A little smaller, so that strokes do not run into each other.
         let size_px = self.array.element_mm().map(|side| (side * self.px_per_mm() - 2.0).max(1.0));
@@ -130,13 +133,13 @@ impl Panel for Map<'_> {
     }
 }
 
-impl Panel for State {
+impl Panel for ElementState {
     fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.square(f, [0.0; 2], [16.0; 2])
     }
 }
 
-impl State {
+impl ElementState {
     /// With its upper left corner at a place.
     fn square(self, f: &mut fmt::Formatter<'_>, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> fmt::Result {
         let style = match self {

@@ -5,7 +5,7 @@ use std::fmt;
 use tactus_calibrate::{Estimate, Form, ResponseFit};
 
 use super::{
-    CalibrationReport, Drawing, Figures,
+    CalibrationReport, Drawing, FigurePlacement,
     elements::sensitivity_map,
     figure,
     figures::{decided, one_sign, recalibrated, responses, scatter_counts, uniform_counts_per_mm},
@@ -61,7 +61,7 @@ pub(super) fn drawings(response: &ResponseFit) -> [Drawing; 2] {
 pub(super) fn section(
     f: &mut fmt::Formatter<'_>,
     report: &CalibrationReport<'_>,
-    figures: Figures,
+    figures: FigurePlacement,
 ) -> fmt::Result {
     writeln!(
         f,
@@ -71,7 +71,7 @@ pub(super) fn section(
     match &report.calibration.response {
         None => writeln!(f, "<p>Not determined.</p>")?,
         Some(response) => {
-            if figures == Figures::Here {
+            if figures == FigurePlacement::Inline {
                 writeln!(f, "<div class=\"pair\">")?;
                 drawings(response).iter().try_for_each(|drawing| figure(f, drawing))?;
                 writeln!(f, "</div>")?;

@@ -6,7 +6,7 @@ use tactus_calibrate::{Curve, SpreadFit, ThicknessFit};
 use tactus_model::{DIGITACTS_PITCH_MM, Psf};
 
 use super::{
-    CalibrationReport, Drawing, Figures, figure,
+    CalibrationReport, Drawing, FigurePlacement, figure,
     figures::{point_spreads, spread_against_thickness},
 };
 use crate::{
@@ -49,7 +49,7 @@ pub(super) fn drawings(report: &CalibrationReport<'_>) -> Vec<Drawing> {
 pub(super) fn section(
     f: &mut fmt::Formatter<'_>,
     report: &CalibrationReport<'_>,
-    figures: Figures,
+    figures: FigurePlacement,
 ) -> fmt::Result {
     writeln!(
         f,
@@ -63,7 +63,7 @@ pub(super) fn section(
             let pitch_mm = report.array.pitch_mm();
             by_depth(f, spreads, pitch_mm)?;
             writeln!(f, "</section>\n<section>\n<h2>Spread against thickness</h2>")?;
-            if figures == Figures::Here {
+            if figures == FigurePlacement::Inline {
                 drawings(report).iter().try_for_each(|drawing| figure(f, drawing))?;
             }
             by_covering(f, thickness, pitch_mm)?;

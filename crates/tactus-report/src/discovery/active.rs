@@ -2,8 +2,6 @@
 
 use std::fmt;
 
-use serde_json::{Value, json};
-
 use super::words::list;
 use crate::{
     document::{Column, Table},
@@ -26,21 +24,21 @@ pub struct ActiveRun {
     /// By how many standard errors, if that could be foreseen.
     pub expected_z: Option<f64>,
     /// The effects that had been added before, each with those that could not be told from it.
-    pub before: Vec<Undecided>,
+    pub before: Vec<AmbiguousEffect>,
     /// The same with this experiment among the data.
-    pub after: Vec<Undecided>,
+    pub after: Vec<AmbiguousEffect>,
 }
 
 /// An effect, and those that the data cannot tell from it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Undecided {
+pub struct AmbiguousEffect {
     /// The effect that was added.
     pub effect: &'static str,
     /// What would do as well.
     pub equivalent: Vec<&'static str>,
 }
 
-impl Undecided {
+impl AmbiguousEffect {
     /// Such as `relaxation` or `relaxation or imprint`.
     pub fn in_words(undecided: &[Self]) -> String {
         if undecided.is_empty() {
@@ -48,10 +46,6 @@ impl Undecided {
         }
         let either = |one: &Self| [&[one.effect][..], &one.equivalent].concat().join(" or ");
         undecided.iter().map(either).collect::<Vec<_>>().join("; ")
-    }
-
-    fn json(&self) -> Value {
-        json!({ "effect": self.effect, "equivalent": self.equivalent })
     }
 }
 
@@ -62,27 +56,6 @@ pub fn command(experiment: &str, parameters: &[(&'static str, String)]) -> Strin
         if is_plain { format!(" -p {name}={value}") } else { format!(" -p '{name}={value}'") }
     });
     format!("tactus run {experiment}{}", parameters.collect::<String>())
-}
-
-/// Parameters as an object of texts.
-pub(super) fn named(parameters: &[(&'static str, String)]) -> Value {
-    parameters.iter().map(|(name, value)| ((*name).to_owned(), Value::from(value.as_str()))).collect()
-}
-
-pub(super) fn json(runs: &[ActiveRun]) -> Vec<Value> {
-    let run = |run: &ActiveRun| {
-        json!({
-            "experiment": run.experiment,
-            "parameters": named(&run.parameters),
-            "recording": run.recording,
-            "duration_s": run.duration_s,
-            "separates": run.separates,
-            "expected_z": run.expected_z,
-            "before_equivalent": run.before.iter().map(Undecided::json).collect::<Vec<_>>(),
-            "after_equivalent": run.after.iter().map(Undecided::json).collect::<Vec<_>>(),
-        })
-    };
-    runs.iter().map(run).collect()
 }
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, runs: &[ActiveRun]) -> fmt::Result {
@@ -104,8 +77,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, runs: &[ActiveRun]) -> fmt::Re
             list(&run.separates),
             run.expected_z.map_or_else(String::new, |z| digits(z, 2)),
             format!("{:.0}", run.duration_s),
-            Undecided::in_words(&run.before),
-            Undecided::in_words(&run.after),
+            AmbiguousEffect::in_words(&run.before),
+            AmbiguousEffect::in_words(&run.after),
         ]);
     }
     writeln!(f, "{table}\n<p>All these recordings are among the data of this report.</p>\n</section>")

@@ -7,7 +7,7 @@ use tactus_model::Array;
 
 use crate::{
     numbers::digits,
-    plot::{Axis, ColourBar, Figure, Heat, Image, Ink, Label, Panel, Scale, Series, Sheet},
+    plot::{Axis, ColourBar, Figure, HeatMap, Image, Ink, Label, Panel, Scale, Series, Sheet},
 };
 
 /// The models that are compared.
@@ -64,7 +64,7 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
     for (nth, (name, values)) in maps.iter().enumerate() {
         let x = (width + GUTTER_PX) * nth as f64;
         sheet.put([x, 12.0], &Label::new(*name).heading());
-        let heat = Heat { values, rows, cols };
+        let heat = HeatMap { values, rows, cols };
         sheet.put([x, 22.0], &Image { heat, cell_px, scale, title: (*name).into() });
     }
     let title = if noise_rms_counts.is_some() { "rms in units of the noise" } else { "rms in counts" };
@@ -74,15 +74,16 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
 
 /// The held-out residual of the base model, of the grown model without each effect, of the grown model, and the noise.
 pub fn levels(found: &Discovery) -> Sheet {
-    let mut bars = vec![Bar::new(format!("{BEFORE}, recalibrated"), found.base.heldout_rms_counts, Ink::Red)];
+    let mut bars =
+        vec![LevelBar::new(format!("{BEFORE}, recalibrated"), found.base.heldout_rms_counts, Ink::Red)];
     if !found.steps.is_empty() {
         bars.extend(found.steps.iter().map(|step| {
             let name = format!("{AFTER} without {}", step.effect);
-            Bar::new(name, step.heldout_rms_before_counts, Ink::Amber)
+            LevelBar::new(name, step.heldout_rms_before_counts, Ink::Amber)
         }));
-        bars.push(Bar::new(AFTER, found.final_.level.heldout_rms_counts, Ink::Blue));
+        bars.push(LevelBar::new(AFTER, found.final_.level.heldout_rms_counts, Ink::Blue));
     }
-    bars.extend(found.noise_rms_counts.map(|rms| Bar::new("noise", rms, Ink::Muted)));
+    bars.extend(found.noise_rms_counts.map(|rms| LevelBar::new("noise", rms, Ink::Muted)));
     let longest = bars.iter().map(|bar| bar.rms_counts).filter(|rms| rms.is_finite()).fold(0.0, f64::max);
     let size_px = [BARS_PX[0] + BARS_PX[1] + 70.0, BAR_PX * bars.len() as f64];
     let mut sheet = Sheet::new("Held-out residual, rms in counts", size_px);
@@ -90,7 +91,7 @@ pub fn levels(found: &Discovery) -> Sheet {
         let length_px = if longest > 0.0 { BARS_PX[1] * bar.rms_counts / longest } else { 0.0 };
         let y = BAR_PX * (nth as f64 + 0.5);
         sheet.put([BARS_PX[0] - 12.0, y + 4.0], &Label::new(bar.name).right());
-        sheet.put([BARS_PX[0], y], &Stroke { length_px, ink: bar.ink });
+        sheet.put([BARS_PX[0], y], &HorizontalBar { length_px, ink: bar.ink });
         let counts = digits(bar.rms_counts, 3);
         sheet.put([BARS_PX[0] + length_px.max(0.0) + 8.0, y + 4.0], &Label::new(counts));
     }
@@ -107,25 +108,25 @@ fn means(curve: &Curve, of: fn(&Point) -> f64) -> [Series; 2] {
     [Series::bars(bars).width_px(1.2), Series::dots(dots.collect()).width_px(4.5)]
 }
 
-struct Bar {
+struct LevelBar {
     name: String,
     rms_counts: f64,
     ink: Ink,
 }
 
-impl Bar {
+impl LevelBar {
     fn new(name: impl Into<String>, rms_counts: f64, ink: Ink) -> Self {
         Self { name: name.into(), rms_counts, ink }
     }
 }
 
 /// A bar from its origin to the right.
-struct Stroke {
+struct HorizontalBar {
     length_px: f64,
     ink: Ink,
 }
 
-impl Panel for Stroke {
+impl Panel for HorizontalBar {
     fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.length_px > 0.0 {
             write!(

@@ -1,143 +1,366 @@
 //! A discovery for machines: `report.json`.
+//!
+//! The structs here are the form of the file, `tactus.discovery/1`; their fields are its keys.
 
-use serde_json::{Map, Value, json};
-use tactus_discover::{Candidate, Estimated, Level, Point, Step};
+use std::collections::BTreeMap;
 
-use super::{DiscoveryReport, active, in_words};
+use serde::Serialize;
+use tactus_discover::{Candidate, Curve, Discovery, Estimated, Gap, Level, NextExperiment, Round, Step};
+
+use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
 
 /// Name of the form of `report.json`.
 const SCHEMA: &str = "tactus.discovery/1";
 
 /// The report as JSON, `tactus.discovery/1`.
 ///
-/// Numbers are finite or `null`; the same discovery always gives the same text. The parameters of an effect that acts
-/// more than once have `#2`, `#3` and so on after their names from its second term on; `terms` has them term by term.
+/// Numbers that are not finite become `null`; the same discovery always gives the same text. The parameters of an effect
+/// that acts more than once have `#2`, `#3` and so on after their names from its second term on; `terms` lists them term
+/// by term.
 pub fn discovery_json(report: &DiscoveryReport<'_>) -> String {
-    let found = report.discovery;
-    let data = report.data.iter().map(|source| {
-        json!({
-            "id": source.id, "sha256": source.sha256, "frames": source.frames, "presses": source.presses,
-        })
-    });
-    let gap = found.gap.iter().map(|gap| {
-        json!({
-            "where": { "covariate": gap.covariate, "unit": gap.unit, "range": gap.range },
-            "effect_size": gap.effect_size,
-            "q_value": gap.q_value,
-        })
-    });
-    let curves = found.curves.iter().map(|curve| {
-        json!({
-            "covariate": curve.covariate, "unit": curve.unit, "of": curve.of,
-            "points": curve.points.iter().map(point).collect::<Vec<_>>(),
-        })
-    });
-    let elements = found.elements.iter().map(|element| {
-        json!({
-            "before_rms_counts": element.before_rms_counts, "after_rms_counts": element.after_rms_counts,
-        })
-    });
-    let rounds = found.rounds.iter().map(|round| {
-        json!({
-            "with": round.with,
-            "candidates": round.candidates.iter().map(candidate).collect::<Vec<_>>(),
-            "taken": round.taken,
-        })
-    });
-    let next = found.next_experiments.iter().map(|next| {
-        json!({
-            "experiment": next.experiment,
-            "parameters": active::named(&next.parameters),
-            "duration_s": next.duration_s,
-            "separates": next.separates,
-            "expected_z": next.expected_z,
-        })
-    });
-    let not_shown = found.not_shown.iter().map(|one| json!({ "effect": one.effect, "reason": one.reason }));
-    let mut last = level(found.final_.level);
-    last.insert("shrink".into(), json!(found.final_.shrink));
-    let split = &found.split;
-    let written = json!({
-        "schema": SCHEMA,
-        "rig": report.rig,
-        "simulated": report.simulated,
-        "data": data.collect::<Vec<_>>(),
-        "seed": found.seed,
-        "notes": report.notes,
-        "not_shown": not_shown.collect::<Vec<_>>(),
-        "warnings": found.warnings,
-        "split": {
-            "frames": split.frames,
-            "train_presses": split.train_presses,
-            "heldout_presses": split.heldout_presses,
-            "heldout_depths_mm": split.heldout_depths_mm,
-            "heldout_coverings_mm": split.heldout_coverings_mm,
-        },
-        "noise_rms_counts": found.noise_rms_counts,
-        "base": level(found.base),
-        "global": { "statistic": found.global.statistic, "p_value": found.global.p_value },
-        "gap": gap.collect::<Vec<_>>(),
-        "curves": curves.collect::<Vec<_>>(),
-        "elements": elements.collect::<Vec<_>>(),
-        "rounds": rounds.collect::<Vec<_>>(),
-        "steps": found.steps.iter().map(step).collect::<Vec<_>>(),
-        "final": last,
-        "verdict": found.verdict.name(),
-        "verdict_text": in_words(found),
-        "unexplained": { "depends_on": found.unexplained.depends_on, "share": found.unexplained.share },
-        "next_experiments": next.collect::<Vec<_>>(),
-        "active": active::json(report.active),
-    });
-    format!("{written:#}\n")
+    // As a value first, because a value's numbers are finite and its keys sorted.
+    let value = serde_json::json!(ReportJson::of(report));
+    format!("{value:#}\n")
 }
 
-fn level(level: Level) -> Map<String, Value> {
-    let fields = [
-        ("heldout_rms_counts", json!(level.heldout_rms_counts)),
-        ("heldout_chi2", json!(level.heldout_chi2)),
-    ];
-    fields.map(|(name, value)| (name.into(), value)).into_iter().collect()
+#[derive(Serialize)]
+struct ReportJson<'a> {
+    schema: &'static str,
+    rig: &'a str,
+    simulated: bool,
+    data: Vec<SourceJson<'a>>,
+    seed: u64,
+    notes: &'a [String],
+    not_shown: Vec<NotShownJson<'a>>,
+    warnings: &'a [String],
+    split: SplitJson<'a>,
+    noise_rms_counts: Option<f64>,
+    base: LevelJson,
+    global: GlobalTestJson,
+    gap: Vec<GapJson<'a>>,
+    curves: Vec<CurveJson<'a>>,
+    elements: Vec<ElementJson>,
+    rounds: Vec<RoundJson<'a>>,
+    steps: Vec<StepJson<'a>>,
+    #[serde(rename = "final")]
+    grown: GrownJson,
+    verdict: &'static str,
+    verdict_text: String,
+    unexplained: UnexplainedJson<'a>,
+    next_experiments: Vec<NextExperimentJson<'a>>,
+    active: Vec<ActiveRunJson<'a>>,
 }
 
-fn point(point: &Point) -> Value {
-    json!({
-        "at": point.at, "before": point.before, "after": point.after, "se": point.standard_error,
-    })
+#[derive(Serialize)]
+struct SourceJson<'a> {
+    id: &'a str,
+    sha256: &'a str,
+    frames: u64,
+    presses: u64,
 }
 
-fn candidate(candidate: &Candidate) -> Value {
-    json!({
-        "effect": candidate.effect,
-        "score": candidate.score,
-        "p_value": candidate.p_value,
-        "heldout_rms_counts": candidate.heldout_rms_counts,
-        "shrink": candidate.shrink,
-    })
+#[derive(Serialize)]
+struct NotShownJson<'a> {
+    effect: &'a str,
+    reason: &'a str,
 }
 
-fn step(step: &Step) -> Value {
-    let mut parameters = Map::new();
-    for (nth, term) in step.terms.iter().enumerate() {
-        for parameter in term {
-            let again = if nth == 0 { String::new() } else { format!("#{}", nth + 1) };
-            parameters.insert(format!("{}{again}", parameter.name), estimated(parameter));
+#[derive(Serialize)]
+struct SplitJson<'a> {
+    frames: usize,
+    train_presses: usize,
+    heldout_presses: usize,
+    heldout_depths_mm: &'a [f64],
+    heldout_coverings_mm: &'a [f64],
+}
+
+#[derive(Serialize)]
+struct LevelJson {
+    heldout_rms_counts: f64,
+    heldout_chi2: f64,
+}
+
+#[derive(Serialize)]
+struct GrownJson {
+    #[serde(flatten)]
+    level: LevelJson,
+    shrink: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct GlobalTestJson {
+    statistic: f64,
+    p_value: f64,
+}
+
+#[derive(Serialize)]
+struct GapJson<'a> {
+    #[serde(rename = "where")]
+    place: GapPlaceJson<'a>,
+    effect_size: f64,
+    q_value: f64,
+}
+
+#[derive(Serialize)]
+struct GapPlaceJson<'a> {
+    covariate: &'a str,
+    unit: &'a str,
+    range: [f64; 2],
+}
+
+#[derive(Serialize)]
+struct CurveJson<'a> {
+    covariate: &'a str,
+    unit: &'a str,
+    of: &'a str,
+    points: Vec<PointJson>,
+}
+
+#[derive(Serialize)]
+struct PointJson {
+    at: f64,
+    before: f64,
+    after: f64,
+    se: f64,
+}
+
+#[derive(Serialize)]
+struct ElementJson {
+    before_rms_counts: f64,
+    after_rms_counts: f64,
+}
+
+#[derive(Serialize)]
+struct RoundJson<'a> {
+    with: &'a [&'static str],
+    candidates: Vec<CandidateJson<'a>>,
+    taken: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct CandidateJson<'a> {
+    effect: &'a str,
+    score: f64,
+    p_value: f64,
+    heldout_rms_counts: Option<f64>,
+    shrink: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct StepJson<'a> {
+    effect: &'a str,
+    parameters: BTreeMap<String, EstimateJson>,
+    terms: Vec<BTreeMap<&'a str, EstimateJson>>,
+    p_value: f64,
+    q_value: f64,
+    heldout_rms_before: f64,
+    heldout_rms_after: f64,
+    equivalent: &'a [&'static str],
+}
+
+#[derive(Serialize)]
+struct EstimateJson {
+    value: f64,
+    se: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct UnexplainedJson<'a> {
+    depends_on: &'a [&'static str],
+    share: f64,
+}
+
+#[derive(Serialize)]
+struct NextExperimentJson<'a> {
+    experiment: &'a str,
+    parameters: BTreeMap<&'a str, &'a str>,
+    duration_s: f64,
+    separates: &'a [String; 2],
+    expected_z: f64,
+}
+
+#[derive(Serialize)]
+struct ActiveRunJson<'a> {
+    experiment: &'a str,
+    parameters: BTreeMap<&'a str, &'a str>,
+    recording: &'a str,
+    duration_s: f64,
+    separates: &'a [String; 2],
+    expected_z: Option<f64>,
+    before_equivalent: Vec<AmbiguousEffectJson<'a>>,
+    after_equivalent: Vec<AmbiguousEffectJson<'a>>,
+}
+
+#[derive(Serialize)]
+struct AmbiguousEffectJson<'a> {
+    effect: &'a str,
+    equivalent: &'a [&'static str],
+}
+
+impl<'a> ReportJson<'a> {
+    fn of(report: &DiscoveryReport<'a>) -> Self {
+        let found: &'a Discovery = report.discovery;
+        let not_shown = found.not_shown.iter();
+        let elements = found.elements.iter();
+        Self {
+            schema: SCHEMA,
+            rig: report.rig,
+            simulated: report.simulated,
+            data: report.data.iter().map(SourceJson::of).collect(),
+            seed: found.seed,
+            notes: report.notes,
+            not_shown: not_shown
+                .map(|one| NotShownJson { effect: one.effect, reason: &one.reason })
+                .collect(),
+            warnings: &found.warnings,
+            split: SplitJson {
+                frames: found.split.frames,
+                train_presses: found.split.train_presses,
+                heldout_presses: found.split.heldout_presses,
+                heldout_depths_mm: &found.split.heldout_depths_mm,
+                heldout_coverings_mm: &found.split.heldout_coverings_mm,
+            },
+            noise_rms_counts: found.noise_rms_counts,
+            base: LevelJson::of(found.base),
+            global: GlobalTestJson { statistic: found.global.statistic, p_value: found.global.p_value },
+            gap: found.gap.iter().map(GapJson::of).collect(),
+            curves: found.curves.iter().map(CurveJson::of).collect(),
+            elements: elements
+                .map(|element| ElementJson {
+                    before_rms_counts: element.before_rms_counts,
+                    after_rms_counts: element.after_rms_counts,
+                })
+                .collect(),
+            rounds: found.rounds.iter().map(RoundJson::of).collect(),
+            steps: found.steps.iter().map(StepJson::of).collect(),
+            grown: GrownJson { level: LevelJson::of(found.final_.level), shrink: found.final_.shrink },
+            verdict: found.verdict.name(),
+            verdict_text: in_words(found),
+            unexplained: UnexplainedJson {
+                depends_on: &found.unexplained.depends_on,
+                share: found.unexplained.share,
+            },
+            next_experiments: found.next_experiments.iter().map(NextExperimentJson::of).collect(),
+            active: report.active.iter().map(ActiveRunJson::of).collect(),
         }
     }
-    let term = |term: &Vec<Estimated>| -> Map<String, Value> {
-        term.iter().map(|parameter| (parameter.name.into(), estimated(parameter))).collect()
-    };
-    json!({
-        "effect": step.effect,
-        "parameters": parameters,
-        "terms": step.terms.iter().map(term).collect::<Vec<_>>(),
-        "p_value": step.p_value,
-        "q_value": step.q_value,
-        "heldout_rms_before": step.heldout_rms_before_counts,
-        "heldout_rms_after": step.heldout_rms_after_counts,
-        "equivalent": step.equivalent,
-    })
 }
 
-fn estimated(parameter: &Estimated) -> Value {
-    json!({ "value": parameter.value, "se": parameter.standard_error })
+impl<'a> SourceJson<'a> {
+    fn of(source: &'a DataSource) -> Self {
+        Self { id: &source.id, sha256: &source.sha256, frames: source.frames, presses: source.presses }
+    }
+}
+
+impl LevelJson {
+    fn of(level: Level) -> Self {
+        Self { heldout_rms_counts: level.heldout_rms_counts, heldout_chi2: level.heldout_chi2 }
+    }
+}
+
+impl<'a> GapJson<'a> {
+    fn of(gap: &'a Gap) -> Self {
+        Self {
+            place: GapPlaceJson { covariate: gap.covariate, unit: gap.unit, range: gap.range },
+            effect_size: gap.effect_size,
+            q_value: gap.q_value,
+        }
+    }
+}
+
+impl<'a> CurveJson<'a> {
+    fn of(curve: &'a Curve) -> Self {
+        let points = curve.points.iter().map(|point| PointJson {
+            at: point.at,
+            before: point.before,
+            after: point.after,
+            se: point.standard_error,
+        });
+        Self { covariate: curve.covariate, unit: curve.unit, of: curve.of, points: points.collect() }
+    }
+}
+
+impl<'a> RoundJson<'a> {
+    fn of(round: &'a Round) -> Self {
+        Self {
+            with: &round.with,
+            candidates: round.candidates.iter().map(CandidateJson::of).collect(),
+            taken: round.taken,
+        }
+    }
+}
+
+impl<'a> CandidateJson<'a> {
+    fn of(candidate: &'a Candidate) -> Self {
+        Self {
+            effect: candidate.effect,
+            score: candidate.score,
+            p_value: candidate.p_value,
+            heldout_rms_counts: candidate.heldout_rms_counts,
+            shrink: candidate.shrink,
+        }
+    }
+}
+
+impl<'a> StepJson<'a> {
+    fn of(step: &'a Step) -> Self {
+        let numbered = step.terms.iter().enumerate().flat_map(|(nth, term)| {
+            let suffix = if nth == 0 { String::new() } else { format!("#{}", nth + 1) };
+            term.iter().map(move |one| (format!("{}{suffix}", one.name), EstimateJson::of(one)))
+        });
+        let term = |term: &'a Vec<Estimated>| term.iter().map(|one| (one.name, EstimateJson::of(one)));
+        Self {
+            effect: step.effect,
+            parameters: numbered.collect(),
+            terms: step.terms.iter().map(|one| term(one).collect()).collect(),
+            p_value: step.p_value,
+            q_value: step.q_value,
+            heldout_rms_before: step.heldout_rms_before_counts,
+            heldout_rms_after: step.heldout_rms_after_counts,
+            equivalent: &step.equivalent,
+        }
+    }
+}
+
+impl EstimateJson {
+    fn of(parameter: &Estimated) -> Self {
+        Self { value: parameter.value, se: parameter.standard_error }
+    }
+}
+
+impl<'a> NextExperimentJson<'a> {
+    fn of(next: &'a NextExperiment) -> Self {
+        Self {
+            experiment: next.experiment,
+            parameters: by_name(&next.parameters),
+            duration_s: next.duration_s,
+            separates: &next.separates,
+            expected_z: next.expected_z,
+        }
+    }
+}
+
+impl<'a> ActiveRunJson<'a> {
+    fn of(run: &'a ActiveRun) -> Self {
+        Self {
+            experiment: &run.experiment,
+            parameters: by_name(&run.parameters),
+            recording: &run.recording,
+            duration_s: run.duration_s,
+            separates: &run.separates,
+            expected_z: run.expected_z,
+            before_equivalent: run.before.iter().map(AmbiguousEffectJson::of).collect(),
+            after_equivalent: run.after.iter().map(AmbiguousEffectJson::of).collect(),
+        }
+    }
+}
+
+impl<'a> AmbiguousEffectJson<'a> {
+    fn of(undecided: &'a AmbiguousEffect) -> Self {
+        Self { effect: undecided.effect, equivalent: &undecided.equivalent }
+    }
+}
+
+fn by_name<'a>(parameters: &'a [(&'static str, String)]) -> BTreeMap<&'a str, &'a str> {
+    parameters.iter().map(|(name, value)| (*name, value.as_str())).collect()
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use tactus_calibrate::acuity::{DiscretisingSensor, Grid, NYQUIST_SIGMA, OFFSETS, OFFSETS_BETWEEN};
 
 use super::{Drawing, FigureError};
-use crate::plot::{Axis, ColourBar, Figure, Heat, Image, Ink, Label, Panel, Scale, Series, Sheet, number};
+use crate::plot::{Axis, ColourBar, Figure, HeatMap, Image, Ink, Label, Panel, Scale, Series, Sheet, number};
 
 const CELL_PX: f64 = 9.0;
 /// Places of the panels and of what stands beside them.
@@ -221,7 +221,7 @@ fn sheet(name: &str, panels: [&LogPanel; 2], scale: Scale, bar: &str) -> Sheet {
         sheet.put([x, TOP_PX - 26.0], &Label::new(heading).heading());
         sheet.put([x, TOP_PX - 10.0], &Label::new(below).muted());
         let [rows, cols] = [panel.grid.force_resolutions.len(), panel.grid.sigmas.len()];
-        let heat = Heat { values: &panel.log10, rows, cols };
+        let heat = HeatMap { values: &panel.log10, rows, cols };
         sheet.put([x, TOP_PX], &Image { heat, cell_px: CELL_PX, scale, title: format!("{name}, {heading}") });
         sheet.put([x, TOP_PX], panel);
     }

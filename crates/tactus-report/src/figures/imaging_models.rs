@@ -6,7 +6,7 @@ use tactus_solid::fem::Bricks;
 use super::{
     COVERINGS, Drawing, FigureError, REFERENCE_INDENTER, inches, uniform, virtual_sensor::VirtualSensor,
 };
-use crate::plot::{ColourBar, Heat, Image, Label, Scale, Sheet, number};
+use crate::plot::{ColourBar, HeatMap, Image, Label, Scale, Sheet, number};
 
 /// Poisson's ratio of the covering: rubber hardly changes its volume.
 const POISSON_RATIO: f64 = 0.49;
@@ -110,7 +110,7 @@ pub fn imaging_models(presses: &[ModelledPress]) -> Sheet {
             let x = LEFT_PX + STEP_X_PX * col as f64;
             #[expect(clippy::cast_possible_truncation, reason = "a colour needs no more digits")]
             let values: Vec<f32> = image.iter().map(|value| *value as f32).collect();
-            let heat = Heat { values: &values, rows, cols };
+            let heat = HeatMap { values: &values, rows, cols };
             let title = format!("{}, {} {}", headings[col].join(" "), inches(press.covering), press.place);
             sheet.put([x, y], &Image { heat, cell_px: CELL_PX, scale: Scale::new(0.0, 1.0), title });
             let percent = |one, other| format!("{} %", number(press.difference_percent(one, other), 1));

@@ -2,7 +2,7 @@
 
 use super::{Drawing, FIGURES};
 use crate::{
-    document::{SIMULATED, document},
+    document::{SIMULATED_BADGE, document},
     markup::Text,
 };
 
@@ -21,7 +21,7 @@ pub(super) fn page(drawings: &[Drawing]) -> String {
         })
         .collect();
     let header = format!(
-        "<header>\n<div class=\"headline\"><h1>The paper's figures</h1>{SIMULATED}</div>\n\
+        "<header>\n<div class=\"headline\"><h1>The paper's figures</h1>{SIMULATED_BADGE}</div>\n\
          <p class=\"under\">Characterization and simulation of tactile sensors, drawn again from the model. No physical \
          sensor was read: where the paper shows one, a virtual sensor stands in.</p>\n</header>\n"
     );

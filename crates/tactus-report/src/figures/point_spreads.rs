@@ -5,7 +5,7 @@ use std::{f64::consts::PI, fmt};
 use tactus_model::{Covering, DIGITACTS_PITCH_MM, Psf};
 
 use super::{COVERINGS, Drawing, FigureError, inches};
-use crate::plot::{Axis, Figure, Heat, Image, Ink, Label, Panel, Scale, Series, Sheet};
+use crate::plot::{Axis, Figure, HeatMap, Image, Ink, Label, Panel, Scale, Series, Sheet};
 
 /// Draws the Gaussian of each covering: as a profile of unit volume, and as an image of its own scale. Lengths are in
 /// pitches.
@@ -50,7 +50,7 @@ pub(crate) fn profiles(spreads: &[(String, f64)]) -> Sheet {
     for (nth, (title, sigma, values)) in images.iter().enumerate() {
         let [x, y] = [658.0 + 148.0 * (nth % 2) as f64, 20.0 + 156.0 * (nth / 2) as f64];
         sheet.put([x, y - 8.0], &Label::new(title));
-        let heat = Heat { values, rows: PIXELS as usize, cols: PIXELS as usize };
+        let heat = HeatMap { values, rows: PIXELS as usize, cols: PIXELS as usize };
         sheet.put(
             [x, y],
             &Image { heat, cell_px: CELL_PX, scale: Scale::new(0.0, 1.0), title: title.clone() },

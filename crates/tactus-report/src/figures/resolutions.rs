@@ -6,7 +6,7 @@ use tactus_model::{Array, Contact, Indenter, Psf};
 use tactus_scene::shapes::{SCENES, Scene};
 
 use super::{COVERINGS, Drawing, FigureError, middle_mm, uniform, zero_to_one};
-use crate::plot::{ColourBar, Heat, Image, Label, Scale, Sheet, number};
+use crate::plot::{ColourBar, HeatMap, Image, Label, Scale, Sheet, number};
 
 /// Images of several tools on one array.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +70,7 @@ pub fn resolutions(tools: &[&str], resolutions: &[Resolution]) -> Sheet {
             let centre_px = [middle_px, TOP_PX + STEP_Y_PX * (row as f64 + 0.5)];
             let corner_px =
                 [centre_px[0] - cell_px * cols as f64 / 2.0, centre_px[1] - cell_px * rows as f64 / 2.0];
-            let heat = Heat { values, rows, cols };
+            let heat = HeatMap { values, rows, cols };
             let title = format!("{tool} on {}", array.name());
             sheet.put(corner_px, &Image { heat, cell_px, scale: Scale::new(0.0, 1.0), title });
         }

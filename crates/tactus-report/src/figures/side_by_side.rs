@@ -10,7 +10,7 @@ use super::{
     virtual_sensor::{GAIN_SPREAD, NOISE_COUNTS, VirtualSensor},
     zero_to_one,
 };
-use crate::plot::{ColourBar, Heat, Image, Label, Scale, Sheet, number};
+use crate::plot::{ColourBar, HeatMap, Image, Label, Scale, Sheet, number};
 
 /// Presses as lightly as the full scale of the sensor asks for.
 const DEPTH_MM: f64 = 0.15;
@@ -81,7 +81,7 @@ pub fn side_by_side(name: &str, contacts: &[SideBySide]) -> Sheet {
         let middle_px = x + width_px / 2.0;
         sheet.put([middle_px, TOP_PX - 10.0], &Label::new(&contact.heading).heading().centred());
         for (row, values) in [&contact.sensor, &contact.model].into_iter().enumerate() {
-            let heat = Heat { values, rows, cols };
+            let heat = HeatMap { values, rows, cols };
             let title = contact.heading.clone();
             let at_px = [x, TOP_PX + STEP_Y_PX * row as f64];
             sheet.put(at_px, &Image { heat, cell_px: CELL_PX, scale: Scale::new(0.0, 1.0), title });

@@ -4,7 +4,7 @@ use tactus_model::{Array, Covering};
 use tactus_scene::shapes::{Scene, Surface};
 
 use super::{COVERINGS, Drawing, FigureError, inches, middle_mm};
-use crate::plot::{Face, Label, Paint, Sheet, View};
+use crate::plot::{Face, Label, ObliqueView, Paint, Sheet};
 
 const BLUE: Paint = Paint { rgb: [66.0, 124.0, 226.0], opacity: 1.0 };
 const YELLOW: Paint = Paint { rgb: [255.0, 220.0, 70.0], opacity: 0.42 };
@@ -42,7 +42,7 @@ pub fn pressed_view(array: &Array, covering: Covering, tool: &Surface, depth_mm:
     });
     // The covering is not cut, and the plane of the elements' tops parts them from the tool.
     let faces = covering.into_iter().chain(tops).chain(tool).chain(sides.into_iter().flatten()).collect();
-    let view = View { faces, azimuth_deg: -62.0, elevation_deg: 32.0, px_per_mm: 26.0 };
+    let view = ObliqueView { faces, azimuth_deg: -62.0, elevation_deg: 32.0, px_per_mm: 26.0 };
     let mut sheet = Sheet::new("The H in the covering", [690.0, 560.0]);
     sheet.put([345.0, 340.0], &view);
     sheet
@@ -61,7 +61,8 @@ pub fn tools_view(tools: &[(&str, Surface)]) -> Sheet {
             let x = STEP_X_PX * col as f64;
             let faces =
                 surface.corners_mm().map(|corners| Face { corners_mm: corners.to_vec(), paint: STEEL });
-            let view = View { faces: faces.collect(), azimuth_deg: -20.0, elevation_deg, px_per_mm: 23.0 };
+            let view =
+                ObliqueView { faces: faces.collect(), azimuth_deg: -20.0, elevation_deg, px_per_mm: 23.0 };
             sheet.put([x, y], &Label::new(format!("{name}, {side}")).heading());
             sheet.put([x + STEP_X_PX / 2.0, y + STEP_Y_PX / 2.0 - 4.0], &view);
         }

@@ -24,7 +24,7 @@ const DEPTHS_MM: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];
 pub(super) struct VirtualSensor {
     model: ForwardModel,
     readout: Readout,
-    chance: ChaCha8Rng,
+    rng: ChaCha8Rng,
     /// Fitted counts against depth, one an element.
     responses: Vec<Polynomial>,
 }
@@ -32,10 +32,10 @@ pub(super) struct VirtualSensor {
 impl VirtualSensor {
     /// Draws the elements and calibrates them under the thinnest covering.
     pub(super) fn new(array: Array, seed: u64) -> Result<Self, ModelError> {
-        let mut chance = ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let elements = array.elements();
         let readout = Readout::of(&array);
-        let mut gain = || 1.0 + GAIN_SPREAD * normal(&mut chance);
+        let mut gain = || 1.0 + GAIN_SPREAD * normal(&mut rng);
         let response = Response {
             sensitivity_counts_per_mm: (0..elements).map(|_| SENSITIVITY_COUNTS_PER_MM * gain()).collect(),
             baseline_counts: vec![BASELINE_COUNTS; elements],
@@ -44,7 +44,7 @@ impl VirtualSensor {
             reference_covering: COVERINGS[0],
         };
         let model = ForwardModel::new(array, Psf::PAPER, response)?;
-        let mut sensor = Self { model, readout, chance, responses: Vec::new() };
+        let mut sensor = Self { model, readout, rng, responses: Vec::new() };
         sensor.responses = (0..elements).filter_map(|element| sensor.calibrated(element)).collect();
         Ok(sensor)
     }
@@ -75,13 +75,13 @@ impl VirtualSensor {
         let mut counts = vec![0.0; self.model.array().elements()];
         self.model.image(contact, covering, &mut counts);
         for value in &mut counts {
-            let read = |_| self.readout.read(*value, NOISE_COUNTS * normal(&mut self.chance));
+            let read = |_| self.readout.read(*value, NOISE_COUNTS * normal(&mut self.rng));
             *value = (0..READINGS).map(read).sum::<f64>() / f64::from(READINGS);
         }
         counts
     }
 }
 
-fn normal(chance: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(chance)
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
 }

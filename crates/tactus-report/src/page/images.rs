@@ -4,8 +4,8 @@ use std::{collections::BTreeMap, fmt};
 
 use super::WIDTH_PX;
 use crate::{
-    plot::{ColourBar, Heat, Mosaic, Scale, Tile},
-    run::{Dwell, Press, RunReport},
+    plot::{ColourBar, HeatMap, Mosaic, Scale, Tile},
+    run::{DwellSummary, PressSummary, RunReport},
 };
 
 /// More cells than this make the page heavy.
@@ -37,7 +37,7 @@ fn laid_out_like_the_array(report: &RunReport, scale: Scale) -> Option<(Mosaic<'
     const GAP_PX: [f64; 2] = [12.0, 12.0];
     const BETWEEN_PX: f64 = 2.0;
     let array = &report.array;
-    let mut pressed: BTreeMap<usize, &Press> = BTreeMap::new();
+    let mut pressed: BTreeMap<usize, &PressSummary> = BTreeMap::new();
     for press in &report.presses {
         if pressed.insert(press.element?, press).is_some() {
             return None;
@@ -90,7 +90,7 @@ fn in_order(report: &RunReport, scale: Scale, dwells: usize) -> (Mosaic<'_>, Str
     let image_px = [cell_px * cols as f64, cell_px * rows as f64];
     let step_px = [image_px[0] + GAP_PX[0], CAPTION_PX + image_px[1] + GAP_PX[1]];
     let across = (1..=shown).take_while(|n| *n as f64 * step_px[0] <= WIDTH_PX + GAP_PX[0]).count().max(1);
-    let all: Vec<(&Press, usize, &Dwell)> = report
+    let all: Vec<(&PressSummary, usize, &DwellSummary)> = report
         .presses
         .iter()
         .flat_map(|press| press.dwells.iter().enumerate().map(move |(nth, dwell)| (press, nth, dwell)))
@@ -123,8 +123,8 @@ fn chosen(place: f64, dwells: usize, shown: usize) -> usize {
 
 fn tile<'a>(
     at_px: [f64; 2],
-    press: &Press,
-    dwell: &'a Dwell,
+    press: &PressSummary,
+    dwell: &'a DwellSummary,
     nth: usize,
     [rows, cols]: [usize; 2],
 ) -> Tile<'a> {
@@ -137,5 +137,5 @@ fn tile<'a>(
         dwell.frames,
         dwell.total_counts()
     );
-    Tile { at_px, heat: Heat { values: &dwell.rise_counts, rows, cols }, title }
+    Tile { at_px, heat: HeatMap { values: &dwell.rise_counts, rows, cols }, title }
 }

@@ -3,17 +3,17 @@
 use std::fmt;
 
 use crate::{
-    fit::{Estimate, Polynomial},
+    fit::{Coefficient, Polynomial},
     markup::Text,
     numbers::{plural, with_error},
     plot::{Axis, Figure, Ink, Series, number},
-    run::Response,
+    run::ResponseCurves,
 };
 
 /// Points along a fitted curve; more are not seen.
 const CURVE_POINTS: u32 = 60;
 
-pub(super) fn section(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
+pub(super) fn section(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
     writeln!(f, "<section>\n<h2>Response of the elements</h2>")?;
     writeln!(
         f,
@@ -32,14 +32,14 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::R
             last[0],
         )?;
     }
-    silent(f, response)?;
+    unresponsive(f, response)?;
     spread(f, response)?;
     writeln!(f, "</div>\n</div>")?;
     table(f, response)?;
     writeln!(f, "</section>")
 }
 
-fn figure(response: &Response) -> Figure {
+fn figure(response: &ResponseCurves) -> Figure {
     let x = Axis::new("indentation", "mm").from_zero();
     let y = Axis::new("response above baseline", "counts").from_zero();
     let mut figure =
@@ -60,7 +60,7 @@ fn figure(response: &Response) -> Figure {
 }
 
 /// A fit over the depths that were held.
-fn along(fit: &Polynomial, response: &Response) -> Vec<[f64; 2]> {
+fn along(fit: &Polynomial, response: &ResponseCurves) -> Vec<[f64; 2]> {
     let (Some([from, _]), Some([to, _])) = (response.mean.first(), response.mean.last()) else {
         return Vec::new();
     };
@@ -68,17 +68,17 @@ fn along(fit: &Polynomial, response: &Response) -> Vec<[f64; 2]> {
     (0..=CURVE_POINTS).map(|step| [at(step), fit.at(at(step))]).collect()
 }
 
-fn elements(response: &Response) -> usize {
+fn elements(response: &ResponseCurves) -> usize {
     let distinct: std::collections::BTreeSet<usize> =
         response.curves.iter().map(|curve| curve.element).collect();
     distinct.len()
 }
 
-fn silent(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
-    if elements(response) < 2 && response.silent.is_empty() {
+fn unresponsive(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
+    if elements(response) < 2 && response.unresponsive.is_empty() {
         return Ok(());
     }
-    if response.silent.is_empty() {
+    if response.unresponsive.is_empty() {
         return writeln!(f, "<p>Every pressed element answers to its own press.</p>");
     }
     writeln!(
@@ -86,16 +86,20 @@ fn silent(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
         "<p class=\"warn\">Left out, because they do not answer to their own press:</p>\n<table class=\"numbers\">"
     )?;
     writeln!(f, "<thead><tr><th>element</th><th>(row, col)</th><th>answers to</th></tr></thead>")?;
-    for silent in &response.silent {
-        let [row, col] = silent.curve.place;
+    for unresponsive in &response.unresponsive {
+        let [row, col] = unresponsive.curve.place;
         let other =
-            silent.answers_to.map_or_else(|| "nothing".into(), |[row, col]| format!("({row}, {col})"));
-        writeln!(f, "<tr><td>{}</td><td>({row}, {col})</td><td>{other}</td></tr>", silent.curve.element)?;
+            unresponsive.answers_to.map_or_else(|| "nothing".into(), |[row, col]| format!("({row}, {col})"));
+        writeln!(
+            f,
+            "<tr><td>{}</td><td>({row}, {col})</td><td>{other}</td></tr>",
+            unresponsive.curve.element
+        )?;
     }
     writeln!(f, "</table>")
 }
 
-fn spread(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
+fn spread(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
     if elements(response) < 2 {
         return Ok(());
     }
@@ -119,7 +123,7 @@ fn spread(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
     )
 }
 
-fn table(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
+fn table(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
     if response.linear.is_none() {
         return writeln!(f, "<p>Too few depths for a fit.</p>");
     }
@@ -131,7 +135,7 @@ fn table(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
         let Some(fit) = fit else { continue };
         write!(f, "<tr><td>{name}</td>")?;
         for k in 0..3 {
-            let text = fit.coefficients.get(k).map(estimate).unwrap_or_default();
+            let text = fit.coefficients.get(k).map(coefficient).unwrap_or_default();
             write!(f, "<td class=\"n\">{}</td>", Text(text))?;
         }
         let residual = fit.residual.map_or_else(|| "\u{2013}".into(), |residual| number(residual, 2));
@@ -143,9 +147,7 @@ fn table(f: &mut fmt::Formatter<'_>, response: &Response) -> fmt::Result {
     )
 }
 
-/// With its standard error where it has one.
-fn estimate(estimate: &Estimate) -> String {
-    estimate
-        .standard_error
-        .map_or_else(|| number(estimate.value, 2), |error| with_error(estimate.value, error))
+/// Value and, where known, standard error.
+fn coefficient(found: &Coefficient) -> String {
+    found.standard_error.map_or_else(|| number(found.value, 2), |error| with_error(found.value, error))
 }

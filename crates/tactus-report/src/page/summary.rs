@@ -3,13 +3,13 @@
 use std::fmt;
 
 use crate::{
-    document::SIMULATED,
+    document::SIMULATED_BADGE,
     markup::Text,
     numbers::{count, duration, plural},
-    run::{RunReport, Summary},
+    run::{RunReport, RunSummary},
 };
 
-pub(super) fn header(f: &mut fmt::Formatter<'_>, summary: &Summary) -> fmt::Result {
+pub(super) fn header(f: &mut fmt::Formatter<'_>, summary: &RunSummary) -> fmt::Result {
     let (word, class) = match summary.exit_status {
         Some("done") => ("done", "good"),
         Some(word @ ("degraded" | "stopped")) => (word, "warn"),
@@ -19,7 +19,7 @@ pub(super) fn header(f: &mut fmt::Formatter<'_>, summary: &Summary) -> fmt::Resu
     writeln!(f, "<header>\n<div class=\"headline\"><h1>{}</h1>", Text(&summary.experiment))?;
     writeln!(f, "<span class=\"badge {class}\">{word}</span>")?;
     if summary.simulated {
-        writeln!(f, "{SIMULATED}")?;
+        writeln!(f, "{SIMULATED_BADGE}")?;
     }
     writeln!(
         f,

@@ -68,18 +68,18 @@ impl fmt::Display for Figure {
 
 impl Panel for Figure {
     fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let frame = Frame::new(self);
-        frame.grid(f)?;
+        let area = PlotArea::new(self);
+        area.grid(f)?;
         for series in &self.series {
-            frame.series(f, series)?;
+            area.series(f, series)?;
         }
-        frame.axes(f, self)?;
+        area.axes(f, self)?;
         legend(f, &self.series)
     }
 }
 
 /// The axes in pixels.
-struct Frame {
+struct PlotArea {
     x: AxisScale,
     y: AxisScale,
     left: f64,
@@ -88,7 +88,7 @@ struct Frame {
     bottom: f64,
 }
 
-impl Frame {
+impl PlotArea {
     fn new(figure: &Figure) -> Self {
         let [width, height] = figure.size_px;
         let legend = usize::from(figure.series.iter().any(|series| series.label.is_some()));

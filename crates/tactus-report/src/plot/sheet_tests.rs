@@ -1,11 +1,11 @@
 use super::{Label, Sheet};
-use crate::plot::{Heat, Image, Scale};
+use crate::plot::{HeatMap, Image, Scale};
 
 #[test]
 fn panels_stand_where_they_are_put() {
     let mut sheet = Sheet::new("a < b", [100.0, 50.0]);
     sheet.put([10.0, 20.5], &Label::new("x & y").centred());
-    let heat = Heat { values: &[0.0, 1.0], rows: 1, cols: 2 };
+    let heat = HeatMap { values: &[0.0, 1.0], rows: 1, cols: 2 };
     sheet.put([0.0, 30.0], &Image { heat, cell_px: 4.0, scale: Scale::new(0.0, 1.0), title: "two".into() });
     let svg = sheet.to_string();
     assert!(svg.starts_with(r#"<svg xmlns="http://www.w3.org/2000/svg""#), "{svg}");

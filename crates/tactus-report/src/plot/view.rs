@@ -28,7 +28,7 @@ pub struct Paint {
 ///
 /// What stands behind is drawn first, which is right for faces that intersect too.
 #[derive(Debug, Clone, PartialEq)]
-pub struct View {
+pub struct ObliqueView {
     /// What is seen. A face may cut others where it stands before them in this list, so those that are not to
     /// be cut come first.
     pub faces: Vec<Face>,
@@ -58,7 +58,7 @@ impl Face {
     }
 }
 
-impl View {
+impl ObliqueView {
     /// Where a point is seen, from the origin rightwards and down.
     pub fn place_px(&self, point_mm: [f64; 3]) -> [f64; 2] {
         let [right, up, _] = self.axes();
@@ -77,7 +77,7 @@ impl View {
     }
 }
 
-impl Panel for View {
+impl Panel for ObliqueView {
     fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [right, _, viewer] = self.axes();
         // Light comes over the viewer's left shoulder, and most on the side of the solid that is looked upon.

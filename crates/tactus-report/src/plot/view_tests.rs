@@ -1,5 +1,5 @@
 use super::{
-    Face, Paint, View, dot,
+    Face, ObliqueView, Paint, dot,
     order::{back_to_front, normal},
 };
 use crate::plot::Sheet;
@@ -7,7 +7,7 @@ use crate::plot::Sheet;
 const GREY: Paint = Paint { rgb: [100.0; 3], opacity: 1.0 };
 
 fn svg(faces: Vec<Face>, elevation_deg: f64) -> String {
-    let view = View { faces, azimuth_deg: -90.0, elevation_deg, px_per_mm: 10.0 };
+    let view = ObliqueView { faces, azimuth_deg: -90.0, elevation_deg, px_per_mm: 10.0 };
     let mut sheet = Sheet::new("view", [100.0, 100.0]);
     sheet.put([50.0, 50.0], &view);
     sheet.to_string()

@@ -21,7 +21,7 @@ pub struct Trace {
 
 /// A place at which frames are missing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Loss {
+pub struct FrameLoss {
     /// When the next frame came, from the start of the run.
     pub at_s: f64,
     /// Frames that never arrived.
@@ -58,8 +58,8 @@ pub struct Intervals {
 
 /// What one pass over the frames gathers.
 #[derive(Default)]
-pub(super) struct Frames {
-    pub(super) losses: Vec<Loss>,
+pub(super) struct FrameStatistics {
+    pub(super) losses: Vec<FrameLoss>,
     pub(super) safety: Vec<pb::SafetyEvent>,
     /// Time of sampling and sum of the raw counts.
     totals: Vec<(MonoTime, f64)>,
@@ -78,7 +78,7 @@ struct Previous {
     received: MonoTime,
 }
 
-impl Frames {
+impl FrameStatistics {
     pub(super) fn read(recording: &Path, timeline: &Timeline) -> Result<Self, ReportError> {
         let mut frames = Self::default();
         let (mut tally, mut previous) = (Tally::default(), None);
@@ -108,7 +108,7 @@ impl Frames {
         self.baseline(timeline, frame, at);
         let Some(previous) = previous else { return };
         if lost > 0 {
-            self.losses.push(Loss {
+            self.losses.push(FrameLoss {
                 at_s: seconds(timeline, at),
                 frames: lost,
                 after_seq: previous.seq,

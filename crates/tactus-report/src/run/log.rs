@@ -7,7 +7,7 @@ use tactus_schema::{
     table::Phase,
 };
 
-use super::frames::{Frames, seconds};
+use super::frames::{FrameStatistics, seconds};
 
 /// One line of the event log.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +23,7 @@ pub struct LoggedEvent {
 }
 
 /// All events, and the acts of the safety supervisor among them, in order of time.
-pub(super) fn events(timeline: &Timeline, frames: &Frames) -> Vec<LoggedEvent> {
+pub(super) fn events(timeline: &Timeline, frames: &FrameStatistics) -> Vec<LoggedEvent> {
     let logged = |event: &pb::RunEvent| {
         let at_s = seconds(timeline, MonoTime::from_ns(event.t_mono_ns));
         let (kind, detail) = event.event.as_ref().map_or(("unknown", String::new()), describe);

@@ -9,14 +9,14 @@ use tactus_schema::{
     pb::{self, run_event::Event},
 };
 
-use super::frames::Frames;
+use super::frames::FrameStatistics;
 
 /// A press this near an element's centre, in pitches, is a press on that element.
 const CENTRE_PITCHES: f64 = 0.3;
 
 /// One press that was not broken off.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Press {
+pub struct PressSummary {
     /// Its index in the run.
     pub index: i32,
     /// Where the tip was told to be, sensor frame.
@@ -24,12 +24,12 @@ pub struct Press {
     /// The element at whose centre that is, within 0.3 pitch.
     pub element: Option<usize>,
     /// Its dwells, in order.
-    pub dwells: Vec<Dwell>,
+    pub dwells: Vec<DwellSummary>,
 }
 
 /// The mean reading at one depth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Dwell {
+pub struct DwellSummary {
     /// Depth below the covering's nominal surface.
     pub depth_mm: f64,
     /// The covering then in place.
@@ -51,7 +51,7 @@ pub enum Baseline {
     RigFile,
 }
 
-impl Dwell {
+impl DwellSummary {
     /// Sum of the rises of all elements.
     pub fn total_counts(&self) -> f64 {
         self.rise_counts.iter().map(|rise| f64::from(*rise)).sum()
@@ -60,17 +60,17 @@ impl Dwell {
 
 /// The presses of a run.
 pub(super) struct Presses {
-    pub(super) done: Vec<Press>,
+    pub(super) done: Vec<PressSummary>,
     pub(super) baseline: Baseline,
     /// Presses that were broken off and begun again.
     pub(super) void: BTreeSet<i32>,
     /// Dwells whose counts are not one finite number per element.
-    pub(super) misfits: u32,
-    zeros: Zeros,
+    pub(super) malformed_dwells: u32,
+    baselines: Baselines,
 }
 
 impl Presses {
-    pub(super) fn of(timeline: &Timeline, frames: &Frames) -> Self {
+    pub(super) fn of(timeline: &Timeline, frames: &FrameStatistics) -> Self {
         let array = &timeline.rig().array;
         let void: BTreeSet<i32> = timeline
             .events()
@@ -80,55 +80,55 @@ impl Presses {
                 _ => None,
             })
             .collect();
-        let zeros = Zeros::of(timeline, frames);
-        let (mut baseline, mut misfits) = (Baseline::Tare, 0);
-        let mut presses: BTreeMap<i32, Press> = BTreeMap::new();
+        let baselines = Baselines::of(timeline, frames);
+        let (mut baseline, mut malformed_dwells) = (Baseline::Tare, 0);
+        let mut presses: BTreeMap<i32, PressSummary> = BTreeMap::new();
         for event in timeline.events() {
             let Some(Event::DwellDone(done)) = &event.event else { continue };
             if done.press < 0 || void.contains(&done.press) {
                 continue;
             }
             let at = MonoTime::from_ns(done.from_mono_ns);
-            let (zero_counts, tared) = zeros.at(at);
+            let (zero_counts, tared) = baselines.at(at);
             if !fits(done, array) {
-                misfits += 1;
+                malformed_dwells += 1;
                 continue;
             }
             if !tared {
-                baseline = zeros.fallback;
+                baseline = baselines.fallback;
             }
             let rise = |(counts, zero): (&f32, &f32)| counts - zero;
-            let press = presses.entry(done.press).or_insert_with(|| Press {
+            let press = presses.entry(done.press).or_insert_with(|| PressSummary {
                 index: done.press,
                 at_mm: [done.x_mm, done.y_mm],
                 element: element_at(array, [done.x_mm, done.y_mm]),
                 dwells: Vec::new(),
             });
-            press.dwells.push(Dwell {
+            press.dwells.push(DwellSummary {
                 depth_mm: done.depth_mm,
                 covering_mm: timeline.covering_mm(at),
                 frames: done.frames,
                 rise_counts: done.mean_counts.iter().zip(zero_counts).map(rise).collect(),
             });
         }
-        Self { done: presses.into_values().collect(), baseline, void, misfits, zeros }
+        Self { done: presses.into_values().collect(), baseline, void, malformed_dwells, baselines }
     }
 
     /// Sum over all elements of the baseline in force.
     pub(super) fn zero_total_counts(&self, at: MonoTime) -> f64 {
-        self.zeros.at(at).0.iter().map(|counts| f64::from(*counts)).sum()
+        self.baselines.at(at).0.iter().map(|counts| f64::from(*counts)).sum()
     }
 }
 
 /// The baselines of a run.
-struct Zeros {
+struct Baselines {
     tares: Vec<(MonoTime, Vec<f32>)>,
     before: Vec<f32>,
     fallback: Baseline,
 }
 
-impl Zeros {
-    fn of(timeline: &Timeline, frames: &Frames) -> Self {
+impl Baselines {
+    fn of(timeline: &Timeline, frames: &FrameStatistics) -> Self {
         let elements = timeline.rig().array.elements();
         let mut tares: Vec<(MonoTime, Vec<f32>)> = timeline
             .events()

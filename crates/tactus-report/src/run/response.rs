@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tactus_schema::Rig;
 
-use super::presses::Press;
+use super::presses::PressSummary;
 use crate::fit::Polynomial;
 
 /// An element that reads less than this share of the median at its own press does not answer.
@@ -16,11 +16,11 @@ const DEPTH_STEP_MM: f64 = 1e-3;
 
 /// The response curves of a run, and polynomials over their mean.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Response {
+pub struct ResponseCurves {
     /// The curves of the elements that answer to their own press, in order of the presses.
     pub curves: Vec<ElementCurve>,
     /// The elements that do not, in order of their index; they are in no fit.
-    pub silent: Vec<Silent>,
+    pub unresponsive: Vec<UnresponsiveElement>,
     /// The mean of the curves at each depth that at least half of them have: `[mm, counts]`.
     pub mean: Vec<[f64; 2]>,
     /// The line through the mean.
@@ -46,36 +46,36 @@ pub struct ElementCurve {
 
 /// An element that does not answer to its own press.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Silent {
+pub struct UnresponsiveElement {
     /// Its curve, all the same.
     pub curve: ElementCurve,
     /// Row and column of the element at whose press it reads most; `None` if it reads nothing anywhere.
     pub answers_to: Option<[usize; 2]>,
 }
 
-impl Response {
+impl ResponseCurves {
     /// `None` unless some press at an element's centre held two depths.
-    pub(super) fn of(rig: &Rig, presses: &[Press]) -> Option<Self> {
+    pub(super) fn of(rig: &Rig, presses: &[PressSummary]) -> Option<Self> {
         let cols = rig.array.cols();
         let curves: Vec<ElementCurve> =
             presses.iter().filter_map(|press| ElementCurve::of(press, cols)).collect();
         if curves.is_empty() {
             return None;
         }
-        let answers = Answers::of(presses);
+        let answers = DeepestReadings::of(presses);
         let mut seen = BTreeSet::new();
-        let mut silent: Vec<Silent> = Vec::new();
+        let mut unresponsive: Vec<UnresponsiveElement> = Vec::new();
         for curve in &curves {
             let answers_to = match answers.of_element(curve.element) {
-                Answer::Own => continue,
-                Answer::To(other) => Some([other / cols, other % cols]),
-                Answer::Nowhere => None,
+                RespondsAt::Own => continue,
+                RespondsAt::To(other) => Some([other / cols, other % cols]),
+                RespondsAt::Nowhere => None,
             };
             if seen.insert(curve.element) {
-                silent.push(Silent { curve: curve.clone(), answers_to });
+                unresponsive.push(UnresponsiveElement { curve: curve.clone(), answers_to });
             }
         }
-        silent.sort_by_key(|silent| silent.curve.element);
+        unresponsive.sort_by_key(|unresponsive| unresponsive.curve.element);
         let curves: Vec<ElementCurve> =
             curves.into_iter().filter(|curve| !seen.contains(&curve.element)).collect();
         let mean = mean(&curves);
@@ -84,7 +84,7 @@ impl Response {
             quadratic: Polynomial::fit(2, &mean),
             mean,
             curves,
-            silent,
+            unresponsive,
         })
     }
 
@@ -98,9 +98,9 @@ impl Response {
 }
 
 impl ElementCurve {
-    fn of(press: &Press, cols: usize) -> Option<Self> {
+    fn of(press: &PressSummary, cols: usize) -> Option<Self> {
         let element = press.element?;
-        let own = |dwell: &super::Dwell| {
+        let own = |dwell: &super::DwellSummary| {
             dwell.rise_counts.get(element).map(|rise| [dwell.depth_mm, f64::from(*rise)])
         };
         let points: Vec<[f64; 2]> = press.dwells.iter().filter_map(own).collect();
@@ -121,14 +121,14 @@ impl ElementCurve {
 }
 
 /// What every element read at the deepest dwell of each press at a centre.
-struct Answers<'a> {
+struct DeepestReadings<'a> {
     /// By the element that was pressed: depth and rises.
     deepest: BTreeMap<usize, (i64, &'a [f32])>,
     median_own: f64,
 }
 
-impl<'a> Answers<'a> {
-    fn of(presses: &'a [Press]) -> Self {
+impl<'a> DeepestReadings<'a> {
+    fn of(presses: &'a [PressSummary]) -> Self {
         let mut deepest: BTreeMap<usize, (i64, &[f32])> = BTreeMap::new();
         for press in presses {
             let dwell = press.dwells.iter().max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm));
@@ -143,11 +143,11 @@ impl<'a> Answers<'a> {
     }
 
     /// Where an element answers.
-    fn of_element(&self, element: usize) -> Answer {
+    fn of_element(&self, element: usize) -> RespondsAt {
         // Sensors of other kinds fall when pressed.
         let toward = |rises: &[f32]| rise(rises, element) * self.median_own.signum();
         let least = DEAD_SHARE * self.median_own.abs();
-        let Some((depth, rises)) = self.deepest.get(&element) else { return Answer::Nowhere };
+        let Some((depth, rises)) = self.deepest.get(&element) else { return RespondsAt::Nowhere };
         let own = toward(rises);
         let most = self
             .deepest
@@ -156,15 +156,15 @@ impl<'a> Answers<'a> {
             .map(|(&pressed, (_, rises))| (pressed, toward(rises)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         match most {
-            Some((other, reading)) if reading >= least && own < OWN_SHARE * reading => Answer::To(other),
-            _ if own < least => Answer::Nowhere,
-            _ => Answer::Own,
+            Some((other, reading)) if reading >= least && own < OWN_SHARE * reading => RespondsAt::To(other),
+            _ if own < least => RespondsAt::Nowhere,
+            _ => RespondsAt::Own,
         }
     }
 }
 
 /// The press at which an element answers.
-enum Answer {
+enum RespondsAt {
     Own,
     To(usize),
     Nowhere,

@@ -1,8 +1,8 @@
 use tactus_model::Array;
 use tactus_schema::Rig;
 
-use super::Response;
-use crate::run::{Dwell, Press};
+use super::ResponseCurves;
+use crate::run::{DwellSummary, PressSummary};
 
 const DEPTHS_MM: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];
 
@@ -11,17 +11,17 @@ fn rig() -> Rig {
 }
 
 /// Presses at all centres; an element reads `rise(depth)` times its share of the press.
-fn presses(rise: impl Fn(f64) -> f64, share: impl Fn(usize, usize) -> f64) -> Vec<Press> {
+fn presses(rise: impl Fn(f64) -> f64, share: impl Fn(usize, usize) -> f64) -> Vec<PressSummary> {
     let array = rig().array;
     #[expect(clippy::cast_possible_truncation, reason = "readings are f32")]
-    let dwell = |pressed: usize, depth_mm: f64| Dwell {
+    let dwell = |pressed: usize, depth_mm: f64| DwellSummary {
         depth_mm,
         covering_mm: 1.016,
         frames: 8,
         rise_counts: (0..48).map(|element| (rise(depth_mm) * share(element, pressed)) as f32).collect(),
     };
     (0..48)
-        .map(|pressed| Press {
+        .map(|pressed| PressSummary {
             index: i32::try_from(pressed).unwrap(),
             at_mm: array.centre_mm(pressed).unwrap(),
             element: Some(pressed),
@@ -39,8 +39,9 @@ fn spread(element: usize, pressed: usize) -> f64 {
 
 #[test]
 fn exact_responses_give_their_polynomial() {
-    let response = Response::of(&rig(), &presses(|x| 10.0 + 600.0 * x + 400.0 * x * x, spread)).unwrap();
-    assert_eq!((response.curves.len(), response.silent.len(), response.mean.len()), (48, 0, 5));
+    let response =
+        ResponseCurves::of(&rig(), &presses(|x| 10.0 + 600.0 * x + 400.0 * x * x, spread)).unwrap();
+    assert_eq!((response.curves.len(), response.unresponsive.len(), response.mean.len()), (48, 0, 5));
     let fitted: Vec<f64> = response.quadratic.unwrap().coefficients.iter().map(|c| c.value).collect();
     for (got, expected) in fitted.iter().zip([10.0, 600.0, 400.0]) {
         // Readings are f32.
@@ -60,9 +61,9 @@ fn cross_wired_and_dead_elements_are_found_and_left_out() {
         element => spread(element, pressed),
     };
     for sign in [1.0, -1.0] {
-        let response = Response::of(&rig(), &presses(|x| sign * 1000.0 * x, share)).unwrap();
+        let response = ResponseCurves::of(&rig(), &presses(|x| sign * 1000.0 * x, share)).unwrap();
         let found: Vec<_> =
-            response.silent.iter().map(|s| (s.curve.element, s.curve.place, s.answers_to)).collect();
+            response.unresponsive.iter().map(|s| (s.curve.element, s.curve.place, s.answers_to)).collect();
         assert_eq!(
             found,
             [(18, [2, 2], Some([2, 3])), (22, [2, 6], Some([2, 7])), (40, [5, 0], None)],
@@ -80,10 +81,10 @@ fn presses_off_centre_or_at_one_depth_give_no_curves() {
     for press in &mut elsewhere {
         press.element = None;
     }
-    assert_eq!(Response::of(&rig(), &elsewhere), None);
+    assert_eq!(ResponseCurves::of(&rig(), &elsewhere), None);
     let mut single = presses(|x| x, spread);
     for press in &mut single {
         press.dwells.truncate(1);
     }
-    assert_eq!(Response::of(&rig(), &single), None);
+    assert_eq!(ResponseCurves::of(&rig(), &single), None);
 }

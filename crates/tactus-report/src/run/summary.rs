@@ -8,7 +8,7 @@ use super::presses::Presses;
 
 /// What run it was, and what it came to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Summary {
+pub struct RunSummary {
     /// Id of the run.
     pub run_id: String,
     /// Name of the experiment.
@@ -57,7 +57,7 @@ pub struct Summary {
     pub planned: Option<[u32; 2]>,
 }
 
-impl Summary {
+impl RunSummary {
     pub(super) fn of(timeline: &Timeline, presses: &Presses) -> Self {
         let (run, rig, tally, started) =
             (timeline.run(), timeline.rig(), timeline.tally(), timeline.started());

@@ -13,7 +13,7 @@ use tactus_report::calibration::{
     CalibrationReport, calibration_html, health_map, point_spreads, recalibrated, responses, sensitivity_map,
     spread_against_thickness,
 };
-use tactus_report::study::{Found, StudyFigure, StudyReport, StudyRow, StudyRun, study_html};
+use tactus_report::study::{ComparedQuantity, FoundValue, StudyFigure, StudyReport, StudyRun, study_html};
 
 const HOSTILE: &str = "<img src=x onerror='alert(\"1\")'>";
 
@@ -222,11 +222,11 @@ fn pages_load_nothing_and_escape_all_text() {
     let array = Array::new(HOSTILE, [1.8; 2], vec![0.9, 2.9], vec![0.9], 30.0, 4095.0, 1.0).unwrap();
     let said = [HOSTILE.to_owned()];
     let report = CalibrationReport { rig: HOSTILE, notes: &said, ..report(&array, &calibration) };
-    let rows = [StudyRow {
+    let rows = [ComparedQuantity {
         quantity: HOSTILE.into(),
         unit: HOSTILE.into(),
         paper: Some(HOSTILE.into()),
-        found: Found::Text(HOSTILE.into()),
+        found: FoundValue::Text(HOSTILE.into()),
         truth: None,
         inside: None,
         note: HOSTILE.into(),
@@ -268,7 +268,7 @@ fn pages_load_nothing_and_escape_all_text() {
 #[test]
 fn a_study_compares_first_and_shows_every_figure_in_the_order_of_the_paper() {
     let (array, calibration) = (Array::digitacts(), whole());
-    let row = |quantity: &str, paper: Option<&str>, found, truth, inside| StudyRow {
+    let row = |quantity: &str, paper: Option<&str>, found, truth, inside| ComparedQuantity {
         quantity: quantity.into(),
         unit: "mm".into(),
         paper: paper.map(Into::into),
@@ -278,9 +278,9 @@ fn a_study_compares_first_and_shows_every_figure_in_the_order_of_the_paper() {
         note: String::new(),
     };
     let rows = [
-        row("origin x", None, Found::Estimate(sure(20.060_324, 0.000_309)), Some(20.0604), Some(true)),
-        row("origin y", None, Found::Estimate(sure(14.959_415, 0.000_376)), Some(14.9), Some(false)),
-        row("best spread", Some("0.3"), Found::Nothing, None, None),
+        row("origin x", None, FoundValue::Estimate(sure(20.060_324, 0.000_309)), Some(20.0604), Some(true)),
+        row("origin y", None, FoundValue::Estimate(sure(14.959_415, 0.000_376)), Some(14.9), Some(false)),
+        row("best spread", Some("0.3"), FoundValue::Nothing, None, None),
     ];
     let figure = |number: &str| StudyFigure {
         number: number.into(),

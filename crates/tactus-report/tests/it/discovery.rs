@@ -11,8 +11,8 @@ use serde_json::Value;
 use tactus_discover::{Discovery, NextExperiment, Unexplained, Verdict};
 use tactus_model::Array;
 use tactus_report::discovery::{
-    DiscoveryReport, discovery_html, discovery_json, element_maps, in_words, levels, not_shown, proposals,
-    residual_against,
+    ActiveRun, AmbiguousEffect, DiscoveryReport, discovery_html, discovery_json, element_maps, in_words,
+    levels, not_shown, proposals, residual_against,
 };
 
 const HOSTILE: &str = "<img src=x onerror='alert(\"1\")'>";
@@ -74,6 +74,39 @@ fn the_json_has_every_field_of_its_schema_where_it_belongs() {
         assert_eq!(is, value, "{place}");
     }
     assert_eq!(found["data"][0]["sha256"].as_str().unwrap().len(), 64);
+}
+
+/// A discovery with every kind of field filled, compared byte for byte with `golden/discovery.json`.
+///
+/// With `TACTUS_WRITE_GOLDEN` set, the file is written anew.
+#[test]
+fn the_json_keeps_its_form_to_the_byte() {
+    let mut discovery = explained();
+    discovery.curves.truncate(1);
+    discovery.curves[0].points.truncate(2);
+    discovery.elements.truncate(2);
+    discovery.heldout_frames.clear();
+    discovery.global.statistic = f64::NAN;
+    discovery.base.heldout_chi2 = f64::INFINITY;
+    let undecided = |equivalent| AmbiguousEffect { effect: "hysteresis", equivalent };
+    let active = [ActiveRun {
+        experiment: "diagnose".into(),
+        parameters: vec![("parts", "hold".into()), ("depth_mm", "0.5".into())],
+        recording: "run-3".into(),
+        duration_s: 61.5,
+        separates: ["hysteresis".into(), "backlash".into()],
+        expected_z: None,
+        before: vec![undecided(vec!["backlash"])],
+        after: vec![undecided(vec![])],
+    }];
+    let (array, data, notes) = (Array::digitacts(), data(), ["one note".to_owned()]);
+    let report = DiscoveryReport { notes: &notes, active: &active, ..report(&array, &data, &discovery) };
+    let text = discovery_json(&report);
+    if env::var_os("TACTUS_WRITE_GOLDEN").is_some() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/golden/discovery.json");
+        fs::write(path, &text).unwrap();
+    }
+    assert_eq!(text, include_str!("golden/discovery.json"));
 }
 
 #[test]

@@ -54,8 +54,9 @@ fn an_element_centre_run_gives_its_curves_images_and_losses() {
     assert_eq!(lost, [(3, 19, 23), (1, 899, 901)]);
 
     let response = report.response.as_ref().unwrap();
-    let silent: Vec<_> = response.silent.iter().map(|s| (s.curve.element, s.answers_to)).collect();
-    assert_eq!(silent, [(18, Some([2, 3])), (22, Some([2, 7]))]);
+    let unresponsive: Vec<_> =
+        response.unresponsive.iter().map(|s| (s.curve.element, s.answers_to)).collect();
+    assert_eq!(unresponsive, [(18, Some([2, 3])), (22, Some([2, 7]))]);
     assert_eq!(response.curves.len(), 46);
     // The run's truth: 800 (x + 0.5 x^2), times gains of mean 1 and a spread of 8 %.
     let at_half = response.quadratic.as_ref().unwrap().at(0.5);

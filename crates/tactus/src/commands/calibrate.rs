@@ -1,4 +1,4 @@
-//! `calibrate`: what measured presses tell of the sensor, as a model, numbers and a report.
+//! `calibrate`: calibrates the sensor from measured presses; writes a model, numbers and a report.
 
 mod model;
 mod print;
@@ -22,20 +22,20 @@ pub(crate) use print::estimate;
 /// Name of the form of `calibration.json`.
 const SCHEMA: &str = "tactus.calibration/1";
 
-/// A calibration, and where its readings came from.
+/// A calibration and its data.
 #[derive(Debug, Clone)]
 pub(crate) struct Calibrated {
     pub(crate) rig: Rig,
     pub(crate) simulated: bool,
     pub(crate) runs: Vec<RunSource>,
-    /// What the files lack.
+    /// Defects of the files.
     pub(crate) notes: Vec<String>,
     pub(crate) calibration: Calibration,
 }
 
 /// `calibration.json`, and what `--json` prints.
 #[derive(Serialize)]
-struct Written<'a> {
+struct CalibrationJson<'a> {
     schema: &'static str,
     rig: &'a str,
     simulated: bool,
@@ -57,7 +57,7 @@ pub(crate) fn calibrate(common: &Common, args: &CalibrateArgs) -> anyhow::Result
     Ok(if whole && calibrated.notes.is_empty() { Exit::Done } else { Exit::Degraded })
 }
 
-/// Reads what was measured and characterises the sensor.
+/// Reads the files and calibrates the sensor.
 pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
     let (source, readings) = rows::readings(files)?;
     if readings.frames == 0 {
@@ -66,7 +66,7 @@ pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
     let rig = source.rig;
     let model = Model::of_rig(&rig).context("the rig's reference indenter is not among its tools")?;
     let declared = Declared {
-        model: model.forward().context("the rig as it is declared makes no model")?,
+        model: model.forward().context("the rig file gives no valid model")?,
         registration: rig.registration,
         indenters: rig.indenters.clone(),
     };
@@ -94,7 +94,7 @@ pub(crate) fn write(calibrated: &Calibrated, folder: &Path) -> anyhow::Result<Ve
 }
 
 impl Calibrated {
-    /// What its report shows.
+    /// The content of its report.
     pub(crate) fn report(&self) -> CalibrationReport<'_> {
         CalibrationReport {
             rig: &self.rig.name,
@@ -110,7 +110,7 @@ impl Calibrated {
     fn to_json(&self) -> anyhow::Result<String> {
         let mut files: Vec<&Path> = self.runs.iter().map(|run| run.path.as_path()).collect();
         files.dedup();
-        Ok(serde_json::to_string_pretty(&Written {
+        Ok(serde_json::to_string_pretty(&CalibrationJson {
             schema: SCHEMA,
             rig: &self.rig.name,
             simulated: self.simulated,

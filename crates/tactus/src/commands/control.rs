@@ -1,4 +1,4 @@
-//! `status`, `stop`, `pause`, `resume`, `reset`: one question, one answer.
+//! `status`, `stop`, `pause`, `resume`, `reset`: one request to the service and its answer.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::connection::{self, PATIENCE};
 use crate::exit::Exit;
 use crate::output::{duration, print_fields};
 
-/// How long a stage may take to home.
+/// How long to wait for `reset`: homing is slow.
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
 
 pub(crate) fn status(common: &Common) -> anyhow::Result<Exit> {
@@ -50,12 +50,11 @@ fn command(common: &Common, command: Command, request: &pb::CommandRequest) -> a
     Ok(Exit::Done)
 }
 
-/// Homing takes its time; all else is answered at once.
 fn patience(command: Command) -> Duration {
     if command == Command::Reset { HOMING_PATIENCE } else { PATIENCE }
 }
 
-/// The answer, as `--json` shows it.
+/// The answer in the form of `--json`.
 fn to_json(reply: &pb::CommandReply) -> Value {
     let state = reply.state.clone().unwrap_or_default();
     let stage = reply.stage.unwrap_or_default();
@@ -106,7 +105,7 @@ fn print(reply: &pb::CommandReply) {
     let health = reply.health.clone().unwrap_or_default();
     let simulated = if health.simulated { " (SIMULATED)" } else { "" };
     let run = match state.phase() {
-        pb::RunPhase::Idle | pb::RunPhase::Unspecified => "none since the start".into(),
+        pb::RunPhase::Idle | pb::RunPhase::Unspecified => "none since the service started".into(),
         pb::RunPhase::Finished => {
             format!("{}: {} {}", state.run_id, state.exit_status().word(), state.message)
         }
@@ -154,7 +153,7 @@ fn print(reply: &pb::CommandReply) {
     print_fields(&fields);
 }
 
-/// What wants a reset, and how it is done.
+/// A fault and how to clear it.
 pub(crate) fn fault_words(fault: &str) -> String {
-    format!("{fault}: see that the tip is free to move, then `tactus reset`")
+    format!("{fault}: make sure that the tip is free to move, then run `tactus reset`")
 }

@@ -1,4 +1,4 @@
-//! `design`: which covering to order for a pitch and a force resolution.
+//! `design`: recommends a covering for a pitch and a force resolution.
 
 use std::fs;
 use std::path::Path;
@@ -47,7 +47,7 @@ pub(crate) fn design(common: &Common, args: &DesignArgs) -> anyhow::Result<Exit>
     Ok(Exit::Done)
 }
 
-/// How the curve is written.
+/// File format of the curve.
 #[derive(Clone, Copy)]
 enum Form {
     Svg,
@@ -60,7 +60,7 @@ impl Form {
             Some("svg") => Ok(Self::Svg),
             Some("html") => Ok(Self::Html),
             _ => {
-                let problem = format!("--out {}: the curve is written as .svg or .html", out.display());
+                let problem = format!("--out {}: write the curve to a .svg or .html file", out.display());
                 Err(Failure::new(Exit::Usage, problem))
             }
         }
@@ -96,7 +96,7 @@ fn print(design: &Design, notes: &[String]) {
         )
     };
     print_fields(&[
-        ("asked", format!("elements {pitch_mm} mm apart; a press is {force_steps} force steps")),
+        ("for", format!("elements {pitch_mm} mm apart, {force_steps} force steps in a press")),
         ("best to locate", acuity(&design.best_for_locating)),
         ("best for two points", acuity(&design.best_for_two_points)),
         ("no aliasing from", format!("spread {:.3} pitches (3/pi)", design.nyquist_sigma)),
@@ -148,7 +148,7 @@ fn print(design: &Design, notes: &[String]) {
     );
 }
 
-/// Why, and how far it holds.
+/// The reason for the recommendation, and its limits.
 fn notes(design: &Design, wanted: &Wanted, measured_pitch_mm: f64) -> Vec<String> {
     let Design { pitch_mm, min_sigma, recommended, .. } = design;
     let Covered { thickness_mm, acuity, .. } = recommended;
@@ -179,14 +179,14 @@ fn notes(design: &Design, wanted: &Wanted, measured_pitch_mm: f64) -> Vec<String
             acuity.sigma
         ),
         Reason::ThinnerThanAvailable => format!(
-            "The wanted spread needs {:.2} mm only; the thinnest available covering (0.04 inch) is recommended.",
+            "The wanted spread needs only {:.2} mm; the thinnest available covering (0.04 inch) is recommended.",
             design.wanted_thickness_mm.unwrap_or_default()
         ),
     };
     let mut notes = vec![why];
     if *min_sigma < design.nyquist_sigma && acuity.sigma < design.nyquist_sigma {
         notes.push(format!(
-            "Under this spread {} of the amplitude at the Nyquist frequency passes: the image of a tool changes with where on the elements it lies.",
+            "With this spread {} of the amplitude at the Nyquist frequency passes: the image of a tool depends on its position relative to the elements.",
             percent(recommended.nyquist_passed)
         ));
     }
@@ -198,8 +198,8 @@ fn notes(design: &Design, wanted: &Wanted, measured_pitch_mm: f64) -> Vec<String
         ));
     }
     notes.push(
-        "Locations and separations are bounds for five elements in a row without noise, a press being all of the force steps \
-         together; a real sensor does worse. Separations are ragged, as they hang on where readings round."
+        "Locations and separations are bounds for five elements in a row without noise, where a press has all force steps; \
+         a real sensor does worse. Separations vary irregularly, because they depend on how readings round."
             .into(),
     );
     notes

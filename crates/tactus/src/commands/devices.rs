@@ -1,4 +1,4 @@
-//! `devices`: what is there, what to write into a rig file for it, whether it may be opened, and which rig means it.
+//! `devices`: lists the devices, their rig-file entries, their access and the rigs that use them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -25,16 +25,16 @@ pub(crate) fn devices(common: &Common, args: &DevicesArgs) -> anyhow::Result<Exi
     Ok(Exit::Done)
 }
 
-/// Where rig files are looked for, if none is named.
+/// Folders searched for rig files if none is given.
 const FOLDERS: [&str; 2] = ["config/rigs", "/etc/tactus/rigs"];
 
-/// What rigs say of their devices.
+/// The devices that rig files name.
 #[derive(Debug, Default)]
 struct Rigs {
     links: Vec<Link>,
-    /// Files that are none.
+    /// Errors of files that cannot be read as rig files.
     notes: Vec<String>,
-    /// Named by whoever asks: what is not there is then told.
+    /// True if the user gave a file: missing devices are then reported.
     are_named: bool,
 }
 
@@ -80,15 +80,15 @@ impl Rigs {
         }
     }
 
-    fn that_mean<'a>(&'a self, found: &'a Found) -> impl Iterator<Item = &'a Link> {
+    fn using<'a>(&'a self, found: &'a Found) -> impl Iterator<Item = &'a Link> {
         self.links.iter().filter(|link| found.is_meant_by(&link.transport))
     }
 
-    /// What the named rigs mean and is not there.
+    /// Devices of the given rigs that are missing.
     fn missing(&self, found: &[Found]) -> Vec<&Link> {
         let is_there = |link: &Link| match &link.transport {
             Transport::Embedded | Transport::Tcp { .. } => true,
-            // A pseudo-terminal is a port too, and not listed.
+            // Pseudo-terminals are not in the inventory.
             Transport::Serial { port: SerialPort::Path(path), .. } => Path::new(path).exists(),
             Transport::Serial { .. } | Transport::Usb(_) | Transport::Hid(_) => {
                 found.iter().any(|one| one.is_meant_by(&link.transport))
@@ -108,16 +108,16 @@ fn toml_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-const NOTHING: &str = "nothing that could be a rig's was found: no serial port, no USB interface of a vendor's own, no \
-    human interface device but keyboards and mice. Is the device switched on, is its cable one that carries data, and \
-    does `dmesg` show it when it is plugged in? A container or virtual machine sees only devices that are handed to \
-    it. The simulated rig needs none: `tactus run element-centres --embedded`";
+const NOTHING: &str = "no device was found that a rig could use: no serial port, no vendor-specific USB interface, no \
+    human interface device except keyboards and mice. Is the device switched on? Does its cable carry data? Does \
+    `dmesg` show it when it is plugged in? A container or virtual machine sees only devices that are passed to it. \
+    The simulated rig needs no device: `tactus run element-centres --embedded`";
 
-const DENIED_SERIAL: &str = "A serial port without permission: add the user to the group that owns it (`ls -l` shows it, \
+const DENIED_SERIAL: &str = "No permission for a serial port: add the user to the group that owns it (`ls -l` shows it, \
     often dialout) and log in again.";
 
-const DENIED_USB: &str = "USB and HID without permission: the rules of Tactus, /etc/udev/rules.d/70-tactus.rules, need \
-    a line with vendor and product; load them as root with `udevadm control --reload && udevadm trigger`.";
+const DENIED_USB: &str = "No permission for a USB or HID device: add a line with its vendor and product to \
+    /etc/udev/rules.d/70-tactus.rules, and load the rules as root with `udevadm control --reload && udevadm trigger`.";
 
 fn print(found: &[Found], rigs: &Rigs) {
     if found.is_empty() {
@@ -153,7 +153,7 @@ fn print(found: &[Found], rigs: &Rigs) {
 
 fn row(one: &Found, rigs: &Rigs) -> Vec<String> {
     let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
-    let rigs: Vec<_> = rigs.that_mean(one).map(|Link { rig, role, .. }| format!("{rig} ({role})")).collect();
+    let rigs: Vec<_> = rigs.using(one).map(|Link { rig, role, .. }| format!("{rig} ({role})")).collect();
     vec![
         kind(one).to_owned(),
         or_dash(one.product.clone()),
@@ -175,7 +175,9 @@ fn comment(one: &Found) -> String {
     if one.is_stable {
         format!("{name}, now at {place}")
     } else {
-        format!("{name}, now at {place}; nothing tells it from others of its kind: plug in one only")
+        format!(
+            "{name}, now at {place}; it cannot be distinguished from others of its kind: plug in only one"
+        )
     }
 }
 
@@ -217,7 +219,7 @@ fn to_json(found: &[Found], rigs: &Rigs) -> Value {
             "stable": one.is_stable,
             "access": access,
             "held_by": held_by.map(|holder| json!({ "pid": holder.pid, "name": holder.name })),
-            "rigs": rigs.that_mean(one).map(link).collect::<Vec<_>>(),
+            "rigs": rigs.using(one).map(link).collect::<Vec<_>>(),
         })
     };
     json!({

@@ -1,7 +1,7 @@
-//! `discover`: what a model is missing, as a report, numbers, a grown model and the residuals.
+//! `discover`: finds what a model is missing; writes a report, its numbers, the grown model and the residuals.
 
 mod active;
-mod measured;
+mod measurements;
 mod model;
 mod print;
 mod residuals;
@@ -19,22 +19,22 @@ use tactus_schema::{Model, Rig};
 use crate::cli::{Ablation, Common, DiscoverArgs};
 use crate::exit::{Exit, Failure};
 use crate::output;
-use crate::progress::Computation;
-use measured::Measured;
+use crate::progress::ComputationProgress;
+use measurements::Measurements;
 
-/// What was found, and what it was found in.
+/// A discovery with its data and its model.
 struct Discovered {
-    measured: Measured,
-    /// What the data were held against.
+    measured: Measurements,
+    /// The model that the data were compared with.
     model: Model,
     known: Known,
     discovery: Discovery,
-    /// What was run on the way.
+    /// Experiments that `--active` ran.
     active: Vec<ActiveRun>,
 }
 
 pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<Exit> {
-    let progress = Computation::new(common.json);
+    let progress = ComputationProgress::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
     let analyse =
         |files: &[PathBuf], of: Option<&str>| analysed(args, declared.clone(), files, of, &progress);
@@ -54,16 +54,16 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     Ok(if discovered.measured.notes.is_empty() { Exit::Done } else { Exit::Degraded })
 }
 
-/// The whole protocol on some files, which must be of the rig `of` if that is given.
+/// Analyses files, which must be of the rig `of` if that is given.
 fn analysed(
     args: &DiscoverArgs,
     declared: Option<Model>,
     files: &[PathBuf],
     of: Option<&str>,
-    progress: &Computation,
+    progress: &ComputationProgress,
 ) -> anyhow::Result<Discovered> {
     progress.show("reading", 0.0);
-    let measured = Measured::read(files)?;
+    let measured = Measurements::read(files)?;
     if let Some(live) = of.filter(|live| *live != measured.rig.name) {
         let error = format!(
             "the data are of rig {:?}, but experiments would run on rig {live:?}: name the rig of the data with --rig or --rig-file",
@@ -89,7 +89,7 @@ fn analysed(
     });
     let discovery = found.map_err(|error| match error {
         DiscoverError::TooLittle(_) => {
-            anyhow!("{error}; `tactus run diagnose` measures enough, and may be given beside these data")
+            anyhow!("{error}; `tactus run diagnose` measures enough; give its recording beside these data")
         }
         DiscoverError::Model(_) | DiscoverError::Effect(_) => error.into(),
     })?;
@@ -132,20 +132,23 @@ impl Discovered {
     }
 }
 
-/// The model of a file.
+/// Reads a model file.
 fn declared(path: &Path) -> anyhow::Result<Model> {
     let text = fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
     let model = Model::from_toml(&text);
     Ok(model.map_err(|error| Failure::new(Exit::Usage, format!("{}: {error}", path.display())))?)
 }
 
-/// The model, if it is of the array that was measured.
+/// The model.
+///
+/// # Errors
+/// If it is of another array than the data.
 fn of_array(model: Model, path: Option<&Path>, measured: &Array) -> anyhow::Result<Model> {
     let declared = &model.base.array;
     if declared != measured {
         let path = path.unwrap_or(Path::new("the model")).display();
         bail!(
-            "{path} is a model of another array than the data: {}, but measured was {}",
+            "{path} is a model of another array than the data: the model has {}, the data have {}",
             described(declared),
             described(measured)
         );

@@ -1,4 +1,4 @@
-//! `figures`: the paper's figures, computed anew.
+//! `figures`: computes the paper's figures.
 
 use std::time::Instant;
 
@@ -25,10 +25,7 @@ pub(crate) fn figures(common: &Common, args: &FiguresArgs) -> anyhow::Result<Exi
         for file in &files {
             println!("{}", file.display());
         }
-        eprintln!(
-            "computed from the model, no sensor was read; drawn in {}",
-            duration(start.elapsed().as_secs_f64())
-        );
+        eprintln!("computed from the model without a sensor in {}", duration(start.elapsed().as_secs_f64()));
     }
     Ok(Exit::Done)
 }

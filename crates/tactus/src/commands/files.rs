@@ -1,4 +1,4 @@
-//! `record info`, `export`, `recover`, `report`: what is done with recordings.
+//! `record info`, `export`, `recover`, `report`: commands on recordings.
 
 use std::path::{Path, PathBuf};
 
@@ -19,10 +19,7 @@ pub(crate) fn info(common: &Common, file: &Path) -> anyhow::Result<Exit> {
     }
     let whole = info.completeness == Completeness::Complete && info.exit_status.is_some();
     if !whole {
-        eprintln!(
-            "tactus: this recording was cut off; `tactus recover {}` makes a whole one of it",
-            file.display()
-        );
+        eprintln!("tactus: this recording was cut off; `tactus recover {}` repairs it", file.display());
     }
     Ok(if whole { Exit::Done } else { Exit::Degraded })
 }

@@ -1,5 +1,4 @@
-//! `link check`: is a description of a device's frames without contradiction, and does it fit what the device sends?
-//! `link sniff`: what does it send?
+//! `link check` checks the description of a device's frames, also against recorded bytes; `link sniff` shows the bytes.
 
 pub(crate) mod sniff;
 
@@ -34,15 +33,15 @@ pub(crate) fn check(common: &Common, args: &LinkCheckArgs) -> anyhow::Result<Exi
     Ok(report.as_ref().map_or(Exit::Done, exit))
 }
 
-/// A description without contradiction.
+/// Parses and checks a description.
 ///
 /// # Errors
-/// If it is no description or contradicts itself: the line or the field, and what to do.
+/// If it is not a description or is inconsistent; the error names the line or the field, and the remedy.
 pub(crate) fn described(text: &str) -> anyhow::Result<Format> {
     Ok(toml::from_str::<RawFormat>(text)?.check()?)
 }
 
-/// What is described, in words.
+/// A description in words.
 pub(crate) fn in_words(format: &Format) -> String {
     let arrives = match format.framing() {
         Framing::Stream => "in a stream",
@@ -56,7 +55,7 @@ fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     fs::read(path).with_context(|| format!("{} cannot be read", path.display()))
 }
 
-/// Done if every byte is part of a frame.
+/// [`Exit::Done`] if every byte belongs to a frame.
 fn exit(report: &CaptureReport) -> Exit {
     match (report.stats.frames, report.first_skipped_at) {
         (0, _) => Exit::Failed,
@@ -70,20 +69,23 @@ fn print(report: &CaptureReport) {
     let at = |at: Option<usize>| at.map_or("-".to_owned(), |at| format!("at byte {at}"));
     let mismatch = |one: Option<Mismatch>| {
         one.map_or("-".to_owned(), |Mismatch { at, expected, found }| {
-            format!("at byte {at}: {found:#x}, and {expected:#x} is expected")
+            format!("at byte {at}: {found:#x} instead of {expected:#x}")
         })
     };
-    let strides: Vec<String> =
-        report.strides.iter().map(|stride| format!("{} ({} times)", stride.bytes, stride.count)).collect();
+    let strides: Vec<String> = report
+        .strides
+        .iter()
+        .map(|stride| format!("{} bytes ({} times)", stride.bytes, stride.count))
+        .collect();
     print_fields(&[
         ("capture", format!("{} bytes", report.bytes)),
         ("frames", format!("{}, the first {}", stats.frames, at(report.first_frame_at))),
         (
-            "part of no frame",
+            "outside frames",
             format!("{} bytes, the first {}", stats.skipped_bytes, at(report.first_skipped_at)),
         ),
         ("sync bytes", format!("{} times", report.syncs)),
-        ("apart, bytes", if strides.is_empty() { "-".to_owned() } else { strides.join(", ") }),
+        ("sync spacing", if strides.is_empty() { "-".to_owned() } else { strides.join(", ") }),
         ("bad length", mismatch(report.first_bad_length)),
         ("bad trailer", at(report.first_bad_trailer_at)),
         ("bad checksum", mismatch(report.first_bad_checksum)),

@@ -1,4 +1,4 @@
-//! `plan`: what an experiment would do, found by a dry run on the rig's simulated twin.
+//! `plan`: shows what an experiment would do, by a dry run on the rig's simulated twin.
 
 use serde_json::json;
 use tactus_plan::{Parameter, RigView};
@@ -13,7 +13,7 @@ use crate::cli::{Common, PlanArgs};
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, print_fields, print_table};
 
-/// The seed of a plan, so that it does not change from one look to the next.
+/// Default seed, so that repeated plans agree.
 const SEED: u64 = 1;
 
 pub(crate) fn plan(common: &Common, args: &PlanArgs) -> anyhow::Result<Exit> {
@@ -96,8 +96,7 @@ fn print(
         println!();
     }
     let outcome = &plan.outcome;
-    let result =
-        if plan.is_possible() { "can be done".into() } else { format!("REFUSED: {}", outcome.message) };
+    let result = if plan.is_possible() { "possible".into() } else { format!("REFUSED: {}", outcome.message) };
     let mut fields = vec![
         ("on rig", format!("{} (dry run on its simulated twin)", rig.name)),
         ("result", result),

@@ -1,4 +1,4 @@
-//! `run`: one experiment, on the service or on the embedded simulated rig, with progress and a report.
+//! `run`: runs one experiment on the service or on the embedded simulated rig, and writes a report.
 
 mod embedded;
 mod served;
@@ -15,8 +15,8 @@ use crate::connection;
 use crate::exit::{Exit, Failure, in_words};
 use crate::output::{duration, print_fields};
 
-/// How a run ended, wherever it ran.
-pub(super) struct Summary {
+/// How a run ended.
+pub(super) struct RunSummary {
     pub(super) run_id: String,
     pub(super) experiment: String,
     pub(super) exit_status: pb::ExitStatus,
@@ -44,7 +44,7 @@ pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
 }
 
 /// Runs the experiment, on the service if there is one, else embedded.
-pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<Summary> {
+pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<RunSummary> {
     let (script, arguments) = experiment(&args.experiment)?;
     if args.embedded || args.rig_file.is_some() {
         return embedded::run(common, args, script, arguments, "as asked");
@@ -53,7 +53,7 @@ pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<Summary
     match runtime.block_on(connection::find(common))? {
         Some(_) if args.truth.is_some() => {
             let error = format!(
-                "--truth is what embedded devices hide; the service at {} has devices of its own: add --embedded",
+                "--truth is for the embedded rig; the service at {} has devices of its own: add --embedded",
                 common.endpoint
             );
             Err(Failure::new(Exit::Usage, error).into())
@@ -63,7 +63,7 @@ pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<Summary
     }
 }
 
-/// The script and the parameters that were asked for.
+/// The script and its parameters from the command line.
 pub(super) fn experiment(args: &ExperimentArgs) -> anyhow::Result<(Script, Arguments)> {
     let script = tactus_runner::experiments::find(&args.experiment, None)
         .map_err(|error| Failure::new(Exit::Usage, error))?;
@@ -74,7 +74,7 @@ pub(super) fn experiment(args: &ExperimentArgs) -> anyhow::Result<(Script, Argum
     Ok((script, arguments))
 }
 
-/// Writes the report beside the recording, or where that may not be written, into the run's folder here.
+/// Writes the report beside the recording or, if that folder is not writable, into `folder`.
 fn make_report(recording: &Path, folder: &Path) -> Option<PathBuf> {
     let made = write_report(recording, &recording.with_file_name("report.html")).or_else(|_| {
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
@@ -84,7 +84,7 @@ fn make_report(recording: &Path, folder: &Path) -> Option<PathBuf> {
         Ok(path) => Some(path),
         Err(error) => {
             let (why, file) = (in_words(&error), recording.display());
-            eprintln!("tactus: no report: {why}; `tactus report {file}` makes it");
+            eprintln!("tactus: no report was written: {why}; try `tactus report {file}`");
             None
         }
     }
@@ -97,7 +97,7 @@ pub(super) fn write_report(recording: &Path, path: &Path) -> anyhow::Result<Path
     Ok(std::path::absolute(path)?)
 }
 
-fn to_json(summary: &Summary, report: Option<&Path>) -> serde_json::Value {
+fn to_json(summary: &RunSummary, report: Option<&Path>) -> serde_json::Value {
     json!({
         "run_id": summary.run_id,
         "experiment": summary.experiment,
@@ -115,7 +115,7 @@ fn to_json(summary: &Summary, report: Option<&Path>) -> serde_json::Value {
     })
 }
 
-fn print(summary: &Summary, report: Option<&Path>) {
+fn print(summary: &RunSummary, report: Option<&Path>) {
     let simulated = if summary.simulated { " (SIMULATED)" } else { "" };
     let mut fields = vec![
         ("run", format!("{}{simulated}", summary.run_id)),

@@ -1,4 +1,4 @@
-//! `simulate`: what a sensor reads of a tool, as an image, as frames along a path, or live on the bus.
+//! `simulate`: simulates what a sensor reads from a tool: an image, frames along a path, or live frames on the bus.
 
 mod live;
 mod picture;
@@ -50,7 +50,7 @@ fn image(common: &Common, args: &SimulateArgs, scene: &Scene) -> anyhow::Result<
     Ok(Exit::Done)
 }
 
-/// What the converter gives of counts under the sensor's own noise.
+/// Adds the sensor's noise and applies the converter.
 fn read(scene: &Scene, clean_counts: &[f64], seed: u64) -> Vec<f64> {
     let readout = Readout::of(scene.array());
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -114,7 +114,7 @@ fn print(args: &SimulateArgs, scene: &Scene, copies: &[Vec<f64>], computed_by: &
     let mut text = String::new();
     for image in copies {
         text.push('\n');
-        // As it lies before the eye: y points up.
+        // Row 0 last, because y points up.
         for row in rows(array, image).iter().rev() {
             let cells: Vec<_> = row.iter().map(|counts| format!("{counts:5.0}")).collect();
             text.push_str(&cells.join(" "));

@@ -1,4 +1,4 @@
-//! `stage check`: is the stage there, is it the one of the rig file, and does it move as it says?
+//! `stage check`: checks that a stage answers, matches the rig file and moves as it reports.
 
 use std::io::{IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ pub(crate) fn check(common: &Common, args: &StageCheckArgs) -> anyhow::Result<Ex
     Ok(if checked.is_good() { Exit::Done } else { Exit::Failed })
 }
 
-/// The rig's file: what `--rig-file` names, or `--rig` if that is no rig's name.
+/// The file given by `--rig-file`, or by `--rig` if that is a path.
 fn rig_file(common: &Common, args: &StageCheckArgs) -> anyhow::Result<Option<PathBuf>> {
     let Some(rig) = args.rig_file.is_none().then_some(common.rig.as_deref()).flatten() else {
         return Ok(args.rig_file.clone());
@@ -51,16 +51,16 @@ fn rig_file(common: &Common, args: &StageCheckArgs) -> anyhow::Result<Option<Pat
     Err(Failure::new(Exit::Usage, what).into())
 }
 
-/// A service that is there holds the stage of its rig.
+/// Fails if a running service holds the stage.
 fn check_free(common: &Common, rig: &Rig, stage: &StageLink) -> anyhow::Result<()> {
     let of_the_rig = Common { rig: Some(rig.name.clone()), ..common.clone() };
     let client = connection::runtime()?.block_on(connection::find(&of_the_rig))?;
-    // One that is not ready yet names no rig.
+    // A service that is not ready yet lists no rig.
     let Some(served) = client.map(|client| client.rigs()) else { return Ok(()) };
     if served.is_empty() || served.contains(&rig.name) {
         let what = format!(
-            "stage ({}): busy: the service at {} holds it; end that first (`systemctl stop tactusd`), or ask it: \
-             `tactus status`",
+            "stage ({}): busy: the service at {} holds it; stop the service first (`systemctl stop tactusd`), or \
+             ask it with `tactus status`",
             in_words(stage),
             common.endpoint
         );
@@ -69,15 +69,15 @@ fn check_free(common: &Common, rig: &Rig, stage: &StageLink) -> anyhow::Result<(
     Ok(())
 }
 
-/// Nothing of hardware moves unasked.
+/// Asks before any hardware moves, unless `--yes` was given.
 fn confirm(rig: &Rig, stage: &StageLink, args: &StageCheckArgs) -> anyhow::Result<()> {
     if args.yes {
         return Ok(());
     }
-    let homes = if args.home { "homes the stage, all the way to its switches, and then " } else { "" };
+    let homes = if args.home { "homes the stage to its limit switches, then " } else { "" };
     let what = format!(
-        "this {homes}moves each axis of the stage of rig {:?} ({}) by {} um and back, after a rise to the safe height if \
-         it stands lower",
+        "this {homes}moves each axis of the stage of rig {:?} ({}) by {} um and back; a tip \
+         below the safe height is raised first",
         rig.name,
         in_words(stage),
         STEP_MM * 1000.0
@@ -85,7 +85,7 @@ fn confirm(rig: &Rig, stage: &StageLink, args: &StageCheckArgs) -> anyhow::Resul
     if !std::io::stdin().is_terminal() {
         return Err(Failure::new(Exit::Failed, format!("nothing was moved: {what}; add --yes")).into());
     }
-    // Not on standard output, which may be somebody's JSON.
+    // On standard error, because standard output may carry JSON.
     let mut out = std::io::stderr().lock();
     write!(out, "{what}.\nIs the way clear? [y/N] ").and_then(|()| out.flush())?;
     let mut answer = String::new();
@@ -110,15 +110,15 @@ fn print(rig: &Rig, link: &str, checked: &StageCheck) {
     let mut fields = vec![("rig", format!("{}{simulated}", rig.name)), ("stage", link.to_owned())];
     if let Some(controller) = &checked.controller {
         let [x, y, z] = checked.position_mm;
-        let known = if checked.is_homed { "" } else { ", not to be trusted" };
+        let known = if checked.is_homed { "" } else { ", not homed: unreliable" };
         fields.push(("controller", controller.identity.clone()));
-        fields.push(("stands at", format!("{x:.3}, {y:.3}, {z:.3} mm{known}")));
+        fields.push(("position", format!("{x:.3}, {y:.3}, {z:.3} mm{known}")));
         print_fields(&fields);
         let settings = controller.settings.iter();
         let rows: Vec<_> =
             settings.map(|one| vec![one.name.clone(), one.value.clone(), one.meaning.clone()]).collect();
         say("");
-        print_table(&["setting", "value", "is"], &rows);
+        print_table(&["setting", "value", "meaning"], &rows);
     } else {
         print_fields(&fields);
     }
@@ -130,7 +130,7 @@ fn print(rig: &Rig, link: &str, checked: &StageCheck) {
     say("");
     match (&checked.trouble, checked.is_good()) {
         (Some(trouble), _) => say(&format!("not good: {trouble}")),
-        (None, true) => say("good: the stage is the rig's, and moves as it says"),
+        (None, true) => say("good: the stage matches the rig file and moves as it reports"),
         (None, false) => say("not good: see the verdicts"),
     }
 }

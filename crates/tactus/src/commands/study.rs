@@ -1,10 +1,10 @@
-//! `study`: everything in the paper on one rig, in one go.
+//! `study`: repeats the paper on one rig.
 //!
-//! Runs first, each a step that is not made again when an interrupted study goes on; then calibration, mechanics,
-//! acuity, images; then one report.
+//! It makes the runs, each of which an interrupted study need not repeat; then calibration, mechanics, acuity and
+//! images; then one report.
 
 mod images;
-mod rows;
+mod quantities;
 mod steps;
 
 use std::fs;
@@ -14,21 +14,21 @@ use std::time::Instant;
 use anyhow::Context;
 use serde_json::json;
 use tactus_report::figures;
-use tactus_report::study::{StudyFigure, StudyReport, StudyRow, StudyRun, study_html};
+use tactus_report::study::{ComparedQuantity, StudyFigure, StudyReport, StudyRun, study_html};
 
 use super::calibrate::{self, Calibrated};
 use crate::cli::{Common, StudyArgs};
 use crate::exit::Exit;
 use crate::output::{self, duration, say};
-use steps::{Steps, Taken};
+use steps::{CompletedStep, StudySteps};
 
-/// What the model alone gives; Figures 2 and 5 come from the calibration, Figure 8 from the rig's own images.
+/// Figures computed from the model alone. Figures 2 and 5 come from the calibration, Figure 8 from the rig's images.
 const FIGURES: [&str; 7] = ["3", "4", "6a", "6b", "9b", "10a", "10b"];
 
 pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     let start = Instant::now();
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
-    let mut steps = Steps::resume(common, args)?;
+    let mut steps = StudySteps::resume(common, args)?;
     let taken = steps.measure(common, args)?;
     let tell = |what: &str| {
         if !common.json {
@@ -39,7 +39,7 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     let recordings: Vec<_> = taken.iter().map(|taken| taken.recording.clone()).collect();
     let calibrated = calibrate::from_files(&recordings)?;
     calibrate::write(&calibrated, &args.out.join("calibration"))?;
-    let truth = rows::truth(&recordings[0])?;
+    let truth = quantities::truth(&recordings[0])?;
     let mut missing = calibrated.calibration.missing.clone();
     let images = if taken.iter().all(|taken| taken.embedded) {
         images::take(common, args, &mut steps, &calibrated)?
@@ -53,7 +53,7 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     };
     tell("mechanics, acuity, figures");
     let mut figures = figures::finished(&FIGURES)?;
-    let rows = rows::rows(&calibrated, truth.as_ref(), images.as_ref())?;
+    let rows = quantities::quantities(&calibrated, truth.as_ref(), images.as_ref())?;
     figures.extend(images.into_iter().flat_map(|images| images.figures));
     let mut warnings: Vec<String> = taken.iter().filter_map(|taken| taken.degraded.clone()).collect();
     warnings.extend(calibrated.notes.iter().chain(&calibrated.calibration.warnings).cloned());
@@ -62,23 +62,23 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     finish(common, args, &calibrated, &findings, start)
 }
 
-/// What a study came to.
+/// Results of a study.
 struct Findings {
-    rows: Vec<StudyRow>,
-    /// What could not be done.
+    rows: Vec<ComparedQuantity>,
+    /// Parts that could not be done.
     missing: Vec<String>,
-    /// What to know before using a number.
+    /// Reservations about the numbers.
     warnings: Vec<String>,
 }
 
 fn write_report(
     args: &StudyArgs,
     calibrated: &Calibrated,
-    taken: &[Taken],
+    taken: &[CompletedStep],
     findings: &Findings,
     figures: &[StudyFigure],
 ) -> anyhow::Result<()> {
-    let runs: Vec<StudyRun> = taken.iter().map(Taken::run).collect();
+    let runs: Vec<StudyRun> = taken.iter().map(CompletedStep::run).collect();
     let page = study_html(&StudyReport {
         rig: &calibrated.rig.name,
         simulated: calibrated.simulated,
@@ -111,7 +111,7 @@ fn finish(
     let known = rows.iter().filter(|row| row.truth.is_some() && row.inside.is_some());
     let (inside, known) = (known.clone().filter(|row| row.inside == Some(true)).count(), known.count());
     if common.json {
-        let rows: Vec<_> = rows.iter().map(rows::to_json).collect();
+        let rows: Vec<_> = rows.iter().map(quantities::to_json).collect();
         let found = json!({
             "schema": "tactus.study/1",
             "rig": calibrated.rig.name,
@@ -126,7 +126,7 @@ fn finish(
         });
         output::write(&format!("{found}\n"))?;
     } else {
-        rows::print(rows);
+        quantities::print(rows);
         say("");
         if known > 0 {
             say(&format!("{inside} of {known} known truths inside their 95 % intervals"));

@@ -1,4 +1,4 @@
-//! `validate`: every file goes through the constructor that the service uses.
+//! `validate`: checks files with the parsers that the service uses.
 
 use std::path::Path;
 
@@ -38,14 +38,17 @@ pub(crate) fn validate(common: &Common, args: &ValidateArgs) -> Exit {
     if results.iter().all(|(_, result)| result.is_ok()) { Exit::Done } else { Exit::Failed }
 }
 
-/// What is wrong with a file, without its name.
+/// The error in a file, without the file's name.
 fn wrong(file: &Path, error: &anyhow::Error) -> String {
     let words = in_words(error);
     let prefix = format!("{}: ", file.display());
     words.strip_prefix(&prefix).map_or_else(|| words.clone(), str::to_owned)
 }
 
-/// What the file is, in words, if nothing is wrong with it.
+/// Describes a valid file.
+///
+/// # Errors
+/// If the file is not valid.
 fn check(file: &Path) -> anyhow::Result<String> {
     match file.extension().and_then(|extension| extension.to_str()) {
         Some("toml") => check_toml(file),
@@ -59,7 +62,7 @@ fn check(file: &Path) -> anyhow::Result<String> {
     }
 }
 
-/// A rig or a model says so in its `schema`; what has none is a service's configuration.
+/// The `schema` key says what the file is; without one it is a service's configuration.
 fn check_toml(file: &Path) -> anyhow::Result<String> {
     let text = std::fs::read_to_string(file).context("cannot be read")?;
     match schema(&text) {
@@ -78,7 +81,7 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
         }
         Some(declared::SCHEMA) => Ok(link::in_words(&link::described(&text)?)),
         Some(other) => bail!(
-            "schema {other:?} is unknown; there is: {}, {}, {}, {HIDDEN_SCHEMA}",
+            "schema {other:?} is unknown; known are {}, {}, {}, {HIDDEN_SCHEMA}",
             rig::SCHEMA,
             model::SCHEMA,
             declared::SCHEMA
@@ -87,7 +90,7 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
     }
 }
 
-/// What stands between the quotes after `schema =`.
+/// The value of the `schema` key.
 fn schema(text: &str) -> Option<&str> {
     text.lines().find_map(|line| {
         let value = line.trim_start().strip_prefix("schema")?.trim_start().strip_prefix('=')?;

@@ -1,4 +1,4 @@
-//! `watch`: the live image, the stage and the run, in the terminal.
+//! `watch`: shows the live image, the stage and the run in the terminal.
 
 mod screen;
 
@@ -18,7 +18,7 @@ use crate::connection::{self, PATIENCE};
 use crate::exit::{Exit, in_words};
 use screen::Screen;
 
-/// The terminal is drawn at most this often; frames between two drawings are counted, not shown.
+/// Period of the terminal view; frames in between are counted, not shown.
 const REDRAW: Duration = Duration::from_millis(50);
 
 pub(crate) fn watch(common: &Common) -> anyhow::Result<Exit> {
@@ -28,7 +28,7 @@ pub(crate) fn watch(common: &Common) -> anyhow::Result<Exit> {
     })
 }
 
-/// One JSON object a frame, until the reader or the service goes away.
+/// Prints one JSON object per frame until the reader closes the pipe or the service ends.
 async fn stream(client: &Client) -> anyhow::Result<Exit> {
     use std::io::Write as _;
     let mut frames = client.subscribe::<pb::Frame>(History::None).await?;
@@ -42,7 +42,7 @@ async fn stream(client: &Client) -> anyhow::Result<Exit> {
             "counts": frame.counts,
             "bad_elements": frame.bad_elements,
         });
-        // A reader that has seen enough closes its end.
+        // The reader closed the pipe.
         if writeln!(out, "{line}").and_then(|()| out.flush()).is_err() {
             break;
         }
@@ -60,7 +60,7 @@ async fn show(client: &Client) -> anyhow::Result<Exit> {
     let mut alive = client.alive();
 
     let mut terminal =
-        ratatui::try_init().context("no terminal to draw on; `tactus watch --json` needs none")?;
+        ratatui::try_init().context("no terminal to draw on; `tactus watch --json` works without one")?;
     let mut keys = keys();
     let mut screen = Screen::new(client.rig());
     let mut redraw = interval(REDRAW);
@@ -75,15 +75,15 @@ async fn show(client: &Client) -> anyhow::Result<Exit> {
             Some(pulse) = health.recv() => screen.health = Some(pulse),
             there = alive.changed() => screen.alive = there == Some(true),
             Some(key) = keys.recv() => match key {
-                Key::Quit => break Ok(()),
-                Key::Stop => {
+                KeyAction::Quit => break Ok(()),
+                KeyAction::Stop => {
                     let request = pb::CommandRequest { who: "watch".into(), reason: "key S".into(), abort: false };
                     screen.note = match connection::ask(client, Command::Stop, &request, PATIENCE).await {
                         Ok(_) => "STOP sent".into(),
                         Err(error) => format!("STOP FAILED: {}", in_words(&error)),
                     };
                 }
-                Key::Tare => screen.tare(),
+                KeyAction::Tare => screen.tare(),
             },
             _ = redraw.tick() => {
                 screen.missed = frames.losses().missed + frames.losses().overrun;
@@ -98,15 +98,15 @@ async fn show(client: &Client) -> anyhow::Result<Exit> {
     Ok(Exit::Done)
 }
 
-enum Key {
+enum KeyAction {
     Quit,
     Stop,
     Tare,
 }
 
-/// Reads the keyboard on a thread of its own, which ends with the process.
-fn keys() -> mpsc::Receiver<Key> {
-    // A person types slowly; what does not fit is dropped.
+/// Reads the keyboard on a separate thread, which ends with the process.
+fn keys() -> mpsc::Receiver<KeyAction> {
+    // Drops keys if full; a person types slowly.
     let (typed, keys) = mpsc::channel(8);
     std::thread::spawn(move || {
         while !typed.is_closed() {
@@ -116,15 +116,15 @@ fn keys() -> mpsc::Receiver<Key> {
             let Ok(Event::Key(key)) = read() else { continue };
             let ctrl_c = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
             let meant = if ctrl_c || key.code == KeyCode::Char('q') || key.code == KeyCode::Esc {
-                Key::Quit
+                KeyAction::Quit
             } else if key.code == KeyCode::Char('S') {
-                Key::Stop
+                KeyAction::Stop
             } else if key.code == KeyCode::Char('t') {
-                Key::Tare
+                KeyAction::Tare
             } else {
                 continue;
             };
-            // Full only if the view hangs, and then a further key helps nobody.
+            // Full only if the view hangs.
             drop(typed.try_send(meant));
         }
     });

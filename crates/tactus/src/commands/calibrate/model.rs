@@ -1,4 +1,4 @@
-//! The model that a calibration makes.
+//! The model of a calibrated sensor.
 
 use std::collections::BTreeMap;
 
@@ -10,8 +10,8 @@ use tactus_schema::model::{Base, KnownEffect};
 use super::Calibrated;
 
 impl Calibrated {
-    /// The rig's description with every parameter that was found in place of the declared one, and the faulty
-    /// elements as effects. `None` if nothing was found that a model holds.
+    /// The rig file's model with the calibrated parameters, and with faulty elements as effects. `None` if no model
+    /// parameter was calibrated.
     pub(crate) fn model(&self) -> Option<Model> {
         let declared = Model::of_rig(&self.rig)?.base;
         let psf = self.calibration.psf(declared.psf);
@@ -34,7 +34,7 @@ impl Calibrated {
         let effects = faults.filter_map(|fault| match fault.kind {
             FaultKind::Dead | FaultKind::Stuck { .. } => miswired(fault.element, fault.element, 0.0),
             FaultKind::CrossWired { answers_for } => miswired(fault.element, answers_for, 1.0),
-            // It may well respond; the model has one noise for all.
+            // It may still respond, and the model has one noise for all elements.
             FaultKind::Noisy { .. } => None,
         });
         Some(Model { effects: effects.collect(), base })

@@ -1,4 +1,4 @@
-//! A calibration for people at the terminal.
+//! Terminal output of a calibration.
 
 use std::path::PathBuf;
 
@@ -36,7 +36,7 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
             fields.push(("surface", format!("{} mm", estimate(surface))));
         }
         if let Some(scale) = registration.scale {
-            fields.push(("scale", format!("{} (a check: 1)", estimate(scale))));
+            fields.push(("scale", format!("{} (check; expected 1)", estimate(scale))));
         }
     }
     for fault in &calibration.health.faults {
@@ -52,7 +52,7 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
         fields
             .push(("response", format!("{} of {} elements", response.form.name(), response.elements.len())));
         if let Some(curvature) = response.shared_quadratic_per_mm {
-            fields.push(("curvature", format!("{} per mm, if one for all", estimate(curvature))));
+            fields.push(("curvature", format!("{} per mm, common to all elements", estimate(curvature))));
         }
     }
     if let Some(line) = calibration.thickness.as_ref().and_then(|thickness| thickness.linear.as_ref()) {
@@ -99,13 +99,13 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
     }
 }
 
-/// `2.7256 +- 0.0007`: as many digits as the error's first.
+/// `2.7256 +- 0.0007`: rounded to the first digit of the error.
 pub(crate) fn estimate(estimate: Estimate) -> String {
     let Estimate { value, standard_error } = estimate;
     if !(standard_error > 0.0 && standard_error.is_finite()) {
         return format!("{value:.4}");
     }
-    // 0.00073 has its first digit at the fourth place.
+    // 0.00073 has its first digit in the fourth decimal place.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
     let digits = (-standard_error.log10()).ceil().clamp(0.0, 9.0) as usize;
     format!("{value:.digits$} +- {standard_error:.digits$}")

@@ -1,10 +1,10 @@
-//! `discover --active`: runs what tells undecided explanations apart, and looks again.
+//! `discover --active`: runs experiments that distinguish the remaining explanations, and analyses again.
 
 use std::path::PathBuf;
 
 use anyhow::bail;
 use tactus_discover::{Discovery, NextExperiment, Verdict};
-use tactus_report::discovery::{ActiveRun, Undecided, command};
+use tactus_report::discovery::{ActiveRun, AmbiguousEffect, command};
 use tactus_runner::config;
 use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_schema::Rig;
@@ -12,27 +12,27 @@ use tactus_schema::pb::ExitStatus;
 
 use super::Discovered;
 use crate::cli::{Common, DiscoverArgs, ExperimentArgs, RunArgs};
-use crate::commands::run::{Summary, execute};
+use crate::commands::run::{RunSummary, execute};
 use crate::connection;
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
-use crate::progress::Computation;
+use crate::progress::ComputationProgress;
 
-/// Where experiments run.
-struct Lab<'a> {
+/// Runs experiments on the service or on the embedded rig.
+struct ExperimentRunner<'a> {
     common: &'a Common,
     args: &'a DiscoverArgs,
     embedded: bool,
     rig: String,
-    /// What is left of the rig's time.
+    /// Remaining rig time.
     budget_s: f64,
-    /// Experiments so far.
+    /// Number of experiments so far.
     runs: u64,
 }
 
 /// An experiment that was chosen.
 #[derive(Debug, Clone, PartialEq)]
-struct Chosen {
+struct ChosenExperiment {
     experiment: &'static str,
     parameters: Vec<(&'static str, String)>,
     duration_s: f64,
@@ -43,18 +43,20 @@ struct Chosen {
 pub(super) fn discover(
     common: &Common,
     args: &DiscoverArgs,
-    progress: &Computation,
+    progress: &ComputationProgress,
     analyse: impl Fn(&[PathBuf], Option<&str>) -> anyhow::Result<Discovered>,
 ) -> anyhow::Result<Discovered> {
-    let mut lab = Lab::find(common, args)?;
+    let mut runner = ExperimentRunner::find(common, args)?;
     let mut files = args.files.clone();
     if files.is_empty() {
-        files.push(lab.run(&Chosen::diagnose((lab.budget_s / 2.0 / DIAGNOSE_S).min(1.0)))?.recording);
+        files.push(
+            runner.run(&ChosenExperiment::diagnose((runner.budget_s / 2.0 / DIAGNOSE_S).min(1.0)))?.recording,
+        );
     }
-    let mut discovered = analyse(&files, Some(&lab.rig))?;
+    let mut discovered = analyse(&files, Some(&runner.rig))?;
     let mut active: Vec<ActiveRun> = Vec::new();
     for _ in 0..args.rounds {
-        let chosen = choose(&discovered.discovery, lab.budget_s, &active);
+        let chosen = choose(&discovered.discovery, runner.budget_s, &active);
         if chosen.is_empty() {
             break;
         }
@@ -62,7 +64,7 @@ pub(super) fn discover(
         let before = undecided(&discovered.discovery);
         let mut round = Vec::new();
         for chosen in chosen {
-            let summary = lab.run(&chosen)?;
+            let summary = runner.run(&chosen)?;
             round.push(ActiveRun {
                 experiment: chosen.experiment.to_owned(),
                 parameters: chosen.parameters,
@@ -75,23 +77,23 @@ pub(super) fn discover(
             });
             files.push(summary.recording);
         }
-        discovered = analyse(&files, Some(&lab.rig))?;
+        discovered = analyse(&files, Some(&runner.rig))?;
         let after = undecided(&discovered.discovery);
         active.extend(round.into_iter().map(|run| ActiveRun { after: after.clone(), ..run }));
     }
     Ok(Discovered { active, ..discovered })
 }
 
-/// For each pair that is undecided the best experiment that there is time for; if something is unexplained, `diagnose`.
-fn choose(found: &Discovery, budget_s: f64, done: &[ActiveRun]) -> Vec<Chosen> {
-    let mut chosen: Vec<Chosen> = Vec::new();
+/// The best affordable experiment for each undecided pair; `diagnose` if there is none and something is unexplained.
+fn choose(found: &Discovery, budget_s: f64, done: &[ActiveRun]) -> Vec<ChosenExperiment> {
+    let mut chosen: Vec<ChosenExperiment> = Vec::new();
     let mut left_s = budget_s;
     let mut answered: Vec<&[String; 2]> = Vec::new();
-    let is_done = |one: &Chosen| {
+    let is_done = |one: &ChosenExperiment| {
         done.iter().any(|run| run.experiment == one.experiment && run.parameters == one.parameters)
     };
     for next in found.next_experiments.iter().filter(|next| next.separates[1] != "nothing") {
-        let one = Chosen::of(next);
+        let one = ChosenExperiment::of(next);
         if answered.contains(&&next.separates) || is_done(&one) || one.duration_s > left_s {
             continue;
         }
@@ -107,7 +109,7 @@ fn choose(found: &Discovery, budget_s: f64, done: &[ActiveRun]) -> Vec<Chosen> {
     let unexplained = matches!(found.verdict, Verdict::Unexplained | Verdict::PartlyExplained);
     if chosen.is_empty() && unexplained {
         let scale = (budget_s / DIAGNOSE_S).min(1.0);
-        let one = Chosen::diagnose((100.0 * scale).floor() / 100.0);
+        let one = ChosenExperiment::diagnose((100.0 * scale).floor() / 100.0);
         if scale >= 0.1 && done.iter().all(|run| run.experiment != one.experiment) {
             chosen.push(one);
         }
@@ -115,10 +117,10 @@ fn choose(found: &Discovery, budget_s: f64, done: &[ActiveRun]) -> Vec<Chosen> {
     chosen
 }
 
-/// What `diagnose` takes at full length, roughly.
+/// Approximate duration of `diagnose` at scale 1.
 const DIAGNOSE_S: f64 = 1100.0;
 
-impl Chosen {
+impl ChosenExperiment {
     fn of(next: &NextExperiment) -> Self {
         Self {
             experiment: next.experiment,
@@ -141,14 +143,16 @@ impl Chosen {
     }
 }
 
-fn undecided(found: &Discovery) -> Vec<Undecided> {
-    let of =
-        |step: &tactus_discover::Step| Undecided { effect: step.effect, equivalent: step.equivalent.clone() };
+fn undecided(found: &Discovery) -> Vec<AmbiguousEffect> {
+    let of = |step: &tactus_discover::Step| AmbiguousEffect {
+        effect: step.effect,
+        equivalent: step.equivalent.clone(),
+    };
     found.steps.iter().map(of).collect()
 }
 
-impl<'a> Lab<'a> {
-    /// The service's rig, or the embedded one; says which.
+impl<'a> ExperimentRunner<'a> {
+    /// Finds the service's rig or the embedded one, and prints which.
     fn find(common: &'a Common, args: &'a DiscoverArgs) -> anyhow::Result<Self> {
         if !(args.budget_min > 0.0 && args.budget_min.is_finite()) {
             let error = format!("--budget-min must be above 0, not {}", args.budget_min);
@@ -181,11 +185,11 @@ impl<'a> Lab<'a> {
         Ok(Self { common, args, embedded, rig, budget_s: 60.0 * args.budget_min, runs: 0 })
     }
 
-    fn run(&mut self, chosen: &Chosen) -> anyhow::Result<Summary> {
+    fn run(&mut self, chosen: &ChosenExperiment) -> anyhow::Result<RunSummary> {
         let command = command(chosen.experiment, &chosen.parameters);
         if !self.common.json {
             let [one, other] = &chosen.separates;
-            say(&format!("{command}: to tell {one} from {other}, {}", duration(chosen.duration_s)));
+            say(&format!("{command}: to distinguish {one} from {other}, {}", duration(chosen.duration_s)));
         }
         let parameters = chosen.parameters.iter().map(|(name, value)| format!("{name}={value}"));
         let args = RunArgs {
@@ -202,7 +206,7 @@ impl<'a> Lab<'a> {
             who: self.args.who.clone(),
             no_report: true,
         };
-        // The run's own first line would stand before every experiment.
+        // Suppresses the run's own first line.
         let summary = execute(&Common { json: true, ..self.common.clone() }, &args)?;
         if !matches!(summary.exit_status, ExitStatus::Done | ExitStatus::Degraded) {
             bail!(Failure::new(Exit::of_run(summary.exit_status), format!("{command}: {}", summary.message)));

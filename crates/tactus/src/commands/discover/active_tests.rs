@@ -16,7 +16,7 @@ fn undecided_between(next_experiments: Vec<NextExperiment>) -> Discovery {
     Discovery { next_experiments, ..found(&before()) }
 }
 
-fn parts(chosen: &[Chosen]) -> Vec<&str> {
+fn parts(chosen: &[ChosenExperiment]) -> Vec<&str> {
     chosen.iter().map(|one| one.parameters[0].1.as_str()).collect()
 }
 
@@ -62,7 +62,7 @@ fn an_experiment_that_was_made_is_not_made_again() {
 fn what_is_unexplained_is_diagnosed_within_the_time_there_is() {
     let unexplained = Discovery { verdict: Verdict::Unexplained, ..undecided_between(Vec::new()) };
     let chosen = choose(&unexplained, 0.5 * DIAGNOSE_S, &[]);
-    assert_eq!(chosen, [Chosen::diagnose(0.5)]);
+    assert_eq!(chosen, [ChosenExperiment::diagnose(0.5)]);
     assert!(choose(&unexplained, 30.0, &[]).is_empty(), "too short to tell anything");
     assert!(choose(&undecided_between(Vec::new()), 1e4, &[]).is_empty(), "nothing is left to tell");
 }

@@ -1,18 +1,18 @@
-//! The model that a discovery makes.
+//! The grown model of a discovery.
 
 use tactus_discover::{Discovery, Estimated, Step};
 use tactus_model::Effect;
 use tactus_schema::Model;
 use tactus_schema::model::{Base, Evidence, KnownEffect};
 
-/// The model with what was added to it, base and effects fitted together. What was added has its standard errors and
-/// the runs that show it; what was known before keeps its evidence.
+/// The model with the discovered effects, base and effects fitted jointly. Added effects have standard errors and name
+/// their data; effects known before keep their evidence.
 pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
     let base = Base::of(before.base.array.clone(), found.grown.psf, found.grown.response.clone());
     let noise_rms_counts = found.noise_rms_counts.unwrap_or(before.base.noise_rms_counts);
     let effects = found.effects.iter().enumerate().map(|(nth, effect)| {
         let added = found.steps.iter().find_map(|step| Some((step, term(step, effect)?)));
-        // Of a wander of each element a step tells the whole, and the effects are its parts.
+        // A random walk of each element is one step with many effects.
         let is_part = |step: &&Step| nth >= before.effects.len() && step.effect == effect.name();
         let part = || found.steps.iter().find(is_part).map(|step| (step, &[][..]));
         let Some((step, term)) = added.or_else(part) else {
@@ -38,7 +38,7 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
     Model { effects: effects.collect(), base: Base { noise_rms_counts, ..base } }
 }
 
-/// The term of a step that is this effect.
+/// The term of a step that belongs to this effect.
 fn term<'a>(step: &'a Step, effect: &Effect) -> Option<&'a [Estimated]> {
     let is = |term: &&Vec<Estimated>| term.iter().all(|one| effect.value(one.name) == Some(one.value));
     (step.effect == effect.name()).then(|| step.terms.iter().find(is)).flatten().map(Vec::as_slice)

@@ -1,23 +1,23 @@
-//! A discovery for people at the terminal.
+//! Terminal output of a discovery.
 
 use std::path::PathBuf;
 
 use tactus_calibrate::Estimate;
 use tactus_discover::{Estimated, Step};
 use tactus_report::discovery::{
-    DiscoveryReport, Proposal, Undecided, command, in_words, not_shown, proposals,
+    AmbiguousEffect, DiscoveryReport, Proposal, command, in_words, not_shown, proposals,
 };
 
 use crate::commands::calibrate::estimate;
 use crate::output::{duration, print_fields, print_table, say};
 
-/// More parameters of one term do not fit on a line.
+/// Parameters of one term that fit on a line.
 const PARAMETERS_MAX: usize = 6;
 
 pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
     let found = report.discovery;
     for (reason, effects) in not_shown(found) {
-        say(&format!("cannot be shown: {}: {reason}", effects.join(", ")));
+        say(&format!("not detectable: {}: {reason}", effects.join(", ")));
     }
     for warning in report.notes.iter().chain(&found.warnings) {
         say(&format!("warning: {warning}"));
@@ -29,19 +29,19 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
         let rows = found.gap.iter().map(|gap| {
             let [from, to] = gap.range;
             let range = format!("{from:.3} to {to:.3} {}", gap.unit);
-            vec![gap.covariate.into(), range, format!("{:.2}", gap.effect_size), chance(gap.q_value)]
+            vec![gap.covariate.into(), range, format!("{:.2}", gap.effect_size), probability(gap.q_value)]
         });
-        print_table(&["depends on", "most at", "in noise units", "q"], &rows.collect::<Vec<_>>());
+        print_table(&["depends on", "most in", "in noise units", "q"], &rows.collect::<Vec<_>>());
     }
     if !found.steps.is_empty() {
         say("");
         let rows: Vec<Vec<String>> = found.steps.iter().flat_map(step).collect();
-        print_table(&["added", "parameters", "held-out counts rms", "q", "not told from"], &rows);
+        print_table(&["added", "parameters", "held-out counts rms", "q", "indistinguishable from"], &rows);
     }
     say("");
     say(&in_words(found));
     for run in report.active {
-        let [before, after] = [&run.before, &run.after].map(|undecided| Undecided::in_words(undecided));
+        let [before, after] = [&run.before, &run.after].map(|undecided| AmbiguousEffect::in_words(undecided));
         say(&format!("{}: {before} -> {after}", command(&run.experiment, &run.parameters)));
     }
     let proposals = proposals(found);
@@ -80,7 +80,7 @@ fn facts(report: &DiscoveryReport<'_>) {
         (
             "noise",
             noise.map_or_else(
-                || "not known: no frames repeat each other".into(),
+                || "unknown: no frames are repeats".into(),
                 |rms| format!("{rms:.3} counts rms"),
             ),
         ),
@@ -89,7 +89,7 @@ fn facts(report: &DiscoveryReport<'_>) {
     ]);
 }
 
-/// A row for each term; what belongs to the whole step stands in the first.
+/// One line per term; the first also has the values of the whole step.
 fn step(step: &Step) -> Vec<Vec<String>> {
     let of_step = |nth: usize, text: String| if nth == 0 { text } else { String::new() };
     let rows = step.terms.iter().enumerate().map(|(nth, term)| {
@@ -98,14 +98,14 @@ fn step(step: &Step) -> Vec<Vec<String>> {
             of_step(nth, step.effect.into()),
             parameters(term),
             of_step(nth, format!("{before:.3} -> {after:.3}")),
-            of_step(nth, chance(step.q_value)),
+            of_step(nth, probability(step.q_value)),
             of_step(nth, step.equivalent.join(", ")),
         ]
     });
     rows.collect()
 }
 
-/// The parameters of a term, but for the knots of a curve, which a line has no room for.
+/// The parameters of a term; only the first of a long curve.
 fn parameters(term: &[Estimated]) -> String {
     let mut said: Vec<String> = term.iter().take(PARAMETERS_MAX).map(parameter).collect();
     if term.len() > PARAMETERS_MAX {
@@ -122,6 +122,6 @@ fn parameter(parameter: &Estimated) -> String {
     }
 }
 
-fn chance(chance: f64) -> String {
-    if chance < 1e-4 { "< 0.0001".into() } else { format!("{chance:.4}") }
+fn probability(value: f64) -> String {
+    if value < 1e-4 { "< 0.0001".into() } else { format!("{value:.4}") }
 }

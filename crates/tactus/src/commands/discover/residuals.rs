@@ -1,4 +1,4 @@
-//! What the model leaves of each frame, before and after it grew.
+//! Residuals of each frame, of the base model and of the grown model.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use tactus_record::{rows, table::ResidualWriter};
 
 use super::Discovered;
 
-/// The frames are read a second time rather than kept.
+/// Writes the residuals. Reads the files again instead of keeping all frames in memory.
 pub(super) fn write(discovered: &Discovered, path: &Path) -> anyhow::Result<()> {
     let Discovered { measured, known, discovery, .. } = discovered;
     let before = predict(known, &measured.frames, &discovery.recalibrated, &known.effects)?;

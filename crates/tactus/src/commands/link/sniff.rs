@@ -1,4 +1,4 @@
-//! `link sniff`: the bytes that a device sends, live, and at the end what they may be.
+//! `link sniff`: shows the bytes that a device sends and proposes a frame format.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -29,7 +29,7 @@ pub(crate) fn sniff(common: &Common, args: &LinkSniffArgs) -> anyhow::Result<Exi
     let live = stdout().is_terminal() && !common.json;
     let ended = runtime()?.block_on(listen(&transport, args, seconds, live, &mut capture))?;
     capture.finish()?;
-    // Only now: it takes a moment.
+    // After the live output, because it takes a moment.
     let proposals = propose(&capture.head);
     if common.json {
         say(&to_json(args, &capture, &ended, &proposals).to_string());
@@ -43,7 +43,7 @@ pub(crate) fn sniff(common: &Common, args: &LinkSniffArgs) -> anyhow::Result<Exi
     })
 }
 
-/// What a person writes for a device.
+/// Parses the name of a device, such as `usb:1209:0020/A1:3:85`.
 fn transport(text: &str, baud: u32, interface: Option<u8>) -> anyhow::Result<Transport> {
     let hex = |digits: &str| u8::from_str_radix(digits.strip_prefix("0x").unwrap_or(digits), 16).ok();
     if let Some(rest) = text.strip_prefix("usb:") {
@@ -74,16 +74,16 @@ fn transport(text: &str, baud: u32, interface: Option<u8>) -> anyhow::Result<Tra
     Ok(Transport::Serial { port, baud })
 }
 
-/// Why it is over.
+/// Why listening ended.
 #[derive(Debug, PartialEq, Eq)]
 enum Ended {
-    /// By Ctrl-C, or with the time or the bytes that were asked for.
+    /// Ctrl-C, or the requested time or number of bytes.
     Asked,
-    /// By the device.
+    /// The device or the link failed.
     Broken(String),
 }
 
-/// Live bytes are shown at most this often.
+/// Period of the live output.
 const REDRAW: Duration = Duration::from_millis(200);
 
 async fn listen(
@@ -93,17 +93,17 @@ async fn listen(
     live: bool,
     capture: &mut Capture,
 ) -> anyhow::Result<Ended> {
-    // Before anything is opened, so that what ends it always ends it well.
-    let mut interrupted = signal(SignalKind::interrupt()).context("Ctrl-C cannot be waited for")?;
-    let mut terminated = signal(SignalKind::terminate()).context("signals cannot be waited for")?;
+    // Before the device is opened, so that a signal always ends it cleanly.
+    let mut interrupted = signal(SignalKind::interrupt()).context("cannot wait for Ctrl-C")?;
+    let mut terminated = signal(SignalKind::terminate()).context("cannot wait for signals")?;
     let connect = devices::physical(transport).context("an embedded device has no link")?;
     let mut stream = connect.connect().await?;
-    eprintln!("listening to {connect}; Ctrl-C ends it");
-    // What does not fit into a clock is longer than anybody listens.
+    eprintln!("listening to {connect}; Ctrl-C stops");
+    // A time beyond the clock's range means no limit.
     let deadline = seconds.and_then(|seconds| Instant::now().checked_add(seconds));
     let mut redraw = interval(REDRAW);
     redraw.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut view = View::default();
+    let mut view = HexView::default();
     let mut buffer = vec![0; MAX_FRAME_BYTES];
     let ended = loop {
         let left = args.bytes.map(|bytes| (bytes.get() as u64).saturating_sub(capture.bytes));
@@ -117,7 +117,7 @@ async fn listen(
             () = until(deadline) => break Ended::Asked,
             _ = redraw.tick(), if live => view.print(),
             read = stream.read(&mut buffer) => match read {
-                Ok(0) => break Ended::Broken("the device has gone".to_owned()),
+                Ok(0) => break Ended::Broken("the device disconnected".to_owned()),
                 Ok(count) => {
                     let read = buffer.get(..count).unwrap_or_default();
                     let read = left.and_then(|left| read.get(..usize::try_from(left).ok()?)).unwrap_or(read);
@@ -142,13 +142,13 @@ async fn until(deadline: Option<Instant>) {
     }
 }
 
-/// So much is kept in memory; no more is looked at for a proposal.
+/// Bytes kept in memory, from which a format is proposed.
 const HEAD_BYTES: usize = 1 << 16;
 
-/// Kinds of packets that are counted; a device that has more has no packets to speak of.
+/// Packet lengths that are counted; further lengths are ignored.
 const LENGTHS_MAX: usize = 64;
 
-/// What came.
+/// The bytes received.
 #[derive(Debug)]
 struct Capture {
     head: Vec<u8>,
@@ -202,7 +202,7 @@ impl Capture {
         }
     }
 
-    /// The one length that all packets have.
+    /// The common length of all packets, if there is one.
     fn packet_bytes(&self) -> Option<usize> {
         let mut lengths = self.lengths.keys();
         lengths.next().copied().filter(|_| self.are_packets && lengths.next().is_none())
@@ -213,22 +213,22 @@ impl Capture {
     }
 }
 
-/// Lines that are shown at once; of more, their number.
+/// Lines shown at once; for more, only the number of bytes.
 const LINES_MAX: usize = 8;
 
 const LINE_BYTES: usize = 16;
 
-/// What is to be shown next.
+/// Hexadecimal lines waiting to be shown.
 #[derive(Debug, Default)]
-struct View {
+struct HexView {
     lines: Vec<String>,
-    /// The line that is not full yet, and where it begins.
+    /// The incomplete line and the offset of its first byte.
     begun: (u64, Vec<u8>),
     hidden_bytes: u64,
 }
 
-impl View {
-    /// Takes what was read, which begins at byte `at`; a packet begins a line.
+impl HexView {
+    /// Adds bytes that begin at offset `at`. A packet starts a new line.
     fn take(&mut self, at: u64, read: &[u8], is_packet: bool) {
         for (at, byte) in (at..).zip(read) {
             if self.begun.1.is_empty() {
@@ -272,7 +272,7 @@ fn line(at: u64, bytes: &[u8]) -> String {
     format!("{at:08x}  {:width$}  |{ascii}|", hex.join(" "), width = 3 * LINE_BYTES - 1)
 }
 
-/// More would not help.
+/// Proposals shown.
 const PROPOSALS_MAX: usize = 3;
 
 fn print(capture: &Capture, ended: &Ended, proposals: &[Proposal]) {
@@ -290,7 +290,7 @@ fn print(capture: &Capture, ended: &Ended, proposals: &[Proposal]) {
     }
     print_fields(&fields);
     for proposal in proposals.iter().take(PROPOSALS_MAX) {
-        say(&format!("maybe: {}", in_words(proposal)));
+        say(&format!("candidate: {}", in_words(proposal)));
     }
     say(&format!("next: {}", next(capture, proposals)));
 }
@@ -302,9 +302,9 @@ fn in_words(proposal: &Proposal) -> String {
     };
     let Proposal { stride, likeness, sync, first_at, constant, counters } = proposal;
     let counting =
-        if counters.is_empty() { String::new() } else { format!("; counting: bytes {}", list(counters)) };
+        if counters.is_empty() { String::new() } else { format!("; counter bytes: {}", list(counters)) };
     format!(
-        "frames of {stride} bytes that begin with {} (first at byte {first_at}, {:.0} % alike); the same in all: bytes \
+        "frames of {stride} bytes that begin with {} (first at byte {first_at}, {:.0} % alike); constant bytes: \
          {}{counting}",
         array(sync),
         100.0 * likeness,
@@ -318,15 +318,15 @@ fn array(bytes: &[u8]) -> String {
     format!("[{}]", bytes.join(", "))
 }
 
-/// What to do with what came.
+/// The next step for the user.
 fn next(capture: &Capture, proposals: &[Proposal]) -> String {
     if capture.bytes == 0 {
-        return "nothing came: is the device switched on, are bit rate and endpoint right, and does it wait for a \
+        return "no bytes arrived: is the device switched on? Are bit rate and endpoint right? Does it wait for a \
                 command before it sends?"
             .to_owned();
     }
     let Some(path) = capture.saved() else {
-        return "record some seconds of it, best while nothing touches the array: the same with --save bytes.bin"
+        return "record a few seconds, with nothing touching the array: repeat with --save bytes.bin"
             .to_owned();
     };
     let check = format!("tactus link check FILE --capture {}", path.display());
@@ -339,8 +339,8 @@ fn next(capture: &Capture, proposals: &[Proposal]) -> String {
             array(sync)
         ),
         (None, None) => format!(
-            "no frame of one length is seen: is the bit rate right? Record longer; if you know the format, describe it \
-             and {check}"
+            "no frames of constant length were found: is the bit rate right? Record longer or, if you know the format, \
+             describe it; then {check}"
         ),
     }
 }

@@ -37,13 +37,13 @@ fn what_is_no_device_is_refused_with_its_form() {
 #[test]
 fn bytes_are_shown_in_hexadecimal_and_as_text() {
     let all: Vec<u8> = (0..20).map(|byte| 0x41 + byte).chain([0x00, 0xAA]).collect();
-    let mut view = View::default();
+    let mut view = HexView::default();
     // As a serial port gives them, in pieces; and then a packet, which begins a line.
     for (at, piece) in all.chunks(3).enumerate() {
         view.take(3 * at as u64, piece, false);
     }
     assert_eq!(view.lines, ["00000000  41 42 43 44 45 46 47 48 49 4a 4b 4c 4d 4e 4f 50  |ABCDEFGHIJKLMNOP|"]);
-    let mut view = View::default();
+    let mut view = HexView::default();
     view.take(16, &all[16..], true);
     view.take(22, b"ok", true);
     let hex = |line: &str| format!("{line:57}");
@@ -58,7 +58,7 @@ fn bytes_are_shown_in_hexadecimal_and_as_text() {
 
 #[test]
 fn of_many_bytes_some_are_shown_and_the_others_counted() {
-    let mut view = View::default();
+    let mut view = HexView::default();
     view.take(0, &[0; 1000], true);
     assert_eq!((view.lines.len(), view.hidden_bytes), (LINES_MAX, 1000 - 16 * LINES_MAX as u64));
     view.print();
@@ -86,7 +86,7 @@ fn packets_of_one_length_are_seen_to_be_frames() {
 #[test]
 fn what_to_do_next_follows_from_what_came() {
     let next = |capture: &Capture| next(capture, &propose(&capture.head));
-    assert!(next(&capture("hid:1209:0020", &[])).starts_with("nothing came"));
+    assert!(next(&capture("hid:1209:0020", &[])).starts_with("no bytes arrived"));
     let unsaved = capture("hid:1209:0020", &[&[1; 64]]);
     assert!(next(&unsaved).contains("--save bytes.bin"));
     let folder = tempfile::TempDir::new().unwrap();

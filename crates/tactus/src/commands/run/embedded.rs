@@ -14,11 +14,11 @@ use tactus_schema::pb::{self, RunPhase};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::Summary;
+use super::RunSummary;
 use crate::cli::{Common, RunArgs};
 use crate::connection;
 use crate::exit::{Exit, Failure};
-use crate::progress::Progress;
+use crate::progress::RunProgress;
 
 /// How often the progress is drawn.
 const REDRAW: Duration = Duration::from_millis(100);
@@ -29,22 +29,21 @@ pub(super) fn run(
     script: Script,
     arguments: Arguments,
     why: &str,
-) -> anyhow::Result<Summary> {
+) -> anyhow::Result<RunSummary> {
     let files = match &args.rig_file {
         Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?,
         None => embedded::simulated_rig()?,
     };
     let rig = &files.rig;
     if !rig.simulated {
-        let error =
-            format!("rig {:?} is not simulated: real devices are run by the service, `tactusd`", rig.name);
+        let error = format!("rig {:?} is not simulated: real devices need the service, `tactusd`", rig.name);
         return Err(Failure::new(Exit::Usage, error).into());
     }
     let truth = args.truth.as_deref().map(read_truth).transpose()?;
     let pace = if args.real_time { Pace::Real } else { Pace::Virtual };
     if !common.json {
-        let time = if args.real_time { "real time" } else { "virtual time, nobody waits" };
-        let hidden = args.truth.as_ref().map(|path| format!("; it hides {}", path.display()));
+        let time = if args.real_time { "real time" } else { "virtual time" };
+        let hidden = args.truth.as_ref().map(|path| format!("; true physics from {}", path.display()));
         let hidden = hidden.unwrap_or_default();
         println!("SIMULATED: running on the embedded simulated rig {:?} ({why}; {time}{hidden})", rig.name);
     }
@@ -56,7 +55,7 @@ pub(super) fn run(
         attending = attend(engine.clone(), silent);
     });
     if let Some(attending) = attending {
-        // It ends with the run, and takes the bar away; a panic there has told itself.
+        // The thread ends with the run and removes the bar. A panic in it has printed its own message.
         drop(attending.join());
     }
     let Finished { outcome, recording } = done.map_err(|error| match error {
@@ -76,7 +75,7 @@ pub(super) fn run(
         | EmbeddedError::Record(_)
         | EmbeddedError::System(_)) => error.into(),
     })?;
-    Ok(Summary {
+    Ok(RunSummary {
         run_id: outcome.run_id,
         experiment: outcome.experiment,
         exit_status: outcome.exit_status,
@@ -102,18 +101,18 @@ fn wrong_truth(path: &Path, error: &TruthError) -> anyhow::Error {
     Failure::new(Exit::Usage, format!("{}: {error}", path.display())).into()
 }
 
-/// Shows the progress and passes Ctrl-C on, from a thread of its own: the run may take this one.
+/// Starts a thread that shows the progress and stops the run at Ctrl-C. The run may occupy the calling thread.
 fn attend(engine: Engine, silent: bool) -> Option<JoinHandle<()>> {
     // Without a thread there is no progress, but the run goes on.
     let spawned = thread::Builder::new().name("progress".into()).spawn(move || {
         if let Ok(runtime) = connection::runtime() {
-            runtime.block_on(follow(&engine, &Progress::new(silent)));
+            runtime.block_on(follow(&engine, &RunProgress::new(silent)));
         }
     });
     spawned.ok()
 }
 
-async fn follow(engine: &Engine, progress: &Progress) {
+async fn follow(engine: &Engine, progress: &RunProgress) {
     let Ok(mut interrupts) = signal(SignalKind::interrupt()) else { return };
     let mut redraw = interval(REDRAW);
     redraw.set_missed_tick_behavior(MissedTickBehavior::Skip);

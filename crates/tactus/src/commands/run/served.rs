@@ -10,11 +10,11 @@ use tactus_schema::key::Command;
 use tactus_schema::pb::{self, RunPhase, RunState};
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::Summary;
+use super::RunSummary;
 use crate::cli::{Common, RunArgs};
 use crate::connection::{self, PATIENCE};
 use crate::exit::in_words;
-use crate::progress::Progress;
+use crate::progress::RunProgress;
 
 /// How long the dry run may take before the service answers.
 const DRY_RUN_PATIENCE: Duration = Duration::from_mins(5);
@@ -25,7 +25,7 @@ pub(super) async fn run(
     args: &RunArgs,
     script: &Script,
     arguments: &Arguments,
-) -> anyhow::Result<Summary> {
+) -> anyhow::Result<RunSummary> {
     if !common.json {
         println!("running on the service at {} (rig {:?})", client.endpoint(), client.rig());
     }
@@ -40,7 +40,7 @@ pub(super) async fn run(
     let reply = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await?;
     let accepted = reply.state.context("the service's answer has no state; is it of another version?")?;
 
-    let progress = Progress::new(common.json);
+    let progress = RunProgress::new(common.json);
     let mut alive = client.alive();
     let mut interrupts = signal(SignalKind::interrupt())?;
     let finished = loop {
@@ -70,7 +70,7 @@ pub(super) async fn run(
     };
     progress.clear();
     client.close().await?;
-    Ok(Summary {
+    Ok(RunSummary {
         exit_status: finished.exit_status(),
         run_id: finished.run_id,
         experiment: finished.experiment,

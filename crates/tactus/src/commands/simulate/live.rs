@@ -1,4 +1,4 @@
-//! A simulated sensor on the bus: frames of a moving tool, at the sensor's own rate, in real time.
+//! A simulated sensor on the bus: frames of a moving tool at the sensor's rate, in real time.
 
 use std::path::Path;
 use std::time::Duration;
@@ -23,19 +23,19 @@ use crate::cli::{Common, SimulateArgs};
 use crate::connection;
 use crate::exit::{Exit, Failure};
 
-/// A sensor that is further behind leaves frames out, and says so in the next one.
-const BEHIND_MAX: Duration = Duration::from_millis(250);
-/// How often the stage and the sensor's health are told.
-const NEWS: Duration = Duration::from_millis(100);
+/// A sensor that is later than this skips frames and reports them lost in the next frame.
+const DELAY_MAX: Duration = Duration::from_millis(250);
+/// Period at which stage state and health are published.
+const STATE_PERIOD: Duration = Duration::from_millis(100);
 /// Length of a device tick.
 const TICK_NS: u64 = 1000;
 
-/// Where the tool is in time.
+/// Position of the tool over time.
 enum Motion {
-    /// Round and round over the array, pressing and letting go.
-    Round { centre_mm: [f64; 2], reach_mm: [f64; 2], depth_mm: f64 },
-    /// Along a path, again and again.
-    Again(Trajectory),
+    /// A closed curve over the array with varying depth.
+    Circuit { centre_mm: [f64; 2], reach_mm: [f64; 2], depth_mm: f64 },
+    /// A path, repeated.
+    Repeat(Trajectory),
 }
 
 impl Motion {
@@ -43,24 +43,24 @@ impl Motion {
         let [x, y] = scene.array().extent_mm();
         let depth_mm = scene.contact.depth_mm;
         trajectory.map_or_else(
-            || Self::Round {
+            || Self::Circuit {
                 centre_mm: scene.contact.position_mm,
                 reach_mm: [x, y].map(|[least, most]| (most - least) / 4.0),
                 depth_mm,
             },
-            Self::Again,
+            Self::Repeat,
         )
     }
 
     fn at(&self, t_s: f64) -> [f64; 3] {
         let turn = std::f64::consts::TAU * t_s;
         match self {
-            Self::Round { centre_mm: [x, y], reach_mm: [along_x, along_y], depth_mm } => [
+            Self::Circuit { centre_mm: [x, y], reach_mm: [along_x, along_y], depth_mm } => [
                 x + along_x * (turn / 7.0).cos(),
                 y + along_y * (turn / 5.0).sin(),
                 -depth_mm * (0.6 - 0.4 * (turn / 2.0).cos()),
             ],
-            Self::Again(trajectory) => {
+            Self::Repeat(trajectory) => {
                 let [start_s, end_s] = [trajectory.start_s(), trajectory.end_s()];
                 let lasts_s = (end_s - start_s).max(f64::MIN_POSITIVE);
                 trajectory.at(start_s + t_s.rem_euclid(lasts_s))
@@ -69,7 +69,7 @@ impl Motion {
     }
 }
 
-/// Publishes until Ctrl-C, or for as long as was asked for.
+/// Publishes until Ctrl-C or for the requested time.
 pub(super) fn publish(
     common: &Common,
     args: &SimulateArgs,
@@ -95,7 +95,7 @@ pub(super) fn publish(
             let name = if args.copies == 1 { name.to_owned() } else { format!("{name}-{}", copy + 1) };
             let endpoint = next(&first, copy)?;
             let motion = Motion::of(scene, trajectory.map(series::read).transpose()?);
-            let sensor = Sensor {
+            let sensor = SimulatedSensor {
                 name: name.clone(),
                 scene: scene.clone(),
                 motion,
@@ -109,14 +109,14 @@ pub(super) fn publish(
             if common.json {
                 println!("{}", json!({ "rig": name, "endpoint": endpoint.to_string(), "rate_hz": rate_hz, "simulated": true }));
             } else {
-                println!("simulated sensor {name:?} at {endpoint}, {rate_hz} frames/s; end with Ctrl-C");
+                println!("simulated sensor {name:?} at {endpoint}, {rate_hz} frames/s; stop with Ctrl-C");
             }
             let refusing = [tokio::spawn(refuse(calls.stops)), tokio::spawn(refuse(calls.commands))];
             let publisher = bus.publisher();
             let task = tokio::spawn(sensor.run(publisher, args.seconds));
             sensors.push((bus, alive, task, refusing));
         }
-        let mut terminate = signal(SignalKind::terminate()).context("the system gives no SIGTERM")?;
+        let mut terminate = signal(SignalKind::terminate()).context("cannot wait for SIGTERM")?;
         let ended = async {
             for (_, _, task, _) in &mut sensors {
                 task.await.context("a sensor's task broke off")??;
@@ -125,7 +125,7 @@ pub(super) fn publish(
         };
         tokio::select! {
             ended = ended => ended?,
-            interrupt = tokio::signal::ctrl_c() => interrupt.context("the system gives no SIGINT")?,
+            interrupt = tokio::signal::ctrl_c() => interrupt.context("cannot wait for SIGINT")?,
             _ = terminate.recv() => {}
         }
         for (bus, alive, task, refusing) in sensors {
@@ -138,18 +138,18 @@ pub(super) fn publish(
     })
 }
 
-/// The endpoint of a copy: ports go up by one.
+/// The endpoint of a copy: each copy has the next port.
 fn next(first: &Endpoint, copy: u32) -> anyhow::Result<Endpoint> {
     if copy == 0 {
         return Ok(first.clone());
     }
     let text = first.to_string();
     let (host, port) = text.rsplit_once(':').context("an endpoint ends with its port")?;
-    let port: u32 = port.parse().with_context(|| format!("{port:?} is no port to count on from"))?;
+    let port: u32 = port.parse().with_context(|| format!("{port:?} is not a port number"))?;
     Ok(format!("{host}:{}", port + copy).parse()?)
 }
 
-/// There is a sensor here, and nothing that could be run or stopped.
+/// Refuses all commands: there is only a sensor.
 async fn refuse(mut calls: mpsc::Receiver<CommandCall>) {
     while let Some(call) = calls.recv().await {
         call.reply.reply(pb::CommandReply {
@@ -163,7 +163,7 @@ async fn refuse(mut calls: mpsc::Receiver<CommandCall>) {
 }
 
 /// One simulated sensor.
-struct Sensor {
+struct SimulatedSensor {
     name: String,
     scene: Scene,
     motion: Motion,
@@ -172,10 +172,10 @@ struct Sensor {
     clock: Clock,
 }
 
-impl Sensor {
+impl SimulatedSensor {
     async fn run(mut self, publisher: tactus_bus::Publisher, seconds: Option<f64>) -> anyhow::Result<()> {
         let mut pipeline = Pipeline::new(&self.scene.simulator)?;
-        // A mesh takes milliseconds to press exactly. Where the blur is too fine for a stamp, it does.
+        // The exact image of a mesh takes milliseconds, which is used where the spread is too small for a press table.
         if let Indenter::Mesh(_) = &self.scene.simulator.indenter
             && let Err(error) = pipeline.hasten(self.scene.simulator.covering.thickness_mm)
         {
@@ -191,7 +191,7 @@ impl Sensor {
             let due = start + Duration::from_secs_f64(t_s);
             sleep_until(due).await;
             let behind = due.elapsed();
-            if behind > BEHIND_MAX {
+            if behind > DELAY_MAX {
                 let missed = whole(behind.as_secs_f64() * self.rate_hz);
                 (seq, lost) = (seq + missed, lost + missed);
                 lost_before = lost_before.saturating_add(u32::try_from(missed).unwrap_or(u32::MAX));
@@ -200,7 +200,7 @@ impl Sensor {
             let frame = self.frame(&mut pipeline, seq, t_s, std::mem::take(&mut lost_before));
             publisher.publish_frame(&frame);
             if frame.received.mono.ns() > 0 && due >= news {
-                news = due + NEWS;
+                news = due + STATE_PERIOD;
                 publisher.publish(&self.stage(seq, t_s));
                 publisher.publish(&self.health(seq + 1 - lost, lost, publisher.dropped_frames()));
             }

@@ -1,4 +1,4 @@
-//! Images as files.
+//! Image files.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -10,8 +10,8 @@ use tactus_report::plot::{Scale, png};
 /// Width of a picture.
 const WIDTH_PX: u32 = 860;
 
-/// Writes each image as PNG (scaled zero to one, as in the paper's Fig. 8) or CSV (counts, row 0 first); the
-/// second and further ones have their number in their name.
+/// Writes each image as PNG (scaled from least to greatest, as in the paper's Fig. 8) or CSV (counts, row 0 first). From
+/// the second on, file names end in the image's number.
 pub(super) fn write(out: &Path, array: &Array, images: &[Vec<f64>]) -> anyhow::Result<()> {
     for (place, image) in images.iter().enumerate() {
         let path = if place == 0 { out.to_owned() } else { numbered(out, place + 1) };

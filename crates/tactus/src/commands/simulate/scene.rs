@@ -1,4 +1,4 @@
-//! Which sensor, which tool, where.
+//! The sensor, the tool and the tool's pose.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,12 +16,12 @@ use crate::exit::{Exit, Failure, in_words};
 /// The characterisation of the paper's sensor.
 const PAPER_MODEL: &str = include_str!("../../../../../config/models/digitacts.toml");
 
-/// A sensor and the tool that stands in its covering.
+/// A sensor and the tool pressed into its covering.
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
     /// The sensor; the robot's frame is its own.
     pub(super) simulator: Simulator,
-    /// The tool in the pose that was asked for.
+    /// The tool in its pose.
     pub(super) contact: Contact,
 }
 
@@ -41,7 +41,7 @@ impl Scene {
             return Err(usage(&format!("--covering-mm must be positive, not {}", args.covering_mm)).into());
         }
         let covering = Covering { thickness_mm: args.covering_mm };
-        // The robot's frame is the sensor's, but for the tool's angle, which a path does not have.
+        // The robot's frame is the sensor's.
         let registration = Registration { origin_mm: [0.0; 2], rotation_deg: 0.0 };
         let simulator = model.simulator(registration, 0.0, covering, yawed(&indenter, args.angle_deg)?)?;
         let contact =
@@ -57,7 +57,7 @@ impl Scene {
         self.simulator.model.psf().sigma_mm(self.simulator.covering)
     }
 
-    /// Counts before noise and converter, rendered on the graphics processor, and by which.
+    /// Counts before noise and converter, rendered on the GPU, and the GPU's name.
     #[cfg(feature = "gpu")]
     pub(super) fn gpu_image(&self) -> anyhow::Result<(Vec<f64>, String)> {
         let Indenter::Mesh(mesh) = &self.contact.indenter else {
@@ -75,7 +75,7 @@ impl Scene {
         Ok((counts.into_iter().map(f64::from).collect(), renderer.adapter().to_owned()))
     }
 
-    /// There is no such path in this build.
+    /// This build has no GPU renderer.
     #[cfg(not(feature = "gpu"))]
     #[expect(clippy::unused_self, reason = "as the other build's")]
     pub(super) fn gpu_image(&self) -> anyhow::Result<(Vec<f64>, String)> {
@@ -84,7 +84,7 @@ impl Scene {
         )
     }
 
-    /// Counts before noise and converter, by the exact model and its effects, of a tool that has just come.
+    /// Counts before noise and converter, by the exact model and its effects, at the moment of contact.
     pub(super) fn image(&self) -> anyhow::Result<Vec<f64>> {
         if self.simulator.effects.is_empty() {
             let mut counts = vec![0.0; self.array().elements()];
@@ -98,7 +98,7 @@ impl Scene {
     }
 }
 
-/// The model that was asked for: a file's, or the paper's, on the array that was asked for.
+/// The model from `--model`, or the paper's, on the array from `--array`.
 fn model(args: &SimulateArgs) -> anyhow::Result<Model> {
     let array = args.array.as_deref().map(array).transpose()?;
     if let Some(path) = &args.model {
@@ -114,7 +114,7 @@ fn model(args: &SimulateArgs) -> anyhow::Result<Model> {
     let paper = Model::from_toml(PAPER_MODEL)?;
     Ok(match array {
         Some(array) if array != paper.base.array => {
-            // The paper's Fig. 10 gives sensors that it did not characterise a spread of one element width.
+            // In the paper's Fig. 10, uncharacterised sensors have a spread of one element width.
             let psf = Psf { sigma_intercept_mm: array.pitch_mm(), sigma_per_mm: 0.0 };
             let mut model = paper.on(array);
             model.base.psf = psf;
@@ -135,7 +135,7 @@ fn array(name: &str) -> Result<Array, Failure> {
     })
 }
 
-/// A made tool by its name, a simple one by its shape, or a mesh from a file.
+/// A generated tool, a simple shape, or a mesh from a file.
 fn indenter(args: &SimulateArgs) -> anyhow::Result<Indenter> {
     let diameter_mm = args.diameter_mm;
     if !(diameter_mm.is_finite() && diameter_mm > 0.0) {
@@ -172,7 +172,7 @@ fn indenter(args: &SimulateArgs) -> anyhow::Result<Indenter> {
     Ok(Indenter::Mesh(Arc::new(tilted)))
 }
 
-/// A mesh from a file. What is wrong inside it is said with its name.
+/// Reads a mesh. Errors name the file.
 fn load(path: &Path) -> anyhow::Result<Mesh> {
     use FileError::{Broken, Io, Mesh, NoFaces, TooLarge, UnknownFormat};
     tactus_scene::load(path).map_err(|error| match error {

@@ -1,4 +1,4 @@
-//! Frames along a path of the stage.
+//! Frames along a path.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -15,7 +15,7 @@ use super::scene::Scene;
 use crate::cli::{Common, SimulateArgs};
 use crate::exit::{Exit, Failure, in_words};
 
-/// Most frames of one series: ten hours at 30 Hz.
+/// Limit of frames in one series: ten hours at 30 Hz.
 const FRAMES_MAX: f64 = 1_080_000.0;
 
 /// Writes the frames along the path of a CSV file, as CSV or as one JSON object a line.

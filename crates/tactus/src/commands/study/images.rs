@@ -1,7 +1,7 @@
 //! Figure 8: the H on the rig and in the calibrated model.
 //!
-//! The simulated rig has the H put on its stage, at several angles and under each covering, and its devices are asked for
-//! the images, as for any press. The model images the same presses.
+//! The simulated rig presses the H at several angles and under each covering, and its devices read the images as in any
+//! press. The model images the same presses.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,12 +17,12 @@ use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_scene::shapes::Scene;
 use toml::{Table, Value};
 
-use super::steps::{Step, Steps};
+use super::steps::{StudyStep, StudySteps};
 use crate::cli::{Common, StudyArgs};
 use crate::commands::calibrate::Calibrated;
 
 const ANGLES_DEG: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 90.0];
-/// So lightly that no element leaves the envelope, wide as the H is.
+/// Light enough for the envelope, although the H is wide.
 const DEPTH_MM: f64 = 0.04;
 
 /// The two parts of Figure 8.
@@ -33,11 +33,11 @@ pub(super) struct Images {
     pub(super) worst_percent: f64,
 }
 
-/// Takes the images; none if the data gave no model.
+/// Takes the images; `None` if the data gave no model.
 pub(super) fn take(
     common: &Common,
     args: &StudyArgs,
-    steps: &mut Steps,
+    steps: &mut StudySteps,
     calibrated: &Calibrated,
 ) -> anyhow::Result<Option<Images>> {
     if calibrated.model().is_none() {
@@ -82,11 +82,11 @@ pub(super) fn take(
     }))
 }
 
-/// The H at an angle under coverings, on the rig and in the model.
+/// Images of the H at one angle under each covering, from the rig and from the model.
 fn pressed(
     common: &Common,
     args: &StudyArgs,
-    steps: &mut Steps,
+    steps: &mut StudySteps,
     calibrated: &Calibrated,
     angle_deg: f64,
     coverings: &[Covering],
@@ -95,7 +95,7 @@ fn pressed(
     let mesh = turned(&Scene::H.mesh(), angle_deg)?;
     let of = if let [_] = coverings { format!("{angle_deg} degrees") } else { "each covering".into() };
     let thicknesses_mm: Vec<f64> = coverings.iter().map(|covering| covering.thickness_mm).collect();
-    let step = Step {
+    let step = StudyStep {
         name: format!("image of the H, {of}"),
         experiment: "image",
         parameters: vec![format!("depth_mm={DEPTH_MM}"), format!("coverings_mm={thicknesses_mm:?}")],
@@ -140,7 +140,7 @@ fn turned(mesh: &Mesh, angle_deg: f64) -> anyhow::Result<Mesh> {
     Ok(mesh.turned([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])?)
 }
 
-/// The file of the same rig with the H on its stage.
+/// Writes a file of the same rig with the H as its indenter.
 fn rig_with(args: &StudyArgs, mesh: &Mesh, angle_deg: f64) -> anyhow::Result<PathBuf> {
     let text = match &args.rig_file {
         Some(path) => fs::read_to_string(path).with_context(|| path.display().to_string())?,
@@ -164,7 +164,7 @@ fn rig_with(args: &StudyArgs, mesh: &Mesh, angle_deg: f64) -> anyhow::Result<Pat
     Ok(path)
 }
 
-/// The description of the sensor's frames is named relative to the rig file, which now stands elsewhere.
+/// Makes the path of the frame description absolute, because the new rig file is in another folder.
 fn describe_from_anywhere(rig: &mut Table, rig_file: Option<&Path>) -> anyhow::Result<()> {
     let format =
         rig.get_mut("sensor").and_then(Value::as_table_mut).and_then(|sensor| sensor.get_mut("format"));

@@ -1,4 +1,4 @@
-//! The runs of a study, remembered, so that none is made twice.
+//! The runs of a study. Completed runs are kept in a file, so that an interrupted study does not repeat them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,39 +19,39 @@ use crate::sha256;
 /// Name of the form of `study.json`.
 const SCHEMA: &str = "tactus.study-steps/1";
 
-/// What was done already; kept in `study.json`.
+/// The completed steps; kept in `study.json`.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Steps {
+pub(super) struct StudySteps {
     schema: String,
-    /// What the steps were made with; other steps do not go with them.
+    // The arguments of the study; a study with others cannot continue this one.
     seed: u64,
     points: u32,
     embedded: bool,
     rig: Option<String>,
     /// SHA-256 of the rig file.
     rig_file: Option<String>,
-    /// SHA-256 of the truth.
+    /// SHA-256 of the truth file.
     truth: Option<String>,
-    taken: Vec<Taken>,
+    taken: Vec<CompletedStep>,
     #[serde(skip)]
     path: PathBuf,
 }
 
-/// A run that was made.
+/// A completed run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Taken {
+pub(super) struct CompletedStep {
     pub(super) step: String,
     pub(super) run_id: String,
     pub(super) presses: u32,
     pub(super) duration_s: f64,
     pub(super) embedded: bool,
-    /// What was lost on the way, if anything was.
+    /// What was lost during the run, if anything.
     pub(super) degraded: Option<String>,
     pub(super) recording: PathBuf,
 }
 
 /// A run to make.
-pub(super) struct Step {
+pub(super) struct StudyStep {
     pub(super) name: String,
     pub(super) experiment: &'static str,
     pub(super) parameters: Vec<String>,
@@ -59,7 +59,7 @@ pub(super) struct Step {
     pub(super) rig_file: Option<PathBuf>,
 }
 
-impl Taken {
+impl CompletedStep {
     pub(super) fn run(&self) -> StudyRun {
         StudyRun {
             name: self.step.clone(),
@@ -71,8 +71,11 @@ impl Taken {
     }
 }
 
-impl Steps {
-    /// The steps of the study in the folder, or none yet.
+impl StudySteps {
+    /// Reads the completed steps from the study's folder; none in a new folder.
+    ///
+    /// # Errors
+    /// If the folder holds a study with other arguments.
     pub(super) fn resume(common: &Common, args: &StudyArgs) -> anyhow::Result<Self> {
         let path = args.out.join("study.json");
         let new = Self {
@@ -91,7 +94,7 @@ impl Steps {
         }
         let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
         let known: Self = serde_json::from_str(&text).with_context(|| {
-            format!("{} is no list of a study's steps; give another --out", path.display())
+            format!("{} is not a study's list of steps; give another --out", path.display())
         })?;
         let with = |steps: &Self| {
             let Self { schema, seed, points, embedded, rig, rig_file, truth, .. } = steps;
@@ -99,7 +102,7 @@ impl Steps {
         };
         if with(&known) != with(&new) {
             let error = format!(
-                "{} is of a study with another seed, rig, rig file, truth or number of points: give another --out, or the same arguments and file",
+                "{} belongs to a study with another seed, rig, rig file, truth or number of points: give another --out, or the same arguments and files",
                 path.display()
             );
             return Err(Failure::new(Exit::Usage, error).into());
@@ -107,16 +110,20 @@ impl Steps {
         Ok(Self { path, ..known })
     }
 
-    /// Corners, element centres and the sweep, one covering after the other.
-    pub(super) fn measure(&mut self, common: &Common, args: &StudyArgs) -> anyhow::Result<Vec<Taken>> {
-        let plain = |name: &str, experiment| Step {
+    /// Runs corners, element centres and the sweep under each covering.
+    pub(super) fn measure(
+        &mut self,
+        common: &Common,
+        args: &StudyArgs,
+    ) -> anyhow::Result<Vec<CompletedStep>> {
+        let plain = |name: &str, experiment| StudyStep {
             name: name.into(),
             experiment,
             parameters: Vec::new(),
             rig_file: None,
         };
         let mut steps = vec![plain("corners", "corners"), plain("element-centres", "element-centres")];
-        steps.extend(COVERINGS.map(|Covering { thickness_mm }| Step {
+        steps.extend(COVERINGS.map(|Covering { thickness_mm }| StudyStep {
             parameters: vec![
                 format!("coverings_mm=[{thickness_mm}]"),
                 format!("points={}", args.points),
@@ -128,8 +135,13 @@ impl Steps {
         steps.iter().map(|step| self.take(common, args, step)).collect()
     }
 
-    /// Makes a step's run, unless it was made already.
-    pub(super) fn take(&mut self, common: &Common, args: &StudyArgs, step: &Step) -> anyhow::Result<Taken> {
+    /// Runs a step, unless it is completed.
+    pub(super) fn take(
+        &mut self,
+        common: &Common,
+        args: &StudyArgs,
+        step: &StudyStep,
+    ) -> anyhow::Result<CompletedStep> {
         let known = self.taken.iter().find(|taken| taken.step == step.name && taken.recording.is_file());
         if let Some(known) = known {
             if !common.json {
@@ -166,14 +178,14 @@ impl Steps {
             );
             return Err(Failure::new(Exit::of_run(summary.exit_status), error).into());
         }
-        let taken = Taken {
+        let taken = CompletedStep {
             step: step.name.clone(),
             run_id: summary.run_id,
             presses: summary.presses,
             duration_s: summary.duration_s,
             embedded: summary.embedded,
             degraded: (summary.exit_status == ExitStatus::Degraded)
-                .then(|| format!("Step {:?} is degraded: {}.", step.name, summary.message)),
+                .then(|| format!("StudyStep {:?} is degraded: {}.", step.name, summary.message)),
             recording: std::path::absolute(&summary.recording)?,
         };
         if !common.json {

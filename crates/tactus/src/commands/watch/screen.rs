@@ -1,4 +1,4 @@
-//! What the live view shows.
+//! Content of the live view.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -13,10 +13,10 @@ use crate::output::duration;
 /// Width and height of an element's cell, in characters.
 const CELL: [u16; 2] = [7, 2];
 
-/// The span of the colours, at least, in counts: noise must not look like a press.
+/// Least span of the colour scale, in counts, so that noise does not look like a press.
 const SPAN_MIN_COUNTS: f32 = 100.0;
 
-/// The latest of everything.
+/// The latest state of everything that is shown.
 pub(super) struct Screen {
     rig: String,
     rows: usize,
@@ -68,7 +68,7 @@ impl Screen {
         self.frame = Some(frame);
     }
 
-    /// The present frame becomes the zero of the view.
+    /// Takes the present frame as the zero of the view.
     pub(super) fn tare(&mut self) {
         if let Some(frame) = &self.frame {
             self.zero_counts.clone_from(&frame.counts);
@@ -113,9 +113,9 @@ impl Screen {
         Line::from(spans)
     }
 
-    /// Row 0 stands at the bottom, as y points up.
+    /// Row 0 is at the bottom, because y points up.
     fn draw_image(&self, frame: &mut Frame<'_>, area: Rect) {
-        let block = Block::bordered().title(" counts above the zero ");
+        let block = Block::bordered().title(" counts above zero ");
         let inner = block.inner(area);
         frame.render_widget(block, area);
         let (Some(latest), true) = (&self.frame, self.rows > 0 && self.cols > 0) else {
@@ -193,7 +193,7 @@ impl Screen {
     }
 }
 
-/// Dark blue over green to yellow, and a text colour that can be read on it; `share` of the span.
+/// Background colour (dark blue to yellow) for a share of the span, and a readable text colour.
 fn colours(share: f32) -> (Color, Color) {
     // Five anchors of the viridis map (van der Walt and Smith, 2015, CC0).
     const ANCHORS: [[f32; 3]; 5] = [

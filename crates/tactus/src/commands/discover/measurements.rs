@@ -1,4 +1,4 @@
-//! What was measured, for discovery.
+//! The frames that a discovery analyses.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -12,17 +12,17 @@ use tactus_schema::Rig;
 use crate::sha256;
 
 /// Frames, and where they came from.
-pub(super) struct Measured {
+pub(super) struct Measurements {
     pub(super) files: Vec<PathBuf>,
     pub(super) rig: Rig,
     pub(super) simulated: bool,
     pub(super) data: Vec<DataSource>,
-    /// What the files lack.
+    /// Defects of the files.
     pub(super) notes: Vec<String>,
     pub(super) frames: Frames,
 }
 
-impl Measured {
+impl Measurements {
     pub(super) fn read(files: &[PathBuf]) -> anyhow::Result<Self> {
         let mut frames: Option<Frames> = None;
         let mut runs: BTreeMap<String, (u64, BTreeSet<i32>)> = BTreeMap::new();
@@ -54,7 +54,7 @@ impl Measured {
         Ok(Self { files: files.to_owned(), rig, simulated, data, notes, frames })
     }
 
-    /// The runs by their ids, as evidence names them.
+    /// The run ids, as evidence names them.
     pub(super) fn id(&self) -> String {
         let ids: Vec<&str> = self.data.iter().map(|source| source.id.as_str()).collect();
         ids.join(", ")

@@ -7,7 +7,7 @@ use crate::markup::Text;
 
 /// One value for each of `rows x cols` elements, row-major; row 0 is drawn at the bottom, as y points up.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Heat<'a> {
+pub struct HeatMap<'a> {
     /// The values; what is missing or not finite is not drawn.
     pub values: &'a [f32],
     /// Number of rows.
@@ -20,7 +20,7 @@ pub struct Heat<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image<'a> {
     /// The values.
-    pub heat: Heat<'a>,
+    pub heat: HeatMap<'a>,
     /// Side of an element's square.
     pub cell_px: f64,
     /// The colours.
@@ -35,7 +35,7 @@ pub struct Tile<'a> {
     /// Upper left corner.
     pub at_px: [f64; 2],
     /// The image.
-    pub heat: Heat<'a>,
+    pub heat: HeatMap<'a>,
     /// What it shows, as a tooltip.
     pub title: String,
 }
@@ -93,7 +93,7 @@ impl fmt::Display for Mosaic<'_> {
     }
 }
 
-impl Heat<'_> {
+impl HeatMap<'_> {
     /// One path a colour, one unit a cell.
     fn write(&self, f: &mut fmt::Formatter<'_>, scale: Scale) -> fmt::Result {
         let mut cells: BTreeMap<u8, Vec<[usize; 2]>> = BTreeMap::new();
@@ -114,5 +114,5 @@ impl Heat<'_> {
 }
 
 #[cfg(test)]
-#[path = "heat_tests.rs"]
+#[path = "heat_map_tests.rs"]
 mod tests;

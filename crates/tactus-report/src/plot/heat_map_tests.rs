@@ -1,10 +1,10 @@
-use super::{Heat, Mosaic, Tile};
+use super::{HeatMap, Mosaic, Tile};
 use crate::plot::Scale;
 
 #[test]
 fn row_zero_is_at_the_bottom_and_equal_values_share_a_path() {
     let values = [0.0, 1.0, 0.0, f32::NAN, 0.0, 0.0];
-    let heat = Heat { values: &values, rows: 3, cols: 2 };
+    let heat = HeatMap { values: &values, rows: 3, cols: 2 };
     let tile = Tile { at_px: [5.0, 7.0], heat, title: "press <0>".into() };
     let mosaic = Mosaic {
         name: "images".into(),

@@ -1,4 +1,4 @@
-//! What there is to compare: quantity, paper, this rig, truth.
+//! The quantities of a study: the paper's value, this rig's and, if known, the truth.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use tactus_calibrate::{Estimate, Fault, FaultKind, Form};
 use tactus_model::{DIGITACTS_PITCH_MM, Psf};
 use tactus_record::Timeline;
 use tactus_report::figures::Widening;
-use tactus_report::study::{Found, StudyRow};
+use tactus_report::study::{ComparedQuantity, FoundValue};
 use tactus_runner::embedded::{self, Truth};
 use tactus_schema::Rig;
 use tactus_schema::rig::ElementFault;
@@ -24,28 +24,28 @@ const POISSON_RATIO: f64 = 0.45;
 /// Force steps of one unit reading for which the acuity is stated: 8 bit.
 const FORCE_STEPS: u32 = 256;
 
-/// What the rig of a recording hides, if it is a simulated one that says so.
+/// The true parameters of the recording's rig, if it is simulated and its file has them.
 pub(super) fn truth(recording: &Path) -> anyhow::Result<Option<Truth>> {
     let timeline = Timeline::read(recording)?;
     let Some(text) = timeline.attachment("rig.toml") else { return Ok(None) };
-    let text = std::str::from_utf8(text).context("the recording's rig file is no text")?;
+    let text = std::str::from_utf8(text).context("the recording's rig file is not text")?;
     let rig = Rig::from_toml(text).context("the recording's rig file")?;
     Ok(embedded::truth(&rig))
 }
 
 /// All quantities, in the paper's order.
-pub(super) fn rows(
+pub(super) fn quantities(
     calibrated: &Calibrated,
     truth: Option<&Truth>,
     images: Option<&Images>,
-) -> anyhow::Result<Vec<StudyRow>> {
+) -> anyhow::Result<Vec<ComparedQuantity>> {
     let mut rows = registration(calibrated, truth);
     rows.extend(response(calibrated, truth));
     rows.extend(mechanics()?);
     rows.extend(spread(calibrated, truth));
     rows.extend(acuity()?);
     if let Some(images) = images {
-        rows.push(StudyRow {
+        rows.push(ComparedQuantity {
             paper: Some("qualitatively similar".into()),
             note: "Fig. 8: largest difference between the rig's images of the H and the model's".into(),
             ..text("images of the H", "", format!("within {:.1} % of their range", images.worst_percent))
@@ -54,7 +54,7 @@ pub(super) fn rows(
     Ok(rows)
 }
 
-fn registration(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
+fn registration(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuantity> {
     let Some(fit) = &calibrated.calibration.registration else { return Vec::new() };
     let of = |of: fn(&Truth) -> f64| truth.map(of);
     let [x, y] = fit.origin_mm;
@@ -63,18 +63,18 @@ fn registration(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow>
         row("origin, y", "mm", Some(y), of(|truth| truth.registration.origin_mm[1])),
         row("rotation", "deg", fit.rotation_deg, of(|truth| truth.registration.rotation_deg)),
         row("surface height", "mm", fit.surface_mm, of(|truth| truth.surface_mm)),
-        StudyRow {
+        ComparedQuantity {
             note: "a check of element centres and stage".into(),
             ..row("scale", "", fit.scale, truth.map(|_| 1.0))
         },
     ]
 }
 
-fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
+fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuantity> {
     let calibration = &calibrated.calibration;
     let faults = &calibration.health.faults;
     let planted = truth.map(planted);
-    let mut rows = vec![StudyRow {
+    let mut rows = vec![ComparedQuantity {
         paper: Some("two, answering a neighbour".into()),
         inside: planted.as_ref().map(|planted| {
             let alike = |(found, (element, kind)): (&Fault, &(usize, FaultKind))| {
@@ -88,7 +88,7 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
         ..text("faulty elements", "", in_words(faults.iter().map(|fault| (fault.element, fault.kind))))
     }];
     let Some(fit) = &calibration.response else { return rows };
-    rows.push(StudyRow {
+    rows.push(ComparedQuantity {
         paper: Some("linear at low force, else quadratic".into()),
         note: "chosen on held-out dwells".into(),
         ..text("response", "", fit.form.name().into())
@@ -108,15 +108,16 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
             one.sensitivity_counts_per_mm.covers(sensitivities[one.element])
         };
         let (inside, of) = (fit.elements.iter().filter(inside).count(), fit.elements.len());
-        rows.push(StudyRow {
-            note: "95 % are expected on average over many rigs; on one rig their errors hang together".into(),
+        rows.push(ComparedQuantity {
+            note: "95 % are expected on average over many rigs; on one rig their errors are correlated"
+                .into(),
             ..text("sensitivities inside their intervals", "", format!("{inside} of {of}"))
         });
     }
     rows
 }
 
-/// What is wrong with the rig's elements, in order of the elements, as calibration says it.
+/// The planted faults in order of the elements, as calibration reports faults.
 fn planted(truth: &Truth) -> Vec<(usize, FaultKind)> {
     let kind = |fault: &ElementFault| match *fault {
         ElementFault::Dead => FaultKind::Dead,
@@ -127,7 +128,7 @@ fn planted(truth: &Truth) -> Vec<(usize, FaultKind)> {
     truth.faults.iter().map(|(element, fault)| (*element, kind(fault))).collect()
 }
 
-/// True if a fault was found for what it is; a noise need not be measured exactly.
+/// True if the fault has the planted kind; the size of a noise may differ.
 fn alike(found: FaultKind, planted: FaultKind) -> bool {
     matches!((found, planted), (FaultKind::Noisy { .. }, FaultKind::Noisy { .. })) || found == planted
 }
@@ -143,16 +144,16 @@ fn in_words(faults: impl Iterator<Item = (usize, FaultKind)>) -> String {
     if words.is_empty() { "none".into() } else { words.join(", ") }
 }
 
-/// What elasticity says of the spread, in bricks, which stand for the paper's unit of thickness in Fig. 3.
-fn mechanics() -> anyhow::Result<Vec<StudyRow>> {
+/// Spread by finite elements, in bricks, the paper's unit of thickness in Fig. 3.
+fn mechanics() -> anyhow::Result<Vec<ComparedQuantity>> {
     let Widening { line: [intercept, slope], of_layer, .. } = Widening::new(POISSON_RATIO)?;
     Ok(vec![
-        StudyRow {
+        ComparedQuantity {
             paper: Some("0.5".into()),
             note: format!("finite elements, Fig. 3, Poisson's ratio {POISSON_RATIO}; the continuous layer has {of_layer:.3}"),
             ..text("spread of the covering alone, per thickness", "", format!("{slope:.3}"))
         },
-        StudyRow {
+        ComparedQuantity {
             paper: Some("0.9".into()),
             note: "elasticity has none: what is left is the mesh's; the rest of the paper's belongs to its sensor".into(),
             ..text("spread at no thickness, finite elements", "bricks", format!("{intercept:.2}"))
@@ -160,17 +161,17 @@ fn mechanics() -> anyhow::Result<Vec<StudyRow>> {
     ])
 }
 
-fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
+fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuantity> {
     let pitch_mm = calibrated.rig.array.pitch_mm();
     let Some(thickness) = &calibrated.calibration.thickness else { return Vec::new() };
     let psf = truth.map(|truth| truth.model.psf());
-    let mut rows: Vec<StudyRow> = thickness
+    let mut rows: Vec<ComparedQuantity> = thickness
         .coverings
         .iter()
         .map(|covering| {
             let t = covering.covering_mm;
             let truth = psf.map(|psf| (psf.sigma_intercept_mm + psf.sigma_per_mm * t) / pitch_mm);
-            StudyRow {
+            ComparedQuantity {
                 paper: Some(format!("{:.2} (Eq. 4)", 1.11 + 0.497 * t / 2.0)),
                 ..row(
                     &format!("spread under {t:.3} mm"),
@@ -183,7 +184,7 @@ fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
         .collect();
     if let Some(line) = &thickness.linear {
         let [intercept, slope] = line.coefficients;
-        rows.push(StudyRow {
+        rows.push(ComparedQuantity {
             paper: Some("1.11".into()),
             ..row(
                 "Eq. 4, intercept",
@@ -192,7 +193,7 @@ fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
                 psf.map(|psf| psf.sigma_intercept_mm / pitch_mm),
             )
         });
-        rows.push(StudyRow {
+        rows.push(ComparedQuantity {
             paper: Some("0.497".into()),
             ..row("Eq. 4, slope", "", Some(slope), psf.map(|psf| psf.sigma_per_mm))
         });
@@ -200,7 +201,7 @@ fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
     if let Some(parabola) = &thickness.quadratic {
         let [_, _, bend] = parabola.coefficients;
         let found = Estimate { value: bend.value * pitch_mm, standard_error: bend.standard_error * pitch_mm };
-        rows.push(StudyRow {
+        rows.push(ComparedQuantity {
             note: "of the quadratic fit of Fig. 5a; 0 if the spread is linear in thickness".into(),
             ..row("spread against thickness, bend", "1/pitch", Some(found), truth.map(|_| 0.0))
         });
@@ -208,7 +209,7 @@ fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<StudyRow> {
     rows
 }
 
-fn acuity() -> anyhow::Result<Vec<StudyRow>> {
+fn acuity() -> anyhow::Result<Vec<ComparedQuantity>> {
     let paper = Wanted {
         pitch_mm: DIGITACTS_PITCH_MM,
         force_steps: FORCE_STEPS,
@@ -217,7 +218,7 @@ fn acuity() -> anyhow::Result<Vec<StudyRow>> {
     };
     let best = paper.design()?.best_for_locating;
     Ok(vec![
-        StudyRow {
+        ComparedQuantity {
             paper: Some("around 0.3".into()),
             note: format!(
                 "Fig. 6a, {FORCE_STEPS} force steps: {} locations in an element; a ridge only where 1/f is whole",
@@ -225,7 +226,7 @@ fn acuity() -> anyhow::Result<Vec<StudyRow>> {
             ),
             ..text("spread that locates best", "pitches", format!("{:.2}", best.sigma))
         },
-        StudyRow {
+        ComparedQuantity {
             paper: Some("1.0".into()),
             note: "3 / pi, which the paper rounds".into(),
             ..text("least spread without aliasing", "pitches", format!("{NYQUIST_SIGMA:.3}"))
@@ -233,52 +234,52 @@ fn acuity() -> anyhow::Result<Vec<StudyRow>> {
     ])
 }
 
-fn row(quantity: &str, unit: &str, found: Option<Estimate>, truth: Option<f64>) -> StudyRow {
-    StudyRow {
+fn row(quantity: &str, unit: &str, found: Option<Estimate>, truth: Option<f64>) -> ComparedQuantity {
+    ComparedQuantity {
         quantity: quantity.into(),
         unit: unit.into(),
         paper: None,
         inside: found.zip(truth).map(|(found, truth)| found.covers(truth)),
-        found: found.map_or(Found::Nothing, Found::Estimate),
+        found: found.map_or(FoundValue::Nothing, FoundValue::Estimate),
         truth,
-        note: if found.is_some() { String::new() } else { "the data do not tell".into() },
+        note: if found.is_some() { String::new() } else { "not determined by the data".into() },
     }
 }
 
-fn text(quantity: &str, unit: &str, found: String) -> StudyRow {
-    StudyRow {
+fn text(quantity: &str, unit: &str, found: String) -> ComparedQuantity {
+    ComparedQuantity {
         quantity: quantity.into(),
         unit: unit.into(),
         paper: None,
-        found: Found::Text(found),
+        found: FoundValue::Text(found),
         truth: None,
         inside: None,
         note: String::new(),
     }
 }
 
-/// A row for machines.
-pub(super) fn to_json(row: &StudyRow) -> Value {
-    let StudyRow { quantity, unit, paper, found, truth, inside, note } = row;
+/// A quantity as JSON.
+pub(super) fn to_json(row: &ComparedQuantity) -> Value {
+    let ComparedQuantity { quantity, unit, paper, found, truth, inside, note } = row;
     let found = match found {
-        Found::Estimate(Estimate { value, standard_error }) => {
+        FoundValue::Estimate(Estimate { value, standard_error }) => {
             json!({ "value": value, "standard_error": standard_error })
         }
-        Found::Text(text) => json!(text),
-        Found::Nothing => Value::Null,
+        FoundValue::Text(text) => json!(text),
+        FoundValue::Nothing => Value::Null,
     };
     json!({
         "quantity": quantity, "unit": unit, "paper": paper, "found": found, "truth": truth, "inside": inside, "note": note,
     })
 }
 
-/// The rows for people.
-pub(super) fn print(rows: &[StudyRow]) {
+/// Prints the quantities as a table.
+pub(super) fn print(rows: &[ComparedQuantity]) {
     let cells = rows.iter().map(|row| {
         let found = match &row.found {
-            Found::Estimate(found) => estimate(*found),
-            Found::Text(text) => text.clone(),
-            Found::Nothing => "-".into(),
+            FoundValue::Estimate(found) => estimate(*found),
+            FoundValue::Text(text) => text.clone(),
+            FoundValue::Nothing => "-".into(),
         };
         let truth = row.truth.map_or_else(String::new, |truth| format!("{truth:.5}"));
         let inside = row.inside.map_or("", |inside| if inside { "yes" } else { "NO" });
