@@ -175,9 +175,9 @@ struct Sensor {
 impl Sensor {
     async fn run(mut self, publisher: tactus_bus::Publisher, seconds: Option<f64>) -> anyhow::Result<()> {
         let mut pipeline = Pipeline::new(&self.scene.simulator)?;
-        // A mesh takes milliseconds to press exactly. Where the blur is too fine for a stamp, it does.
+        // A mesh takes milliseconds to press exactly. Where the blur is too fine for a press table, it does.
         if let Indenter::Mesh(_) = &self.scene.simulator.indenter
-            && let Err(error) = pipeline.hasten(self.scene.simulator.covering.thickness_mm)
+            && let Err(error) = pipeline.use_press_table(self.scene.simulator.covering.thickness_mm)
         {
             tracing::warn!("{error}; images are computed one by one, and may come late");
         }
