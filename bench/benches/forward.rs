@@ -17,8 +17,8 @@ fn main() -> Result<()> {
 /// Only what has a mesh is drawn.
 fn ways(tool: Tool) -> &'static [Way] {
     match tool {
-        Tool::H => &[Way::Stamp, Way::Raster, Way::Exact],
-        Tool::Cylinder => &[Way::Stamp, Way::Exact],
+        Tool::H => &[Way::PressTable, Way::Raster, Way::Exact],
+        Tool::Cylinder => &[Way::PressTable, Way::Exact],
     }
 }
 

@@ -143,7 +143,7 @@ class Ours:
         return {"version": self.said["version"], "ready_s": self.said["ready_s"]}
 
 
-OURS = (("stamp", "h"), ("raster", "h"), ("exact", "h"), ("stamp", "cylinder"))
+OURS = (("press-table", "h"), ("raster", "h"), ("exact", "h"), ("press-table", "cylinder"))
 
 
 class Peer:

@@ -35,13 +35,13 @@ impl Growth {
     /// If an image cannot be made.
     pub fn measure() -> Result<Vec<Self>> {
         let mut growths = Vec::new();
-        for way in [Way::Stamp, Way::Raster, Way::Exact] {
+        for way in [Way::PressTable, Way::Raster, Way::Exact] {
             growths.push(Self::with_elements(Tool::H, way)?);
         }
-        for way in [Way::Stamp, Way::Exact] {
+        for way in [Way::PressTable, Way::Exact] {
             growths.push(Self::with_elements(Tool::Cylinder, way)?);
         }
-        growths.extend(Self::with_triangles(Way::Stamp)?);
+        growths.extend(Self::with_triangles(Way::PressTable)?);
         for way in [Way::Raster, Way::Exact] {
             let [_, image] = Self::with_triangles(way)?;
             growths.push(image);

@@ -10,7 +10,7 @@ use crate::{Painter, Tool, Way, model, per_image_s, poses};
 
 /// Rates of one core, and how near to them the kernels come.
 ///
-/// For the stamp the formulas are, per element that the tool reaches and with `C` channels (1 for the cylinder, 3
+/// For the press table the formulas are, per element that the tool reaches and with `C` channels (1 for the cylinder, 3
 /// for the H: the nodes of its rotation):
 ///
 /// ```text
@@ -58,7 +58,7 @@ impl Limits {
         let mut kernels = Vec::new();
         for array in Array::shipped() {
             for tool in [Tool::H, Tool::Cylinder] {
-                kernels.push(Kernel::of_stamp(&array, tool)?);
+                kernels.push(Kernel::of_press_table(&array, tool)?);
             }
         }
         Ok(Self { flops_per_s: flops_per_s(), bytes_per_s: PLACES.map(bytes_per_s), kernels })
@@ -66,8 +66,8 @@ impl Limits {
 }
 
 impl Kernel {
-    fn of_stamp(array: &Array, tool: Tool) -> Result<Self> {
-        let mut painter = Painter::new(Way::Stamp, &model(array.clone())?, &tool.indenter())?;
+    fn of_press_table(array: &Array, tool: Tool) -> Result<Self> {
+        let mut painter = Painter::new(Way::PressTable, &model(array.clone())?, &tool.indenter())?;
         let channels = match tool {
             Tool::H => 3.0,
             Tool::Cylinder => 1.0,

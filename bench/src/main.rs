@@ -36,7 +36,7 @@ enum Part {
         #[arg(long, value_enum, default_value = "h")]
         tool: Tool,
         /// From pose to image.
-        #[arg(long = "path", value_enum, default_value = "stamp")]
+        #[arg(long = "path", value_enum, default_value = "press-table")]
         way: Way,
         /// How many press at once.
         #[arg(long, default_value_t = 1)]
@@ -60,7 +60,7 @@ enum Part {
         #[arg(long, value_enum, default_value = "h")]
         tool: Tool,
         /// From pose to image.
-        #[arg(long = "path", value_enum, default_value = "stamp")]
+        #[arg(long = "path", value_enum, default_value = "press-table")]
         way: Way,
     },
     /// Both panels of Fig. 6, 25 x 25, and how their time grows.
@@ -254,7 +254,7 @@ fn limits(limits: &Limits) {
         memory / 1e9
     );
     println!(
-        "stamp, an image: flops = n (44 C + 41), bytes = n (64 C + 24), n elements reached, C = 3 (h), 1 (cylinder)"
+        "press table, an image: flops = n (44 C + 41), bytes = n (64 C + 24), n elements reached, C = 3 (h), 1 (cylinder)"
     );
     println!(
         "{:<14}{:<10}{:>10}{:>10}{:>9}{:>12}{:>14}",

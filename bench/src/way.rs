@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use tactus_model::{Contact, ForwardModel, Indenter, Stamp};
+use tactus_model::{Contact, ForwardModel, Indenter, PressTable};
 use tactus_scene::{Attitude, Renderer};
 
 use crate::{COVERING, DEPTH_MAX_MM, Pose};
@@ -11,8 +11,8 @@ use crate::{COVERING, DEPTH_MAX_MM, Pose};
 /// How an image comes about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Way {
-    /// [`Stamp`]: the tool's blurred and integrated footprint, tabulated once.
-    Stamp,
+    /// [`PressTable`]: the tool's blurred and integrated footprint, tabulated once.
+    PressTable,
     /// [`Renderer`]: the mesh drawn into a depth map, then two matrix products; any attitude.
     Raster,
     /// [`ForwardModel::image`]: closed forms and quadrature; the reference.
@@ -22,8 +22,8 @@ pub enum Way {
 /// Makes images of one tool along one way, with the memory it needs; every thread has its own.
 #[derive(Debug, Clone)]
 pub enum Painter {
-    /// See [`Way::Stamp`].
-    Stamp(Stamp),
+    /// See [`Way::PressTable`].
+    PressTable(PressTable),
     /// See [`Way::Raster`].
     Raster(Renderer),
     /// See [`Way::Exact`].
@@ -41,10 +41,10 @@ impl Painter {
     /// What can be made ready before the first pose is known.
     ///
     /// # Errors
-    /// If the blur is too fine for a stamp, or a tool without a mesh is to be drawn.
+    /// If the blur is too fine for a press table, or a tool without a mesh is to be drawn.
     pub fn new(way: Way, model: &ForwardModel, indenter: &Indenter) -> Result<Self> {
         Ok(match way {
-            Way::Stamp => Self::Stamp(Stamp::new(model, indenter, COVERING, DEPTH_MAX_MM)?),
+            Way::PressTable => Self::PressTable(PressTable::new(model, indenter, COVERING, DEPTH_MAX_MM)?),
             Way::Raster => {
                 let Indenter::Mesh(mesh) = indenter else {
                     bail!("only a mesh is drawn: {indenter:?} is none")
@@ -71,7 +71,7 @@ impl Painter {
     pub fn image(&mut self, pose: &Pose, image: &mut [f32]) -> Result<()> {
         let Pose { position_mm, rotation_deg, depth_mm } = *pose;
         match self {
-            Self::Stamp(stamp) => stamp.image(position_mm, rotation_deg, depth_mm, image)?,
+            Self::PressTable(table) => table.image(position_mm, rotation_deg, depth_mm, image)?,
             Self::Raster(renderer) => {
                 let attitude = Attitude::upright(rotation_deg);
                 renderer.image(&tactus_scene::Pose { position_mm, attitude, depth_mm }, image)?;

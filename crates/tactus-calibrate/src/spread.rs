@@ -283,7 +283,7 @@ impl<'a> Search<'a> {
         let step_mm = STEP_SHARE * sigma_mm;
         let [less, more] = [sigma_mm - step_mm, sigma_mm + step_mm].map(|sigma_mm| {
             let mut felt = vec![0.0; self.declared.array().elements()];
-            let press = effect::Press {
+            let press = effect::Load {
                 weight: 1.0,
                 contact: contact.clone(),
                 lean: [0.0; 2],

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector};
-use tactus_model::effect::{Definition, Kind, REGISTRY};
+use tactus_model::effect::{Definition, ParameterKind, REGISTRY};
 
 use crate::fit::{Fitted, Free, Problem, solve};
 use crate::score::{Fitting, Score};
@@ -70,7 +70,7 @@ impl Candidate {
         let mut amplitudes = Vec::new();
         let mut shapes = vec![Term::neutral(definition)];
         for (parameter, known) in definition.parameters.iter().enumerate() {
-            if known.kind != Kind::Real {
+            if known.kind != ParameterKind::Real {
                 continue;
             }
             let acts = known.neutral == 0.0 || {
@@ -90,7 +90,7 @@ impl Candidate {
                 shapes = cross(&shapes, parameter, &values);
             }
         }
-        let wires = definition.parameters.iter().any(|known| known.kind == Kind::Element);
+        let wires = definition.parameters.iter().any(|known| known.kind == ParameterKind::Element);
         let shapes = if wires { Shapes::Wiring } else { Shapes::Grid(shapes) };
         Ok(Self { definition, amplitudes, shapes })
     }
@@ -234,7 +234,7 @@ fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> 
 /// A pair's term as far as it goes: the element answers for the other alone.
 fn crossed(mut pair: Term) -> Term {
     for (known, value) in pair.definition.parameters.iter().zip(&mut pair.values) {
-        if known.kind == Kind::Real {
+        if known.kind == ParameterKind::Real {
             let [least, most] = known.range;
             *value = if known.neutral == 0.0 { most } else { least + 0.02 * (known.neutral - least) };
         }
@@ -248,7 +248,7 @@ fn wired(definition: &'static Definition, pair: [usize; 2]) -> Option<Term> {
         .parameters
         .iter()
         .enumerate()
-        .filter(|(_, known)| known.kind == Kind::Element)
+        .filter(|(_, known)| known.kind == ParameterKind::Element)
         .map(|(place, _)| place)
         .collect();
     let [first, second] = <[usize; 2]>::try_from(places).ok()?;

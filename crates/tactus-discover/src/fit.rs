@@ -13,7 +13,7 @@
 //! Marquardt.
 
 use nalgebra::{DMatrix, DVector};
-use tactus_model::effect::Kind;
+use tactus_model::effect::ParameterKind;
 
 use crate::DiscoverError;
 use crate::contacts::Contacts;
@@ -130,12 +130,12 @@ impl<'a> Problem<'a> {
         }
         for (term, Term { definition, values }) in parameters.terms.iter().enumerate() {
             let mut values = definition.parameters.iter().zip(values);
-            if values.any(|(known, value)| known.kind == Kind::ElementOrAll && *value >= 0.0) {
+            if values.any(|(known, value)| known.kind == ParameterKind::ElementOrAll && *value >= 0.0) {
                 // How one element's zero wandered before is no shape to fit.
                 continue;
             }
             for (parameter, known) in definition.parameters.iter().enumerate() {
-                if known.kind == Kind::Real && known.name != "duration_s" {
+                if known.kind == ParameterKind::Real && known.name != "duration_s" {
                     free.push(Free::Of { term, parameter });
                 }
             }

@@ -17,7 +17,7 @@
 
 mod design;
 
-use tactus_model::effect::{Definition, Kind};
+use tactus_model::effect::{Definition, ParameterKind};
 
 use crate::discovery::{NextExperiment, NotShown};
 use crate::fit::{Free, Problem};
@@ -190,7 +190,7 @@ impl Setting<'_> {
             let term = with.terms.len() - 1;
             let mut best = 0.0_f64;
             for (parameter, known) in definition.parameters.iter().enumerate() {
-                if known.kind != Kind::Real {
+                if known.kind != ParameterKind::Real {
                     continue;
                 }
                 let mut column = problem.slope(&with, &predicted, Free::Of { term, parameter })?;

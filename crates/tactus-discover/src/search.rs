@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use tactus_model::effect::{Definition, Kind};
+use tactus_model::effect::{Definition, ParameterKind};
 
 use crate::candidates::{Candidate, Screened, with};
 use crate::discovery;
@@ -462,7 +462,7 @@ impl Search<'_> {
 
 /// True if nature cannot have another form of an effect: wiring is right or wrong.
 fn is_exact(definition: &Definition) -> bool {
-    definition.parameters.iter().any(|parameter| parameter.kind == Kind::Element)
+    definition.parameters.iter().any(|parameter| parameter.kind == ParameterKind::Element)
 }
 
 /// The cost of a model, its parameters charged for.

@@ -44,7 +44,7 @@
 //! goes through it); or, without touching this crate, a `static` [`Definition`] given to [`Effect::of`].
 //!
 //! ```
-//! use tactus_model::effect::{Base, Definition, Make, OnElement, Parameter};
+//! use tactus_model::effect::{BaseModel, Definition, Make, OnElement, Parameter};
 //! use tactus_model::Effect;
 //!
 //! /// Elements lose a share of their signal: `u -> (1 - lost_share) u`.
@@ -63,7 +63,7 @@
 //! }
 //!
 //! impl OnElement for Loss {
-//!     fn signal(&self, _: Base<'_>, _: &[f64], signal_mm: &mut [f64]) {
+//!     fn signal(&self, _: BaseModel<'_>, _: &[f64], signal_mm: &mut [f64]) {
 //!         signal_mm.iter_mut().for_each(|u| *u *= 1.0 - self.lost_share);
 //!     }
 //! }
@@ -110,8 +110,10 @@ mod time_lag;
 #[doc = include_str!("../../../docs/adding-an-effect.md")]
 struct AddingAnEffect;
 
-pub use definition::{Definition, Effect, EffectError, Kind, Make, Parameter, Stage};
-pub use stage::{Base, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Place, Press, Shift};
+pub use definition::{Definition, Effect, EffectError, Make, Parameter, ParameterKind, PipelineStage};
+pub use stage::{
+    BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Shift, TipState,
+};
 
 /// Every effect of the library, in the order of the stages.
 pub static REGISTRY: &[&Definition] = &[

@@ -2,7 +2,7 @@
 
 use crate::blur::Blur;
 use crate::contact::Slice;
-use crate::effect::Press;
+use crate::effect::Load;
 use crate::{Array, Contact, Covering, Indenter, Psf};
 
 /// How an element answers what reaches it.
@@ -129,7 +129,7 @@ impl ForwardModel {
     pub fn indentation(&self, contact: &Contact, covering: Covering, indentation_mm: &mut [f64]) {
         let (contact, sigma_mm) = (contact.clone(), [self.psf.sigma_mm(covering); 2]);
         self.indentation_of(
-            &Press { weight: 1.0, contact, lean: [0.0; 2], sigma_mm },
+            &Load { weight: 1.0, contact, lean: [0.0; 2], sigma_mm },
             covering,
             indentation_mm,
         );
@@ -140,10 +140,10 @@ impl ForwardModel {
     ///
     /// # Panics
     /// If `indentation_mm` has not one place per element.
-    pub fn indentation_of(&self, press: &Press, covering: Covering, indentation_mm: &mut [f64]) {
+    pub fn indentation_of(&self, press: &Load, covering: Covering, indentation_mm: &mut [f64]) {
         assert_eq!(indentation_mm.len(), self.array.elements(), "one place per element");
         indentation_mm.fill(0.0);
-        let Press { contact, lean, sigma_mm, .. } = press;
+        let Load { contact, lean, sigma_mm, .. } = press;
         let finest_mm = sigma_mm[0].min(sigma_mm[1]);
         let blurs = sigma_mm.map(|sigma_mm| Blur { sigma_mm });
         self.press(&contact.leaning(*lean, finest_mm), blurs, 1.0, indentation_mm);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::effect::{Base, Press};
+use crate::effect::{BaseModel, Load};
 use crate::{Contact, Indenter};
 
 /// A memory of what presses give, shared by [`Pipeline`](crate::Pipeline)s of one array and one reference press that
@@ -30,17 +30,17 @@ impl Images {
     /// The image of a press, remembered or computed by `compute`.
     pub(crate) fn recall(
         &self,
-        base: Base<'_>,
-        press: &Press,
+        base: BaseModel<'_>,
+        press: &Load,
         image_mm: &mut [f64],
-        compute: impl FnOnce(&Press, &mut [f64]),
+        compute: impl FnOnce(&Load, &mut [f64]),
     ) {
         let thickness_mm = base.covering.thickness_mm;
         if !is_even(press) {
             return self.recall_as_it_is(base, press, image_mm, compute);
         }
         let contact = Contact { depth_mm: thickness_mm, ..press.contact.clone() };
-        let deepest = Press { contact, ..press.clone() };
+        let deepest = Load { contact, ..press.clone() };
         self.recall_as_it_is(base, &deepest, image_mm, compute);
         let share = press.contact.depth_mm.min(thickness_mm) / thickness_mm;
         for of_element in image_mm {
@@ -50,10 +50,10 @@ impl Images {
 
     fn recall_as_it_is(
         &self,
-        base: Base<'_>,
-        press: &Press,
+        base: BaseModel<'_>,
+        press: &Load,
         image_mm: &mut [f64],
-        compute: impl FnOnce(&Press, &mut [f64]),
+        compute: impl FnOnce(&Load, &mut [f64]),
     ) {
         let Some(key) = key(base, press) else { return compute(press, image_mm) };
         let known = self.held.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
@@ -72,13 +72,13 @@ impl Images {
 
 /// True if the penetration is the same all over the tool's face: its image is in proportion to it, up to the covering's
 /// thickness.
-fn is_even(press: &Press) -> bool {
+fn is_even(press: &Load) -> bool {
     let is_flat = matches!(press.contact.indenter, Indenter::Cylinder { .. } | Indenter::Box { .. });
     is_flat && press.lean.iter().all(|by| *by == 0.0)
 }
 
-fn key(base: Base<'_>, press: &Press) -> Option<Key> {
-    let Press { weight: _, contact, lean, sigma_mm } = press;
+fn key(base: BaseModel<'_>, press: &Load) -> Option<Key> {
+    let Load { weight: _, contact, lean, sigma_mm } = press;
     let Contact { indenter, position_mm: [x, y], rotation_deg, depth_mm } = contact;
     let (shape, [size, other]) = match indenter {
         Indenter::Cylinder { diameter_mm } => (0, [*diameter_mm, 0.0]),

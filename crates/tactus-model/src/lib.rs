@@ -43,7 +43,7 @@
 //! | box, mesh | closed form; direct quadrature in the tool's own frame | 1e-9 |
 //! | mesh of many triangles | finer slices | about 1e-5 of the peak |
 //! | derivatives ([`Gradient`]) | central differences | 1e-6 of the largest |
-//! | [`Stamp`] | the exact image | 5e-5 of the peak (4e-6 measured for the paper's H) |
+//! | [`PressTable`] | the exact image | 5e-5 of the peak (4e-6 measured for the paper's H) |
 //!
 //! Also held by tests: all that presses arrives (mass), mirror symmetry, linearity in depth of flat tools, and the
 //! limits of no spread and endless spread.
@@ -78,7 +78,7 @@
 //!
 //! # Speed
 //!
-//! A [`Stamp`] is a tool's image made ready: sampled instead of computed, some 1.7 million images a second on a core
+//! A [`PressTable`] is a tool's image made ready: sampled instead of computed, some 1.7 million images a second on a core
 //! for any mesh on 48 elements, where the exact image of a cylinder takes 7 us and of the H 500 us.
 //!
 //! This crate has no I/O, no async, no clock and no global random numbers.
@@ -101,11 +101,11 @@ mod indenter;
 mod mesh;
 mod phase;
 mod pipeline;
+mod press_table;
 mod quadrature;
 mod readout;
 mod registration;
 mod simulator;
-mod stamp;
 mod trail;
 mod trajectory;
 
@@ -121,10 +121,10 @@ pub use indenter::Indenter;
 pub use mesh::{Mesh, MeshError};
 pub use phase::Phase;
 pub use pipeline::{Moment, Pipeline};
+pub use press_table::{PressTable, PressTableError};
 pub use readout::Readout;
 pub use registration::Registration;
 pub use simulator::{Image, Simulator};
-pub use stamp::{Stamp, StampError};
 pub use trail::Trail;
 pub use trajectory::{Path, Trajectory, TrajectoryError};
 

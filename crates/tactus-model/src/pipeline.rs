@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use crate::effect::{
-    Base, Effect, EffectError, Make, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Place, Press,
+    BaseModel, Effect, EffectError, Load, Make, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout,
+    TipState,
 };
 use crate::{
-    Contact, Covering, ForwardModel, Images, Indenter, Path, Readout, Registration, Simulator, Stamp,
-    StampError,
+    Contact, Covering, ForwardModel, Images, Indenter, Path, PressTable, PressTableError, Readout,
+    Registration, Simulator,
 };
 
 /// An instant at which the elements are read.
@@ -46,7 +47,7 @@ pub struct Pipeline {
     stages: Stages,
     last_s: Option<f64>,
     pressed: Pressed,
-    stamp: Option<Stamp>,
+    table: Option<PressTable>,
     images: Option<Arc<Images>>,
     felt_mm: Vec<f64>,
     counts: Vec<f64>,
@@ -68,7 +69,7 @@ struct Pressed {
     /// Where: position, rotation and depth; `None` if it is to be computed anew.
     at: Option<([f64; 2], f64, f64)>,
     contact: Contact,
-    presses: Vec<Press>,
+    loads: Vec<Load>,
     reached_mm: Vec<f64>,
     of_one_mm: Vec<f64>,
 }
@@ -76,7 +77,7 @@ struct Pressed {
 /// What spares the pipeline the computing of images.
 #[derive(Debug, Clone, Copy)]
 struct Ready<'a> {
-    stamp: Option<&'a Stamp>,
+    table: Option<&'a PressTable>,
     images: Option<&'a Images>,
 }
 
@@ -113,11 +114,11 @@ impl Pipeline {
                     rotation_deg: 0.0,
                     depth_mm: 0.0,
                 },
-                presses: Vec::new(),
+                loads: Vec::new(),
                 reached_mm: vec![0.0; elements],
                 of_one_mm: vec![0.0; elements],
             },
-            stamp: None,
+            table: None,
             images: None,
             felt_mm: vec![0.0; elements],
             counts: vec![0.0; elements],
@@ -134,20 +135,20 @@ impl Pipeline {
         let Moment { t_s, temperature_c } = moment;
         let dt_s = self.last_s.map_or(0.0, |last_s| (t_s - last_s).max(0.0));
         self.last_s = Some(self.last_s.map_or(t_s, |last_s| last_s.max(t_s)));
-        let base = Base { model: &self.model, covering: self.covering };
+        let base = BaseModel { model: &self.model, covering: self.covering };
         let now = Now { t_s, dt_s, temperature_c, base };
 
         let instant_s = self.stages.motion.iter().fold(t_s, |t_s, effect| effect.instant_s(t_s));
-        let mut place = Place {
+        let mut tip = TipState {
             tip_mm: path.at(instant_s),
             registration: self.registration,
             surface_mm: self.surface_mm,
         };
         for effect in &mut self.stages.motion {
-            effect.place(now, &mut place);
+            effect.place(now, &mut tip);
         }
-        let ready = Ready { stamp: self.stamp.as_ref(), images: self.images.as_deref() };
-        self.pressed.press(&place, &self.indenter, base, &self.stages, ready);
+        let ready = Ready { table: self.table.as_ref(), images: self.images.as_deref() };
+        self.pressed.press(&tip, &self.indenter, base, &self.stages, ready);
 
         for (felt, reached) in self.felt_mm.iter_mut().zip(&self.pressed.reached_mm) {
             *felt = self.stiffness * reached;
@@ -202,14 +203,14 @@ impl Pipeline {
         self.last_s = None;
     }
 
-    /// Makes presses up to `depth_max_mm` deep fast by a [`Stamp`] of the tool, at the cost of its accuracy and of the
+    /// Makes presses up to `depth_max_mm` deep fast by a [`PressTable`] of the tool, at the cost of its accuracy and of the
     /// time that it takes to make. It serves wherever no effect changes the tool or the spread, until another
     /// covering is put in place.
     ///
     /// # Errors
-    /// As [`Stamp::new`].
-    pub fn hasten(&mut self, depth_max_mm: f64) -> Result<(), StampError> {
-        self.stamp = Some(Stamp::new(&self.model, &self.indenter, self.covering, depth_max_mm)?);
+    /// As [`PressTable::new`].
+    pub fn use_press_table(&mut self, depth_max_mm: f64) -> Result<(), PressTableError> {
+        self.table = Some(PressTable::new(&self.model, &self.indenter, self.covering, depth_max_mm)?);
         self.pressed.at = None;
         Ok(())
     }
@@ -223,7 +224,7 @@ impl Pipeline {
     /// Puts another covering in place.
     pub fn set_covering(&mut self, covering: Covering) {
         self.covering = covering;
-        self.stamp = None;
+        self.table = None;
         self.pressed.at = None;
     }
 
@@ -258,13 +259,13 @@ impl Stages {
 impl Pressed {
     fn press(
         &mut self,
-        place: &Place,
+        tip: &TipState,
         indenter: &Indenter,
-        base: Base<'_>,
+        base: BaseModel<'_>,
         stages: &Stages,
-        Ready { stamp, images }: Ready<'_>,
+        Ready { table, images }: Ready<'_>,
     ) {
-        let contact = place.contact(indenter.clone());
+        let contact = tip.contact(indenter.clone());
         let at = (contact.position_mm, contact.rotation_deg, contact.depth_mm);
         if self.at == Some(at) {
             return;
@@ -280,38 +281,38 @@ impl Pressed {
         if lean.iter().any(|by| *by != 0.0) {
             self.contact.depth_mm += self.contact.indenter.lowered_mm(lean);
         }
-        self.presses.clear();
+        self.loads.clear();
         let (contact, sigma_mm) = (self.contact.clone(), [base.sigma_mm(); 2]);
-        self.presses.push(Press { weight: 1.0, contact, lean, sigma_mm });
+        self.loads.push(Load { weight: 1.0, contact, lean, sigma_mm });
         for effect in &stages.covering {
-            effect.spread(base, &mut self.presses);
+            effect.spread(base, &mut self.loads);
         }
         self.reached_mm.fill(0.0);
-        // A stamp is of the tool and the spread as they are.
-        let stamp = stamp.filter(|_| stages.contact.is_empty());
-        for press in self.presses.iter().filter(|press| press.contact.depth_mm > 0.0) {
-            let stamped = stamp.is_some_and(|stamp| press.stamped(stamp, base, &mut self.of_one_mm));
-            if !stamped {
-                let compute = |press: &Press, image_mm: &mut [f64]| press.indentation(base, image_mm);
+        // A press table is of the tool and the spread as they are.
+        let table = table.filter(|_| stages.contact.is_empty());
+        for load in self.loads.iter().filter(|load| load.contact.depth_mm > 0.0) {
+            let tabulated = table.is_some_and(|table| load.tabulated(table, base, &mut self.of_one_mm));
+            if !tabulated {
+                let compute = |load: &Load, image_mm: &mut [f64]| load.indentation(base, image_mm);
                 match images {
-                    Some(images) => images.recall(base, press, &mut self.of_one_mm, compute),
-                    None => compute(press, &mut self.of_one_mm),
+                    Some(images) => images.recall(base, load, &mut self.of_one_mm, compute),
+                    None => compute(load, &mut self.of_one_mm),
                 }
             }
             for (reached, of_one) in self.reached_mm.iter_mut().zip(&self.of_one_mm) {
-                *reached += press.weight * of_one;
+                *reached += load.weight * of_one;
             }
         }
     }
 }
 
-impl Press {
-    /// As [`Press::indentation`] by a stamp; false if it is not for this press.
-    fn stamped(&self, stamp: &Stamp, base: Base<'_>, indentation_mm: &mut [f64]) -> bool {
+impl Load {
+    /// As [`Load::indentation`] by a press table; false if it is not for this press.
+    fn tabulated(&self, table: &PressTable, base: BaseModel<'_>, indentation_mm: &mut [f64]) -> bool {
         let Contact { position_mm, rotation_deg, depth_mm, .. } = self.contact;
         let mut single_mm = vec![0.0_f32; indentation_mm.len()];
         let is_bases = self.sigma_mm.map(f64::to_bits) == [base.sigma_mm().to_bits(); 2];
-        if !is_bases || stamp.indentation(position_mm, rotation_deg, depth_mm, &mut single_mm).is_err() {
+        if !is_bases || table.indentation(position_mm, rotation_deg, depth_mm, &mut single_mm).is_err() {
             return false;
         }
         for (wide_mm, single_mm) in indentation_mm.iter_mut().zip(single_mm) {
@@ -322,7 +323,7 @@ impl Press {
 
     /// What reaches every element, in units of the base model's reference press; nothing of a spread that none can
     /// be.
-    fn indentation(&self, base: Base<'_>, indentation_mm: &mut [f64]) {
+    fn indentation(&self, base: BaseModel<'_>, indentation_mm: &mut [f64]) {
         if self.sigma_mm.iter().all(|sigma_mm| *sigma_mm > 0.0) {
             base.model.indentation_of(self, base.covering, indentation_mm);
         } else {

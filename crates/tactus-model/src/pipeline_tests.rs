@@ -37,7 +37,7 @@ fn without_effects_counts_are_the_base_models_to_the_bit() {
 }
 
 #[test]
-fn a_hastened_pipeline_reads_the_same_but_for_the_stamps_error() {
+fn a_pipeline_with_a_press_table_reads_the_same_but_for_its_error() {
     for effects in [
         vec![],
         vec![effect(
@@ -53,13 +53,13 @@ fn a_hastened_pipeline_reads_the_same_but_for_the_stamps_error() {
     ] {
         let simulator = simulator(effects);
         let way = way(&simulator);
-        let (mut exact, mut hastened) =
+        let (mut exact, mut sampled) =
             (Pipeline::new(&simulator).unwrap(), Pipeline::new(&simulator).unwrap());
         // The way goes 0.75 mm deep: the deepest part is computed exactly.
-        hastened.hasten(0.6).unwrap();
+        sampled.use_press_table(0.6).unwrap();
         for k in 0..80 {
             let moment = Moment::at(f64::from(k) / 30.0);
-            let (want, got) = (exact.step(moment, &way), hastened.step(moment, &way));
+            let (want, got) = (exact.step(moment, &way), sampled.step(moment, &way));
             assert!(want.iter().zip(got).all(|(want, got)| (want - got).abs() < 0.05), "{want:?} {got:?}");
         }
     }

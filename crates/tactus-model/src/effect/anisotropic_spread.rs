@@ -13,7 +13,7 @@
 //! A sheet that was drawn in one direction, or lies on electrodes that run in one: the Gaussian of an orthotropic
 //! medium, J. Crank, *The Mathematics of Diffusion* (1975).
 
-use super::{Base, Definition, Make, OnCovering, Parameter, Press};
+use super::{BaseModel, Definition, Load, Make, OnCovering, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "anisotropic-spread",
@@ -30,8 +30,8 @@ struct AnisotropicSpread {
 }
 
 impl OnCovering for AnisotropicSpread {
-    fn spread(&self, _: Base<'_>, presses: &mut Vec<Press>) {
-        for Press { sigma_mm: [x, y], .. } in presses {
+    fn spread(&self, _: BaseModel<'_>, loads: &mut Vec<Load>) {
+        for Load { sigma_mm: [x, y], .. } in loads {
             *x *= self.ratio.sqrt();
             *y /= self.ratio.sqrt();
         }

@@ -13,7 +13,7 @@
 //! # Source
 //! The play operator: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (1989).
 
-use super::{Base, Definition, Make, Now, OnMotion, Parameter, Place, Shift};
+use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "backlash",
@@ -42,13 +42,13 @@ struct Axis {
 }
 
 impl OnMotion for Backlash {
-    fn place(&mut self, _: Now<'_>, place: &mut Place) {
-        for (axis, tip_mm) in self.axes.iter_mut().zip(&mut place.tip_mm) {
+    fn place(&mut self, _: Now<'_>, tip: &mut TipState) {
+        for (axis, tip_mm) in self.axes.iter_mut().zip(&mut tip.tip_mm) {
             *tip_mm = axis.follow(*tip_mm);
         }
     }
 
-    fn slope(&self, parameter: usize, _: Base<'_>, before: &Place) -> Option<Shift> {
+    fn slope(&self, parameter: usize, _: BaseModel<'_>, before: &TipState) -> Option<Shift> {
         let (_, by_play) = self.axes.get(parameter)?.at?;
         let (sin, cos) = before.registration.rotation_deg.to_radians().sin_cos();
         Some(match parameter {

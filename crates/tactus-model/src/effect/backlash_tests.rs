@@ -1,5 +1,5 @@
 use crate::effect::bench::{THIN, assert_slopes, effect, model, simulator};
-use crate::effect::{Base, Make, Now, Place};
+use crate::effect::{BaseModel, Make, Now, TipState};
 use crate::{Moment, Pipeline, Registration};
 
 /// Places where the tip truly is, robot frame, after each where the stage says it is; the surface stands at 0.
@@ -52,14 +52,14 @@ fn without_play_a_little_would_leave_the_tip_behind_the_last_move() {
     let none = effect("backlash", [("play_x_mm", 0.0), ("play_y_mm", 0.0), ("play_z_mm", 0.0)]);
     let Make::Motion(make) = none.definition().make else { panic!("an effect of motion") };
     let (mut backlash, model) = (make(none.values()), model());
-    let base = Base { model: &model, covering: THIN };
+    let base = BaseModel { model: &model, covering: THIN };
     let now = Now { t_s: 0.0, dt_s: 0.0, temperature_c: None, base };
     let registration = Registration { origin_mm: [0.0; 2], rotation_deg: 0.0 };
     // Down, then a rest, then up.
     for (z_mm, want) in [(0.0, 0.0), (-0.5, -0.5), (-0.5, -0.5), (-0.2, 0.5)] {
-        let mut place = Place { tip_mm: [0.0, 0.0, z_mm], registration, surface_mm: 0.0 };
-        backlash.place(now, &mut place);
-        let by_play = backlash.slope(2, base, &place).unwrap().depth_mm;
+        let mut tip = TipState { tip_mm: [0.0, 0.0, z_mm], registration, surface_mm: 0.0 };
+        backlash.place(now, &mut tip);
+        let by_play = backlash.slope(2, base, &tip).unwrap().depth_mm;
         assert!((by_play - want).abs() < 1e-12, "{z_mm}: {by_play}");
     }
 }

@@ -1,6 +1,6 @@
 //! A sensor on the test bench, and derivatives against differences.
 
-use super::{Base, Effect, Make, Now, Place};
+use super::{BaseModel, Effect, Make, Now, TipState};
 use crate::{
     Array, Contact, Covering, ForwardModel, Indenter, Moment, Pipeline, Psf, Registration, Response,
     Simulator,
@@ -102,7 +102,7 @@ pub(crate) fn assert_slopes(effect: &Effect, known: &[&str]) {
 /// What the effect makes of a short history, or the derivative of its last output by a parameter.
 fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
     let model = model();
-    let base = Base { model: &model, covering: THIN };
+    let base = BaseModel { model: &model, covering: THIN };
     let values = effect.values();
     let history = |k: u32| -> (Now<'_>, Vec<f64>) {
         let temperature_c = Some(20.0 + 0.3 * f64::from(k));
@@ -114,20 +114,20 @@ fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
     match effect.definition().make {
         Make::Motion(make) => {
             let registration = Registration { origin_mm: [20.0, 15.0], rotation_deg: 3.0 };
-            let before = Place { tip_mm: [24.0, 22.0, -0.3], registration, surface_mm: 0.1 };
-            let (mut motion, mut place) = (make(values), before);
+            let before = TipState { tip_mm: [24.0, 22.0, -0.3], registration, surface_mm: 0.1 };
+            let (mut motion, mut tip) = (make(values), before);
             for k in 0..6 {
                 // Up to the place, from both sides.
                 let aside_mm = 0.3 * (f64::from(5 - k) * 1.3).sin();
-                place = Place { tip_mm: before.tip_mm.map(|tip_mm| tip_mm + aside_mm), ..before };
-                motion.place(history(k).0, &mut place);
+                tip = TipState { tip_mm: before.tip_mm.map(|tip_mm| tip_mm + aside_mm), ..before };
+                motion.place(history(k).0, &mut tip);
             }
             if let Some(parameter) = by {
                 let shift = motion.slope(parameter, base, &before)?;
                 let [x, y] = shift.position_mm;
                 return Some(vec![x, y, shift.rotation_deg, shift.depth_mm]);
             }
-            let Contact { position_mm: [x, y], rotation_deg, depth_mm, .. } = place.contact(CYLINDER);
+            let Contact { position_mm: [x, y], rotation_deg, depth_mm, .. } = tip.contact(CYLINDER);
             Some(vec![x, y, rotation_deg, depth_mm])
         }
         Make::Contact(_) => by.is_none().then_some(slope),

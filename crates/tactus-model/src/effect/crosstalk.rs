@@ -15,7 +15,7 @@
 //! Row-column addressing: charge that leaks between the lines of a capacitive matrix, and stray capacitance
 //! between neighbours.
 
-use super::{Base, Definition, Make, OnElement, Parameter};
+use super::{BaseModel, Definition, Make, OnElement, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "crosstalk",
@@ -39,7 +39,7 @@ struct Crosstalk {
 }
 
 impl OnElement for Crosstalk {
-    fn signal(&self, base: Base<'_>, _: &[f64], signal_mm: &mut [f64]) {
+    fn signal(&self, base: BaseModel<'_>, _: &[f64], signal_mm: &mut [f64]) {
         let mut added_mm = vec![0.0; signal_mm.len()];
         for (sum, share) in SUMS.iter().zip(self.shares).filter(|(_, share)| *share != 0.0) {
             for (added, from_others) in added_mm.iter_mut().zip(sum(base.model.array().cols(), signal_mm)) {
@@ -54,7 +54,7 @@ impl OnElement for Crosstalk {
     fn slope(
         &self,
         parameter: usize,
-        base: Base<'_>,
+        base: BaseModel<'_>,
         _: &[f64],
         before_mm: &[f64],
         slope_mm: &mut [f64],

@@ -1,5 +1,5 @@
 use crate::effect::bench::{assert_slopes, effect, model};
-use crate::effect::{Base, Make};
+use crate::effect::{BaseModel, Make};
 
 const NAMES: [&str; 5] =
     ["neighbour_share", "diagonal_share", "row_neighbour_share", "row_share", "column_share"];
@@ -8,7 +8,7 @@ fn crossed(shares: [f64; 5], signal: &[f64]) -> Vec<f64> {
     let effect = effect("crosstalk", std::array::from_fn::<_, 5, _>(|k| (NAMES[k], shares[k])));
     let Make::Element(make) = effect.definition().make else { panic!("an effect of the elements") };
     let (model, mut out) = (model(), signal.to_vec());
-    let base = Base { model: &model, covering: crate::effect::bench::THIN };
+    let base = BaseModel { model: &model, covering: crate::effect::bench::THIN };
     make(effect.values()).signal(base, signal, &mut out);
     out
 }

@@ -30,14 +30,14 @@ pub struct Parameter {
     /// Least and greatest value.
     pub range: [f64; 2],
     /// What kind of number it is.
-    pub kind: Kind,
+    pub kind: ParameterKind,
     /// True if it is neutral where no value is given.
     pub is_optional: bool,
 }
 
 /// Kinds of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ParameterKind {
     /// A real number.
     Real,
     /// Index of an element; no fit varies it, and it has no meaning on another array.
@@ -51,7 +51,7 @@ pub enum Kind {
 /// Where in the pipeline an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "the names say it")]
-pub enum Stage {
+pub enum PipelineStage {
     Motion,
     Contact,
     Covering,
@@ -149,13 +149,13 @@ impl Definition {
     }
 
     /// Where it acts.
-    pub fn stage(&self) -> Stage {
+    pub fn stage(&self) -> PipelineStage {
         match self.make {
-            Make::Motion(_) => Stage::Motion,
-            Make::Contact(_) => Stage::Contact,
-            Make::Covering(_) => Stage::Covering,
-            Make::Element(_) => Stage::Element,
-            Make::Readout(_) => Stage::Readout,
+            Make::Motion(_) => PipelineStage::Motion,
+            Make::Contact(_) => PipelineStage::Contact,
+            Make::Covering(_) => PipelineStage::Covering,
+            Make::Element(_) => PipelineStage::Element,
+            Make::Readout(_) => PipelineStage::Readout,
         }
     }
 
@@ -172,7 +172,7 @@ impl Definition {
 impl Parameter {
     /// A real number within a range.
     pub const fn real(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
-        Self { name, neutral, range, kind: Kind::Real, is_optional: false }
+        Self { name, neutral, range, kind: ParameterKind::Real, is_optional: false }
     }
 
     /// The same, which may be left out: what an effect had from its beginning may not.
@@ -183,7 +183,13 @@ impl Parameter {
 
     /// Index of an element.
     pub const fn element(name: &'static str) -> Self {
-        Self { name, neutral: 0.0, range: [0.0, u32::MAX as f64], kind: Kind::Element, is_optional: false }
+        Self {
+            name,
+            neutral: 0.0,
+            range: [0.0, u32::MAX as f64],
+            kind: ParameterKind::Element,
+            is_optional: false,
+        }
     }
 
     /// Index of an element, or -1 for all of them.
@@ -192,20 +198,20 @@ impl Parameter {
             name,
             neutral: -1.0,
             range: [-1.0, u32::MAX as f64],
-            kind: Kind::ElementOrAll,
+            kind: ParameterKind::ElementOrAll,
             is_optional: true,
         }
     }
 
     /// A number within a range that no fit varies.
     pub const fn given(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
-        Self { name, neutral, range, kind: Kind::Given, is_optional: true }
+        Self { name, neutral, range, kind: ParameterKind::Given, is_optional: true }
     }
 
     /// True if a value is the index of an element.
     fn names_element(&self, value: f64) -> bool {
-        self.kind == Kind::Element
-            || self.kind == Kind::ElementOrAll && value.to_bits() != self.neutral.to_bits()
+        self.kind == ParameterKind::Element
+            || self.kind == ParameterKind::ElementOrAll && value.to_bits() != self.neutral.to_bits()
     }
 }
 

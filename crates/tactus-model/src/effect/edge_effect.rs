@@ -14,7 +14,7 @@
 //! The paper's Fig. 1: two sensors side by side. What an edge disturbs dies away exponentially within about a
 //! thickness, by Saint-Venant's principle: S. P. Timoshenko and J. N. Goodier, *Theory of Elasticity* (1970).
 
-use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -51,7 +51,7 @@ impl OnCovering for EdgeEffect {
     fn slope(
         &self,
         parameter: usize,
-        base: Base<'_>,
+        base: BaseModel<'_>,
         contact: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],
@@ -75,13 +75,13 @@ impl OnCovering for EdgeEffect {
 
 impl EdgeEffect {
     /// 1 at the edge and at the seam, less further off.
-    fn nearness(&self, base: Base<'_>, contact: &Contact) -> [f64; 2] {
+    fn nearness(&self, base: BaseModel<'_>, contact: &Contact) -> [f64; 2] {
         distances_mm(base, contact).map(|distance_mm| (-distance_mm / self.reach_mm).exp())
     }
 }
 
 /// Of the tool's axis from the edge and from the seam.
-fn distances_mm(base: Base<'_>, contact: &Contact) -> [f64; 2] {
+fn distances_mm(base: BaseModel<'_>, contact: &Contact) -> [f64; 2] {
     let [[x_min, x_max], [y_min, y_max]] = base.model.array().extent_mm();
     let [x, y] = contact.position_mm;
     let edge_mm = (x - x_min).min(x_max - x).min(y - y_min).min(y_max - y);

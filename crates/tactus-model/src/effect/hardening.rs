@@ -18,7 +18,7 @@
 //! of an elastic law, as in a Duffing spring, is an exponent of 2; the power law of a contact, K. L. Johnson, *Contact
 //! Mechanics* (1985), chapter 4, gives others.
 
-use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -55,7 +55,7 @@ impl OnCovering for Hardening {
     fn slope(
         &self,
         parameter: usize,
-        base: Base<'_>,
+        base: BaseModel<'_>,
         contact: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],
@@ -85,7 +85,7 @@ impl Hardening {
     }
 }
 
-fn depth_mm(base: Base<'_>, contact: &Contact) -> f64 {
+fn depth_mm(base: BaseModel<'_>, contact: &Contact) -> f64 {
     contact.depth_mm.min(base.covering.thickness_mm).max(0.0)
 }
 

@@ -10,7 +10,7 @@
 //! The layered elastic solution falls off more slowly than the Gaussian of its core (the paper's Fig. 3); a mixture
 //! of two Gaussians is the usual closed form of such a spread.
 
-use super::{Base, Definition, Make, OnCovering, Parameter, Press};
+use super::{BaseModel, Definition, Load, Make, OnCovering, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "heavy-tail",
@@ -31,20 +31,20 @@ struct HeavyTail {
 }
 
 impl OnCovering for HeavyTail {
-    fn spread(&self, _: Base<'_>, presses: &mut Vec<Press>) {
+    fn spread(&self, _: BaseModel<'_>, loads: &mut Vec<Load>) {
         if self.tail_share == 0.0 {
             return;
         }
-        let tail = |core: &Press| Press {
+        let tail = |core: &Load| Load {
             weight: self.tail_share * core.weight,
             sigma_mm: core.sigma_mm.map(|sigma_mm| self.width_ratio * sigma_mm),
             ..core.clone()
         };
-        let tails: Vec<Press> = presses.iter().map(tail).collect();
-        for core in presses.iter_mut() {
+        let tails: Vec<Load> = loads.iter().map(tail).collect();
+        for core in loads.iter_mut() {
             core.weight *= 1.0 - self.tail_share;
         }
-        presses.extend(tails);
+        loads.extend(tails);
     }
 }
 

@@ -28,7 +28,7 @@
 //! Transitions* (1996), chapter 2; plays between two curves, M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with
 //! Hysteresis* (1989), chapter 1.
 
-use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -87,7 +87,7 @@ impl OnCovering for Hysteresis {
     fn slope(
         &self,
         parameter: usize,
-        base: Base<'_>,
+        base: BaseModel<'_>,
         contact: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],

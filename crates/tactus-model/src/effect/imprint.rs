@@ -16,7 +16,7 @@
 //! Properties of Polymers* (1980), chapter 1.
 
 use super::lag::{mean, spread};
-use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -69,7 +69,7 @@ impl OnCovering for Imprint {
     fn slope(
         &self,
         parameter: usize,
-        _: Base<'_>,
+        _: BaseModel<'_>,
         _: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],

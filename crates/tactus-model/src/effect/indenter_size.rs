@@ -12,7 +12,7 @@
 
 use std::sync::Arc;
 
-use super::{Base, Definition, Make, OnContact, Parameter};
+use super::{BaseModel, Definition, Make, OnContact, Parameter};
 use crate::{Contact, Indenter};
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -30,7 +30,7 @@ struct IndenterSize {
 }
 
 impl OnContact for IndenterSize {
-    fn touch(&self, _: Base<'_>, contact: &mut Contact) {
+    fn touch(&self, _: BaseModel<'_>, contact: &mut Contact) {
         match &mut contact.indenter {
             Indenter::Cylinder { diameter_mm }
             | Indenter::Sphere { diameter_mm }

@@ -15,7 +15,7 @@
 //! # Source
 //! A rigid flat punch that is turned about an axis in the plane: K. L. Johnson, *Contact Mechanics* (1985).
 
-use super::{Base, Definition, Make, OnContact, Parameter};
+use super::{BaseModel, Definition, Make, OnContact, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -40,7 +40,7 @@ struct IndenterTilt {
 }
 
 impl OnContact for IndenterTilt {
-    fn touch(&self, _: Base<'_>, contact: &mut Contact) {
+    fn touch(&self, _: BaseModel<'_>, contact: &mut Contact) {
         contact.depth_mm -= self.touched_share * contact.indenter.lowered_mm(self.lean());
     }
 

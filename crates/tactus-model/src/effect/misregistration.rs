@@ -14,7 +14,7 @@
 //! # Source
 //! The paper's Sec. 2.1: two touches near opposite corners set the registration, and so carry their errors.
 
-use super::{Base, Definition, Make, Now, OnMotion, Parameter, Place, Shift};
+use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "misregistration",
@@ -55,16 +55,16 @@ struct Misregistration {
 }
 
 impl OnMotion for Misregistration {
-    fn place(&mut self, _: Now<'_>, place: &mut Place) {
-        self.displace(place);
+    fn place(&mut self, _: Now<'_>, tip: &mut TipState) {
+        self.displace(tip);
     }
 
-    fn slope(&self, parameter: usize, _: Base<'_>, before: &Place) -> Option<Shift> {
-        let mut place = *before;
-        self.displace(&mut place);
+    fn slope(&self, parameter: usize, _: BaseModel<'_>, before: &TipState) -> Option<Shift> {
+        let mut tip = *before;
+        self.displace(&mut tip);
         let scale = 1.0 + self.scale_error;
-        let (sin, cos) = place.registration.rotation_deg.to_radians().sin_cos();
-        let [x, y] = place.position_mm();
+        let (sin, cos) = tip.registration.rotation_deg.to_radians().sin_cos();
+        let [x, y] = tip.position_mm();
         let degree = 1.0_f64.to_radians();
         let along_y_mm = sin * x + cos * y;
         let widening = degree * (1.0 + self.lean * self.lean);
@@ -88,15 +88,15 @@ impl OnMotion for Misregistration {
 }
 
 impl Misregistration {
-    fn displace(&self, place: &mut Place) {
-        let registration = &mut place.registration;
+    fn displace(&self, tip: &mut TipState) {
+        let registration = &mut tip.registration;
         registration.rotation_deg += self.rotation_deg;
         for axis in 0..2 {
             registration.origin_mm[axis] += self.offset_mm[axis];
         }
-        let [x, y] = [0, 1].map(|axis| place.tip_mm[axis] - registration.origin_mm[axis]);
-        place.tip_mm[0] += self.scale_error * x + (1.0 + self.scale_error) * self.lean * y;
-        place.tip_mm[1] += self.scale_error * y;
+        let [x, y] = [0, 1].map(|axis| tip.tip_mm[axis] - registration.origin_mm[axis]);
+        tip.tip_mm[0] += self.scale_error * x + (1.0 + self.scale_error) * self.lean * y;
+        tip.tip_mm[1] += self.scale_error * y;
     }
 }
 

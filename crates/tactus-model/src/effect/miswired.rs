@@ -11,7 +11,7 @@
 //! # Source
 //! The paper's Sec. 2.2: two elements responded to a stimulus of one adjacent element, but not to their own.
 
-use super::{Base, Definition, Make, OnElement, Parameter};
+use super::{BaseModel, Definition, Make, OnElement, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "miswired",
@@ -43,7 +43,7 @@ struct Miswired {
 }
 
 impl OnElement for Miswired {
-    fn signal(&self, _: Base<'_>, felt_mm: &[f64], signal_mm: &mut [f64]) {
+    fn signal(&self, _: BaseModel<'_>, felt_mm: &[f64], signal_mm: &mut [f64]) {
         if let (Some(u), Some(other)) = (signal_mm.get_mut(self.element), felt_mm.get(self.answers_for)) {
             *u = self.own_share * *u + self.other_share * other;
         }
@@ -52,7 +52,7 @@ impl OnElement for Miswired {
     fn slope(
         &self,
         parameter: usize,
-        _: Base<'_>,
+        _: BaseModel<'_>,
         felt_mm: &[f64],
         before_mm: &[f64],
         slope_mm: &mut [f64],

@@ -15,7 +15,7 @@
 //! The strain-rate factor of G. R. Johnson and W. H. Cook, *Proc. 7th Int. Symp. on Ballistics* (1983), with 1 added
 //! to the ratio of speeds, so that rest is the base model's.
 
-use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -78,7 +78,7 @@ impl OnCovering for RateStiffening {
     fn slope(
         &self,
         parameter: usize,
-        _: Base<'_>,
+        _: BaseModel<'_>,
         _: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],

@@ -29,7 +29,7 @@
 //! *Viscoelastic Properties of Polymers* (1980), chapter 1.
 
 use super::lag::SpreadLag;
-use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -91,7 +91,7 @@ impl OnCovering for Relaxation {
     fn slope(
         &self,
         parameter: usize,
-        _: Base<'_>,
+        _: BaseModel<'_>,
         contact: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],

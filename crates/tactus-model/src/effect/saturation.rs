@@ -17,7 +17,7 @@
 //! # Source
 //! The compression of an amplifier: C. Rapp, *Effects of HPA-Nonlinearity on a 4-DPSK/OFDM-Signal* (1991).
 
-use super::{Base, Definition, Make, OnElement, Parameter};
+use super::{BaseModel, Definition, Make, OnElement, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "saturation",
@@ -40,7 +40,7 @@ struct Saturation {
 }
 
 impl OnElement for Saturation {
-    fn signal(&self, _: Base<'_>, _: &[f64], signal_mm: &mut [f64]) {
+    fn signal(&self, _: BaseModel<'_>, _: &[f64], signal_mm: &mut [f64]) {
         if self.q > 0.0 {
             for u in signal_mm.iter_mut().filter(|u| **u > 0.0) {
                 *u *= self.bend(*u).powf(-1.0 / self.knee);
@@ -51,7 +51,7 @@ impl OnElement for Saturation {
     fn slope(
         &self,
         parameter: usize,
-        _: Base<'_>,
+        _: BaseModel<'_>,
         _: &[f64],
         before_mm: &[f64],
         slope_mm: &mut [f64],

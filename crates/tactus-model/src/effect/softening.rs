@@ -16,7 +16,7 @@
 use libm::erf;
 use std::f64::consts::FRAC_2_SQRT_PI;
 
-use super::{Base, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -53,7 +53,7 @@ impl OnCovering for Softening {
     fn slope(
         &self,
         parameter: usize,
-        _: Base<'_>,
+        _: BaseModel<'_>,
         _: &Contact,
         before_mm: &[f64],
         slope_mm: &mut [f64],

@@ -6,7 +6,7 @@ use crate::{Contact, Covering, ForwardModel, Indenter, Registration};
 
 /// The base model, and the covering in place.
 #[derive(Debug, Clone, Copy)]
-pub struct Base<'a> {
+pub struct BaseModel<'a> {
     /// The base model.
     pub model: &'a ForwardModel,
     /// The covering in place.
@@ -23,12 +23,12 @@ pub struct Now<'a> {
     /// Temperature of the sensor, where it is known.
     pub temperature_c: Option<f64>,
     /// The base model and the covering.
-    pub base: Base<'a>,
+    pub base: BaseModel<'a>,
 }
 
 /// Where the tip is, and where the sensor is taken to lie; all in the robot frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct TipState {
     /// The tip.
     pub tip_mm: [f64; 3],
     /// Where the sensor lies.
@@ -48,11 +48,11 @@ pub struct Shift {
     pub depth_mm: f64,
 }
 
-/// A share of what reaches the elements: a contact and its spread.
+/// A contact and how the covering spreads it; what the elements measure is the weighted sum of all loads.
 ///
-/// Spread conserves what is spread: a press of another width has the same volume.
+/// The spread conserves volume: a load with another width has the same volume.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Press {
+pub struct Load {
     /// By what it is multiplied.
     pub weight: f64,
     /// The tool in the covering.
@@ -71,10 +71,10 @@ pub trait OnMotion: Debug + Send + Sync {
     }
 
     /// Changes where the tip is, or where the sensor lies.
-    fn place(&mut self, _now: Now<'_>, _place: &mut Place) {}
+    fn place(&mut self, _now: Now<'_>, _tip: &mut TipState) {}
 
     /// Derivative of the contact by the parameter of an index; `before` is what [`OnMotion::place`] was last given.
-    fn slope(&self, _parameter: usize, _base: Base<'_>, _before: &Place) -> Option<Shift> {
+    fn slope(&self, _parameter: usize, _base: BaseModel<'_>, _before: &TipState) -> Option<Shift> {
         None
     }
 
@@ -85,7 +85,7 @@ pub trait OnMotion: Debug + Send + Sync {
 /// An effect on the tool and how it stands; without memory.
 pub trait OnContact: Debug + Send + Sync {
     /// Changes the contact.
-    fn touch(&self, _base: Base<'_>, _contact: &mut Contact) {}
+    fn touch(&self, _base: BaseModel<'_>, _contact: &mut Contact) {}
 
     /// How the tool leans about the foot of its axis: by how much a flat face stands deeper per mm along the tool's
     /// own x and y. A [`Contact`] is upright, so that this goes beside it; those of several effects add.
@@ -96,9 +96,9 @@ pub trait OnContact: Debug + Send + Sync {
 
 /// An effect of the covering.
 pub trait OnCovering: Debug + Send + Sync {
-    /// Changes how presses spread, before the elements integrate them; without memory. At first there is one,
-    /// of weight 1, with the base model's spread, the same along x and y.
-    fn spread(&self, _base: Base<'_>, _presses: &mut Vec<Press>) {}
+    /// Changes how the loads spread, before the elements integrate them; without memory. The list starts with one load
+    /// of weight 1 with the base model's spread, the same along x and y.
+    fn spread(&self, _base: BaseModel<'_>, _loads: &mut Vec<Load>) {}
 
     /// Changes what reaches the elements: equivalent indentations in mm, row-major.
     fn signal(&mut self, _now: Now<'_>, _contact: &Contact, _signal_mm: &mut [f64]) {}
@@ -108,7 +108,7 @@ pub trait OnCovering: Debug + Send + Sync {
     fn slope(
         &self,
         _parameter: usize,
-        _base: Base<'_>,
+        _base: BaseModel<'_>,
         _contact: &Contact,
         _before_mm: &[f64],
         _slope_mm: &mut [f64],
@@ -124,17 +124,17 @@ pub trait OnCovering: Debug + Send + Sync {
 pub trait OnElement: Debug + Send + Sync {
     /// Changes the elements' signals before their response: equivalent indentations in mm, row-major.
     /// `felt_mm` is what reached each element, before any effect of this stage.
-    fn signal(&self, _base: Base<'_>, _felt_mm: &[f64], _signal_mm: &mut [f64]) {}
+    fn signal(&self, _base: BaseModel<'_>, _felt_mm: &[f64], _signal_mm: &mut [f64]) {}
 
     /// Changes counts after the response.
-    fn counts(&self, _base: Base<'_>, _counts: &mut [f64]) {}
+    fn counts(&self, _base: BaseModel<'_>, _counts: &mut [f64]) {}
 
     /// Derivative of what [`OnElement::signal`] gives by the parameter of an index, at the input `before`, in mm
     /// per unit. False, and `slope_mm` as it was, where there is no closed form.
     fn slope(
         &self,
         _parameter: usize,
-        _base: Base<'_>,
+        _base: BaseModel<'_>,
         _felt_mm: &[f64],
         _before_mm: &[f64],
         _slope_mm: &mut [f64],
@@ -163,14 +163,14 @@ pub trait OnReadout: Debug + Send + Sync {
     fn reset(&mut self) {}
 }
 
-impl Base<'_> {
+impl BaseModel<'_> {
     /// The base model's spread under the covering in place.
     pub fn sigma_mm(&self) -> f64 {
         self.model.psf().sigma_mm(self.covering)
     }
 }
 
-impl Place {
+impl TipState {
     /// The tip in the sensor's plane.
     pub fn position_mm(&self) -> [f64; 2] {
         let [x_mm, y_mm, _] = self.tip_mm;

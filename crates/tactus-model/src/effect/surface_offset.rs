@@ -9,7 +9,7 @@
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
-use super::{Base, Definition, Make, Now, OnMotion, Parameter, Place, Shift};
+use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-offset",
@@ -26,11 +26,11 @@ struct SurfaceOffset {
 }
 
 impl OnMotion for SurfaceOffset {
-    fn place(&mut self, _: Now<'_>, place: &mut Place) {
-        place.surface_mm += self.offset_mm;
+    fn place(&mut self, _: Now<'_>, tip: &mut TipState) {
+        tip.surface_mm += self.offset_mm;
     }
 
-    fn slope(&self, parameter: usize, _: Base<'_>, _: &Place) -> Option<Shift> {
+    fn slope(&self, parameter: usize, _: BaseModel<'_>, _: &TipState) -> Option<Shift> {
         (parameter == 0).then_some(Shift { depth_mm: 1.0, ..Shift::default() })
     }
 }

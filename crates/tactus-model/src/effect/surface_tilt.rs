@@ -10,7 +10,7 @@
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
-use super::{Base, Definition, Make, Now, OnMotion, Parameter, Place, Shift};
+use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-tilt",
@@ -37,16 +37,16 @@ struct SurfaceTilt {
 }
 
 impl OnMotion for SurfaceTilt {
-    fn place(&mut self, now: Now<'_>, place: &mut Place) {
-        let from_middle_mm = from_middle_mm(now.base, place);
+    fn place(&mut self, now: Now<'_>, tip: &mut TipState) {
+        let from_middle_mm = from_middle_mm(now.base, tip);
         for ((slope, from_mm), touched_mm) in
             self.slope_mm_per_mm.iter().zip(from_middle_mm).zip(self.touched_mm)
         {
-            place.surface_mm += slope * (from_mm - touched_mm);
+            tip.surface_mm += slope * (from_mm - touched_mm);
         }
     }
 
-    fn slope(&self, parameter: usize, base: Base<'_>, before: &Place) -> Option<Shift> {
+    fn slope(&self, parameter: usize, base: BaseModel<'_>, before: &TipState) -> Option<Shift> {
         let from_middle_mm = from_middle_mm(base, before);
         let depth_mm = match parameter {
             0 | 1 => from_middle_mm[parameter] - self.touched_mm[parameter],
@@ -58,9 +58,9 @@ impl OnMotion for SurfaceTilt {
 }
 
 /// The tip's distance from the middle of the active area, sensor frame.
-fn from_middle_mm(base: Base<'_>, place: &Place) -> [f64; 2] {
+fn from_middle_mm(base: BaseModel<'_>, tip: &TipState) -> [f64; 2] {
     let [[x_min, x_max], [y_min, y_max]] = base.model.array().extent_mm();
-    let [x, y] = place.position_mm();
+    let [x, y] = tip.position_mm();
     [x - f64::midpoint(x_min, x_max), y - f64::midpoint(y_min, y_max)]
 }
 

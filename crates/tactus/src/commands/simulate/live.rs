@@ -175,9 +175,9 @@ struct SimulatedSensor {
 impl SimulatedSensor {
     async fn run(mut self, publisher: tactus_bus::Publisher, seconds: Option<f64>) -> anyhow::Result<()> {
         let mut pipeline = Pipeline::new(&self.scene.simulator)?;
-        // The exact image of a mesh takes milliseconds, which is used where the spread is too small for a press table.
+        // Pressing a mesh exactly takes milliseconds. That remains where the blur is too fine for a press table.
         if let Indenter::Mesh(_) = &self.scene.simulator.indenter
-            && let Err(error) = pipeline.hasten(self.scene.simulator.covering.thickness_mm)
+            && let Err(error) = pipeline.use_press_table(self.scene.simulator.covering.thickness_mm)
         {
             tracing::warn!("{error}; images are computed one by one, and may come late");
         }

@@ -25,20 +25,20 @@ use layers::Layers;
 /// in size (see the tests and the benchmarks, which print it). Values are `f32`.
 ///
 /// ```
-/// use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Response, Stamp};
+/// use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Response, PressTable};
 ///
 /// let covering = Covering { thickness_mm: 1.016 };
 /// let indenter = Indenter::Cylinder { diameter_mm: 1.0 };
 /// let model = ForwardModel::new(Array::digitacts(), Psf::PAPER, Response::uniform(48, 1000.0, 100.0))?;
-/// let stamp = Stamp::new(&model, &indenter, covering, 0.6)?;
+/// let table = PressTable::new(&model, &indenter, covering, 0.6)?;
 /// let mut counts = [0.0; 48];
-/// stamp.image([2.9, 4.9], 0.0, 0.3, &mut counts)?;
+/// table.image([2.9, 4.9], 0.0, 0.3, &mut counts)?;
 /// // The reference press at the centre of element 17: sensitivity times depth above the baseline.
 /// assert!((counts[17] - 400.0).abs() < 0.01);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Stamp {
+pub struct PressTable {
     depth_max_mm: f64,
     layers: Layers,
     col_centres_mm: Vec<f32>,
@@ -54,11 +54,11 @@ struct Element {
     quadratic: f32,
 }
 
-/// Why there is no stamp, or no image of it.
+/// Why there is no press table, or no image of it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StampError {
-    /// The depth is beyond what the stamp was made for, or not a number.
-    #[error("depth {depth_mm} mm is beyond {depth_max_mm} mm, for which the stamp was made")]
+pub enum PressTableError {
+    /// The depth is beyond what the press table was made for, or not a number.
+    #[error("depth {depth_mm} mm is beyond {depth_max_mm} mm, for which the press table was made")]
     Depth {
         /// What was asked for.
         depth_mm: f64,
@@ -77,7 +77,7 @@ pub enum StampError {
     },
     /// The blur is too fine against the elements or the tool for a table of it.
     #[error(
-        "a blur of {sigma_mm} mm is too fine for a stamp: it needs half an element ({element_mm} mm) and 1/200 of the tool ({tool_mm} mm)"
+        "a blur of {sigma_mm} mm is too fine for a press table: it needs half an element ({element_mm} mm) and 1/200 of the tool ({tool_mm} mm)"
     )]
     Fine {
         /// The blur's standard deviation.
@@ -97,29 +97,29 @@ pub enum StampError {
     },
 }
 
-impl Stamp {
-    /// Makes the stamp of a tool under a covering for depths up to `depth_max_mm`, in mm.
+impl PressTable {
+    /// Makes the press table of a tool under a covering for depths up to `depth_max_mm`, in mm.
     ///
     /// Takes milliseconds for flat tools, seconds for finely tessellated ones.
     ///
     /// # Errors
-    /// [`StampError::DepthMax`] unless `0 < depth_max_mm <= ` the covering's thickness; [`StampError::Fine`] if the
+    /// [`PressTableError::DepthMax`] unless `0 < depth_max_mm <= ` the covering's thickness; [`PressTableError::Fine`] if the
     /// blur is less than half an element or 1/200 of the tool.
     pub fn new(
         model: &ForwardModel,
         indenter: &Indenter,
         covering: Covering,
         depth_max_mm: f64,
-    ) -> Result<Self, StampError> {
+    ) -> Result<Self, PressTableError> {
         let thickness_mm = covering.thickness_mm;
         if !(depth_max_mm > 0.0 && depth_max_mm <= thickness_mm) {
-            return Err(StampError::DepthMax { depth_max_mm, thickness_mm });
+            return Err(PressTableError::DepthMax { depth_max_mm, thickness_mm });
         }
         let sigma_mm = model.psf().sigma_mm(covering);
         let [width_mm, height_mm] = model.array().element_mm();
         let (element_mm, tool_mm) = (width_mm.max(height_mm), 2.0 * reach_mm(indenter));
         if sigma_mm < element_mm / 2.0 || sigma_mm < tool_mm / 200.0 {
-            return Err(StampError::Fine { sigma_mm, element_mm, tool_mm });
+            return Err(PressTableError::Fine { sigma_mm, element_mm, tool_mm });
         }
         let narrow = |values: &[f64]| values.iter().map(|value| single(*value)).collect();
         let response = model.response();
@@ -149,7 +149,7 @@ impl Stamp {
     /// row-major, overwritten.
     ///
     /// # Errors
-    /// [`StampError::Depth`] beyond the depth that the stamp was made for, [`StampError::Length`] if `counts` has
+    /// [`PressTableError::Depth`] beyond the depth that the press table was made for, [`PressTableError::Length`] if `counts` has
     /// not one place per element.
     pub fn image(
         &self,
@@ -157,7 +157,7 @@ impl Stamp {
         rotation_deg: f64,
         depth_mm: f64,
         counts: &mut [f32],
-    ) -> Result<(), StampError> {
+    ) -> Result<(), PressTableError> {
         self.indentation(position_mm, rotation_deg, depth_mm, counts)?;
         for (count, element) in counts.iter_mut().zip(&self.response) {
             *count = element.baseline + element.gain * (*count + element.quadratic * *count * *count);
@@ -165,24 +165,27 @@ impl Stamp {
         Ok(())
     }
 
-    /// Equivalent indentation of every element, in mm, for a tool placed as in [`Stamp::image`].
+    /// Equivalent indentation of every element, in mm, for a tool placed as in [`PressTable::image`].
     ///
     /// `indentation_mm`: one per element, row-major, overwritten.
     ///
     /// # Errors
-    /// As [`Stamp::image`].
+    /// As [`PressTable::image`].
     pub fn indentation(
         &self,
         position_mm: [f64; 2],
         rotation_deg: f64,
         depth_mm: f64,
         indentation_mm: &mut [f32],
-    ) -> Result<(), StampError> {
+    ) -> Result<(), PressTableError> {
         if indentation_mm.len() != self.response.len() {
-            return Err(StampError::Length { elements: self.response.len(), places: indentation_mm.len() });
+            return Err(PressTableError::Length {
+                elements: self.response.len(),
+                places: indentation_mm.len(),
+            });
         }
         if depth_mm.is_nan() || depth_mm > self.depth_max_mm {
-            return Err(StampError::Depth { depth_mm, depth_max_mm: self.depth_max_mm });
+            return Err(PressTableError::Depth { depth_mm, depth_max_mm: self.depth_max_mm });
         }
         if depth_mm > 0.0 {
             let offsets = [(position_mm[0], &self.col_centres_mm), (position_mm[1], &self.row_centres_mm)];
@@ -205,11 +208,11 @@ fn reach_mm(indenter: &Indenter) -> f64 {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the stamp's values are single precision")]
+#[expect(clippy::cast_possible_truncation, reason = "the press table's values are single precision")]
 fn single(value: f64) -> f32 {
     value as f32
 }
 
 #[cfg(test)]
-#[path = "stamp_tests.rs"]
+#[path = "press_table_tests.rs"]
 mod tests;

@@ -45,7 +45,7 @@ fn flat_mesh() -> Indenter {
 
 /// Greatest difference to the exact image over some poses, as a share of the greatest rise in any of them.
 fn error(model: &ForwardModel, indenter: &Indenter) -> f64 {
-    let stamp = Stamp::new(model, indenter, COVERING, 0.7).unwrap();
+    let table = PressTable::new(model, indenter, COVERING, 0.7).unwrap();
     let elements = model.array().elements();
     let (mut exact, mut counts) = (vec![0.0; elements], vec![0.0; elements]);
     let (mut worst, mut peak) = (0.0_f64, 0.0_f64);
@@ -55,7 +55,7 @@ fn error(model: &ForwardModel, indenter: &Indenter) -> f64 {
         let (rotation_deg, depth_mm) = (360.0 * share(0.731), 0.7 * (0.05 + 0.95 * share(0.281)));
         let contact = Contact { indenter: indenter.clone(), position_mm, rotation_deg, depth_mm };
         model.image(&contact, COVERING, &mut exact);
-        stamp.image(position_mm, rotation_deg, depth_mm, &mut counts).unwrap();
+        table.image(position_mm, rotation_deg, depth_mm, &mut counts).unwrap();
         for ((got, want), baseline) in counts.iter().zip(&exact).zip(&model.response().baseline_counts) {
             worst = worst.max((f64::from(*got) - want).abs());
             peak = peak.max(want - baseline);
@@ -96,10 +96,10 @@ fn oblong_elements_take_part() {
 #[test]
 fn a_tool_above_the_surface_or_far_away_leaves_the_baseline() {
     let model = model(Array::digitacts(), Psf::PAPER);
-    let stamp = Stamp::new(&model, &flat_mesh(), COVERING, 0.5).unwrap();
+    let table = PressTable::new(&model, &flat_mesh(), COVERING, 0.5).unwrap();
     let mut counts = vec![0.0; 48];
     for (x, depth) in [(5.0, 0.0), (5.0, -3.0), (200.0, 0.5)] {
-        stamp.image([x, 5.0], 10.0, depth, &mut counts).unwrap();
+        table.image([x, 5.0], 10.0, depth, &mut counts).unwrap();
         let baseline = &model.response().baseline_counts;
         assert!(
             counts.iter().zip(baseline).all(|(count, baseline)| (f64::from(*count) - baseline).abs() < 1e-12)
@@ -113,16 +113,19 @@ fn what_it_cannot_do_is_refused() {
     let cylinder = Indenter::Cylinder { diameter_mm: 1.0 };
     for depth_max_mm in [0.0, 1.1, f64::NAN] {
         assert!(matches!(
-            Stamp::new(&model, &cylinder, COVERING, depth_max_mm),
-            Err(StampError::DepthMax { .. })
+            PressTable::new(&model, &cylinder, COVERING, depth_max_mm),
+            Err(PressTableError::DepthMax { .. })
         ));
     }
     let plate = Indenter::Box { size_mm: [600.0, 600.0] };
-    assert!(matches!(Stamp::new(&model, &plate, COVERING, 0.5), Err(StampError::Fine { .. })));
-    let stamp = Stamp::new(&model, &cylinder, COVERING, 0.5).unwrap();
+    assert!(matches!(PressTable::new(&model, &plate, COVERING, 0.5), Err(PressTableError::Fine { .. })));
+    let table = PressTable::new(&model, &cylinder, COVERING, 0.5).unwrap();
     let mut counts = vec![0.0; 48];
     for depth_mm in [0.6, f64::NAN] {
-        assert!(matches!(stamp.image([5.0; 2], 0.0, depth_mm, &mut counts), Err(StampError::Depth { .. })));
+        assert!(matches!(
+            table.image([5.0; 2], 0.0, depth_mm, &mut counts),
+            Err(PressTableError::Depth { .. })
+        ));
     }
-    assert!(matches!(stamp.image([5.0; 2], 0.0, 0.1, &mut counts[1..]), Err(StampError::Length { .. })));
+    assert!(matches!(table.image([5.0; 2], 0.0, 0.1, &mut counts[1..]), Err(PressTableError::Length { .. })));
 }

@@ -1,4 +1,4 @@
-//! The tables of a stamp and how they are sampled.
+//! The tables of a press table and how they are sampled.
 
 use wide::{f32x4, f32x8};
 
