@@ -4,6 +4,10 @@
 //! sigma_x = sqrt(ratio) sigma          sigma_y = sigma / sqrt(ratio)
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `ratio` | - | 1 | 0.2 to 5 | `sigma_x / sigma_y` |
+//!
 //! The area that a point is spread over stays. Axes are the sensor's: a Gaussian that lies askew is no product of one
 //! along x and one along y.
 //!

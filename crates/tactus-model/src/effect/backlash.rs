@@ -4,6 +4,12 @@
 //! q(t) = max(x(t) - play / 2, min(x(t) + play / 2, q before))          on each of the robot's axes
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `play_x_mm` | mm | 0 | 0 to 1 | width of the play on the robot's x axis |
+//! | `play_y_mm` | mm | 0 | 0 to 1 | width of the play on the robot's y axis |
+//! | `play_z_mm` | mm | 0 | 0 to 0.5 | width of the play on the robot's z axis |
+//!
 //! `x` is where the stage says that the tip is, `q` where it is. The tip follows half the play behind a stage that
 //! goes on, and rests for the whole play where the stage turns; of two opposite approaches the mean is the
 //! registration's, or the surface's. The tip begins amid its play.

@@ -5,6 +5,13 @@
 //! c straight through 0 and offset_01_counts .. offset_16_counts, duration / 16 apart, and constant before and after
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `element` | index | -1 | -1, or an element of the array | the element that drifts; -1, or left out: all of them, alike |
+//! | `start_s` | s | 0 | 0 to 1000000 | start of the curve; no fit varies it; may be left out |
+//! | `duration_s` | s | 600 | 1 to 1000000 | from the start to the last knot; `tactus discover` sets it to the length of the data |
+//! | `offset_01_counts` to `offset_16_counts` | counts | 0 | -1000 to 1000 | drift at the knots, `duration_s / 16` apart |
+//!
 //! The start is at 0, since the baselines are the base model's. A wander of any
 //! shape is followed, be it a trend, a warming up or a random walk, of which least squares leave 4 % of the variance;
 //! 12 knots would leave 5 % and 6 knots 10 %. What is faster than a sixteenth of the duration is not: it takes several

@@ -8,6 +8,14 @@
 //!            + column_share        * (sum over the others of its column)
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `neighbour_share` | - | 0 | -0.5 to 0.5 | share of each of the up to four nearest neighbours |
+//! | `diagonal_share` | - | 0 | -0.5 to 0.5 | share of each of the up to four neighbours across the corners |
+//! | `row_neighbour_share` | - | 0 | -0.5 to 0.5 | share of each of the up to two neighbours in the same row |
+//! | `row_share` | - | 0 | -0.5 to 0.5 | share of each other element of the same row |
+//! | `column_share` | - | 0 | -0.5 to 0.5 | share of each other element of the same column |
+//!
 //! Along a row that leaks from column to column, neighbours answer most and the rest of the row less: the two shares of
 //! a row together follow such a ladder.
 //!

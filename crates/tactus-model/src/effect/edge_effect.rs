@@ -4,6 +4,12 @@
 //! u_e -> u_e (1 + edge_share exp(-edge distance / reach) + seam_share exp(-seam distance / reach))
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `edge_share` | - | 0 | -1 to 2 | relative change of the signal where the tool's axis is at the edge |
+//! | `seam_share` | - | 0 | -1 to 2 | relative change of the signal where the tool's axis is at the seam |
+//! | `reach_mm` | mm | 2 | 0.1 to 20 | distance over which either change falls to 1/e |
+//!
 //! Distances are those of the tool's axis: from the nearest side of the active area (0 on it and outside), and from
 //! the line in the middle of x, where the paper's two sensors meet. A factor by the element's own place would be part
 //! of its sensitivity.

@@ -4,6 +4,11 @@
 //! G -> (1 - tail_share) G_sigma + tail_share G_(width_ratio sigma)
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `tail_share` | - | 0 | 0 to 1 | share of the volume that is in the wider Gaussian |
+//! | `width_ratio` | - | 2 | 1 to 10 | standard deviation of the wider Gaussian over that of the core |
+//!
 //! Both of unit volume. The tail takes from the peak: sensitivity, stated for a Gaussian, is to be calibrated anew.
 //!
 //! # Source

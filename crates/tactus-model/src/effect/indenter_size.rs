@@ -4,6 +4,10 @@
 //! width = ratio x declared width
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `ratio` | - | 1 | 0.2 to 5 | true width over declared width |
+//!
 //! Widths are a cylinder's, sphere's or cone's diameter (a cone keeps its angle), a box's two sides, and for a mesh
 //! its x and y. Sensitivity keeps its meaning: it is stated for the reference tool as it is declared.
 //!

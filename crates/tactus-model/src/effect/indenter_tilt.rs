@@ -5,6 +5,12 @@
 //! lowest  = the greatest tan(tilt_x) u + tan(tilt_y) v of the face
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `tilt_x_deg` | degree | 0 | -10 to 10 | tilt along the tool's own x; positive: the side of positive x is deeper |
+//! | `tilt_y_deg` | degree | 0 | -10 to 10 | the same along the tool's own y |
+//! | `touched_share` | - | 0.5 | 0 to 1 | the point to which depth is measured: 0 the foot of the axis, 1 the lowest point |
+//!
 //! `u, v` along the tool's own sides (the robot's axes) from the foot of its axis. `touched_share` says which height of
 //! the tool the depth is told of: 0 the foot of the axis (one edge goes deeper, the other less deep, and while all of the
 //! face touches the volume is the same), 1 the lowest point, with which a touch finds the surface. Acts on tools with a

@@ -4,6 +4,13 @@
 //! u_element -> own_share u_element + other_share u_answers_for
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `element` | index | 0 | an element of the array | the faulty element |
+//! | `answers_for` | index | 0 | an element of the array | the element whose signal it takes |
+//! | `own_share` | - | 1 | 0 to 1 | share of its own signal that it keeps |
+//! | `other_share` | - | 0 | -1 to 1 | share of the other element's signal that it takes |
+//!
 //! Dead: both shares 0. The paper's faulty elements: `own_share` 0, `other_share` 1. Several are several effects, one
 //! for each element; every one takes what reached the elements themselves, so that their order does not matter. The
 //! element keeps its own gain and baseline.

@@ -4,6 +4,11 @@
 //! counts(t) -> counts(t - (last_row - row) row_time - (last_column - column) column_time)
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `row_time_s` | s | 0 | 0 to 0.1 | time from the sampling of a row to that of the next |
+//! | `column_time_s` | s | 0 | 0 to 0.1 | time from the sampling of a column to that of the next |
+//!
 //! Elements one by one, row by row, take an `element_time` each if `column_time` is that and `row_time` a row's columns
 //! of it; rows at once have no `column_time`, and columns at once no `row_time`. A frame bears the time of its last
 //! element; the first was sampled longest ago. Between moments counts are taken

@@ -4,6 +4,10 @@
 //! depth = surface + offset - z
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `offset_mm` | mm | 0 | -2 to 2 | the surface stands so much higher than the touch that found it says |
+//!
 //! A threshold of contact is the same with a negative offset.
 //!
 //! # Source

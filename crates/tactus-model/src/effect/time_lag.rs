@@ -4,6 +4,10 @@
 //! tip(t) -> tip(t - lag)          late: lag > 0
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `lag_s` | s | 0 | -1 to 1 | a frame shows where the tip was so long before; negative: frames are early |
+//!
 //! The path is asked for another instant; only one that knows its future can be early. Where places come one by
 //! one, a [`Trail`](crate::Trail) of them is the path.
 //!
