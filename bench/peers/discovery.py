@@ -324,9 +324,9 @@ def timed(folder, name):
         for part in np.array_split(scaled, max(len(scaled) // 20_000, 1)):
             process.predict(part)
 
-    take("PySINDy STLSQ", "24 generic terms, five thresholds, on all readings; no names of effects", sparse)
-    take("scikit-learn gradient boosting", "100 trees on all readings, twice; names nothing", black_box)
-    take("scikit-learn Gaussian process", "fitted to 1,000 of the readings, predicts all; names nothing", gaussian_process)
+    take("PySINDy STLSQ", "24 generic terms, five thresholds, on all readings; no effect names", sparse)
+    take("scikit-learn gradient boosting", "100 trees on all readings, twice; no effect names", black_box)
+    take("scikit-learn Gaussian process", "fitted to 1,000 of the readings, predicts all; no effect names", gaussian_process)
     versions = {"python": platform.python_version(), "numpy": np.__version__, "scikit-learn": sklearn.__version__, "pysindy": pysindy.__version__}
     return {"versions": versions, "frames": len(Data(folder, name).t), "rows": rows}
 

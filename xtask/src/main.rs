@@ -1,4 +1,4 @@
-//! Chores of the repository: `cargo xtask proto` compiles the messages, `cargo xtask assets` makes the tools.
+//! Chores of the repository: `cargo xtask proto` compiles the messages, `cargo xtask assets` writes the tools as STL.
 
 mod assets;
 mod messages;
@@ -12,7 +12,7 @@ fn main() -> Result<()> {
     match task.as_deref() {
         Some("proto") => messages::compile(&repository(), &repository()),
         Some("assets") => assets::write(&repository()),
-        other => bail!("unknown task {other:?}; there are: proto, assets"),
+        other => bail!("unknown task {other:?}; known: proto, assets"),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The direction of dependencies: a crate may depend only on crates in rows above its own.
+//! Direction of dependencies: a crate depends only on crates in rows above its own.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::collections::BTreeSet;
@@ -29,7 +29,7 @@ const ROWS: [&str; 20] = [
     "xtask",
 ];
 
-/// What each layer must not reach for, not even through its dependencies' features.
+/// Crates that must not be direct dependencies of a crate.
 const NEVER: [(&str, &[&str]); 7] = [
     ("tactus-model", &["tokio", "rand", "serde"]),
     ("tactus-solid", &["tokio", "rand", "serde"]),
@@ -40,7 +40,7 @@ const NEVER: [(&str, &[&str]); 7] = [
     ("tactus-plan", &["tokio"]),
 ];
 
-/// Only the apps embed virtual devices; benchmarks measure on their hidden physics.
+/// The daemon embeds virtual devices, the end-to-end tests use them, and the benchmarks score discovery on their hidden physics.
 const MAY_USE_MOCK: [&str; 3] = ["tactus-daemon", "tactus-e2e", "tactus-bench"];
 
 fn metadata() -> Metadata {
@@ -50,7 +50,7 @@ fn metadata() -> Metadata {
         .unwrap()
 }
 
-/// Pairs of a workspace crate and what it is built from, tests aside.
+/// Pairs of a workspace crate and one of its direct dependencies; development dependencies are left out.
 fn edges(metadata: &Metadata) -> BTreeSet<(String, String)> {
     metadata
         .workspace_packages()
@@ -76,7 +76,7 @@ fn dependencies_point_upwards() {
     let row = |name: &str| ROWS.iter().position(|row| *row == name);
     for (user, used) in edges(&metadata()) {
         if let (Some(user_row), Some(used_row)) = (row(&user), row(&used)) {
-            assert!(used_row < user_row, "{user} stands above {used} and must not depend on it");
+            assert!(used_row < user_row, "{user} is in a row above {used} and must not depend on it");
         }
     }
 }

@@ -20,7 +20,8 @@ fn the_page_shows_the_file_the_line_and_the_tests_as_they_are() {
 
 #[test]
 fn the_modules_table_has_every_effect() {
-    let rows: Vec<&str> = include_str!("effect.rs").lines().filter(|line| line.starts_with("//! | ")).collect();
+    let rows: Vec<&str> =
+        include_str!("effect.rs").lines().filter(|line| line.starts_with("//! | ")).collect();
     for definition in REGISTRY {
         let name = format!("`{}`", definition.name);
         assert!(rows.iter().any(|row| row.contains(&name)), "{name}");
