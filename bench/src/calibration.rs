@@ -75,8 +75,8 @@ fn sweeps_of(
     readings: &Readings,
     found: &tactus_calibrate::Calibration,
 ) -> Result<Vec<Sweep>> {
-    let responses = &found.response.as_ref().context("no response was fitted")?.elements;
-    let place = found.registration.as_ref().context("no place was found")?;
+    let responses = &found.response.as_ref().context("the recordings give no responses")?.elements;
+    let place = found.registration.as_ref().context("the recordings give no registration")?;
     let registration = place.registration(declared.registration);
     let surface_mm = place.surface_mm.map_or(0.0, |surface| surface.value);
     let array = declared.model.array();
@@ -98,9 +98,10 @@ fn sweeps_of(
                         one.indentation_mm(rise)
                     });
                     sweep.places_mm.push(registration.to_sensor(press.place_mm));
-                    sweep
-                        .images_mm
-                        .push(read.collect::<Option<_>>().context("a reading beyond the response")?);
+                    sweep.images_mm.push(
+                        read.collect::<Option<_>>()
+                            .context("a reading is outside the range of its element's response")?,
+                    );
                 }
             }
         }

@@ -263,10 +263,10 @@ impl Bounds {
             + count(Campaign::Pairs, is_wrong)
             + count(Campaign::Outside, is_wrong);
         println!("false alarms {false_alarms}, exact {exact}, pairs {pairs}, sets with a wrong name {wrong}");
-        ensure!(false_alarms <= self.false_alarms_most, "at most {} false alarms", self.false_alarms_most);
-        ensure!(exact >= self.exact_least, "at least {} named exactly", self.exact_least);
-        ensure!(pairs >= self.pairs_least, "at least {} pairs with both named", self.pairs_least);
-        ensure!(wrong <= self.wrong_most, "at most {} sets with a wrong name", self.wrong_most);
+        ensure!(false_alarms <= self.false_alarms_most, "more than {} false alarms", self.false_alarms_most);
+        ensure!(exact >= self.exact_least, "fewer than {} sets named exactly", self.exact_least);
+        ensure!(pairs >= self.pairs_least, "fewer than {} pairs with both named", self.pairs_least);
+        ensure!(wrong <= self.wrong_most, "more than {} sets with a wrong name", self.wrong_most);
         Ok(())
     }
 }
