@@ -16,8 +16,8 @@
 //! | `row_share` | - | 0 | -0.5 to 0.5 | share of each other element of the same row |
 //! | `column_share` | - | 0 | -0.5 to 0.5 | share of each other element of the same column |
 //!
-//! Along a row that leaks from column to column, neighbours answer most and the rest of the row less: the two shares of
-//! a row together follow such a ladder.
+//! In a row that leaks from column to column, neighbours answer most and the rest of the row less: `row_neighbour_share` and
+//! `row_share` together follow such a ladder.
 //!
 //! # Source
 //! Row-column addressing: charge that leaks between the lines of a capacitive matrix, and stray capacitance

@@ -8,7 +8,7 @@
 //! |---|---|---|---|---|
 //! | `growth_share` | - | 0 | -0.9 to 5 | relative growth of sigma where the depth is the whole thickness |
 //!
-//! What is spread wider is not lost: the peak falls as the width grows.
+//! The volume is conserved: the peak falls as the width grows.
 //!
 //! No derivative in closed form. Cost: one image.
 //!

@@ -9,7 +9,8 @@
 //! | `tail_share` | - | 0 | 0 to 1 | share of the volume that is in the wider Gaussian |
 //! | `width_ratio` | - | 2 | 1 to 10 | standard deviation of the wider Gaussian over that of the core |
 //!
-//! Both of unit volume. The tail takes from the peak: sensitivity, stated for a Gaussian, is to be calibrated anew.
+//! Both Gaussians have unit volume. The tail lowers the peak, so that the sensitivity, which is stated for one Gaussian, must be
+//! calibrated again.
 //!
 //! # Source
 //! The layered elastic solution falls off more slowly than the Gaussian of its core (the paper's Fig. 3); a mixture

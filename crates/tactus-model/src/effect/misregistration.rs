@@ -16,8 +16,8 @@
 //! | `scale_error` | - | 0 | -0.2 to 0.2 | the stage moves this share further than it reports |
 //! | `squareness_deg` | degree | 0 | -10 to 10 | the stage's y axis leans so far towards its x axis; may be left out |
 //!
-//! Shift and turn are those of the registration itself. Scale and squareness are the stage's, about the shifted origin: its steps are
-//! longer than it believes, and its y axis leans towards x.
+//! Offset and rotation belong to the registration. Scale and squareness belong to the stage and act about the shifted origin: its
+//! steps are longer than it reports, and its y axis leans towards x.
 //!
 //! # Source
 //! The paper's Sec. 2.1: two touches near opposite corners set the registration, and so carry their errors.

@@ -1,4 +1,4 @@
-//! `surface-offset`: the covering's surface is not at the height where the one touch put it.
+//! `surface-offset`: the covering's surface is not at the height that the touch found.
 //!
 //! ```text
 //! depth = surface + offset - z
@@ -8,7 +8,7 @@
 //! |---|---|---|---|---|
 //! | `offset_mm` | mm | 0 | -2 to 2 | the surface stands so much higher than the touch that found it says |
 //!
-//! A threshold of contact is the same with a negative offset.
+//! A negative offset is the same as a threshold of contact.
 //!
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
