@@ -107,8 +107,8 @@ fn quoted_files_exist() {
         let here = top.join(&text.path);
         text.wrong(|line| {
             let is_path = |quoted: &&str| {
-                let first = quoted.split('/').next().unwrap_or_default();
-                quoted.contains('/')
+                let (first, _) = quoted.split_once('/').unwrap_or_default();
+                !first.is_empty()
                     && !quoted.contains([' ', '<', '*', '{'])
                     && first != "target"
                     && top.join(first).is_dir()
