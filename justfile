@@ -173,8 +173,8 @@ solid-tools:
     test -d {{ tools }}/solid || python3 -m venv {{ tools }}/solid
     {{ tools }}/solid/bin/pip install --quiet --requirement bench/peers/fem-requirements.txt
 
-# Truth comes back: the paper's experiments on many simulated rigs whose truth varies, calibrated, all by the real binary; the table of
-# coverage. 200 rigs take about 20 minutes on two cores; tests/e2e/truth.rs does two of them, coarsely, with every other test.
+# The table of docs/calibration-evidence.md: the paper's experiments on simulated rigs with different true parameters, calibrated by the
+# release build. 200 rigs take about 20 minutes on two cores; tests/e2e/truth.rs takes two of them and a coarse sweep in every test run.
 truth rigs="200":
     cargo build --release --package tactus
     TACTUS_TRUTH_RIGS={{ rigs }} TACTUS_TRUTH_POINTS=15 cargo test --release --package tactus-e2e --test e2e truth:: -- --nocapture

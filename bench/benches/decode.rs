@@ -1,5 +1,5 @@
-//! Bytes a second through each sensor's decoder, clean and with a bit flipped in one byte of a hundred, beside copying the bytes.
-//! They are pushed in reads of 4 kB, as a driver does, and every frame is taken out to its readings.
+//! Bytes per second through each sensor's decoder, clean and with a bit flipped in one byte of a hundred, beside copying the
+//! bytes. They are pushed in reads of 4 kB, as a driver does, and every reading is taken out.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The three figures of one codec. `take` gives the number of frames, so that a decoder that finds none is not called fast.
+/// The three figures of one codec. `take` returns the number of frames, so that a decoder that finds none fails.
 fn bench(criterion: &mut Criterion, name: &str, clean: &[u8], take: impl Fn(&[u8]) -> usize) {
     let corrupt = corrupted(clean);
     let frames = take(clean);
@@ -59,7 +59,7 @@ fn bench(criterion: &mut Criterion, name: &str, clean: &[u8], take: impl Fn(&[u8
     group.finish();
 }
 
-/// A mebibyte of frames, the first of number 0.
+/// A mebibyte of frames, numbered from 0.
 fn stream(frame: impl Fn(u16) -> Vec<u8>) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(STREAM_BYTES);
     let mut number = 0;
@@ -74,13 +74,13 @@ fn time_ms(frame: u16) -> u32 {
     33 * u32::from(frame)
 }
 
-/// A bit flipped in every 101st byte, at places that no frame's length divides.
+/// The bytes with a bit flipped in every 101st, a step that no frame's length divides.
 fn corrupted(bytes: &[u8]) -> Vec<u8> {
     let flip = |(index, byte): (usize, &u8)| if index % 101 == 100 { byte ^ 0x10 } else { *byte };
     bytes.iter().enumerate().map(flip).collect()
 }
 
-/// Readings of a resting array with a press amidst them.
+/// Readings of an array under one press.
 fn counts(frame: u16) -> [u16; ELEMENTS] {
     std::array::from_fn(|element| {
         let far = element.abs_diff(20);
@@ -89,8 +89,8 @@ fn counts(frame: u16) -> [u16; ELEMENTS] {
     })
 }
 
-/// Pushes the bytes through a decoder, as reads bring them; the number of readings. `next` takes the next thing out, if there is one, and says
-/// whether it is a reading.
+/// Pushes the bytes through a decoder in reads of 4 kB; returns the number of readings. `next` takes the next item out, if there
+/// is one, and says whether it is a reading.
 fn readings<D>(
     bytes: &[u8],
     mut decoder: D,

@@ -1,4 +1,4 @@
-//! Time of the finite element model of the covering, and how it grows with bricks.
+//! Time of the finite element model of the covering, at several numbers of bricks.
 
 use anyhow::Result;
 use criterion::{BenchmarkId, Criterion};

@@ -1,4 +1,4 @@
-//! Time of one image: every array, tool and way, and how it grows with elements and triangles.
+//! Time of one image: every array, tool and way, and several numbers of elements and triangles.
 
 use anyhow::Result;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, measurement::WallTime};
@@ -14,7 +14,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Only what has a mesh is drawn.
+/// The ways for a tool; `raster` needs a mesh.
 fn ways(tool: Tool) -> &'static [Way] {
     match tool {
         Tool::H => &[Way::PressTable, Way::Raster, Way::Exact],
@@ -22,7 +22,7 @@ fn ways(tool: Tool) -> &'static [Way] {
     }
 }
 
-/// The shipped arrays.
+/// Every shipped array.
 fn arrays(criterion: &mut Criterion) -> Result<()> {
     for tool in [Tool::Cylinder, Tool::H] {
         let mut group = criterion.benchmark_group(format!("{tool:?}").to_lowercase());
@@ -37,7 +37,7 @@ fn arrays(criterion: &mut Criterion) -> Result<()> {
     Ok(())
 }
 
-/// One area in ever finer elements.
+/// The same area in ever finer elements.
 fn elements(criterion: &mut Criterion) -> Result<()> {
     let mut group = criterion.benchmark_group("elements");
     for fineness in [1, 2, 4] {
@@ -50,7 +50,7 @@ fn elements(criterion: &mut Criterion) -> Result<()> {
     Ok(())
 }
 
-/// One sphere in ever finer triangles.
+/// The same sphere in ever finer triangles.
 fn triangles(criterion: &mut Criterion) -> Result<()> {
     let mut group = criterion.benchmark_group("triangles");
     group.sample_size(10);

@@ -1,7 +1,7 @@
-"""Both panels of Fig. 6, 25 x 25: ours and a plain numpy program, turn by turn on one machine.
+"""Both panels of Fig. 6 with 25 x 25 cells: Tactus and a plain numpy program, in turns on one machine.
 
-The numpy program takes every step that the paper tells of, all steps of a search in one array (or in arrays that
-double until the change is met), and counts with numpy.unique. The grid is ours; the values are compared one by one.
+The numpy program takes every step that the paper describes, all steps of a search in one array (or in arrays that
+double until the change is found), and counts with numpy.unique. Both use the grid of Tactus; all values are compared.
 """
 
 import os

@@ -1,10 +1,10 @@
-"""The fit of the point spreads to the paper's sweep: ours and scipy.optimize on the same images, on one machine.
+"""The fit of the point spreads to the paper's sweep: Tactus and scipy.optimize on the same images, on one machine.
 
-The embedded rig makes the recordings. Ours reads them, calibrates, and prints the images that its spreads rest on.
+The embedded rig makes the recordings. Tactus reads them, calibrates, and prints the images that its spreads are fitted to.
 The scipy program maximises the same criterion (Eq. 3, images of unit L2 norm) over sigma for each covering and depth,
-by `minimize_scalar` with bounds, in two ways. As the paper tells it: a raster of 0.1 mm, `gaussian_filter`, sums over the
-elements, one press after the other; of one sweep in twelve, times twelve. And by the same mathematics as ours: the disc cut
-into 16 strips (Gauss and Legendre), each blurred and integrated by the normal distribution, all presses in one array.
+by `minimize_scalar` with bounds, in two ways. The first follows the paper: a raster of 0.1 mm, `gaussian_filter`, sums over
+the elements, one press after the other, for one sweep of twelve, times twelve. The second uses the mathematics of Tactus: the
+disc is cut into 16 strips (Gauss and Legendre), each blurred and integrated by the normal distribution, all presses in one array.
 """
 
 import os

@@ -1,17 +1,17 @@
-"""What others make of the same data: a black box and sparse regression on the residual, and their time and memory.
+"""Other methods on the data of `tactus discover`: a black box and sparse regression on the residual, with time and memory.
 
-`report` works on the tables that `tactus-bench evidence run --keep-tables` keeps: measurements, and the residual of the
-recalibrated base model, which everyone is given. It writes reports of the form that the scorer reads, beside ours. It opens no
-label: held-out presses decide, as they do for us.
+`report` reads the tables that `tactus-bench evidence run --keep-tables` keeps: the measurements, and the residual of the
+recalibrated base model, which all methods get. It writes reports in the form that the scorer reads. It opens no labels:
+held-out presses decide, as in `tactus discover`.
 
-- Black box: scikit-learn's gradient boosting of the residual on everything that is known of a reading. It has no names
-  to give: where it predicts held-out presses better than nothing does, its verdict is `unexplained`. It is also fitted to the
-  shallower presses only, and asked for the deepest.
-- Sparse regression: PySINDy's STLSQ on a library of generic terms of the signal, its derivatives and the stage's; the
-  threshold is the one that predicts held-out presses best. A term that stays and carries a fifth of what all carry is a
-  name: that of the effect whose first-order form it is, with the others that it may be.
+- Black box: scikit-learn's gradient boosting of the residual on everything that is known of a reading. It names no
+  effects: if it predicts held-out presses significantly, its verdict is `unexplained`. It is also fitted to the shallower
+  presses only and judged on the deepest.
+- Sparse regression: PySINDy's STLSQ on a library of generic terms of the signal and its derivatives and of the stage's
+  motion. The threshold is the one that predicts held-out presses best. A term with at least a fifth of all weight names the
+  effect whose first-order form it is; other effects of that form are its equivalents.
 
-`time` takes each of them, and a Gaussian process on 1,000 readings, over one table.
+`time` measures each of them, and a Gaussian process on 1,000 readings, on one table.
 """
 
 import os
@@ -84,7 +84,7 @@ def main():
 
 
 def reported(folder, name):
-    """Writes everyone's report of a set; what is done already is left as it is."""
+    """Writes the report of each method on a set, unless it is there already."""
     warnings.filterwarnings("ignore")
     data = None
     for method, work in (("black-box", black_box), ("sparse", sparse)):
@@ -112,11 +112,11 @@ def arguments():
 
 
 class Data:
-    """A set's readings: the base model's residual, and what is known of each."""
+    """The readings of a set: the base model's residual, and what is known of each reading."""
 
     def __init__(self, work, name):
         table, residuals = (pq.read_table(work / part / f"{name}.parquet") for part in ("sets", "residuals"))
-        # The floor is everyone's: that of frames which repeat each other.
+        # All methods use the same noise, that of frames which repeat each other.
         self.noise = json.loads((work / "reports" / f"{name}.json").read_text())["noise_rms_counts"]
         rig = json.loads(table.schema.metadata[b"tactus.rig"])["array"]
         rows, cols = rig["rows"], rig["cols"]
@@ -137,7 +137,7 @@ class Data:
         self.shape = (rows, cols)
         presses = np.unique(self.press[self.press >= 0])
         held = np.random.default_rng(1).permutation(presses)[: len(presses) // HELD_OUT]
-        # What is between the presses goes to the fit.
+        # Frames between the presses are fitted.
         self.is_held = np.isin(self.press, held)
         self.presses = len(presses)
         deepest = np.array([self.depth[self.press == press].max() for press in presses])
@@ -145,7 +145,7 @@ class Data:
         self.is_deep = np.isin(self.press, deep)
 
     def features(self):
-        """Of every reading, element by element: what a black box is given."""
+        """Inputs of the black box, for every reading."""
         n, elements = self.base.shape
         frame = np.stack(
             [self.depth, *self.velocity.T, self.held, self.released, self.t, *self.at.T, self.press], axis=1
@@ -156,7 +156,7 @@ class Data:
         return np.column_stack([wide, np.tile(place, (n, 1)), *(part.ravel() for part in per_reading)])
 
     def terms(self):
-        """Of every reading: the library of sparse regression, by name, each of unit root mean square."""
+        """Terms of the sparse regression, for every reading: names, and values of unit root mean square."""
         p, (rows, cols) = self.base, self.shape
         image = p.reshape(-1, rows, cols)
         d = lambda axis: np.gradient(image, axis=axis).reshape(p.shape)
@@ -193,7 +193,7 @@ class Data:
             "p y": p * wide(self.at[:, 1]),
             "p edge": p * edge,
         }
-        # Gain and offset of each element were fitted; a term counts for what it has beyond them.
+        # Gain and offset of each element are fitted already, so a term counts without them.
         for name, term in terms.items():
             term = term - term.mean(axis=0)
             own = p - p.mean(axis=0)
@@ -203,7 +203,7 @@ class Data:
 
 
 def since(is_so, t):
-    """Seconds for which it has been so; 0 where it is not."""
+    """Time in s for which a condition has held; 0 where it does not."""
     begins = np.flatnonzero(is_so & ~np.r_[False, is_so[:-1]])
     last = np.searchsorted(begins, np.arange(len(t)), side="right") - 1
     return np.where(is_so & (last >= 0), t - t[begins[np.maximum(last, 0)]] if len(begins) else 0.0, 0.0)
@@ -256,7 +256,7 @@ def sparse(data):
 
 
 def thresholded(data, terms, held):
-    """The fit to what is not held out, with the threshold that predicts what is held out best."""
+    """The fit to the frames that are not held out, with the threshold that predicts the others best."""
     elements = data.residual.shape[1]
     readings = np.repeat(~held, elements)
     best = (np.zeros_like(data.residual), np.zeros(terms.shape[1]))
@@ -273,7 +273,7 @@ def thresholded(data, terms, held):
 
 
 def gain(data, predicted, held):
-    """What each held-out press gains, and the shrink over them."""
+    """The gain of each held-out press, and the shrink over all of them."""
     before, after = data.residual**2, (data.residual - predicted) ** 2
     presses = np.unique(data.press[held])
     gains = [(before - after)[data.press == press].mean() for press in presses]
@@ -301,7 +301,7 @@ def timed(folder, name):
     rows = []
 
     def take(who, does, work):
-        # A process of its own for each, so that the greatest memory is its own.
+        # Each method has its own process, so that the peak memory is its own.
         reader, writer = os.pipe()
         child = os.fork()
         if child == 0:
@@ -324,9 +324,9 @@ def timed(folder, name):
         for part in np.array_split(scaled, max(len(scaled) // 20_000, 1)):
             process.predict(part)
 
-    take("PySINDy STLSQ", "24 generic terms, five thresholds, on all readings; no names of effects", sparse)
-    take("scikit-learn gradient boosting", "100 trees on all readings, twice; names nothing", black_box)
-    take("scikit-learn Gaussian process", "fitted to 1,000 of the readings, predicts all; names nothing", gaussian_process)
+    take("PySINDy STLSQ", "24 generic terms, five thresholds, on all readings; no effect names", sparse)
+    take("scikit-learn gradient boosting", "100 trees on all readings, twice; no effect names", black_box)
+    take("scikit-learn Gaussian process", "fitted to 1,000 of the readings, predicts all; no effect names", gaussian_process)
     versions = {"python": platform.python_version(), "numpy": np.__version__, "scikit-learn": sklearn.__version__, "pysindy": pysindy.__version__}
     return {"versions": versions, "frames": len(Data(folder, name).t), "rows": rows}
 

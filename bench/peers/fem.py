@@ -1,8 +1,8 @@
-"""The finite element model of the covering: our reactions and times beside those of CalculiX and scikit-fem.
+"""The finite element model of the covering: reactions and times of Tactus beside those of CalculiX and scikit-fem.
 
-Everyone solves the same slabs of cubes: bottom bonded, sides on rollers, 1 N on the middle of the top. With mean
-dilatation we meet scikit-fem, whose pressure is constant in a brick, which is the same; with full integration we meet
-CalculiX, whose C3D8 that is in linear statics. Free sides stand beside it, to show whether the sides matter.
+All programs solve the same slabs of cubes: bottom bonded, sides on rollers, 1 N on the middle of the top. With mean
+dilatation Tactus equals scikit-fem, whose pressure is constant in a brick, which is the same. With full integration it
+equals CalculiX, whose C3D8 bricks are integrated in full in linear statics. Free sides show whether the sides matter.
 """
 
 import os

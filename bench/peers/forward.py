@@ -1,8 +1,7 @@
-"""Images a second of a letter H pressed on three arrays: ours and the peers', turn by turn on one machine.
+"""Images per second of a letter H pressed on three arrays: Tactus and its peers, in turns on one machine.
 
-Arrays, poses and our images come from `tactus-bench scene`, so that everyone presses the same. What a contender
-computes, and what it is given, stands beside its figure; so does how far its values are from a quadrature of
-the definition, made here.
+Arrays, poses and the images of Tactus come from `tactus-bench scene`, so that all programs press the same. The output
+says what each program computes, and how far its values are from a quadrature of the definition, which is made here.
 """
 
 import os

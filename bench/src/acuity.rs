@@ -1,28 +1,28 @@
-//! Both panels of Fig. 6, in full.
+//! Both panels of the paper's Fig. 6.
 
 use anyhow::Result;
 use tactus_calibrate::acuity::{Grid, OFFSETS};
 
 use crate::{Growth, clock::timed};
 
-/// The panels of one size.
+/// Both panels on one grid, with the time they take.
 #[derive(Debug, Clone)]
 pub struct Acuity {
     /// Spreads and force resolutions.
     pub grid: Grid,
-    /// Fig. 6a, row-major.
+    /// Fig. 6a: number of locations, row-major.
     pub locations: Vec<usize>,
-    /// Fig. 6b, row-major.
+    /// Fig. 6b: mean separation, row-major.
     pub separations: Vec<Option<f64>>,
-    /// Seconds of each panel, on all cores that the program may use: medians.
+    /// Median time of each panel, on all cores that the program may use.
     pub panels_s: [f64; 2],
 }
 
 impl Acuity {
-    /// Computes the panels so many times.
+    /// Computes the panels `times` times.
     ///
     /// # Errors
-    /// None in truth: the grids' spreads and resolutions are in range.
+    /// If a spread or a force resolution of the grid is out of range.
     pub fn measure(grid: Grid, times: usize) -> Result<Self> {
         let (locations, locations_s) = timed(times, || grid.map(|sensor| sensor.locations()))?;
         let (separations, separations_s) =
@@ -30,8 +30,8 @@ impl Acuity {
         Ok(Self { grid, locations, separations, panels_s: [locations_s, separations_s] })
     }
 
-    /// How the time of both panels grows with their cells: 25 x 25, 50 x 50 and 100 x 100 over the same ranges; and how
-    /// that of one row grows with its force steps.
+    /// Growth of the time of both panels with their cells (25 x 25, 50 x 50 and 100 x 100 over the same ranges), and of the
+    /// time of one row with its force steps.
     ///
     /// # Errors
     /// As [`Acuity::measure`].

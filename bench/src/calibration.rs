@@ -1,4 +1,4 @@
-//! A calibration from recordings: reading them, the whole of it, and the fit of the spreads.
+//! Time of a calibration from recordings.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -9,16 +9,16 @@ use tactus_schema::Model;
 
 use crate::clock::timed;
 
-/// The times of a calibration, and the images that its spreads were fitted to.
+/// Times of a calibration, and the images that its spreads are fitted to.
 #[derive(Debug, Clone)]
 pub struct Calibration {
-    /// Presses read.
+    /// Number of presses.
     pub presses: usize,
-    /// Seconds to read the recordings and gather their frames.
+    /// Time to read the recordings and gather their frames.
     pub read_s: f64,
-    /// Seconds of the calibration: the median of so many.
+    /// Median time of the calibration.
     pub whole_s: f64,
-    /// The same without the presses of the sweeps, of which only the spreads are fitted.
+    /// The same without the presses of the sweeps, to which only the spreads are fitted.
     pub without_sweeps_s: f64,
     /// The sweeps, by covering and depth.
     pub sweeps: Vec<Sweep>,
@@ -31,18 +31,18 @@ pub struct Sweep {
     pub covering_mm: f64,
     /// Depth of the presses.
     pub depth_mm: f64,
-    /// What was fitted.
+    /// The fitted spread.
     pub sigma_mm: f64,
-    /// Centres of the elements that take part; sensor frame.
+    /// Centres of the elements used, sensor frame.
     pub centres_mm: Vec<[f64; 2]>,
-    /// Where the presses stood; sensor frame.
+    /// Places of the presses, sensor frame.
     pub places_mm: Vec<[f64; 2]>,
-    /// What these elements read in each, as indentations.
+    /// Readings of these elements in each press, as equivalent indentations.
     pub images_mm: Vec<Vec<f64>>,
 }
 
 impl Calibration {
-    /// Calibrates from recordings so many times.
+    /// Calibrates from recordings `times` times.
     ///
     /// # Errors
     /// If the files cannot be read, or show no spread.
@@ -75,8 +75,8 @@ fn sweeps_of(
     readings: &Readings,
     found: &tactus_calibrate::Calibration,
 ) -> Result<Vec<Sweep>> {
-    let responses = &found.response.as_ref().context("no response was fitted")?.elements;
-    let place = found.registration.as_ref().context("no place was found")?;
+    let responses = &found.response.as_ref().context("the recordings give no responses")?.elements;
+    let place = found.registration.as_ref().context("the recordings give no registration")?;
     let registration = place.registration(declared.registration);
     let surface_mm = place.surface_mm.map_or(0.0, |surface| surface.value);
     let array = declared.model.array();
@@ -98,9 +98,10 @@ fn sweeps_of(
                         one.indentation_mm(rise)
                     });
                     sweep.places_mm.push(registration.to_sensor(press.place_mm));
-                    sweep
-                        .images_mm
-                        .push(read.collect::<Option<_>>().context("a reading beyond the response")?);
+                    sweep.images_mm.push(
+                        read.collect::<Option<_>>()
+                            .context("a reading is outside the range of its element's response")?,
+                    );
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! The time of an image, and of any work.
+//! Times of images and of other work.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -8,7 +8,7 @@ use tactus_model::Array;
 
 use crate::{Painter, Pose, poses};
 
-/// Seconds from a pose to its image: the median of five runs over the same poses, each of at least 0.05 s.
+/// Time in s from a pose to its image: the median of five runs over the same poses, each of at least 0.05 s.
 ///
 /// # Errors
 /// If the painter refuses a pose.
@@ -25,7 +25,7 @@ pub fn per_image_s(painter: &mut Painter, array: &Array) -> Result<f64> {
     Ok(runs_s[RUNS / 2])
 }
 
-/// Makes images of the poses, over and over, for a while: how many, and how long it took.
+/// Makes images of the poses, cyclically, for at least some time; returns their number and the time taken.
 pub(crate) fn paint(
     painter: &mut Painter,
     poses: &[Pose],
@@ -34,7 +34,7 @@ pub(crate) fn paint(
 ) -> Result<(u64, Duration)> {
     let started = Instant::now();
     let mut images = 0;
-    // One look at the clock, some tens of nanoseconds, for several images.
+    // Reading the clock takes some tens of nanoseconds, so it is read once for several images.
     for several in poses.chunks(16).cycle() {
         for pose in several {
             painter.image(black_box(pose), image)?;
@@ -48,7 +48,7 @@ pub(crate) fn paint(
     Ok((images, started.elapsed()))
 }
 
-/// What the work gives, and the median of its seconds.
+/// The result of the work, and the median of its times in s.
 pub(crate) fn timed<T, E>(times: usize, mut work: impl FnMut() -> Result<T, E>) -> Result<(T, f64), E> {
     let mut once = || {
         let started = Instant::now();

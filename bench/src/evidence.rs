@@ -1,9 +1,9 @@
-//! How well `tactus discover` finds and names what is hidden in data.
+//! How well `tactus discover` finds and names hidden physics.
 //!
-//! A *campaign* is a list of sets, each made from its own seed ([`campaigns()`]). [`run()`] makes them, seals their labels
-//! in a folder of their own, and has the real binary discover, which is given a measurement table and nothing
-//! else. [`read()`] alone opens labels, and holds them against the reports; [`Scores`] counts, [`document()`] and
-//! [`pictures()`] tell.
+//! A *campaign* is a list of sets, each made from its own seed ([`campaigns()`]). [`run()`] makes the sets, writes their
+//! labels into a separate folder, and starts the program `tactus`, which gets a measurement table and nothing else. Only
+//! [`read()`] opens the labels; it compares them with the reports. [`Scores`] counts the outcomes, [`document()`] and
+//! [`pictures()`] present them.
 
 mod ablation;
 mod campaign;

@@ -20,13 +20,13 @@ pub(crate) struct EvidenceArgs {
 
 #[derive(Debug, Subcommand)]
 enum Part {
-    /// Makes sets and has `tactus` discover in them; goes on where it was left off. Then scores.
+    /// Makes sets, runs `tactus discover` on each and scores; continues an interrupted run.
     Run(RunArgs),
-    /// Scores what has been run.
+    /// Scores the sets that have been run.
     Score(WhichArgs),
-    /// Time and memory of `tactus discover` from 9,000 to 144,000 frames, as JSON.
+    /// Measures time and memory of `tactus discover`, by default for 9,000 to 144,000 frames; prints JSON.
     Time(TimeArgs),
-    /// Twins: what the paper's own experiments leave undecided, and one active round on the embedded rig decides.
+    /// Runs the cases that an experiment of the paper leaves undecided, with one active round each on the embedded rig.
     Active(ActiveArgs),
 }
 
@@ -35,13 +35,13 @@ struct ActiveArgs {
     /// The program that discovers.
     #[arg(long, default_value = "target/release/tactus")]
     tactus: PathBuf,
-    /// Only physics that have this in their names.
+    /// Run only physics whose ids contain this.
     #[arg(long)]
     only: Option<String>,
-    /// Recordings and reports.
+    /// Folder of the recordings and reports.
     #[arg(long, default_value = "target/evidence/active")]
     work: PathBuf,
-    /// Write the table between its marks in this document.
+    /// Replace the table between its marks in this document.
     #[arg(long)]
     document: Option<PathBuf>,
 }
@@ -51,13 +51,13 @@ struct TimeArgs {
     /// The program that discovers.
     #[arg(long, default_value = "target/release/tactus")]
     tactus: PathBuf,
-    /// Frames of the sets, several with commas.
+    /// Numbers of frames, separated by commas.
     #[arg(long, value_delimiter = ',', default_values_t = [9_000, 36_000, 144_000])]
     frames: Vec<usize>,
-    /// The median of so many.
+    /// Runs of each size; the median counts.
     #[arg(long, default_value_t = 3)]
     runs: usize,
-    /// Sets and reports.
+    /// Folder of the sets and reports.
     #[arg(long, default_value = "target/evidence/time")]
     work: PathBuf,
 }
@@ -69,50 +69,50 @@ struct RunArgs {
     /// The program that discovers.
     #[arg(long, default_value = "target/release/tactus")]
     tactus: PathBuf,
-    /// Sets at once; as many as there are cores if not given.
+    /// Sets that run at the same time; by default the number of cores.
     #[arg(long)]
     jobs: Option<NonZeroUsize>,
     /// A further argument of `tactus discover`; may be given several times.
     #[arg(long = "with", allow_hyphen_values = true)]
     more: Vec<String>,
-    /// Keep the tables of measurements and residuals, for the peers.
+    /// Keep the tables of measurements and residuals, which the peers need.
     #[arg(long)]
     keep_tables: bool,
-    /// Fail if a slice's result is worse than it must be.
+    /// Fail if the result of the slice is below its bounds.
     #[arg(long)]
     check: bool,
 }
 
 #[derive(Debug, Args)]
 struct WhichArgs {
-    /// How much: the whole, a glance of some hundred sets, a slice of 46, or the sample of 11 that CI runs.
+    /// Which sets: all, those for other methods, a first look of some hundred, a slice of 46, or the sample of 11 that CI runs.
     #[arg(long, value_enum, default_value = "whole")]
     size: Size,
-    /// Campaigns, several with commas; all if not given.
+    /// Campaigns, separated by commas; by default all.
     #[arg(long, value_enum, value_delimiter = ',')]
     campaign: Vec<Campaign>,
-    /// Only sets whose id has this in it.
+    /// Only sets whose ids contain this.
     #[arg(long)]
     only: Option<String>,
-    /// Seed of all sets, and of every discovery.
+    /// Seed of all sets, and of `tactus discover`.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Frames of a set, if not some 6,000.
+    /// Frames of a set; by default some 6,000.
     #[arg(long)]
     frames: Option<usize>,
-    /// Reports and results.
+    /// Folder of the reports and results.
     #[arg(long, default_value = "target/evidence/work")]
     work: PathBuf,
-    /// Labels: for the scorer only.
+    /// Folder of the labels, for the scorer only.
     #[arg(long, default_value = "target/evidence/sealed")]
     sealed: PathBuf,
-    /// A work folder with others' reports in `peers`, of the same sealed labels.
+    /// A work folder with the reports of other methods in `peers`, for the same labels.
     #[arg(long)]
     ablation: Option<PathBuf>,
-    /// What discovery costs: a JSON object of `ours`, from `time`, and `peers`.
+    /// Time and memory: a JSON file with `ours`, from `evidence time`, and `peers`.
     #[arg(long)]
     costs: Option<PathBuf>,
-    /// Write the tables between the marks of this document.
+    /// Replace the tables between the marks of this document.
     #[arg(long)]
     document: Option<PathBuf>,
     /// Write the pictures into this folder.
@@ -129,17 +129,16 @@ enum Size {
     Sample,
 }
 
-/// What the slice must reach, of 12 sets without effect, 24 of one, 4 of two and 6 outside. Each bound is where a workflow that meets
-/// its targets falls by bad luck less than once in a hundred slices, if its sets were drawn anew; they are not: the slice is always
-/// the same.
+/// Bounds of the slice: 12 sets without physics, 24 with one effect, 4 with two and 6 outside the library. A program that meets its
+/// targets breaks each bound in 0.6 to 4 % of random slices. This slice is not random: it is always the same.
 struct Bounds {
-    /// 2.8 % of 12 are 0.3; two or more come by luck in 4 % of draws, but the slice is fixed.
+    /// Expected: 2.8 % of 12, 0.3. Two or more have a probability of 4 %.
     false_alarms_most: usize,
-    /// 95 % of 24 are 22.8; 20 or fewer come by luck in 0.6 %.
+    /// Expected: 95 % of 24, 22.8. 19 or fewer have a probability of 0.6 %.
     exact_least: usize,
-    /// 85 % of 4 are 3.4; one or none come by luck in 1.2 %.
+    /// Expected: 85 % of 4, 3.4. One or none has a probability of 1.2 %.
     pairs_least: usize,
-    /// 5 % of 34 are 1.7; five or more come by luck in 2 %.
+    /// Expected: 5 % of 34, 1.7. Five or more have a probability of 2.6 %.
     wrong_most: usize,
 }
 
@@ -275,19 +274,19 @@ impl Bounds {
             + count(Campaign::Pairs, is_wrong)
             + count(Campaign::Outside, is_wrong);
         println!("false alarms {false_alarms}, exact {exact}, pairs {pairs}, sets with a wrong name {wrong}");
-        ensure!(false_alarms <= self.false_alarms_most, "at most {} false alarms", self.false_alarms_most);
-        ensure!(exact >= self.exact_least, "at least {} named exactly", self.exact_least);
-        ensure!(pairs >= self.pairs_least, "at least {} pairs with both named", self.pairs_least);
-        ensure!(wrong <= self.wrong_most, "at most {} sets with a wrong name", self.wrong_most);
+        ensure!(false_alarms <= self.false_alarms_most, "more than {} false alarms", self.false_alarms_most);
+        ensure!(exact >= self.exact_least, "fewer than {} sets named exactly", self.exact_least);
+        ensure!(pairs >= self.pairs_least, "fewer than {} pairs with both named", self.pairs_least);
+        ensure!(wrong <= self.wrong_most, "more than {} sets with a wrong name", self.wrong_most);
         Ok(())
     }
 }
 
-/// Writes a part of a document anew.
+/// Replaces a part of a document.
 fn into(path: &Path, part: evidence::Part, text: &str) -> Result<()> {
     let before = fs::read_to_string(path).with_context(|| path.display().to_string())?;
     let after = into_document(&before, part, text);
-    write(path, &after.with_context(|| format!("{} has no marks", path.display()))?)
+    write(path, &after.with_context(|| format!("{} has no marks for this part", path.display()))?)
 }
 
 fn write(path: &Path, text: &str) -> Result<()> {

@@ -1,4 +1,4 @@
-//! The finite element model of the covering: the time of one solution, and the reactions.
+//! Time and result of the finite element model of the covering.
 
 use std::convert::Infallible;
 use std::hint::black_box;
@@ -7,22 +7,22 @@ use tactus_solid::fem::{Bricks, Reaction};
 
 use crate::clock::timed;
 
-/// Solutions whose median time counts.
+/// Solutions; their median time counts.
 const RUNS: usize = 5;
 
-/// One slab under 1 N at the middle of its top.
+/// A slab under 1 N at the middle of its top.
 #[derive(Debug, Clone)]
 pub struct Fem {
-    /// The slab.
+    /// The mesh of the slab.
     pub bricks: Bricks,
-    /// From the numbers that describe the slab to the reactions: the median of five.
+    /// Median time, from the description of the slab to the reactions.
     pub solve_s: f64,
-    /// What arrives at the base.
+    /// Vertical reactions at the bottom.
     pub reaction: Reaction,
 }
 
 impl Fem {
-    /// Solves a slab, five times over.
+    /// Solves a slab five times.
     pub fn measure(bricks: Bricks) -> Self {
         let solve = || Ok::<_, Infallible>(black_box(black_box(bricks).under_point()));
         let Ok((reaction, solve_s)) = timed(RUNS, solve);

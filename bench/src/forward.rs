@@ -1,4 +1,4 @@
-//! Images a second along one way, and how far it is from exact.
+//! Images per second along one way, and their error.
 
 use std::thread;
 use std::time::{Duration, Instant};
@@ -9,31 +9,31 @@ use tactus_model::Array;
 use crate::clock::paint;
 use crate::{Painter, Tool, Way, model, poses};
 
-/// Poses of a throughput run: more than a branch predictor learns by heart.
+/// Poses of a throughput run: too many for a branch predictor to learn.
 const POSES: u32 = 4096;
 
 /// One measurement.
 #[derive(Debug, Clone)]
 pub struct Forward {
-    /// Which array.
+    /// The array.
     pub array: Array,
-    /// Which tool.
+    /// The tool.
     pub tool: Tool,
-    /// Which way.
+    /// The way.
     pub way: Way,
-    /// How many at once.
+    /// Number of threads.
     pub threads: usize,
-    /// Seconds to make ready what no pose changes.
+    /// Time to prepare everything that does not depend on the pose.
     pub ready_s: f64,
-    /// All threads together.
+    /// Rate of all threads together.
     pub images_per_s: f64,
-    /// Greatest difference of an element to the exact image over the poses compared, as a share of that image's
-    /// peak; none if none was compared.
+    /// Greatest difference of an element from the exact image, as a share of that image's peak; `None` if no image was
+    /// compared.
     pub error: Option<f64>,
 }
 
 impl Forward {
-    /// Presses for a while, and holds so many images against the exact ones.
+    /// Makes images for `time`, and compares `compared` images with the exact ones.
     ///
     /// # Errors
     /// If the way does not exist for this array.
@@ -73,7 +73,7 @@ fn images_per_s(painter: &Painter, array: &Array, threads: usize, time: Duration
     };
     thread::scope(|scope| {
         let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().map(|worker| worker.join().map_err(|_| anyhow!("a thread fell over"))?).sum()
+        workers.into_iter().map(|worker| worker.join().map_err(|_| anyhow!("a thread panicked"))?).sum()
     })
 }
 

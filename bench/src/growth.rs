@@ -1,5 +1,5 @@
-//! How the time of an image grows with the elements and with the tool's triangles, and that of the finite element
-//! model with its bricks.
+//! Growth of the time of an image with the array's elements and the tool's triangles, and of the time of the finite
+//! element model with its bricks.
 
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use crate::{Fem, Painter, Tool, Way, even, fine_sphere, per_image_s};
 
 /// Rows and columns against those of the `DigiTacts` array: 48, 192 and 768 elements.
 const FINENESSES: [u32; 3] = [1, 2, 4];
-/// Triangles of a sphere.
+/// Triangles of the spheres.
 const TRIANGLES: [u32; 4] = [500, 2_000, 8_000, 32_000];
 /// Slabs: bricks along a side, and layers.
 const SLABS: [(&str, [[u32; 2]; 3]); 2] =
@@ -20,16 +20,16 @@ const SLABS: [(&str, [[u32; 2]; 3]); 2] =
 /// Times at several sizes, and the power of the size that fits them best.
 #[derive(Debug, Clone)]
 pub struct Growth {
-    /// What was timed.
+    /// The timed work.
     pub what: String,
-    /// What the size counts.
+    /// Unit of the size, such as `elements`.
     pub size_of: &'static str,
     /// Size and seconds.
     pub points: Vec<[f64; 2]>,
 }
 
 impl Growth {
-    /// Every growth there is.
+    /// All growths.
     ///
     /// # Errors
     /// If an image cannot be made.
@@ -52,7 +52,7 @@ impl Growth {
         Ok(growths)
     }
 
-    /// `p` of the time `~ size^p`: the slope of the line through the logarithms, by least squares.
+    /// `p`, where time grows as `size^p`: the least-squares slope of the logarithms.
     pub fn exponent(&self) -> f64 {
         let logs = self.points.iter().map(|point| point.map(f64::ln));
         let count = self.points.len() as f64;
@@ -74,7 +74,7 @@ impl Growth {
         Ok(Self { what: format!("image, {tool:?}, {way:?}").to_lowercase(), size_of: "elements", points })
     }
 
-    /// Of what is made ready before the first pose, and of an image.
+    /// Growth of the preparation before the first pose, and of an image.
     fn with_triangles(way: Way) -> Result<[Self; 2]> {
         let model = even(1)?;
         let (mut ready, mut image) = (Vec::new(), Vec::new());
@@ -90,7 +90,7 @@ impl Growth {
             let what = format!("{what}, sphere, {way:?}").to_lowercase();
             Self { what, size_of: "triangles", points }
         };
-        Ok([named("making ready", ready), named("image", image)])
+        Ok([named("preparation", ready), named("image", image)])
     }
 
     fn with_bricks(how: &str, slabs: &[[u32; 2]]) -> Result<Self> {

@@ -1,8 +1,8 @@
-//! How fast the models are, how exact, how they grow, and how far from the machine's limits.
+//! Speed, accuracy and growth of the models, and their distance from the machine's limits.
 //!
-//! What measures the forward model (`tactus-bench --help`, the criterion bench) presses the same [`Tool`]s at the
-//! same [`Pose`]s on the same arrays, along one [`Way`] from pose to image or another. [`Fem`] is the finite element
-//! model of the covering. [`evidence`] is another matter: how well discovery finds and names what is hidden in data.
+//! The measurements of the forward model (`tactus-bench --help` and the criterion benchmark) use the same [`Tool`]s at the
+//! same [`Pose`]s on the same arrays, along each [`Way`] from pose to image. [`Fem`] is the finite element model of the
+//! covering. [`evidence`] measures something else: how well `tactus discover` finds and names hidden physics.
 
 pub mod evidence;
 

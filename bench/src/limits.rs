@@ -1,4 +1,4 @@
-//! What this machine can do at most, and what of it a kernel uses.
+//! Limits of this machine, and how much of them the kernels use.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -8,10 +8,10 @@ use tactus_model::Array;
 
 use crate::{Painter, Tool, Way, model, per_image_s, poses};
 
-/// Rates of one core, and how near to them the kernels come.
+/// Rates of one core, and the work of the kernels.
 ///
-/// For the press table the formulas are, per element that the tool reaches and with `C` channels (1 for the cylinder, 3
-/// for the H: the nodes of its rotation):
+/// For each element that the tool reaches, with `C` channels (1 for the cylinder, 3 for the H: the nodes of its
+/// rotation), the press table takes:
 ///
 /// ```text
 /// flops = 32 C (4 x 4 nodes, a multiplication and an addition each) + 12 C (weights along x) + 41 (place, spline
@@ -19,24 +19,24 @@ use crate::{Painter, Tool, Way, model, per_image_s, poses};
 /// bytes = 64 C (4 x 4 nodes) + 20 (centre, response) + 4 (the count)
 /// ```
 ///
-/// The exact way has no such line: it spends its time in `erfc` and `exp`.
+/// There is no such formula for the exact way, which spends its time in `erfc` and `exp`.
 #[derive(Debug, Clone)]
 pub struct Limits {
-    /// Single-precision operations, a multiplication and an addition counting two, with the vector width and
+    /// Single-precision operations, where a multiplication and an addition count as two, with the vector width and the
     /// instructions that this program is compiled for.
     pub flops_per_s: f64,
-    /// Reading from the first and the second cache and from memory.
+    /// Reading from the first cache, the second cache and memory.
     pub bytes_per_s: [f64; 3],
-    /// What was held against them.
+    /// The measured kernels.
     pub kernels: Vec<Kernel>,
 }
 
 /// One kernel on one array.
 #[derive(Debug, Clone)]
 pub struct Kernel {
-    /// Which array.
+    /// Name of the array.
     pub array: String,
-    /// Which tool.
+    /// The tool.
     pub tool: Tool,
     /// Floating-point operations of an image.
     pub flops: f64,
@@ -46,7 +46,7 @@ pub struct Kernel {
     pub image_s: f64,
 }
 
-/// Places that fill the first cache's half, the second's half, and no cache.
+/// Numbers that fill half of the first cache, half of the second cache, and more than any cache.
 const PLACES: [usize; 3] = [4 << 10, 128 << 10, 64 << 20];
 
 impl Limits {
@@ -83,7 +83,7 @@ impl Kernel {
     }
 }
 
-/// Elements that a tool reaches at all, on average.
+/// Elements that a tool reaches, on average.
 fn reached(painter: &mut Painter, array: &Array) -> Result<f64> {
     let mut image = vec![0.0; array.elements()];
     let poses = poses(array, 256);
@@ -104,7 +104,7 @@ const LANES: usize = if cfg!(target_feature = "avx512f") {
     4
 };
 
-/// Enough chains of operations, each waiting for itself only, to keep the units busy, and few enough for the
+/// Measured with chains of operations that do not wait for each other: enough to keep the units busy, and few enough for the
 /// registers.
 fn flops_per_s() -> f64 {
     const CHAINS: usize = 12;
@@ -122,9 +122,9 @@ fn flops_per_s() -> f64 {
     2.0 * f64::from(ROUNDS) * (LANES * CHAINS) as f64 / least_s(round)
 }
 
-/// Adds up a list, over and over where it is short.
+/// Measured by adding up a list, repeatedly if it is short.
 fn bytes_per_s(places: usize) -> f64 {
-    /// As many sums side by side as hide the time of one addition.
+    /// Parallel sums; enough to hide the latency of an addition.
     const SUMS: usize = 64;
     let list = vec![1_u32; places];
     let rounds = (PLACES[2] / places).max(1);
@@ -142,7 +142,7 @@ fn bytes_per_s(places: usize) -> f64 {
     (rounds * places * size_of::<u32>()) as f64 / least_s(round)
 }
 
-/// Least of several times: what disturbs only ever adds.
+/// The least of several times, since a disturbance only adds time.
 fn least_s(work: impl Fn()) -> f64 {
     let time_s = |_| {
         let started = Instant::now();

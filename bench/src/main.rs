@@ -1,4 +1,4 @@
-//! `tactus-bench`: what `just bench` and `just bench-peers` run beside criterion.
+//! `tactus-bench`: measurements of the models and of discovery, which the `bench` and `discovery` recipes of `just` run.
 #![expect(clippy::print_stdout, reason = "standard output is this program's interface")]
 
 mod evidence_command;
@@ -17,7 +17,7 @@ use tactus_calibrate::acuity::Grid;
 use tactus_model::Array;
 use tactus_solid::fem::Bricks;
 
-/// How fast the models are, how exact, how they grow, and how far from the machine's limits.
+/// Measures speed, accuracy and growth of the models, and how well `tactus discover` works.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Args {
@@ -27,45 +27,45 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Part {
-    /// Images a second over many poses, and the greatest error against the exact way.
+    /// Images per second over many poses, and the greatest error against the exact way.
     Forward {
-        /// Which array: `digitacts`, `fingertip` or `tekscan-5027`.
+        /// Array: `digitacts`, `fingertip` or `tekscan-5027`.
         #[arg(long, value_parser = shipped, default_value = "digitacts")]
         array: Array,
-        /// What presses.
+        /// Tool.
         #[arg(long, value_enum, default_value = "h")]
         tool: Tool,
-        /// From pose to image.
+        /// Way from pose to image.
         #[arg(long = "path", value_enum, default_value = "press-table")]
         way: Way,
-        /// How many press at once.
+        /// Number of threads.
         #[arg(long, default_value_t = 1)]
         threads: usize,
-        /// For how long.
+        /// Time of the measurement in s.
         #[arg(long, default_value_t = 1.0)]
         seconds: f64,
-        /// How many images to hold against the exact way's.
+        /// Number of images to compare with the exact way.
         #[arg(long, default_value_t = 200)]
         compared: u32,
-        /// One JSON object instead of a line of text.
+        /// Print one JSON object instead of a line of text.
         #[arg(long)]
         json: bool,
     },
-    /// An array, its model, some poses and their images, as JSON: what the peers press.
+    /// An array, its model, 64 poses and their images, as JSON for the peers.
     Scene {
-        /// Which array: `digitacts`, `fingertip` or `tekscan-5027`.
+        /// Array: `digitacts`, `fingertip` or `tekscan-5027`.
         #[arg(long, value_parser = shipped, default_value = "digitacts")]
         array: Array,
-        /// What presses.
+        /// Tool.
         #[arg(long, value_enum, default_value = "h")]
         tool: Tool,
-        /// From pose to image.
+        /// Way from pose to image.
         #[arg(long = "path", value_enum, default_value = "press-table")]
         way: Way,
     },
-    /// Both panels of Fig. 6, 25 x 25, and how their time grows.
+    /// Time of both panels of Fig. 6 with 25 x 25 cells, and its growth.
     Acuity {
-        /// The panels' values and times as one JSON object, without the growth.
+        /// Print the panels' values and times as one JSON object, without the growth.
         #[arg(long)]
         json: bool,
     },
@@ -77,30 +77,30 @@ enum Part {
         /// Layers of bricks.
         #[arg(long, default_value_t = 10)]
         layers: u32,
-        /// Of the bricks.
+        /// Poisson's ratio of the bricks.
         #[arg(long, default_value_t = 0.45)]
         poisson_ratio: f64,
-        /// Bricks integrated in full, as plain ones are, not with mean dilatation.
+        /// Integrate the bricks in full, without mean dilatation.
         #[arg(long)]
         full: bool,
-        /// One JSON object, with the force at every node of the bottom, instead of a line of text.
+        /// Print one JSON object, with the force at every node of the bottom, instead of a line of text.
         #[arg(long)]
         json: bool,
     },
-    /// A calibration from recordings: reading, the whole, and without the sweeps that its spreads are fitted to.
+    /// Time of a calibration from recordings: reading, the whole, and without the sweeps that the spreads are fitted to.
     Calibrate {
         /// The recordings.
         #[arg(required = true)]
         files: Vec<PathBuf>,
-        /// One JSON object, with the images of the sweeps, instead of a line of text.
+        /// Print one JSON object, with the images of the sweeps, instead of a line of text.
         #[arg(long)]
         json: bool,
     },
-    /// How the time of an image grows with elements and triangles, and that of the finite elements with bricks.
+    /// Growth of the time of an image with elements and triangles, and of the finite elements with bricks.
     Growth,
-    /// What of this machine's arithmetic and bandwidth the kernels use.
+    /// Share of this machine's arithmetic and bandwidth that the kernels use.
     Limits,
-    /// How well `tactus discover` finds and names what is hidden in data.
+    /// How well `tactus discover` finds and names hidden physics.
     Evidence(EvidenceArgs),
 }
 
@@ -126,7 +126,7 @@ fn main() -> Result<()> {
 
 fn shipped(name: &str) -> Result<Array, String> {
     let named = Array::shipped().into_iter().find(|array| array.name() == name);
-    named.ok_or_else(|| "there are digitacts, fingertip and tekscan-5027".into())
+    named.ok_or_else(|| "expected digitacts, fingertip or tekscan-5027".into())
 }
 
 fn forward(measured: &Forward, as_json: bool) {

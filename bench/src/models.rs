@@ -1,13 +1,13 @@
-//! The models that are measured.
+//! The measured models.
 
 use anyhow::Result;
 use tactus_model::{Array, ForwardModel, Psf, Response};
 
-/// A model of an array: the paper's spread on the pitch it was measured at, one pitch on others (the paper's
-/// Fig. 10); a slightly bent response from a baseline of 0, so that counts are the rise.
+/// A model of an array. The spread is the paper's on the array that it was measured on, and one pitch on others (the
+/// paper's Fig. 10). The response is slightly nonlinear, from a baseline of 0.
 ///
 /// # Errors
-/// None in truth: the parameters make a model.
+/// If the parameters do not make a model.
 pub fn model(array: Array) -> Result<ForwardModel> {
     let psf = if array == Array::digitacts() {
         Psf::PAPER
@@ -17,11 +17,11 @@ pub fn model(array: Array) -> Result<ForwardModel> {
     with_psf(array, psf)
 }
 
-/// A model of `fineness` times as many rows and columns as the `DigiTacts` array has, on about its area and under
-/// its spread.
+/// A model with `fineness` times as many rows and columns as the `DigiTacts` array, on about the same area and with the
+/// same spread.
 ///
 /// # Errors
-/// None in truth: the parameters make a model.
+/// If the parameters do not make a model.
 pub fn even(fineness: u32) -> Result<ForwardModel> {
     let pitch_mm = 2.0 / f64::from(fineness);
     let centres = |count: u32| (0..count).map(|place| (f64::from(place) + 0.45) * pitch_mm).collect();

@@ -1,4 +1,4 @@
-//! What presses, how deep, where.
+//! Tools, depths and poses.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -9,13 +9,13 @@ use tactus_scene::shapes::Scene;
 /// The paper's thinnest covering, 0.04 inch.
 pub const COVERING: Covering = Covering { thickness_mm: 1.016 };
 
-/// Greatest depth of a press.
+/// Greatest depth of a pose.
 pub const DEPTH_MAX_MM: f64 = 0.6;
 
-/// Depth of the lightest press.
+/// Least depth of a pose.
 const DEPTH_MIN_MM: f64 = 0.05;
 
-/// What presses.
+/// A tool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Tool {
     /// The block letter of `assets/h.stl`: 8 x 10 mm, strokes of 2 mm, 44 triangles.
@@ -24,19 +24,19 @@ pub enum Tool {
     Cylinder,
 }
 
-/// Where a tool stands.
+/// Place, rotation and depth of a tool.
 #[derive(Debug, Clone, Copy)]
 pub struct Pose {
-    /// Its axis, sensor frame.
+    /// Place of its axis, sensor frame.
     pub position_mm: [f64; 2],
     /// Counter-clockwise.
     pub rotation_deg: f64,
-    /// Of its lowest point.
+    /// Depth of its lowest point.
     pub depth_mm: f64,
 }
 
 impl Tool {
-    /// The shape.
+    /// The tool's shape.
     pub fn indenter(self) -> Indenter {
         match self {
             Self::H => Indenter::Mesh(Arc::new(Scene::H.mesh())),
@@ -45,9 +45,9 @@ impl Tool {
     }
 }
 
-/// As many poses, spread evenly over the array's active area, the full turn and the depths from 0.05 to
-/// [`DEPTH_MAX_MM`]: multiples of the powers of 1/g without their whole part, where `g^5 = g + 1` (M. Roberts'
-/// sequence for four dimensions). The peers press at the same ones.
+/// `count` poses, spread evenly over the array's active area, the full turn and the depths from 0.05 mm to
+/// [`DEPTH_MAX_MM`]: the fractional parts of multiples of the powers of 1/g, where `g^5 = g + 1` (M. Roberts'
+/// sequence for four dimensions). The peers use the same poses.
 pub fn poses(array: &Array, count: u32) -> Vec<Pose> {
     const G: f64 = 1.167_303_978_261_418_7;
     let [along_x, along_y] = array.extent_mm();
@@ -64,10 +64,10 @@ pub fn poses(array: &Array, count: u32) -> Vec<Pose> {
     (0..count).map(pose).collect()
 }
 
-/// The lower half of a sphere of 4 mm in about as many triangles.
+/// The lower half of a sphere of 4 mm diameter, in about `triangles` triangles.
 ///
 /// # Errors
-/// None in truth: the mesh is one.
+/// If the triangles do not make a mesh.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some hundreds of rings")]
 pub fn fine_sphere(triangles: u32) -> Result<Indenter, MeshError> {
     const RADIUS_MM: f64 = 2.0;

@@ -23,7 +23,7 @@ fn poses_stay_on_the_array_and_within_the_depths() {
     }
 }
 
-/// Three boxes that do not overlap make the same H; their signals add as long as the response is straight.
+/// Three boxes that do not overlap make the same H; their signals add because indentation is linear.
 #[test]
 fn the_h_presses_as_its_three_strokes_do() {
     let model = model(Array::digitacts()).unwrap();
@@ -47,7 +47,7 @@ fn the_h_presses_as_its_three_strokes_do() {
     }
 }
 
-/// The facets of the fine one stand inside the sphere, by less than 1e-3 of its signal.
+/// The facets of the fine mesh are inside the sphere.
 #[test]
 fn a_fine_mesh_presses_as_the_sphere_does() {
     let model = model(Array::digitacts()).unwrap();

@@ -8,18 +8,18 @@ use tactus_scene::{Attitude, Renderer};
 
 use crate::{COVERING, DEPTH_MAX_MM, Pose};
 
-/// How an image comes about.
+/// How an image is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Way {
-    /// [`PressTable`]: the tool's blurred and integrated footprint, tabulated once.
+    /// [`PressTable`]: samples a table of the tool's blurred and integrated footprint, which is made once.
     PressTable,
-    /// [`Renderer`]: the mesh drawn into a depth map, then two matrix products; any attitude.
+    /// [`Renderer`]: draws the mesh into a depth map, then takes two matrix products; any attitude.
     Raster,
     /// [`ForwardModel::image`]: closed forms and quadrature; the reference.
     Exact,
 }
 
-/// Makes images of one tool along one way, with the memory it needs; every thread has its own.
+/// Makes images of one tool along one way, and owns the memory for it; each thread has its own.
 #[derive(Debug, Clone)]
 pub enum Painter {
     /// See [`Way::PressTable`].
@@ -30,7 +30,7 @@ pub enum Painter {
     Exact {
         /// The model.
         model: ForwardModel,
-        /// The tool, at the last pose.
+        /// The tool at the last pose.
         contact: Contact,
         /// The last image.
         counts: Vec<f64>,
@@ -38,16 +38,16 @@ pub enum Painter {
 }
 
 impl Painter {
-    /// What can be made ready before the first pose is known.
+    /// Prepares everything that does not depend on the pose.
     ///
     /// # Errors
-    /// If the blur is too fine for a press table, or a tool without a mesh is to be drawn.
+    /// If the blur is too fine for a press table, or if the way needs a mesh and the tool has none.
     pub fn new(way: Way, model: &ForwardModel, indenter: &Indenter) -> Result<Self> {
         Ok(match way {
             Way::PressTable => Self::PressTable(PressTable::new(model, indenter, COVERING, DEPTH_MAX_MM)?),
             Way::Raster => {
                 let Indenter::Mesh(mesh) = indenter else {
-                    bail!("only a mesh is drawn: {indenter:?} is none")
+                    bail!("the way `raster` needs a mesh, not {indenter:?}")
                 };
                 Self::Raster(Renderer::new(model.clone(), COVERING, Arc::clone(mesh))?)
             }
@@ -64,10 +64,10 @@ impl Painter {
         })
     }
 
-    /// From a pose to the counts of every element: depth, blur, integration, response.
+    /// Writes the counts of every element for a pose: depth, blur, integration, response.
     ///
     /// # Errors
-    /// If the pose is deeper than [`DEPTH_MAX_MM`] or `image` has not one place per element.
+    /// If the pose is deeper than [`DEPTH_MAX_MM`], or if `image` does not have one place for each element.
     pub fn image(&mut self, pose: &Pose, image: &mut [f32]) -> Result<()> {
         let Pose { position_mm, rotation_deg, depth_mm } = *pose;
         match self {

@@ -1,8 +1,8 @@
-//! Truth comes back: simulated rigs whose truth varies are measured by the paper's experiments and calibrated, all by
-//! the real binary, and what was found is held against what each rig hides.
+//! Calibration recovers the truth: simulated rigs with different true parameters are measured with the paper's
+//! experiments and calibrated by the program `tactus`. The results are compared with the true parameters.
 //!
-//! `just truth` does it for 200 rigs with the paper's sweep, and prints the table; here it is a few rigs and a coarse
-//! sweep, which show that nothing is broken, not that the intervals are right.
+//! `just truth` takes 200 rigs and the paper's sweep, and prints the table of `docs/calibration-evidence.md`. By default
+//! the test takes two rigs and a coarse sweep, which show that nothing is broken, not that the intervals are right.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 #![expect(clippy::print_stdout, reason = "the table is what `just truth` is for")]
 
@@ -24,14 +24,14 @@ use toml::Table;
 /// 0.975 quantile of the standard normal distribution.
 const Z_95: f64 = 1.96;
 
-/// How many rigs, and how many points each side of the sweep has.
+/// Number of rigs, and of points along a side of the sweep.
 fn extent() -> (u64, u64) {
     let of = |name: &str, default| std::env::var(name).map_or(default, |text| text.parse().unwrap());
     (of("TACTUS_TRUTH_RIGS", 2), of("TACTUS_TRUTH_POINTS", 5))
 }
 
 #[test]
-fn calibration_gives_back_what_simulated_rigs_hide() {
+fn calibration_recovers_the_true_parameters_of_simulated_rigs() {
     let (rigs, points) = extent();
     let workers = thread::available_parallelism().map_or(1, usize::from) as u64;
     let found: Vec<Found> = thread::scope(|scope| {
@@ -45,7 +45,7 @@ fn calibration_gives_back_what_simulated_rigs_hide() {
     });
     let tally = Tally::of(&found);
     tally.print(rigs, points);
-    assert_eq!((tally.missed, tally.accused), (0, 0), "faults missed, elements falsely accused");
+    assert_eq!((tally.missed, tally.accused), (0, 0), "faults missed, sound elements called faulty");
     for (name, row) in &tally.quantities {
         assert!(row.worst < 5.5, "{name}: {} standard errors off", row.worst);
         if rigs >= 100 {
@@ -54,7 +54,7 @@ fn calibration_gives_back_what_simulated_rigs_hide() {
     }
 }
 
-/// What one rig gave: by quantity, errors in units of their standard errors.
+/// Results for one rig: errors of quantities, in units of their standard errors, and counts of faults.
 struct Found {
     errors: Vec<(String, f64)>,
     missed: usize,
@@ -62,7 +62,7 @@ struct Found {
     planted: usize,
 }
 
-/// Makes a rig of a seed, runs the experiments, calibrates, compares.
+/// Makes the rig of a seed, runs the experiments, calibrates and compares.
 fn measured(seed: u64, points: u64) -> Found {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("rig.toml");
@@ -102,7 +102,7 @@ fn run(folder: &Path, seed: u64, experiment: &str, parameters: &[String]) -> Pat
     folder.join(said.json()["recording"].as_str().unwrap())
 }
 
-/// The shipped simulated rig with another truth, and another declared spread.
+/// The shipped simulated rig with other parameters. Its file declares the true spread; registration and surface are off.
 fn varied(seed: u64) -> String {
     let text = fs::read_to_string(repository("config/rigs/sim.toml")).unwrap();
     let mut rig: Table = toml::from_str(&text).unwrap();
@@ -119,7 +119,7 @@ fn varied(seed: u64) -> String {
     put(&["simulation", "seed"], i64::try_from(seed + 1).unwrap().into());
     put(&["simulation", "noise_rms_counts"], within(1.0, 4.0).into());
     put(&["simulation", "gain_spread"], within(0.02, 0.12).into());
-    // A curve too slight to be seen is no curve, and one that is seen is no line.
+    // Either no curvature, or one that is large enough to be estimated.
     let curved = within(0.0, 1.0) > 0.2;
     put(&["simulation", "quadratic_per_mm"], if curved { within(0.05, 0.3) } else { 0.0 }.into());
     put(&["simulation", "surface_mm"], within(-0.05, 0.05).into());
@@ -132,7 +132,7 @@ fn varied(seed: u64) -> String {
     toml::to_string(&rig).unwrap()
 }
 
-/// None to three of each kind of fault, each on an element of its own.
+/// Up to two of each kind of fault, and up to one stuck element, each on a different element.
 fn faults(rng: &mut impl Rng) -> [(&'static str, toml::Value); 4] {
     let mut left: Vec<i64> = (0..48).collect();
     let mut draw = |rng: &mut dyn Rng, most: u32| {
@@ -217,7 +217,7 @@ fn compare(rig: &Rig, found: &Value) -> Found {
     }
 }
 
-/// Over all rigs.
+/// Results over all rigs.
 struct Tally {
     quantities: BTreeMap<String, Coverage>,
     missed: usize,
@@ -277,8 +277,8 @@ impl Tally {
                 row.worst
             );
         }
-        println!("bias, scatter and worst in units of the standard error");
+        println!("bias, scatter and worst are in units of the standard error");
         let Self { planted, missed, accused, .. } = self;
-        println!("faults: {planted} planted, {missed} missed or misnamed, {accused} sound elements accused");
+        println!("{planted} faults: {missed} missed or misnamed; {accused} sound elements called faulty");
     }
 }

@@ -1,4 +1,4 @@
-//! Writes the made tools as binary STL, for whoever wants to print, view or press them.
+//! Writes the tools that are made in code as binary STL files, to print, view or simulate.
 
 use std::{fs, path::Path};
 
@@ -6,10 +6,10 @@ use anyhow::{Context, Result};
 use stl_io::{Triangle, Vertex};
 use tactus_scene::shapes::{SCENES, Surface};
 
-/// Where they are committed, below the top of the repository.
+/// Folder of the committed files, relative to the repository.
 const FOLDER: &str = "assets";
 
-/// Writes every scene's tool below `out`.
+/// Writes every scene's tool into [`FOLDER`] in `out`.
 pub(crate) fn write(out: &Path) -> Result<()> {
     let folder = out.join(FOLDER);
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -27,7 +27,7 @@ fn stl(surface: &Surface) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A triangle and the unit vector that points out of it.
+/// A triangle with its outward unit normal.
 fn triangle([a, b, c]: [[f64; 3]; 3]) -> Triangle {
     let [u, v] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
     let across = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];

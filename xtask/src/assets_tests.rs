@@ -4,7 +4,7 @@ use super::{FOLDER, write};
 use tactus_scene::shapes::SCENES;
 
 #[test]
-fn what_is_committed_are_the_made_tools() {
+fn the_committed_tools_are_up_to_date() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let fresh = tempfile::tempdir().unwrap();
     write(fresh.path()).unwrap();

@@ -1,7 +1,7 @@
 //! Chores of the repository.
 //!
 //! - `cargo xtask proto` compiles the messages.
-//! - `cargo xtask assets` makes the tools.
+//! - `cargo xtask assets` writes the tools as STL.
 
 mod assets;
 #[cfg(any(test, feature = "proto"))]
@@ -17,7 +17,7 @@ fn main() -> Result<()> {
         #[cfg(feature = "proto")]
         Some("proto") => messages::compile(&repository(), &repository()),
         Some("assets") => assets::write(&repository()),
-        other => bail!("unknown task {other:?}; there are: proto, assets"),
+        other => bail!("unknown task {other:?}; known: proto, assets"),
     }
 }
 

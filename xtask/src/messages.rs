@@ -1,4 +1,4 @@
-//! Compiles the messages: `tactus.proto` to what is committed of it.
+//! Compiles `tactus.proto` to the committed Rust types and descriptors.
 
 use std::{
     fs,
@@ -7,13 +7,13 @@ use std::{
 
 use anyhow::{Context, Result};
 
-/// What is made of `tactus.proto`, below the top of the repository. Committed, so that neither a
-/// build nor the Python client needs a protobuf compiler.
+/// The compiled files, relative to the repository. They are committed so that neither a build nor the Python client
+/// needs a protobuf compiler.
 const RUST_TYPES: &str = "crates/tactus-schema/proto/tactus.v1.rs";
 const DESCRIPTORS: [&str; 2] =
     ["crates/tactus-schema/proto/tactus.binpb", "clients/python/src/tactus_client/tactus.binpb"];
 
-/// Compiles the messages of the repository at `top` and writes what is made of them below `out`.
+/// Compiles the messages of the repository at `top` and writes the results below `out`.
 pub(crate) fn compile(top: &Path, out: &Path) -> Result<()> {
     let descriptors = protox::Compiler::new([top.join("crates/tactus-schema/proto")])?
         .include_source_info(true)
@@ -30,7 +30,7 @@ pub(crate) fn compile(top: &Path, out: &Path) -> Result<()> {
         .compile_fds(descriptors.clone())
         .context("no Rust types from tactus.proto")?;
 
-    // Comments go into the descriptors too: a stock MCAP viewer shows them beside the fields.
+    // The descriptors include the comments, which stock MCAP viewers show beside the fields.
     let bytes = prost::Message::encode_to_vec(&descriptors);
     for path in DESCRIPTORS {
         fs::write(place(out, path)?, &bytes).with_context(|| format!("cannot write {path}"))?;
@@ -38,7 +38,7 @@ pub(crate) fn compile(top: &Path, out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A path below `out` whose folder exists.
+/// A path below `out`; makes its folder.
 fn place(out: &Path, path: &str) -> Result<PathBuf> {
     let path = out.join(path);
     if let Some(folder) = path.parent() {

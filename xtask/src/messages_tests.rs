@@ -3,7 +3,7 @@ use std::{fs, path::Path};
 use super::{DESCRIPTORS, RUST_TYPES, compile};
 
 #[test]
-fn what_is_committed_is_what_the_messages_compile_to() {
+fn the_committed_messages_are_up_to_date() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let fresh = tempfile::tempdir().unwrap();
     compile(&top, fresh.path()).unwrap();

@@ -1,4 +1,4 @@
-//! Other ways to go about it, on the same sets.
+//! Other methods on the same sets.
 
 use std::fs;
 use std::path::Path;
@@ -12,34 +12,35 @@ use super::rate::{Rate, quantile};
 use super::run::Places;
 use super::score::{SHRINK_ERROR_MAX, Shrink, Z_SEPARATE};
 
-/// How one way fares.
+/// The scores of one method.
 #[derive(Debug, Clone, Serialize)]
 pub struct Ablation {
-    /// Which way; `tactus` is ours.
+    /// Name of the method; `tactus` is the real search.
     pub method: String,
-    /// Anything is said to be missing where nothing is.
+    /// Detections in sets without hidden physics.
     pub false_alarms: Rate,
-    /// One effect, from [`Z_SEPARATE`] on: named, and nothing else; of all.
+    /// Sets with one effect, from [`Z_SEPARATE`] on: it is named and nothing else; of all those sets.
     pub exact: Rate,
-    /// The same: named or in a set of equivalents.
+    /// The same sets: it is named or in a set of equivalents.
     pub in_set: Rate,
-    /// The same: an effect is named that is not there, nor equivalent to one that is.
+    /// The same sets: a named effect is neither hidden nor equivalent to the hidden one.
     pub wrong: Rate,
-    /// Both of two are named.
+    /// Sets with two effects: both are named.
     pub pairs: Rate,
-    /// Outside the library: unexplained.
+    /// Sets outside the library: the verdict is `unexplained`.
     pub unexplained: Rate,
-    /// Outside the library: a name.
+    /// Sets outside the library: an effect is named.
     pub outside_named: Rate,
-    /// Shrink on held-out presses of all depths, where the gap is known.
+    /// Shrink on held-out presses of all depths, where the gap is known within a tenth.
     pub shrink: Shrink,
-    /// Shrink on presses deeper than any fitted, on the same sets.
+    /// Shrink on presses deeper than any fitted one, on the same sets.
     pub deeper_shrink: Shrink,
-    /// Median of a set's seconds on one thread.
+    /// Median time of a set on one thread.
     pub seconds: Option<f64>,
 }
 
-/// Ours, which lies in `places`, and every other way that lies in a folder of `peers` there; each on the sets that all have done.
+/// The scores of `tactus`, whose reports are in `places`, and of each method with a folder in `peers` there; all on the sets that
+/// every one of them has run.
 ///
 /// # Errors
 /// If a label or a report cannot be read.

@@ -1,22 +1,22 @@
-//! Which sets there are.
+//! The planned sets.
 
 use serde::{Deserialize, Serialize};
 use tactus_hidden::{CATALOGUE, Definition};
 use tactus_sets::{Amount, Content, NoiseKind, Recipe};
 
-/// What a set is made for.
+/// The purpose of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Campaign {
-    /// Nothing is hidden: whatever is found is a false alarm.
+    /// Nothing is hidden: any detection is a false alarm.
     FalseAlarms,
-    /// One physics of the library's effects.
+    /// One physics that is an instance of an effect of the library.
     Names,
-    /// Two.
+    /// Two such physics, of different effects.
     Pairs,
     /// Three.
     Triples,
-    /// One that the library has nothing like.
+    /// One physics that has no counterpart in the library.
     Outside,
 }
 
@@ -27,11 +27,11 @@ pub struct Sizes {
     pub false_alarms: usize,
     /// Physics of the library's effects.
     pub physics: Vec<&'static Definition>,
-    /// Separations beyond the spread, of each physics.
+    /// Separations of each physics, after the spread is fitted too.
     pub separations: Vec<f64>,
-    /// Strengths beside them; 1 is a bad rig.
+    /// Further sets of each physics, by strength; 1 is a bad rig.
     pub strengths: Vec<f64>,
-    /// Sets of each physics and separation or strength.
+    /// Sets for each physics and each separation or strength.
     pub name_seeds: usize,
     /// Sets of two effects.
     pub pairs: usize,
@@ -43,18 +43,18 @@ pub struct Sizes {
     pub outside_separations: Vec<f64>,
     /// Their strengths.
     pub outside_strengths: Vec<f64>,
-    /// Sets of each.
+    /// Sets for each of those.
     pub outside_seeds: usize,
-    /// Frames of a set, if not the plan's own number.
+    /// Frames of a set; the plan's own number if `None`.
     pub frames: Option<usize>,
 }
 
-/// A set: how to make it.
+/// A set that can be made.
 #[derive(Debug, Clone)]
 pub struct Planned {
-    /// Says what is in it, so it is for the scorer only: `names/relaxation-prony-z8-0`.
+    /// Such as `names/relaxation-prony-z8-0`. It says what is hidden, so it is for the scorer only.
     pub id: String,
-    /// What it is made for.
+    /// Its purpose.
     pub campaign: Campaign,
     /// How to make it.
     pub recipe: Recipe,
@@ -64,7 +64,7 @@ pub struct Planned {
 const SEVERAL_Z: [f64; 2] = [20.0, 60.0];
 
 impl Campaign {
-    /// All of them.
+    /// Every campaign.
     pub const ALL: [Self; 5] = [Self::FalseAlarms, Self::Names, Self::Pairs, Self::Triples, Self::Outside];
 
     /// Its folder.
@@ -80,7 +80,7 @@ impl Campaign {
 }
 
 impl Sizes {
-    /// The sizes that the evidence rests on.
+    /// The sizes of the published evidence.
     pub fn whole() -> Self {
         Self {
             false_alarms: 501,
@@ -98,7 +98,7 @@ impl Sizes {
         }
     }
 
-    /// A look at everything: every physics once, strong; a tenth of the rest.
+    /// A first look: every physics once and strong, a tenth of the other sets.
     pub fn glance() -> Self {
         Self {
             false_alarms: 48,
@@ -114,7 +114,7 @@ impl Sizes {
         }
     }
 
-    /// What other ways are tried on: every physics strong and as on a bad rig, once.
+    /// The sets for other methods: every physics once at a strong separation and once as on a bad rig.
     pub fn ablation() -> Self {
         Self {
             false_alarms: 45,
@@ -126,7 +126,7 @@ impl Sizes {
         }
     }
 
-    /// A few of everything but triples, strong.
+    /// A few strong sets of every campaign but `Triples`.
     pub fn slice() -> Self {
         Self {
             false_alarms: 12,
@@ -151,12 +151,12 @@ impl Sizes {
     }
 }
 
-/// The sets of a campaign. A set's seed follows from its id and `seed`: it is the same set whatever the sizes.
+/// The sets of a campaign. A set's seed follows from its id and `seed`, so that a set is the same at all sizes.
 pub fn campaigns(campaign: Campaign, sizes: &Sizes, seed: u64) -> Vec<Planned> {
     let planned = |name: String, noise: NoiseKind, content: Content, amount: fn(f64) -> Amount, of: f64| {
         let id = format!("{}/{name}", campaign.name());
         let recipe = Recipe {
-            // The run's id in the table, which must tell nothing.
+            // This is the run's id in the table, which must not say what is hidden.
             name: "set".into(),
             noise,
             content,
@@ -234,7 +234,7 @@ fn one_of_each() -> impl Iterator<Item = &'static Definition> {
     })
 }
 
-/// A seed of its own for every name: FNV-1a, well mixed (`SplitMix64`).
+/// A different seed for each name: FNV-1a, mixed as in `SplitMix64`.
 fn seed_of(name: &str, seed: u64) -> u64 {
     let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64 ^ seed, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)

@@ -34,7 +34,7 @@ fn a_set_is_the_same_in_a_small_campaign_and_in_the_whole() {
 }
 
 #[test]
-fn the_table_is_not_told_what_is_in_it() {
+fn the_table_does_not_say_what_is_hidden() {
     assert!(all(&Sizes::whole()).iter().all(|set| set.recipe.name == "set"));
 }
 

@@ -1,9 +1,10 @@
-//! The evidence as text.
+//! The evidence as Markdown.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Write};
 
 use serde::Deserialize;
+use tactus_model::effect::REGISTRY;
 
 use super::ablation::Ablation;
 use super::campaign::Campaign;
@@ -12,12 +13,12 @@ use super::rate::Rate;
 use super::score::{Band, OutsideScore, Scores, Several, Shrink};
 use super::timing::Timing;
 
-/// A part of a document that is written anew, between marks of its own.
+/// A part of a document that this program replaces, between marks of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// What is found in the sets.
+    /// The scores of the campaigns.
     Evidence,
-    /// What `tactus discover --active` decides.
+    /// The twins that `tactus discover --active` decides.
     Active,
 }
 
@@ -30,7 +31,7 @@ impl Part {
     }
 }
 
-/// Puts a text between a part's marks in a document; `None` if it has none.
+/// The document with a text between a part's marks; `None` if it has no such marks.
 pub fn into_document(document: &str, part: Part, text: &str) -> Option<String> {
     let [begin, end] = part.marks();
     let (before, rest) = document.split_once(begin)?;
@@ -38,16 +39,16 @@ pub fn into_document(document: &str, part: Part, text: &str) -> Option<String> {
     Some(format!("{before}{begin}\n\n{}\n\n{end}{after}", text.trim()))
 }
 
-/// What discovery costs, beside its peers.
+/// Time and memory of `tactus discover` and of its peers.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Costs {
-    /// Ours.
+    /// Of `tactus discover`.
     pub ours: Timing,
-    /// The others', on one of the tables.
+    /// Of the peers, on one of the same tables.
     pub peers: Option<Peers>,
 }
 
-/// What `bench/peers/discovery.py time` tells.
+/// The output of `bench/peers/discovery.py time`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Peers {
     versions: BTreeMap<String, String>,
@@ -77,7 +78,7 @@ pub fn document(scores: &Scores, ablations: &[Ablation], costs: Option<&Costs>) 
     .to_string()
 }
 
-/// One line for each set that was not named exactly: what was in it, what was said.
+/// One line for each set that was not named exactly: what is hidden in it and what was reported.
 pub fn misses(outcomes: &[Outcome]) -> String {
     let mut text = String::new();
     for set in outcomes {
@@ -108,7 +109,7 @@ pub fn misses(outcomes: &[Outcome]) -> String {
         // Writing to a string does not fail.
         _ = writeln!(
             text,
-            "{:<44} noise {:.2} phi {:.1} | {} -> {} | {} | shrink {shrink} | taken on the way: {}",
+            "{:<44} noise {:.2} phi {:.1} | {} -> {} | {} | shrink {shrink} | added during the search: {}",
             set.id,
             set.noise[0],
             set.noise[1],
@@ -121,10 +122,11 @@ pub fn misses(outcomes: &[Outcome]) -> String {
     text
 }
 
-/// A target, and how far it is missed.
+/// A target, and what was measured.
 struct Target<'a> {
     what: &'a str,
     wanted: f64,
+    /// The target is an upper bound.
     is_most: bool,
     seen: Option<f64>,
     of: usize,
@@ -153,16 +155,26 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         rows.push(rate("false alarms", 0.028, true, *all));
     }
     if let Some(band) = scores.bands.iter().find(|band| band.name == "16 and more") {
-        rows.push(rate("one effect, z 16 and more: named exactly", 0.95, false, band.exact));
-        rows.push(rate("one effect, z 16 and more: in the reported set", 0.95, false, band.in_set));
+        rows.push(rate("one effect, z of 16 and more: named exactly, of detected", 0.95, false, band.exact));
+        rows.push(rate(
+            "one effect, z of 16 and more: in the reported set, of detected",
+            0.95,
+            false,
+            band.in_set,
+        ));
         rows.push(shrink("shrink, median", 0.95, band.shrink.of, band.shrink.median));
         rows.push(shrink("shrink, fifth percentile", 0.8, band.shrink.of, band.shrink.fifth));
     }
     rows.push(rate("two effects: both named", 0.85, false, scores.pairs.named));
-    rows.push(rate("two effects, each z 16 and more: both named", 0.85, false, scores.separate_pairs.named));
+    rows.push(rate(
+        "two effects, each with z of 16 and more: both named",
+        0.85,
+        false,
+        scores.separate_pairs.named,
+    ));
     rows.push(rate("three effects: all named", 0.7, false, scores.triples.named));
     rows.push(rate(
-        "three effects, each z 16 and more: all named",
+        "three effects, each with z of 16 and more: all named",
         0.7,
         false,
         scores.separate_triples.named,
@@ -171,15 +183,15 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         rows.push(rate("outside the library: \"unexplained\"", 0.9, false, all.unexplained));
         rows.push(rate("outside the library: a wrong name", 0.05, true, all.wrong));
     }
-    writeln!(f, "## Against the targets\n")?;
-    writeln!(f, "| what | target | seen | 95 % interval | sets | missed by |\n|---|---|---|---|---|---|")?;
+    writeln!(f, "## Targets\n")?;
+    writeln!(f, "| what | target | measured | 95 % interval | sets | result |\n|---|---|---|---|---|---|")?;
     for Target { what, wanted, is_most, seen, of, interval } in rows {
         let bound = if is_most { "at most" } else { "at least" };
         let missed = seen.map_or_else(
             || "-".into(),
             |seen| {
                 let by = if is_most { seen - wanted } else { wanted - seen };
-                if by > 0.0 { format!("**{:.1} points**", 100.0 * by) } else { "met".into() }
+                if by > 0.0 { format!("**missed by {:.1} points**", 100.0 * by) } else { "met".into() }
             },
         );
         let seen = seen.map_or_else(|| "-".into(), percent);
@@ -191,7 +203,7 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
         let sets: Vec<String> = sets.collect();
         writeln!(
             f,
-            "\nSets: {}. Each was discovered in on one thread in {median:.1} s (median; 95 % within {most:.1} s). Runs that made no report: {}.",
+            "\nSets: {}. `tactus discover` took {median:.1} s for a set on one thread (median; 95 % of the sets within {most:.1} s). Runs without a report: {}.",
             sets.join(", "),
             scores.failed.len()
         )?;
@@ -202,7 +214,7 @@ fn targets(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
 fn false_alarms(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
     writeln!(
         f,
-        "## Nothing is missing\n\n| noise | sets | false alarms | share | 95 % interval |\n|---|---|---|---|---|"
+        "## Sets without hidden physics\n\n| noise | sets | false alarms | share | 95 % interval |\n|---|---|---|---|---|"
     )?;
     for (noise, rate) in &scores.false_alarms {
         writeln!(
@@ -217,20 +229,20 @@ fn false_alarms(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
     writeln!(f)
 }
 
-const BAND_HEAD: &str = "sets | detected | exact, of detected | in the reported set, of detected | a wrong name | shrink: median, fifth percentile (sets) | to the effect's own fit |\n|---|---|---|---|---|---|---|---|";
+const BAND_HEAD: &str = "sets | detected | named exactly, of detected | in the reported set, of detected | a wrong name | shrink: median, fifth percentile (sets) | the same over that of the true effect's own fit |\n|---|---|---|---|---|---|---|---|";
 
 fn names(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
-    writeln!(f, "## One effect\n\n| z | {BAND_HEAD}")?;
+    writeln!(f, "## Sets with one effect\n\n| z | {BAND_HEAD}")?;
     for band in &scores.bands {
         band_row(f, &band.name, band)?;
     }
-    writeln!(f, "\nBy effect, z 16 and more:\n\n| effect | {BAND_HEAD}")?;
+    writeln!(f, "\nBy effect, z of 16 and more:\n\n| effect | {BAND_HEAD}")?;
     for row in &scores.effects {
         band_row(f, &row.effect, &row.band)?;
     }
     writeln!(
         f,
-        "\n![Truth against name](images/discovery-confusion.svg)\n\n![Power](images/discovery-power.svg)\n"
+        "\n![Hidden effects against named effects](images/discovery-confusion.svg)\n\n![Power against separation](images/discovery-power.svg)\n"
     )
 }
 
@@ -252,13 +264,13 @@ fn band_row(f: &mut fmt::Formatter<'_>, name: &str, band: &Band) -> fmt::Result 
 fn several(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
     writeln!(
         f,
-        "## Several effects\n\n| | sets | all named | and nothing else | all in reported sets | a wrong name | shrink |\n|---|---|---|---|---|---|---|"
+        "## Sets with several effects\n\n| effects | sets | all named | all named and nothing else | all in reported sets | a wrong name | shrink: median, fifth percentile (sets) |\n|---|---|---|---|---|---|---|"
     )?;
     let rows = [
         ("two", &scores.pairs),
-        ("two, each z 16 and more", &scores.separate_pairs),
+        ("two, each with z of 16 and more", &scores.separate_pairs),
         ("three", &scores.triples),
-        ("three, each z 16 and more", &scores.separate_triples),
+        ("three, each with z of 16 and more", &scores.separate_triples),
     ];
     for (name, several) in rows {
         let Several { named, exact, in_set, wrong, shrink } = several;
@@ -280,7 +292,7 @@ fn several(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
 fn outside(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
     writeln!(
         f,
-        "## Outside the library\n\n| physics | sets | unexplained | any name | partly explained | not seen |\n|---|---|---|---|---|---|"
+        "## Sets with physics outside the library\n\n| physics | sets | unexplained | any effect named | partly explained | not detected |\n|---|---|---|---|---|---|"
     )?;
     for (physics, OutsideScore { unexplained, wrong, partly, missed }) in &scores.outside {
         writeln!(
@@ -302,7 +314,7 @@ fn ways(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
     }
     writeln!(
         f,
-        "\n## Other ways, on the same sets\n\n| way | false alarms | exact, of all | in the reported set | a wrong name | both of two | outside: unexplained | outside: any name | shrink | shrink on deeper presses than any fitted | s a set |\n|---|---|---|---|---|---|---|---|---|---|---|"
+        "\n## Other methods on the same sets\n\n| method | false alarms | named exactly | in the reported set | a wrong name | both of two named | outside: unexplained | outside: any effect named | shrink: median, fifth percentile (sets) | the same on presses deeper than any fitted | s for each set |\n|---|---|---|---|---|---|---|---|---|---|---|"
     )?;
     for way in ablations {
         writeln!(
@@ -334,13 +346,17 @@ fn ways(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
 fn time(f: &mut fmt::Formatter<'_>, Costs { ours, peers }: &Costs) -> fmt::Result {
     writeln!(
         f,
-        "\n## Time and memory\n\n| who | frames of 48 elements | s | peak, MiB | does |\n|---|---|---|---|---|"
+        "\n## Time and memory\n\n| program | frames of 48 elements | s | peak, MiB | what it does |\n|---|---|---|---|---|"
     )?;
     for cost in &ours.rows {
         writeln!(
             f,
-            "| tactus discover, {} cores | {} | {:.1} | {:.0} | names one of 26 effects, or none |",
-            ours.cores, cost.frames, cost.seconds, cost.peak_mib
+            "| tactus discover, {} cores | {} | {:.1} | {:.0} | tells which of {} effects are missing |",
+            ours.cores,
+            cost.frames,
+            cost.seconds,
+            cost.peak_mib,
+            REGISTRY.len()
         )?;
     }
     let rows = peers.iter().flat_map(|peers| peers.rows.iter().map(|row| (peers.frames, row)));
@@ -348,11 +364,11 @@ fn time(f: &mut fmt::Formatter<'_>, Costs { ours, peers }: &Costs) -> fmt::Resul
         let seconds = seconds.map_or_else(|| "failed".into(), |seconds| format!("{seconds:.1}"));
         writeln!(f, "| {who}, one core | {frames} | {seconds} | {peak_mib:.0} | {does} |")?;
     }
-    writeln!(f, "\ntime ~ frames^{:.2}.", ours.exponent)?;
+    writeln!(f, "\nTime grows as frames^{:.2}.", ours.exponent)?;
     for frames in &ours.left_out {
         writeln!(
             f,
-            "{frames} frames were left out: by the growth of the memory, this machine has not enough."
+            "{frames} frames were not run: at the growth seen so far they need more memory than this machine has."
         )?;
     }
     if let Some(Peers { versions, .. }) = peers {
@@ -360,7 +376,7 @@ fn time(f: &mut fmt::Formatter<'_>, Costs { ours, peers }: &Costs) -> fmt::Resul
             versions.iter().map(|(what, version)| format!("{what} {version}")).collect();
         writeln!(
             f,
-            "Peers: {}; their time is that of the work after the residual of the base model is there.",
+            "Versions: {}. The time of these programs begins with the residual of the base model.",
             versions.join(", ")
         )?;
     }
@@ -368,8 +384,8 @@ fn time(f: &mut fmt::Formatter<'_>, Costs { ours, peers }: &Costs) -> fmt::Resul
     for (what, seen, most) in
         asked.iter().flat_map(|cost| [("s", cost.seconds, 60.0), ("MiB", cost.peak_mib, 1024.0)])
     {
-        let verdict = if seen < most { "met".into() } else { format!("missed by {:.0}", seen - most) };
-        writeln!(f, "36,000 frames: {seen:.1} {what} of at most {most} {what}: {verdict}.")?;
+        let verdict = if seen < most { "met".into() } else { format!("missed by {:.0} {what}", seen - most) };
+        writeln!(f, "36,000 frames take {seen:.1} {what}. Target: at most {most} {what}, {verdict}.")?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! A set's truth beside what was found: the one place where labels are opened.
+//! The truth of a set beside the report on it. Labels are opened only here.
 
 use std::fs;
 
@@ -9,85 +9,85 @@ use tactus_sets::Label;
 use super::campaign::{Campaign, Planned};
 use super::run::{Places, Ran};
 
-/// A set's truth, and what was found.
+/// The truth of a set, and what was reported.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// The set.
+    /// Id of the set.
     pub id: String,
-    /// What it was made for.
+    /// Its purpose.
     pub campaign: Campaign,
-    /// What is in it.
+    /// The hidden physics.
     pub truths: Vec<Truth>,
-    /// Noise: standard deviation in counts, and correlation from reading to reading.
+    /// Noise: standard deviation in counts, and correlation of a reading with the one before.
     pub noise: [f64; 2],
-    /// What was named; none if no report was made.
+    /// The named effects; empty without a report.
     pub named: Vec<Named>,
-    /// What each round of the search took, whatever was taken back in the end.
+    /// The effect that each round of the search added, even if it was withdrawn later.
     pub taken: Vec<String>,
-    /// The verdict; `failed` if no report was made.
+    /// The verdict; `failed` without a report.
     pub verdict: String,
-    /// Share of the gap that was closed on held-out presses.
+    /// Share of the gap on held-out presses that the model closes.
     pub shrink: Option<f64>,
-    /// The same on presses deeper than any that was fitted, if that was asked.
+    /// The same on presses deeper than any fitted one, if the method reports it.
     pub deeper_shrink: Option<f64>,
     /// Relative standard error of the gap itself.
     pub gap_error: f64,
-    /// Shrink of the first effect's own fit in the first round, if it was fitted.
+    /// Shrink of the first hidden effect, fitted alone in the first round; `None` if it was not fitted.
     pub alone_shrink: Option<f64>,
-    /// Wall time.
+    /// Wall time in s.
     pub seconds: f64,
 }
 
-/// What is in a set.
+/// A hidden physics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
-    /// The physics.
+    /// Id of the physics.
     pub physics: String,
-    /// The library's effect that it is an instance of; none outside the library.
+    /// The effect of the library that it is an instance of; `None` outside the library.
     pub effect: Option<String>,
-    /// Separation from the base model, gain, offset and spread recalibrated.
+    /// Separation from the base model after gains, offsets and spread are fitted.
     pub z: f64,
 }
 
-/// What was named.
+/// A named effect.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct Named {
     /// The effect.
     pub effect: String,
-    /// Effects that are said to be as likely.
+    /// Effects that the data cannot tell from it, as the report says.
     pub equivalent: Vec<String>,
 }
 
 impl Outcome {
-    /// Whether anything is said to be missing.
+    /// True if the verdict is not `nothing-missing` or an effect is named.
     pub fn is_detected(&self) -> bool {
         !self.has_failed() && (self.verdict != "nothing-missing" || !self.named.is_empty())
     }
 
-    /// Whether the program made no report.
+    /// True if there is no report.
     pub fn has_failed(&self) -> bool {
         self.verdict == "failed"
     }
 
-    /// Whether every true effect is named.
+    /// True if every hidden effect is named.
     pub fn names_all(&self) -> bool {
         self.truths
             .iter()
             .all(|truth| self.named.iter().any(|named| truth.effect.as_ref() == Some(&named.effect)))
     }
 
-    /// Whether the true effects are named, and nothing else.
+    /// True if every hidden effect is named and nothing else.
     pub fn is_exact(&self) -> bool {
         self.names_all() && self.named.len() == self.truths.len()
     }
 
-    /// Whether every true effect is named or in a named one's set of equivalents, each in one of its own.
+    /// True if every hidden effect is named or in a set of equivalents, each in a different one.
     pub fn holds_all(&self) -> bool {
         let effects: Vec<&str> = self.truths.iter().filter_map(|truth| truth.effect.as_deref()).collect();
         effects.len() == self.truths.len() && matches(&effects, &self.named)
     }
 
-    /// Named effects that are not in the set, nor equivalent to one that is.
+    /// Named effects that are neither hidden nor equivalent to a hidden one.
     pub fn wrong_names(&self) -> Vec<&str> {
         let is_true = |named: &&Named| {
             self.truths.iter().filter_map(|truth| truth.effect.as_deref()).any(|effect| named.may_be(effect))
@@ -95,7 +95,7 @@ impl Outcome {
         self.named.iter().filter(|named| !is_true(named)).map(|named| named.effect.as_str()).collect()
     }
 
-    /// Separation of the weakest truth; none without.
+    /// Separation of the weakest hidden physics; infinite if there is none.
     pub fn z(&self) -> f64 {
         self.truths.iter().map(|truth| truth.z).fold(f64::INFINITY, f64::min)
     }
@@ -107,7 +107,7 @@ impl Named {
     }
 }
 
-/// Whether each effect finds a name of its own.
+/// True if each effect can be matched with a different name.
 fn matches(effects: &[&str], named: &[Named]) -> bool {
     let Some((first, rest)) = effects.split_first() else { return true };
     (0..named.len()).filter(|index| named[*index].may_be(first)).any(|index| {
@@ -121,7 +121,7 @@ fn matches(effects: &[&str], named: &[Named]) -> bool {
     })
 }
 
-/// What this reads of `report.json`.
+/// The part of `report.json` that is read.
 #[derive(Debug, Deserialize)]
 struct Report {
     split: Split,
@@ -163,7 +163,7 @@ struct Last {
     deeper_shrink: Option<f64>,
 }
 
-/// The outcomes of those sets that have been run.
+/// The outcomes of the sets that have been run.
 ///
 /// # Errors
 /// If a label or a report cannot be read.
@@ -213,8 +213,8 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<Report>) -> O
     }
 }
 
-/// Relative standard error of the gap, `sqrt(2 (1 + phi^2) / (n (1 - phi^2))) / (chi2 - 1)`: a mean of the squares of `n`
-/// readings is known no better.
+/// Relative standard error of the gap, `sqrt(2 (1 + phi^2) / (n (1 - phi^2))) / (chi2 - 1)`: that of a mean of the squares of `n`
+/// correlated readings.
 fn gap_error(report: &Report, elements: f64, phi: f64) -> f64 {
     let Split { frames, train_presses, heldout_presses } = report.split;
     let share = heldout_presses as f64 / (train_presses + heldout_presses) as f64;

@@ -11,7 +11,7 @@ fn named(names: &[(&str, &[&str])]) -> Vec<Named> {
     names.iter().map(named).collect()
 }
 
-/// A set of such effects, in which these were named.
+/// A set with hidden effects, and a report with names.
 pub(crate) fn set(truths: &[Option<&str>], names: &[(&str, &[&str])], verdict: &str) -> Outcome {
     let truth =
         |effect: Option<&str>| Truth { physics: "made-up".into(), effect: effect.map(Into::into), z: 40.0 };
@@ -78,7 +78,7 @@ fn labels_and_reports_are_read_from_files() -> Result<()> {
         Recipe { frames: Some(300), content: Content { physics, ..Content::default() }, ..Recipe::new(3) };
     let id = "names/relaxation-prony-s1-0".to_owned();
     let set = Planned { id: id.clone(), campaign: Campaign::Names, recipe };
-    assert_eq!(read(std::slice::from_ref(&set), &places)?, [], "it was not run");
+    assert_eq!(read(std::slice::from_ref(&set), &places)?, [], "the set was not run");
 
     let label = set.recipe.make()?.label;
     let ran = Ran { program: String::new(), seconds: 2.5, exit: Some(0), said: String::new() };

@@ -9,7 +9,7 @@ use tactus_report::plot::{Axis, Figure, Ink, Label, Panel, Series, Sheet};
 use super::rate::Rate;
 use super::score::{Cell, PowerPoint, Scores, Z_DETECTABLE, oracle};
 
-/// The pictures of the evidence: file name and SVG.
+/// File name and SVG of each picture.
 pub fn pictures(scores: &Scores) -> [(&'static str, String); 2] {
     [
         ("discovery-confusion.svg", confusion(&scores.confusion).to_string()),
@@ -21,14 +21,14 @@ const CELL_PX: f64 = 26.0;
 const NAMES_PX: f64 = 170.0;
 const HEADS_PX: f64 = 150.0;
 
-/// Rows are truths, columns names; a cell's colour and number are its share of the row.
+/// Rows are hidden effects, columns named ones. A cell's colour and number are its share of the row, in percent.
 fn confusion(cells: &[Cell]) -> Sheet {
     let effects = effects();
     let rows: Vec<&str> = effects.iter().copied().chain(["outside the library", "nothing"]).collect();
     let columns: Vec<&str> = effects.iter().copied().chain(["several", "unexplained", "nothing"]).collect();
     let size = [NAMES_PX + CELL_PX * columns.len() as f64 + 60.0, HEADS_PX + CELL_PX * rows.len() as f64];
-    let mut sheet = Sheet::new("What was in the sets, and what was named", size);
-    sheet.put([0.0, HEADS_PX - 12.0], &Label::new("in the set").heading());
+    let mut sheet = Sheet::new("Hidden effects against named effects", size);
+    sheet.put([0.0, HEADS_PX - 12.0], &Label::new("hidden").heading());
     let beside = NAMES_PX + CELL_PX * columns.len() as f64 + 8.0;
     sheet.put([beside, HEADS_PX - 12.0], &Label::new("sets").heading());
     for (column, name) in columns.iter().enumerate() {
@@ -53,16 +53,21 @@ fn confusion(cells: &[Cell]) -> Sheet {
 const PANEL_PX: [f64; 2] = [280.0, 190.0];
 const ACROSS: usize = 4;
 
-/// Of `lg(z / Z_DETECTABLE)`; what lies beyond is left out.
+/// Range of `lg(z / Z_DETECTABLE)`; points outside are left out.
 const PLACES: [f64; 2] = [-0.5, 2.0];
 
-/// One panel an effect: share detected and share named against separation, beside the oracle's.
+/// A panel for each effect: the shares detected and named exactly against separation, and the power of the oracle.
 fn power(effects: &BTreeMap<String, Vec<PowerPoint>>) -> Sheet {
     let down = effects.len().div_ceil(ACROSS);
     let height = PANEL_PX[1] + 28.0;
     let mut sheet =
         Sheet::new("Power against separation", [PANEL_PX[0] * ACROSS as f64, height * down as f64 + 30.0]);
-    sheet.put([70.0, 10.0], &Label::new("green: something is said to be missing; blue: named exactly; grey: a test that knows the effect; bars: 95 % intervals"));
+    sheet.put(
+        [70.0, 10.0],
+        &Label::new(
+            "green: detected; blue: named exactly; grey: a test that knows the effect; bars: 95 % intervals",
+        ),
+    );
     for (index, (effect, points)) in effects.iter().enumerate() {
         let [x, y] = [PANEL_PX[0] * (index % ACROSS) as f64, 30.0 + height * (index / ACROSS) as f64];
         sheet.put([x + 70.0, y + 14.0], &Label::new(effect).heading());
@@ -110,7 +115,7 @@ fn effects() -> Vec<&'static str> {
     effects
 }
 
-/// A column's head.
+/// The head of a column.
 struct Slanted<'a>(&'a str);
 
 impl Panel for Slanted<'_> {

@@ -1,34 +1,34 @@
-//! Shares with their intervals, and the few functions of statistics that the evidence needs.
+//! Shares with their intervals, and the statistical functions that the evidence needs.
 
 use serde::Serialize;
 
-/// So many of so many, with the exact interval of 95 % (Clopper and Pearson 1934).
+/// A binomial share with its exact 95 % interval (Clopper and Pearson 1934).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rate {
-    /// How many.
+    /// Number of hits.
     pub hits: usize,
-    /// Of how many.
+    /// Number of trials.
     pub of: usize,
-    /// `hits / of`; not a number of none.
+    /// `hits / of`; NaN without trials.
     pub share: f64,
-    /// Ends of the interval; 0 and 1 of none.
+    /// Ends of the interval; 0 and 1 without trials.
     pub interval: [f64; 2],
 }
 
-/// Chance of each end of the interval.
+/// Probability outside each end of the interval.
 const TAIL: f64 = 0.025;
-/// Halvings of `[0, 1]`: beyond the precision of what is printed.
+/// Halvings of `[0, 1]`; the result is finer than the printed precision.
 const HALVINGS: usize = 50;
 
 impl Rate {
-    /// So many of so many.
+    /// The share of `hits` in `of`.
     pub fn new(hits: usize, of: usize) -> Self {
         let least = if hits == 0 { 0.0 } else { root(|p| at_most(hits - 1, of, p) - (1.0 - TAIL)) };
         let most = if hits >= of { 1.0 } else { root(|p| at_most(hits, of, p) - TAIL) };
         Self { hits, of, share: hits as f64 / of as f64, interval: [least, most] }
     }
 
-    /// How many of some are so.
+    /// The share of items for which `is_so` holds.
     pub fn of<T>(all: impl IntoIterator<Item = T>, is_so: impl Fn(T) -> bool) -> Self {
         let (mut hits, mut of) = (0, 0);
         for one in all {
@@ -39,7 +39,7 @@ impl Rate {
     }
 }
 
-/// Where a function that falls over `[0, 1]` is zero.
+/// The zero of a function that falls over `[0, 1]`.
 fn root(falling: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..HALVINGS {
@@ -53,7 +53,7 @@ fn root(falling: impl Fn(f64) -> f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// Chance of at most `hits` of `of`, each with chance `p`.
+/// Probability of at most `hits` in `of` trials, each with probability `p`.
 fn at_most(hits: usize, of: usize, p: f64) -> f64 {
     let ln_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
     let term = |k: usize| {
@@ -63,12 +63,12 @@ fn at_most(hits: usize, of: usize, p: f64) -> f64 {
     (0..=hits).map(term).sum()
 }
 
-/// The normal distribution function: share of standard normal deviates below `x`.
+/// The normal distribution function: the share of standard normal deviates below `x`.
 pub fn normal_share(x: f64) -> f64 {
     0.5 * libm::erfc(-x / std::f64::consts::SQRT_2)
 }
 
-/// The value below which a share of all lies, linear between neighbours; none of none.
+/// The value below which a share of all values lies, linear between neighbours; `None` without values.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the values")]
 pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);

@@ -14,7 +14,7 @@ fn the_interval_is_that_of_clopper_and_pearson() {
     near(rate.interval[1], 0.046_533_327_0);
 }
 
-/// None of n: 1 - 0.025^(1/n).
+/// The upper end for 0 of n is 1 - 0.025^(1/n).
 #[test]
 fn none_and_all_have_one_sided_intervals() {
     let end = 1.0 - 0.025_f64.powf(1.0 / 20.0);

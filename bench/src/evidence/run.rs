@@ -1,4 +1,4 @@
-//! Making sets and having the real binary discover.
+//! Makes sets and runs `tactus discover` on each.
 
 use std::fmt::Write;
 use std::fs;
@@ -15,86 +15,86 @@ use sha2::{Digest, Sha256};
 
 use super::campaign::Planned;
 
-/// Where things go.
+/// The folders of a campaign.
 #[derive(Debug, Clone)]
 pub struct Places {
-    /// Reports; tables while they are worked on.
+    /// Reports and results; a set's table while it is worked on.
     pub work: PathBuf,
     /// Labels: for the scorer only.
     pub sealed: PathBuf,
 }
 
-/// What discovers.
+/// How `tactus discover` is run.
 #[derive(Debug, Clone)]
 pub struct Workflow {
-    /// The program `tactus`.
+    /// The program.
     pub tactus: PathBuf,
-    /// Arguments beside those that every run has.
+    /// Further arguments of `tactus discover`.
     pub more: Vec<String>,
     /// Seed of the discovery.
     pub seed: u64,
-    /// Sets at once; each has one thread.
+    /// Sets that run at the same time, each on one thread.
     pub jobs: usize,
-    /// Keep the tables of measurements and of residuals, for programs that work on them.
+    /// Keeps the tables of measurements and of residuals, for the peers.
     pub keeps_tables: bool,
 }
 
-/// How far it has come.
+/// Progress of a campaign.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress<'a> {
-    /// The set that was done last.
+    /// Id of the set that was done last.
     pub id: &'a str,
     /// Sets done.
     pub done: usize,
     /// Sets in all.
     pub total: usize,
-    /// Seconds that the rest will take.
+    /// Estimate of the remaining time.
     pub left_s: f64,
 }
 
-/// What became of a run of the binary.
+/// The result of a run of the program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ran {
     /// SHA-256 of the program.
     pub program: String,
-    /// Wall time on one thread, beside as many others as there are jobs.
+    /// Wall time on one thread, while the other jobs run.
     pub seconds: f64,
-    /// Exit code; none if a signal ended it.
+    /// Exit code; `None` if a signal ended the program.
     pub exit: Option<i32>,
-    /// What it said on standard error, if it made no report.
+    /// Its standard error, if it made no report.
     pub said: String,
 }
 
-/// Exit code of a program that was called wrongly.
+/// Exit code of `tactus` after wrong arguments.
 const USAGE: i32 = 2;
 
 impl Places {
-    /// A set's report, as `tactus discover` wrote it.
+    /// The report of a set, as `tactus discover` wrote it.
     pub fn report(&self, id: &str) -> PathBuf {
         self.work.join("reports").join(format!("{id}.json"))
     }
 
-    /// What became of the run.
+    /// The [`Ran`] of a set.
     pub fn ran(&self, id: &str) -> PathBuf {
         self.work.join("ran").join(format!("{id}.json"))
     }
 
-    /// A set's measurement table and that of its residuals, if they are kept.
+    /// The tables of a set's measurements and residuals, if they are kept.
     pub fn tables(&self, id: &str) -> [PathBuf; 2] {
         ["sets", "residuals"].map(|folder| self.work.join(folder).join(format!("{id}.parquet")))
     }
 
-    /// A set's truth.
+    /// The label of a set.
     pub fn label(&self, id: &str) -> PathBuf {
         self.sealed.join(format!("{id}.json"))
     }
 }
 
-/// Makes every set, seals its label, and has the program discover in its table; what is done already is left as it is.
+/// Makes every set, writes its label and runs the program on its table. Sets that are done already are skipped.
 ///
 /// # Errors
-/// If a set cannot be made, a file not written or the program not started, or if the results of another build lie there. A run
-/// of the program that fails is a result, not an error.
+/// If a set cannot be made, a file cannot be written or the program cannot be started, or if the folder has results of another
+/// build. A run of the program that fails is a result, not an error.
 pub fn run(
     sets: &[Planned],
     places: &Places,
@@ -142,7 +142,7 @@ fn is_done(set: &Planned, places: &Places, program: &str, wants_tables: bool) ->
     let ran: Ran = serde_json::from_str(&text).with_context(|| at(&path))?;
     ensure!(
         ran.program == program,
-        "{} is the work of another build of `tactus`; give another folder, or remove that one",
+        "{} is from another build of `tactus`: give another folder with --work, or remove this one",
         path.display()
     );
     Ok(!wants_tables
@@ -155,7 +155,7 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
     let label = places.label(&set.id);
     write(&label, &serde_json::to_string_pretty(&made.label).with_context(|| at(&label))?)?;
 
-    // The program sees a number, not the set's name.
+    // The path that the program sees has the seed, not the set's name.
     let folder = places.work.join("now").join(format!("{:016x}", set.recipe.seed));
     fs::create_dir_all(&folder).with_context(|| at(&folder))?;
     let table = folder.join("set.parquet");
@@ -174,7 +174,7 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
         .with_context(|| at(&workflow.tactus))?;
     let seconds = started.elapsed().as_secs_f64();
     let told = || String::from_utf8_lossy(&output.stderr).into_owned();
-    // A wrong argument says nothing of any set.
+    // Wrong arguments are an error of the campaign, not a result of a set.
     ensure!(output.status.code() != Some(USAGE), "{}: {}", at(&workflow.tactus), told());
     let found = out.join("report.json");
     let said = if found.exists() {

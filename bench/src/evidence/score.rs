@@ -1,4 +1,4 @@
-//! From outcomes to shares.
+//! Counts outcomes.
 
 use std::collections::BTreeMap;
 
@@ -8,17 +8,17 @@ use super::campaign::Campaign;
 use super::outcome::Outcome;
 use super::rate::{Rate, normal_share, quantile};
 
-/// The smallest separation that is called detectable.
+/// The smallest separation that counts as detectable.
 pub const Z_DETECTABLE: f64 = 4.0;
-/// The separation from which on an exact name is asked for.
+/// The separation from which on effects should be named exactly.
 pub const Z_SEPARATE: f64 = 16.0;
-/// Level of the oracle's test: the share of false alarms that is allowed.
+/// Level of the oracle's test, equal to the allowed share of false alarms.
 pub const ORACLE_LEVEL: f64 = 0.028;
 /// The `1 - ORACLE_LEVEL` quantile of the normal distribution.
 const ORACLE_QUANTILE: f64 = 1.911;
-/// A shrink counts where the gap is known within this share.
+/// Greatest relative error of a gap whose shrink counts.
 pub(super) const SHRINK_ERROR_MAX: f64 = 0.1;
-/// Bands of separation beyond the spread.
+/// Ranges of separation after the spread is fitted too.
 const BANDS: [(&str, [f64; 2]); 5] = [
     ("all", [0.0, f64::INFINITY]),
     ("below 4", [0.0, 3.9]),
@@ -27,61 +27,61 @@ const BANDS: [(&str, [f64; 2]); 5] = [
     ("100 and more", [100.0, f64::INFINITY]),
 ];
 
-/// Everything that is counted.
+/// All scores.
 #[derive(Debug, Clone, Serialize)]
 pub struct Scores {
-    /// Sets of each campaign.
+    /// Number of sets of each campaign.
     pub sets: BTreeMap<Campaign, usize>,
-    /// Sets of which no report was made; they count as misses.
+    /// Ids of the sets without a report. They count as misses, or as false alarms where nothing is hidden.
     pub failed: Vec<String>,
     /// False alarms by noise: `all`, `white`, `coloured`, `quantised`.
     pub false_alarms: BTreeMap<String, Rate>,
-    /// Sets of one effect, by separation.
+    /// Sets with one effect, by separation.
     pub bands: Vec<Band>,
-    /// Sets of one effect, by effect, from [`Z_SEPARATE`] on.
+    /// Sets with one effect, by effect, from [`Z_SEPARATE`] on.
     pub effects: Vec<EffectScore>,
-    /// Power of each effect.
+    /// Power curve of each effect.
     pub power: BTreeMap<String, Vec<PowerPoint>>,
-    /// Truth against name, sets of one effect from [`Z_SEPARATE`] on, outside and without.
+    /// Hidden against named effects, over the sets with one effect from [`Z_SEPARATE`] on, with physics outside the library and
+    /// without physics.
     pub confusion: Vec<Cell>,
-    /// Sets of two.
+    /// Sets with two effects.
     pub pairs: Several,
-    /// Sets of three.
+    /// Sets with three effects.
     pub triples: Several,
-    /// Those sets of two in which each effect is from [`Z_SEPARATE`] on: some physics shows in some sets hardly or not at all,
-    /// however strong it is made.
+    /// The sets with two effects in which each is from [`Z_SEPARATE`] on. Some physics hardly shows in some sets at any strength.
     pub separate_pairs: Several,
-    /// The same of three.
+    /// The same with three effects.
     pub separate_triples: Several,
-    /// Outside the library: `all` and by physics.
+    /// Sets outside the library: `all` and by physics.
     pub outside: BTreeMap<String, OutsideScore>,
     /// Seconds of a set on one thread: median and 95th percentile.
     pub seconds: Option<[f64; 2]>,
 }
 
-/// Sets of one effect within a range of separations.
+/// Scores of sets with one effect.
 #[derive(Debug, Clone, Serialize)]
 pub struct Band {
-    /// Which.
+    /// Name of the range of separations.
     pub name: String,
-    /// Something is said to be missing.
+    /// Detected.
     pub detected: Rate,
-    /// The effect and nothing else is named, of those detected.
+    /// The effect is named and nothing else; of the detected sets.
     pub exact: Rate,
-    /// The effect is named or in a set of equivalents, of those detected.
+    /// The effect is named or in a set of equivalents; of the detected sets.
     pub in_set: Rate,
-    /// An effect is named that is not there, nor equivalent to one that is; of all.
+    /// A named effect is neither hidden nor equivalent to a hidden one; of all sets.
     pub wrong: Rate,
-    /// Shrink, where the effect is named and the gap is known within a tenth.
+    /// Shrink of the sets in which the effect is named and the gap is known within a tenth.
     pub shrink: Shrink,
-    /// The same against that of the true effect's own fit.
+    /// The same over the shrink of the true effect, fitted alone.
     pub shrink_to_own_fit: Shrink,
 }
 
-/// How much of gaps is closed.
+/// Statistics of the shrink, the share of a gap that is closed.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Shrink {
-    /// Sets.
+    /// Number of sets.
     pub of: usize,
     /// Median.
     pub median: Option<f64>,
@@ -89,70 +89,70 @@ pub struct Shrink {
     pub fifth: Option<f64>,
 }
 
-/// One effect.
+/// Scores of the sets of one effect.
 #[derive(Debug, Clone, Serialize)]
 pub struct EffectScore {
     /// Its name.
     pub effect: String,
-    /// How its sets fared.
+    /// The scores.
     #[serde(flatten)]
     pub band: Band,
 }
 
-/// Detection at one strength.
+/// A point of a power curve.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct PowerPoint {
     /// Geometric mean of the separations.
     pub z: f64,
-    /// Something is said to be missing.
+    /// Detected.
     pub detected: Rate,
-    /// The effect and nothing else is named.
+    /// The effect is named and nothing else.
     pub exact: Rate,
     /// Power of a one-sided normal test at [`ORACLE_LEVEL`] that knows the effect.
     pub oracle: f64,
 }
 
-/// How often a truth was given a name.
+/// How often a hidden effect was given a name.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cell {
-    /// Effect in the set; `outside the library` or `nothing`.
+    /// The hidden effect; `outside the library` or `nothing`.
     pub truth: String,
-    /// The one that was named; `nothing`, `unexplained` or `several`.
+    /// The named effect; `nothing`, `unexplained` or `several`.
     pub named: String,
-    /// Sets.
+    /// Number of sets.
     pub count: usize,
 }
 
-/// Sets of several effects.
+/// Scores of sets with several effects.
 #[derive(Debug, Clone, Serialize)]
 pub struct Several {
-    /// All are named, whatever else is.
+    /// All are named, perhaps with others.
     pub named: Rate,
     /// All are named, and nothing else.
     pub exact: Rate,
-    /// All are named or in sets of equivalents, each in one of its own.
+    /// All are named or in sets of equivalents, each in a different one.
     pub in_set: Rate,
-    /// An effect is named that is not there, nor equivalent to one that is.
+    /// A named effect is neither hidden nor equivalent to a hidden one.
     pub wrong: Rate,
-    /// Shrink, where the gap is known within a tenth.
+    /// Shrink of the sets in which the gap is known within a tenth.
     pub shrink: Shrink,
 }
 
-/// Sets outside the library.
+/// Scores of sets with physics outside the library.
 #[derive(Debug, Clone, Serialize)]
 pub struct OutsideScore {
     /// The verdict is `unexplained`.
     pub unexplained: Rate,
-    /// Any effect is named.
+    /// An effect is named.
     pub wrong: Rate,
     /// The verdict is `partly-explained`.
     pub partly: Rate,
-    /// Nothing is said to be missing.
+    /// Not detected.
     pub missed: Rate,
 }
 
 impl Scores {
-    /// Counts.
+    /// The scores of some outcomes.
     pub fn new(outcomes: &[Outcome]) -> Self {
         let of = |campaign: Campaign| -> Vec<&Outcome> {
             outcomes.iter().filter(|outcome| outcome.campaign == campaign).collect()
@@ -238,7 +238,7 @@ impl OutsideScore {
     }
 }
 
-/// The power of a test that knows what it looks for.
+/// Power of a one-sided normal test at [`ORACLE_LEVEL`] that knows the effect.
 pub(super) fn oracle(z: f64) -> f64 {
     normal_share(z - ORACLE_QUANTILE)
 }
@@ -247,7 +247,7 @@ fn within<'a>(sets: &[&'a Outcome], [least, most]: [f64; 2]) -> Vec<&'a Outcome>
     sets.iter().copied().filter(|set| (least..most).contains(&set.z())).collect()
 }
 
-/// What is in a set, in a word or two.
+/// The hidden effect, as [`Cell::truth`].
 fn truth(set: &Outcome) -> String {
     match set.truths.first() {
         None => "nothing".into(),
@@ -255,7 +255,7 @@ fn truth(set: &Outcome) -> String {
     }
 }
 
-/// What was said of it.
+/// The named effect, as [`Cell::named`].
 fn said(set: &Outcome) -> String {
     match &set.named[..] {
         [] if set.is_detected() => "unexplained".into(),
@@ -281,7 +281,7 @@ fn by_noise(sets: &[&Outcome]) -> BTreeMap<String, Rate> {
             groups.entry(group.into()).or_default().push(set);
         }
     }
-    // A set of which no report was made is no evidence of calmness.
+    // A set without a report does not show that nothing was detected.
     let is_alarm = |set: &&Outcome| set.is_detected() || set.has_failed();
     groups.into_iter().map(|(kind, sets)| (kind, Rate::of(&sets, is_alarm))).collect()
 }

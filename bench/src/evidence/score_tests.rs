@@ -56,14 +56,14 @@ fn a_shrink_counts_only_where_the_gap_is_known() {
 }
 
 #[test]
-fn power_is_told_by_the_powers_of_two_of_the_separation() {
+fn power_is_grouped_by_powers_of_two_of_the_separation() {
     let sets = [2.0, 2.01, 8.0].map(|z| at(z, set(&[Some("backlash")], &[], "nothing-missing")));
     let power = &Scores::new(&sets).power["backlash"];
     assert_eq!(power.iter().map(|point| point.detected.of).collect::<Vec<_>>(), [2, 1]);
     assert!((power[1].z - 8.0).abs() < 1e-9);
 }
 
-/// At no separation it says so as often as it may by chance, at its quantile every other time.
+/// It detects with the probability of its level at a z of 0, and with 1/2 at its quantile.
 #[test]
 fn the_oracle_is_the_normal_test_at_its_level() {
     assert!((oracle(0.0) - ORACLE_LEVEL).abs() < 1e-4);

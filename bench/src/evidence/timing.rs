@@ -1,4 +1,4 @@
-//! What discovery costs.
+//! Time and memory of `tactus discover`.
 
 use std::fs;
 use std::path::Path;
@@ -13,20 +13,20 @@ use tactus_sets::{Content, Plan, Recipe};
 use super::rate::quantile;
 use crate::Growth;
 
-/// Time and memory of `tactus discover` at several sizes, on all cores.
+/// Time and memory at several sizes, on all cores.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// Cores of the machine.
     pub cores: usize,
-    /// One row a size.
+    /// A row for each size.
     pub rows: Vec<Cost>,
-    /// Sizes that were not run: by the growth of those before, this machine's memory would not have been enough.
+    /// Sizes that were not run: in proportion to the size before, they need more memory than is available.
     pub left_out: Vec<usize>,
-    /// `p` of the time `~ frames^p`.
+    /// `p`, where time grows as `frames^p`.
     pub exponent: f64,
 }
 
-/// One size.
+/// Time and memory at one size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Frames of 48 elements.
@@ -37,12 +37,13 @@ pub struct Cost {
     pub peak_mib: f64,
 }
 
-/// Two effects of a bad rig, so that the search goes several rounds.
+/// Two physics of a bad rig, so that the search takes several rounds.
 const PHYSICS: [&str; 2] = ["relaxation-prony", "shifted-mount"];
+/// Time between two readings of the memory.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
 impl Timing {
-    /// Makes a set of each size in a folder, by the plan of the `diagnose` experiment, and discovers in it so many times.
+    /// Makes a set of each size by the plan of the experiment `diagnose`, and runs `tactus discover` on it `runs` times.
     ///
     /// # Errors
     /// If a set cannot be made or the program fails.
@@ -56,7 +57,7 @@ impl Timing {
             }
             let content = Content { physics: PHYSICS.map(Into::into).into(), ..Content::default() };
             let recipe = Recipe { plan: Plan::Diagnose, frames: Some(*frames), content, ..Recipe::new(1) };
-            // Laid out as the peers look for it.
+            // The peers expect these paths.
             let place = |part: &str, ending: &str| folder.join(part).join(format!("{frames}.{ending}"));
             let table = place("sets", "parquet");
             for part in ["sets", "residuals", "reports"] {
@@ -91,7 +92,7 @@ fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
     let status = format!("/proc/{}/status", child.id());
     let mut peak_kib = 0.0_f64;
     loop {
-        // Gone in the last moment before the process is waited for; what was read before stays.
+        // The file is gone once the process has ended; the last value stays.
         let most_kib = fs::read_to_string(&status).ok().and_then(|text| kib(&text, "VmHWM:"));
         peak_kib = peak_kib.max(most_kib.unwrap_or(0.0));
         if let Some(exit) = child.try_wait()? {
@@ -102,12 +103,12 @@ fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
     }
 }
 
-/// Memory that programs may still take.
+/// Memory that is available to programs.
 fn available_mib() -> Option<f64> {
     Some(kib(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")? / 1024.0)
 }
 
-/// A line of the kernel's, such as `VmHWM:   231596 kB`.
+/// The value of a line of the kernel, such as `VmHWM:   231596 kB`.
 fn kib(lines: &str, name: &str) -> Option<f64> {
     lines.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
 }

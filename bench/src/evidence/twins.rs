@@ -1,4 +1,5 @@
-//! Twins: what the paper's own experiments leave undecided, and what one that `tactus discover --active` chooses decides.
+//! Twins: effects that one of the paper's experiments cannot tell apart, and whether the experiments that
+//! `tactus discover --active` chooses can.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,29 +11,29 @@ use serde::Deserialize;
 
 use super::outcome::parsed;
 
-/// Hidden physics, and what it is mistaken for.
+/// Hidden physics, and the effects that it is mistaken for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Twins {
-    /// What the embedded rig hides, as `tactus-mock hidden list` names it.
+    /// Id of the hidden physics, as in `tactus-mock hidden list`.
     pub physics: &'static str,
-    /// 1 is a bad rig.
+    /// Its strength; 1 is a bad rig.
     pub strength: f64,
-    /// What it is.
+    /// The effect that it is an instance of.
     pub effect: &'static str,
-    /// What it looks like.
+    /// Effects that look like it.
     pub twins: &'static [&'static str],
-    /// The paper's experiment that leaves it undecided.
+    /// The experiment of the paper that cannot tell them apart.
     pub experiment: &'static str,
 }
 
-/// An effect that was added, and those that the data could not tell from it.
+/// A named effect, and those that the data cannot tell from it.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct Undecided {
     effect: String,
     equivalent: Vec<String>,
 }
 
-/// An experiment that was chosen and run.
+/// An experiment that was chosen and run, with the named effects before and after it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Chosen {
     experiment: String,
@@ -44,16 +45,16 @@ pub struct Chosen {
     after: Vec<Undecided>,
 }
 
-/// What became of a pair.
+/// The result for one case of twins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decision {
-    /// The pair.
+    /// The case.
     pub twins: Twins,
-    /// What was run in the round, in order; none if nothing was undecided.
+    /// The experiments of the round, in order; empty if nothing was undecided.
     pub chosen: Vec<Chosen>,
 }
 
-/// The twins of the document.
+/// The cases of `docs/discovery-evidence.md`.
 pub const TWINS: [Twins; 6] = [
     Twins {
         physics: "lost-motion",
@@ -99,7 +100,7 @@ pub const TWINS: [Twins; 6] = [
     },
 ];
 
-/// Time that a round may take on the rig.
+/// Limit of the rig's time for a round.
 pub const BUDGET_MIN: f64 = 6.0;
 
 const RIG: &str = include_str!("../../../config/rigs/sim.toml");
@@ -115,7 +116,7 @@ struct Summary {
 }
 
 impl Twins {
-    /// Runs the paper's experiment and one active round on the embedded rig, which hides the physics and nothing else.
+    /// Runs the paper's experiment and one active round on the embedded rig, which hides this physics and nothing else.
     ///
     /// # Errors
     /// If the program or a file fails.
@@ -154,7 +155,7 @@ impl Twins {
 }
 
 impl Decision {
-    /// True if the truth or one of its twins was named, with the others as good.
+    /// True if the right effect or a twin was named, with all others as equivalents.
     pub fn is_undecided_before(&self) -> bool {
         let Twins { effect, twins, .. } = self.twins;
         self.chosen.first().is_some_and(|first| {
@@ -165,7 +166,7 @@ impl Decision {
         })
     }
 
-    /// True if then the truth was named, and no twin was named or as good any more.
+    /// True if afterwards the right effect was named, and no twin was named or equivalent to it.
     pub fn is_decided_after(&self) -> bool {
         let Twins { effect, twins, .. } = self.twins;
         let is_twin = |name: &str| twins.contains(&name);
@@ -177,7 +178,7 @@ impl Decision {
         })
     }
 
-    /// How long the rig was busy with the round.
+    /// The rig's time for the round, in s.
     pub fn duration_s(&self) -> f64 {
         self.chosen.iter().fold(0.0, |sum, chosen| sum + chosen.duration_s)
     }
@@ -200,9 +201,9 @@ impl Decision {
     }
 }
 
-/// The table of the document.
+/// The table of `docs/discovery-evidence.md`.
 pub fn twins_table(decisions: &[Decision]) -> String {
-    let head = "| hidden | strength | effect, twins | measured | named | chosen | on the rig | named then | decided |\n\
+    let head = "| hidden physics | strength | effect or twins | first experiment | named after it | chosen next | time on the rig | named after that | decided |\n\
                 |---|---|---|---|---|---|---|---|---|\n";
     let rows: Vec<String> = decisions.iter().map(Decision::row).collect();
     [head, &rows.concat()].concat()
@@ -221,7 +222,7 @@ fn in_words(undecided: &[Undecided]) -> String {
     if all.is_empty() { "nothing named".into() } else { all.join("; ") }
 }
 
-/// The rig without what its own simulation hides.
+/// The rig file without the departures that its own simulation hides.
 fn plain(rig: &str) -> Result<String> {
     let mut rig: toml::Table = rig.parse()?;
     let simulation = rig.get_mut("simulation").and_then(toml::Value::as_table_mut);

@@ -8,7 +8,7 @@ const LOST_MOTION: Twins = Twins {
     experiment: "corners",
 };
 
-/// A round after which one name stands for what two stood for.
+/// A round with one experiment.
 fn decision(before: &[(&str, &[&str])], after: &[(&str, &[&str])]) -> Decision {
     let undecided = |of: &[(&str, &[&str])]| {
         let one = |(effect, equivalent): &(&str, &[&str])| Undecided {

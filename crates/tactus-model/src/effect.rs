@@ -16,17 +16,18 @@
 //! | readout | [`OnReadout`] | counts in time; what stands before the converter |
 //!
 //! The [`Pipeline`](crate::Pipeline) calls the effects of a stage one after the other, in the order in which they
-//! are listed. History lives in the effect and is forgotten by `reset`. Between two moments an effect with memory
-//! takes its input as a straight line, so that a call more often changes nothing for such an input. At neutral
-//! parameters an effect changes nothing, to the bit.
+//! are listed. History lives in the effect; `reset` clears it. Between two moments an effect with memory takes its input as
+//! a straight line, so that calls at a higher rate give the same result. At neutral parameters an effect changes nothing,
+//! to the bit.
 //!
 //! **Derivatives.** Where a closed form exists, `slope` gives the derivative of the effect's own output by one of
-//! its parameters at the same input, with that of the memory; `None` or `false` where there is none. From there to
-//! counts: a [`Shift`] of the contact through [`ForwardModel::gradient`](crate::ForwardModel::gradient), a
-//! change of signal times `sensitivity (1 + 2 k u)`, a change of counts as it is, as long as no effect stands
-//! behind. Else two pipelines are differenced: [`Effect::with`] makes the other one.
+//! its parameters at the same input, with that of the memory; `None` or `false` where there is none. Fits do not call it:
+//! `tactus discover` differences the predictions of two pipelines, and [`Effect::with`] makes the second one. A program that
+//! wants counts multiplies by what follows: a [`Shift`] of the contact through
+//! [`ForwardModel::gradient`](crate::ForwardModel::gradient), a change of signal times `sensitivity (1 + 2 k u)`, a change of
+//! counts by 1; this holds for the last effect of the pipeline.
 //!
-//! **There are**, in [`REGISTRY`]; these names are a contract of reports and model files:
+//! **The library**, in [`REGISTRY`]; these names are a contract of reports and model files:
 //!
 //! | stage | effects |
 //! |---|---|
@@ -40,8 +41,8 @@
 //! **Cost**: an image is computed when the contact changes, as without effects; `heavy-tail` computes two, and one
 //! of a leaning tool takes several times as long. All else is some operations an element and moment.
 //!
-//! **A lab's own effect** is one file of the kind below and one line in the registry (`docs/adding-an-effect.md`
-//! goes through it); or, without touching this crate, a `static` [`Definition`] given to [`Effect::of`].
+//! **Another effect** joins the library as `docs/adding-an-effect.md` describes. A lab's own effect needs no change of this
+//! crate: it is a `static` [`Definition`], given to [`Effect::of`].
 //!
 //! ```
 //! use tactus_model::effect::{BaseModel, Definition, Make, OnElement, Parameter};

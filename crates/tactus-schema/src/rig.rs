@@ -141,7 +141,7 @@ pub struct SensorLink {
     pub transport: Transport,
 }
 
-/// Protocols of sensors (devices.md). What a frame's counts are depends on it.
+/// Protocols of sensors. The meaning of a frame's counts depends on the protocol.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SensorProtocol {
     /// `weiss-dsa`: the `DSACON32m` and relatives, push mode; 12-bit counts.

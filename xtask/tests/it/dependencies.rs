@@ -1,4 +1,4 @@
-//! The direction of dependencies: a crate may depend only on crates in rows above its own.
+//! Direction of dependencies: a crate depends only on crates in rows above its own.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::collections::BTreeSet;
@@ -35,7 +35,7 @@ const ROWS: [&str; 26] = [
     "xtask",
 ];
 
-/// What each layer must not reach for, not even through its dependencies' features.
+/// Crates that must not be direct dependencies of a crate.
 const NEVER: [(&str, &[&str]); 7] = [
     ("tactus-model", &["tokio", "rand", "serde"]),
     ("tactus-solid", &["tokio", "rand", "serde"]),
@@ -63,7 +63,7 @@ fn metadata() -> Metadata {
         .unwrap()
 }
 
-/// Pairs of a workspace crate and what it is built from, tests aside.
+/// Pairs of a workspace crate and one of its direct dependencies; development dependencies are left out.
 fn edges(metadata: &Metadata) -> BTreeSet<(String, String)> {
     metadata
         .workspace_packages()
@@ -89,7 +89,7 @@ fn dependencies_point_upwards() {
     let row = |name: &str| ROWS.iter().position(|row| *row == name);
     for (user, used) in edges(&metadata()) {
         if let (Some(user_row), Some(used_row)) = (row(&user), row(&used)) {
-            assert!(used_row < user_row, "{user} stands above {used} and must not depend on it");
+            assert!(used_row < user_row, "{user} is in a row above {used} and must not depend on it");
         }
     }
 }

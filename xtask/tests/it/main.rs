@@ -2,3 +2,4 @@
 
 mod ci;
 mod dependencies;
+mod references;

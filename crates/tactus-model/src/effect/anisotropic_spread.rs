@@ -4,13 +4,17 @@
 //! sigma_x = sqrt(ratio) sigma          sigma_y = sigma / sqrt(ratio)
 //! ```
 //!
-//! The area that a point is spread over stays. Axes are the sensor's: a Gaussian that lies askew is no product of one
-//! along x and one along y.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `ratio` | - | 1 | 0.2 to 5 | `sigma_x / sigma_y` |
+//!
+//! The area of the spread stays the same. The axes are the sensor's, because a Gaussian along other axes is not a product of
+//! one along x and one along y.
 //!
 //! No derivative in closed form. Cost: one image.
 //!
 //! # Source
-//! A sheet that was drawn in one direction, or lies on electrodes that run in one: the Gaussian of an orthotropic
+//! A sheet that was drawn in one direction, or lies on electrodes that run in one direction: the Gaussian of an orthotropic
 //! medium, J. Crank, *The Mathematics of Diffusion* (1975).
 
 use super::{BaseModel, Definition, Load, Make, OnCovering, Parameter};

@@ -1,12 +1,18 @@
-//! `backlash`: the tip is not where its stage says, but behind it, by direction of approach.
+//! `backlash`: the tip lags behind the position that the stage reports, depending on the direction of approach.
 //!
 //! ```text
 //! q(t) = max(x(t) - play / 2, min(x(t) + play / 2, q before))          on each of the robot's axes
 //! ```
 //!
-//! `x` is where the stage says that the tip is, `q` where it is. The tip follows half the play behind a stage that
-//! goes on, and rests for the whole play where the stage turns; of two opposite approaches the mean is the
-//! registration's, or the surface's. The tip begins amid its play.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `play_x_mm` | mm | 0 | 0 to 1 | width of the play on the robot's x axis |
+//! | `play_y_mm` | mm | 0 | 0 to 1 | width of the play on the robot's y axis |
+//! | `play_z_mm` | mm | 0 | 0 to 0.5 | width of the play on the robot's z axis |
+//!
+//! `x` is the position that the stage reports, `q` the true one. The tip follows half the play behind a moving stage, and
+//! rests for the whole play after the stage turns. The mean of two opposite approaches is the position of the registration,
+//! or of the surface. The tip begins in the middle of its play.
 //!
 //! Derivative in closed form, with memory. Cost: none.
 //!

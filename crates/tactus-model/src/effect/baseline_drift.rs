@@ -1,15 +1,21 @@
-//! `baseline-drift`: the zero wanders in time, of all elements alike or of one.
+//! `baseline-drift`: the zero wanders in time, alike in all elements or in one.
 //!
 //! ```text
 //! counts -> counts + c(t - start)          t since the start of the run
-//! c straight through 0 and offset_01_counts .. offset_16_counts, duration / 16 apart, and constant before and after
+//! c: straight lines from 0 through offset_01_counts .. offset_16_counts, duration / 16 apart; constant before and after
 //! ```
 //!
-//! The start is at 0, since the baselines are the base model's. A wander of any
-//! shape is followed, be it a trend, a warming up or a random walk, of which least squares leave 4 % of the variance;
-//! 12 knots would leave 5 % and 6 knots 10 %. What is faster than a sixteenth of the duration is not: it takes several
-//! effects, each starting where the one before ends. With `element` -1, or without it, all elements wander alike; each for
-//! itself takes an effect for each.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `element` | index | -1 | -1, or an element of the array | the element that drifts; -1, or left out: all of them, alike |
+//! | `start_s` | s | 0 | 0 to 1000000 | start of the curve; no fit varies it; may be left out |
+//! | `duration_s` | s | 600 | 1 to 1000000 | from the start to the last knot; `tactus discover` sets it to the length of the data |
+//! | `offset_01_counts` to `offset_16_counts` | counts | 0 | -1000 to 1000 | drift at the knots, `duration_s / 16` apart |
+//!
+//! The curve starts at 0, since the baselines belong to the base model. It follows a drift of any shape: a trend, a warm-up, a
+//! random walk. Least squares leave 4 % of the variance of a random walk; 12 knots would leave 5 % and 6 knots 10 %. A drift
+//! that is faster than a sixteenth of the duration takes several effects, each starting where the one before ends. Elements
+//! that wander each for itself take an effect each.
 //!
 //! Derivatives in closed form. Cost: none.
 //!

@@ -8,8 +8,16 @@
 //!            + column_share        * (sum over the others of its column)
 //! ```
 //!
-//! Along a row that leaks from column to column, neighbours answer most and the rest of the row less: the two shares of
-//! a row together follow such a ladder.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `neighbour_share` | - | 0 | -0.5 to 0.5 | share of each of the up to four nearest neighbours |
+//! | `diagonal_share` | - | 0 | -0.5 to 0.5 | share of each of the up to four neighbours across the corners |
+//! | `row_neighbour_share` | - | 0 | -0.5 to 0.5 | share of each of the up to two neighbours in the same row |
+//! | `row_share` | - | 0 | -0.5 to 0.5 | share of each other element of the same row |
+//! | `column_share` | - | 0 | -0.5 to 0.5 | share of each other element of the same column |
+//!
+//! In a row that leaks from column to column, neighbours answer most and the rest of the row less: `row_neighbour_share` and
+//! `row_share` together follow such a ladder.
 //!
 //! # Source
 //! Row-column addressing: charge that leaks between the lines of a capacitive matrix, and stray capacitance

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Of the design's table, in its order.
+/// The names that model files use, in the order of the stages.
 const CONTRACT: [&str; 26] = [
     "misregistration",
     "surface-offset",
@@ -73,6 +73,25 @@ fn a_definition_is_whole() {
         for twin in definition.near_twins {
             let is_mutual = Definition::find(twin).is_ok_and(|twin| twin.near_twins.contains(&name));
             assert!(is_mutual || BASE.contains(twin), "{name}: {twin}");
+        }
+    }
+}
+
+/// By a row of the table in the effect's file; numbered parameters share one.
+#[test]
+fn each_parameter_is_explained() {
+    let unnumbered = |name: &str| name.replace(|letter: char| letter.is_ascii_digit(), "");
+    for Definition { name: effect, parameters, .. } in REGISTRY {
+        let file = format!("{}/src/effect/{}.rs", env!("CARGO_MANIFEST_DIR"), effect.replace('-', "_"));
+        let text = std::fs::read_to_string(file).unwrap();
+        for Parameter { name, neutral, range: [least, most], kind, .. } in *parameters {
+            let mut rows = text.lines().filter_map(|line| line.strip_prefix("//! | `")?.split_once('`'));
+            let row = rows.find(|(first, _)| unnumbered(first) == unnumbered(name));
+            let (_, row) = row.unwrap_or_else(|| panic!("{effect}: {name} has no row"));
+            if matches!(kind, Kind::Real | Kind::Given) {
+                let values = format!("| {neutral} | {least} to {most} | ");
+                assert!(row.contains(&values), "{effect}: {name} is {values}");
+            }
         }
     }
 }

@@ -4,7 +4,11 @@
 //! sigma -> sigma (1 + growth_share depth / thickness)          depth at most the thickness
 //! ```
 //!
-//! What is spread wider is not lost: the peak falls as the width grows.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `growth_share` | - | 0 | -0.9 to 5 | relative growth of sigma where the depth is the whole thickness |
+//!
+//! The volume is conserved: the peak falls as the width grows.
 //!
 //! No derivative in closed form. Cost: one image.
 //!

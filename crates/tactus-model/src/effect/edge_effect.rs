@@ -4,14 +4,20 @@
 //! u_e -> u_e (1 + edge_share exp(-edge distance / reach) + seam_share exp(-seam distance / reach))
 //! ```
 //!
-//! Distances are those of the tool's axis: from the nearest side of the active area (0 on it and outside), and from
-//! the line in the middle of x, where the paper's two sensors meet. A factor by the element's own place would be part
-//! of its sensitivity.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `edge_share` | - | 0 | -1 to 2 | relative change of the signal where the tool's axis is at the edge |
+//! | `seam_share` | - | 0 | -1 to 2 | relative change of the signal where the tool's axis is at the seam |
+//! | `reach_mm` | mm | 2 | 0.1 to 20 | distance over which either change falls to 1/e |
+//!
+//! The distances are those of the tool's axis: from the nearest side of the active area (0 on it and outside), and from
+//! the line in the middle of x, where the paper's two sensors meet. A factor that depends on the element's own place would be
+//! part of its sensitivity.
 //!
 //! Derivatives in closed form. Cost: none.
 //!
 //! # Source
-//! The paper's Fig. 1: two sensors side by side. What an edge disturbs dies away exponentially within about a
+//! The paper's Fig. 1: two sensors side by side. The disturbance of an edge dies away exponentially within about a
 //! thickness, by Saint-Venant's principle: S. P. Timoshenko and J. N. Goodier, *Theory of Elasticity* (1970).
 
 use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};

@@ -2,11 +2,17 @@
 //!
 //! ```text
 //! counts -> counts + (counts - baseline) (g(t) + per_k (T - T_0))          t since the start
-//! g straight through 0 and gain_01_share .. gain_06_share, duration / 6 apart, and constant after the duration
+//! g: straight lines from 0 through gain_01_share .. gain_06_share, duration / 6 apart; constant after the duration
 //! ```
 //!
-//! The start is at 0, since the gain there is the base model's. Of a random walk least squares leave 10 % of the
-//! variance. `T_0` is the first temperature that is known; without one temperature does nothing.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `rate_per_k` | 1/K | 0 | -0.1 to 0.1 | relative change of the gain for each kelvin above the first known temperature |
+//! | `duration_s` | s | 600 | 1 to 1000000 | from the start to the last knot; `tactus discover` sets it to the length of the data |
+//! | `gain_01_share` to `gain_06_share` | - | 0 | -1 to 5 | relative change of the gain at the knots, `duration_s / 6` apart |
+//!
+//! The curve starts at 0, since the gain there is the base model's. Least squares leave 10 % of the variance of a random walk.
+//! `T_0` is the first known temperature; without one, temperature has no effect.
 //!
 //! Derivatives in closed form. Cost: none.
 //!

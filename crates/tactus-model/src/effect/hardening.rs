@@ -1,17 +1,23 @@
 //! `hardening`: the covering answers more than in proportion to depth.
 //!
 //! ```text
-//! u_e -> u_e (1 + growth_at_1_mm (depth / 1 mm)^exponent)          depth at most the covering's thickness
+//! u_e -> u_e (1 + growth_at_1_mm (a_e / 1 mm)^exponent)          a_e = (1 - own_share) depth + own_share max(0, u_e)
 //! ```
 //!
-//! The covering is compressed, and so hardens, under the tool; what arrives there is spread as before. So all
-//! elements gain by the same factor, whereas the base model's quadratic term acts on each element's own signal.
-//! An exponent of 1 adds the square of depth, 2 its cube. It only grows: what levels off is `saturation`.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `growth_at_1_mm` | - | 0 | 0 to 20 | relative growth of the signal where `a_e` is 1 mm |
+//! | `exponent` | - | 2 | 0.25 to 6 | power of `a_e`: 1 adds the square of depth, 2 its cube |
+//! | `own_share` | - | 0 | 0 to 1 | what hardens the covering: 0 the tool's depth, 1 the element's own signal; between, their mixture |
 //!
-//! With the gain free it follows to 0.6 mm the elastic laws `exp(a depth) - 1` of 1 to 6 per mm and `depth^p` of 1.2
-//! to 2 to 0.5 % (rms) of the greatest response, and `depth^3` to 2 %.
+//! `depth` is that of the tool, from 0 to the covering's thickness. With an `own_share` of 0 the covering hardens under the
+//! tool and spreads the result as before: all elements gain by the same factor. With 1 each element gains by its own signal,
+//! as in the base model's quadratic term. The effect only grows; a response that levels off is `saturation`.
 //!
-//! Derivatives in closed form. Cost: a power a moment.
+//! With a free gain, an `own_share` of 0 and depths to 0.6 mm it follows the elastic laws `exp(a depth) - 1` (`a` from 1 to 6
+//! per mm) and `depth^p` (`p` from 1.2 to 2) within 0.5 % rms of the greatest response, and `depth^3` within 2 %.
+//!
+//! Derivatives in closed form. Cost: a power for each element.
 //!
 //! # Source
 //! The paper's Sec. 6: at large deformation the response grows nonlinearly by elastic hardening. The first odd term

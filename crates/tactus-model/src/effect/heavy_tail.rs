@@ -4,7 +4,13 @@
 //! G -> (1 - tail_share) G_sigma + tail_share G_(width_ratio sigma)
 //! ```
 //!
-//! Both of unit volume. The tail takes from the peak: sensitivity, stated for a Gaussian, is to be calibrated anew.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `tail_share` | - | 0 | 0 to 1 | share of the volume that is in the wider Gaussian |
+//! | `width_ratio` | - | 2 | 1 to 10 | standard deviation of the wider Gaussian over that of the core |
+//!
+//! Both Gaussians have unit volume. The tail lowers the peak, so that the sensitivity, which is stated for one Gaussian, must be
+//! calibrated again.
 //!
 //! # Source
 //! The layered elastic solution falls off more slowly than the Gaussian of its core (the paper's Fig. 3); a mixture

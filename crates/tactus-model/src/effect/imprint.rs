@@ -5,9 +5,15 @@
 //! u     -> u + set_share mean(m_k - u)                         tau = recovery {1 / spread_ratio, 1, spread_ratio}
 //! ```
 //!
-//! The dent is a share of the deepest, each element's own, and recovers exponentially with a ratio of 1; with others it
-//! follows power laws and series, as `relaxation` does. It adds to what presses less than it did; a press that goes as
-//! deep as the one before feels nothing of it, since `m_k` is then `u`.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `set_share` | - | 0 | 0 to 1 | share of the deepest signal that is left right after release |
+//! | `recovery_s` | s | 60 | 0.1 to 100000 | the middle one of the three recovery times |
+//! | `spread_ratio` | - | 4 | 1 to 100 | ratio of one recovery time to the next; at 1 all three are equal |
+//!
+//! Each element keeps its own dent, a share of its deepest signal. With a ratio of 1 the dent recovers exponentially; with larger
+//! ratios it follows power laws and series, as `relaxation` does. The dent adds to lighter presses. A press as deep as the one
+//! before shows nothing of it, since `m_k` is then `u`.
 //!
 //! Derivatives in closed form, with memory. Cost: three exponentials a moment.
 //!

@@ -5,10 +5,16 @@
 //! lowest  = the greatest tan(tilt_x) u + tan(tilt_y) v of the face
 //! ```
 //!
-//! `u, v` along the tool's own sides (the robot's axes) from the foot of its axis. `touched_share` says which height of
-//! the tool the depth is told of: 0 the foot of the axis (one edge goes deeper, the other less deep, and while all of the
-//! face touches the volume is the same), 1 the lowest point, with which a touch finds the surface. Acts on tools with a
-//! flat face and on meshes; the head of a sphere or a cone stays as it is.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `tilt_x_deg` | degree | 0 | -10 to 10 | tilt along the tool's own x; positive: the side of positive x is deeper |
+//! | `tilt_y_deg` | degree | 0 | -10 to 10 | the same along the tool's own y |
+//! | `touched_share` | - | 0.5 | 0 to 1 | the point to which depth is measured: 0 the foot of the axis, 1 the lowest point |
+//!
+//! `u, v` run along the tool's own sides (the robot's axes) from the foot of its axis. With a `touched_share` of 0 one edge is
+//! deeper and the other less deep; the volume is the same as long as the whole face touches. With 1 the depth is that of the
+//! lowest point, which finds the surface in a touch. The effect acts on tools with a flat face and on meshes, not on spheres and
+//! cones.
 //!
 //! No derivative in closed form. Cost: one image, in four to five times its time.
 //!

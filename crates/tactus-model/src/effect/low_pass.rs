@@ -1,8 +1,12 @@
-//! `low-pass`: the readout follows slowly.
+//! `low-pass`: the readout is a first-order low-pass filter.
 //!
 //! ```text
 //! c' = (counts - c) / time_constant          settled at the first moment
 //! ```
+//!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `time_constant_s` | s | 0 | 0 to 10 | time constant of the filter; at 0 it follows at once |
 //!
 //! # Source
 //! The first-order filter of a charge amplifier or of the controller's averaging.

@@ -8,8 +8,16 @@
 //!     | 0           1          |
 //! ```
 //!
-//! Shift and turn are those of the registration itself. Scale and squareness are the stage's, about the shifted origin: its steps are
-//! longer than it believes, and its y axis leans towards x.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `offset_x_mm` | mm | 0 | -5 to 5 | the sensor's origin lies so far from where the registration has it, along the robot's x |
+//! | `offset_y_mm` | mm | 0 | -5 to 5 | the same along the robot's y |
+//! | `rotation_deg` | degree | 0 | -45 to 45 | the sensor is turned so far beyond the registration, counter-clockwise |
+//! | `scale_error` | - | 0 | -0.2 to 0.2 | the stage moves this share further than it reports |
+//! | `squareness_deg` | degree | 0 | -10 to 10 | the stage's y axis leans so far towards its x axis; may be left out |
+//!
+//! Offset and rotation belong to the registration. Scale and squareness belong to the stage and act about the shifted origin: its
+//! steps are longer than it reports, and its y axis leans towards x.
 //!
 //! # Source
 //! The paper's Sec. 2.1: two touches near opposite corners set the registration, and so carry their errors.

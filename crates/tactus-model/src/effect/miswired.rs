@@ -4,9 +4,16 @@
 //! u_element -> own_share u_element + other_share u_answers_for
 //! ```
 //!
-//! Dead: both shares 0. The paper's faulty elements: `own_share` 0, `other_share` 1. Several are several effects, one
-//! for each element; every one takes what reached the elements themselves, so that their order does not matter. The
-//! element keeps its own gain and baseline.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `element` | index | 0 | an element of the array | the faulty element |
+//! | `answers_for` | index | 0 | an element of the array | the element whose signal it takes |
+//! | `own_share` | - | 1 | 0 to 1 | share of its own signal that it keeps |
+//! | `other_share` | - | 0 | -1 to 1 | share of the other element's signal that it takes |
+//!
+//! A dead element has both shares at 0. The paper's faulty elements have an `own_share` of 0 and an `other_share` of 1. Each
+//! faulty element takes an effect of its own. All of them take the signals before any such effect, so that their order does
+//! not matter. The element keeps its own gain and baseline.
 //!
 //! # Source
 //! The paper's Sec. 2.2: two elements responded to a stimulus of one adjacent element, but not to their own.

@@ -4,8 +4,16 @@
 //! counts -> counts + sine sin(a) + cosine cos(a)          a = 2 pi frequency t + column phase_per_column
 //! ```
 //!
-//! the same on all elements, or running over the columns in the order in which they are read. Sine and cosine stand
-//! for amplitude and phase: they act linearly. A tone above half the frame rate shows as its alias below it.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `sine_counts` | counts | 0 | -1000 to 1000 | amplitude of the sine |
+//! | `cosine_counts` | counts | 0 | -1000 to 1000 | amplitude of the cosine |
+//! | `frequency_hz` | Hz | 10 | 0.001 to 1000 | frequency of the tone |
+//! | `phase_per_column_deg` | degree | 0 | -180 to 180 | phase from one column to the next |
+//!
+//! The tone is the same on all elements of a column. From column to column, in the order in which they are read, its phase
+//! may differ. Sine and cosine replace amplitude and phase because they act linearly. A tone above half the frame rate
+//! shows as its alias below it.
 //!
 //! Derivatives in closed form. Cost: a sine and a cosine for each column.
 //!

@@ -4,6 +4,10 @@
 //! counts -> step round(counts / step)          before the declared converter; 0: no step
 //! ```
 //!
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `step_counts` | counts | 0 | 0 to 1000 | step of the converter; 0: no steps |
+//!
 //! # Source
 //! A converter with fewer effective bits than its word has.
 

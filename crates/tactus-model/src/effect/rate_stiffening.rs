@@ -5,9 +5,15 @@
 //! v(t) = greatest of the speed of loading and v before, fallen by exp(-dt / recovery)
 //! ```
 //!
-//! The speed of loading is that at which depth grows while the tool is in the covering. Without loading what it did
-//! dies away with the recovery time: a short one acts on the way down only, a long one for as long as the tool
-//! stands in the covering. Out of it, it is forgotten.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `stiffening_share` | - | 0 | -0.5 to 2 | relative growth of the signal for each factor e in `1 + v / speed` |
+//! | `speed_mm_per_s` | mm/s | 1 | 0.001 to 100 | speed from which on stiffening shows |
+//! | `recovery_s` | s | 1 | 0.001 to 100000 | time in which the speed that still acts falls to 1/e |
+//!
+//! The speed of loading is the rate at which depth grows while the tool is in the covering. Without loading the stiffening dies
+//! away with the recovery time: with a short one it acts on the way down only, with a long one as long as the tool is in the
+//! covering. It is gone once the tool has left.
 //!
 //! Derivatives in closed form. Cost: none.
 //!

@@ -5,16 +5,23 @@
 //!                                                       tau = time_constant {1 / spread_ratio, 1, spread_ratio}
 //! ```
 //!
-//! and, while the tool touches, not below 0, since a covering does not pull. Once it has left, `after_release` of the
-//! change still shows: nothing of it where the covering is no longer felt, so that it shows in the next press only; all of
-//! it in a linear solid. Without contact it recovers `recovery_ratio` times as fast as it relaxes: where that is large,
-//! each press begins anew. A step to `u` and a hold give, with a ratio of 1, `u (1 - relaxed_share (1 - exp(-t / time_constant)))`: the
-//! response at once is the base model's. A negative share creeps upwards.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `relaxed_share` | - | 0 | -5 to 1 | share of the response that a long hold loses; negative: the response creeps upwards |
+//! | `time_constant_s` | s | 10 | 0.001 to 100000 | the middle one of the three time constants |
+//! | `spread_ratio` | - | 4 | 1 to 100 | ratio of one time constant to the next; at 1 all three are equal |
+//! | `after_release` | - | 0.5 | 0 to 1 | share of the change that still shows without contact |
+//! | `recovery_ratio` | - | 1.5 | 1 to 1000 | speed of the recovery without contact, over that of the relaxation |
 //!
-//! Three times spread on a scale of ratios follow what relaxes in no single one. Share of the fall that is explained
-//! under a depth held from 0.03 to 60 s, the gain free, frames at 30 Hz (without spread, and with):
+//! While the tool touches, the result is not below 0, since a covering does not pull. After release the share
+//! `after_release` of the change still shows: 0 where the covering is no longer felt, so that the change shows only in the
+//! next press; 1 in a linear solid. With a large `recovery_ratio` each press begins anew. A step to `u` and a hold give,
+//! with a ratio of 1, `u (1 - relaxed_share (1 - exp(-t / time_constant)))`: the response at first is the base model's.
 //!
-//! | law | ratio 1 | free |
+//! Three time constants follow a relaxation that has no single one. This share of the fall is explained under a depth held
+//! from 0.03 to 60 s, with a free gain and frames at 30 Hz:
+//!
+//! | law | ratio 1 | free ratio |
 //! |---|---|---|
 //! | power law `t^-0.15` | 0.909 | 0.993 |
 //! | power law `t^-0.05` | 0.938 | 0.999 |

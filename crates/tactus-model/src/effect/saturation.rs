@@ -4,15 +4,20 @@
 //! u_e -> u_e (1 + q (u_e / 1 mm)^knee)^(-1 / knee)          q = (1 - loss_at_1_mm)^(-knee) - 1
 //! ```
 //!
-//! A signal of 1 mm loses the share `loss_at_1_mm`, and the greatest end at the ceiling `q^(-1 / knee)` mm; small ones
-//! are as they were. A knee of 1 is the hyperbola of Michaelis and Menten, 2 much like a tanh, and 12 nearly a kink at
-//! the ceiling. All this before the element's gain and baseline; the converter's own end, which is sudden, is the base
-//! model's. The first term is `-loss_at_1_mm u^(knee + 1)`, so that a fit can start from none.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `loss_at_1_mm` | - | 0 | 0 to 0.99 | share that a signal of 1 mm loses |
+//! | `knee` | - | 2 | 0.5 to 12 | how sharply the response turns off |
 //!
-//! Of what a free gain leaves of other forms to 0.6 mm, it explains all but 0.02 % (tanh, exponential, arctan and
-//! logarithm, that lose up to half), and all but 1.1 % of a kink at 0.4 mm.
+//! Small signals stay as they are; the largest end at the ceiling `q^(-1 / knee)` mm. With a knee of 1 the curve is the
+//! hyperbola of Michaelis and Menten, with 2 nearly a tanh, with 12 nearly a kink at the ceiling. The effect acts before
+//! the element's gain and baseline. The converter's own end, which is sudden, belongs to the base model. The first term is
+//! `-loss_at_1_mm u^(knee + 1)`, so a fit can start from a loss of 0.
 //!
-//! Derivatives in closed form. Cost: two powers for each element that feels something.
+//! Other forms that lose up to half of the signal, to 0.6 mm and with a free gain: of what the gain alone leaves, 0.02 %
+//! stays unexplained for tanh, exponential, arctan and logarithm, and 1.1 % for a kink at 0.4 mm.
+//!
+//! Derivatives in closed form. Cost: two powers for each element with a signal.
 //!
 //! # Source
 //! The compression of an amplifier: C. Rapp, *Effects of HPA-Nonlinearity on a 4-DPSK/OFDM-Signal* (1991).
@@ -74,7 +79,7 @@ impl Saturation {
         Self { kept_log, knee, q: (-knee * kept_log).exp_m1() }
     }
 
-    /// 1 for small signals; it grows from where they level off.
+    /// `1 + q u^knee`: near 1 for small signals.
     fn bend(&self, u: f64) -> f64 {
         1.0 + self.q * u.powf(self.knee)
     }

@@ -4,11 +4,16 @@
 //! counts(t) -> counts(t - (last_row - row) row_time - (last_column - column) column_time)
 //! ```
 //!
-//! Elements one by one, row by row, take an `element_time` each if `column_time` is that and `row_time` a row's columns
-//! of it; rows at once have no `column_time`, and columns at once no `row_time`. A frame bears the time of its last
-//! element; the first was sampled longest ago. Between moments counts are taken
-//! to run straight, and what was before the first to be as the first. All elements together are late by half a scan,
-//! which is `time-lag`; what tells them apart is that the first are later than the last.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `row_time_s` | s | 0 | 0 to 0.1 | time from the sampling of a row to that of the next |
+//! | `column_time_s` | s | 0 | 0 to 0.1 | time from the sampling of a column to that of the next |
+//!
+//! If elements are sampled one by one, row by row, `row_time` is `column_time` times the number of columns. If whole rows are
+//! sampled at once, `column_time` is 0; if whole columns, `row_time` is 0. A frame has the time of its last element; the first
+//! element was sampled longest before. Counts run straight between two moments, and before the first moment they are as at the
+//! first. On average the elements are late by half a scan, which is also a `time-lag`; but here the first ones are later than
+//! the last.
 //!
 //! Derivatives in closed form. Cost: a short history, as long as a scan.
 //!

@@ -4,8 +4,13 @@
 //! u -> u (1 - softened_share erf((1 - u^2 / m^2) / width_share))          m = greatest u so far
 //! ```
 //!
-//! each element by its own past. A first loading is the base model's, and so is going on beyond what was reached;
-//! below it unloading and every later press follow the same weaker curve. It does not recover.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `softened_share` | - | 0 | -1 to 1 | share of the signal that is lost far below the greatest signal so far |
+//! | `width_share` | - | 1 | 0.01 to 10 | width of the transition below `m`, as a share of the energy `m^2` |
+//!
+//! Each element has its own past. A first loading follows the base model, and so does loading beyond the greatest signal so
+//! far. Below that, unloading and every later press follow the same weaker curve. The covering does not recover.
 //!
 //! Derivatives in closed form. Cost: an error function for each element.
 //!

@@ -1,10 +1,14 @@
-//! `surface-offset`: the covering's surface is not at the height where the one touch put it.
+//! `surface-offset`: the covering's surface is not at the height that the touch found.
 //!
 //! ```text
 //! depth = surface + offset - z
 //! ```
 //!
-//! A threshold of contact is the same with a negative offset.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `offset_mm` | mm | 0 | -2 to 2 | the surface stands so much higher than the touch that found it says |
+//!
+//! A negative offset is the same as a threshold of contact.
 //!
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.

@@ -4,8 +4,15 @@
 //! depth = surface + slope_x (x - x_c - touched_x) + slope_y (y - y_c - touched_y) - z
 //! ```
 //!
-//! `x, y` in the sensor frame, `x_c, y_c` the middle of the active area, and `touched` from there the place at which the
-//! surface's height was found, where a tilt changes nothing. Only that place's distance along the slope matters.
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `slope_x_mm_per_mm` | mm/mm | 0 | -0.2 to 0.2 | rise of the surface along the sensor's x |
+//! | `slope_y_mm_per_mm` | mm/mm | 0 | -0.2 to 0.2 | rise of the surface along the sensor's y |
+//! | `touched_x_mm` | mm | 0 | -50 to 50 | where the surface's height was found: x from the middle of the active area |
+//! | `touched_y_mm` | mm | 0 | -50 to 50 | the same in y |
+//!
+//! `x, y` are in the sensor frame; `x_c, y_c` is the middle of the active area. `touched` is the place, from there, where the
+//! surface's height was found: a tilt changes nothing at that place. Only its distance along the slope matters.
 //!
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.

@@ -4,10 +4,14 @@
 //! tip(t) -> tip(t - lag)          late: lag > 0
 //! ```
 //!
-//! The path is asked for another instant; only one that knows its future can be early. Where places come one by
+//! | parameter | unit | neutral | range | meaning |
+//! |---|---|---|---|---|
+//! | `lag_s` | s | 0 | -1 to 1 | a frame shows where the tip was so long before; negative: frames are early |
+//!
+//! The path is looked up at another instant. A negative lag needs a path that knows its future. Where positions arrive one by
 //! one, a [`Trail`](crate::Trail) of them is the path.
 //!
-//! No derivative: that is the tip's velocity, which only the path knows. Cost: none.
+//! No derivative: it would need the tip's velocity, which only the path knows. Cost: none.
 //!
 //! # Source
 //! Transport delay, the factor `exp(-s lag)` of a linear system: K. J. Astrom and R. M. Murray, *Feedback Systems*

@@ -15,7 +15,7 @@ pub struct StageLink {
     pub transport: Transport,
 }
 
-/// Protocols of stages (devices.md), and what each has to know of the axes.
+/// Protocols of stages, with what each has to know of the axes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StageProtocol {
     /// `grbl`: Grbl 1.1 and grblHAL.
