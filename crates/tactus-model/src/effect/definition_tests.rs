@@ -88,7 +88,7 @@ fn each_parameter_is_explained() {
             let mut rows = text.lines().filter_map(|line| line.strip_prefix("//! | `")?.split_once('`'));
             let row = rows.find(|(first, _)| unnumbered(first) == unnumbered(name));
             let (_, row) = row.unwrap_or_else(|| panic!("{effect}: {name} has no row"));
-            if matches!(kind, Kind::Real | Kind::Given) {
+            if matches!(kind, ParameterKind::Real | ParameterKind::Given) {
                 let values = format!("| {neutral} | {least} to {most} | ");
                 assert!(row.contains(&values), "{effect}: {name} is {values}");
             }
