@@ -108,7 +108,8 @@ fn readings<D>(
 }
 
 fn weiss_dsa(checksum: Checksum) -> impl Fn(&[u8]) -> usize {
-    let is_frame = |packet: weiss::Packet<'_>| weiss::Frame::parse(&packet, ELEMENTS).map(black_box).is_ok();
+    let is_frame =
+        |packet: weiss::Packet<'_>| weiss::DecodedFrame::parse(&packet, ELEMENTS).map(black_box).is_ok();
     move |bytes| {
         let decoder = weiss::Decoder::new().with_checksum(checksum);
         readings(bytes, decoder, weiss::Decoder::push, |decoder| {
@@ -133,7 +134,7 @@ fn take_replies(bytes: &[u8]) -> usize {
 
 fn magnetic_frame(frame: u16) -> Vec<u8> {
     let mut numbers = counts(frame).into_iter().map(|count| 0.1 * f32::from(count)).cycle();
-    let mut made = anyskin::Frame::default();
+    let mut made = anyskin::DecodedFrame::default();
     for magnetometer in &mut made.magnetometers {
         magnetometer.temperature_c = 21.5;
         magnetometer.field_ut = std::array::from_fn(|_| numbers.next().unwrap_or_default());

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 const FIRST: Duration = Duration::from_millis(20);
 
-/// A device that has come back is found within this.
+/// The longest pause: a device that is back is found within this time.
 const LONGEST: Duration = Duration::from_secs(1);
 
 /// Pauses that double from 20 ms to 1 s.
@@ -18,14 +18,14 @@ impl Backoff {
         Self { next: FIRST }
     }
 
-    /// The next pause.
+    /// The next pause; the one after it is twice as long.
     pub(crate) fn pause(&mut self) -> Duration {
         let pause = self.next;
         self.next = (pause * 2).min(LONGEST);
         pause
     }
 
-    /// Begins again with short pauses: the device answered.
+    /// Starts again with short pauses, because the device answered.
     pub(crate) fn reset(&mut self) {
         *self = Self::new();
     }

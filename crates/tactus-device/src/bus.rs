@@ -1,52 +1,51 @@
-//! The USB devices that the system knows, as it shows them in `/sys/bus/usb/devices`.
+//! The USB devices that the kernel lists in `/sys/bus/usb/devices`.
 //!
-//! They are read there and not asked: nothing is opened, so no device is disturbed and no permission is needed.
-//! Of interfaces with alternate settings the one that is set is shown.
+//! No device is opened, so none is disturbed and no permission is needed. Of an interface with alternate settings, the
+//! active one is shown.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where they are.
+/// Folder with an entry for each device.
 pub(crate) const ROOT: &str = "/sys/bus/usb/devices";
 
-/// A device.
+/// A USB device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct UsbDevice {
-    /// Number of its bus.
     pub(crate) bus: u8,
-    /// Its address there, until it is unplugged.
+    /// Its address on the bus, valid until it is unplugged.
     pub(crate) address: u8,
     pub(crate) vid: u16,
     pub(crate) pid: u16,
     pub(crate) serial: Option<String>,
     pub(crate) product: Option<String>,
-    /// By number.
+    /// Sorted by number.
     pub(crate) interfaces: Vec<UsbInterface>,
 }
 
-/// One of its interfaces.
+/// An interface of a USB device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct UsbInterface {
     pub(crate) number: u8,
-    /// 0xFF is the vendor's own.
+    /// 0xFF is vendor-specific.
     pub(crate) class: u8,
-    /// The driver that has it; `usbfs` if it is a program.
+    /// The driver that claims it; `usbfs` for a program.
     pub(crate) driver: Option<String>,
-    /// By address.
+    /// Sorted by address.
     pub(crate) endpoints: Vec<UsbEndpoint>,
 }
 
 /// An endpoint of an interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct UsbEndpoint {
-    /// From 0x80 on, it is read.
+    /// From 0x80 on, it sends to the host.
     pub(crate) address: u8,
     pub(crate) kind: EndpointKind,
-    /// The most that a packet of it has.
+    /// Greatest length of a packet in bytes.
     pub(crate) packet_bytes: u16,
 }
 
-/// How an endpoint carries data.
+/// Transfer type of an endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum EndpointKind {
     Bulk,
@@ -56,7 +55,7 @@ pub(crate) enum EndpointKind {
 }
 
 impl UsbDevice {
-    /// Its node, whose permissions decide who may open it.
+    /// Its node in `/dev`, whose permissions decide who may open it.
     pub(crate) fn node(&self) -> PathBuf {
         format!("/dev/bus/usb/{:03}/{:03}", self.bus, self.address).into()
     }
@@ -68,7 +67,7 @@ impl UsbEndpoint {
     }
 }
 
-/// All of them; none where there is no USB. What goes away while it is read is left out.
+/// Lists all devices; none where there is no USB. A device that is unplugged meanwhile is left out.
 pub(crate) fn devices(root: &Path) -> Vec<UsbDevice> {
     let mut devices: Vec<_> = folders(root).iter().filter_map(|folder| device(folder)).collect();
     devices.sort_by_key(|device| (device.bus, device.address));
@@ -110,7 +109,7 @@ fn endpoint(folder: &Path) -> Option<UsbEndpoint> {
             "Interrupt" => EndpointKind::Interrupt,
             _ => EndpointKind::Other,
         },
-        // Above are the packets a microframe of fast isochronous and interrupt endpoints.
+        // The higher bits count packets in a microframe, for high-speed isochronous and interrupt endpoints.
         packet_bytes: size & 0x07FF,
     })
 }
@@ -119,14 +118,14 @@ fn byte(folder: &Path, name: &str) -> Option<u8> {
     u8::from_str_radix(&attribute(folder, name)?, 16).ok()
 }
 
-/// What an attribute says, if it says anything.
+/// The text of an attribute; `None` if it is missing or empty.
 fn attribute(folder: &Path, name: &str) -> Option<String> {
     let bytes = fs::read(folder.join(name)).ok()?;
     let text = String::from_utf8_lossy(&bytes).trim().to_owned();
     (!text.is_empty()).then_some(text)
 }
 
-/// Folders in a folder, by name; links to them too.
+/// Folders in a folder, and links to folders, sorted by name.
 fn folders(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut folders: Vec<_> = entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect();

@@ -7,8 +7,8 @@ use tokio::time::Instant;
 
 /// The host's monotonic and wall clock, read together.
 ///
-/// Monotonic time is tokio's: in a runtime started with paused time it jumps to the next timer
-/// whenever every task waits, so that nobody waits for real.
+/// Monotonic time is tokio's. In a runtime with paused time it jumps to the next timer whenever every task waits, so
+/// tests do not wait.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
     start: Instant,
@@ -22,7 +22,7 @@ impl Clock {
         Self { start: Instant::now(), wall_start: wall_now(), is_virtual: false }
     }
 
-    /// A clock for a runtime with paused time: the wall stands at the present and moves with the virtual time.
+    /// A clock for a runtime with paused time. Its wall time starts at the present and advances with the virtual time.
     pub fn paused() -> Self {
         Self { is_virtual: true, ..Self::real() }
     }
@@ -32,8 +32,8 @@ impl Clock {
         self.is_virtual
     }
 
-    /// The present instant. On a real clock the wall time is read anew each time, so that a step of the
-    /// system clock shows in it and not in the monotonic time.
+    /// The present instant. A real clock reads the system's wall time at each call: a step of the system clock shows
+    /// in the wall time and not in the monotonic time.
     pub fn now(&self) -> Stamp {
         let mono = MonoTime::default().after(self.start.elapsed());
         let wall = if self.is_virtual { self.wall_start.after(self.start.elapsed()) } else { wall_now() };

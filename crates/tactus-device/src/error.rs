@@ -1,30 +1,30 @@
-//! What can go wrong with a device, by what physically happened.
+//! Errors of devices, classified by what physically happened.
 
 use std::fmt::Display;
 use std::io;
 
-/// What physically happened; the retry policy and the remedy follow from it.
+/// What physically happened. It decides how to retry and what to tell the user.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ErrorKind {
     /// There is no such device.
     Absent,
-    /// What is there is another device than the rig file tells, or one of several.
+    /// Another device than the one in the rig file is connected, or several match.
     WrongDevice,
-    /// It is there, but this user may not open it.
+    /// This user has no permission to open it.
     Permission,
-    /// Somebody else holds it.
+    /// Another process has it open.
     Busy,
-    /// It was there and has gone.
+    /// It was connected, and the link broke.
     Disconnected,
-    /// It is there and silent.
+    /// It is connected, but sends nothing.
     Timeout,
-    /// It speaks, but not this protocol.
+    /// It sends data, but not in this protocol.
     Protocol,
     /// It reports a fault of its own.
     DeviceFault,
 }
 
-/// An error of a device, with where and what to do.
+/// An error of a device: which device, what happened, and what to do.
 #[derive(Debug, thiserror::Error)]
 #[error("{device}: {what}")]
 pub struct DeviceError {
@@ -32,9 +32,9 @@ pub struct DeviceError {
     pub device: String,
     /// What physically happened.
     pub kind: ErrorKind,
-    /// What happened and what to do about it, for a person.
+    /// What happened and what to do about it.
     pub what: String,
-    /// The system's own error, where there is one.
+    /// The operating system's error, if there is one.
     #[source]
     pub source: Option<io::Error>,
 }
@@ -53,7 +53,7 @@ impl DeviceError {
         Self { source: Some(source), ..Self::new(device, kind, what) }
     }
 
-    /// Of a link that was open and broke.
+    /// An error of a link that was open and broke.
     pub(crate) fn disconnected(device: impl Display, source: Option<io::Error>) -> Self {
         Self {
             source,

@@ -1,6 +1,6 @@
-//! The devices that are there and could be a rig's, each with what to write into the rig file.
+//! Lists the connected devices that a rig could use, each with the transport to write into the rig file.
 //!
-//! Everything is read from what the system shows; no device is opened or asked, so none is disturbed.
+//! Everything is read from the operating system's lists. No device is opened or queried, so none is disturbed.
 
 mod holders;
 
@@ -19,20 +19,20 @@ use holders::Holders;
 
 pub use holders::Holder;
 
-/// A device that could be a rig's.
+/// A connected device that a rig could use.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
-    /// What to write into a rig file to reach it; the bit rate of a serial port is a guess.
+pub struct FoundDevice {
+    /// The transport to write into a rig file. The bit rate of a serial port is a guess.
     pub transport: Transport,
-    /// True if that finds this device and no other, wherever it is plugged in and whatever else is.
+    /// True if `transport` finds this device and no other, at any socket and beside any other devices.
     pub is_stable: bool,
-    /// Its identity on USB.
+    /// Its vendor, product and serial number; `None` if it is not on USB.
     pub identity: Option<UsbIdentity>,
-    /// What it calls itself.
+    /// Its product name, as it reports it.
     pub product: Option<String>,
-    /// Its node in `/dev`, until it is plugged in again.
+    /// Its node in `/dev`; may change when it is plugged in again.
     pub node: PathBuf,
-    /// The name under `/dev/serial/by-id` that stays with it.
+    /// Its stable name under `/dev/serial/by-id`, for serial ports.
     pub by_id: Option<PathBuf>,
     /// Whether this user may open it.
     pub access: Access,
@@ -41,16 +41,16 @@ pub struct Found {
 /// Whether a device may be opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Access {
-    /// Nothing seems to be in the way.
+    /// Nothing was found that prevents it.
     Free,
-    /// This user may not.
+    /// This user has no permission.
     Denied,
-    /// Another program has it; `None` if the system does not say which.
+    /// Another program has it open; `None` if the system does not say which.
     Held(Option<Holder>),
 }
 
-impl Found {
-    /// True if a rig with this transport means this device.
+impl FoundDevice {
+    /// True if a rig with this transport uses this device.
     pub fn is_meant_by(&self, transport: &Transport) -> bool {
         let is_of = |identity: &UsbIdentity| {
             let own = self.identity.as_ref();
@@ -75,17 +75,17 @@ impl Found {
     }
 }
 
-/// All of them: serial ports, then USB interfaces, then human interface devices. Keyboards and mice are left out, as
-/// are USB interfaces that a driver of the system serves.
+/// Lists serial ports, then USB interfaces, then human interface devices. Keyboards, mice and USB interfaces with a
+/// kernel driver are left out.
 ///
 /// # Errors
-/// If the system does not let its devices be listed. Where it has none, the list is empty.
-pub fn inventory() -> io::Result<Vec<Found>> {
+/// If the system refuses to list its devices. A system without devices gives an empty list.
+pub fn inventory() -> io::Result<Vec<FoundDevice>> {
     let holders = Holders::read(Path::new("/proc"));
     let mut found = serial_ports(&serial::ports()?, Path::new("/dev/serial/by-id"));
     found.extend(usb_interfaces(&bus::devices(Path::new(bus::ROOT)), &holders));
     found.extend(hid_nodes(hid::nodes()?));
-    // A container may see the machine's devices in `/sys` and have the nodes of few.
+    // A container may show all devices of the machine in `/sys`, but the nodes of only a few.
     found.retain(|one| one.node.exists());
     for one in &mut found {
         if access(&one.node, Mode::READ_OK | Mode::WRITE_OK).is_err() {
@@ -97,10 +97,10 @@ pub fn inventory() -> io::Result<Vec<Found>> {
     Ok(found)
 }
 
-/// The usual rate of boards that do not care for it, and of the controllers that we know.
+/// The rate of the supported controllers. Boards with native USB ignore it.
 const BAUD: u32 = 115_200;
 
-fn serial_ports(ports: &[SerialPortInfo], by_id: &Path) -> Vec<Found> {
+fn serial_ports(ports: &[SerialPortInfo], by_id: &Path) -> Vec<FoundDevice> {
     let identities: Vec<Option<UsbIdentity>> = ports.iter().map(identity).collect();
     let found = ports.iter().zip(&identities).map(|(port, identity)| {
         let node = PathBuf::from(&port.port_name);
@@ -110,19 +110,19 @@ fn serial_ports(ports: &[SerialPortInfo], by_id: &Path) -> Vec<Found> {
         let stable = identity.as_ref().filter(|own| own.serial.is_some() && is_one(own));
         let (port_of, is_stable) = match (stable, &by_id) {
             (Some(identity), _) => (SerialPort::Usb(identity.clone()), true),
-            // Links of devices without a serial number are by kind, and go to whichever came last.
+            // The link of a device without a serial number names only its kind: it leads to the one plugged in last.
             (None, Some(link)) => {
                 let has_serial = identity.as_ref().is_some_and(|own| own.serial.is_some());
                 (SerialPort::Path(link.display().to_string()), has_serial)
             }
-            // A port that is built in stays where it is.
+            // A built-in port keeps its name.
             (None, None) => (SerialPort::Path(port.port_name.clone()), identity.is_none()),
         };
         let product = match &port.port_type {
             SerialPortType::UsbPort(usb) => usb.product.clone(),
             SerialPortType::PciPort | SerialPortType::BluetoothPort | SerialPortType::Unknown => None,
         };
-        Found {
+        FoundDevice {
             transport: Transport::Serial { port: port_of, baud: BAUD },
             is_stable,
             identity: identity.clone(),
@@ -146,7 +146,7 @@ fn identity(port: &SerialPortInfo) -> Option<UsbIdentity> {
     }
 }
 
-/// The link in a folder that leads to a node.
+/// The first symbolic link in a folder that leads to a node.
 fn link_to(node: &Path, folder: &Path) -> Option<PathBuf> {
     let node = fs::canonicalize(node).ok()?;
     let links = fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
@@ -156,8 +156,8 @@ fn link_to(node: &Path, folder: &Path) -> Option<PathBuf> {
     links.into_iter().next()
 }
 
-/// One for each endpoint that is read.
-fn usb_interfaces(devices: &[UsbDevice], holders: &Holders) -> Vec<Found> {
+/// One entry for each endpoint that sends data to the host.
+fn usb_interfaces(devices: &[UsbDevice], holders: &Holders) -> Vec<FoundDevice> {
     let mut found = Vec::new();
     for device in devices {
         let identity = UsbIdentity { vid: device.vid, pid: device.pid, serial: device.serial.clone() };
@@ -165,11 +165,11 @@ fn usb_interfaces(devices: &[UsbDevice], holders: &Holders) -> Vec<Found> {
             (other.vid, other.pid, &other.serial) == (device.vid, device.pid, &device.serial)
         });
         let is_stable = device.serial.is_some() && twins.count() == 1;
-        for interface in device.interfaces.iter().filter(|interface| is_a_programs(interface)) {
+        for interface in device.interfaces.iter().filter(|interface| is_vendor_specific(interface)) {
             let carries = |kind: EndpointKind| kind != EndpointKind::Other;
             for read in interface.endpoints.iter().filter(|one| one.is_in() && carries(one.kind)) {
                 let write = interface.endpoints.iter().find(|one| !one.is_in() && one.kind == read.kind);
-                found.push(Found {
+                found.push(FoundDevice {
                     transport: Transport::Usb(UsbLink {
                         identity: identity.clone(),
                         interface: interface.number,
@@ -192,17 +192,17 @@ fn usb_interfaces(devices: &[UsbDevice], holders: &Holders) -> Vec<Found> {
     found
 }
 
-/// True for an interface of the vendor's own that no driver of the system serves.
-fn is_a_programs(interface: &UsbInterface) -> bool {
+/// True for a vendor-specific interface without a kernel driver.
+fn is_vendor_specific(interface: &UsbInterface) -> bool {
     interface.class == 0xFF && matches!(interface.driver.as_deref(), None | Some("usbfs"))
 }
 
-fn hid_nodes(mut nodes: Vec<HidNode>) -> Vec<Found> {
-    nodes.retain(|node| !is_for_people(node));
+fn hid_nodes(mut nodes: Vec<HidNode>) -> Vec<FoundDevice> {
+    nodes.retain(|node| !is_human_input(node));
     let told_by = |node: &HidNode| (node.identity(), node.interface);
     let found = nodes.iter().map(|node| {
         let twins = nodes.iter().filter(|other| told_by(other) == told_by(node)).count();
-        Found {
+        FoundDevice {
             transport: Transport::Hid(HidLink {
                 identity: node.identity(),
                 interface: node.interface,
@@ -219,8 +219,8 @@ fn hid_nodes(mut nodes: Vec<HidNode>) -> Vec<Found> {
     found.collect()
 }
 
-/// Keyboards, mice and keypads: of the page of the desktop, usages 1, 2, 6 and 7.
-fn is_for_people(node: &HidNode) -> bool {
+/// Keyboards, mice and keypads: usages 1, 2, 6 and 7 of usage page 1 (generic desktop).
+fn is_human_input(node: &HidNode) -> bool {
     node.usages.iter().any(|usage| matches!(usage, (1, 1 | 2 | 6 | 7)))
 }
 

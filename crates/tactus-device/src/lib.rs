@@ -1,8 +1,10 @@
-//! Sensors and stages as the service sees them, whatever carries their bytes.
+//! Sensors and stages, independent of the link that carries their bytes.
 //!
-//! A driver pumps a sans-IO codec of `tactus-wire` over a [`Transport`](transport), in a task that
-//! owns the device. It reconnects by itself with growing pauses, names its errors, and never calls
-//! a move done that did not happen. All time is tokio's, so that a paused runtime makes it virtual.
+//! There is one driver for sensors and one for stages. Each runs a session of `tactus-wire`
+//! ([`sensor::Session`](tactus_wire::sensor::Session), [`stage::Session`](tactus_wire::stage::Session)) over a
+//! [`transport`], in a task that owns the device. A driver reconnects by itself with growing pauses and names its
+//! errors. It reports a move as done only when the controller stands at the target. All times are tokio's, so a
+//! runtime with paused time makes them virtual.
 
 mod backoff;
 mod bus;
@@ -17,7 +19,7 @@ pub mod transport;
 
 pub use clock::Clock;
 pub use error::{DeviceError, ErrorKind};
-pub use inventory::{Access, Found, Holder, inventory};
+pub use inventory::{Access, FoundDevice, Holder, inventory};
 pub use sensor::{ArrayExpectation, LinkFile, LinkFileError, Sensor, SensorCodec, SensorDriver, SensorEvent};
 pub use stage::{
     Connection, DrivenStage, Stage, StageError, StageOptions, Target, grbl_config, zaber_config,

@@ -1,4 +1,4 @@
-//! An open link: what a driver reads, writes and waits for.
+//! An open link to a device: a driver reads, writes and waits for deadlines on it.
 
 use std::time::Duration;
 
@@ -10,13 +10,13 @@ use tokio::time::{sleep_until, timeout};
 use crate::transport::ByteStream;
 use crate::{Clock, DeviceError, ErrorKind};
 
-/// A device that does not take a command within this is not there any more.
+/// A device that does not accept a command within this time is taken as disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Read at once: many frames' worth, and the longest packet whole.
+/// Size of a read: room for many frames, and for the longest packet in one piece.
 const BUFFER_BYTES: usize = MAX_FRAME_BYTES;
 
-/// An open link, the clock, and the device's name for errors.
+/// An open link to a device.
 pub(crate) struct Link {
     stream: Box<dyn ByteStream>,
     buffer: Box<[u8]>,
@@ -24,11 +24,11 @@ pub(crate) struct Link {
     device: String,
 }
 
-/// What happened on a link.
+/// An event on a link.
 pub(crate) enum LinkEvent<'a> {
-    /// Bytes came.
+    /// Bytes arrived.
     Received(&'a [u8]),
-    /// The deadline has come.
+    /// The deadline was reached.
     Deadline,
 }
 
@@ -37,7 +37,7 @@ impl Link {
         Self { stream, buffer: vec![0; BUFFER_BYTES].into(), clock, device }
     }
 
-    /// The same link, of which one read gives up to `bytes`, or more.
+    /// The same link, with room for at least `bytes` in one read.
     pub(crate) fn reading_at_least(self, bytes: usize) -> Self {
         Self { buffer: vec![0; bytes.max(BUFFER_BYTES)].into(), ..self }
     }
@@ -48,7 +48,7 @@ impl Link {
         deadline: Option<Duration>,
     ) -> Result<(Stamp, LinkEvent<'_>), DeviceError> {
         let read = tokio::select! {
-            // The deadline first: a device that babbles without end must not keep it from being met.
+            // The deadline comes first: a device that sends without pause must not delay it.
             biased;
             () = until(&self.clock, deadline) => None,
             read = self.stream.read(&mut self.buffer) => Some(read),
@@ -71,7 +71,7 @@ impl Link {
     }
 }
 
-/// A session's time: since the clock's start.
+/// The time of a session: since the start of the clock.
 pub(crate) fn since_start(stamp: Stamp) -> Duration {
     stamp.mono.since(MonoTime::default())
 }

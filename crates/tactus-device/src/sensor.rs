@@ -19,21 +19,21 @@ pub use link_file::{LinkFile, LinkFileError};
 
 /// A tactile array that is being read. One task owns it.
 pub trait Sensor: Send {
-    /// Waits for what comes next. Never ends: a lost device is waited for, with growing pauses.
+    /// Waits for the next event. There is no last one: a lost device is searched for with growing pauses.
     ///
     /// Cancel-safe: an event that is not returned is not lost.
     fn next(&mut self) -> BoxFuture<'_, SensorEvent>;
 }
 
-/// What a sensor tells.
+/// An event of a sensor.
 #[derive(Debug)]
 pub enum SensorEvent {
-    /// The device answered and frames are to follow. The first event, and one after each loss.
+    /// The device answered and frames follow. Also comes after each loss.
     Connected(pb::SensorInfo),
-    /// Frames were lost; comes just before the frame that follows the gap.
+    /// Frames are missing; comes just before the frame that follows the gap.
     Gap(pb::Gap),
     /// One reading.
     Frame(Frame),
-    /// The device has gone or speaks nonsense; it is being looked for. Told once for each change of kind.
+    /// The device is gone, silent or sends something else. The driver keeps trying. Comes once for each change of kind.
     Lost(DeviceError),
 }

@@ -1,7 +1,7 @@
-//! What carries a device's bytes: a serial port, a USB interface, a human interface device, a serial server, or memory.
+//! Links to devices: serial port, USB interface, human interface device, serial server over TCP, or memory.
 //!
-//! What is on USB is found by its identity, which stays with it wherever it is plugged in. It is looked for at each
-//! connection, without opening anything else. Of USB interfaces and human interface devices one read gives one packet.
+//! A USB device is found by its identity, which does not depend on the socket. It is searched for at each connection,
+//! without opening any other device. One read of a USB interface or human interface device gives one packet.
 
 use std::fmt;
 
@@ -27,8 +27,8 @@ pub trait ByteStream: AsyncRead + AsyncWrite + Unpin + Send {}
 
 impl<T: AsyncRead + AsyncWrite + Unpin + Send> ByteStream for T {}
 
-/// A way to reach a device, again and again.
+/// Opens a device, as often as needed. Its text form is the link's name in messages.
 pub trait Connect: fmt::Display + Send + Sync {
-    /// Opens the device.
+    /// Opens the device. An error says what to do.
     fn connect(&self) -> BoxFuture<'_, Result<Box<dyn ByteStream>, DeviceError>>;
 }

@@ -17,5 +17,5 @@ mod frame;
 mod session;
 
 pub use decoder::{CONFIRMING_FRAMES, Decoder, DecoderStats};
-pub use frame::{FRAME_BYTES, Frame, MAGNETOMETERS, Magnetometer};
+pub use frame::{DecodedFrame, FRAME_BYTES, MAGNETOMETERS, Magnetometer};
 pub use session::Session;

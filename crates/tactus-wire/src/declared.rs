@@ -78,7 +78,7 @@ mod ticks;
 
 pub use capture::{CaptureReport, Hint, Mismatch, Stride, check_capture};
 pub use checksum::{Algorithm, CRC32, Crc, CrcParameters, CrcWidth};
-pub use decoder::{Decoder, DecoderStats, Frame};
+pub use decoder::{DecodedFrame, Decoder, DecoderStats};
 pub use encoder::{ElementsError, Encoder};
 pub use field::Field;
 pub use format::{Format, FormatError, MAX_FRAME_BYTES};

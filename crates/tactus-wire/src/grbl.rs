@@ -17,6 +17,7 @@
 //!
 //! [`Response`] reads what the controller says, [`Session`] is the host's side of the conversation.
 
+mod active_move;
 mod config;
 mod meaning;
 mod poll;
@@ -24,7 +25,6 @@ mod response;
 mod session;
 mod settings;
 mod status;
-mod travel;
 
 pub use config::{Axis, Config, ConfigError};
 pub use meaning::{alarm_meaning, error_meaning};

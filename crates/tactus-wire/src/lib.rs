@@ -16,4 +16,4 @@ pub mod zaber;
 
 #[cfg(test)]
 mod pieces;
-mod wrapping;
+mod unwrapper;

@@ -14,5 +14,5 @@ pub use action::{Action, Alarm, Cause, Controller, Failure, Report, Setting, Sta
 pub use axis::{AxisName, Direction};
 pub use session::Session;
 
-pub(crate) use arrival::{Arrival, Judgement};
+pub(crate) use arrival::{ArrivalCheck, Judgement};
 pub(crate) use axis::distance_mm;

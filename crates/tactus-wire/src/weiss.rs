@@ -14,7 +14,7 @@
 //! [`Decoder`] and [`Config`] are told which to expect.
 //!
 //! [`Decoder`] serves both ends of the link: the host reads replies and frames with it, a virtual
-//! device reads [`Command`]s. [`Session`] is the host's side.
+//! device reads [`HostCommand`]s. [`Session`] is the host's side.
 
 mod checksum;
 mod command;
@@ -28,11 +28,11 @@ mod ticks;
 
 pub use checksum::Checksum;
 pub use command::{
-    Command, CommandError, acknowledge, acquire, query_controller, query_matrix, query_sensor,
+    CommandError, HostCommand, acknowledge, acquire, query_controller, query_matrix, query_sensor,
 };
 pub use crc::crc;
 pub use decoder::{ChecksumError, Decoder, DecoderStats};
-pub use frame::{Frame, FrameError, encode_frame};
+pub use frame::{DecodedFrame, FrameError, encode_frame};
 pub use info::{ControllerInfo, ErrorCode, InfoError, MatrixInfo, SensorInfo};
 pub use packet::{MAX_PAYLOAD_BYTES, Packet, encode_packet, id};
 pub use session::{ANSWER_TIMEOUT, Config, Session, SessionError, TICK};

@@ -25,8 +25,8 @@
 //! The words of the flags and rejections are ours. Nothing here has met a real device yet. Why this is not the `zproto`
 //! crate: `docs/decisions/0013-zabers-protocol-is-ours.md`.
 //!
-//! [`Decoder`] and [`Message`] read what devices say, [`Command`] is what a host says, [`Flag`] and
-//! [`Rejection`] are in words, [`Session`] is the host's side of the conversation. [`CommandDecoder`] and
+//! [`Decoder`] and [`Message`] read what devices say, [`HostCommand`] is what a host says, [`Flag`] and
+//! [`Rejection`] are in words, [`Session`] is the host's side of the conversation. [`HostCommandDecoder`] and
 //! [`Message::encode`] are the device's side.
 
 mod checksum;
@@ -39,7 +39,7 @@ mod path;
 mod rejection;
 mod session;
 
-pub use command::{Command, CommandDecoder};
+pub use command::{HostCommand, HostCommandDecoder};
 pub use config::{Axis, Config, ConfigError};
 pub use decoder::Decoder;
 pub use flag::{Flag, Severity};

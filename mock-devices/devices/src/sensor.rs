@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use tactus_device::SensorCodec;
-use tactus_wire::weiss::{BOOT_MESSAGE, Command, CommandError, ErrorCode, acknowledge, id};
+use tactus_wire::weiss::{BOOT_MESSAGE, CommandError, ErrorCode, HostCommand, acknowledge, id};
 use tokio::time::Instant;
 
 use crate::cable::Device;
@@ -114,12 +114,12 @@ impl VirtualSensor {
         }
     }
 
-    fn obey(&mut self, command: Result<Command, CommandError>, now: Instant) -> Vec<u8> {
+    fn obey(&mut self, command: Result<HostCommand, CommandError>, now: Instant) -> Vec<u8> {
         match command {
-            Ok(Command::QueryController) => voice::controller(),
-            Ok(Command::QuerySensor) => voice::sensor(),
-            Ok(Command::QueryMatrix { matrix }) => voice::matrix(matrix, self.world.lock().truth()),
-            Ok(Command::Acquire { run, run_length, fps }) => {
+            Ok(HostCommand::QueryController) => voice::controller(),
+            Ok(HostCommand::QuerySensor) => voice::sensor(),
+            Ok(HostCommand::QueryMatrix { matrix }) => voice::matrix(matrix, self.world.lock().truth()),
+            Ok(HostCommand::Acquire { run, run_length, fps }) => {
                 let rate_hz = rate(f64::from(fps), self.own_rate_hz());
                 self.acquisition =
                     run.then(|| Acquisition { run_length, rate_hz, next: self.after(now, rate_hz) });

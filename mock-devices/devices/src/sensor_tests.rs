@@ -1,4 +1,4 @@
-use tactus_wire::weiss::{Decoder, Frame, Packet, acquire, query_controller, query_matrix};
+use tactus_wire::weiss::{DecodedFrame, Decoder, Packet, acquire, query_controller, query_matrix};
 
 use super::*;
 use crate::bench::{Bench, sim_rig};
@@ -22,7 +22,7 @@ fn pushing(seed: u64) -> Bench<VirtualSensor> {
 }
 
 /// What a host makes of bytes: frames, and how many checksums did not hold.
-fn frames(bytes: &[u8]) -> (Vec<Frame>, u64) {
+fn frames(bytes: &[u8]) -> (Vec<DecodedFrame>, u64) {
     let mut decoder = Decoder::new();
     decoder.push(bytes);
     let mut found = Vec::new();
@@ -36,9 +36,9 @@ fn frames(bytes: &[u8]) -> (Vec<Frame>, u64) {
     (found, decoder.stats().bad_checksums)
 }
 
-fn frame(packet: &Packet<'_>) -> Frame {
+fn frame(packet: &Packet<'_>) -> DecodedFrame {
     let elements = (packet.payload.len() - 5) / 2;
-    Frame::parse(packet, elements).or_else(|_| Frame::parse(packet, 48)).unwrap()
+    DecodedFrame::parse(packet, elements).or_else(|_| DecodedFrame::parse(packet, 48)).unwrap()
 }
 
 fn timestamps_ms(bytes: &[u8]) -> Vec<u32> {

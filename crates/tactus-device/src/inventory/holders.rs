@@ -1,7 +1,7 @@
-//! Which programs hold which devices, as `/proc` tells it.
+//! Which programs have which devices open, as `/proc` shows it.
 //!
-//! Two traces are read, and neither touches a device: locks, which everybody sees, and which our serial ports and
-//! human interface devices have; and open files, which a user sees of own processes only, and root of all.
+//! Two lists are read, and neither touches a device. Locks are visible to every user; Tactus locks its serial ports and
+//! human interface devices. Open files are visible for a user's own processes only, and to root for all.
 
 use std::collections::HashMap;
 use std::fs;
@@ -11,27 +11,27 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::{major, minor};
 
-/// A program that holds a device.
+/// A program that has a device open.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Holder {
     /// Its process id.
     pub pid: u32,
-    /// Its name, as far as the system keeps it; empty if it has just ended.
+    /// Its name, which Linux cuts to 15 characters; empty if it has just ended.
     pub name: String,
 }
 
-/// Who holds what.
+/// The programs that have devices open.
 #[derive(Debug)]
 pub(super) struct Holders {
     proc: PathBuf,
-    /// Process ids by the file's device and number, as the system writes them.
+    /// Process ids by the locked file's device and inode, as `/proc/locks` writes them.
     locks: HashMap<String, u32>,
-    /// Process ids by what their open files are.
-    open: HashMap<Open, u32>,
+    /// Process ids by the devices that their open files are.
+    open: HashMap<OpenDevice, u32>,
 }
 
 impl Holders {
-    /// What `/proc` tells.
+    /// Reads `/proc`; what cannot be read is left out.
     pub(super) fn read(proc: &Path) -> Self {
         let locks = fs::read_to_string(proc.join("locks")).unwrap_or_default();
         let pids = fs::read_dir(proc).into_iter().flatten().flatten();
@@ -39,30 +39,30 @@ impl Holders {
             let files = fs::read_dir(proc.join(pid.to_string()).join("fd")).into_iter().flatten().flatten();
             files.filter_map(move |file| {
                 fs::read_link(file.path()).ok().filter(|node| node.starts_with("/dev"))?;
-                Some((Open::at(&file.path())?, pid))
+                Some((OpenDevice::at(&file.path())?, pid))
             })
         });
         Self { proc: proc.to_owned(), locks: locks.lines().filter_map(lock).collect(), open: open.collect() }
     }
 
-    /// The program that holds the device at a node, if one is seen to.
+    /// The program that has the device at a node open, as far as this user can see.
     pub(super) fn of(&self, node: &Path) -> Option<Holder> {
-        let pid = self.locks.get(&key(node)?).or_else(|| self.open.get(&Open::at(node)?))?;
+        let pid = self.locks.get(&key(node)?).or_else(|| self.open.get(&OpenDevice::at(node)?))?;
         let name = fs::read_to_string(self.proc.join(pid.to_string()).join("comm")).unwrap_or_default();
         Some(Holder { pid: *pid, name: name.trim().to_owned() })
     }
 }
 
-/// A device as its nodes tell it, of which a container may have its own.
+/// A device by its numbers. A container may have nodes of its own for it.
 #[derive(Debug, PartialEq, Eq, Hash)]
-struct Open {
+struct OpenDevice {
     device: u64,
-    /// Of a pseudo-terminal: each container counts them anew.
+    /// For a pseudo-terminal, whose numbers start again in each container.
     file_system: Option<u64>,
 }
 
-impl Open {
-    /// `None` for what is no device. Looking at a node does not open it.
+impl OpenDevice {
+    /// `None` if the node is no device. The node is not opened.
     fn at(node: &Path) -> Option<Self> {
         let file = fs::metadata(node).ok()?;
         let device = file.rdev();
@@ -71,10 +71,10 @@ impl Open {
     }
 }
 
-/// Their major numbers.
+/// Major device numbers of pseudo-terminals.
 const PSEUDO_TERMINALS: RangeInclusive<u32> = 136..=143;
 
-/// `1: FLOCK  ADVISORY  WRITE 1234 00:06:567 0 EOF`
+/// Parses a line such as `1: FLOCK  ADVISORY  WRITE 1234 00:06:567 0 EOF`.
 fn lock(line: &str) -> Option<(String, u32)> {
     let mut words = line.split_whitespace().skip(1);
     (words.next()? == "FLOCK").then_some(())?;
@@ -82,7 +82,7 @@ fn lock(line: &str) -> Option<(String, u32)> {
     Some((words.next()?.to_owned(), pid))
 }
 
-/// A file as `/proc/locks` tells it.
+/// A file's device and inode, in the form of `/proc/locks`.
 fn key(node: &Path) -> Option<String> {
     let file = fs::metadata(node).ok()?;
     Some(format!("{:02x}:{:02x}:{}", major(file.dev()), minor(file.dev()), file.ino()))

@@ -1,4 +1,4 @@
-//! The driver of every array.
+//! The driver of all arrays: it runs a session over a link.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,23 +10,23 @@ use tactus_wire::sensor::{Action, Cause, Loss, Reading, Session};
 use tokio::sync::mpsc;
 use tokio::time::sleep;
 
-use super::sequence::{Arrival, GapCause, Sequence};
+use super::sequence::{GapCause, ReceivedFrame, Sequence};
 use super::{Sensor, SensorCodec, SensorEvent};
 use crate::backoff::Backoff;
 use crate::link::{Link, LinkEvent, since_start};
 use crate::transport::Connect;
 use crate::{Clock, DeviceError, ErrorKind};
 
-/// Events that may wait to be taken: four seconds of frames at 30 Hz.
+/// Events that may wait for the reader: four seconds of frames at 30 Hz.
 const EVENTS_MAX: usize = 120;
 
-/// A tactile array that is read by its codec.
+/// A tactile array, read by a task of its own.
 #[derive(Debug)]
 pub struct SensorDriver {
     events: mpsc::Receiver<SensorEvent>,
 }
 
-/// The array that the rig says is there.
+/// The array as the rig file describes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArrayExpectation {
     /// Name of the rig.
@@ -37,28 +37,27 @@ pub struct ArrayExpectation {
     pub rows: usize,
     /// Its columns.
     pub cols: usize,
-    /// Frames a second to ask for; lost frames are counted against it.
+    /// Frames per second to request. Missing frames are counted against it.
     pub rate_hz: f64,
-    /// The end of an element's range.
+    /// Counts at the end of an element's range. A frame with such an element is marked as saturated.
     pub full_scale_counts: f64,
     /// True if no physical sensor is read.
     pub simulated: bool,
 }
 
 impl SensorDriver {
-    /// Starts the task that owns the sensor. It ends when what this returns is dropped.
+    /// Starts the task that owns the sensor. It ends when the returned value is dropped.
     ///
-    /// A device that is silent for a second, or repeats itself, is [`ErrorKind::Timeout`]; one that speaks otherwise
-    /// than `codec`, or has another number of elements, is [`ErrorKind::Protocol`].
+    /// A device that is silent or sends nothing new for a second is reported as [`ErrorKind::Timeout`]. One that does not
+    /// speak the codec's protocol, or has another number of elements, is reported as [`ErrorKind::Protocol`].
     pub fn start(
         codec: SensorCodec,
         connect: Box<dyn Connect>,
         expect: ArrayExpectation,
         clock: Clock,
     ) -> Self {
-        // Bounded. The reader is the service's one sensor task, which always drains. Should it fall behind, frames
-        // are passed over before they are numbered, and the gap is told with the next that fits; all other events
-        // wait for room.
+        // Bounded. The reader is the service's sensor task, which always drains it. If it falls behind, frames are
+        // dropped before they are numbered, and the next frame that fits reports the gap. Other events wait for room.
         let (sender, events) = mpsc::channel(EVENTS_MAX);
         let driver = Driver {
             device: format!("sensor on {connect}"),
@@ -70,8 +69,8 @@ impl SensorDriver {
             expect,
             clock,
             events: sender,
-            told: None,
-            passed_over: 0,
+            reported_loss: None,
+            dropped: 0,
         };
         tokio::spawn(driver.run());
         Self { events }
@@ -92,7 +91,7 @@ impl Sensor for SensorDriver {
 }
 
 impl ArrayExpectation {
-    /// What a rig description says.
+    /// The array of a rig file.
     pub fn of(rig: &Rig) -> Self {
         Self {
             rig: rig.name.clone(),
@@ -118,16 +117,16 @@ struct Driver {
     device: String,
     transport: String,
     sequence: Sequence,
-    /// The last reading of each element in this epoch; 0 without one.
+    /// Each element's last reading in this epoch; 0 before the first.
     held: Vec<f32>,
     events: mpsc::Sender<SensorEvent>,
-    /// The kind of loss that was told and has not been made good.
-    told: Option<ErrorKind>,
-    /// Readings that found no room since the last that did, and those that the device said were missing before them.
-    passed_over: u64,
+    /// The kind of the present loss, once it has been reported.
+    reported_loss: Option<ErrorKind>,
+    /// Readings dropped for lack of room since the last frame, and those missing before them by the device's count.
+    dropped: u64,
 }
 
-/// The reader has gone: the task is to end.
+/// The reader is gone, so the task ends.
 struct Unread;
 
 impl Driver {
@@ -153,14 +152,14 @@ impl Driver {
         }
     }
 
-    /// Reads from an open link until it fails; gives why.
+    /// Reads from an open link until it fails; returns why.
     async fn read_link(&mut self, link: Link, backoff: &mut Backoff) -> Result<DeviceError, Unread> {
         let mut session = match self.codec.session(&self.expect) {
             Ok(session) => session,
             Err(loss) => return Ok(self.error(loss)),
         };
         let mut link = match session.packet_bytes() {
-            // Room for one byte more: a longer packet must not look like a whole one.
+            // One byte more, so that a longer packet cannot look like a whole one.
             Some(bytes) => link.reading_at_least(bytes + 1),
             None => link,
         };
@@ -212,7 +211,7 @@ impl Driver {
                     session.timer(since_start(now))
                 }
                 Err(error) => {
-                    tracing::info!(device = self.device, met = session.quality(), "sensor link ended");
+                    tracing::info!(device = self.device, quality = session.quality(), "sensor link ended");
                     return Ok(error);
                 }
             };
@@ -220,9 +219,9 @@ impl Driver {
     }
 
     async fn connected(&mut self, info: pb::SensorInfo, identity: Option<String>) -> Result<(), Unread> {
-        self.told = None;
+        self.reported_loss = None;
         tracing::info!(device = self.device, identity, "sensor connected");
-        self.tell(SensorEvent::Connected(info)).await
+        self.emit(SensorEvent::Connected(info)).await
     }
 
     fn describe(&self, session: &dyn Session) -> pb::SensorInfo {
@@ -240,7 +239,7 @@ impl Driver {
         }
     }
 
-    /// Makes a frame of a reading, the first of `together` that came at once.
+    /// Makes a frame from a reading. `together` counts it and the readings behind it that arrived at the same time.
     fn reading(
         &mut self,
         now: Stamp,
@@ -256,28 +255,28 @@ impl Driver {
             if self.events.is_closed() {
                 return Err(Unread);
             }
-            if self.passed_over == 0 {
-                tracing::warn!(device = self.device, "frames are not taken: they are passed over");
+            if self.dropped == 0 {
+                tracing::warn!(device = self.device, "the reader is too slow: frames are dropped");
             }
-            self.passed_over += 1 + reading.evidence.counted();
+            self.dropped += 1 + reading.evidence.counted();
             return Ok(());
         };
-        if self.passed_over > 0 {
-            tracing::warn!(device = self.device, frames = self.passed_over, "frames were passed over");
+        if self.dropped > 0 {
+            tracing::warn!(device = self.device, frames = self.dropped, "frames were dropped");
             if *cause == GapCause::Link {
                 *cause = GapCause::HostTooSlow;
             }
         }
         let device_tick = reading.tick.map(DeviceTick);
-        let place = self.sequence.place(Arrival {
+        let placement = self.sequence.place(ReceivedFrame {
             tick: device_tick,
             evidence: reading.evidence,
             received: now.mono,
             together,
-            passed_over: std::mem::take(&mut self.passed_over),
+            dropped: std::mem::take(&mut self.dropped),
             cause: std::mem::replace(cause, GapCause::Link),
         });
-        let mut flags = place.flags;
+        let mut flags = placement.flags;
         if flags.contains(FrameFlags::NEW_EPOCH) {
             self.held.fill(0.0);
         }
@@ -294,34 +293,34 @@ impl Driver {
             flags = flags.with(FrameFlags::BAD_ELEMENTS);
         }
         let frame = Frame {
-            seq: place.seq,
-            epoch: place.epoch,
+            seq: placement.seq,
+            epoch: placement.epoch,
             device_tick,
             received: now,
             counts,
             flags,
-            lost_before: place.lost_before,
+            lost_before: placement.lost_before,
             simulated: self.expect.simulated,
             bad_elements: reading.bad.into(),
         };
-        let gap = place.gap.map(SensorEvent::Gap);
+        let gap = placement.gap.map(SensorEvent::Gap);
         for (permit, event) in room.zip(gap.into_iter().chain([SensorEvent::Frame(frame)])) {
             permit.send(event);
         }
         Ok(())
     }
 
-    /// Tells a loss, unless one of its kind has been told and not been made good.
+    /// Reports a loss, unless the present loss has already been reported with this kind.
     async fn lost(&mut self, error: DeviceError) -> Result<(), Unread> {
-        if self.told == Some(error.kind) {
+        if self.reported_loss == Some(error.kind) {
             return Ok(());
         }
         tracing::warn!(%error, kind = ?error.kind, "sensor lost");
-        self.told = Some(error.kind);
-        self.tell(SensorEvent::Lost(error)).await
+        self.reported_loss = Some(error.kind);
+        self.emit(SensorEvent::Lost(error)).await
     }
 
-    async fn tell(&self, event: SensorEvent) -> Result<(), Unread> {
+    async fn emit(&self, event: SensorEvent) -> Result<(), Unread> {
         self.events.send(event).await.map_err(|_| Unread)
     }
 
@@ -336,7 +335,7 @@ impl Driver {
     }
 }
 
-/// Whether an element is in a list in order.
+/// Whether an element is in an ascending list.
 fn is_listed(element: usize, elements: &[u32]) -> bool {
     elements.binary_search(&count(element)).is_ok()
 }

@@ -13,7 +13,7 @@ use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use tactus_schema::{DeviceTick, Frame, FrameFlags, pb};
 use tactus_wire::weiss::{
-    BOOT_MESSAGE, Command, ControllerInfo, Decoder, ErrorCode, MatrixInfo, SensorInfo, acknowledge,
+    BOOT_MESSAGE, ControllerInfo, Decoder, ErrorCode, HostCommand, MatrixInfo, SensorInfo, acknowledge,
     encode_frame, id,
 };
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream};
@@ -49,15 +49,15 @@ async fn greet(stream: &mut (impl AsyncRead + AsyncWrite + Unpin)) {
     let mut buffer = [0; 256];
     loop {
         while let Some(packet) = decoder.next_packet() {
-            let command = Command::parse(&packet.unwrap()).unwrap();
+            let command = HostCommand::parse(&packet.unwrap()).unwrap();
             let reply = match command {
-                Command::QueryController => ControllerInfo::default().encode(),
-                Command::QuerySensor => SensorInfo::default().encode(),
-                Command::QueryMatrix { matrix: _ } => MatrixInfo::default().encode(),
-                Command::Acquire { .. } => acknowledge(id::ACQUIRE, ErrorCode::SUCCESS),
+                HostCommand::QueryController => ControllerInfo::default().encode(),
+                HostCommand::QuerySensor => SensorInfo::default().encode(),
+                HostCommand::QueryMatrix { matrix: _ } => MatrixInfo::default().encode(),
+                HostCommand::Acquire { .. } => acknowledge(id::ACQUIRE, ErrorCode::SUCCESS),
             };
             stream.write_all(&reply).await.unwrap();
-            if let Command::Acquire { run: true, fps, .. } = command {
+            if let HostCommand::Acquire { run: true, fps, .. } = command {
                 assert_eq!(fps, 30);
                 return;
             }

@@ -1,4 +1,4 @@
-//! The file that describes frames (`tactus.link/1`), read for a rig and held against it.
+//! Reads the file that describes frames (`tactus.link/1`), and compares it with the rig.
 
 use std::fs;
 use std::io;
@@ -11,62 +11,39 @@ use tactus_wire::declared::{Format, FormatError, Framing, RawFormat, RawSamples}
 
 use super::SensorCodec;
 
-/// A description of frames as it was read.
+/// A description of frames, as it was read from a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LinkFile {
-    /// Where it stands.
+    /// Path of the file.
     pub path: PathBuf,
-    /// What it says, for recordings.
+    /// Text of the file; recordings contain a copy.
     pub text: String,
 }
 
-/// Why the file that a rig file names cannot be used.
+/// Why the format file that a rig file names cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum LinkFileError {
     /// It could not be read.
     #[error("{}: sensor.format: {} cannot be read: {source}", rig_file.display(), path.display())]
-    Read {
-        /// The rig file.
-        rig_file: PathBuf,
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// It is not of the right form; the text names line and key.
+    Read { rig_file: PathBuf, path: PathBuf, source: io::Error },
+    /// It is not a description; the message names line and key.
     #[error("{}: {source}", path.display())]
-    Form {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: toml::de::Error,
-    },
+    Form { path: PathBuf, source: toml::de::Error },
     /// It contradicts itself.
     #[error("{}: {source}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: FormatError,
-    },
+    Format { path: PathBuf, source: FormatError },
     /// It contradicts the rig file.
     #[error("{}: {contradiction} in {}", path.display(), rig_file.display())]
-    Rig {
-        /// The file.
-        path: PathBuf,
-        /// The rig file.
-        rig_file: PathBuf,
-        /// Both fields and what they say; ends with the rig file's.
-        contradiction: String,
-    },
+    Rig { path: PathBuf, rig_file: PathBuf, contradiction: String },
 }
 
 impl SensorCodec {
-    /// The codec of a rig that was read from `rig_file`, with the description of its frames if the rig file names
-    /// one: that file is read and held against the rig. A rig without a service has the default.
+    /// The codec of a rig that was read from `rig_file`, and the format file if the rig names one. That file is read and
+    /// compared with the rig. A rig without a `[service]` has the default codec.
     ///
     /// # Errors
-    /// [`LinkFileError`] names the file and the field, and of a contradiction both fields.
+    /// [`LinkFileError`] names the file and the field, and both fields of a contradiction.
     pub fn load(rig: &Rig, rig_file: &Path) -> Result<(Self, Option<LinkFile>), LinkFileError> {
         let Some(service) = &rig.service else { return Ok((Self::default(), None)) };
         let protocol = &service.sensor.protocol;
@@ -92,7 +69,7 @@ impl SensorCodec {
     }
 }
 
-/// What the description and the rig say differently.
+/// The first difference between the description and the rig, in words.
 fn contradiction(format: &Format, samples: &RawSamples, rig: &Rig, transport: &Transport) -> Option<String> {
     let (array, elements) = (&rig.array, format.samples().elements());
     let (rows, cols) = (array.rows(), array.cols());
@@ -128,7 +105,7 @@ fn contradiction(format: &Format, samples: &RawSamples, rig: &Rig, transport: &T
     if format.framing() == Framing::Stream {
         return None;
     }
-    // What keeps packets apart comes with one read each.
+    // Only links that preserve packets return one with each read.
     let stream = match transport {
         Transport::Serial { .. } => "serial",
         Transport::Tcp { .. } => "tcp",

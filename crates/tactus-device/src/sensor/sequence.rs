@@ -1,76 +1,75 @@
-//! Sequence numbers: how many frames were lost before the one that came.
+//! Numbers frames, and counts the frames that are missing before each.
 
 use std::time::Duration;
 
 use tactus_schema::{DeviceTick, FrameFlags, MonoTime, pb};
 use tactus_wire::sensor::LossEvidence;
 
-/// By the host's clock alone, a frame this many periods behind its time may be one behind a loss.
+/// A frame this many periods late, by the host's clock alone, may follow lost frames.
 const BEHIND_PERIODS: f64 = 0.5;
 
-/// What is buffered on the way comes within this; what is later than that was lost.
+/// The longest delay by buffers on the way. Frames that are later than this were lost.
 const BUFFERED_S: f64 = 1.0;
 
-/// How much of a small lateness is forgotten with each frame: rates are not quite what the rig says.
+/// Share of a small lateness that is discarded with each frame, because real rates differ slightly from the rig's.
 const FORGOTTEN: f64 = 0.1;
 
-/// Counts every frame that the sensor took or should have taken: by the device's own count, or by its clock or,
-/// where that is another one than before or there is none, by the host's.
+/// Numbers every frame that the sensor took or should have taken. Missing frames are counted by the device's own count;
+/// without one by its clock; and by the host's clock if the device has none, or a new one.
 #[derive(Debug, Clone)]
 pub(super) struct Sequence {
     rate_hz: f64,
-    /// Length of a device tick, if it is short enough to tell frames apart.
+    /// Length of a device tick; `None` without a clock, or if a tick is too long to resolve frames.
     tick: Option<Duration>,
     /// Number of the present epoch; the first is 0.
     epoch: u32,
-    last: Option<Last>,
+    last: Option<PreviousFrame>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Last {
+struct PreviousFrame {
     seq: u64,
     tick: Option<DeviceTick>,
     received: MonoTime,
-    /// Behind its time, by the host's clock.
+    /// How late it was by the host's clock, in frame periods.
     late_periods: f64,
 }
 
-/// A frame that has come.
+/// A frame as it arrived, before it has a number.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Arrival {
-    /// By the device's clock; comparable with the last frame's unless `cause` says otherwise.
+pub(super) struct ReceivedFrame {
+    /// By the device's clock; comparable with the previous frame's unless `cause` says otherwise.
     pub(super) tick: Option<DeviceTick>,
-    /// What else is known of the way from the last frame.
     pub(super) evidence: LossEvidence,
     pub(super) received: MonoTime,
-    /// Frames that came at once, this one and those behind it: by their arrival, they stand for as many periods.
+    /// This frame and those behind it that arrived at the same time; together they stand for as many periods.
     pub(super) together: usize,
-    /// Frames that came between the last one and this, and were not taken.
-    pub(super) passed_over: u64,
+    /// Frames that arrived since the previous one, and were dropped by the service.
+    pub(super) dropped: u64,
     pub(super) cause: GapCause,
 }
 
-/// A frame's place.
+/// The number of a frame, and what is missing before it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Place {
+pub(super) struct FramePlacement {
     pub(super) seq: u64,
     pub(super) epoch: u32,
     pub(super) flags: FrameFlags,
     pub(super) lost_before: u32,
-    /// What to tell before the frame.
+    /// To be reported before the frame.
     pub(super) gap: Option<pb::Gap>,
 }
 
-/// Why frames may be missing.
+/// Why frames are missing, if any are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum GapCause {
-    /// They were lost on the way, or never sent.
+    /// They were lost on the link, or never sent.
     Link,
-    /// The connection is another one.
+    /// The device was connected again.
     Reconnected,
-    /// The device's clock is another one.
+    /// The device's clock jumped.
     ClockJumped,
-    /// They came, and the service did not take them in time.
+    /// They arrived, but the service was too slow to take them.
     HostTooSlow,
 }
 
@@ -87,12 +86,12 @@ impl Sequence {
         self.tick = resolves_frames.then_some(tick);
     }
 
-    /// Places the next frame.
-    pub(super) fn place(&mut self, arrival: Arrival) -> Place {
-        let Arrival { tick, received, cause, .. } = arrival;
+    /// Numbers the next frame.
+    pub(super) fn place(&mut self, arrival: ReceivedFrame) -> FramePlacement {
+        let ReceivedFrame { tick, received, cause, .. } = arrival;
         let Some(last) = self.last else {
-            self.last = Some(Last { seq: 0, tick, received, late_periods: 0.0 });
-            return Place {
+            self.last = Some(PreviousFrame { seq: 0, tick, received, late_periods: 0.0 });
+            return FramePlacement {
                 seq: 0,
                 epoch: self.epoch,
                 flags: FrameFlags::NEW_EPOCH,
@@ -104,7 +103,7 @@ impl Sequence {
         self.epoch += u32::from(new_epoch);
         let (lost_before, late_periods) = self.missing(last, &arrival);
         let seq = last.seq + u64::from(lost_before) + 1;
-        self.last = Some(Last { seq, tick, received, late_periods });
+        self.last = Some(PreviousFrame { seq, tick, received, late_periods });
         let gap = (lost_before > 0).then(|| pb::Gap {
             frames_lost: lost_before.into(),
             after_seq: last.seq,
@@ -118,37 +117,37 @@ impl Sequence {
         if gap.is_some() {
             flags = flags.with(FrameFlags::GAP_BEFORE);
         }
-        Place { seq, epoch: self.epoch, flags, lost_before, gap }
+        FramePlacement { seq, epoch: self.epoch, flags, lost_before, gap }
     }
 }
 
 impl Sequence {
-    /// How many frames are missing, and by how many periods the arrival is late if so many are.
-    fn missing(&self, last: Last, arrival: &Arrival) -> (u32, f64) {
+    /// How many frames are missing, and how many periods late the frame is after those are counted.
+    fn missing(&self, last: PreviousFrame, arrival: &ReceivedFrame) -> (u32, f64) {
         let periods = arrival.received.since(last.received).as_secs_f64() * self.rate_hz;
         let by_host = (periods - arrival.together as f64).round();
         let by_ticks = || {
             let (tick, [from, to]) = (self.tick?, [last.tick?, arrival.tick?]);
             Some((to.0.saturating_sub(from.0) as f64 * tick.as_secs_f64() * self.rate_hz).round() - 1.0)
         };
-        let passed_over = arrival.passed_over as f64;
+        let dropped = arrival.dropped as f64;
         let mut late_periods = 0.0;
         let missing = match (arrival.cause, arrival.evidence) {
             (
                 GapCause::Link | GapCause::HostTooSlow | GapCause::ClockJumped,
                 LossEvidence::Counted { lost, wrap },
             ) => {
-                let lost = lost as f64 + passed_over;
-                // Whole rounds of the count, which it cannot tell itself.
+                let lost = lost as f64 + dropped;
+                // Whole rounds of the count, which only the host's clock shows.
                 lost + ((by_host - lost) / wrap as f64).round().max(0.0) * wrap as f64
             }
             (GapCause::Reconnected | GapCause::ClockJumped, _) => by_host,
             (GapCause::Link | GapCause::HostTooSlow, evidence) => by_ticks().unwrap_or_else(|| {
-                let late = last.late_periods + periods - 1.0 - passed_over;
+                let late = last.late_periods + periods - 1.0 - dropped;
                 let lost =
                     self.missing_by_arrivals(last.late_periods, late, periods, evidence, arrival.together);
                 late_periods = settled(late - lost);
-                lost + passed_over
+                lost + dropped
             }),
         };
         #[expect(
@@ -156,13 +155,13 @@ impl Sequence {
             clippy::cast_sign_loss,
             reason = "saturates, as it should"
         )]
-        let missing = missing.max(passed_over) as u32;
+        let missing = missing.max(dropped) as u32;
         (missing, late_periods)
     }
 
-    /// A frame that is late and stands alone may have been lost ones' follower or just slow: those that were held up
-    /// come close behind each other, and then the last of them is in time. So a loss is told when the frame after
-    /// it, a period later, is as late; at once if bytes were damaged or the silence was longer than any buffer.
+    /// Missing frames by times of arrival alone. A single late frame may follow lost frames, or may itself be delayed.
+    /// Delayed frames arrive close together, and the last of them is in time again. A loss is therefore counted when the
+    /// next frame, a period later, is as late; and at once if bytes were damaged or the silence exceeds any buffer.
     fn missing_by_arrivals(
         &self,
         was_late: f64,
@@ -182,7 +181,7 @@ impl Sequence {
     }
 }
 
-/// The lateness to go on with: none of a frame that came early, less of one that was hardly late.
+/// The lateness to carry to the next frame: 0 after an early frame, a reduced one after a slightly late frame.
 fn settled(late_periods: f64) -> f64 {
     if late_periods < BEHIND_PERIODS { late_periods.max(0.0) * (1.0 - FORGOTTEN) } else { late_periods }
 }

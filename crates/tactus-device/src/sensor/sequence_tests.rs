@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use tactus_schema::{DeviceTick, FrameFlags, MonoTime};
 
-use super::{Arrival, GapCause, LossEvidence, Place, Sequence};
+use super::{FramePlacement, GapCause, LossEvidence, ReceivedFrame, Sequence};
 
 /// 30 Hz.
 fn sequence_with(tick: Duration) -> Sequence {
@@ -17,20 +17,20 @@ fn sequence() -> Sequence {
 }
 
 /// One frame, without a device's clock or count.
-fn arrival(received_ms: i64) -> Arrival {
-    Arrival {
+fn arrival(received_ms: i64) -> ReceivedFrame {
+    ReceivedFrame {
         tick: None,
         evidence: LossEvidence::TimesOnly,
         received: MonoTime::from_ns(received_ms * 1_000_000),
         together: 1,
-        passed_over: 0,
+        dropped: 0,
         cause: GapCause::Link,
     }
 }
 
-fn place(sequence: &mut Sequence, tick_ms: u64, received_ms: i64, cause: GapCause) -> Place {
+fn place(sequence: &mut Sequence, tick_ms: u64, received_ms: i64, cause: GapCause) -> FramePlacement {
     let tick = Some(DeviceTick(tick_ms));
-    sequence.place(Arrival { tick, cause, ..arrival(received_ms) })
+    sequence.place(ReceivedFrame { tick, cause, ..arrival(received_ms) })
 }
 
 #[test]
@@ -86,9 +86,9 @@ fn the_reason_is_told() {
 }
 
 /// What is missing before a frame that comes `after_ms` behind the first.
-fn missing(tick: Duration, second: Arrival) -> u32 {
+fn missing(tick: Duration, second: ReceivedFrame) -> u32 {
     let mut sequence = sequence_with(tick);
-    sequence.place(Arrival { tick: second.tick.map(|_| DeviceTick(0)), ..arrival(0) });
+    sequence.place(ReceivedFrame { tick: second.tick.map(|_| DeviceTick(0)), ..arrival(0) });
     sequence.place(second).lost_before
 }
 
@@ -98,12 +98,13 @@ fn the_devices_own_count_is_exact_but_for_whole_rounds_which_times_tell() {
     for (lost, after_ms, want) in
         [(0, 0, 0), (0, 900, 0), (3, 10, 3), (3, 133, 3), (3, 8_667, 259), (0, 17_100, 512)]
     {
-        let second = Arrival { evidence: numbers(lost), ..arrival(after_ms) };
+        let second = ReceivedFrame { evidence: numbers(lost), ..arrival(after_ms) };
         assert_eq!(missing(Duration::ZERO, second), want, "{lost} after {after_ms} ms");
     }
-    let jumped = Arrival { evidence: numbers(2), cause: GapCause::ClockJumped, ..arrival(100) };
+    let jumped = ReceivedFrame { evidence: numbers(2), cause: GapCause::ClockJumped, ..arrival(100) };
     assert_eq!(missing(Duration::ZERO, jumped), 2, "a clock that jumps does not change the count");
-    let slow = Arrival { evidence: numbers(2), passed_over: 5, cause: GapCause::HostTooSlow, ..arrival(267) };
+    let slow =
+        ReceivedFrame { evidence: numbers(2), dropped: 5, cause: GapCause::HostTooSlow, ..arrival(267) };
     assert_eq!(missing(Duration::ZERO, slow), 7);
 }
 
@@ -139,17 +140,17 @@ fn by_the_hosts_clock_alone_a_loss_is_told_from_a_delay_by_the_frame_after_it() 
 #[test]
 fn damage_on_the_way_is_a_loss_if_there_was_time_for_one() {
     let damaged =
-        |after_ms, together| Arrival { evidence: LossEvidence::Damage, together, ..arrival(after_ms) };
+        |after_ms, together| ReceivedFrame { evidence: LossEvidence::Damage, together, ..arrival(after_ms) };
     for (after_ms, together, want) in [(67, 1, 1), (33, 1, 0), (133, 3, 1), (100, 3, 0)] {
         assert_eq!(missing(Duration::ZERO, damaged(after_ms, together)), want, "{after_ms} ms, {together}");
     }
-    let slow = Arrival { passed_over: 5, cause: GapCause::HostTooSlow, ..arrival(200) };
+    let slow = ReceivedFrame { dropped: 5, cause: GapCause::HostTooSlow, ..arrival(200) };
     assert_eq!(missing(Duration::ZERO, slow), 5, "they came, and were not taken");
 }
 
 #[test]
 fn a_clock_too_coarse_to_tell_frames_apart_counts_none() {
-    let second = Arrival { tick: Some(DeviceTick(1)), ..arrival(33) };
+    let second = ReceivedFrame { tick: Some(DeviceTick(1)), ..arrival(33) };
     assert_eq!(missing(Duration::from_secs(1), second), 0);
-    assert_eq!(missing(Duration::from_millis(10), Arrival { tick: Some(DeviceTick(10)), ..second }), 2);
+    assert_eq!(missing(Duration::from_millis(10), ReceivedFrame { tick: Some(DeviceTick(10)), ..second }), 2);
 }

@@ -1,4 +1,4 @@
-//! A stage with a driver: what callers hold of it.
+//! A stage with a driver: the side that callers use.
 
 use std::sync::Arc;
 
@@ -9,55 +9,56 @@ use tactus_schema::rig::StageProtocol;
 use tactus_wire::stage::{Controller, Session};
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::driver::{Command, Driver, Progress, Request};
+use super::driver::{CommandRequest, Driver, Progress, StageCommand};
 use super::stop::StopSwitch;
 use super::{Stage, StageError, Target, grbl_config, zaber_config};
 use crate::transport::Connect;
 use crate::{Clock, DeviceError, ErrorKind};
 
-/// Reports that may wait to be taken: twelve seconds of them in motion.
+/// Reports that may wait for the reader: twelve seconds of motion.
 const REPORTS_MAX: usize = 256;
 
-/// Commands that may wait for the one before them to be looked at.
+/// Commands that may wait for the driver.
 const REQUESTS_MAX: usize = 8;
 
-/// A stage whose controller a driver of its own talks to.
+/// A stage that is driven by a task of its own.
 #[derive(Debug)]
 pub struct DrivenStage {
     device: String,
-    requests: mpsc::Sender<Request>,
+    requests: mpsc::Sender<CommandRequest>,
     stop: Arc<StopSwitch>,
     state: watch::Receiver<pb::StageState>,
     connection: watch::Receiver<Connection>,
 }
 
-/// How the driver stands with the controller.
+/// State of the link to the controller.
 #[derive(Debug, Clone)]
 pub enum Connection {
-    /// It is being looked for; why it is not there, once that is known.
+    /// The driver is trying to connect; the error of the last attempt, if there was one.
     Seeking(Option<Arc<DeviceError>>),
-    /// It answers.
+    /// The controller answers.
     Connected(Controller),
 }
 
-/// What the driver is told of the stage.
+/// Options of a stage that do not depend on its protocol.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageOptions {
-    /// A move is done when the controller stands within this of the target.
+    /// A move is done when the stage stands within this distance of the target.
     pub tolerance_mm: f64,
     /// True if no physical stage moves.
     pub simulated: bool,
 }
 
 impl DrivenStage {
-    /// Starts the task that owns the stage, and gives the stage and every report of it. The task ends when
-    /// the stage is dropped.
+    /// Starts the task that owns the stage. Returns the stage and the channel of its reports. The task ends when the stage
+    /// is dropped.
     ///
-    /// Until the stage answers, and while it is gone, commands fail at once as
-    /// [`StageError::Device`]. A command that is given while another is in hand is refused; one that is given
-    /// while a stop is under way waits until the stage stands. To drop the future of a command does not end it.
+    /// While the stage does not answer, commands fail at once with [`StageError::Device`]. A command is refused while
+    /// another is under way. A command given during a stop waits until the stage stands still. Dropping a command's future
+    /// does not end the command.
     ///
-    /// The reports must be drained by a task that does not wait for the stage: see the note on the channel.
+    /// A task that does not wait for the stage must drain the reports: when the channel is full, the driver stops reading
+    /// from the device.
     pub fn start(
         connect: Box<dyn Connect>,
         protocol: &StageProtocol,
@@ -67,23 +68,23 @@ impl DrivenStage {
         match protocol {
             StageProtocol::Grbl(axes) => {
                 let config = grbl_config(axes, options.tolerance_mm);
-                Self::speak(connect, move || tactus_wire::grbl::Session::new(config), options, clock)
+                Self::spawn(connect, move || tactus_wire::grbl::Session::new(config), options, clock)
             }
             StageProtocol::Zaber(axes) => {
                 let config = zaber_config(axes, options.tolerance_mm);
                 let begin = move || tactus_wire::zaber::Session::new(config.clone());
-                Self::speak(connect, begin, options, clock)
+                Self::spawn(connect, begin, options, clock)
             }
         }
     }
 
-    /// How the driver stands with the controller, now and as it changes.
+    /// State of the link to the controller, updated when it changes.
     pub fn connection(&self) -> watch::Receiver<Connection> {
         self.connection.clone()
     }
 
     /// Starts the driver; `begin` makes the session of each connection.
-    fn speak<S, E>(
+    fn spawn<S, E>(
         connect: Box<dyn Connect>,
         begin: impl Fn() -> Result<S, E> + Send + Sync + 'static,
         options: StageOptions,
@@ -94,8 +95,8 @@ impl DrivenStage {
         S::Error: Send + Sync,
         E: std::error::Error,
     {
-        // Bounded, and no report is ever lost: when it is full the driver takes nothing more from the device until
-        // there is room. A stop is still sent at once.
+        // Bounded, and no report is lost: when it is full, the driver reads nothing from the device until there is room.
+        // A stop is still sent at once.
         let (reports, all_reports) = mpsc::channel(REPORTS_MAX);
         // Bounded: callers wait for room.
         let (sender, requests) = mpsc::channel(REQUESTS_MAX);
@@ -124,13 +125,13 @@ impl DrivenStage {
         (Arc::new(Self { device, requests: sender, stop, state, connection }), all_reports)
     }
 
-    fn command(&self, command: Command) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
-        // Taken when the command is given: a stop that comes before it is carried out is meant for it too.
+    fn command(&self, command: StageCommand) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
+        // Counted when the command is given, so that a stop before the command begins ends it, too.
         let stops_before = self.stop.count();
         async move {
             let (reply, result) = oneshot::channel();
             let gone = || DeviceError::new(&self.device, ErrorKind::Disconnected, "its driver has ended");
-            self.requests.send(Request { command, stops_before, reply }).await.map_err(|_| gone())?;
+            self.requests.send(CommandRequest { command, stops_before, reply }).await.map_err(|_| gone())?;
             result.await.map_err(|_| gone())?
         }
         .boxed()
@@ -143,11 +144,11 @@ impl Stage for DrivenStage {
     }
 
     fn home(&self) -> BoxFuture<'_, Result<(), StageError>> {
-        self.command(Command::Home).map(|result| result.map(|_| ())).boxed()
+        self.command(StageCommand::Home).map(|result| result.map(|_| ())).boxed()
     }
 
     fn move_to(&self, target: Target) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
-        self.command(Command::MoveTo(target))
+        self.command(StageCommand::MoveTo(target))
     }
 
     fn stop(&self) {
@@ -155,7 +156,7 @@ impl Stage for DrivenStage {
     }
 
     fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>> {
-        self.command(Command::ClearAlarm).map(|result| result.map(|_| ())).boxed()
+        self.command(StageCommand::ClearAlarm).map(|result| result.map(|_| ())).boxed()
     }
 }
 

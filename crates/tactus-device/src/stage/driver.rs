@@ -1,4 +1,4 @@
-//! The task that owns the stage, whatever protocol its controller speaks.
+//! The driver of all stages: it runs a session over a link.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -16,33 +16,33 @@ use crate::link::{Link, LinkEvent, since_start};
 use crate::transport::Connect;
 use crate::{Clock, DeviceError, ErrorKind, StageError, Target};
 
-/// Where the result of a command goes.
+/// Receives the result of a command: the position in mm.
 type Reply = oneshot::Sender<Result<[f64; 3], StageError>>;
 
-/// A command, and where its result goes.
+/// A command, with the channel for its result.
 #[derive(Debug)]
-pub(super) struct Request {
-    pub(super) command: Command,
+pub(super) struct CommandRequest {
+    pub(super) command: StageCommand,
     /// How often stop had been pressed when the command was given.
     pub(super) stops_before: u64,
     pub(super) reply: Reply,
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Command {
+pub(super) enum StageCommand {
     Home,
     MoveTo(Target),
     ClearAlarm,
 }
 
-/// Owns the stage: what it says goes to `reports` and `latest`, what it is to do comes by `requests` and `stop`.
+/// Owns the stage. Reports go to `reports` and `latest`; commands come from `requests` and `stop`.
 pub(super) struct Driver<S> {
     pub(super) connect: Arc<dyn Connect>,
-    /// Makes the session of a connection, or says why the rig has none.
+    /// Makes the session of a connection; the error says why the configuration is invalid.
     pub(super) begin: Box<dyn Fn() -> Result<S, String> + Send + Sync>,
     pub(super) options: StageOptions,
     pub(super) clock: Clock,
-    pub(super) requests: mpsc::Receiver<Request>,
+    pub(super) requests: mpsc::Receiver<CommandRequest>,
     pub(super) stop: Arc<StopSwitch>,
     pub(super) reports: mpsc::Sender<pb::StageState>,
     pub(super) latest: watch::Sender<pb::StageState>,
@@ -50,19 +50,20 @@ pub(super) struct Driver<S> {
     pub(super) progress: Progress,
 }
 
-/// What the driver is about.
+/// The driver's state.
 #[derive(Default)]
 pub(super) struct Progress {
-    /// The stage has answered and not been lost since.
+    /// The stage answers.
     connected: bool,
-    in_hand: Option<Reply>,
-    /// Reports that found no room yet. The device is not read meanwhile, so that these stay few.
+    /// Receives the result of the command under way.
+    active: Option<Reply>,
+    /// Reports that found no room yet. The device is not read meanwhile, so there are few.
     waiting: VecDeque<pb::StageState>,
-    /// The kind of loss that was logged and has not been made good.
+    /// The kind of the present loss, once it has been logged.
     logged: Option<ErrorKind>,
 }
 
-/// Nobody holds the stage any more: the task is to end.
+/// The stage was dropped, so the task ends.
 struct Unused;
 
 impl<S: Session + Send> Driver<S>
@@ -76,7 +77,7 @@ where
             let ended = match self.meanwhile(connect.connect()).await {
                 Ok(Ok(stream)) => {
                     let link = Link::new(stream, self.clock, self.device());
-                    self.converse(link, &mut backoff).await
+                    self.run_session(link, &mut backoff).await
                 }
                 Ok(Err(error)) => Ok(error),
                 Err(Unused) => return,
@@ -89,7 +90,7 @@ where
         }
     }
 
-    /// Waits for something while there is no stage: commands fail, and a stop has nothing to stop.
+    /// Waits for something while no stage answers. Commands fail meanwhile, and a stop has no effect.
     async fn meanwhile<T>(&mut self, awaited: impl Future<Output = T>) -> Result<T, Unused> {
         tokio::pin!(awaited);
         loop {
@@ -106,8 +107,8 @@ where
         }
     }
 
-    /// Talks over an open link until it fails; gives why.
-    async fn converse(&mut self, mut link: Link, backoff: &mut Backoff) -> Result<DeviceError, Unused> {
+    /// Runs a session over an open link until it fails; returns why.
+    async fn run_session(&mut self, mut link: Link, backoff: &mut Backoff) -> Result<DeviceError, Unused> {
         let mut session = match (self.begin)() {
             Ok(session) => session,
             Err(why) => return Ok(DeviceError::new(self.device(), ErrorKind::Protocol, why)),
@@ -118,10 +119,10 @@ where
             if let Err(error) = self.carry_out(now, actions, &mut link, backoff).await {
                 return Ok(error);
             }
-            let Progress { connected, ref in_hand, ref waiting, .. } = self.progress;
-            // While a stop is under way commands wait; otherwise they are begun or refused.
-            let refuses_requests = !connected || (in_hand.is_some() && !session.is_stopping());
-            let looks_at_requests = refuses_requests || session.is_ready();
+            let Progress { connected, ref active, ref waiting, .. } = self.progress;
+            // During a stop, commands wait. Otherwise they are started or refused.
+            let refuses_requests = !connected || (active.is_some() && !session.is_stopping());
+            let takes_requests = refuses_requests || session.is_ready();
             let has_room = waiting.is_empty();
             actions = tokio::select! {
                 biased;
@@ -133,7 +134,7 @@ where
                     self.hand_over();
                     Vec::new()
                 }
-                request = self.requests.recv(), if has_room && looks_at_requests => {
+                request = self.requests.recv(), if has_room && takes_requests => {
                     let Some(request) = request else { return Err(Unused) };
                     now = self.clock.now();
                     self.begin(now, request, &mut session)
@@ -154,22 +155,24 @@ where
     }
 
     /// Begins a command, or answers why not.
-    fn begin(&mut self, now: Stamp, request: Request, session: &mut S) -> Vec<Action<S::Error>> {
-        let Request { command, stops_before, reply } = request;
+    fn begin(&mut self, now: Stamp, request: CommandRequest, session: &mut S) -> Vec<Action<S::Error>> {
+        let CommandRequest { command, stops_before, reply } = request;
         let refusal = if !self.progress.connected {
             self.not_connected()
-        } else if self.progress.in_hand.is_some() {
+        } else if self.progress.active.is_some() {
             let reason = "another command is in hand".to_owned();
             StageError::Refused { command: format!("{command:?}"), reason }
         } else if stops_before != self.stop.count() {
             StageError::Stopped { position_mm: self.position_mm() }
         } else {
-            self.progress.in_hand = Some(reply);
+            self.progress.active = Some(reply);
             let now = since_start(now);
             return match command {
-                Command::Home => session.home(now),
-                Command::MoveTo(target) => session.move_to(now, target.position_mm, target.speed_mm_per_s),
-                Command::ClearAlarm => session.clear_alarm(now),
+                StageCommand::Home => session.home(now),
+                StageCommand::MoveTo(target) => {
+                    session.move_to(now, target.position_mm, target.speed_mm_per_s)
+                }
+                StageCommand::ClearAlarm => session.clear_alarm(now),
             };
         };
         answer(reply, Err(refusal));
@@ -202,7 +205,7 @@ where
                     tracing::warn!(device = self.device(), why, "the stage's position is suspect");
                 }
                 Action::Done(result) => {
-                    if let Some(reply) = self.progress.in_hand.take() {
+                    if let Some(reply) = self.progress.active.take() {
                         answer(reply, result.map_err(stage_error));
                     }
                 }
@@ -253,11 +256,11 @@ where
         };
         self.latest.send_replace(state);
         self.progress.waiting.push_back(state);
-        // Now, if it can be, so that a report is there before the result that rests on it.
+        // At once if possible, so that a report arrives before the result that depends on it.
         self.hand_over();
     }
 
-    /// Hands over the reports for which there is room; all of them are of no use if nobody takes them.
+    /// Sends the reports for which there is room. Without a receiver they are dropped.
     fn hand_over(&mut self) {
         while let Some(report) = self.progress.waiting.pop_front() {
             if let Err(TrySendError::Full(report)) = self.reports.try_send(report) {
@@ -267,14 +270,14 @@ where
         }
     }
 
-    /// The link has failed: so does the command in hand.
+    /// The link failed, so the command under way fails, too.
     fn lost(&mut self, error: DeviceError) {
         if self.progress.logged != Some(error.kind) {
             tracing::warn!(%error, kind = ?error.kind, "stage lost");
             self.progress.logged = Some(error.kind);
         }
         self.progress.connected = false;
-        if let Some(reply) = self.progress.in_hand.take() {
+        if let Some(reply) = self.progress.active.take() {
             answer(reply, Err(DeviceError::new(&error.device, error.kind, &error.what).into()));
         }
         self.connection.send_replace(Connection::Seeking(Some(Arc::new(error))));
@@ -292,7 +295,7 @@ where
         format!("stage on {}", self.connect)
     }
 
-    /// That there is no stage, and what is known of why.
+    /// The error of a command while no stage answers, with the cause if it is known.
     fn not_connected(&self) -> StageError {
         let what = "it is not connected; it is being looked for";
         let error = match &*self.connection.borrow() {
@@ -342,7 +345,7 @@ fn answer(reply: Reply, result: Result<[f64; 3], StageError>) {
     }
 }
 
-/// Waits until there is room for a report, or nobody to take it.
+/// Waits until there is room for a report, or no receiver is left.
 async fn room(reports: &mpsc::Sender<pb::StageState>) {
     drop(reports.reserve().await);
 }

@@ -1,4 +1,4 @@
-//! What a rig says of a stage that speaks `grbl`, for its session.
+//! Converts a rig's axes to the configuration of a `grbl` session.
 
 use tactus_schema::rig::{GrblAxes, GrblAxis, MachineAxis};
 use tactus_wire::grbl::{Axis, Config};

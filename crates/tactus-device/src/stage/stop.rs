@@ -1,10 +1,10 @@
-//! The stop that is never queued.
+//! The stop switch: a stop is never queued behind commands.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use tokio::sync::Notify;
 
-/// Pressed from anywhere, at any time, without waiting.
+/// Can be pressed from any task at any time, without waiting.
 #[derive(Debug, Default)]
 pub(super) struct StopSwitch {
     count: AtomicU64,
@@ -17,12 +17,12 @@ impl StopSwitch {
         self.pressed.notify_one();
     }
 
-    /// How often it was pressed so far.
+    /// How often it has been pressed.
     pub(super) fn count(&self) -> u64 {
         self.count.load(Ordering::SeqCst)
     }
 
-    /// Waits until it is pressed, or returns at once if it was since the last time. Cancel-safe.
+    /// Waits until it is pressed; returns at once if it was pressed since the last call. Cancel-safe.
     pub(super) async fn pressed(&self) {
         self.pressed.notified().await;
     }

@@ -1,4 +1,4 @@
-//! What a rig says of a stage that speaks `zaber-ascii`, for its session.
+//! Converts a rig's axes to the configuration of a `zaber-ascii` session.
 
 use tactus_schema::rig::{ZaberAxes, ZaberAxis};
 use tactus_wire::zaber::{Axis, Config};

@@ -1,10 +1,10 @@
-//! A human interface device: reports in, reports out.
+//! A human interface device (HID), read and written in reports.
 //!
-//! Each report is one packet of the stream. Where a device numbers its reports, the number is the first byte, and is
-//! kept; of a report that is written the first byte is always the number, 0 where there is none.
+//! Each report is one packet of the stream. If a device numbers its reports, the number is the first byte and is kept.
+//! The first byte of a written report is always the number, 0 for a device without numbers.
 //!
-//! The system keeps 63 reports for a program that does not read, and then drops them without a word. So whoever reads
-//! too slowly gets an error instead of a gap that nobody sees.
+//! The kernel queues 63 reports for a program that does not read, and then drops further ones silently. A reader that is
+//! too slow therefore gets an error instead of a hidden gap.
 
 use std::ffi::{CString, OsStr};
 use std::fmt;
@@ -25,13 +25,13 @@ use super::packets::{LastReader, PacketSink, PacketSource, PacketStream, StillOp
 use super::{ByteStream, Connect};
 use crate::{DeviceError, ErrorKind};
 
-/// How long a read waits before the thread looks whether it is still wanted, in milliseconds.
+/// How long a read waits, in ms, before the thread checks whether it should end.
 const PATIENCE_MS: i32 = 100;
 
-/// Reports that the system keeps: it drops what comes when so many wait.
+/// Reports that the kernel queues. It drops those that come when the queue is full.
 const KEPT_BY_THE_SYSTEM: usize = 63;
 
-/// Opens a human interface device. Others of our programs that want it find it busy; strangers may read along.
+/// Opens a human interface device. Other programs of Tactus then find it busy; foreign programs can still read it.
 #[derive(Debug, Clone)]
 pub struct HidConnector {
     link: HidLink,
@@ -39,7 +39,7 @@ pub struct HidConnector {
 }
 
 impl HidConnector {
-    /// The device is looked for by its identity at each connection.
+    /// A connector that searches for the device by its identity at each connection.
     pub fn new(link: HidLink) -> Self {
         Self { link, last: LastReader::default() }
     }
@@ -76,7 +76,7 @@ impl fmt::Display for HidConnector {
     }
 }
 
-/// A human interface device that the system knows.
+/// A human interface device that the kernel lists.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct HidNode {
     pub(crate) path: PathBuf,
@@ -84,20 +84,20 @@ pub(crate) struct HidNode {
     pub(crate) pid: u16,
     pub(crate) serial: Option<String>,
     pub(crate) product: Option<String>,
-    /// Of a USB device.
+    /// Number of the USB interface; `None` if it is not on USB.
     pub(crate) interface: Option<u8>,
-    /// What it is for: page and number of its usages.
+    /// Usage page and usage number of each of its collections.
     pub(crate) usages: Vec<(u16, u16)>,
 }
 
-/// All of them, by path; nothing is opened for it.
+/// Lists all human interface devices, sorted by path, without opening them.
 pub(crate) fn nodes() -> io::Result<Vec<HidNode>> {
     let api = HidApi::new().map_err(broken)?;
     let mut nodes: Vec<HidNode> = Vec::new();
     for info in api.device_list() {
         let path = PathBuf::from(OsStr::from_bytes(info.path().to_bytes()));
         let usage = (info.usage_page(), info.usage());
-        // Listed once for each of its usages.
+        // The library lists a device once for each usage.
         if let Some(node) = nodes.iter_mut().find(|node| node.path == path) {
             node.usages.push(usage);
             continue;
@@ -138,7 +138,7 @@ impl Candidate for HidNode {
 
 const APART: &str = "Name the serial number in the rig file, and the interface of a device that has several";
 
-/// The node that the rig file means.
+/// The one node that matches the rig file.
 fn choose(name: impl fmt::Display, link: &HidLink, nodes: Vec<HidNode>) -> Result<HidNode, DeviceError> {
     let HidLink { identity, interface, .. } = link;
     let is_it = |node: &HidNode| identity.is_of(node.vid, node.pid, node.serial.as_deref());
@@ -153,7 +153,7 @@ fn choose(name: impl fmt::Display, link: &HidLink, nodes: Vec<HidNode>) -> Resul
         );
         return Err(DeviceError::new(name, ErrorKind::WrongDevice, what));
     }
-    // Those of other interfaces are not meant; those of other serial numbers say what is there instead.
+    // Drop other interfaces of the right device. Keep other serial numbers: the error lists them.
     let nodes = nodes
         .into_iter()
         .filter(|node| !is_it(node) || interface.is_none() || node.interface == *interface)
@@ -161,21 +161,21 @@ fn choose(name: impl fmt::Display, link: &HidLink, nodes: Vec<HidNode>) -> Resul
     the_one(name, identity, nodes, APART)
 }
 
-/// For writing; it also holds the lock by which others of our programs see that the device is taken, and whose
-/// errors, unlike the library's, have a kind.
+/// Opens a node for writing, with a lock that tells other programs of Tactus that the device is in use. Unlike the
+/// library's errors, its errors have a kind.
 fn open_alone(path: &Path) -> io::Result<File> {
     let file = OpenOptions::new().read(true).write(true).open(path)?;
     flock(&file, FlockOperation::NonBlockingLockExclusive)?;
     Ok(file)
 }
 
-/// For reading.
+/// Opens a node for reading.
 fn open(path: &Path) -> io::Result<HidDevice> {
     let name = CString::new(path.as_os_str().as_bytes())?;
     HidApi::new().and_then(|api| api.open_path(&name)).map_err(broken)
 }
 
-/// Why a device could not be opened.
+/// The error for a device that could not be opened.
 fn explain(name: impl fmt::Display, node: &HidNode, error: io::Error) -> DeviceError {
     let (kind, what) = match error.raw_os_error().map(Errno::from_raw_os_error) {
         Some(Errno::ACCESS | Errno::PERM) => {
@@ -198,9 +198,9 @@ fn explain(name: impl fmt::Display, node: &HidNode, error: io::Error) -> DeviceE
     DeviceError::from_io(name, kind, format!("{what} ({error})"), error)
 }
 
-/// What gives reports.
+/// A source of reports.
 trait Reports: Send + 'static {
-    /// Length of the next one, 0 if none came in time.
+    /// Reads the next report and returns its length in bytes; 0 if none came in time.
     fn read(&mut self, report: &mut [u8], timeout_ms: i32) -> io::Result<usize>;
 }
 
@@ -215,9 +215,9 @@ impl Reports for HidDevice {
 
 struct HidSource<R> {
     reports: R,
-    /// One byte longer than the longest report, so that a longer one is seen.
+    /// One byte longer than the longest report, so that a longer one is noticed.
     report: Box<[u8]>,
-    /// Reports that had been waiting, since the reading was held up; `None` if nothing waits.
+    /// Queued reports read since reading was delayed; `None` when the queue is empty.
     backlog: Option<usize>,
 }
 
@@ -275,7 +275,7 @@ fn broken(error: HidError) -> io::Error {
 }
 
 impl HidNode {
-    /// What tells it from others, with its serial number if it has one.
+    /// What identifies it; includes the serial number if it has one.
     pub(crate) fn identity(&self) -> UsbIdentity {
         UsbIdentity { vid: self.vid, pid: self.pid, serial: self.serial.clone() }
     }

@@ -1,4 +1,4 @@
-//! Which of the devices that are there is meant.
+//! Selects the device that a rig file identifies.
 
 use std::fmt::Display;
 
@@ -6,19 +6,19 @@ use tactus_schema::rig::UsbIdentity;
 
 use crate::{DeviceError, ErrorKind};
 
-/// A device that may be the one.
+/// A connected device that may match an identity.
 pub(super) trait Candidate {
-    /// Vendor and product.
+    /// Vendor and product id.
     fn vid_pid(&self) -> (u16, u16);
 
     /// The serial number, if it has one.
     fn serial(&self) -> Option<&str>;
 
-    /// Where it is, for people: its node in `/dev`.
+    /// Its node in `/dev`, for messages.
     fn place(&self) -> String;
 }
 
-/// The one of the candidates that has this identity. `apart` says how to tell several apart.
+/// The only candidate with this identity. The error for several ends with `apart`, which says how to distinguish them.
 pub(super) fn the_one<T: Candidate>(
     device: impl Display,
     identity: &UsbIdentity,
@@ -58,7 +58,7 @@ pub(super) fn the_one<T: Candidate>(
 pub(super) const ABSENT: &str =
     "there is no such device: is it plugged in and switched on? `tactus devices` shows what is there";
 
-/// What to do about a node of `/dev` that this user may not open; `rule` finds the device.
+/// Advice for a node of `/dev` that this user may not open. `rule` is the udev rule that matches the device.
 pub(super) fn permission(node: impl Display, rule: &str) -> String {
     format!(
         "this user may not open {node}: the rules of Tactus, /etc/udev/rules.d/70-tactus.rules, need the line \

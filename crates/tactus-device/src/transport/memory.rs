@@ -1,4 +1,4 @@
-//! A device in the same process, reached over memory. Takes no time, so that it works in virtual time.
+//! A virtual device in the same process. Transfers take no time, so it works in virtual time.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,7 +14,7 @@ use crate::{DeviceError, ErrorKind};
 /// Bytes that either side may write before the other reads; then the writer waits, as on a full serial port.
 const BUFFER_BYTES: usize = 64 * 1024;
 
-/// The two ends of a place where a virtual device can be plugged in; it is plugged in from the start.
+/// The two ends of a socket for a virtual device. The device is plugged in from the start.
 pub fn pair(name: impl Into<String>) -> (MemoryConnector, MemoryPort) {
     let socket = Socket::default();
     let mut port = MemoryPort { socket: socket.clone(), plug: None };
@@ -36,12 +36,12 @@ pub struct MemoryPort {
     plug: Option<mpsc::Receiver<DuplexStream>>,
 }
 
-/// Where a device that is plugged in and not yet connected takes its stream.
+/// Holds the sender for the stream of a device that is plugged in but not connected.
 type Socket = Arc<Mutex<Option<mpsc::Sender<DuplexStream>>>>;
 
 impl MemoryPort {
-    /// Plugs the device in, if it is not, and waits for the host. Dropping the stream that this gives is
-    /// the device's going away: it is absent from then until the next call.
+    /// Plugs the device in and waits for the host to connect. When the returned stream is dropped, the device is
+    /// absent until the next call.
     ///
     /// Cancel-safe; a device whose waiting is cancelled stays plugged in.
     pub async fn accept(&mut self) -> DuplexStream {

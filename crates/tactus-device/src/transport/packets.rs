@@ -1,7 +1,7 @@
-//! Packets that a library which blocks reads and writes, as a stream of bytes.
+//! Turns a blocking library's packets into an asynchronous stream of bytes.
 //!
-//! A thread owns the reading, and ends when the stream is dropped. Packets keep their boundaries: each is handed out
-//! by one read, if the reader's buffer has room for it; else the rest comes with the next. Each write is one packet.
+//! A thread reads, and ends when the stream is dropped. Packets keep their boundaries: one read returns one packet, if
+//! the buffer has room for it; otherwise the next read returns the rest. Each write is one packet.
 
 use std::fmt;
 use std::io;
@@ -19,26 +19,26 @@ use tokio::task::{JoinHandle, spawn_blocking};
 use super::ByteStream;
 use crate::{DeviceError, ErrorKind};
 
-/// Packets that may wait for the reader. With more than these the thread waits, and reads no further: a USB device
-/// then waits too, and of HID reports the system keeps a few more.
+/// Packets that may wait for the reader. When so many wait, the thread stops reading: a USB device then waits too, and
+/// the kernel queues some further HID reports.
 pub(super) const PACKETS_MAX: usize = 512;
 
-/// Reads packets; blocks.
+/// Reads packets, blocking.
 pub(super) trait PacketSource: Send + 'static {
-    /// The next packet, or `None` if none came within a moment, so that the thread sees whether it is still wanted.
+    /// The next packet, or `None` after a short time without one, so that the thread can check whether to end.
     fn next(&mut self) -> io::Result<Option<Vec<u8>>>;
 
-    /// Nothing was read for a while, because nobody took what had been read.
+    /// Called after reading was delayed because the reader of the stream was slow.
     fn was_held_up(&mut self) {}
 }
 
-/// Writes packets; blocks.
+/// Writes packets, blocking.
 pub(super) trait PacketSink: Send + 'static {
     /// Writes one packet, all of it.
     fn send(&mut self, packet: &[u8]) -> io::Result<()>;
 }
 
-/// Who has read last, so that a device is not opened again before it has been closed.
+/// The last reading thread of a device, so that the device is not opened again before it is closed.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LastReader(Arc<Mutex<Option<Reader>>>);
 
@@ -53,7 +53,7 @@ struct Reader {
 pub(super) struct StillOpen;
 
 impl LastReader {
-    /// Waits until the last reader has closed the device. Blocks, for the moment that a read lasts at most.
+    /// Blocks until the last reader has closed the device, at most for one read.
     pub(super) fn wait(&self) -> Result<(), StillOpen> {
         let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if last.as_ref().is_some_and(|reader| reader.stream.strong_count() > 0) {
@@ -68,7 +68,7 @@ impl LastReader {
     }
 }
 
-/// Opens a device by a library that blocks, apart from what must not wait.
+/// Opens a device with a blocking library on a separate thread.
 pub(super) async fn open_apart<T>(
     device: &impl fmt::Display,
     open: impl FnOnce() -> Result<T, DeviceError> + Send + 'static,
@@ -85,7 +85,7 @@ where
     }
 }
 
-/// As [`stream`], of a device that is told by its name in errors.
+/// Like [`stream`], with errors that name the device.
 pub(super) fn stream_of(
     device: &impl fmt::Display,
     source: impl PacketSource,
@@ -105,7 +105,7 @@ pub(super) fn stream(
     sink: Option<Box<dyn PacketSink>>,
     last: &LastReader,
 ) -> io::Result<PacketStream> {
-    // Bounded; what happens when it is full is told at PACKETS_MAX.
+    // Bounded; see PACKETS_MAX for what happens when it is full.
     let (sender, packets) = mpsc::channel(PACKETS_MAX);
     let held = Arc::new(());
     let stream = Arc::downgrade(&held);
@@ -122,7 +122,7 @@ pub(super) fn stream(
     Ok(PacketStream { packets, rest: Vec::new(), handed_out: 0, writer, _held: held })
 }
 
-/// Reads until nobody listens or the link breaks.
+/// Reads until the stream is dropped or the link breaks.
 fn pump(name: &str, source: &mut impl PacketSource, sender: &mpsc::Sender<io::Result<Vec<u8>>>) {
     let mut is_slow = false;
     while !sender.is_closed() {
@@ -134,7 +134,7 @@ fn pump(name: &str, source: &mut impl PacketSource, sender: &mpsc::Sender<io::Re
             Ok(Some(packet)) => packet,
             Err(error) => {
                 tracing::debug!(device = name, %error, "the link broke");
-                // If nobody listens any more, nobody misses it.
+                // Without a reader the error is not needed.
                 drop(sender.blocking_send(Err(error)));
                 return;
             }
@@ -143,7 +143,7 @@ fn pump(name: &str, source: &mut impl PacketSource, sender: &mpsc::Sender<io::Re
             Ok(()) => {}
             Err(TrySendError::Closed(_)) => return,
             Err(TrySendError::Full(packet)) => {
-                // Once, until all has been read that was there.
+                // Warn once, until all waiting packets have been read.
                 if !mem::replace(&mut is_slow, true) {
                     tracing::warn!(device = name, "packets are taken too slowly: {PACKETS_MAX} of them wait");
                 }
@@ -159,7 +159,7 @@ fn pump(name: &str, source: &mut impl PacketSource, sender: &mpsc::Sender<io::Re
 /// The stream; dropping it ends the thread and closes the device.
 pub(super) struct PacketStream {
     packets: mpsc::Receiver<io::Result<Vec<u8>>>,
-    /// The last packet, as long as not all of it was handed out.
+    /// The last packet, until all of it has been handed out.
     rest: Vec<u8>,
     handed_out: usize,
     writer: Writer,
@@ -177,7 +177,7 @@ enum Writer {
 }
 
 impl PacketStream {
-    /// Waits until the last packet is written; tells whether it was.
+    /// Waits until the last packet is written; its error, if it was not.
     fn poll_written(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         let Writer::Busy(writing) = &mut self.writer else { return Poll::Ready(Ok(())) };
         match ready!(Pin::new(writing).poll(context)) {
@@ -219,7 +219,7 @@ impl AsyncRead for PacketStream {
 }
 
 impl AsyncWrite for PacketStream {
-    /// The packet is on its way when this returns; whether it arrived is told by the next write or flush.
+    /// Returns when writing has started. The next write or flush reports an error of this one.
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,

@@ -1,4 +1,4 @@
-//! A serial port, a USB serial device or a pseudo-terminal; at a path, or wherever the system has put it.
+//! A serial port, USB serial device or pseudo-terminal, found by its path or by its USB identity.
 
 use std::fmt;
 use std::io;
@@ -14,7 +14,7 @@ use super::identity::{Candidate, the_one};
 use super::{ByteStream, Connect};
 use crate::{DeviceError, ErrorKind};
 
-/// Opens a serial port: 8 data bits, no parity, 1 stop bit, no flow control, for us alone.
+/// Opens a serial port exclusively: 8 data bits, no parity, 1 stop bit, no flow control.
 #[derive(Debug, Clone)]
 pub struct SerialConnector {
     port: SerialPort,
@@ -22,14 +22,14 @@ pub struct SerialConnector {
 }
 
 impl SerialConnector {
-    /// The port at `path`, `baud` bits a second. Of a device's names choose the one that stays with it,
-    /// such as those under `/dev/serial/by-id`.
+    /// The port at `path`, at `baud` bits per second. Prefer a path that stays with the device, such as one under
+    /// `/dev/serial/by-id`.
     pub fn new(path: impl Into<PathBuf>, baud: u32) -> Self {
         let path: PathBuf = path.into();
         Self::of(SerialPort::Path(path.to_string_lossy().into_owned()), baud)
     }
 
-    /// The port, `baud` bits a second. One that is told by its USB device is looked for at each connection.
+    /// A port at `baud` bits per second. A port given by its USB identity is searched for at each connection.
     pub fn of(port: SerialPort, baud: u32) -> Self {
         Self { port, baud }
     }
@@ -45,7 +45,7 @@ impl SerialConnector {
         }
     }
 
-    /// Where the port is now.
+    /// The present path of the port.
     fn path(&self) -> Result<String, DeviceError> {
         match &self.port {
             SerialPort::Path(path) => Ok(path.clone()),
@@ -66,7 +66,7 @@ impl SerialConnector {
         let is_there = Path::new(path).exists();
         let (kind, what) = match error.kind {
             Io(io::ErrorKind::PermissionDenied) => (ErrorKind::Permission, PERMISSION),
-            // So the library calls it when somebody else has locked the port.
+            // The library's error for a port that another program has locked.
             NoDevice if is_there => (ErrorKind::Busy, BUSY),
             InvalidInput | Unknown | Io(_) if is_there => (ErrorKind::Protocol, NOT_SERIAL),
             NoDevice | InvalidInput | Unknown | Io(_) => (ErrorKind::Absent, ABSENT),
@@ -79,9 +79,9 @@ impl SerialConnector {
     }
 }
 
-/// All serial ports that the system knows, by name; none is opened for it.
+/// Lists all serial ports, sorted by name, without opening them.
 pub(crate) fn ports() -> io::Result<Vec<SerialPortInfo>> {
-    // Where the system shows nothing, as in some containers, the library would panic.
+    // Without this folder, as in some containers, the library would panic.
     if !Path::new("/sys/class/tty").is_dir() {
         return Ok(Vec::new());
     }
@@ -91,7 +91,7 @@ pub(crate) fn ports() -> io::Result<Vec<SerialPortInfo>> {
 }
 
 impl Candidate for SerialPortInfo {
-    /// 0 for both if it is none on USB.
+    /// Both are 0 for a port that is not on USB.
     fn vid_pid(&self) -> (u16, u16) {
         match &self.port_type {
             SerialPortType::UsbPort(usb) => (usb.vid, usb.pid),

@@ -12,7 +12,7 @@ use tokio::time::timeout;
 use super::{ByteStream, Connect};
 use crate::{DeviceError, ErrorKind};
 
-/// How long a connection may take.
+/// Longest time to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Connects to `host:port`.
@@ -30,7 +30,7 @@ impl TcpConnector {
     async fn open(&self) -> Result<Box<dyn ByteStream>, DeviceError> {
         let connected = timeout(CONNECT_TIMEOUT, TcpStream::connect(&self.address)).await;
         let connected = connected.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()));
-        // Commands are few and small, and a stop must not wait for company.
+        // Commands are small, and a stop must not wait to be sent together with other data.
         let stream = connected.and_then(|stream| stream.set_nodelay(true).map(|()| stream));
         match stream {
             Ok(stream) => Ok(Box::new(stream)),

@@ -1,4 +1,4 @@
-//! In the place of USB interfaces, in a program that was built without the feature `usb`.
+//! Stands in for USB interfaces in a program that was built without the feature `usb`.
 
 use std::fmt;
 
@@ -9,14 +9,14 @@ use tactus_schema::rig::UsbLink;
 use super::{ByteStream, Connect};
 use crate::{DeviceError, ErrorKind};
 
-/// Says at each connection that this program cannot.
+/// Fails at each connection, with an error that names the missing feature.
 #[derive(Debug, Clone)]
 pub struct UnbuiltConnector {
     link: UsbLink,
 }
 
 impl UnbuiltConnector {
-    /// In the place of this link.
+    /// Stands in for a connector of this link.
     pub fn new(link: UsbLink) -> Self {
         Self { link }
     }

@@ -1,10 +1,10 @@
-//! An interface of a USB device that no driver of the system serves: bulk or interrupt endpoints.
+//! A vendor-specific USB interface with bulk or interrupt endpoints.
 //!
-//! A bulk transfer ends with a packet that is not full, and is one packet of the stream. Devices that send full
-//! packets only should end each transfer with an empty one; those that do not are served too: a transfer also ends
-//! when nothing follows for 5 ms. An interrupt endpoint's packets each stand for themselves.
+//! A bulk transfer is one packet of the stream. It ends with a packet that is not full, or when nothing follows for
+//! 5 ms. (A device whose transfers end with a full packet should send an empty one; some do not.) Each packet of an
+//! interrupt endpoint is one packet of the stream.
 //!
-//! A device that is not read waits, so nothing is lost between it and the reader, however slow that is.
+//! A device that is not read waits, so a slow reader loses nothing.
 
 use std::fmt;
 use std::fs::OpenOptions;
@@ -25,22 +25,22 @@ use super::{ByteStream, Connect};
 use crate::bus::{self, EndpointKind, UsbDevice, UsbEndpoint};
 use crate::{DeviceError, ErrorKind};
 
-/// How long a read waits before the thread looks whether it is still wanted.
+/// How long a read waits before the thread checks whether it should end.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Packets of one transfer follow each other within this.
+/// Longest pause between packets of one transfer.
 const GAP: Duration = Duration::from_millis(5);
 
-/// A transfer that goes on for longer is handed out in parts.
+/// A transfer that takes longer than this is handed out in parts.
 const TRANSFER_MAX: Duration = Duration::from_millis(100);
 
-/// So is a longer one; no frame has more.
+/// A longer transfer is handed out in parts, too. No frame is longer.
 const TRANSFER_MAX_BYTES: usize = MAX_FRAME_BYTES;
 
-/// A device that does not take a packet within this is not there any more.
+/// A device that does not accept a packet within this time is taken as disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Opens an interface of a USB device, for us alone.
+/// Opens an interface of a USB device exclusively.
 #[derive(Debug, Clone)]
 pub struct UsbConnector {
     link: UsbLink,
@@ -48,7 +48,7 @@ pub struct UsbConnector {
 }
 
 impl UsbConnector {
-    /// The device is looked for by its identity at each connection.
+    /// A connector that searches for the device by its identity at each connection.
     pub fn new(link: UsbLink) -> Self {
         Self { link, last: LastReader::default() }
     }
@@ -75,10 +75,10 @@ impl UsbConnector {
         stream_of(self, source, sink, &self.last)
     }
 
-    /// Opens the device and takes the interface from whatever driver of the system has it.
+    /// Opens the device and claims the interface, detaching a kernel driver if there is one.
     fn claim(&self, device: &UsbDevice) -> Result<Arc<DeviceHandle<Context>>, DeviceError> {
         let explain = |error| explain(self, device, self.link.interface, error);
-        // First by ourselves: libusb tells some refusals, such as those of a systemd unit, as faults of the device.
+        // Try the node first: libusb reports some refusals, such as those of a systemd unit, as device faults.
         if let Err(error) = OpenOptions::new().read(true).write(true).open(device.node())
             && let Some(refused) = refused(self, device, error)
         {
@@ -94,7 +94,7 @@ impl UsbConnector {
             .ok_or_else(|| self.error(ErrorKind::Absent, ABSENT))?;
         let handle = found.open().map_err(explain)?;
         match handle.set_auto_detach_kernel_driver(true) {
-            // Where drivers cannot be detached, there are none to be detached.
+            // A system that cannot detach drivers has none to detach.
             Ok(()) | Err(rusb::Error::NotSupported) => {}
             Err(error) => return Err(explain(error)),
         }
@@ -136,14 +136,14 @@ impl Candidate for UsbDevice {
     }
 }
 
-/// What is read and what is written.
+/// The endpoints of a link.
 #[derive(Debug, PartialEq, Eq)]
 struct Endpoints {
     read: UsbEndpoint,
     write: Option<UsbEndpoint>,
 }
 
-/// The endpoints that the rig file names, or why the device is another.
+/// The endpoints that the rig file names; an error says why the device does not match.
 fn choose(device: &UsbDevice, link: &UsbLink) -> Result<Endpoints, String> {
     let Some(interface) = device.interfaces.iter().find(|interface| interface.number == link.interface)
     else {
@@ -190,7 +190,7 @@ fn in_words(endpoint: UsbEndpoint) -> String {
 const NO_LIBUSB: &str = "this program is not let look for USB devices: under systemd, its unit needs AF_NETLINK among \
     RestrictAddressFamilies";
 
-/// Why its node cannot be opened, if that is for lack of permission or of the node.
+/// The error for a node that is missing or that this user may not open; `None` for other causes.
 fn refused(name: impl fmt::Display, device: &UsbDevice, error: io::Error) -> Option<DeviceError> {
     let UsbDevice { vid, pid, .. } = device;
     let node = device.node();
@@ -199,7 +199,7 @@ fn refused(name: impl fmt::Display, device: &UsbDevice, error: io::Error) -> Opt
             format!("SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vid:04x}\", ATTR{{idProduct}}==\"{pid:04x}\"");
         (ErrorKind::Permission, permission(node.display(), &rule))
     } else if error.kind() == io::ErrorKind::NotFound {
-        // As in a container that shows the machine's devices and has not been handed them.
+        // A container may list the machine's devices without having their nodes.
         let node = node.display();
         (
             ErrorKind::Absent,
@@ -211,7 +211,7 @@ fn refused(name: impl fmt::Display, device: &UsbDevice, error: io::Error) -> Opt
     Some(DeviceError::from_io(name, kind, format!("{what} ({error})"), error))
 }
 
-/// Why a device could not be opened or its interface not claimed.
+/// The error for a device that could not be opened, or whose interface could not be claimed.
 fn explain(name: impl fmt::Display, device: &UsbDevice, interface: u8, error: rusb::Error) -> DeviceError {
     if error == rusb::Error::Access
         && let Some(refused) = refused(&name, device, io::ErrorKind::PermissionDenied.into())
@@ -237,7 +237,7 @@ fn explain(name: impl fmt::Display, device: &UsbDevice, interface: u8, error: ru
     DeviceError::from_io(name, kind, format!("{what} ({error})"), io::Error::other(error))
 }
 
-/// One endpoint that is read.
+/// An endpoint that sends to the host.
 trait Pipe: Send + 'static {
     fn read(&mut self, packet: &mut [u8], timeout: Duration) -> rusb::Result<usize>;
 
@@ -263,14 +263,14 @@ impl Pipe for UsbPipe {
     }
 }
 
-/// Puts transfers together. Each packet is asked for by itself: only so it is seen where a transfer ends, and a read
-/// that times out has never half of one.
+/// Joins packets into transfers. It requests one packet at a time, because the length of each shows where a transfer
+/// ends, and because a read that times out then never holds part of a packet.
 struct UsbSource<P> {
     name: String,
     pipe: P,
     kind: EndpointKind,
     packet: Box<[u8]>,
-    /// The endpoint has stalled, and nothing has come since.
+    /// The endpoint stalled, and has sent nothing since.
     stalled: bool,
 }
 
@@ -342,7 +342,7 @@ impl PacketSink for UsbSink {
     }
 }
 
-/// A link that was open and is no more.
+/// The I/O error for a link that broke.
 fn broken(error: rusb::Error) -> io::Error {
     let kind = if matches!(error, rusb::Error::NoDevice | rusb::Error::NotFound) {
         io::ErrorKind::NotConnected

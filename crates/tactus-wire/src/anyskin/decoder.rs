@@ -1,6 +1,6 @@
 //! Frames out of a stream of bytes that marks only their ends, and not only these.
 
-use super::{FRAME_BYTES, Frame};
+use super::{DecodedFrame, FRAME_BYTES};
 
 /// So many frames in a row must end where they should before the first is believed.
 pub const CONFIRMING_FRAMES: usize = 3;
@@ -47,9 +47,9 @@ impl Decoder {
     }
 
     /// The next frame, or `None` until more is pushed.
-    pub fn next_frame(&mut self) -> Option<Frame> {
+    pub fn next_frame(&mut self) -> Option<DecodedFrame> {
         if self.in_step {
-            if let Some(frame) = Frame::parse(self.whole_at(self.start)?) {
+            if let Some(frame) = DecodedFrame::parse(self.whole_at(self.start)?) {
                 self.start += FRAME_BYTES;
                 return Some(frame);
             }
@@ -61,7 +61,7 @@ impl Decoder {
             self.stats.skipped_bytes += 1;
         }
         self.in_step = true;
-        let frame = Frame::parse(self.whole_at(self.start)?)?;
+        let frame = DecodedFrame::parse(self.whole_at(self.start)?)?;
         self.start += FRAME_BYTES;
         Some(frame)
     }
@@ -74,7 +74,7 @@ impl Decoder {
     /// Whether plausible frames follow each other from `at`; `None` if not enough has arrived to know.
     fn goes_on_from(&self, at: usize) -> Option<bool> {
         for count in 0..CONFIRMING_FRAMES {
-            let frame = Frame::parse(self.whole_at(at + count * FRAME_BYTES)?);
+            let frame = DecodedFrame::parse(self.whole_at(at + count * FRAME_BYTES)?);
             if !frame.is_some_and(|frame| frame.is_plausible()) {
                 return Some(false);
             }

@@ -1,14 +1,14 @@
 use proptest::prelude::*;
 
 use super::{CONFIRMING_FRAMES, Decoder, DecoderStats};
-use crate::anyskin::{FRAME_BYTES, Frame, Magnetometer};
+use crate::anyskin::{DecodedFrame, FRAME_BYTES, Magnetometer};
 use crate::pieces::cut;
 
 /// A frame that is told from others by its number.
 fn frame(number: u8) -> Vec<u8> {
     let mut magnetometers = [Magnetometer { temperature_c: 24.5, field_ut: [12.25, -310.0, 55.5] }; 5];
     magnetometers[2].field_ut[1] = f32::from(number);
-    Frame { magnetometers }.encode()
+    DecodedFrame { magnetometers }.encode()
 }
 
 /// A frame with what ends frames in its numbers.

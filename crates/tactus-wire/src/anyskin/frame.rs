@@ -17,7 +17,7 @@ const PLAUSIBLE: core::ops::Range<f32> = 1e-9..1e9;
 
 /// One reading of all magnetometers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Frame {
+pub struct DecodedFrame {
     /// In the order of the wire.
     pub magnetometers: [Magnetometer; MAGNETOMETERS],
 }
@@ -32,7 +32,7 @@ pub struct Magnetometer {
     pub field_ut: [f32; 3],
 }
 
-impl Frame {
+impl DecodedFrame {
     /// Reads a frame, if that is its end.
     pub fn parse(bytes: &[u8; FRAME_BYTES]) -> Option<Self> {
         let (magnetometers, end) = bytes.as_chunks::<MAGNETOMETER_BYTES>();

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::{Decoder, DecoderStats, Frame};
+use super::{DecodedFrame, Decoder, DecoderStats};
 use crate::sensor::{
     self, Action, Cause, Loss, LossEvidence, NO_FRAME_AFTER, Reading, SILENT_AFTER, StreamFault, Watchdog,
 };
@@ -23,7 +23,7 @@ impl Session {
         Self::default()
     }
 
-    fn read(&mut self, frame: &Frame) -> Reading {
+    fn read(&mut self, frame: &DecodedFrame) -> Reading {
         let last_stats = core::mem::replace(&mut self.last_stats, self.decoder.stats());
         let damaged = core::mem::replace(&mut self.any_frame, true) && last_stats != self.last_stats;
         let counts: Vec<f32> =

@@ -1,7 +1,7 @@
 use core::time::Duration;
 
 use super::Session;
-use crate::anyskin::{Frame, Magnetometer};
+use crate::anyskin::{DecodedFrame, Magnetometer};
 use crate::sensor::{Action, Cause, LossEvidence, Reading, Session as _};
 
 fn ms(ms: u64) -> Duration {
@@ -9,7 +9,7 @@ fn ms(ms: u64) -> Duration {
 }
 
 fn bytes(field_ut: [f32; 3]) -> Vec<u8> {
-    Frame { magnetometers: [Magnetometer { temperature_c: 25.0, field_ut }; 5] }.encode()
+    DecodedFrame { magnetometers: [Magnetometer { temperature_c: 25.0, field_ut }; 5] }.encode()
 }
 
 fn reading(evidence: LossEvidence) -> Action {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::inspect::Verdict;
 use super::{Format, Framing};
-use crate::wrapping::{Step, Wrapping};
+use crate::unwrapper::{Advance, Unwrapper};
 
 /// Finds frames in a stream that may be cut anywhere and hold garbage, or in packets.
 ///
@@ -24,8 +24,8 @@ pub struct Decoder {
     start: usize,
     /// Bytes that are no longer held.
     gone: u64,
-    sequence: Option<Wrapping>,
-    clock: Option<Wrapping>,
+    sequence: Option<Unwrapper>,
+    clock: Option<Unwrapper>,
     wire: Vec<f32>,
     counts: Vec<f32>,
     bad: Vec<usize>,
@@ -53,7 +53,7 @@ pub struct DecoderStats {
 
 /// One reading of all elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame<'a> {
+pub struct DecodedFrame<'a> {
     /// Where it begins: bytes that were pushed before it.
     pub at: u64,
     /// The count of frames, unwrapped, if there is one.
@@ -80,8 +80,8 @@ impl Decoder {
             bytes: Vec::with_capacity(2 * format.bytes),
             start: 0,
             gone: 0,
-            sequence: format.sequence.map(|sequence| Wrapping::new(sequence.wrap)),
-            clock: format.timestamp.map(|timestamp| Wrapping::new(timestamp.wrap)),
+            sequence: format.sequence.map(|sequence| Unwrapper::new(sequence.wrap)),
+            clock: format.timestamp.map(|timestamp| Unwrapper::new(timestamp.wrap)),
             wire: Vec::with_capacity(elements),
             counts: Vec::with_capacity(elements),
             bad: Vec::new(),
@@ -110,7 +110,7 @@ impl Decoder {
     }
 
     /// The next frame, or `None` until more is pushed.
-    pub fn next_frame(&mut self) -> Option<Frame<'_>> {
+    pub fn next_frame(&mut self) -> Option<DecodedFrame<'_>> {
         loop {
             self.skip_to_head();
             let rest = self.bytes.get(self.start..)?;
@@ -167,7 +167,7 @@ impl Decoder {
     }
 
     /// The frame at `start`, which is then done with.
-    fn accept(&mut self) -> Option<Frame<'_>> {
+    fn accept(&mut self) -> Option<DecodedFrame<'_>> {
         let format = &*self.format;
         let frame = self.bytes.get(self.start..)?.get(..format.bytes)?;
         let at = self.gone + self.start as u64;
@@ -177,23 +177,23 @@ impl Decoder {
         let clock = read(format.timestamp.map(|timestamp| timestamp.field))
             .and_then(|raw| self.clock.as_mut().map(|clock| clock.advance(raw)));
         let lost_before = match sequence {
-            Some(Step::Ahead { by, .. }) => by - 1,
-            Some(Step::Anew { .. } | Step::Same { .. }) | None => 0,
+            Some(Advance::Ahead { by, .. }) => by - 1,
+            Some(Advance::Anew { .. } | Advance::Same { .. }) | None => 0,
         };
         let may_be_stale = format.timestamp.is_some_and(|timestamp| timestamp.unchanged_is_stale);
-        let stale = may_be_stale && matches!(clock, Some(Step::Same { .. }));
+        let stale = may_be_stale && matches!(clock, Some(Advance::Same { .. }));
         format.samples.decode(frame, &mut self.wire, &mut self.counts);
         format.samples.find_bad(&self.counts, &mut self.bad);
         self.start += format.bytes;
         self.stats.frames += 1;
         self.stats.lost_frames = self.stats.lost_frames.saturating_add(lost_before);
         self.stats.stale_frames += u64::from(stale);
-        Some(Frame {
+        Some(DecodedFrame {
             at,
-            sequence: sequence.map(Step::total),
+            sequence: sequence.map(Advance::total),
             lost_before,
-            tick: clock.map(Step::total),
-            new_clock: matches!(clock, Some(Step::Anew { .. })),
+            tick: clock.map(Advance::total),
+            new_clock: matches!(clock, Some(Advance::Anew { .. })),
             stale,
             counts: &self.counts,
             bad: &self.bad,

@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use super::ticks::TickLength;
-use super::{Decoder, DecoderStats, Format, Frame, Framing};
+use super::{DecodedFrame, Decoder, DecoderStats, Format, Framing};
 use crate::sensor::{
     self, Action, Cause, Loss, LossEvidence, NO_FRAME_AFTER, Reading, SILENT_AFTER, StreamFault, Watchdog,
 };
@@ -165,7 +165,7 @@ impl sensor::Session for Session {
 }
 
 /// What the device's frame count shows; `None` where the count itself started again.
-fn counted(frame: &Frame<'_>, previous: Option<u64>, wrap: u64) -> Option<LossEvidence> {
+fn counted(frame: &DecodedFrame<'_>, previous: Option<u64>, wrap: u64) -> Option<LossEvidence> {
     let lost = frame.lost_before;
     let continues = previous
         .zip(frame.sequence)
@@ -175,7 +175,7 @@ fn counted(frame: &Frame<'_>, previous: Option<u64>, wrap: u64) -> Option<LossEv
 
 /// Whether the device's clock advanced by more than the host's clock allows.
 fn is_set_forward(
-    frame: &Frame<'_>,
+    frame: &DecodedFrame<'_>,
     previous: Option<(u64, Duration)>,
     ticks: TickLength,
     now: Duration,

@@ -97,12 +97,13 @@ fn histogram<'a>(bytes: impl IntoIterator<Item = &'a u8>) -> [usize; 256] {
 
 /// The proposal for a stride, if bytes mark each frame once.
 fn proposal(bytes: &[u8], stride: usize, likeness: f64) -> Option<Proposal> {
-    let columns: Vec<Column> = (0..stride).map(|phase| Column::of(bytes, stride, phase)).collect();
-    let mut runs: Vec<Run> = runs(&columns).into_iter().map(|run| Run::of(&columns, run)).collect();
+    let columns: Vec<ByteColumn> = (0..stride).map(|phase| ByteColumn::of(bytes, stride, phase)).collect();
+    let mut runs: Vec<ConstantRun> =
+        runs(&columns).into_iter().map(|run| ConstantRun::of(&columns, run)).collect();
     runs.sort_by_key(|run| Reverse((run.telling, run.after_varied)));
     let mark = runs.iter().take(RUNS_LOOKED_FOR).find_map(|run| run.mark(bytes, stride))?;
     let first_at = find(bytes, &mark.sync).next()?;
-    let from_sync = |matches: fn(&Column) -> bool| -> Vec<usize> {
+    let from_sync = |matches: fn(&ByteColumn) -> bool| -> Vec<usize> {
         let phases = columns.iter().cycle().skip(mark.phase).take(stride).enumerate();
         phases.filter(|(_, column)| matches(column)).map(|(offset, _)| offset).collect()
     };
@@ -117,7 +118,7 @@ fn proposal(bytes: &[u8], stride: usize, likeness: f64) -> Option<Proposal> {
 }
 
 /// The bytes at one place of all frames.
-struct Column {
+struct ByteColumn {
     /// Theirs, if they are all the same.
     value: Option<u8>,
     /// They step by one.
@@ -126,7 +127,7 @@ struct Column {
     kinds: usize,
 }
 
-impl Column {
+impl ByteColumn {
     fn of(bytes: &[u8], stride: usize, phase: usize) -> Self {
         let values = || bytes.iter().skip(phase).step_by(stride);
         let counts = histogram(values());
@@ -142,7 +143,7 @@ impl Column {
 }
 
 /// Where runs of constant columns begin, and how long they are; a run may go on at the beginning.
-fn runs(columns: &[Column]) -> Vec<(usize, usize)> {
+fn runs(columns: &[ByteColumn]) -> Vec<(usize, usize)> {
     let stride = columns.len();
     let constant = |phase: usize| columns.get(phase % stride).is_some_and(|column| column.value.is_some());
     (0..stride)
@@ -152,7 +153,7 @@ fn runs(columns: &[Column]) -> Vec<(usize, usize)> {
 }
 
 /// Columns side by side in which nothing changes.
-struct Run {
+struct ConstantRun {
     phase: usize,
     values: Vec<u8>,
     /// Bytes that are neither 0x00 nor 0xFF, which are rare outside of marks.
@@ -162,13 +163,13 @@ struct Run {
 }
 
 /// Constant bytes that are there once in every stride.
-struct Mark {
+struct SyncCandidate {
     phase: usize,
     sync: Vec<u8>,
 }
 
-impl Run {
-    fn of(columns: &[Column], (phase, length): (usize, usize)) -> Self {
+impl ConstantRun {
+    fn of(columns: &[ByteColumn], (phase, length): (usize, usize)) -> Self {
         let values: Vec<u8> =
             columns.iter().cycle().skip(phase).take(length).filter_map(|column| column.value).collect();
         let telling = values.iter().filter(|byte| !matches!(byte, 0x00 | 0xFF)).count();
@@ -177,7 +178,7 @@ impl Run {
     }
 
     /// Its shortest beginning of two bytes or more, or else its first byte, that is there once in every stride.
-    fn mark(&self, bytes: &[u8], stride: usize) -> Option<Mark> {
+    fn mark(&self, bytes: &[u8], stride: usize) -> Option<SyncCandidate> {
         let expected = bytes.len() as f64 / stride as f64;
         let is_mark = |sync: &&[u8]| {
             let found = find(bytes, sync).take(bytes.len() / stride * 2 + 2).count() as f64;
@@ -185,7 +186,7 @@ impl Run {
         };
         let lengths = (2..=self.values.len().min(MAX_SYNC_BYTES)).chain([1]);
         let sync = lengths.filter_map(|length| self.values.get(..length)).find(is_mark)?.to_vec();
-        Some(Mark { phase: self.phase, sync })
+        Some(SyncCandidate { phase: self.phase, sync })
     }
 }
 

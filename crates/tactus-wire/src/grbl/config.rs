@@ -28,31 +28,17 @@ pub struct Axis {
 
 /// Why a configuration makes no stage.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ConfigError {
     /// A number of the stage is not more than 0.
     #[error("{field} is {value}, but must be more than 0")]
-    NotPositive {
-        /// Which number.
-        field: &'static str,
-        /// What it is.
-        value: f64,
-    },
+    NotPositive { field: &'static str, value: f64 },
     /// An origin is no place.
     #[error("{name}: origin_mm is {value}, but must be a number")]
-    Origin {
-        /// Of which axis.
-        name: AxisName,
-        /// What it is.
-        value: f64,
-    },
+    Origin { name: AxisName, value: f64 },
     /// An axis of the controller would serve two of the stage.
     #[error("{first} and {second} are the same axis of the controller")]
-    Same {
-        /// The one.
-        first: AxisName,
-        /// The other.
-        second: AxisName,
-    },
+    Same { first: AxisName, second: AxisName },
 }
 
 impl Config {

@@ -10,16 +10,16 @@ const SILENCE_MAX: Duration = Duration::from_secs(2);
 
 /// Asks for status reports, one at a time.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Poll {
-    /// When the last question was sent.
+pub(super) struct StatusPoll {
+    /// When the last query was sent.
     last: Option<Duration>,
     /// When the first of the questions that stand unanswered was sent.
     waiting: Option<Duration>,
-    /// The next question does not wait for its turn.
+    /// The next query does not wait for its turn.
     at_once: bool,
 }
 
-impl Poll {
+impl StatusPoll {
     /// When to ask next, if questions are `interval` apart.
     pub(super) fn next(&self, interval: Duration) -> Duration {
         match (self.last, self.waiting) {
@@ -29,12 +29,12 @@ impl Poll {
         }
     }
 
-    /// Asks as soon as no question stands unanswered.
+    /// Asks as soon as no query stands unanswered.
     pub(super) fn at_once(&mut self) {
         self.at_once = true;
     }
 
-    /// A question goes out now.
+    /// A query goes out now.
     pub(super) fn sent(&mut self, now: Duration) {
         self.last = Some(now);
         self.waiting.get_or_insert(now);
@@ -46,12 +46,12 @@ impl Poll {
         self.waiting.take()
     }
 
-    /// True if the last question was asked again for lack of an answer.
+    /// True if the last query was asked again for lack of an answer.
     pub(super) fn is_repeated(&self) -> bool {
         self.waiting.is_some() && self.waiting != self.last
     }
 
-    /// Forgets a question that a reset has swallowed.
+    /// Forgets a query that a reset has swallowed.
     pub(super) fn reset(&mut self) {
         *self = Self::default();
     }

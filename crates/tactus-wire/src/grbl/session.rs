@@ -9,9 +9,9 @@ use core::time::Duration;
 
 use phase::{Phase, Purpose};
 
-use super::poll::Poll;
+use super::active_move::ActiveMove;
+use super::poll::StatusPoll;
 use super::settings::Settings;
-use super::travel::Travel;
 use super::{Config, ConfigError, FEED_HOLD, MachineState, Response, alarm_meaning};
 use crate::lines::Lines;
 use crate::stage::{self, Alarm, Cause, Failure, Session as _, distance_mm};
@@ -42,7 +42,7 @@ const SAME_PLACE_MM: f64 = 0.0005;
 pub struct Session {
     config: Config,
     lines: Lines,
-    poll: Poll,
+    poll: StatusPoll,
     phase: Phase,
     homed: bool,
     /// In alarm, with its number; 0 if it was not told.
@@ -68,7 +68,7 @@ impl Session {
         Ok(Self {
             config,
             lines: Lines::default(),
-            poll: Poll::default(),
+            poll: StatusPoll::default(),
             phase: Phase::Over,
             homed: false,
             alarm: None,
@@ -160,7 +160,7 @@ impl stage::Session for Session {
         if self.is_over() {
             return Vec::new();
         }
-        let travel = Travel::new(now, &self.config, self.position_mm, target_mm, speed_mm_per_s);
+        let travel = ActiveMove::new(now, &self.config, self.position_mm, target_mm, speed_mm_per_s);
         let checked = self
             .check_ready(travel.line())
             .and_then(|()| check_numbers(travel.line(), target_mm, speed_mm_per_s))
@@ -233,7 +233,7 @@ impl stage::Session for Session {
         // In an alarm the controller may keep silent until it is reset.
         let excused = self.alarm.is_some() && self.is_ready();
         if self.poll_interval().is_some() && self.poll.is_silent(now) && !excused {
-            self.fail(SessionError::Silent { question: "for its status" });
+            self.fail(SessionError::Silent { query: "for its status" });
         }
         self.finish(now)
     }

@@ -46,21 +46,16 @@ pub struct ElementReading {
 
 /// A reply is not the reading that was asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ReplyError {
     /// The element did not answer the board.
     #[error(
         "the element at address {address} did not answer on the I2C bus; check its address and its cable"
     )]
-    TimedOut {
-        /// Of the element.
-        address: u8,
-    },
+    TimedOut { address: u8 },
     /// Another number of bytes.
     #[error("a reading has 6 bytes, not {bytes}")]
-    Length {
-        /// As received.
-        bytes: usize,
-    },
+    Length { bytes: usize },
 }
 
 impl<'a> Reply<'a> {

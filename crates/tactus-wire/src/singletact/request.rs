@@ -62,27 +62,17 @@ pub enum Operation<'a> {
 
 /// Why a request cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum RequestError {
     /// No such address on an I2C bus.
     #[error("address {address} is not below 128")]
-    Address {
-        /// As given.
-        address: u8,
-    },
+    Address { address: u8 },
     /// More bytes than a transfer holds, or none at all where some must be.
     #[error("{bytes} bytes do not fit: reads take up to 32, writes 1 to 28")]
-    Length {
-        /// As given.
-        bytes: usize,
-    },
+    Length { bytes: usize },
     /// The register ends before, or may only be read there.
     #[error("location {location} and {bytes} bytes: reads end at 191, writes at 128")]
-    Location {
-        /// Where it was to begin.
-        location: u8,
-        /// How many bytes.
-        bytes: usize,
-    },
+    Location { location: u8, bytes: usize },
 }
 
 impl Request<'static> {

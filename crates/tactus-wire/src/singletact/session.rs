@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use super::{Decoder, Reply, ReplyError, Request};
 use crate::sensor::{self, Action, Cause, Loss, LossEvidence, Reading};
-use crate::wrapping::{Step, Wrapping};
+use crate::unwrapper::{Advance, Unwrapper};
 
 /// Length of a tick of the board's clock.
 pub const TICK: Duration = Duration::from_micros(100);
@@ -28,7 +28,7 @@ pub struct Session {
     interval: Duration,
     elements: Vec<Element>,
     decoder: Decoder,
-    clock: Wrapping,
+    clock: Unwrapper,
     state: State,
     next_id: u8,
     round_begun: Duration,
@@ -54,22 +54,17 @@ pub struct Config {
 
 /// Why these elements cannot be polled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ConfigError {
     /// The list is empty.
     #[error("there is no address to poll: name at least one, 4 if the element was given none of its own")]
     NoAddress,
     /// No such address on an I2C bus.
     #[error("address {address} is not below 128")]
-    Address {
-        /// As given.
-        address: u8,
-    },
+    Address { address: u8 },
     /// Twice the same.
     #[error("address {address} is there twice: give each element its own")]
-    Twice {
-        /// As given.
-        address: u8,
-    },
+    Twice { address: u8 },
 }
 
 /// Why an element gives no more readings.
@@ -99,7 +94,7 @@ struct Round {
 struct Element {
     address: u8,
     /// The element's own count of its readings.
-    counter: Wrapping,
+    counter: Unwrapper,
     /// When its counter last advanced.
     fresh: Option<Duration>,
     /// Polls in a row without an answer, or with one that is no reading.
@@ -137,7 +132,7 @@ impl Session {
             interval,
             elements: addresses.into_iter().map(Element::new).collect(),
             decoder: Decoder::new(),
-            clock: Wrapping::new(1 << 32),
+            clock: Unwrapper::new(1 << 32),
             state: State::Unstarted,
             next_id: 0,
             round_begun: Duration::ZERO,
@@ -336,12 +331,12 @@ impl sensor::Session for Session {
 }
 
 impl Round {
-    fn take(&mut self, place: usize, counts: u16, clock: Step) {
+    fn take(&mut self, place: usize, counts: u16, clock: Advance) {
         if let Some(to) = self.counts.get_mut(place) {
             *to = Some(counts);
         }
         self.tick = clock.total();
-        self.new_clock |= matches!(clock, Step::Anew { .. });
+        self.new_clock |= matches!(clock, Advance::Anew { .. });
     }
 
     /// The reading, if any element was read, with `lost` readings missing before it; empties the round.
@@ -364,12 +359,12 @@ impl Round {
 
 impl Element {
     fn new(address: u8) -> Self {
-        Self { address, counter: Wrapping::new(1 << 16), fresh: None, failed: 0, lost: false }
+        Self { address, counter: Unwrapper::new(1 << 16), fresh: None, failed: 0, lost: false }
     }
 
     /// Whether its counter has advanced; then it is no longer lost.
     fn is_fresh(&mut self, now: Duration, counter: u16) -> bool {
-        if matches!(self.counter.advance(counter.into()), Step::Same { .. }) {
+        if matches!(self.counter.advance(counter.into()), Advance::Same { .. }) {
             return false;
         }
         self.fresh = Some(now);

@@ -13,7 +13,7 @@ const ELSEWHERE_MIN: Duration = Duration::from_millis(200);
 
 /// A place that is to be reached.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Arrival {
+pub(crate) struct ArrivalCheck {
     target_mm: [f64; 3],
     sent: Duration,
     overdue: Duration,
@@ -32,7 +32,7 @@ pub(crate) enum Judgement {
     NotThere,
 }
 
-impl Arrival {
+impl ArrivalCheck {
     /// At a place for which the stage sets out now, and which it should reach within `expected_s`.
     pub(crate) fn new(now: Duration, target_mm: [f64; 3], expected_s: f64) -> Self {
         let expected = Duration::try_from_secs_f64(2.0 * expected_s).unwrap_or(Duration::MAX);

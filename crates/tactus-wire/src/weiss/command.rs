@@ -37,7 +37,7 @@ pub fn acknowledge(id: u8, code: ErrorCode) -> Vec<u8> {
 
 /// A command as the device reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Command {
+pub enum HostCommand {
     /// [`query_controller`].
     QueryController,
     /// [`query_sensor`].
@@ -60,24 +60,17 @@ pub enum Command {
 
 /// Why a packet is not a command that is known here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum CommandError {
     /// No such command.
     #[error("there is no command {id:#04x}")]
-    Unknown {
-        /// The packet's id.
-        id: u8,
-    },
+    Unknown { id: u8 },
     /// Its payload has another length.
     #[error("command {id:#04x} with {bytes} bytes of payload")]
-    Length {
-        /// The packet's id.
-        id: u8,
-        /// Length of the payload.
-        bytes: usize,
-    },
+    Length { id: u8, bytes: usize },
 }
 
-impl Command {
+impl HostCommand {
     /// Reads a command.
     ///
     /// # Errors

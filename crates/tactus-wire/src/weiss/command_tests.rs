@@ -1,10 +1,10 @@
-use super::{Command, CommandError, acknowledge, acquire, query_controller, query_matrix, query_sensor};
+use super::{CommandError, HostCommand, acknowledge, acquire, query_controller, query_matrix, query_sensor};
 use crate::weiss::{Decoder, ErrorCode, Packet};
 
-fn read(bytes: &[u8]) -> Command {
+fn read(bytes: &[u8]) -> HostCommand {
     let mut decoder = Decoder::new();
     decoder.push(bytes);
-    Command::parse(&decoder.next_packet().unwrap().unwrap()).unwrap()
+    HostCommand::parse(&decoder.next_packet().unwrap().unwrap()).unwrap()
 }
 
 /// As in `packet_tests`: laid out by hand, checksums by a separate program.
@@ -21,17 +21,20 @@ fn golden() {
 
 #[test]
 fn the_device_reads_what_the_host_writes() {
-    assert_eq!(read(&query_controller()), Command::QueryController);
-    assert_eq!(read(&query_sensor()), Command::QuerySensor);
-    assert_eq!(read(&query_matrix(3)), Command::QueryMatrix { matrix: 3 });
-    assert_eq!(read(&acquire(true, false, 260)), Command::Acquire { run: true, run_length: false, fps: 260 });
-    assert_eq!(read(&acquire(false, true, 0)), Command::Acquire { run: false, run_length: true, fps: 0 });
+    assert_eq!(read(&query_controller()), HostCommand::QueryController);
+    assert_eq!(read(&query_sensor()), HostCommand::QuerySensor);
+    assert_eq!(read(&query_matrix(3)), HostCommand::QueryMatrix { matrix: 3 });
+    assert_eq!(
+        read(&acquire(true, false, 260)),
+        HostCommand::Acquire { run: true, run_length: false, fps: 260 }
+    );
+    assert_eq!(read(&acquire(false, true, 0)), HostCommand::Acquire { run: false, run_length: true, fps: 0 });
 }
 
 #[test]
 fn other_packets_are_named() {
-    let unknown = Command::parse(&Packet { id: 0x0A, payload: &[] });
+    let unknown = HostCommand::parse(&Packet { id: 0x0A, payload: &[] });
     assert_eq!(unknown, Err(CommandError::Unknown { id: 0x0A }));
-    let long = Command::parse(&Packet { id: 3, payload: &[0; 4] });
+    let long = HostCommand::parse(&Packet { id: 3, payload: &[0; 4] });
     assert_eq!(long, Err(CommandError::Length { id: 3, bytes: 4 }));
 }

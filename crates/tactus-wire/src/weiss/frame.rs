@@ -10,7 +10,7 @@ const MAX_RUN_COUNTS: u16 = 0x0FFF;
 
 /// One reading of all elements.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Frame {
+pub struct DecodedFrame {
     /// The controller's clock in ms; wraps after 49.7 days.
     pub timestamp_ms: u32,
     /// True if the counts came run-length encoded.
@@ -21,30 +21,20 @@ pub struct Frame {
 
 /// Why a packet is not the frame that was expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum FrameError {
     /// The packet is something else.
     #[error("packet {id:#04x} is not a frame")]
-    NotAFrame {
-        /// The packet's id.
-        id: u8,
-    },
+    NotAFrame { id: u8 },
     /// The payload ends before the counts begin, or within one.
     #[error("a frame of {bytes} bytes has no whole number of counts")]
-    Length {
-        /// Length of the payload.
-        bytes: usize,
-    },
+    Length { bytes: usize },
     /// Another array than expected.
     #[error("the frame has {found} elements, the rig's array has {expected}")]
-    Elements {
-        /// As the rig says.
-        expected: usize,
-        /// As received.
-        found: usize,
-    },
+    Elements { expected: usize, found: usize },
 }
 
-impl Frame {
+impl DecodedFrame {
     /// Reads a frame of exactly `elements` counts.
     ///
     /// # Errors

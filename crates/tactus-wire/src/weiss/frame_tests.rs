@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use super::{Frame, FrameError, encode_frame};
+use super::{DecodedFrame, FrameError, encode_frame};
 use crate::weiss::{Decoder, Packet};
 
 /// Laid out by hand from the published format, checksums by a separate program.
@@ -17,10 +17,10 @@ const RUN_LENGTH: [u8; 19] = [
 
 const COUNTS: [u16; 4] = [100, 100, 4095, 0];
 
-fn read(bytes: &[u8], elements: usize) -> Result<Frame, FrameError> {
+fn read(bytes: &[u8], elements: usize) -> Result<DecodedFrame, FrameError> {
     let mut decoder = Decoder::with_max_payload(65_535);
     decoder.push(bytes);
-    Frame::parse(&decoder.next_packet().unwrap().unwrap(), elements)
+    DecodedFrame::parse(&decoder.next_packet().unwrap().unwrap(), elements)
 }
 
 #[test]
@@ -32,8 +32,8 @@ fn golden_bytes() {
 #[test]
 fn both_forms_read_the_same() {
     let plain = read(&PLAIN, 4).unwrap();
-    assert_eq!(plain, Frame { timestamp_ms: 0x1234_5678, run_length: false, counts: COUNTS.to_vec() });
-    assert_eq!(read(&RUN_LENGTH, 4).unwrap(), Frame { run_length: true, ..plain });
+    assert_eq!(plain, DecodedFrame { timestamp_ms: 0x1234_5678, run_length: false, counts: COUNTS.to_vec() });
+    assert_eq!(read(&RUN_LENGTH, 4).unwrap(), DecodedFrame { run_length: true, ..plain });
 }
 
 #[test]
@@ -60,12 +60,15 @@ fn a_wrong_array_is_named_with_both_numbers() {
 
 #[test]
 fn broken_payloads_are_named() {
-    let parse = |payload: &[u8]| Frame::parse(&Packet { id: 0, payload }, 1);
+    let parse = |payload: &[u8]| DecodedFrame::parse(&Packet { id: 0, payload }, 1);
     assert_eq!(parse(&[]), Err(FrameError::Length { bytes: 0 }));
     assert_eq!(parse(&[0; 4]), Err(FrameError::Length { bytes: 4 }));
     assert_eq!(parse(&[0; 6]), Err(FrameError::Length { bytes: 6 }));
     assert_eq!(parse(&[0; 5]), Err(FrameError::Elements { expected: 1, found: 0 }));
-    assert_eq!(Frame::parse(&Packet { id: 9, payload: &[0; 7] }, 1), Err(FrameError::NotAFrame { id: 9 }));
+    assert_eq!(
+        DecodedFrame::parse(&Packet { id: 9, payload: &[0; 7] }, 1),
+        Err(FrameError::NotAFrame { id: 9 })
+    );
 }
 
 proptest! {
@@ -76,12 +79,12 @@ proptest! {
         run_length: bool,
     ) {
         let frame = read(&encode_frame(timestamp_ms, &counts, run_length), counts.len()).unwrap();
-        prop_assert_eq!(frame, Frame { timestamp_ms, run_length, counts });
+        prop_assert_eq!(frame, DecodedFrame { timestamp_ms, run_length, counts });
     }
 
     #[test]
     fn any_payload_is_read_or_refused(payload: Vec<u8>, elements in 0..100usize) {
-        if let Ok(frame) = Frame::parse(&Packet { id: 0, payload: &payload }, elements) {
+        if let Ok(frame) = DecodedFrame::parse(&Packet { id: 0, payload: &payload }, elements) {
             prop_assert_eq!(frame.counts.len(), elements);
         }
     }

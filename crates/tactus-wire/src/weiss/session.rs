@@ -2,9 +2,9 @@
 
 use core::time::Duration;
 
-use super::ticks::{Placed, Ticks};
+use super::ticks::{TickOrder, TickUnwrapper};
 use super::{
-    Checksum, ControllerInfo, Decoder, ErrorCode, Frame, FrameError, InfoError, MatrixInfo, Packet,
+    Checksum, ControllerInfo, DecodedFrame, Decoder, ErrorCode, FrameError, InfoError, MatrixInfo, Packet,
     SensorInfo, acquire, id, query_controller, query_matrix, query_sensor,
 };
 use crate::sensor::{self, Action, Cause, Loss, LossEvidence, Reading};
@@ -12,10 +12,10 @@ use crate::sensor::{self, Action, Cause, Loss, LossEvidence, Reading};
 /// Length of a tick of the controller's clock.
 pub const TICK: Duration = Duration::from_millis(1);
 
-/// A question that is not answered is asked again after this; an acquisition without fresh frames too.
+/// A query that is not answered is asked again after this; an acquisition without fresh frames too.
 pub const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// How often a question is asked before the link is given up: well over the 8 s that the controller takes to boot.
+/// How often a query is asked before the link is given up: well over the 8 s that the controller takes to boot.
 const ASKED_MAX: u32 = 15;
 
 /// Reads one connection to a controller: switches the acquisition off, queries the controller, its sensor and matrix,
@@ -24,7 +24,7 @@ const ASKED_MAX: u32 = 15;
 pub struct Session {
     config: Config,
     decoder: Decoder,
-    ticks: Ticks,
+    ticks: TickUnwrapper,
     state: State,
     device: Device,
     /// Frames that were dropped because they came twice or late.
@@ -57,41 +57,32 @@ struct Device {
 
 /// Why a session is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum SessionError {
-    /// A question was asked again and again without an answer.
-    #[error("the controller did not answer {asked} times to {question}")]
-    Silent {
-        /// What was asked.
-        question: &'static str,
-        /// How often.
-        asked: u32,
-    },
+    /// A query was asked again and again without an answer.
+    #[error("the controller did not answer {asked} times to {query}")]
+    Silent { query: &'static str, asked: u32 },
     /// The controller refused.
-    #[error("the controller refused {question}: error {}, {}", code.0, code.meaning())]
-    Refused {
-        /// What was asked.
-        question: &'static str,
-        /// Why.
-        code: ErrorCode,
-    },
+    #[error("the controller refused {query}: error {}, {}", code.0, code.meaning())]
+    Refused { query: &'static str, code: ErrorCode },
     /// The controller answers in another form.
     #[error("{0}")]
     Answer(#[from] InfoError),
     /// The controller sends other frames.
     #[error("{0}")]
-    Frame(#[from] FrameError),
+    DecodedFrame(#[from] FrameError),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    Asking { question: Question, asked: u32, deadline: Duration },
+    Asking { query: Query, asked: u32, deadline: Duration },
     Running { deadline: Duration },
     Over,
 }
 
 /// The questions in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Question {
+enum Query {
     SwitchOff,
     Controller,
     Sensor,
@@ -108,21 +99,21 @@ impl Session {
         Self {
             config,
             decoder: Decoder::with_max_payload(max_payload_bytes).with_checksum(config.checksum),
-            ticks: Ticks::default(),
+            ticks: TickUnwrapper::default(),
             state: State::Over,
             device: Device::default(),
             stale_frames: 0,
         }
     }
 
-    fn ask(&mut self, now: Duration, question: Question, asked: u32) -> Action {
-        self.state = State::Asking { question, asked, deadline: now + ANSWER_TIMEOUT };
-        let packet = match question {
-            Question::SwitchOff => acquire(false, false, 0),
-            Question::Controller => query_controller(),
-            Question::Sensor => query_sensor(),
-            Question::Matrix => query_matrix(0),
-            Question::SwitchOn => acquire(true, self.config.run_length, self.config.fps),
+    fn ask(&mut self, now: Duration, query: Query, asked: u32) -> Action {
+        self.state = State::Asking { query, asked, deadline: now + ANSWER_TIMEOUT };
+        let packet = match query {
+            Query::SwitchOff => acquire(false, false, 0),
+            Query::Controller => query_controller(),
+            Query::Sensor => query_sensor(),
+            Query::Matrix => query_matrix(0),
+            Query::SwitchOn => acquire(true, self.config.run_length, self.config.fps),
         };
         Action::Send(self.config.checksum.close(packet))
     }
@@ -133,34 +124,34 @@ impl Session {
         packet: &Packet<'_>,
         actions: &mut Vec<Action>,
     ) -> Result<(), SessionError> {
-        let State::Asking { question, .. } = self.state else {
+        let State::Asking { query, .. } = self.state else {
             if matches!(self.state, State::Running { .. }) && packet.id == id::FRAME {
                 self.handle_frame(now, packet, actions)?;
             }
             return Ok(());
         };
-        let next = match (question, packet.id) {
-            (Question::SwitchOff, id::ACQUIRE) => Question::Controller,
-            (Question::Controller, id::CONTROLLER) => {
+        let next = match (query, packet.id) {
+            (Query::SwitchOff, id::ACQUIRE) => Query::Controller,
+            (Query::Controller, id::CONTROLLER) => {
                 self.device.controller = ControllerInfo::parse(packet)?;
-                question.check(self.device.controller.error)?;
-                Question::Sensor
+                query.check(self.device.controller.error)?;
+                Query::Sensor
             }
-            (Question::Sensor, id::SENSOR) => {
+            (Query::Sensor, id::SENSOR) => {
                 self.device.sensor = SensorInfo::parse(packet)?;
-                question.check(self.device.sensor.error)?;
-                Question::Matrix
+                query.check(self.device.sensor.error)?;
+                Query::Matrix
             }
-            (Question::Matrix, id::MATRIX) => {
+            (Query::Matrix, id::MATRIX) => {
                 self.device.matrix = MatrixInfo::parse(packet)?;
-                question.check(self.device.matrix.error)?;
-                Question::SwitchOn
+                query.check(self.device.matrix.error)?;
+                Query::SwitchOn
             }
-            (Question::SwitchOn, id::ACQUIRE) => {
+            (Query::SwitchOn, id::ACQUIRE) => {
                 let code = packet.payload.first_chunk().map(|code| ErrorCode(u16::from_le_bytes(*code)));
-                return question.check(code.unwrap_or_default());
+                return query.check(code.unwrap_or_default());
             }
-            (Question::SwitchOn, id::FRAME) => return self.handle_frame(now, packet, actions),
+            (Query::SwitchOn, id::FRAME) => return self.handle_frame(now, packet, actions),
             // Frames of an earlier acquisition, and late answers to questions asked twice.
             _ => return Ok(()),
         };
@@ -174,11 +165,11 @@ impl Session {
         packet: &Packet<'_>,
         actions: &mut Vec<Action>,
     ) -> Result<(), SessionError> {
-        let Frame { timestamp_ms, counts, .. } = Frame::parse(packet, self.config.elements())?;
+        let DecodedFrame { timestamp_ms, counts, .. } = DecodedFrame::parse(packet, self.config.elements())?;
         let (tick_ms, new_clock) = match self.ticks.place(now, timestamp_ms) {
-            Placed::Next { tick_ms } => (tick_ms, false),
-            Placed::NewClock { tick_ms } => (tick_ms, true),
-            Placed::Stale => {
+            TickOrder::Next { tick_ms } => (tick_ms, false),
+            TickOrder::NewClock { tick_ms } => (tick_ms, true),
+            TickOrder::Stale => {
                 self.stale_frames += 1;
                 return Ok(());
             }
@@ -205,8 +196,8 @@ impl Session {
             State::Running { .. } => actions.push(Action::Lost(restarted())),
             State::Asking { .. } => {}
         }
-        self.ticks = Ticks::default();
-        actions.push(self.ask(now, Question::SwitchOff, 1));
+        self.ticks = TickUnwrapper::default();
+        actions.push(self.ask(now, Query::SwitchOff, 1));
     }
 }
 
@@ -223,7 +214,7 @@ impl sensor::Session for Session {
     }
 
     fn start(&mut self, now: Duration) -> Vec<Action> {
-        vec![self.ask(now, Question::SwitchOff, 1)]
+        vec![self.ask(now, Query::SwitchOff, 1)]
     }
 
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
@@ -249,16 +240,16 @@ impl sensor::Session for Session {
 
     fn timer(&mut self, now: Duration) -> Vec<Action> {
         match self.state {
-            State::Asking { question, asked, deadline } if now >= deadline => {
+            State::Asking { query, asked, deadline } if now >= deadline => {
                 if asked < ASKED_MAX {
-                    return vec![self.ask(now, question, asked + 1)];
+                    return vec![self.ask(now, query, asked + 1)];
                 }
                 self.state = State::Over;
-                let error = SessionError::Silent { question: question.name(), asked };
+                let error = SessionError::Silent { query: query.name(), asked };
                 vec![Action::Failed(error.into())]
             }
             State::Running { deadline } if now >= deadline => {
-                vec![Action::Lost(silent()), self.ask(now, Question::SwitchOn, 1)]
+                vec![Action::Lost(silent()), self.ask(now, Query::SwitchOn, 1)]
             }
             State::Asking { .. } | State::Running { .. } | State::Over => Vec::new(),
         }
@@ -311,7 +302,7 @@ impl From<SessionError> for Loss {
                 (Cause::Silent, "is it the sensor, is it switched on, and is the bit rate right?")
             }
             SessionError::Refused { .. } => (Cause::DeviceFault, "see the controller's manual"),
-            SessionError::Answer(_) | SessionError::Frame(_) => {
+            SessionError::Answer(_) | SessionError::DecodedFrame(_) => {
                 (Cause::Protocol, "is it the sensor that the rig file describes?")
             }
         };
@@ -327,7 +318,7 @@ fn restarted() -> Loss {
     Loss::new(Cause::Restarted, "the controller has restarted")
 }
 
-impl Question {
+impl Query {
     fn name(self) -> &'static str {
         match self {
             Self::SwitchOff => "switching the acquisition off",
@@ -342,7 +333,7 @@ impl Question {
         if code == ErrorCode::SUCCESS {
             Ok(())
         } else {
-            Err(SessionError::Refused { question: self.name(), code })
+            Err(SessionError::Refused { query: self.name(), code })
         }
     }
 }

@@ -127,7 +127,7 @@ fn a_booting_controller_is_asked_until_it_answers() {
 fn silence_is_given_up_in_the_end() {
     let mut dialogue = vec![(0, Start, send(acquire(false, false, 0)))];
     dialogue.extend((1..15).map(|s| (s * 1000, Timer, send(acquire(false, false, 0)))));
-    let error = SessionError::Silent { question: "switching the acquisition off", asked: 15 };
+    let error = SessionError::Silent { query: "switching the acquisition off", asked: 15 };
     dialogue.push((15_000, Timer, vec![Action::Failed(error.into())]));
     dialogue.push((15_001, acknowledged(), vec![]));
     assert_eq!(check(dialogue).deadline(), None);
@@ -207,7 +207,7 @@ fn a_clock_that_jumps_is_a_new_clock() {
 #[test]
 fn a_frame_of_another_array_ends_the_session() {
     for elements in [1, 3, 48, 500] {
-        let error = SessionError::Frame(FrameError::Elements { expected: 2, found: elements });
+        let error = SessionError::DecodedFrame(FrameError::Elements { expected: 2, found: elements });
         let other = Hear(encode_frame(1033, &vec![0; elements], false));
         let session = after_greeting(vec![(33, other, vec![Action::Failed(error.into())])]);
         assert_eq!(session.deadline(), None);
@@ -223,11 +223,11 @@ fn a_refusal_ends_the_session() {
         dialogue
     };
     let mut refused = dialogue(5);
-    let question = "switching the acquisition on";
-    refused[5].2 = vec![Action::Failed(SessionError::Refused { question, code: ErrorCode(5) }.into())];
+    let query = "switching the acquisition on";
+    refused[5].2 = vec![Action::Failed(SessionError::Refused { query, code: ErrorCode(5) }.into())];
     check(refused);
     check(dialogue(0));
-    let error = SessionError::Refused { question, code: ErrorCode(5) };
+    let error = SessionError::Refused { query, code: ErrorCode(5) };
     assert_eq!(
         error.to_string(),
         "the controller refused switching the acquisition on: error 5, feature not supported"

@@ -11,14 +11,14 @@ const DELAY_MS: u128 = 1000;
 
 /// Turns the wrapping 32-bit ticks of successive frames into 64-bit ones.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Ticks {
-    last: Option<Last>,
+pub(super) struct TickUnwrapper {
+    last: Option<PreviousTick>,
     /// A frame that seemed late. If the next goes on from it, the clock was set back.
     late: Option<u32>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Last {
+struct PreviousTick {
     raw_ms: u32,
     tick_ms: u64,
     received: Duration,
@@ -26,7 +26,7 @@ struct Last {
 
 /// What a frame's tick says of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Placed {
+pub(super) enum TickOrder {
     /// Later than the frame before, on the same clock.
     Next { tick_ms: u64 },
     /// The first on a new clock: the first at all, or the controller's clock has jumped.
@@ -35,13 +35,13 @@ pub(super) enum Placed {
     Stale,
 }
 
-impl Ticks {
+impl TickUnwrapper {
     /// Places a frame that was received at `now`.
-    pub(super) fn place(&mut self, now: Duration, raw_ms: u32) -> Placed {
+    pub(super) fn place(&mut self, now: Duration, raw_ms: u32) -> TickOrder {
         let Some(last) = self.last else { return self.new_clock(now, raw_ms) };
         let (ahead_ms, behind_ms) = (raw_ms.wrapping_sub(last.raw_ms), last.raw_ms.wrapping_sub(raw_ms));
         if ahead_ms == 0 {
-            return Placed::Stale;
+            return TickOrder::Stale;
         }
         if ahead_ms < behind_ms {
             let elapsed_ms = now.saturating_sub(last.received).as_millis();
@@ -49,23 +49,23 @@ impl Ticks {
                 return self.new_clock(now, raw_ms);
             }
             let tick_ms = last.tick_ms + u64::from(ahead_ms);
-            self.last = Some(Last { raw_ms, tick_ms, received: now });
+            self.last = Some(PreviousTick { raw_ms, tick_ms, received: now });
             self.late = None;
-            return Placed::Next { tick_ms };
+            return TickOrder::Next { tick_ms };
         }
         let goes_on = self.late.is_some_and(|late| (1..LATE_MS).contains(&raw_ms.wrapping_sub(late)));
         if behind_ms > LATE_MS || goes_on {
             return self.new_clock(now, raw_ms);
         }
         self.late = Some(raw_ms);
-        Placed::Stale
+        TickOrder::Stale
     }
 
-    fn new_clock(&mut self, now: Duration, raw_ms: u32) -> Placed {
+    fn new_clock(&mut self, now: Duration, raw_ms: u32) -> TickOrder {
         let tick_ms = u64::from(raw_ms);
-        self.last = Some(Last { raw_ms, tick_ms, received: now });
+        self.last = Some(PreviousTick { raw_ms, tick_ms, received: now });
         self.late = None;
-        Placed::NewClock { tick_ms }
+        TickOrder::NewClock { tick_ms }
     }
 }
 

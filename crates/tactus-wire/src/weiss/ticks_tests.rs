@@ -1,10 +1,10 @@
 use core::time::Duration;
 
-use super::{Placed, Ticks};
+use super::{TickOrder, TickUnwrapper};
 
 /// Places frames given as (host time in ms, tick in ms).
-fn check(frames: &[(u64, u32)], expected: &[Placed]) {
-    let mut ticks = Ticks::default();
+fn check(frames: &[(u64, u32)], expected: &[TickOrder]) {
+    let mut ticks = TickUnwrapper::default();
     let placed: Vec<_> = frames
         .iter()
         .map(|(host_ms, raw_ms)| ticks.place(Duration::from_millis(*host_ms), *raw_ms))
@@ -12,12 +12,12 @@ fn check(frames: &[(u64, u32)], expected: &[Placed]) {
     assert_eq!(placed, expected);
 }
 
-const fn new(tick_ms: u64) -> Placed {
-    Placed::NewClock { tick_ms }
+const fn new(tick_ms: u64) -> TickOrder {
+    TickOrder::NewClock { tick_ms }
 }
 
-const fn next(tick_ms: u64) -> Placed {
-    Placed::Next { tick_ms }
+const fn next(tick_ms: u64) -> TickOrder {
+    TickOrder::Next { tick_ms }
 }
 
 #[test]
@@ -30,19 +30,19 @@ fn ticks_wrap_without_a_trace() {
 
 #[test]
 fn a_frame_twice_is_stale() {
-    check(&[(0, 5), (1, 5), (33, 38), (34, 38)], &[new(5), Placed::Stale, next(38), Placed::Stale]);
+    check(&[(0, 5), (1, 5), (33, 38), (34, 38)], &[new(5), TickOrder::Stale, next(38), TickOrder::Stale]);
 }
 
 #[test]
 fn two_frames_in_the_wrong_order_cost_the_late_one() {
-    check(&[(0, 100), (66, 166), (67, 133), (99, 199)], &[new(100), next(166), Placed::Stale, next(199)]);
+    check(&[(0, 100), (66, 166), (67, 133), (99, 199)], &[new(100), next(166), TickOrder::Stale, next(199)]);
 }
 
 #[test]
 fn a_reordered_pair_after_another_is_still_late() {
     check(
         &[(0, 100), (66, 166), (67, 133), (133, 232), (134, 199)],
-        &[new(100), next(166), Placed::Stale, next(232), Placed::Stale],
+        &[new(100), next(166), TickOrder::Stale, next(232), TickOrder::Stale],
     );
 }
 
@@ -53,7 +53,7 @@ fn a_clock_set_far_back_is_new_at_once() {
 
 #[test]
 fn a_clock_set_back_a_little_costs_one_frame() {
-    check(&[(0, 1000), (33, 533), (66, 566), (99, 600)], &[new(1000), Placed::Stale, new(566), next(600)]);
+    check(&[(0, 1000), (33, 533), (66, 566), (99, 600)], &[new(1000), TickOrder::Stale, new(566), next(600)]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::lines::Lines;
 
 /// A command.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Command {
+pub struct HostCommand {
     /// Address of the device, 1 to 99; 0 means all of them.
     pub device: u8,
     /// Number of the axis, 1 to 9; 0 means the device and all its axes.
@@ -17,7 +17,7 @@ pub struct Command {
     pub text: String,
 }
 
-impl Command {
+impl HostCommand {
     /// The bytes that a host sends.
     pub fn encode(&self, with_checksum: bool) -> Vec<u8> {
         let Self { device, axis, id, text } = self;
@@ -50,16 +50,16 @@ impl Command {
 /// The device's ear, for virtual devices: cuts a stream into commands, whatever way it arrives. What is no
 /// command is dropped and counted.
 #[derive(Debug, Clone, Default)]
-pub struct CommandDecoder {
+pub struct HostCommandDecoder {
     lines: Lines,
     broken: u64,
 }
 
-impl CommandDecoder {
+impl HostCommandDecoder {
     /// Takes what arrived and hands each command to `each`.
-    pub fn push(&mut self, bytes: &[u8], mut each: impl FnMut(Command)) {
+    pub fn push(&mut self, bytes: &[u8], mut each: impl FnMut(HostCommand)) {
         let broken = &mut self.broken;
-        self.lines.push(bytes, |line| match Command::parse(line) {
+        self.lines.push(bytes, |line| match HostCommand::parse(line) {
             Some(command) => each(command),
             None => *broken += 1,
         });

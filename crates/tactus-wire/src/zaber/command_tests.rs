@@ -1,9 +1,9 @@
 use proptest::prelude::*;
 
-use super::{Command, CommandDecoder};
+use super::{HostCommand, HostCommandDecoder};
 
-fn command(device: u8, axis: u8, id: Option<u8>, text: &str) -> Command {
-    Command { device, axis, id, text: text.to_owned() }
+fn command(device: u8, axis: u8, id: Option<u8>, text: &str) -> HostCommand {
+    HostCommand { device, axis, id, text: text.to_owned() }
 }
 
 #[test]
@@ -12,7 +12,7 @@ fn a_host_sends_these_bytes() {
     assert_eq!(command(1, 1, Some(7), "move abs 10000").encode(true), b"/1 1 07 move abs 10000:B9\n");
     assert_eq!(command(0, 0, None, "").encode(false), b"/0 0\n");
     // The sum of "hello" is 0x214.
-    assert_eq!(Command::parse("/hello:EC"), Some(command(0, 0, None, "hello")));
+    assert_eq!(HostCommand::parse("/hello:EC"), Some(command(0, 0, None, "hello")));
 }
 
 #[test]
@@ -27,16 +27,16 @@ fn a_device_reads_these_lines() {
         ("/  1  2  get pos ", command(1, 2, None, "get pos")),
     ];
     for (line, command) in golden {
-        assert_eq!(Command::parse(line), Some(command), "{line}");
+        assert_eq!(HostCommand::parse(line), Some(command), "{line}");
     }
     for line in ["", "home", "/home:00", "/home:4", "/1 tools\\"] {
-        assert_eq!(Command::parse(line), None, "{line}");
+        assert_eq!(HostCommand::parse(line), None, "{line}");
     }
 }
 
 #[test]
 fn what_is_no_command_is_counted() {
-    let mut decoder = CommandDecoder::default();
+    let mut decoder = HostCommandDecoder::default();
     let mut found = Vec::new();
     decoder.push(b"/1 1 00 get", |command| found.push(command));
     decoder.push(b" pos\n\r\nnoise\r\n\xFF\n/2 0 stop\r", |command| found.push(command));
@@ -47,7 +47,7 @@ fn what_is_no_command_is_counted() {
 proptest! {
     #[test]
     fn any_line_is_read_or_refused(line in "/?\\PC{0,60}") {
-        drop(Command::parse(&line));
+        drop(HostCommand::parse(&line));
     }
 
     #[test]
@@ -58,6 +58,6 @@ proptest! {
     ) {
         let command = command(device, axis, Some(id), &text);
         let bytes = command.encode(with_checksum);
-        prop_assert_eq!(Command::parse(str::from_utf8(&bytes).unwrap().trim_end()), Some(command));
+        prop_assert_eq!(HostCommand::parse(str::from_utf8(&bytes).unwrap().trim_end()), Some(command));
     }
 }

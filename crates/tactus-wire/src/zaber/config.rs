@@ -48,38 +48,20 @@ pub struct Axis {
 
 /// Why a configuration makes no stage.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ConfigError {
     /// It has no axis.
     #[error("the stage has no axis")]
     NoAxis,
     /// A number is out of range.
     #[error("{name}: {field} is {value}, but must be {range}")]
-    Range {
-        /// Of which axis.
-        name: AxisName,
-        /// Which number.
-        field: &'static str,
-        /// What it is.
-        value: f64,
-        /// What it may be.
-        range: &'static str,
-    },
+    Range { name: AxisName, field: &'static str, value: f64, range: &'static str },
     /// A number of the stage is not more than 0.
     #[error("{field} is {value}, but must be more than 0")]
-    NotPositive {
-        /// Which number.
-        field: &'static str,
-        /// What it is.
-        value: f64,
-    },
+    NotPositive { field: &'static str, value: f64 },
     /// Two axes are the same one.
     #[error("{first} and {second} are the same axis of the same device")]
-    Same {
-        /// The one.
-        first: AxisName,
-        /// The other.
-        second: AxisName,
-    },
+    Same { first: AxisName, second: AxisName },
 }
 
 impl Config {

@@ -66,6 +66,7 @@ pub struct Packet {
 
 /// Why a line is no packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum PacketError {
     /// It begins with none of `@`, `#` and `!`.
     #[error("the line begins with none of @, # and !")]
@@ -75,10 +76,7 @@ pub enum PacketError {
     Checksum,
     /// A field is missing or malformed.
     #[error("the {field} is missing or malformed")]
-    Field {
-        /// Which.
-        field: &'static str,
-    },
+    Field { field: &'static str },
 }
 
 impl Packet {

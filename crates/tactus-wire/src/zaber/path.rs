@@ -40,22 +40,22 @@ pub fn accel_told(setting: i64) -> f64 {
 
 /// What one axis is to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Leg {
+pub(super) struct AxisMove {
     pub(super) target_microsteps: i64,
     pub(super) speed: i64,
     pub(super) accel: Option<i64>,
 }
 
-/// The leg of an axis that goes `way_mm` of a path of `path_mm`, either sign. `None` if the speed or the
+/// The move of an axis that goes `way_mm` of a path of `path_mm`, either sign. `None` if the speed or the
 /// acceleration cannot be told to the controller.
-pub(super) fn leg(
+pub(super) fn axis_move(
     axis: &Axis,
     target_microsteps: i64,
     way_mm: f64,
     path_mm: f64,
     speed_mm_per_s: f64,
     accel_mm_per_s2: Option<f64>,
-) -> Option<Leg> {
+) -> Option<AxisMove> {
     let share = (way_mm / path_mm).abs().min(1.0);
     let microsteps = |mm: f64| mm * 1000.0 / axis.um_per_microstep;
     let speed = microsteps(speed_mm_per_s * share);
@@ -67,7 +67,7 @@ pub(super) fn leg(
         Some(accel) => Some(accel_setting(microsteps(accel * share))?),
         None => None,
     };
-    Some(Leg { target_microsteps, speed: speed_setting(speed)?, accel })
+    Some(AxisMove { target_microsteps, speed: speed_setting(speed)?, accel })
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "checked to be within 32 bits")]

@@ -1,4 +1,4 @@
-use super::{Leg, accel_setting, leg, speed_setting};
+use super::{AxisMove, accel_setting, axis_move, speed_setting};
 use crate::stage::Direction;
 use crate::zaber::Axis;
 
@@ -24,16 +24,16 @@ fn settings_are_scaled_as_in_the_manual() {
 
 #[test]
 fn an_axis_gets_its_part() {
-    let whole = leg(&AXIS, 20_000, 10.0, 10.0, 1.0, Some(10.0));
-    assert_eq!(whole, Some(Leg { target_microsteps: 20_000, speed: 3277, accel: Some(3) }));
-    let half = leg(&AXIS, -10_000, -5.0, 10.0, 1.0, None);
-    assert_eq!(half, Some(Leg { target_microsteps: -10_000, speed: 1638, accel: None }));
+    let whole = axis_move(&AXIS, 20_000, 10.0, 10.0, 1.0, Some(10.0));
+    assert_eq!(whole, Some(AxisMove { target_microsteps: 20_000, speed: 3277, accel: Some(3) }));
+    let half = axis_move(&AXIS, -10_000, -5.0, 10.0, 1.0, None);
+    assert_eq!(half, Some(AxisMove { target_microsteps: -10_000, speed: 1638, accel: None }));
 }
 
 #[test]
 fn no_path_is_faster_than_asked() {
     // One unit of speed is 0.000305 mm/s here.
-    assert_eq!(leg(&AXIS, 20_000, 10.0, 10.0, 0.000_3, None), None);
-    assert!(leg(&AXIS, 20_000, 10.0, 10.0, 0.000_31, None).is_some());
-    assert_eq!(leg(&AXIS, 2, 0.001, 10.0, 0.001, None).map(|leg| leg.speed), Some(1));
+    assert_eq!(axis_move(&AXIS, 20_000, 10.0, 10.0, 0.000_3, None), None);
+    assert!(axis_move(&AXIS, 20_000, 10.0, 10.0, 0.000_31, None).is_some());
+    assert_eq!(axis_move(&AXIS, 2, 0.001, 10.0, 0.001, None).map(|axis_move| axis_move.speed), Some(1));
 }

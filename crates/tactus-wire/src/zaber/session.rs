@@ -1,23 +1,23 @@
 //! The host's side of the conversation.
 
-mod ask;
 mod axis_state;
 mod conclude;
 mod error;
 mod hear;
 mod phase;
+mod request;
 mod step;
 
 use core::time::Duration;
 use std::collections::VecDeque;
 
-use ask::{Ask, Pending, Question};
 use axis_state::AxisState;
-use phase::{Phase, Travel};
+use phase::{ActiveMove, Phase};
+use request::{Pending, Request, SlotRequest};
 
-use super::path::leg;
+use super::path::axis_move;
 use super::{Config, ConfigError, Decoder, Flag};
-use crate::stage::{self, Alarm, Arrival, AxisName, Cause, Failure, Session as _, Setting, distance_mm};
+use crate::stage::{self, Alarm, ArrivalCheck, AxisName, Cause, Failure, Session as _, Setting, distance_mm};
 
 pub use error::SessionError;
 
@@ -29,8 +29,8 @@ const HOMING_TIMEOUT: Duration = Duration::from_mins(2);
 
 /// A conversation over one connection with all devices of a stage; see [`stage::Session`].
 ///
-/// One question stands at a time, and its answer is known by its message id; only a stop overtakes it. So no
-/// axis ever has more than one move in flight. A question that only asks or sets is asked again when no
+/// One request stands at a time, and its answer is known by its message id; only a stop overtakes it. So no
+/// axis ever has more than one move in flight. A request that only asks or sets is asked again when no
 /// answer comes; a move or a homing that is not answered is never sent again: the stage is stopped instead.
 ///
 /// The position counts as known from a successful homing on, or from the start if
@@ -43,7 +43,7 @@ pub struct Session {
     axes: Vec<AxisState>,
     phase: Phase,
     /// What is still to be asked in the batch or round under way.
-    queue: VecDeque<Question>,
+    queue: VecDeque<SlotRequest>,
     pending: Option<Pending>,
     last_id: u8,
     /// When the last round of questions for the positions began.
@@ -103,7 +103,7 @@ impl Session {
         command: &str,
         target_mm: [f64; 3],
         speed_mm_per_s: f64,
-    ) -> Result<Option<Travel>, Failure> {
+    ) -> Result<Option<ActiveMove>, Failure> {
         let mut targets = Vec::new();
         let mut reached_mm = [0.0; 3];
         for (slot, state) in self.axes.iter().enumerate() {
@@ -127,20 +127,22 @@ impl Session {
         for (slot, target) in targets {
             let Some(state) = self.axes.get(slot) else { continue };
             let way_mm = state.name.of(reached_mm) - state.name.of(from_mm);
-            let Some(leg) = leg(&state.axis, target, way_mm, path_mm, speed_mm_per_s, accel) else {
+            let Some(axis_move) = axis_move(&state.axis, target, way_mm, path_mm, speed_mm_per_s, accel)
+            else {
                 let reason = format!("the controller of {} cannot be told such a speed", state.name);
                 return Err(Failure::Refused { command: command.to_owned(), reason });
             };
-            settings.push(Question { slot, ask: Ask::Speed(leg.speed) });
-            settings.extend(leg.accel.map(|accel| Question { slot, ask: Ask::Accel(accel) }));
-            moves.push(Question { slot, ask: Ask::Move(leg.target_microsteps) });
+            settings.push(SlotRequest { slot, request: Request::Speed(axis_move.speed) });
+            settings
+                .extend(axis_move.accel.map(|accel| SlotRequest { slot, request: Request::Accel(accel) }));
+            moves.push(SlotRequest { slot, request: Request::Move(axis_move.target_microsteps) });
         }
         self.begin_batch();
         self.queue.extend(settings.into_iter().chain(moves));
         let expected_s = path_mm / speed_mm_per_s + accel.map_or(0.0, |accel| speed_mm_per_s / accel);
-        let arrival = Arrival::new(now, reached_mm, expected_s);
+        let arrival = ArrivalCheck::new(now, reached_mm, expected_s);
         let command = command.to_owned();
-        Ok(Some(Travel { command, arrival, set_out: false }))
+        Ok(Some(ActiveMove { command, arrival, set_out: false }))
     }
 
     fn is_over(&self) -> bool {
@@ -218,16 +220,16 @@ impl stage::Session for Session {
             if !devices.contains(&device) {
                 devices.push(device);
                 if self.config.checksums {
-                    self.queue.push_back(Question { slot, ask: Ask::Checksums });
+                    self.queue.push_back(SlotRequest { slot, request: Request::Checksums });
                 }
-                self.queue.push_back(Question { slot, ask: Ask::Version });
+                self.queue.push_back(SlotRequest { slot, request: Request::Version });
             }
-            self.queue.push_back(Question { slot, ask: Ask::AxisCount });
+            self.queue.push_back(SlotRequest { slot, request: Request::AxisCount });
             if self.axes.get(slot).is_some_and(|state| state.axis.resolution.is_some()) {
-                self.queue.push_back(Question { slot, ask: Ask::Resolution });
+                self.queue.push_back(SlotRequest { slot, request: Request::Resolution });
             }
-            for ask in [Ask::LimitMin, Ask::LimitMax, Ask::Warnings, Ask::Position] {
-                self.queue.push_back(Question { slot, ask });
+            for request in [Request::LimitMin, Request::LimitMax, Request::Warnings, Request::Position] {
+                self.queue.push_back(SlotRequest { slot, request });
             }
         }
         self.finish(now)
@@ -254,7 +256,7 @@ impl stage::Session for Session {
 
     /// Each axis is set to its part of the speed, so that all arrive together.
     ///
-    /// The axes start one after another, a question and its answer apart: on a line at 115200 baud that is
+    /// The axes start one after another, a request and its answer apart: on a line at 115200 baud that is
     /// about 5 ms, by which the path departs from a straight line.
     fn move_to(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) -> Vec<Action> {
         if self.is_over() {
@@ -293,12 +295,12 @@ impl stage::Session for Session {
             self.phase = Phase::Clearing;
             self.begin_batch();
             for slot in 0..self.axes.len() {
-                self.queue.push_back(Question { slot, ask: Ask::Clear });
+                self.queue.push_back(SlotRequest { slot, request: Request::Clear });
                 let is_off = |state: &AxisState| state.fault.is_some_and(Flag::driver_is_off);
                 if self.axes.get(slot).is_some_and(is_off) {
-                    self.queue.push_back(Question { slot, ask: Ask::Enable });
+                    self.queue.push_back(SlotRequest { slot, request: Request::Enable });
                 }
-                self.queue.push_back(Question { slot, ask: Ask::Warnings });
+                self.queue.push_back(SlotRequest { slot, request: Request::Warnings });
             }
         }
         self.finish(now)
@@ -326,7 +328,7 @@ impl stage::Session for Session {
         let mut decoder = core::mem::take(&mut self.decoder);
         decoder.push(bytes, |message| {
             self.hear(now, &message);
-            // The next question goes out with the answer to the last, whatever else has arrived.
+            // The next request goes out with the answer to the last, whatever else has arrived.
             self.proceed(now);
         });
         if self.needs_checksums() {

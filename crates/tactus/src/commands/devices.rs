@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde_json::{Value, json};
-use tactus_device::{Access, Found, inventory};
+use tactus_device::{Access, FoundDevice, inventory};
 use tactus_runner::config::{self, Config, RigFiles};
 use tactus_schema::Rig;
 use tactus_schema::rig::{SerialPort, Transport};
@@ -80,12 +80,12 @@ impl Rigs {
         }
     }
 
-    fn using<'a>(&'a self, found: &'a Found) -> impl Iterator<Item = &'a Link> {
+    fn using<'a>(&'a self, found: &'a FoundDevice) -> impl Iterator<Item = &'a Link> {
         self.links.iter().filter(|link| found.is_meant_by(&link.transport))
     }
 
     /// Devices of the given rigs that are missing.
-    fn missing(&self, found: &[Found]) -> Vec<&Link> {
+    fn missing(&self, found: &[FoundDevice]) -> Vec<&Link> {
         let is_there = |link: &Link| match &link.transport {
             Transport::Embedded | Transport::Tcp { .. } => true,
             // Pseudo-terminals are not in the inventory.
@@ -119,7 +119,7 @@ const DENIED_SERIAL: &str = "No permission for a serial port: add the user to th
 const DENIED_USB: &str = "No permission for a USB or HID device: add a line with its vendor and product to \
     /etc/udev/rules.d/70-tactus.rules, and load the rules as root with `udevadm control --reload && udevadm trigger`.";
 
-fn print(found: &[Found], rigs: &Rigs) {
+fn print(found: &[FoundDevice], rigs: &Rigs) {
     if found.is_empty() {
         say(NOTHING);
     } else {
@@ -151,7 +151,7 @@ fn print(found: &[Found], rigs: &Rigs) {
     }
 }
 
-fn row(one: &Found, rigs: &Rigs) -> Vec<String> {
+fn row(one: &FoundDevice, rigs: &Rigs) -> Vec<String> {
     let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     let rigs: Vec<_> = rigs.using(one).map(|Link { rig, role, .. }| format!("{rig} ({role})")).collect();
     vec![
@@ -169,7 +169,7 @@ fn row(one: &Found, rigs: &Rigs) -> Vec<String> {
     ]
 }
 
-fn comment(one: &Found) -> String {
+fn comment(one: &FoundDevice) -> String {
     let name = one.product.as_deref().unwrap_or("A port");
     let place = one.node.display();
     if one.is_stable {
@@ -181,7 +181,7 @@ fn comment(one: &Found) -> String {
     }
 }
 
-fn kind(one: &Found) -> &'static str {
+fn kind(one: &FoundDevice) -> &'static str {
     match one.transport {
         Transport::Serial { .. } => "serial",
         Transport::Usb(_) => "usb",
@@ -190,9 +190,9 @@ fn kind(one: &Found) -> &'static str {
     }
 }
 
-fn to_json(found: &[Found], rigs: &Rigs) -> Value {
+fn to_json(found: &[FoundDevice], rigs: &Rigs) -> Value {
     let link = |Link { rig, role, .. }: &Link| json!({ "rig": rig, "role": role });
-    let device = |one: &Found| {
+    let device = |one: &FoundDevice| {
         let (interface, endpoint_in, endpoint_out) = match &one.transport {
             Transport::Usb(link) => (Some(link.interface), Some(link.endpoint_in), link.endpoint_out),
             Transport::Hid(link) => (link.interface, None, None),

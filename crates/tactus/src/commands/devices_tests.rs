@@ -4,9 +4,9 @@ use super::*;
 
 const SIM: &str = include_str!("../../../../config/rigs/sim.toml");
 
-fn found(serial: &str, access: Access) -> Found {
+fn found(serial: &str, access: Access) -> FoundDevice {
     let identity: tactus_schema::rig::UsbIdentity = format!("0403:6001/{serial}").parse().unwrap();
-    Found {
+    FoundDevice {
         transport: Transport::Serial { port: SerialPort::Usb(identity.clone()), baud: 115_200 },
         is_stable: true,
         identity: Some(identity),

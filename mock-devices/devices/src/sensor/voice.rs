@@ -9,8 +9,8 @@ use tactus_wire::singletact::{
     self, DEFAULT_ADDRESS, ElementReading, Operation, READING_BYTES, READING_LOCATION, Reply, Request, Via,
 };
 use tactus_wire::weiss::{
-    self, Checksum, Command, CommandError, ControllerInfo, ErrorCode, MatrixInfo, SensorInfo, acknowledge,
-    encode_frame, id,
+    self, Checksum, CommandError, ControllerInfo, ErrorCode, HostCommand, MatrixInfo, SensorInfo,
+    acknowledge, encode_frame, id,
 };
 
 use crate::truth::Truth;
@@ -40,7 +40,7 @@ pub(super) enum Voice {
 /// What a host asks.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Asked {
-    Weiss(Result<Command, CommandError>),
+    Weiss(Result<HostCommand, CommandError>),
     SingleTact { address: u8, id: u8, asked: Register },
 }
 
@@ -134,7 +134,7 @@ impl Voice {
             Self::Weiss { decoder, .. } => {
                 decoder.push(bytes);
                 while let Some(packet) = decoder.next_packet() {
-                    asked.extend(packet.ok().map(|packet| Asked::Weiss(Command::parse(&packet))));
+                    asked.extend(packet.ok().map(|packet| Asked::Weiss(HostCommand::parse(&packet))));
                 }
             }
             Self::SingleTact { decoder, .. } => {
@@ -271,8 +271,8 @@ pub(super) fn reply(
 }
 
 /// Counts as the fields of a board's magnetometers.
-fn board(counts: &[u16]) -> anyskin::Frame {
-    let mut frame = anyskin::Frame::default();
+fn board(counts: &[u16]) -> anyskin::DecodedFrame {
+    let mut frame = anyskin::DecodedFrame::default();
     let (axes, _) = counts.as_chunks::<3>();
     for (magnetometer, axes) in frame.magnetometers.iter_mut().zip(axes) {
         *magnetometer = Magnetometer { temperature_c: TEMPERATURE_C, field_ut: axes.map(f32::from) };

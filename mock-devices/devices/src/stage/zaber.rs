@@ -12,7 +12,7 @@ use std::time::Duration;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use tactus_wire::stage::AxisName;
-use tactus_wire::zaber::{Command, CommandDecoder, Config, Flag, Header, Message, Rejection};
+use tactus_wire::zaber::{Config, Flag, Header, HostCommand, HostCommandDecoder, Message, Rejection};
 use tokio::time::Instant;
 
 use super::Controller;
@@ -33,7 +33,7 @@ const VERSION: &str = "7.38";
 pub(super) struct ZaberController {
     world: Shared,
     axes: Vec<VirtualAxis>,
-    ear: CommandDecoder,
+    ear: HostCommandDecoder,
     outbox: Outbox,
     /// Devices whose messages carry checksums.
     checksums: Vec<u8>,
@@ -58,7 +58,7 @@ impl ZaberController {
         let mut controller = Self {
             axes: axes.collect(),
             world,
-            ear: CommandDecoder::default(),
+            ear: HostCommandDecoder::default(),
             outbox: Outbox::default(),
             checksums: Vec::new(),
             rng: Draw::StageController.rng(truth.seed),
@@ -70,7 +70,7 @@ impl ZaberController {
 
     /// As after a power failure: every axis believes to be at its 0. Settings outlive it.
     fn power_up(&mut self, now: Instant) {
-        self.ear = CommandDecoder::default();
+        self.ear = HostCommandDecoder::default();
         self.outbox.clear();
         let mut world = self.world.lock();
         world.settle(now);
@@ -80,7 +80,7 @@ impl ZaberController {
     }
 
     /// Each device that a command is for answers it once.
-    fn obey(&mut self, command: &Command, now: Instant) {
+    fn obey(&mut self, command: &HostCommand, now: Instant) {
         let mut devices: Vec<u8> = self.axes.iter().map(VirtualAxis::device).collect();
         devices.sort_unstable();
         devices.dedup();
@@ -89,7 +89,7 @@ impl ZaberController {
         }
     }
 
-    fn answer(&mut self, device: u8, command: &Command, now: Instant) {
+    fn answer(&mut self, device: u8, command: &HostCommand, now: Instant) {
         let axis_count =
             self.axes.iter().filter(|axis| axis.device() == device).map(VirtualAxis::number).max();
         let result = match command.text.split_ascii_whitespace().collect::<Vec<_>>()[..] {

@@ -199,7 +199,7 @@ async fn a_host_that_comes_later_reads_nothing_old() {
         let count = host.read(&mut buffer).await.unwrap();
         decoder.push(&buffer[..count]);
         if let Some(Ok(packet)) = decoder.next_packet() {
-            break u64::from(wire::Frame::parse(&packet, 48).unwrap().timestamp_ms);
+            break u64::from(wire::DecodedFrame::parse(&packet, 48).unwrap().timestamp_ms);
         }
     };
     assert!(first_ms > last_ms + 1000, "{last_ms} {first_ms}");

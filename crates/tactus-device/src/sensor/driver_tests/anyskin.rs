@@ -26,7 +26,7 @@ fn start() -> (SensorDriver, MemoryPort) {
 
 fn bytes(field_ut: [f32; 3]) -> Vec<u8> {
     let magnetometers = [Magnetometer { temperature_c: 25.0, field_ut }; 5];
-    anyskin::Frame { magnetometers }.encode()
+    anyskin::DecodedFrame { magnetometers }.encode()
 }
 
 /// Frames, one a period; the last falls on the present.

@@ -55,14 +55,14 @@ fn format(toml: &str) -> Arc<Format> {
 }
 
 /// A device on its port, and the sensor that reads it.
-struct Lab {
+struct TestBench {
     sensor: SensorDriver,
     port: MemoryPort,
     encoder: Encoder,
     format: Arc<Format>,
 }
 
-fn lab(toml: &str) -> Lab {
+fn lab(toml: &str) -> TestBench {
     let (connector, port) = pair("sensor");
     let format = format(toml);
     let expect = ArrayExpectation {
@@ -76,10 +76,10 @@ fn lab(toml: &str) -> Lab {
     };
     let codec = SensorCodec::Declared { format: Arc::clone(&format) };
     let sensor = SensorDriver::start(codec, Box::new(connector), expect, Clock::paused());
-    Lab { sensor, port, encoder: Encoder::new(Arc::clone(&format)), format }
+    TestBench { sensor, port, encoder: Encoder::new(Arc::clone(&format)), format }
 }
 
-impl Lab {
+impl TestBench {
     fn frame(&mut self, tick: u64, counts: [f32; 2]) -> Vec<u8> {
         self.encoder.encode(tick, &counts).unwrap().to_vec()
     }
@@ -352,7 +352,7 @@ async fn ticks_of_any_length_are_told_in_whole_ns() {
 
 #[tokio::test(start_paused = true)]
 async fn the_link_is_closed_when_the_sensor_is_dropped() {
-    let Lab { sensor, mut port, .. } = lab(COUNTED);
+    let TestBench { sensor, mut port, .. } = lab(COUNTED);
     let mut device = port.accept().await;
     drop(sensor);
     let mut rest = Vec::new();

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tactus_schema::pb::StageStatus;
 use tactus_schema::rig::{StageProtocol, ZaberAxes, ZaberAxis};
-use tactus_wire::zaber::{Command, CommandDecoder, Flag, Header, Message};
+use tactus_wire::zaber::{Flag, Header, HostCommand, HostCommandDecoder, Message};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use tokio::time::{Instant, sleep};
 
@@ -35,7 +35,7 @@ fn protocol() -> StageProtocol {
 /// The devices' end of the line.
 struct Devices {
     stream: DuplexStream,
-    ear: CommandDecoder,
+    ear: HostCommandDecoder,
     flag: Flag,
     busy: bool,
     position: i64,
@@ -44,12 +44,12 @@ struct Devices {
 
 impl Devices {
     fn new(stream: DuplexStream) -> Self {
-        let ear = CommandDecoder::default();
+        let ear = HostCommandDecoder::default();
         Self { stream, ear, flag: Flag::NO_REFERENCE, busy: false, position: 0, resolution: 64 }
     }
 
     /// The commands that come next.
-    async fn hear(&mut self) -> Vec<Command> {
+    async fn hear(&mut self) -> Vec<HostCommand> {
         let mut buffer = [0; 256];
         let count = self.stream.read(&mut buffer).await.unwrap();
         let mut commands = Vec::new();
@@ -58,7 +58,7 @@ impl Devices {
     }
 
     /// Answers until a command begins so; gives that, unanswered.
-    async fn answer_until(&mut self, text: &str) -> Command {
+    async fn answer_until(&mut self, text: &str) -> HostCommand {
         loop {
             for command in self.hear().await {
                 if command.text.starts_with(text) {
@@ -69,7 +69,7 @@ impl Devices {
         }
     }
 
-    async fn answer(&mut self, command: &Command) {
+    async fn answer(&mut self, command: &HostCommand) {
         let data = match command.text.as_str() {
             "get version" => "7.38".to_owned(),
             "get system.axiscount" => "1".to_owned(),

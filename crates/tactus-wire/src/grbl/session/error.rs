@@ -4,42 +4,23 @@ use crate::stage::Cause;
 
 /// Why a session is over.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum SessionError {
     /// No banner came.
     #[error("no banner came after {resets} resets: is this a Grbl controller, and is the bit rate right?")]
-    NoBanner {
-        /// How often the controller was reset.
-        resets: u32,
-    },
+    NoBanner { resets: u32 },
     /// The controller stopped answering.
-    #[error("the controller did not answer {question}")]
-    Silent {
-        /// What was asked.
-        question: &'static str,
-    },
-    /// The controller refused a question without which nothing can be done.
-    #[error("the controller refused {question}: error {code}, {meaning}")]
-    Refused {
-        /// What was asked.
-        question: &'static str,
-        /// The controller's number.
-        code: u8,
-        /// What it means.
-        meaning: &'static str,
-    },
+    #[error("the controller did not answer {query}")]
+    Silent { query: &'static str },
+    /// The controller refused a query without which nothing can be done.
+    #[error("the controller refused {query}: error {code}, {meaning}")]
+    Refused { query: &'static str, code: u8, meaning: &'static str },
     /// A setting of the controller is not what the rig relies on.
     #[error(
         "the controller has ${number} = {found}, but the rig needs {needed}: correct the rig file, or the \
          controller's setting by its own tools; nothing was changed"
     )]
-    Setting {
-        /// Number of the setting.
-        number: u16,
-        /// Its value.
-        found: String,
-        /// What the rig needs.
-        needed: String,
-    },
+    Setting { number: u16, found: String, needed: String },
 }
 
 impl SessionError {

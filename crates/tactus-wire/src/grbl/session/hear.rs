@@ -2,9 +2,9 @@
 
 use core::time::Duration;
 
-use super::phase::{Phase, Purpose, Question};
+use super::phase::{Phase, Purpose, Query};
 use super::{Action, Failure, SAME_PLACE_MM, Session, SessionError, alarm};
-use crate::grbl::travel::Travel;
+use crate::grbl::active_move::ActiveMove;
 use crate::grbl::{FEED_HOLD, MachineState, Position, Response, StatusReport, error_meaning};
 use crate::stage::{Controller, Judgement, distance_mm};
 
@@ -45,14 +45,14 @@ impl Session {
             self.poll.at_once();
         } else if let Phase::Unlocking { .. } = self.phase {
             self.look(now, Purpose::Clear);
-        } else if let Phase::Asking { question, .. } = self.phase {
-            self.hear_answered(now, question);
+        } else if let Phase::Asking { query, .. } = self.phase {
+            self.hear_answered(now, query);
         }
     }
 
     /// Of what `$I` tells only the version is of interest.
     fn hear_feedback(&mut self, text: &str) {
-        if let Phase::Asking { question: Question::Build, .. } = self.phase
+        if let Phase::Asking { query: Query::Build, .. } = self.phase
             && text.starts_with("VER:")
         {
             self.identity.push_str(", ");
@@ -61,9 +61,9 @@ impl Session {
     }
 
     /// What was asked before the controller is taken for the rig's has been answered.
-    fn hear_answered(&mut self, now: Duration, question: Question) {
-        if question == Question::Build {
-            return self.ask(now, Question::Settings, 1);
+    fn hear_answered(&mut self, now: Duration, query: Query) {
+        if query == Query::Build {
+            return self.ask(now, Query::Settings, 1);
         }
         if let Err(error) = self.settings.check(&self.config) {
             return self.fail(error);
@@ -78,12 +78,12 @@ impl Session {
         if code == ERROR_AT_BOOT {
             return;
         }
-        if let Phase::Asking { question, .. } = self.phase {
-            return match question {
+        if let Phase::Asking { query, .. } = self.phase {
+            return match query {
                 // It has no version to tell.
-                Question::Build => self.hear_answered(now, question),
-                Question::Settings => self.fail(SessionError::Refused {
-                    question: question.line(),
+                Query::Build => self.hear_answered(now, query),
+                Query::Settings => self.fail(SessionError::Refused {
+                    query: query.line(),
                     code,
                     meaning: error_meaning(code),
                 }),
@@ -211,7 +211,7 @@ impl Session {
         before.is_some_and(|before| distance_mm(before, offset_mm) > SAME_PLACE_MM)
     }
 
-    fn judge(&mut self, now: Duration, asked: Option<Duration>, mut travel: Travel) {
+    fn judge(&mut self, now: Duration, asked: Option<Duration>, mut travel: ActiveMove) {
         let (position_mm, stands) = (self.position_mm, self.state == Some(MachineState::Idle));
         let target_mm = travel.arrival().target_mm();
         let result = match travel.judge(now, asked, stands, position_mm, self.config.tolerance_mm) {
@@ -258,7 +258,7 @@ impl Session {
     fn conclude_look(&mut self, now: Duration, purpose: Purpose) {
         let position_mm = self.position_mm;
         match purpose {
-            Purpose::Greet => self.ask(now, Question::Build, 1),
+            Purpose::Greet => self.ask(now, Query::Build, 1),
             Purpose::Recover => {
                 self.phase = Phase::Ready;
                 self.report();

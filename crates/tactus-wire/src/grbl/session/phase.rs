@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use super::Failure;
-use crate::grbl::travel::Travel;
+use crate::grbl::active_move::ActiveMove;
 
 /// How long a held stage may go on decelerating before it is reset in motion.
 const HOLD_TIMEOUT: Duration = Duration::from_secs(3);
@@ -16,11 +16,11 @@ pub(super) enum Phase {
     /// The first report asked for since then is waited for.
     Looking { purpose: Purpose, since: Duration },
     /// The controller is asked what it is, for the `tries`th time.
-    Asking { question: Question, tries: u32, deadline: Duration },
+    Asking { query: Query, tries: u32, deadline: Duration },
     /// Nothing is in hand.
     Ready,
     /// A move is in hand.
-    Moving(Travel),
+    Moving(ActiveMove),
     /// Homing is in hand; `accepted` is when the controller said that it is done.
     Homing { deadline: Duration, accepted: Option<Duration> },
     /// `$X` is on its way.
@@ -33,7 +33,7 @@ pub(super) enum Phase {
 
 /// What the controller is asked before it is taken for the rig's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Question {
+pub(super) enum Query {
     /// `$I`: its version.
     Build,
     /// `$$`: its settings.
@@ -68,7 +68,7 @@ impl Phase {
     }
 }
 
-impl Question {
+impl Query {
     /// The line to send, without its end.
     pub(super) fn line(self) -> &'static str {
         match self {

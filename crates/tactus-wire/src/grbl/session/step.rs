@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::phase::{Phase, Purpose, Question};
+use super::phase::{Phase, Purpose, Query};
 use super::{Action, Failure, Session, SessionError, alarm};
 use crate::grbl::{FEED_HOLD, MachineState, SOFT_RESET, STATUS_QUERY};
 use crate::stage::{Report, Status};
@@ -76,12 +76,12 @@ impl Session {
     }
 
     /// Asks the controller what it is, for the `tries`th time.
-    pub(super) fn ask(&mut self, now: Duration, question: Question, tries: u32) {
-        if question == Question::Settings {
+    pub(super) fn ask(&mut self, now: Duration, query: Query, tries: u32) {
+        if query == Query::Settings {
             self.settings.forget();
         }
-        self.send_line(question.line());
-        self.phase = Phase::Asking { question, tries, deadline: now + ANSWER_TIMEOUT };
+        self.send_line(query.line());
+        self.phase = Phase::Asking { query, tries, deadline: now + ANSWER_TIMEOUT };
     }
 
     /// Does what follows when a phase has taken too long.
@@ -96,12 +96,12 @@ impl Session {
                 let failure = Failure::Overdue { target_mm, position_mm: self.position_mm, waited };
                 self.hold(now, Some(failure));
             }
-            Phase::Asking { question, tries, .. } if tries >= TRIES_MAX => {
-                self.fail(SessionError::Silent { question: question.line() });
+            Phase::Asking { query, tries, .. } if tries >= TRIES_MAX => {
+                self.fail(SessionError::Silent { query: query.line() });
             }
-            Phase::Asking { question, tries, .. } => self.ask(now, question, tries + 1),
-            Phase::Homing { .. } => self.fail(SessionError::Silent { question: "that it is homed" }),
-            Phase::Unlocking { .. } => self.fail(SessionError::Silent { question: "to $X" }),
+            Phase::Asking { query, tries, .. } => self.ask(now, query, tries + 1),
+            Phase::Homing { .. } => self.fail(SessionError::Silent { query: "that it is homed" }),
+            Phase::Unlocking { .. } => self.fail(SessionError::Silent { query: "to $X" }),
             Phase::Holding { failure, .. } => self.reset(now, Purpose::Stop { failure, held_mm: None }, 1),
             Phase::Looking { .. } | Phase::Ready | Phase::Over => {}
         }
@@ -124,7 +124,7 @@ impl Session {
         match self.phase {
             Phase::Resetting { .. } | Phase::Asking { .. } | Phase::Unlocking { .. } | Phase::Over => None,
             Phase::Homing { accepted, .. } => accepted.map(|_| POLL_MOVING),
-            // A question asked now would only delay the one that follows the `ok`.
+            // A query asked now would only delay the one that follows the `ok`.
             Phase::Moving(ref travel) if travel.awaits_ok() => Some(POLL_IDLE),
             Phase::Ready if !self.moves() => Some(POLL_IDLE),
             Phase::Ready | Phase::Moving(_) | Phase::Holding { .. } | Phase::Looking { .. } => {

@@ -4,7 +4,7 @@ use super::{HOMED, TOLERANCE_MM, check, check_with};
 use crate::grbl::{Axis, Config};
 use crate::stage::{AxisName, Direction, Session as _};
 
-/// From opening the port to the question for the settings.
+/// From opening the port to the query for the settings.
 const ASKED: &str = "
     0 * start
     10 < Grbl 1.1h ['$' for help]

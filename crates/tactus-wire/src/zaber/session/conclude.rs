@@ -2,14 +2,14 @@
 
 use core::time::Duration;
 
-use super::ask::{Ask, Question};
 use super::axis_state::Reference;
 use super::phase::Phase;
+use super::request::{Request, SlotRequest};
 use super::{Action, Failure, Session};
 use crate::stage::{Controller, Judgement};
 
 impl Session {
-    /// Every question of a batch or a round has its answer.
+    /// Every request of a batch or a round has its answer.
     pub(super) fn conclude(&mut self, now: Duration) {
         let was_round = self.round_began.is_some() && self.round_ended.is_none();
         self.round_ended = Some(now);
@@ -122,9 +122,9 @@ impl Session {
         let homing_speed = self.config.homing_speed_mm_per_s;
         for slot in &slots {
             let speed = self.axes.get(*slot).and_then(|state| state.axis.speed_setting(homing_speed?));
-            self.queue.extend(speed.map(|speed| Question { slot: *slot, ask: Ask::Speed(speed) }));
+            self.queue.extend(speed.map(|speed| SlotRequest { slot: *slot, request: Request::Speed(speed) }));
         }
-        self.queue.extend(slots.iter().map(|slot| Question { slot: *slot, ask: Ask::Home }));
+        self.queue.extend(slots.iter().map(|slot| SlotRequest { slot: *slot, request: Request::Home }));
         if let Phase::Homing { group, .. } = &mut self.phase {
             *group = slots;
         }

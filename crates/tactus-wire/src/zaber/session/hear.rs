@@ -2,9 +2,9 @@
 
 use core::time::Duration;
 
-use super::ask::{Answer, Ask, Pending, Question};
 use super::axis_state::{AxisState, Reference};
 use super::phase::Phase;
+use super::request::{Answer, Pending, Request, SlotRequest};
 use super::{Action, Failure, Session, SessionError};
 use crate::stage::Alarm;
 use crate::zaber::{Flag, Header, Message, Rejection, Severity};
@@ -43,40 +43,45 @@ impl Session {
             self.ignored += 1;
             return;
         };
-        let question = pending.question;
+        let request = pending.request;
         if !accepted {
-            return self.hear_rejection(now, question, &Rejection::parse(data));
+            return self.hear_rejection(now, request, &Rejection::parse(data));
         }
-        let Some(answer) = question.ask.read(data) else {
+        let Some(answer) = request.request.read(data) else {
             self.ignored += 1;
             return;
         };
         self.pending = None;
-        if !self.take_answer(question, busy, answer.clone()) || question.ask.is_of_device() {
+        if !self.take_answer(request, busy, answer.clone()) || request.request.is_of_device() {
             return;
         }
         let all = if let Answer::Flags(flags) = &answer { Some(&flags[..]) } else { None };
-        if self.hear_flags(now, question, flag, all) && self.queue.is_empty() {
+        if self.hear_flags(now, request, flag, all) && self.queue.is_empty() {
             self.conclude(now);
         }
     }
 
     fn is_answer(&self, pending: &Pending, header: Header) -> bool {
-        let Question { slot, ask } = pending.question;
+        let SlotRequest { slot, request } = pending.request;
         let Some(state) = self.axes.get(slot) else { return false };
-        let axis = if ask.is_of_device() { 0 } else { state.axis.number };
+        let axis = if request.is_of_device() { 0 } else { state.axis.number };
         header == Header { device: state.axis.device, axis, id: Some(pending.id) }
     }
 
     /// Takes over what an answer says; false if it ends the session.
-    fn take_answer(&mut self, Question { slot, ask }: Question, busy: bool, answer: Answer) -> bool {
+    fn take_answer(
+        &mut self,
+        SlotRequest { slot, request }: SlotRequest,
+        busy: bool,
+        answer: Answer,
+    ) -> bool {
         let Some(state) = self.axes.get_mut(slot) else { return true };
-        if !ask.is_of_device() {
+        if !request.is_of_device() {
             state.busy = busy;
         }
-        match (ask, answer) {
-            (Ask::Position, Answer::Number(number)) => state.position = number,
-            (Ask::Resolution, Answer::Number(found)) => {
+        match (request, answer) {
+            (Request::Position, Answer::Number(number)) => state.position = number,
+            (Request::Resolution, Answer::Number(found)) => {
                 let needed = state.axis.resolution.map_or(found, i64::from);
                 if found != needed {
                     let name = state.name;
@@ -84,14 +89,14 @@ impl Session {
                     return false;
                 }
             }
-            (Ask::LimitMin, Answer::Number(number)) => state.limit_min = number,
-            (Ask::LimitMax, Answer::Number(number)) => state.limit_max = number,
-            (Ask::AxisCount, Answer::Number(axis_count)) if axis_count < i64::from(state.axis.number) => {
+            (Request::LimitMin, Answer::Number(number)) => state.limit_min = number,
+            (Request::LimitMax, Answer::Number(number)) => state.limit_max = number,
+            (Request::AxisCount, Answer::Number(axis_count)) if axis_count < i64::from(state.axis.number) => {
                 let (device, number, name) = (state.axis.device, state.axis.number, state.name);
                 self.fail(SessionError::NoAxis { device, number, name, axis_count });
                 return false;
             }
-            (Ask::Version, Answer::Text(version)) => {
+            (Request::Version, Answer::Text(version)) => {
                 let device = state.axis.device;
                 let separator = if self.identity.is_empty() { "" } else { ", " };
                 let device = format!("{separator}device {device} firmware {version}");
@@ -102,35 +107,35 @@ impl Session {
         true
     }
 
-    fn hear_rejection(&mut self, now: Duration, question: Question, rejection: &Rejection) {
-        let command = question.ask.text();
+    fn hear_rejection(&mut self, now: Duration, request: SlotRequest, rejection: &Rejection) {
+        let command = request.request.text();
         let moving = matches!(self.phase, Phase::Moving(_) | Phase::Homing { .. });
-        match question.ask {
-            Ask::Move(_) | Ask::Home | Ask::Speed(_) | Ask::Accel(_) if moving => {
+        match request.request {
+            Request::Move(_) | Request::Home | Request::Speed(_) | Request::Accel(_) if moving => {
                 let name =
-                    self.axes.get(question.slot).map(|state| state.name.to_string()).unwrap_or_default();
+                    self.axes.get(request.slot).map(|state| state.name.to_string()).unwrap_or_default();
                 let failure = Failure::Refused { command, reason: format!("{name}: {rejection}") };
                 self.halt(now, Some(failure));
             }
             // What is still wrong afterwards shows in the warnings.
-            Ask::Clear | Ask::Enable => {
+            Request::Clear | Request::Enable => {
                 self.pending = None;
             }
             // Asked again when the time is over.
-            ask if *rejection == Rejection::Again && !ask.moves() => {}
-            Ask::Checksums
-            | Ask::Version
-            | Ask::AxisCount
-            | Ask::Resolution
-            | Ask::LimitMin
-            | Ask::LimitMax
-            | Ask::Position
-            | Ask::Warnings
-            | Ask::Speed(_)
-            | Ask::Accel(_)
-            | Ask::Move(_)
-            | Ask::Home => {
-                let device = self.device_of(question.slot);
+            request if *rejection == Rejection::Again && !request.moves() => {}
+            Request::Checksums
+            | Request::Version
+            | Request::AxisCount
+            | Request::Resolution
+            | Request::LimitMin
+            | Request::LimitMax
+            | Request::Position
+            | Request::Warnings
+            | Request::Speed(_)
+            | Request::Accel(_)
+            | Request::Move(_)
+            | Request::Home => {
+                let device = self.device_of(request.slot);
                 self.fail(SessionError::Refused { device, command, rejection: rejection.clone() });
             }
         }
@@ -149,7 +154,7 @@ impl Session {
             && let Some(slot) = self.axes.iter().position(is_meant)
             && severity == Severity::Fault
         {
-            self.hear_flags(now, Question { slot, ask: Ask::Warnings }, flag, None);
+            self.hear_flags(now, SlotRequest { slot, request: Request::Warnings }, flag, None);
         }
     }
 
@@ -157,7 +162,7 @@ impl Session {
     fn hear_flags(
         &mut self,
         now: Duration,
-        Question { slot, ask }: Question,
+        SlotRequest { slot, request }: SlotRequest,
         flag: Flag,
         all: Option<&[Flag]>,
     ) -> bool {
@@ -165,7 +170,7 @@ impl Session {
         let is_new_fault = state.take_flags(flag, all);
         // Both flags stay until the next command, so that only a flag that is new tells of someone else.
         let is_others = matches!(flag, Flag::MANUAL_CONTROL | Flag::INTERRUPTED);
-        if ask.moves() {
+        if request.moves() {
             state.is_ours = !is_others;
         }
         let (name, is_lost, is_ours) = (state.name, state.reference == Reference::Lost, state.is_ours);

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use super::Failure;
-use crate::stage::Arrival;
+use crate::stage::ArrivalCheck;
 
 /// A stop that a device has not confirmed by then is sent again.
 const STOP_REPLY_TIMEOUT: Duration = Duration::from_millis(250);
@@ -20,7 +20,7 @@ pub(super) enum Phase {
     /// Nothing is in hand.
     Ready,
     /// A move is in hand.
-    Moving(Travel),
+    Moving(ActiveMove),
     /// Homing is in hand: of the axes in the slots of `group`, and `then` of the others.
     Homing { group: Vec<usize>, then: Option<Vec<usize>>, deadline: Duration },
     /// An alarm is being cleared.
@@ -33,10 +33,10 @@ pub(super) enum Phase {
 
 /// A move under way.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Travel {
+pub(super) struct ActiveMove {
     pub(super) command: String,
     /// In whole microsteps.
-    pub(super) arrival: Arrival,
+    pub(super) arrival: ArrivalCheck,
     /// Every axis has confirmed its move.
     pub(super) set_out: bool,
 }

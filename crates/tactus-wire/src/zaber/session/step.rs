@@ -2,11 +2,11 @@
 
 use core::time::Duration;
 
-use super::ask::{Ask, Pending, Question};
 use super::phase::{Phase, Stop};
+use super::request::{Pending, Request, SlotRequest};
 use super::{Action, Failure, Session, SessionError};
 use crate::stage::{Alarm, Report, Session as _, Status};
-use crate::zaber::Command;
+use crate::zaber::HostCommand;
 
 /// Between rounds of questions while the stage stands.
 const POLL_IDLE: Duration = Duration::from_millis(100);
@@ -78,7 +78,7 @@ impl Session {
     /// Tells all devices of the port at once to stop.
     pub(super) fn send_stop(&mut self, text: &str) {
         let id = self.next_id();
-        self.send(&Command { device: 0, axis: 0, id: Some(id), text: text.to_owned() });
+        self.send(&HostCommand { device: 0, axis: 0, id: Some(id), text: text.to_owned() });
     }
 
     /// Does what follows when a phase has taken too long.
@@ -117,24 +117,24 @@ impl Session {
         self.repeat_stop(now, "estop");
     }
 
-    /// No answer has come in time: the question is asked again, unless that would move something twice.
+    /// No answer has come in time: the request is asked again, unless that would move something twice.
     pub(super) fn unanswered(&mut self, now: Duration) {
         let Some(pending) = self.pending else { return };
-        let Question { slot, ask } = pending.question;
-        if ask.moves() {
+        let SlotRequest { slot, request } = pending.request;
+        if request.moves() {
             return self
-                .halt(now, Some(Failure::refused(&ask.text(), "no answer came; the stage was stopped")));
+                .halt(now, Some(Failure::refused(&request.text(), "no answer came; the stage was stopped")));
         }
         if pending.is_silent(now) {
             let device = self.device_of(slot);
             return self.fail(if matches!(self.phase, Phase::Greeting) {
                 SessionError::NoDevice { device }
             } else {
-                SessionError::Silent { device, command: ask.text() }
+                SessionError::Silent { device, command: request.text() }
             });
         }
         self.pending = Some(Pending { sent: now, ..pending });
-        self.send_question(pending.question, pending.id);
+        self.send_request(pending.request, pending.id);
     }
 
     /// Hands out what is to be done.
@@ -143,7 +143,7 @@ impl Session {
         core::mem::take(&mut self.actions)
     }
 
-    /// Asks the next question, if none stands and it is time.
+    /// Asks the next request, if none stands and it is time.
     pub(super) fn proceed(&mut self, now: Duration) {
         if self.pending.is_some() || matches!(self.phase, Phase::Over) {
             return;
@@ -151,10 +151,10 @@ impl Session {
         if self.queue.is_empty() && self.next_round().is_some_and(|next| now >= next) {
             self.begin_round(now);
         }
-        if let Some(question) = self.queue.pop_front() {
+        if let Some(request) = self.queue.pop_front() {
             let id = self.next_id();
-            self.pending = Some(Pending { question, id, since: now, sent: now });
-            self.send_question(question, id);
+            self.pending = Some(Pending { request, id, since: now, sent: now });
+            self.send_request(request, id);
         }
     }
 
@@ -175,9 +175,9 @@ impl Session {
     fn begin_round(&mut self, now: Duration) {
         (self.round_began, self.round_ended, self.at_once) = (Some(now), None, false);
         for (slot, state) in self.axes.iter().enumerate() {
-            self.queue.push_back(Question { slot, ask: Ask::Position });
+            self.queue.push_back(SlotRequest { slot, request: Request::Position });
             if state.needs_list {
-                self.queue.push_back(Question { slot, ask: Ask::Warnings });
+                self.queue.push_back(SlotRequest { slot, request: Request::Warnings });
             }
         }
     }
@@ -231,13 +231,13 @@ impl Session {
         devices
     }
 
-    fn send_question(&mut self, Question { slot, ask }: Question, id: u8) {
+    fn send_request(&mut self, SlotRequest { slot, request }: SlotRequest, id: u8) {
         let Some(state) = self.axes.get(slot) else { return };
-        let axis = if ask.is_of_device() { 0 } else { state.axis.number };
-        self.send(&Command { device: state.axis.device, axis, id: Some(id), text: ask.text() });
+        let axis = if request.is_of_device() { 0 } else { state.axis.number };
+        self.send(&HostCommand { device: state.axis.device, axis, id: Some(id), text: request.text() });
     }
 
-    fn send(&mut self, command: &Command) {
+    fn send(&mut self, command: &HostCommand) {
         self.actions.push(Action::Send(command.encode(self.config.checksums)));
     }
 

@@ -2,14 +2,14 @@
 
 use core::time::Duration;
 
-use crate::zaber::{Command, CommandDecoder, Flag, Header, Message};
+use crate::zaber::{Flag, Header, HostCommand, HostCommandDecoder, Message};
 
 /// `maxspeed` in microsteps per second.
 const SPEED_SCALE: f64 = 1.6384;
 
 /// Two devices, the first with two axes.
 pub(super) struct Fake {
-    ear: CommandDecoder,
+    ear: HostCommandDecoder,
     pub(super) axes: Vec<FakeAxis>,
     pub(super) checksums: bool,
     /// Microsteps a full step.
@@ -61,7 +61,7 @@ impl Fake {
             moved: Duration::ZERO,
         };
         Self {
-            ear: CommandDecoder::default(),
+            ear: HostCommandDecoder::default(),
             axes: vec![axis(1, 1), axis(1, 2), axis(2, 1)],
             checksums: false,
             resolution: 64,
@@ -90,7 +90,7 @@ impl Fake {
         commands.into_iter().flat_map(|command| self.obey(now, &command)).collect()
     }
 
-    fn obey(&mut self, now: Duration, command: &Command) -> Vec<Vec<u8>> {
+    fn obey(&mut self, now: Duration, command: &HostCommand) -> Vec<Vec<u8>> {
         self.axes.iter_mut().for_each(|axis| axis.go(now));
         if self.is_dead || self.deaf_to.is_some_and(|start| command.text.starts_with(start)) {
             return Vec::new();
@@ -105,7 +105,7 @@ impl Fake {
         replies.into_iter().skip(lost).collect()
     }
 
-    fn reply(&mut self, device: u8, command: &Command) -> Message {
+    fn reply(&mut self, device: u8, command: &HostCommand) -> Message {
         let rejection = self
             .rejects
             .filter(|(start, _)| command.text.starts_with(start))

@@ -2,7 +2,7 @@
 
 use super::{Failure, Play, Status};
 use crate::stage::Session as _;
-use crate::zaber::Command;
+use crate::zaber::HostCommand;
 
 #[test]
 fn a_stop_is_sent_at_once_and_keeps_the_position() {
@@ -102,7 +102,7 @@ fn a_reply_to_what_was_asked_before_the_stop_proves_nothing() {
         .under_way
         .iter()
         .filter(|(_, to_stage, _)| *to_stage)
-        .filter_map(|(_, _, bytes)| Command::parse(String::from_utf8_lossy(bytes).trim_end())?.id)
+        .filter_map(|(_, _, bytes)| HostCommand::parse(String::from_utf8_lossy(bytes).trim_end())?.id)
         .collect();
     let before = ids[0] - 1;
     let late = format!("@01 1 {before:02} OK IDLE -- 6000\r\n");

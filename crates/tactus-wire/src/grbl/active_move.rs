@@ -3,18 +3,18 @@
 use core::time::Duration;
 
 use super::Config;
-use crate::stage::{Arrival, Judgement, distance_mm};
+use crate::stage::{ArrivalCheck, Judgement, distance_mm};
 
 /// A move under way.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Travel {
-    arrival: Arrival,
+pub(super) struct ActiveMove {
+    arrival: ArrivalCheck,
     line: String,
     /// When the controller took the line.
     accepted: Option<Duration>,
 }
 
-impl Travel {
+impl ActiveMove {
     /// A move that sets out now. The target is rounded to the three decimals that are sent.
     pub(super) fn new(
         now: Duration,
@@ -28,7 +28,7 @@ impl Travel {
         let [x, y, z] = machine_mm;
         let line = format!("G90 G21 G1 X{x:.3} Y{y:.3} Z{z:.3} F{:.3}", speed_mm_per_s * 60.0);
         let expected_s = distance_mm(from_mm, target_mm) / speed_mm_per_s;
-        Self { arrival: Arrival::new(now, target_mm, expected_s), line, accepted: None }
+        Self { arrival: ArrivalCheck::new(now, target_mm, expected_s), line, accepted: None }
     }
 
     /// The line to send, without its end.
@@ -36,7 +36,7 @@ impl Travel {
         &self.line
     }
 
-    pub(super) fn arrival(&self) -> &Arrival {
+    pub(super) fn arrival(&self) -> &ArrivalCheck {
         &self.arrival
     }
 

@@ -10,12 +10,12 @@ const REPLY_TIMEOUT: Duration = Duration::from_millis(250);
 /// A move or a homing that is not answered by then may have been lost, or not.
 const MOTION_REPLY_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// A question that stays unanswered for this long means that the device is gone.
+/// A request that stays unanswered for this long means that the device is gone.
 const SILENCE_MAX: Duration = Duration::from_secs(2);
 
 /// What is asked or told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ask {
+pub(super) enum Request {
     Checksums,
     Version,
     AxisCount,
@@ -32,17 +32,17 @@ pub(super) enum Ask {
     Home,
 }
 
-/// A question to the axis in a slot, or to its device.
+/// A request to the axis in a slot, or to its device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Question {
+pub(super) struct SlotRequest {
     pub(super) slot: usize,
-    pub(super) ask: Ask,
+    pub(super) request: Request,
 }
 
-/// The question that stands.
+/// The request that stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Pending {
-    pub(super) question: Question,
+    pub(super) request: SlotRequest,
     pub(super) id: u8,
     pub(super) since: Duration,
     pub(super) sent: Duration,
@@ -57,7 +57,7 @@ pub(super) enum Answer {
     Flags(Vec<Flag>),
 }
 
-impl Ask {
+impl Request {
     /// The words of the command.
     pub(super) fn text(self) -> String {
         match self {
@@ -115,7 +115,7 @@ impl Ask {
 impl Pending {
     /// When to do something about the lack of an answer.
     pub(super) fn overdue(&self) -> Duration {
-        self.sent + if self.question.ask.moves() { MOTION_REPLY_TIMEOUT } else { REPLY_TIMEOUT }
+        self.sent + if self.request.request.moves() { MOTION_REPLY_TIMEOUT } else { REPLY_TIMEOUT }
     }
 
     /// True if there is no more hope for an answer.

@@ -2,20 +2,20 @@
 
 /// Unwraps a number that begins again at 0 after `modulus` steps.
 #[derive(Debug, Clone)]
-pub(crate) struct Wrapping {
+pub(crate) struct Unwrapper {
     modulus: u128,
-    last: Option<Last>,
+    last: Option<Previous>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Last {
+struct Previous {
     raw: u64,
     total: u64,
 }
 
 /// Where a number stands to the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum Advance {
     /// There is none before, or it is more than half the way round ahead, which is taken for a step back:
     /// counting begins anew here.
     Anew { total: u64 },
@@ -25,7 +25,7 @@ pub(crate) enum Step {
     Ahead { by: u64, total: u64 },
 }
 
-impl Step {
+impl Advance {
     /// The number unwrapped.
     pub(crate) fn total(self) -> u64 {
         match self {
@@ -34,28 +34,28 @@ impl Step {
     }
 }
 
-impl Wrapping {
+impl Unwrapper {
     /// For numbers below `modulus`, which is 2 to 2^64.
     pub(crate) fn new(modulus: u128) -> Self {
         Self { modulus: modulus.clamp(2, 1 << 64), last: None }
     }
 
     /// Takes the next number; one beyond the modulus is taken by its remainder.
-    pub(crate) fn advance(&mut self, raw: u64) -> Step {
+    pub(crate) fn advance(&mut self, raw: u64) -> Advance {
         let raw = narrow(u128::from(raw) % self.modulus);
         let step = match self.last {
-            None => Step::Anew { total: raw },
-            Some(last) if last.raw == raw => Step::Same { total: last.total },
+            None => Advance::Anew { total: raw },
+            Some(last) if last.raw == raw => Advance::Same { total: last.total },
             Some(last) => {
                 let ahead = (u128::from(raw) + self.modulus - u128::from(last.raw)) % self.modulus;
                 if ahead <= self.modulus / 2 {
-                    Step::Ahead { by: narrow(ahead), total: last.total.saturating_add(narrow(ahead)) }
+                    Advance::Ahead { by: narrow(ahead), total: last.total.saturating_add(narrow(ahead)) }
                 } else {
-                    Step::Anew { total: raw }
+                    Advance::Anew { total: raw }
                 }
             }
         };
-        self.last = Some(Last { raw, total: step.total() });
+        self.last = Some(Previous { raw, total: step.total() });
         step
     }
 }
@@ -65,5 +65,5 @@ fn narrow(number: u128) -> u64 {
 }
 
 #[cfg(test)]
-#[path = "wrapping_tests.rs"]
+#[path = "unwrapper_tests.rs"]
 mod tests;
