@@ -29,7 +29,7 @@ pub struct Definition {
     pub about: &'static str,
     /// True if it needs time steps finer than a frame.
     pub(crate) is_fine: bool,
-    pub(crate) make: fn(&mut Knobs<'_>) -> Stage,
+    pub(crate) make: fn(&mut Knobs<'_>) -> PipelineHook,
 }
 
 /// A physics at a strength.
@@ -162,7 +162,7 @@ type OnElements = Box<dyn FnMut(&Now, &mut [f64]) + Send>;
 type OnCount = Box<dyn Fn(f64) -> f64 + Send>;
 
 /// What physics changes, in the order in which it acts.
-pub(crate) enum Stage {
+pub(crate) enum PipelineHook {
     /// Where the tip is, robot frame.
     Path(OnPath),
     /// Where the tool stands against the covering.
@@ -179,7 +179,7 @@ pub(crate) enum Stage {
     Converter(OnCount),
 }
 
-impl Stage {
+impl PipelineHook {
     fn path(f: impl FnMut(&Now, &dyn Path, &mut [f64; 3]) + Send + 'static) -> Self {
         Self::Path(Box::new(f))
     }
@@ -306,7 +306,7 @@ impl<'a> Knobs<'a> {
     }
 
     /// Random numbers for what goes on in time: other ones in each run.
-    fn chance(&self) -> ChaCha8Rng {
+    fn rng(&self) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(self.run + 1);
         rng

@@ -6,8 +6,8 @@ use std::fmt;
 
 use tactus_model::{Contact, Covering, Indenter, Path, Readout, Simulator};
 
-use crate::base::Climate;
-use crate::physics::{Dose, Knobs, Now, Stage, Tool, Touch};
+use crate::climate::Climate;
+use crate::physics::{Dose, Knobs, Now, PipelineHook, Tool, Touch};
 use face::Face;
 
 /// A virtual sensor with hidden physics: the base model's image of every instant, changed on its way by each dose.
@@ -18,13 +18,13 @@ use face::Face;
 ///
 /// Without doses it reads what [`tactus_model::ForwardModel`] does (to 1e-12 of a reading). Steps must go forward in
 /// time (one back in time counts as none); the first is a sensor at rest without a past.
-pub struct Sensor {
+pub struct HiddenSensor {
     base: Simulator,
     readout: Readout,
     climate: Climate,
     doses: Vec<Dose>,
     run: u64,
-    stages: Vec<Stage>,
+    hooks: Vec<PipelineHook>,
     stiffness: f64,
     parameters: Vec<Vec<(String, f64)>>,
     /// Steps within one asked for are no longer than this.
@@ -66,7 +66,7 @@ const STEPS_MAX: f64 = 64.0;
 /// Speeds are taken over this time, backwards.
 const SPEED_OVER_S: f64 = 0.002;
 
-impl Sensor {
+impl HiddenSensor {
     /// A sensor at rest with doses in it. `run` chooses among random courses of the same physics.
     ///
     /// `base.effects` and `base.noise_rms_counts` are not used: physics here is what `doses` say.
@@ -74,11 +74,11 @@ impl Sensor {
         let mut parameters = Vec::new();
         let mut make = |dose: &Dose| {
             let mut knobs = Knobs::new(dose, base, run);
-            let stage = (dose.physics.make)(&mut knobs);
+            let hook = (dose.physics.make)(&mut knobs);
             parameters.push(knobs.into_drawn());
-            stage
+            hook
         };
-        let stages = doses.iter().map(&mut make).collect();
+        let hooks = doses.iter().map(&mut make).collect();
         let is_fine = doses.iter().any(|dose| dose.physics.is_fine);
         let elements = base.model.array().elements();
         Self {
@@ -87,7 +87,7 @@ impl Sensor {
             climate,
             doses: doses.to_vec(),
             run,
-            stages,
+            hooks,
             parameters,
             longest_step_s: if is_fine { FINE_STEP_S } else { f64::INFINITY },
             last_s: None,
@@ -105,7 +105,7 @@ impl Sensor {
 
     /// Makes elements answer for others: which, for which, and with what share of its indentation.
     pub fn wire(&mut self, wiring: Vec<(usize, usize, f64)>) {
-        self.stages.push(Stage::Covering(Box::new(move |_, indentation_mm| {
+        self.hooks.push(PipelineHook::Covering(Box::new(move |_, indentation_mm| {
             let felt_mm = indentation_mm.to_vec();
             for (element, answers_for, share) in &wiring {
                 indentation_mm[*element] = share * felt_mm[*answers_for];
@@ -117,9 +117,9 @@ impl Sensor {
     pub fn set_covering(&mut self, covering: Covering) {
         self.base.covering = covering;
         self.imprint = None;
-        for (stage, dose) in self.stages.iter_mut().zip(&self.doses) {
-            if let Stage::Covering(_) | Stage::Tool(_) = stage {
-                *stage = (dose.physics.make)(&mut Knobs::new(dose, &self.base, self.run));
+        for (hook, dose) in self.hooks.iter_mut().zip(&self.doses) {
+            if let PipelineHook::Covering(_) | PipelineHook::Tool(_) = hook {
+                *hook = (dose.physics.make)(&mut Knobs::new(dose, &self.base, self.run));
             }
         }
     }
@@ -164,14 +164,14 @@ impl Sensor {
 
     /// What the converter makes of counts before it takes whole steps of them: exact but for its own physics.
     pub fn convert(&self, counts: f64) -> f64 {
-        self.stages.iter().fold(counts, |counts, stage| match stage {
-            Stage::Converter(convert) => convert(counts),
-            Stage::Path(_)
-            | Stage::Touch(_)
-            | Stage::Tool(_)
-            | Stage::Covering(_)
-            | Stage::Element(_)
-            | Stage::Readout(_) => counts,
+        self.hooks.iter().fold(counts, |counts, hook| match hook {
+            PipelineHook::Converter(convert) => convert(counts),
+            PipelineHook::Path(_)
+            | PipelineHook::Touch(_)
+            | PipelineHook::Tool(_)
+            | PipelineHook::Covering(_)
+            | PipelineHook::Element(_)
+            | PipelineHook::Readout(_) => counts,
         })
     }
 
@@ -185,8 +185,8 @@ impl Sensor {
             temperature_c: self.climate.at(t_s),
             touch: Touch { point_mm: [0.0; 2], depth_mm: 0.0 },
         };
-        for stage in &mut self.stages {
-            if let Stage::Path(on_path) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Path(on_path) = hook {
                 on_path(&now, path, &mut tip_mm);
             }
         }
@@ -194,30 +194,30 @@ impl Sensor {
             point_mm: self.base.registration.to_sensor([tip_mm[0], tip_mm[1]]),
             depth_mm: self.base.surface_mm - tip_mm[2],
         };
-        for stage in &mut self.stages {
-            if let Stage::Touch(on_touch) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Touch(on_touch) = hook {
                 let mut touch = now.touch;
                 on_touch(&now, &mut touch);
                 now.touch = touch;
             }
         }
         let mut tool = self.tool();
-        for stage in &mut self.stages {
-            if let Stage::Tool(on_tool) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Tool(on_tool) = hook {
                 on_tool(&now, &mut tool);
             }
         }
         self.press(now.touch, tool);
-        for stage in &mut self.stages {
-            if let Stage::Covering(on_covering) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Covering(on_covering) = hook {
                 on_covering(&now, &mut self.counts);
             }
         }
         self.counts.iter_mut().for_each(|value| *value *= self.stiffness);
         self.base.model.respond(&mut self.counts);
         self.amplify(&now);
-        for stage in &mut self.stages {
-            if let Stage::Readout(on_readout) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Readout(on_readout) = hook {
                 on_readout(&now, &mut self.counts);
             }
         }
@@ -228,8 +228,8 @@ impl Sensor {
     fn amplify(&mut self, now: &Now) {
         let baselines = &self.base.model.response().baseline_counts;
         let mut signal: Option<Vec<f64>> = None;
-        for stage in &mut self.stages {
-            if let Stage::Element(on_element) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Element(on_element) = hook {
                 let signal = signal
                     .get_or_insert_with(|| self.counts.iter().zip(baselines).map(|(c, b)| c - b).collect());
                 on_element(now, signal);
@@ -291,9 +291,9 @@ impl Sensor {
     }
 }
 
-impl fmt::Debug for Sensor {
+impl fmt::Debug for HiddenSensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Sensor")
+        f.debug_struct("HiddenSensor")
             .field("parameters", &self.parameters)
             .field("now", &self.now)
             .finish_non_exhaustive()

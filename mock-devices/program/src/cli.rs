@@ -27,11 +27,11 @@ use crate::usb::UsbArgs;
 #[command(name = "tactus-mock", version)]
 pub(crate) struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: MockCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum MockCommand {
     /// Serves a simulated rig at two pseudo-terminals, whose paths it prints.
     ///
     /// It then reads faults from standard input, one a line such as `sensor stall 2s`, answers each with
@@ -135,9 +135,9 @@ impl Cli {
     /// With the file and the place that are wrong, or what the system refused.
     pub(crate) fn run(self) -> Result<()> {
         match self.command {
-            Command::Rig(args) => in_runtime(serve(args)),
-            Command::Usb(args) => in_runtime(args.serve()),
-            Command::Hidden(args) => args.run(),
+            MockCommand::Rig(args) => in_runtime(serve(args)),
+            MockCommand::Usb(args) => in_runtime(args.serve()),
+            MockCommand::Hidden(args) => args.run(),
         }
     }
 }

@@ -15,11 +15,11 @@ use tactus_sets::{Amount, Content, Label, NoiseKind, Plan, Recipe};
 #[derive(Debug, Args)]
 pub(crate) struct HiddenArgs {
     #[command(subcommand)]
-    command: Command,
+    command: HiddenCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum HiddenCommand {
     /// Lists every physics, the library's effect that it is an instance of, and what it does.
     List {
         /// As JSON.
@@ -82,8 +82,8 @@ struct MakeArgs {
 impl HiddenArgs {
     pub(crate) fn run(self) -> Result<()> {
         match self.command {
-            Command::List { json } => list(json),
-            Command::Make(args) => args.run(),
+            HiddenCommand::List { json } => list(json),
+            HiddenCommand::Make(args) => args.run(),
         }
     }
 }

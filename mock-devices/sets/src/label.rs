@@ -19,7 +19,7 @@ pub struct Label {
     /// Frames of all runs.
     pub frames: usize,
     /// The physics that is in it.
-    pub physics: Vec<Dosed>,
+    pub physics: Vec<PhysicsLabel>,
     /// Separation of all of it together from the recalibrated base model (see [`Separation`](crate::Separation)); 0
     /// without physics.
     pub z: f64,
@@ -39,7 +39,7 @@ pub struct Label {
 
 /// One physics of a set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Dosed {
+pub struct PhysicsLabel {
     /// Its id in the catalogue.
     pub id: String,
     /// The effect that it is an instance of; none outside the library.

@@ -3,15 +3,15 @@
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tactus_hidden::{Base, CATALOGUE, Climate, Definition, Dose, STRENGTH_MAX, Sensor};
+use tactus_hidden::{CATALOGUE, Climate, Definition, Dose, HiddenSensor, RandomRig, STRENGTH_MAX};
 use tactus_model::{ModelError, Simulator, TrajectoryError};
 use tactus_schema::Rig;
 
-use crate::label::{Dosed, Label};
+use crate::label::{Label, PhysicsLabel};
 use crate::noise::{Noise, NoiseKind};
-use crate::plan::{Course, Plan};
+use crate::plan::{Plan, PlannedRun};
 use crate::separation::Separation;
-use crate::set::{Row, Run, Set};
+use crate::set::{DataSet, FrameContext, SetRun};
 
 /// How to make one set. All of it follows from this.
 #[derive(Debug, Clone)]
@@ -92,7 +92,7 @@ const CLOSE: f64 = 0.01;
 
 /// What draws random numbers, each from a stream of its own.
 #[derive(Debug, Clone, Copy)]
-enum Draw {
+enum RandomStream {
     Content,
     Shape,
     Base,
@@ -121,19 +121,19 @@ impl Recipe {
     ///
     /// # Errors
     /// [`RecipeError`] if something is asked for that there is not.
-    pub fn make(&self) -> Result<Set, RecipeError> {
+    pub fn make(&self) -> Result<DataSet, RecipeError> {
         self.check()?;
-        let chosen = self.content.choose(&mut self.rng(Draw::Content))?;
-        let base = Base::new(self.seed_of(Draw::Base))?;
+        let chosen = self.content.choose(&mut self.rng(RandomStream::Content))?;
+        let base = RandomRig::new(self.seed_of(RandomStream::Base))?;
         let Rig { array, registration, covering, .. } = &base.rig;
-        let courses =
-            self.plan.courses(array, *registration, *covering, self.frames, self.seed_of(Draw::Plan))?;
-        let climate = Climate::new(self.seed_of(Draw::Climate));
-        let noise = Noise::draw(self.noise, &mut self.rng(Draw::NoiseKind));
-        let bench = Bench::new(&base, courses, climate, noise);
-        let (doses, mut physics) = self.doses(&chosen, &bench);
-        let Readings { runs, counts, clean } = self.read(&bench, &doses);
-        let Separation { z, z_beyond_spread, .. } = bench.separation_of(&clean);
+        let planned =
+            self.plan.runs(array, *registration, *covering, self.frames, self.seed_of(RandomStream::Plan))?;
+        let climate = Climate::new(self.seed_of(RandomStream::Climate));
+        let noise = Noise::draw(self.noise, &mut self.rng(RandomStream::NoiseKind));
+        let oracle = SeparationOracle::new(&base, planned, climate, noise);
+        let (doses, mut physics) = self.doses(&chosen, &oracle);
+        let Readings { runs, counts, clean } = self.read(&oracle, &doses);
+        let Separation { z, z_beyond_spread, .. } = oracle.separation_of(&clean);
         // Of one alone it is that of the set.
         if let [only] = &mut physics[..] {
             (only.z, only.z_beyond_spread) = (z, z_beyond_spread);
@@ -154,24 +154,28 @@ impl Recipe {
             sigma_intercept_mm: psf.sigma_intercept_mm,
             sigma_per_mm: psf.sigma_per_mm,
         };
-        Ok(Set { rig: base.rig, runs, counts, label })
+        Ok(DataSet { rig: base.rig, runs, counts, label })
     }
 
     /// How much of each physics, and what the label says of it.
-    fn doses(&self, chosen: &[&'static Definition], bench: &Bench<'_>) -> (Vec<Dose>, Vec<Dosed>) {
-        let mut seeds = self.rng(Draw::Shape);
+    fn doses(
+        &self,
+        chosen: &[&'static Definition],
+        oracle: &SeparationOracle<'_>,
+    ) -> (Vec<Dose>, Vec<PhysicsLabel>) {
+        let mut seeds = self.rng(RandomStream::Shape);
         let dose_of = |physics: &&'static Definition| {
             let dose = Dose { physics, strength: 1.0, seed: seeds.random() };
             let (dose, separation, reached) = match self.amount {
                 Amount::Strength(strength) => {
                     let dose = Dose { strength, ..dose };
                     let is_alone = chosen.len() == 1;
-                    (dose, if is_alone { Separation::default() } else { bench.separation(dose) }, true)
+                    (dose, if is_alone { Separation::default() } else { oracle.separation(dose) }, true)
                 }
-                Amount::Separation(z) => bench.dose(dose, z, |separation| separation.z),
-                Amount::BeyondSpread(z) => bench.dose(dose, z, |separation| separation.z_beyond_spread),
+                Amount::Separation(z) => oracle.dose(dose, z, |separation| separation.z),
+                Amount::BeyondSpread(z) => oracle.dose(dose, z, |separation| separation.z_beyond_spread),
             };
-            let dosed = Dosed {
+            let dosed = PhysicsLabel {
                 id: physics.id.into(),
                 effect: physics.effect.map(Into::into),
                 strength: dose.strength,
@@ -179,7 +183,12 @@ impl Recipe {
                 z_beyond_spread: separation.z_beyond_spread,
                 reached,
                 seed: dose.seed,
-                parameters: bench.sensor(bench.base, &[dose], 0).parameters().concat().into_iter().collect(),
+                parameters: oracle
+                    .sensor(oracle.base, &[dose], 0)
+                    .parameters()
+                    .concat()
+                    .into_iter()
+                    .collect(),
             };
             (dose, dosed)
         };
@@ -187,19 +196,19 @@ impl Recipe {
     }
 
     /// What the sensor reads in all runs.
-    fn read(&self, bench: &Bench<'_>, doses: &[Dose]) -> Readings {
-        let array = &bench.base.rig.array;
-        let has_thermometer = self.rng(Draw::Thermometer).random_bool(0.7);
-        let mut rng = self.rng(Draw::Noise);
-        let mut noise_of = bench.noise.series(&mut rng, array.elements());
+    fn read(&self, oracle: &SeparationOracle<'_>, doses: &[Dose]) -> Readings {
+        let array = &oracle.base.rig.array;
+        let has_thermometer = self.rng(RandomStream::Thermometer).random_bool(0.7);
+        let mut rng = self.rng(RandomStream::Noise);
+        let mut noise_of = oracle.noise.series(&mut rng, array.elements());
         let mut noise_counts = vec![0.0; array.elements()];
         let mut readings = Readings::default();
-        for (index, course) in bench.courses.iter().enumerate() {
-            let mut sensor = bench.sensor(bench.base, doses, index);
-            let mut rows = Vec::with_capacity(course.frames);
-            for (frame, (press, phase)) in course.doing(array.rate_hz()).enumerate() {
+        for (index, run) in oracle.planned.iter().enumerate() {
+            let mut sensor = oracle.sensor(oracle.base, doses, index);
+            let mut rows = Vec::with_capacity(run.frames);
+            for (frame, (press, phase)) in run.phases_of_frames(array.rate_hz()).enumerate() {
                 let t_s = frame as f64 / array.rate_hz();
-                sensor.step(t_s, &course.trajectory);
+                sensor.step(t_s, &run.trajectory);
                 noise_of(&mut noise_counts);
                 for (clean, noise) in sensor.counts().iter().zip(&noise_counts) {
                     #[expect(clippy::cast_possible_truncation, reason = "whole counts below 4096")]
@@ -209,11 +218,17 @@ impl Recipe {
                 #[expect(clippy::cast_possible_truncation, reason = "a run of some minutes")]
                 let t_ns = (t_s * 1e9).round() as i64;
                 let temperature_c = sensor.temperature_c().filter(|_| has_thermometer);
-                rows.push(Row { press, phase, t_ns, position_mm: course.trajectory.at(t_s), temperature_c });
+                rows.push(FrameContext {
+                    press,
+                    phase,
+                    t_ns,
+                    position_mm: run.trajectory.at(t_s),
+                    temperature_c,
+                });
             }
             let id =
-                if bench.courses.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
-            readings.runs.push(Run { id, covering_mm: course.covering.thickness_mm, rows });
+                if oracle.planned.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
+            readings.runs.push(SetRun { id, covering_mm: run.covering.thickness_mm, rows });
         }
         readings
     }
@@ -233,13 +248,13 @@ impl Recipe {
         }
     }
 
-    fn rng(&self, draw: Draw) -> ChaCha8Rng {
+    fn rng(&self, draw: RandomStream) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(draw as u64);
         rng
     }
 
-    fn seed_of(&self, draw: Draw) -> u64 {
+    fn seed_of(&self, draw: RandomStream) -> u64 {
         self.rng(draw).random()
     }
 }
@@ -280,16 +295,16 @@ impl Content {
 /// What is read of a sensor.
 #[derive(Debug, Default)]
 struct Readings {
-    runs: Vec<Run>,
+    runs: Vec<SetRun>,
     counts: Vec<f32>,
     /// The same without noise and before whole steps.
     clean: Vec<f64>,
 }
 
 /// What a set is made on.
-struct Bench<'a> {
-    base: &'a Base,
-    courses: Vec<Course>,
+struct SeparationOracle<'a> {
+    base: &'a RandomRig,
+    planned: Vec<PlannedRun>,
     climate: Climate,
     noise: Noise,
     /// Counts of all frames, without physics and noise.
@@ -298,34 +313,34 @@ struct Bench<'a> {
     wider: Vec<f64>,
 }
 
-/// The spread of [`Bench::wider`], as a multiple of the true one.
+/// The spread of [`SeparationOracle::wider`], as a multiple of the true one.
 const WIDER: f64 = 1.001;
 /// A spread that is off by less than this share is near enough, and this often one comes nearer.
 const SPREAD_CHANGE_LEAST: f64 = 5e-4;
 const SPREAD_ROUNDS: usize = 3;
 
-impl<'a> Bench<'a> {
-    fn new(base: &'a Base, courses: Vec<Course>, climate: Climate, noise: Noise) -> Self {
-        let mut bench = Self { base, courses, climate, noise, clean: Vec::new(), wider: Vec::new() };
-        bench.clean = bench.counts(base, &[]);
-        bench.wider =
-            base.spread_by(WIDER).map_or_else(|_| bench.clean.clone(), |wider| bench.counts(&wider, &[]));
-        bench
+impl<'a> SeparationOracle<'a> {
+    fn new(base: &'a RandomRig, planned: Vec<PlannedRun>, climate: Climate, noise: Noise) -> Self {
+        let mut oracle = Self { base, planned, climate, noise, clean: Vec::new(), wider: Vec::new() };
+        oracle.clean = oracle.counts(base, &[]);
+        oracle.wider =
+            base.spread_by(WIDER).map_or_else(|_| oracle.clean.clone(), |wider| oracle.counts(&wider, &[]));
+        oracle
     }
 
-    fn sensor(&self, base: &Base, doses: &[Dose], run: usize) -> Sensor {
-        let covering = self.courses[run].covering;
-        Sensor::new(&Simulator { covering, ..base.sensor.clone() }, doses, self.climate, run as u64)
+    fn sensor(&self, base: &RandomRig, doses: &[Dose], run: usize) -> HiddenSensor {
+        let covering = self.planned[run].covering;
+        HiddenSensor::new(&Simulator { covering, ..base.sensor.clone() }, doses, self.climate, run as u64)
     }
 
     /// Counts of all frames without noise.
-    fn counts(&self, base: &Base, doses: &[Dose]) -> Vec<f64> {
+    fn counts(&self, base: &RandomRig, doses: &[Dose]) -> Vec<f64> {
         let rate_hz = base.rig.array.rate_hz();
         let mut counts = Vec::new();
-        for (run, course) in self.courses.iter().enumerate() {
-            let mut sensor = self.sensor(base, doses, run);
-            for frame in 0..course.frames {
-                sensor.step(frame as f64 / rate_hz, &course.trajectory);
+        for (index, run) in self.planned.iter().enumerate() {
+            let mut sensor = self.sensor(base, doses, index);
+            for frame in 0..run.frames {
+                sensor.step(frame as f64 / rate_hz, &run.trajectory);
                 counts.extend(sensor.counts().iter().map(|count| sensor.convert(*count)));
             }
         }

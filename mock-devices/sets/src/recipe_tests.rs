@@ -14,7 +14,7 @@ fn short(content: Content) -> Recipe {
 fn a_set_without_physics_is_the_base_model_and_noise() {
     let recipe = Recipe { noise: NoiseKind::Coloured, ..short(Content { none: true, ..Content::default() }) };
     let set = recipe.make().unwrap();
-    let base = Base::new(recipe.seed_of(Draw::Base)).unwrap();
+    let base = RandomRig::new(recipe.seed_of(RandomStream::Base)).unwrap();
     let mut image = vec![0.0; 48];
     let (mut squares, mut largest) = (0.0, 0.0_f64);
     for (row, counts) in set.runs[0].rows.iter().zip(set.counts.chunks_exact(48)) {

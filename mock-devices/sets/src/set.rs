@@ -10,11 +10,11 @@ use crate::label::Label;
 
 /// A measurement table in memory, and the truth about it.
 #[derive(Debug, Clone)]
-pub struct Set {
+pub struct DataSet {
     /// The rig as declared.
     pub rig: Rig,
     /// The runs, one after the other.
-    pub runs: Vec<Run>,
+    pub runs: Vec<SetRun>,
     /// Counts of all rows of all runs, one value per element.
     pub counts: Vec<f32>,
     /// The truth, which does not stand in the table.
@@ -23,18 +23,18 @@ pub struct Set {
 
 /// One run of a set.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub struct SetRun {
     /// Its id.
     pub id: String,
     /// Thickness of the covering in place.
     pub covering_mm: f64,
     /// Its rows, in order of time.
-    pub rows: Vec<Row>,
+    pub rows: Vec<FrameContext>,
 }
 
 /// One frame of a run, but for its counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row {
+pub struct FrameContext {
     /// Press index; -1 outside a press.
     pub press: i32,
     /// What the stage does.
@@ -47,7 +47,7 @@ pub struct Row {
     pub temperature_c: Option<f64>,
 }
 
-impl Set {
+impl DataSet {
     /// Writes the measurement table.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl Set {
         let mut counts = self.counts.chunks_exact(self.rig.array.elements());
         for run in &self.runs {
             for (row, counts) in run.rows.iter().zip(&mut counts) {
-                let &Row { press, phase, t_ns, position_mm, temperature_c } = row;
+                let &FrameContext { press, phase, t_ns, position_mm, temperature_c } = row;
                 table.push(RowView {
                     run: &run.id,
                     press,

@@ -1,6 +1,6 @@
 //! Covering: response that changes while depth is held.
 
-use super::{Definition, Stage, left};
+use super::{Definition, PipelineHook, left};
 
 pub(super) const PRONY: Definition = Definition {
     id: "relaxation-prony",
@@ -43,7 +43,7 @@ pub(super) const LOGARITHMIC: Definition = Definition {
         let time_s = knobs.decade("time_constant_s", 0.1, 1.0);
         let by_decade = knobs.scaled("per_decade", 0.05);
         let mut in_contact_s = 0.0;
-        Stage::depth(move |now, depth_mm| {
+        PipelineHook::depth(move |now, depth_mm| {
             in_contact_s = if depth_mm > 0.0 { in_contact_s + now.dt_s } else { 0.0 };
             depth_mm * (1.0 + by_decade * (1.0 + in_contact_s / time_s).log10())
         })
@@ -88,9 +88,9 @@ impl Branches {
 
 /// `u - sum of weight times branch`, the stress of a relaxing solid, as far as it presses: a tool does not pull, and
 /// one that is gone presses nothing, but what the solid has forgotten by then is missing in the next press.
-fn relaxing(times_s: Vec<f64>, weights: Vec<f64>) -> Stage {
+fn relaxing(times_s: Vec<f64>, weights: Vec<f64>) -> PipelineHook {
     let mut branches = Branches::new(times_s);
-    Stage::covering(move |now, indentation_mm| {
+    PipelineHook::covering(move |now, indentation_mm| {
         branches.follow(now.dt_s, indentation_mm);
         if now.touch.depth_mm <= 0.0 {
             return;

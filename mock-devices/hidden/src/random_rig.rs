@@ -12,24 +12,14 @@ use tactus_schema::rig::SensitivityReference;
 /// A rig as declared, and the true sensor behind it. The difference is for recalibration to find: gains differ by 10 %
 /// from element to element, baselines lie in 80-120 counts, both parameters of the spread are off by up to 5 %.
 #[derive(Debug, Clone)]
-pub struct Base {
+pub struct RandomRig {
     /// What stands in the table.
     pub rig: Rig,
     /// What makes the counts: the true base model, no effects.
     pub sensor: Simulator,
 }
 
-/// The room's temperature: a mean, a slow trend and a slow swing.
-#[derive(Debug, Clone, Copy)]
-pub struct Climate {
-    mean_c: f64,
-    trend_c: f64,
-    swing_c: f64,
-    period_s: f64,
-    phase_rad: f64,
-}
-
-impl Base {
+impl RandomRig {
     /// The base of a seed. Registration and surface are as declared.
     ///
     /// # Errors
@@ -83,9 +73,7 @@ impl Base {
         };
         Ok(Self { rig, sensor })
     }
-}
 
-impl Base {
     /// The same sensor under a spread so many times as wide.
     ///
     /// # Errors
@@ -96,27 +84,5 @@ impl Base {
         let psf = Psf { sigma_intercept_mm: by * sigma_intercept_mm, sigma_per_mm: by * sigma_per_mm };
         let model = ForwardModel::new(model.array().clone(), psf, model.response().clone())?;
         Ok(Self { rig: self.rig.clone(), sensor: Simulator { model, ..self.sensor.clone() } })
-    }
-}
-
-impl Climate {
-    /// The climate of a seed.
-    pub fn new(seed: u64) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        Self {
-            mean_c: rng.random_range(19.0..25.0),
-            trend_c: rng.random_range(-2.0..2.0),
-            swing_c: rng.random_range(0.3..1.2),
-            period_s: rng.random_range(80.0..400.0),
-            phase_rad: rng.random_range(0.0..std::f64::consts::TAU),
-        }
-    }
-
-    /// Temperature at a time.
-    pub fn at(&self, t_s: f64) -> f64 {
-        let Self { mean_c, trend_c, swing_c, period_s, phase_rad } = self;
-        // The trend is spent over a quarter of an hour.
-        let trend = trend_c * (1.0 - (-t_s / 300.0).exp());
-        mean_c + trend + swing_c * (std::f64::consts::TAU * t_s / period_s + phase_rad).sin()
     }
 }
