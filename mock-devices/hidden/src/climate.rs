@@ -1,4 +1,4 @@
-//! The temperature of the room in a set.
+//! The temperature of the room.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ pub struct Climate {
 }
 
 impl Climate {
-    /// The climate of a seed.
+    /// The climate of a seed: 19 to 25 degrees Celsius, with a trend and a swing.
     pub fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         Self {
@@ -26,10 +26,10 @@ impl Climate {
         }
     }
 
-    /// Temperature at a time.
+    /// Temperature at a time, degrees Celsius.
     pub fn at(&self, t_s: f64) -> f64 {
         let Self { mean_c, trend_c, swing_c, period_s, phase_rad } = self;
-        // The trend is spent over a quarter of an hour.
+        // After a quarter of an hour the trend is over.
         let trend = trend_c * (1.0 - (-t_s / 300.0).exp());
         mean_c + trend + swing_c * (std::f64::consts::TAU * t_s / period_s + phase_rad).sin()
     }

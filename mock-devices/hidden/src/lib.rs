@@ -1,8 +1,8 @@
 //! Hidden physics: what simulated sensors do that the base model does not know.
 //!
-//! It is written apart from the effect library and in other functional forms: a relaxation here is a Prony series of
-//! three terms, a power law or a logarithm; hysteresis is Prandtl-Ishlinskii, Preisach or Bouc-Wen. Some physics has no
-//! counterpart in the library at all ([`Definition::effect`] is `None`).
+//! It shares no code with the effect library and uses other functional forms: relaxation is a Prony series of three
+//! terms, a power law or a logarithm; hysteresis is Prandtl-Ishlinskii, Preisach or Bouc-Wen. Some physics has no
+//! counterpart in the library ([`Definition::effect`] is `None`).
 //!
 //! [`CATALOGUE`] lists every physics. A [`Dose`] is one of them at a strength, with a seed for its shape. A [`HiddenSensor`]
 //! follows a path as the base model does, with doses in it. A [`RandomRig`] is a rig drawn from a seed to put doses in.

@@ -1,4 +1,4 @@
-//! The sensor below the physics: what a lab declares, and what is true.
+//! A rig drawn from a seed: what a lab declares, and the true sensor.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -9,18 +9,18 @@ use tactus_model::{
 use tactus_schema::Rig;
 use tactus_schema::rig::SensitivityReference;
 
-/// A rig as declared, and the true sensor behind it. The difference is for recalibration to find: gains differ by 10 %
-/// from element to element, baselines lie in 80-120 counts, both parameters of the spread are off by up to 5 %.
+/// A rig as declared, and the true sensor behind it. A recalibration finds the difference: gains scatter by 10 % from
+/// element to element, baselines are 80 to 120 counts, both parameters of the spread are off by up to 5 %.
 #[derive(Debug, Clone)]
 pub struct RandomRig {
-    /// What stands in the table.
+    /// The rig in the measurement table.
     pub rig: Rig,
-    /// What makes the counts: the true base model, no effects.
+    /// The true base model, without effects and noise.
     pub sensor: Simulator,
 }
 
 impl RandomRig {
-    /// The base of a seed. Registration and surface are as declared.
+    /// The rig of a seed. Registration and surface are as declared.
     ///
     /// # Errors
     /// None for any seed: the parameters are within the model's ranges.
@@ -74,10 +74,10 @@ impl RandomRig {
         Ok(Self { rig, sensor })
     }
 
-    /// The same sensor under a spread so many times as wide.
+    /// The same sensor with a spread that is `by` times as wide.
     ///
     /// # Errors
-    /// If the spread is then out of the model's range.
+    /// If the model does not accept that spread.
     pub fn spread_by(&self, by: f64) -> Result<Self, ModelError> {
         let model = &self.sensor.model;
         let Psf { sigma_intercept_mm, sigma_per_mm } = model.psf();

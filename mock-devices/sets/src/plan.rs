@@ -1,4 +1,4 @@
-//! What the stage does in a set: experiments made by procedure, for the simulated rig's array and tool.
+//! What the stage does in a set: generated experiments for the array and tool of the random rig.
 
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -10,38 +10,38 @@ use tactus_model::{Array, Covering, Phase, Registration, Trajectory, TrajectoryE
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Plan {
-    /// All that shows effects, within some 200 s: presses all over at two depths each, repeats, ladders, rates,
-    /// four directions, two holds of 12 s with rest, idle time.
+    /// Everything that shows effects, in about 200 s: presses over the whole array at two depths each, repeats, ladders of
+    /// depths, rates, four directions, two holds of 12 s with rest, idle time.
     #[default]
     Bundle,
     /// The paper's experiments only: two corners, all element centres at five depths, and a coarse grid sweep under
     /// two coverings.
     Paper,
-    /// The bundle's parts at the length of the `diagnose` experiment: some 20 minutes.
+    /// The parts of the bundle at the length of the `diagnose` experiment: about 20 minutes.
     Diagnose,
 }
 
-/// The stage's way through one run, and what it does when.
+/// The stage's path through one run, and the phases of it.
 #[derive(Debug, Clone)]
 pub struct PlannedRun {
-    /// The covering in place.
+    /// The covering of this run.
     pub covering: Covering,
-    /// The tip's way, robot frame.
+    /// Path of the tip, robot frame.
     pub trajectory: Trajectory,
-    /// What it does, in order of time.
+    /// In order of time.
     pub phases: Vec<PhaseInterval>,
-    /// Frames that are taken, the first at 0 s.
+    /// Number of frames, the first at 0 s.
     pub frames: usize,
 }
 
-/// What the stage does from the end of the mark before until this one's.
+/// What the stage does from the end of the previous interval until the end of this one.
 #[derive(Debug, Clone, Copy)]
 pub struct PhaseInterval {
-    /// Its end.
+    /// Its end, since the start of the run.
     pub until_s: f64,
     /// Press index; -1 outside a press.
     pub press: i32,
-    /// What it does.
+    /// What the stage does.
     pub phase: Phase,
 }
 
@@ -49,14 +49,14 @@ const SAFE_MM: f64 = 2.0;
 const APPROACH_MM: f64 = 0.3;
 const TRAVEL_MM_PER_S: f64 = 20.0;
 const LOAD_MM_PER_S: f64 = 1.0;
-/// A press comes from there when its direction matters.
+/// Sideways distance from which a press approaches when its direction matters.
 const ASIDE_MM: f64 = 1.0;
-/// The sweep's other covering, of the paper's four.
+/// Second covering of the grid sweep, one of the paper's four.
 const THICKER: Covering = Covering { thickness_mm: 2.54 };
 
 impl Plan {
-    /// The runs of the plan on an array under `covering`. `frames`: so many in all, in which the last run's parts are
-    /// repeated or cut; without it the plan takes its own time.
+    /// The runs of the plan on an array under `covering`. With `frames`, the parts of the last run are repeated or cut so
+    /// that all runs together have this many frames. Without it the plan has its own length.
     ///
     /// # Errors
     /// None for arrays of the simulated rigs.
@@ -96,7 +96,7 @@ impl Plan {
 }
 
 impl PlannedRun {
-    /// What the stage does at each frame: press and phase.
+    /// Press index and phase of each frame.
     pub fn phases_of_frames(&self, rate_hz: f64) -> impl Iterator<Item = (i32, Phase)> {
         let mut mark = 0;
         (0..self.frames).map(move |frame| {
@@ -109,7 +109,7 @@ impl PlannedRun {
     }
 }
 
-/// How much of each part.
+/// Numbers and durations of the parts of a bundle.
 struct PartSizes {
     rounds: usize,
     idle_s: f64,
@@ -149,14 +149,14 @@ const DIAGNOSE: PartSizes = PartSizes {
     dwell_s: [0.25, 0.5],
 };
 
-/// A press to be made.
+/// One press of the plan.
 struct PlannedPress {
     /// Sensor frame.
     at_mm: [f64; 2],
     depths_mm: Vec<f64>,
     dwell_s: f64,
     load_mm_per_s: f64,
-    /// From where it comes at the approach height, robot frame.
+    /// Start of the approach, relative to the press, robot frame.
     from_mm: [f64; 2],
 }
 
@@ -174,7 +174,7 @@ struct PlanBuilder {
 }
 
 impl PlanBuilder {
-    /// At rest at the safe height over the array's middle.
+    /// Starts at rest at the safe height above the array's middle.
     fn new(array: &Array, registration: Registration, covering: Covering, rng: ChaCha8Rng) -> Self {
         let middle_mm = array.extent_mm().map(|[least, greatest]| f64::midpoint(least, greatest));
         let [x, y] = registration.to_robot(middle_mm);
@@ -200,7 +200,7 @@ impl PlanBuilder {
         Ok(PlannedRun { covering: self.covering, trajectory, phases: self.phases, frames })
     }
 
-    /// Makes a part once, or as often as the time asks.
+    /// Makes a part once, and again until the wanted time is over.
     fn repeat(&mut self, wanted_s: Option<f64>, mut part: impl FnMut(&mut Self)) {
         part(self);
         while wanted_s.is_some_and(|wanted_s| self.t_s < wanted_s) {
@@ -239,7 +239,7 @@ impl PlanBuilder {
         }
     }
 
-    /// Every second element's centre, as on a chessboard, and a few places off centre, in random order, at two depths each.
+    /// Every second element's centre, as on a chessboard, and four places off centre, in random order, at two depths each.
     fn all_over(&mut self, parts: &PartSizes) {
         let odd = self.rng.random_range(0..2_usize);
         let mut sites_mm: Vec<[f64; 2]> = (self.centres_mm.iter().enumerate())
@@ -308,7 +308,7 @@ impl PlanBuilder {
         }
     }
 
-    /// 7 x 7 places 0.1 mm apart about one element, at 30, 50 and 65 % of the thickness.
+    /// 7 x 7 places, 0.1 mm apart, around one element, at 30, 50 and 65 % of the thickness.
     fn grid_sweep(&mut self) {
         self.rest(1.0);
         let [x, y] = self.centres_mm[self.centres_mm.len() / 2 + 4];
@@ -365,12 +365,12 @@ impl PlanBuilder {
         self.phases.push(PhaseInterval { until_s: self.t_s, press, phase });
     }
 
-    /// An element's centre by chance.
+    /// The centre of a random element, sensor frame.
     fn site(&mut self) -> [f64; 2] {
         self.centres_mm[self.rng.random_range(0..self.centres_mm.len())]
     }
 
-    /// Depth that is a share of the covering's thickness.
+    /// A share of the covering's thickness, mm.
     fn share(&self, share: f64) -> f64 {
         share * self.covering.thickness_mm
     }

@@ -1,4 +1,4 @@
-//! From what is asked for to a set.
+//! From a recipe to a data set.
 
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -13,48 +13,48 @@ use crate::plan::{Plan, PlannedRun};
 use crate::separation::Separation;
 use crate::set::{DataSet, FrameContext, SetRun};
 
-/// How to make one set. All of it follows from this.
+/// How to make one data set. Equal recipes make equal sets.
 #[derive(Debug, Clone)]
 pub struct Recipe {
-    /// Name of the set; its runs are named after it.
+    /// Name of the set, and prefix of its run ids.
     pub name: String,
     /// Seed of everything random.
     pub seed: u64,
     /// What the stage does.
     pub plan: Plan,
-    /// Frames, if not the plan's own number.
+    /// Number of frames; the plan's if `None`.
     pub frames: Option<usize>,
-    /// What noise comes upon the readings.
+    /// Noise of the readings.
     pub noise: NoiseKind,
-    /// Which physics.
+    /// Its physics.
     pub content: Content,
-    /// How much of each.
+    /// How strong each physics is.
     pub amount: Amount,
 }
 
-/// Which physics a set has. Without anything asked for: one of the library's effects by chance.
+/// Which physics a set has. The default is a random one of the library's effects.
 #[derive(Debug, Clone, Default)]
 pub struct Content {
-    /// These, by id.
+    /// Physics by id.
     pub physics: Vec<String>,
-    /// One instance by chance of each of these effects.
+    /// A random instance of each of these effects.
     pub effects: Vec<String>,
-    /// So many further effects of the library, all different; 1 if nothing else is asked for.
+    /// Number of further effects of the library, all different; 1 if nothing else is given.
     pub combine: Option<usize>,
-    /// One that the library has nothing like.
+    /// A random physics outside the library.
     pub outside: bool,
-    /// None.
+    /// No physics at all.
     pub none: bool,
 }
 
-/// How much of each physics.
+/// How strong each physics is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Amount {
-    /// At this strength.
+    /// This strength.
     Strength(f64),
-    /// As much as lies this far from the base model, each taken alone: [`Separation::z`].
+    /// The strength at which the physics alone has this [`Separation::z`].
     Separation(f64),
-    /// The same after the spread was recalibrated too: [`Separation::z_beyond_spread`].
+    /// The strength at which the physics alone has this [`Separation::z_beyond_spread`].
     BeyondSpread(f64),
 }
 
@@ -69,14 +69,8 @@ pub enum RecipeError {
     UnknownEffect(String),
     /// A number is out of its range.
     #[error("{field} must be {range}, not {value}")]
-    Range {
-        /// Which.
-        field: &'static str,
-        /// What it may be.
-        range: &'static str,
-        /// What it was.
-        value: f64,
-    },
+    #[expect(missing_docs, reason = "the message says what each field is")]
+    Range { field: &'static str, range: &'static str, value: f64 },
     /// The base model refused its parameters.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -87,10 +81,10 @@ pub enum RecipeError {
 
 const STRENGTH_MIN: f64 = 1e-5;
 const TRIALS_MAX: usize = 24;
-/// A separation is met within this share of it.
+/// Relative tolerance of a requested separation.
 const CLOSE: f64 = 0.01;
 
-/// What draws random numbers, each from a stream of its own.
+/// Uses of random numbers. Each has its own stream.
 #[derive(Debug, Clone, Copy)]
 enum RandomStream {
     Content,
@@ -104,7 +98,7 @@ enum RandomStream {
 }
 
 impl Recipe {
-    /// A bundle of white, coloured or quantised noise with one effect of the library, by chance, at strength 1.
+    /// A bundle with random noise and one random effect of the library, at strength 1.
     pub fn new(seed: u64) -> Self {
         Self {
             name: "set-0000".into(),
@@ -120,7 +114,7 @@ impl Recipe {
     /// Makes the set.
     ///
     /// # Errors
-    /// [`RecipeError`] if something is asked for that there is not.
+    /// [`RecipeError`] names the unknown physics or effect, or the number out of range.
     pub fn make(&self) -> Result<DataSet, RecipeError> {
         self.check()?;
         let chosen = self.content.choose(&mut self.rng(RandomStream::Content))?;
@@ -134,7 +128,7 @@ impl Recipe {
         let (doses, mut physics) = self.doses(&chosen, &oracle);
         let Readings { runs, counts, clean } = self.read(&oracle, &doses);
         let Separation { z, z_beyond_spread, .. } = oracle.separation_of(&clean);
-        // Of one alone it is that of the set.
+        // The separation of a single physics is that of the set.
         if let [only] = &mut physics[..] {
             (only.z, only.z_beyond_spread) = (z, z_beyond_spread);
         }
@@ -144,7 +138,7 @@ impl Recipe {
             set: self.name.clone(),
             seed: self.seed,
             plan: self.plan,
-            frames: runs.iter().map(|run| run.rows.len()).sum(),
+            frames: runs.iter().map(|run| run.frames.len()).sum(),
             physics,
             z,
             z_beyond_spread,
@@ -157,7 +151,7 @@ impl Recipe {
         Ok(DataSet { rig: base.rig, runs, counts, label })
     }
 
-    /// How much of each physics, and what the label says of it.
+    /// The dose of each physics, and its label.
     fn doses(
         &self,
         chosen: &[&'static Definition],
@@ -195,7 +189,7 @@ impl Recipe {
         chosen.iter().map(dose_of).unzip()
     }
 
-    /// What the sensor reads in all runs.
+    /// The readings of all runs.
     fn read(&self, oracle: &SeparationOracle<'_>, doses: &[Dose]) -> Readings {
         let array = &oracle.base.rig.array;
         let has_thermometer = self.rng(RandomStream::Thermometer).random_bool(0.7);
@@ -228,7 +222,7 @@ impl Recipe {
             }
             let id =
                 if oracle.planned.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
-            readings.runs.push(SetRun { id, covering_mm: run.covering.thickness_mm, rows });
+            readings.runs.push(SetRun { id, covering_mm: run.covering.thickness_mm, frames: rows });
         }
         readings
     }
@@ -260,7 +254,7 @@ impl Recipe {
 }
 
 impl Content {
-    /// The physics, in the order of the catalogue.
+    /// The chosen physics, in the order of the catalogue.
     fn choose(&self, rng: &mut ChaCha8Rng) -> Result<Vec<&'static Definition>, RecipeError> {
         let mut chosen: Vec<&'static Definition> = Vec::new();
         if self.none {
@@ -292,16 +286,16 @@ impl Content {
     }
 }
 
-/// What is read of a sensor.
+/// The readings of all runs.
 #[derive(Debug, Default)]
 struct Readings {
     runs: Vec<SetRun>,
     counts: Vec<f32>,
-    /// The same without noise and before whole steps.
+    /// The same without noise and quantisation.
     clean: Vec<f64>,
 }
 
-/// What a set is made on.
+/// Computes how far physics is from the base model on the runs of one set.
 struct SeparationOracle<'a> {
     base: &'a RandomRig,
     planned: Vec<PlannedRun>,
@@ -309,13 +303,13 @@ struct SeparationOracle<'a> {
     noise: Noise,
     /// Counts of all frames, without physics and noise.
     clean: Vec<f64>,
-    /// The same under a spread that is wider by [`WIDER`].
+    /// The same with a spread that is [`WIDER`] times as wide.
     wider: Vec<f64>,
 }
 
 /// The spread of [`SeparationOracle::wider`], as a multiple of the true one.
 const WIDER: f64 = 1.001;
-/// A spread that is off by less than this share is near enough, and this often one comes nearer.
+/// The search for the nearest spread ends when its change is below this share, or after this many rounds.
 const SPREAD_CHANGE_LEAST: f64 = 5e-4;
 const SPREAD_ROUNDS: usize = 3;
 
@@ -358,7 +352,7 @@ impl<'a> SeparationOracle<'a> {
             Separation::new(clean, with, wider, array.elements(), sigma_counts)
         };
         let mut separation = from(&self.clean, &self.wider);
-        // Counts are linear in small changes of the spread only: what looks like a large one is held against that spread.
+        // Counts are linear only in small changes of the spread: a large change is compared again at the new spread.
         let mut spread = 1.0;
         for _ in 0..SPREAD_ROUNDS {
             let change = (WIDER - 1.0) * separation.spread_steps;
@@ -377,10 +371,10 @@ impl<'a> SeparationOracle<'a> {
         separation
     }
 
-    /// The strength at which a physics lies `wanted` from the base model: the dose, its separation, and whether it is
-    /// the one wanted. Where it cannot be (an element is dead or it is not), the nearest that is any.
+    /// Finds the strength at which a physics has the separation `wanted`. Returns the dose, its separation, and whether
+    /// that is the one wanted. If no strength has it (an element is dead or not), the result is the nearest.
     ///
-    /// Separation grows about in proportion to strength, which makes the first guess of each step.
+    /// Each step first guesses that separation is proportional to strength.
     fn dose(&self, dose: Dose, wanted: f64, z_of: fn(&Separation) -> f64) -> (Dose, Separation, bool) {
         let (mut low, mut high) = (STRENGTH_MIN, STRENGTH_MAX);
         let mut strength: f64 = 1.0;
@@ -415,7 +409,7 @@ impl<'a> SeparationOracle<'a> {
     }
 }
 
-/// One physics by chance, of those that a condition lets through.
+/// A random physics among those that fulfil a condition.
 fn one_of(rng: &mut ChaCha8Rng, is_right: impl Fn(&Definition) -> bool) -> Option<&'static Definition> {
     let fitting: Vec<&'static Definition> =
         CATALOGUE.iter().copied().filter(|definition| is_right(definition)).collect();

@@ -17,7 +17,7 @@ fn a_set_without_physics_is_the_base_model_and_noise() {
     let base = RandomRig::new(recipe.seed_of(RandomStream::Base)).unwrap();
     let mut image = vec![0.0; 48];
     let (mut squares, mut largest) = (0.0, 0.0_f64);
-    for (row, counts) in set.runs[0].rows.iter().zip(set.counts.chunks_exact(48)) {
+    for (row, counts) in set.runs[0].frames.iter().zip(set.counts.chunks_exact(48)) {
         let [x, y, z] = row.position_mm;
         let contact = Contact {
             indenter: base.sensor.indenter.clone(),
@@ -132,6 +132,6 @@ fn tables_with_and_without_physics_differ_in_their_counts_alone() {
     let none = set(Content { none: true, ..Content::default() });
     let some = set(Content { physics: vec!["late-frames".into()], ..Content::default() });
     assert_eq!(none.rig, some.rig);
-    assert_eq!(none.runs[0].rows, some.runs[0].rows);
+    assert_eq!(none.runs[0].frames, some.runs[0].frames);
     assert_ne!(none.counts, some.counts);
 }

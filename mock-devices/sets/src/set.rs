@@ -1,4 +1,4 @@
-//! A set: the measurement table of a simulated experiment, and its label.
+//! A data set: the measurement table of a simulated experiment, and its label.
 
 use std::path::Path;
 
@@ -11,39 +11,39 @@ use crate::label::Label;
 /// A measurement table in memory, and the truth about it.
 #[derive(Debug, Clone)]
 pub struct DataSet {
-    /// The rig as declared.
+    /// The declared rig.
     pub rig: Rig,
-    /// The runs, one after the other.
+    /// In order of time.
     pub runs: Vec<SetRun>,
-    /// Counts of all rows of all runs, one value per element.
+    /// Counts of all frames of all runs, frame by frame, one value per element.
     pub counts: Vec<f32>,
-    /// The truth, which does not stand in the table.
+    /// The truth, which is not in the table.
     pub label: Label,
 }
 
-/// One run of a set.
+/// One run of a data set.
 #[derive(Debug, Clone)]
 pub struct SetRun {
-    /// Its id.
+    /// Run id, unique in the set.
     pub id: String,
-    /// Thickness of the covering in place.
+    /// Thickness of the covering.
     pub covering_mm: f64,
-    /// Its rows, in order of time.
-    pub rows: Vec<FrameContext>,
+    /// In order of time.
+    pub frames: Vec<FrameContext>,
 }
 
-/// One frame of a run, but for its counts.
+/// A row of the measurement table without what the run and the counts give.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameContext {
     /// Press index; -1 outside a press.
     pub press: i32,
-    /// What the stage does.
+    /// What the stage is doing.
     pub phase: Phase,
-    /// Time of sampling since the run began.
+    /// Time of sampling since the start of the run.
     pub t_ns: i64,
-    /// Stage position.
+    /// Stage position, robot frame.
     pub position_mm: [f64; 3],
-    /// Temperature, if it is measured.
+    /// Temperature, if the rig measures it.
     pub temperature_c: Option<f64>,
 }
 
@@ -56,7 +56,7 @@ impl DataSet {
         let mut table = TableWriter::create(path.as_ref(), &self.rig.to_json())?;
         let mut counts = self.counts.chunks_exact(self.rig.array.elements());
         for run in &self.runs {
-            for (row, counts) in run.rows.iter().zip(&mut counts) {
+            for (row, counts) in run.frames.iter().zip(&mut counts) {
                 let &FrameContext { press, phase, t_ns, position_mm, temperature_c } = row;
                 table.push(RowView {
                     run: &run.id,

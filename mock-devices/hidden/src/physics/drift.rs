@@ -1,4 +1,4 @@
-//! Readout: zero and gain that wander.
+//! Readout: drift of baselines and gains.
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -8,7 +8,7 @@ use super::{Definition, PipelineHook, left, shift};
 pub(super) const COMMON_WALK: Definition = Definition {
     id: "drift-common-walk",
     effect: Some("baseline-drift"),
-    about: "b' = b + W(t), W one Wiener process for all elements: the reference voltage wanders",
+    about: "b' = b + W(t), W one Wiener process for all elements: the reference voltage drifts",
     is_fine: false,
     make: |knobs| {
         let counts_per_root_s = knobs.scaled("counts_per_root_s", 0.5);
@@ -72,7 +72,7 @@ pub(super) const GAIN_WARM_UP: Definition = Definition {
 pub(super) const GAIN_WALK: Definition = Definition {
     id: "gain-walk",
     effect: Some("gain-drift"),
-    about: "s' = s (1 + W(t)), W one Wiener process for all elements: the excitation's amplitude wanders",
+    about: "s' = s (1 + W(t)), W one Wiener process for all elements: the excitation's amplitude drifts",
     is_fine: false,
     make: |knobs| {
         let per_root_s = knobs.scaled("per_root_s", 0.004);
@@ -98,7 +98,7 @@ pub(super) const GAIN_TEMPERATURE: Definition = Definition {
     },
 };
 
-/// A gain of all elements: one plus what `excess` says of the time, the step and the temperature.
+/// A gain of all elements: 1 plus `excess` of the time, the time step and the temperature.
 fn gain(baselines: Vec<f64>, mut excess: impl FnMut(f64, f64, f64) -> f64 + Send + 'static) -> PipelineHook {
     PipelineHook::readout(move |now, counts| {
         let by = excess(now.t_s, now.dt_s, now.temperature_c);

@@ -126,7 +126,7 @@ pub(super) const COARSE_STEPS: Definition = Definition {
     },
 };
 
-/// Readings of a while ago, straight between steps: time, counts, and their integral since the first step.
+/// Past readings, linear between steps: time, counts, and their integral since the first step.
 #[derive(Debug, Default)]
 struct ReadingHistory(VecDeque<(f64, Vec<f64>, Vec<f64>)>);
 
@@ -147,7 +147,7 @@ impl ReadingHistory {
         }
     }
 
-    /// Reading of an element at an earlier time; the earliest known before that.
+    /// Reading of an element at an earlier time; the earliest known one before that.
     fn at(&self, t_s: f64, element: usize) -> f64 {
         let after = self.after(t_s);
         let (after_s, later, _) = &self.0[after];
@@ -158,7 +158,7 @@ impl ReadingHistory {
         earlier[element] + (later[element] - earlier[element]) * (t_s - before_s) / (after_s - before_s)
     }
 
-    /// Means over the last `window_s`, into `means`.
+    /// Writes the means over the last `window_s` into `means`.
     fn mean(&self, t_s: f64, window_s: f64, means: &mut [f64]) {
         let Some((_, _, until)) = self.0.back().filter(|_| window_s > 0.0) else { return };
         let from_s = t_s - window_s;

@@ -1,4 +1,4 @@
-//! Covering: how far the press spreads, and where.
+//! Covering: how far a press spreads, and differences over the array.
 
 use std::f64::consts::PI;
 
@@ -124,7 +124,7 @@ pub(super) const SEAM: Definition = Definition {
     },
 };
 
-/// A share of the press that spreads by another kernel, of unit volume, evaluated at the elements' centres.
+/// Spreads a share of the press by another kernel of unit volume, evaluated at the elements' centres.
 fn tail(knobs: &mut Knobs<'_>, per_mm2: impl Fn(f64) -> f64) -> PipelineHook {
     const STEP_MM: f64 = 0.05;
     const REACH_MM: f64 = 30.0;
