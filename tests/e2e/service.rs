@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Lab, Process, repository, tactus};
+use tactus_e2e::{Process, ServiceUnderTest, repository, tactus};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb::{self, run_event::Event};
 
@@ -30,7 +30,7 @@ fn events(recording: &Path) -> Vec<Event> {
     messages(recording).into_iter().filter_map(of_run).collect()
 }
 
-fn recording(lab: &Lab) -> PathBuf {
+fn recording(lab: &ServiceUnderTest) -> PathBuf {
     let runs: Vec<_> =
         fs::read_dir(lab.folder.path().join("runs")).unwrap().map(|run| run.unwrap().path()).collect();
     assert_eq!(runs.len(), 1, "{runs:?}");
@@ -38,7 +38,7 @@ fn recording(lab: &Lab) -> PathBuf {
 }
 
 /// Waits until the array feels the tip, as a viewer of the live frames sees it.
-fn wait_until_pressing(lab: &Lab) {
+fn wait_until_pressing(lab: &ServiceUnderTest) {
     let mut viewer = lab.start_tactus(&["watch", "--json"]);
     viewer.wait_until(|line| {
         let frame: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
@@ -49,14 +49,14 @@ fn wait_until_pressing(lab: &Lab) {
 }
 
 /// What the service is doing.
-fn status(lab: &Lab) -> Value {
+fn status(lab: &ServiceUnderTest) -> Value {
     let said = lab.tactus(&["--json", "status"]);
     assert_eq!(said.code, Some(0), "{said:?}");
     said.json()
 }
 
 /// Where the tip truly is, as the virtual stage knows.
-fn truth(lab: &mut Lab) -> Value {
+fn truth(lab: &mut ServiceUnderTest) -> Value {
     lab.mock.type_line("truth");
     let line = lab.mock.wait_until(|line| line.starts_with('{'));
     serde_json::from_str(&line).unwrap()
@@ -64,7 +64,7 @@ fn truth(lab: &mut Lab) -> Value {
 
 #[test]
 fn a_run_started_by_the_cli_is_done_and_recorded() {
-    let lab = Lab::start(|rig| rig);
+    let lab = ServiceUnderTest::start(|rig| rig);
     let script = lab.script("presses.star", PRESSES);
     let said = lab.tactus(&["--json", "run", &script]);
     assert_eq!(said.code, Some(0), "{said:?}");
@@ -94,7 +94,7 @@ fn described(_: String) -> String {
 
 #[test]
 fn a_sensor_whose_frames_are_described_is_read_and_recorded_with_its_description() {
-    let mut lab = Lab::start(described);
+    let mut lab = ServiceUnderTest::start(described);
     let script = lab.script("presses.star", PRESSES);
     let said = lab.tactus(&["--json", "run", &script, "--no-report"]);
     assert_eq!(said.code, Some(0), "{said:?}");
@@ -140,7 +140,7 @@ fn a_sensor_whose_frames_are_described_is_read_and_recorded_with_its_description
 
 #[test]
 fn sigterm_in_the_middle_of_a_press_retracts_and_closes_the_recording() {
-    let lab = Lab::start(|rig| rig);
+    let lab = ServiceUnderTest::start(|rig| rig);
     let script = lab.script("hold.star", HOLD);
     let _client = lab.start_tactus(&["run", &script]);
     wait_until_pressing(&lab);
@@ -161,7 +161,7 @@ fn sigterm_in_the_middle_of_a_press_retracts_and_closes_the_recording() {
 
 #[test]
 fn a_sensor_that_goes_for_two_seconds_is_a_gap_of_sixty_frames_and_the_press_is_repeated() {
-    let mut lab = Lab::start(|rig| rig);
+    let mut lab = ServiceUnderTest::start(|rig| rig);
     let script = lab.script("long.star", LONG_DWELL);
     let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
     wait_until_pressing(&lab);
@@ -187,7 +187,7 @@ fn a_sensor_that_goes_for_two_seconds_is_a_gap_of_sixty_frames_and_the_press_is_
 
 #[test]
 fn where_the_policy_says_fail_a_lost_sensor_fails_the_run_with_the_tip_up() {
-    let mut lab = Lab::start(|rig| rig.replace("on_gap = \"repeat\"", "on_gap = \"fail\""));
+    let mut lab = ServiceUnderTest::start(|rig| rig.replace("on_gap = \"repeat\"", "on_gap = \"fail\""));
     let script = lab.script("hold.star", HOLD);
     let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
     wait_until_pressing(&lab);
@@ -203,7 +203,7 @@ fn where_the_policy_says_fail_a_lost_sensor_fails_the_run_with_the_tip_up() {
 
 #[test]
 fn stop_pause_and_resume_work_from_another_client() {
-    let lab = Lab::start(|rig| rig);
+    let lab = ServiceUnderTest::start(|rig| rig);
     assert_eq!(lab.tactus(&["pause"]).code, Some(1), "no run can be paused");
     assert_eq!(lab.tactus(&["stop"]).code, Some(0), "stop is never refused");
 
@@ -234,7 +234,7 @@ fn stop_pause_and_resume_work_from_another_client() {
 
 #[test]
 fn a_service_that_is_killed_leaves_a_recording_that_lacks_at_most_a_second() {
-    let lab = Lab::start(|rig| rig);
+    let lab = ServiceUnderTest::start(|rig| rig);
     let script = lab.script("hold.star", HOLD);
     let _client = lab.start_tactus(&["run", &script]);
     wait_until_pressing(&lab);
@@ -252,9 +252,9 @@ fn a_service_that_is_killed_leaves_a_recording_that_lacks_at_most_a_second() {
 
 #[test]
 fn after_a_start_nothing_moves_before_an_explicit_reset() {
-    let mut lab = Lab::start_only(|rig| rig);
+    let mut lab = ServiceUnderTest::start_only(|rig| rig);
     let presses = lab.script("presses.star", PRESSES);
-    let refused_before_a_reset = |lab: &mut Lab| {
+    let refused_before_a_reset = |lab: &mut ServiceUnderTest| {
         let before = truth(lab);
         let refused = lab.tactus(&["--json", "run", &presses, "--no-report"]);
         assert_eq!(refused.code, Some(4), "{refused:?}");
@@ -279,7 +279,7 @@ fn after_a_start_nothing_moves_before_an_explicit_reset() {
 
 #[test]
 fn an_alarm_fails_the_run_and_only_an_explicit_reset_makes_the_stage_move_again() {
-    let mut lab = Lab::start(|rig| rig);
+    let mut lab = ServiceUnderTest::start(|rig| rig);
     let script = lab.script("hold.star", HOLD);
     let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
     wait_until_pressing(&lab);

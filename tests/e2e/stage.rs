@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use tactus_e2e::{Lab, Process, Said, free_endpoint, repository, tactus};
+use tactus_e2e::{Process, Said, ServiceUnderTest, free_endpoint, repository, tactus};
 use tempfile::TempDir;
 
 const ZABER: &str = "protocol = \"zaber-ascii\"
@@ -113,7 +113,7 @@ fn another_controller_than_the_rigs_and_no_controller_are_told() {
 
 #[test]
 fn a_stage_that_the_service_holds_is_left_alone() {
-    let lab = Lab::start(|rig| rig);
+    let lab = ServiceUnderTest::start(|rig| rig);
     let said = lab.tactus(&["stage", "check", "--rig", "rig.toml", "--home", "--yes"]);
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.err.contains("busy") && said.err.contains("systemctl stop tactusd"), "{said:?}");
@@ -125,7 +125,7 @@ fn a_stage_that_the_service_holds_is_left_alone() {
 
 #[test]
 fn a_service_presses_with_a_stage_that_speaks_zaber() {
-    let lab = Lab::start(|rig| rig.replace("protocol = \"grbl\"\n", ZABER));
+    let lab = ServiceUnderTest::start(|rig| rig.replace("protocol = \"grbl\"\n", ZABER));
     let script = lab.script(
         "presses.star",
         "def run(rig):\n    tare()\n    for x in (5.0, 9.0):\n        press(x, 5.0, depths_mm = [0.2, 0.4])\n",

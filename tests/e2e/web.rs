@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 use serde_json::Value;
-use tactus_e2e::{Lab, Process, free_endpoint};
+use tactus_e2e::{Process, ServiceUnderTest, free_endpoint};
 
 const HOLD: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 600.0)\n";
 
@@ -17,7 +17,7 @@ struct Web {
 }
 
 impl Web {
-    fn start(lab: &Lab, endpoint: &str) -> Self {
+    fn start(lab: &ServiceUnderTest, endpoint: &str) -> Self {
         let arguments = ["--endpoint", endpoint, "--listen", "127.0.0.1:0"];
         let mut process = Process::start("tactus-web", lab.folder.path(), &arguments);
         let line = process.wait_for("http://");
@@ -62,7 +62,7 @@ impl Web {
 
 #[test]
 fn the_page_shows_live_frames_and_stops_a_run() {
-    let lab = Lab::start(|rig| rig);
+    let lab = ServiceUnderTest::start(|rig| rig);
     let web = Web::start(&lab, &lab.endpoint);
     let (status, page) = web.ask("GET /", "");
     assert_eq!(status, 200, "{page}");
@@ -99,7 +99,7 @@ fn the_page_shows_live_frames_and_stops_a_run() {
 
 #[test]
 fn pages_of_other_sites_command_and_read_nothing() {
-    let lab = Lab::start_only(|rig| rig);
+    let lab = ServiceUnderTest::start_only(|rig| rig);
     let web = Web::start(&lab, &lab.endpoint);
     web.until(|view| view["run"]["fault"].as_str().is_some_and(|fault| !fault.is_empty()));
     for headers in
@@ -121,7 +121,7 @@ fn pages_of_other_sites_command_and_read_nothing() {
 
 #[test]
 fn without_a_service_it_says_so_and_finds_it_when_it_comes() {
-    let mut lab = Lab::start(|rig| rig);
+    let mut lab = ServiceUnderTest::start(|rig| rig);
     let nobody = Web::start(&lab, &free_endpoint());
     let view = nobody
         .until(|view| view["problem"].as_str().is_some_and(|problem| problem.contains("no service at")));

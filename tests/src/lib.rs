@@ -195,7 +195,7 @@ impl Drop for Process {
 
 /// A virtual rig on pseudo-terminals and a service that owns it, in a folder of their own.
 #[derive(Debug)]
-pub struct Lab {
+pub struct ServiceUnderTest {
     /// The virtual devices; faults are typed into them.
     pub mock: Process,
     /// The service.
@@ -206,7 +206,7 @@ pub struct Lab {
     pub folder: TempDir,
 }
 
-impl Lab {
+impl ServiceUnderTest {
     /// Starts both, waits until frames flow, and resets, so that runs can start. `change` may rewrite the rig file.
     ///
     /// # Panics

@@ -180,7 +180,7 @@ fn one(set: &Planned, places: &Places) -> Result<Outcome> {
 }
 
 fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<Report>) -> Outcome {
-    let truth = |dosed: &tactus_sets::Dosed| Truth {
+    let truth = |dosed: &tactus_sets::PhysicsLabel| Truth {
         physics: dosed.id.clone(),
         effect: dosed.effect.clone(),
         z: dosed.z_beyond_spread,

@@ -10,9 +10,9 @@
 //! | watchdog | half of systemd's limit |
 //! | main | SIGTERM or SIGINT |
 
-mod answer;
+mod commands;
 mod health;
-mod watch;
+mod publish;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -32,8 +32,8 @@ use tokio::time::timeout;
 use tracing::{error, info, warn};
 
 use crate::notify;
-use answer::Desk;
-use watch::OnBus;
+use commands::CommandDesk;
+use publish::BusPublisher;
 
 /// How long a run may take to retract and close its recording at shutdown.
 const FAREWELL: Duration = Duration::from_secs(30);
@@ -122,10 +122,10 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     let (bus, calls) = Bus::open(&endpoints, keys).await?;
     let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
     let opened = devices::open(&rig, &rig_service, codec, truth, clock);
-    let engine = Engine::start(rig, opened.devices, clock, Arc::new(OnBus(bus.publisher())))?;
+    let engine = Engine::start(rig, opened.devices, clock, Arc::new(BusPublisher(bus.publisher())))?;
 
     let Calls { stops, commands } = calls;
-    let desk = Arc::new(Desk::new(engine.clone(), config, bus.publisher()));
+    let desk = Arc::new(CommandDesk::new(engine.clone(), config, bus.publisher()));
     let tasks = [
         tokio::spawn(Arc::clone(&desk).answer_stops(stops)),
         tokio::spawn(Arc::clone(&desk).answer_commands(commands)),

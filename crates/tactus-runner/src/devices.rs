@@ -16,7 +16,7 @@ use tokio::sync::mpsc;
 
 /// Started devices, and the truth behind the virtual ones among them.
 #[derive(Debug)]
-pub struct Opened {
+pub struct OpenedRig {
     /// For the engine.
     pub devices: Devices,
     /// Of the embedded virtual devices, if there are any.
@@ -33,7 +33,7 @@ pub fn open(
     codec: SensorCodec,
     truth: impl FnOnce() -> Truth,
     clock: Clock,
-) -> Opened {
+) -> OpenedRig {
     let embedded = [&service.sensor.transport, &service.stage.transport].contains(&&Transport::Embedded);
     let mut virtual_rig = embedded.then(|| VirtualRig::of(truth(), rig.covering, &codec));
     let sensor_link =
@@ -48,7 +48,7 @@ pub fn open(
             Arc::new(move |thickness_mm| control.set_covering_mm(thickness_mm));
         change
     });
-    Opened { devices: Devices { sensor, stage, stage_reports, change_covering }, control }
+    OpenedRig { devices: Devices { sensor, stage, stage_reports, change_covering }, control }
 }
 
 /// Starts the driver of a rig's stage alone; `embedded` is the way to it where the rig says `embedded`.

@@ -12,9 +12,9 @@ use tactus_schema::rig::Transport;
 use tactus_schema::{Rig, RigError};
 
 use crate::config::{ConfigError, RigFiles};
-use crate::order::{self, Ask};
-use crate::recorder::{InPlace, OnThread};
-use crate::twin::{self, Plan, TwinError};
+use crate::order::{self, RunRequest};
+use crate::recorder::{DirectRecorder, ThreadRecorder};
+use crate::twin::{self, DryRun, TwinError};
 use crate::{devices, virtual_time};
 
 pub use tactus_virtual::{HIDDEN_SCHEMA, Truth, TruthError, TruthFile};
@@ -76,7 +76,7 @@ pub enum EmbeddedError {
     Twin(#[from] TwinError),
     /// The dry run found a step that cannot be done; nothing was moved.
     #[error("{}", .0.outcome.message)]
-    NotPossible(Box<Plan>),
+    NotPossible(Box<DryRun>),
     /// The recording could not be opened.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -108,7 +108,7 @@ pub fn truth(rig: &Rig) -> Option<Truth> {
 pub fn run(
     RigFiles { rig, codec, texts }: &RigFiles,
     truth: Option<&TruthFile>,
-    ask: Ask,
+    request: RunRequest,
     folder: &Path,
     pace: Pace,
     started: impl FnOnce(&Engine, &RunOrder),
@@ -129,7 +129,7 @@ pub fn run(
             Pace::Real => Clock::real(),
         }
     });
-    let mut order = order::order(ask, rig, clock.now().wall)?;
+    let mut order = order::order(request, rig, clock.now().wall)?;
     let hidden = match truth {
         Some(truth) => truth.behind(rig, order.seed)?,
         None => Truth::of_rig(rig, order.seed),
@@ -145,8 +145,8 @@ pub fn run(
     let (recording, path) = order::recording(&order, rig, texts, folder, clock.now().wall)?;
     order.recording = path.display().to_string();
     let record: Box<dyn Record> = match pace {
-        Pace::Virtual => Box::new(InPlace(recording)),
-        Pace::Real => Box::new(OnThread::start(recording)?),
+        Pace::Virtual => Box::new(DirectRecorder(recording)),
+        Pace::Real => Box::new(ThreadRecorder::start(recording)?),
     };
     runtime.block_on(async {
         let opened = devices::open(rig, &service, codec.clone(), || hidden, clock);

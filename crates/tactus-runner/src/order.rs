@@ -11,7 +11,7 @@ use tactus_schema::{Rig, WallTime};
 
 /// What somebody asks for.
 #[derive(Debug, Clone)]
-pub struct Ask {
+pub struct RunRequest {
     /// The experiment.
     pub script: Script,
     /// The parameters that differ from their defaults.
@@ -35,8 +35,8 @@ pub struct Texts<'a> {
 ///
 /// # Errors
 /// [`ScriptError`] names the parameter or the script's line.
-pub fn order(ask: Ask, rig: &Rig, at: WallTime) -> Result<RunOrder, ScriptError> {
-    let Ask { script, arguments, seed, who } = ask;
+pub fn order(request: RunRequest, rig: &Rig, at: WallTime) -> Result<RunOrder, ScriptError> {
+    let RunRequest { script, arguments, seed, who } = request;
     let arguments = arguments.resolve(&script, &RigView::of(rig))?;
     let seed = seed.unwrap_or_else(|| mix(at.ns().unsigned_abs()));
     let run_id =

@@ -12,11 +12,11 @@ const QUEUE: usize = 4096;
 
 /// Writes in place: in virtual time nothing waits for the disk.
 #[derive(Debug)]
-pub struct InPlace(pub Recording);
+pub struct DirectRecorder(pub Recording);
 
 /// Hands everything to a thread, so that a slow disk never holds up acquisition.
 #[derive(Debug)]
-pub struct OnThread {
+pub struct ThreadRecorder {
     entries: SyncSender<Entry>,
     writer: JoinHandle<Result<(), RecordError>>,
 }
@@ -41,7 +41,7 @@ enum Entry {
     Safety(pb::SafetyEvent),
 }
 
-impl Record for InPlace {
+impl Record for DirectRecorder {
     fn sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordFailure> {
         self.0.write_sensor_info(info, at).map_err(failure)
     }
@@ -67,7 +67,7 @@ impl Record for InPlace {
     }
 }
 
-impl OnThread {
+impl ThreadRecorder {
     /// Starts the thread.
     ///
     /// # Errors
@@ -90,7 +90,7 @@ impl OnThread {
     }
 }
 
-impl Record for OnThread {
+impl Record for ThreadRecorder {
     fn sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordFailure> {
         self.hand(Entry::SensorInfo(info.clone(), at))
     }

@@ -19,7 +19,7 @@ const LONGEST: Duration = Duration::from_hours(72);
 
 /// What an experiment will do, as a dry run found it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct DryRun {
     /// How the dry run ended; anything but done means that the experiment would not be done either.
     pub outcome: RunOutcome,
 }
@@ -41,7 +41,7 @@ pub enum TwinError {
     Panicked,
 }
 
-impl Plan {
+impl DryRun {
     /// True if the twin did everything that was asked.
     pub fn is_possible(&self) -> bool {
         self.outcome.exit_status == pb::ExitStatus::Done
@@ -65,8 +65,8 @@ impl Plan {
 /// Runs an experiment on the rig's twin. Blocks for as long as that takes to compute.
 ///
 /// # Errors
-/// [`TwinError`] if there was no dry run; a refused step is a [`Plan`] that is not possible.
-pub fn dry_run(rig: &Rig, mut order: RunOrder) -> Result<Plan, TwinError> {
+/// [`TwinError`] if there was no dry run; a refused step is a [`DryRun`] that is not possible.
+pub fn dry_run(rig: &Rig, mut order: RunOrder) -> Result<DryRun, TwinError> {
     let mut twin = twin_of(rig);
     order.resets = true;
     if let Some(service) = &mut twin.service {
@@ -81,7 +81,7 @@ pub fn dry_run(rig: &Rig, mut order: RunOrder) -> Result<Plan, TwinError> {
             tracing::subscriber::with_default(NoSubscriber::new(), || {
                 let runtime = virtual_time::runtime()?;
                 let outcome = runtime.block_on(run(twin, order))?;
-                Ok(Plan { outcome })
+                Ok(DryRun { outcome })
             })
         })?
         .join()

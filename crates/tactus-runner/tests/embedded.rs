@@ -8,7 +8,7 @@ use tactus_device::{Clock, SensorCodec};
 use tactus_plan::{Arguments, Script};
 use tactus_runner::config::RigFiles;
 use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, Truth};
-use tactus_runner::order::Ask;
+use tactus_runner::order::RunRequest;
 use tactus_runner::{devices, experiments};
 use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
@@ -18,8 +18,8 @@ use tempfile::TempDir;
 fn run(script: Script, arguments: Arguments, rig_toml: &str) -> Result<(Finished, TempDir), EmbeddedError> {
     let folder = TempDir::new().unwrap();
     let rig = RigFiles::of(rig_toml, Path::new("rig.toml")).unwrap();
-    let ask = Ask { script, arguments, seed: Some(1), who: "test".into() };
-    let finished = embedded::run(&rig, None, ask, folder.path(), Pace::Virtual, |_, _| {})?;
+    let request = RunRequest { script, arguments, seed: Some(1), who: "test".into() };
+    let finished = embedded::run(&rig, None, request, folder.path(), Pace::Virtual, |_, _| {})?;
     Ok((finished, folder))
 }
 

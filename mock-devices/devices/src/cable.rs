@@ -130,28 +130,28 @@ pub async fn run<D: Device>(
         let wake = device.next_wake();
         let event = tokio::select! {
             biased;
-            Some(strike) = strikes.recv() => Event::Strike(strike),
+            Some(strike) = strikes.recv() => CableEvent::Strike(strike),
             event = listen(&mut link, &mut port, &mut buffer) => event?,
             () = until(wake) => continue,
         };
         let now = Instant::now();
         match event {
-            Event::Connected(stream) => link = Link::Up(stream),
-            Event::Bytes(count) => {
+            CableEvent::Connected(stream) => link = Link::Up(stream),
+            CableEvent::Bytes(count) => {
                 port.heard_host();
                 device.receive(buffer.get(..count).unwrap_or_default(), now);
             }
-            Event::Closed => link = Link::Waiting,
-            Event::Replugged => {
+            CableEvent::Closed => link = Link::Waiting,
+            CableEvent::Replugged => {
                 link = Link::Waiting;
                 device.plugged_in(now);
             }
-            Event::Strike(InjectedFault::Device(fault)) => device.fault(fault, now),
-            Event::Strike(InjectedFault::Cable(CableFault::Disconnect(duration))) => {
+            CableEvent::Strike(InjectedFault::Device(fault)) => device.fault(fault, now),
+            CableEvent::Strike(InjectedFault::Cable(CableFault::Disconnect(duration))) => {
                 link = Link::Out(now + duration);
                 port.unplug();
             }
-            Event::Strike(InjectedFault::Cable(CableFault::Renumber)) => {
+            CableEvent::Strike(InjectedFault::Cable(CableFault::Renumber)) => {
                 link = Link::Out(now);
                 port.move_away()?;
             }
@@ -167,7 +167,7 @@ enum Link {
     Out(Instant),
 }
 
-enum Event<F> {
+enum CableEvent<F> {
     Connected(Box<dyn ByteStream>),
     Bytes(usize),
     Closed,
@@ -176,16 +176,16 @@ enum Event<F> {
 }
 
 /// Waits for what comes over the cable. Cancel-safe.
-async fn listen<F>(link: &mut Link, port: &mut Port, buffer: &mut [u8]) -> io::Result<Event<F>> {
+async fn listen<F>(link: &mut Link, port: &mut Port, buffer: &mut [u8]) -> io::Result<CableEvent<F>> {
     match link {
-        Link::Waiting => Ok(Event::Connected(port.accept().await?)),
+        Link::Waiting => Ok(CableEvent::Connected(port.accept().await?)),
         Link::Up(stream) => Ok(match stream.read(buffer).await {
-            Ok(0) | Err(_) => Event::Closed,
-            Ok(count) => Event::Bytes(count),
+            Ok(0) | Err(_) => CableEvent::Closed,
+            Ok(count) => CableEvent::Bytes(count),
         }),
         Link::Out(until) => {
             sleep_until(*until).await;
-            Ok(Event::Replugged)
+            Ok(CableEvent::Replugged)
         }
     }
 }

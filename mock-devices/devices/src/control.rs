@@ -8,7 +8,7 @@ use tokio::time::{Instant, sleep_until};
 use crate::cable::InjectedFault;
 use crate::faults::{Fault, FaultError, FaultScript, RigFault, SensorFault, StageFault};
 use crate::truth::Truth;
-use crate::world::Shared;
+use crate::world::SharedWorld;
 
 /// Faults that may wait for a device; it takes them whenever it is awake, so that more than these mean
 /// that it has ended. An overflow is refused with [`FaultError::NotTaken`].
@@ -19,7 +19,7 @@ const FAULTS_WAITING: usize = 64;
 /// All positions are the robot's frame; all values are those of the present instant.
 #[derive(Debug, Clone)]
 pub struct RigControl {
-    world: Shared,
+    world: SharedWorld,
     started: Instant,
     sensor: mpsc::Sender<InjectedFault<SensorFault>>,
     stage: mpsc::Sender<InjectedFault<StageFault>>,
@@ -35,7 +35,7 @@ pub struct FaultReceivers {
 }
 
 impl RigControl {
-    pub(crate) fn new(world: Shared, started: Instant) -> (Self, FaultReceivers) {
+    pub(crate) fn new(world: SharedWorld, started: Instant) -> (Self, FaultReceivers) {
         let (sensor, sensor_tap) = mpsc::channel(FAULTS_WAITING);
         let (stage, stage_tap) = mpsc::channel(FAULTS_WAITING);
         (Self { world, started, sensor, stage }, FaultReceivers { sensor: sensor_tap, stage: stage_tap })

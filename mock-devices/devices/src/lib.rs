@@ -12,17 +12,17 @@
 pub mod cable;
 pub mod faults;
 
-#[cfg(test)]
-mod bench;
 mod control;
-mod feel;
 mod kinematics;
 mod motion;
 mod outbox;
 mod rig;
 mod sensor;
+mod sensor_model;
 mod stage;
 mod terminal;
+#[cfg(test)]
+mod test_bench;
 mod truth;
 mod truth_file;
 mod twin;

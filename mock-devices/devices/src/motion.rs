@@ -20,12 +20,12 @@ pub(crate) struct Motion {
     rest_mm: Point,
     offset_mm: Point,
     moves: VecDeque<Move>,
-    held: VecDeque<Target>,
+    held: VecDeque<MoveTarget>,
     lose_next_mm: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Target {
+struct MoveTarget {
     to_mm: Point,
     speed_mm_per_s: f64,
 }
@@ -34,7 +34,7 @@ struct Target {
 struct Move {
     from_mm: Point,
     direction: Point,
-    target: Target,
+    target: MoveTarget,
     profile: Profile,
     start: Instant,
     /// The motor slips over this much at the beginning.
@@ -139,7 +139,7 @@ impl Motion {
 
     /// Appends a move. Held motion is not resumed by it: the move waits too.
     pub(crate) fn push(&mut self, to_mm: Point, speed_mm_per_s: f64, now: Instant) {
-        let target = Target { to_mm, speed_mm_per_s };
+        let target = MoveTarget { to_mm, speed_mm_per_s };
         if self.held.is_empty() {
             self.start(target, now);
         } else {
@@ -155,7 +155,7 @@ impl Motion {
     /// Brakes at once; what was not done is held.
     pub(crate) fn hold(&mut self, now: Instant) {
         self.settle(now);
-        let mut undone: VecDeque<Target> = self.moves.iter().map(|one| one.target).collect();
+        let mut undone: VecDeque<MoveTarget> = self.moves.iter().map(|one| one.target).collect();
         let Some(current) = self.moves.front().copied().filter(|current| current.start <= now) else {
             self.moves.clear();
             self.held.extend(undone);
@@ -176,7 +176,7 @@ impl Motion {
             self.moves.clear();
             self.moves.push_back(Move {
                 from_mm,
-                target: Target { to_mm: end_mm, ..current.target },
+                target: MoveTarget { to_mm: end_mm, ..current.target },
                 profile: braking,
                 start: now,
                 lost_mm: (current.lost_mm - gone_mm).max(0.0),
@@ -220,7 +220,7 @@ impl Motion {
         self.lose_next_mm = lost_mm;
     }
 
-    fn start(&mut self, target: Target, now: Instant) {
+    fn start(&mut self, target: MoveTarget, now: Instant) {
         let from_mm = self.moves.back().map_or(self.rest_mm, Move::end_mm);
         let start = self.moves.back().map_or(now, Move::end).max(now);
         let way = difference(target.to_mm, from_mm);

@@ -16,7 +16,7 @@ use crate::control::{FaultReceivers, RigControl};
 use crate::sensor::VirtualSensor;
 use crate::stage::VirtualStage;
 use crate::truth::Truth;
-use crate::world::{Shared, World};
+use crate::world::{SharedWorld, World};
 
 /// Both devices of a simulated rig, in this process.
 ///
@@ -90,7 +90,7 @@ pub struct Started {
 /// # Panics
 /// Of a truth that was not made by its own constructors.
 pub fn start_devices(truth: Truth, covering: Covering, codec: &SensorCodec, now: Instant) -> Started {
-    let world = Shared::new(World::new(Arc::new(truth), covering));
+    let world = SharedWorld::new(World::new(Arc::new(truth), covering));
     let (control, faults) = RigControl::new(world.clone(), now);
     let sensor = VirtualSensor::new(world.clone(), codec, now);
     let stage = VirtualStage::new(world, now);

@@ -5,8 +5,8 @@
 //! the protocol has room for it, the device says that it is simulated: the controller's serial numbers spell `SIM`,
 //! its matrix's unique id `SIMULA`, the element's register `SIMULATED`. The other two have no room.
 
-mod tamper;
-mod voice;
+mod codec;
+mod link_faults;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -18,9 +18,9 @@ use tokio::time::Instant;
 use crate::cable::Device;
 use crate::faults::SensorFault;
 use crate::outbox::Outbox;
-use crate::world::Shared;
-use tamper::Tamper;
-use voice::{Asked, Register, Voice};
+use crate::world::SharedWorld;
+use codec::{DeviceCodec, HostRequest, Register};
+use link_faults::LinkFaults;
 
 /// From power-up to the boot message. The real controller needs about 8 s; a simulated rig would make
 /// everybody wait for nothing, and a shorter pause takes the driver through the same states.
@@ -38,17 +38,17 @@ const BACKLOG: Duration = Duration::from_secs(1);
 /// A virtual tactile array and its electronics.
 #[derive(Debug)]
 pub struct VirtualSensor {
-    world: Shared,
+    world: SharedWorld,
     /// The clock's zero.
     powered_up: Instant,
     clock_offset_ticks: i128,
     is_booting: bool,
-    voice: Voice,
+    codec: DeviceCodec,
     acquisition: Option<Acquisition>,
     counts: Vec<u16>,
-    /// Elements that do not read what they feel, with what they read instead.
+    /// Elements that do not read what the model says, with what they read instead.
     overridden: BTreeMap<usize, u16>,
-    tamper: Tamper,
+    link_faults: LinkFaults,
     outbox: Outbox,
 }
 
@@ -63,18 +63,18 @@ struct Acquisition {
 
 impl VirtualSensor {
     /// A device that is switched on now and speaks by `codec`.
-    pub(crate) fn new(world: Shared, codec: &SensorCodec, now: Instant) -> Self {
+    pub(crate) fn new(world: SharedWorld, codec: &SensorCodec, now: Instant) -> Self {
         let seed = world.lock().truth().seed;
         let mut sensor = Self {
             world,
             powered_up: now,
             clock_offset_ticks: 0,
             is_booting: true,
-            voice: Voice::of(codec),
+            codec: DeviceCodec::of(codec),
             acquisition: None,
             counts: Vec::new(),
             overridden: BTreeMap::new(),
-            tamper: Tamper::new(seed),
+            link_faults: LinkFaults::new(seed),
             outbox: Outbox::default(),
         };
         sensor.power_up(now);
@@ -84,41 +84,42 @@ impl VirtualSensor {
     fn power_up(&mut self, now: Instant) {
         self.powered_up = now;
         self.clock_offset_ticks = 0;
-        self.voice.power_up();
+        self.codec.power_up();
         self.outbox.clear();
-        self.is_booting = self.voice.boots();
+        self.is_booting = self.codec.boots();
         if self.is_booting {
             self.outbox.push(now + BOOT, BOOT_MESSAGE.repeat(BOOT_MESSAGES));
         }
         let rate_hz = self.own_rate_hz();
         self.acquisition =
-            self.voice.streams().then_some(Acquisition { run_length: false, rate_hz, next: 1 });
+            self.codec.streams().then_some(Acquisition { run_length: false, rate_hz, next: 1 });
     }
 
-    fn answer(&mut self, asked: Asked, now: Instant) -> Vec<u8> {
+    fn answer(&mut self, asked: HostRequest, now: Instant) -> Vec<u8> {
         match asked {
-            Asked::Weiss(command) => {
+            HostRequest::Weiss(command) => {
                 let answer = self.obey(command, now);
-                self.voice.close(answer)
+                self.codec.close(answer)
             }
-            Asked::SingleTact { address, id, asked } => {
-                let element = self.voice.element_at(address);
+            HostRequest::SingleTact { address, id, asked } => {
+                let element = self.codec.element_at(address);
                 if element.is_some() && asked == Register::Reading {
                     self.sample(now);
                 }
                 let counts = element.and_then(|element| self.counts.get(element).copied().or(Some(0)));
                 let (tick, rate_hz) = (self.tick(now), self.own_rate_hz());
                 let running = now.duration_since(self.powered_up);
-                self.tamper.frame(now, |_| voice::reply((address, id, asked), tick, running, rate_hz, counts))
+                self.link_faults
+                    .frame(now, |_| codec::reply((address, id, asked), tick, running, rate_hz, counts))
             }
         }
     }
 
     fn obey(&mut self, command: Result<HostCommand, CommandError>, now: Instant) -> Vec<u8> {
         match command {
-            Ok(HostCommand::QueryController) => voice::controller(),
-            Ok(HostCommand::QuerySensor) => voice::sensor(),
-            Ok(HostCommand::QueryMatrix { matrix }) => voice::matrix(matrix, self.world.lock().truth()),
+            Ok(HostCommand::QueryController) => codec::controller(),
+            Ok(HostCommand::QuerySensor) => codec::sensor(),
+            Ok(HostCommand::QueryMatrix { matrix }) => codec::matrix(matrix, self.world.lock().truth()),
             Ok(HostCommand::Acquire { run, run_length, fps }) => {
                 let rate_hz = rate(f64::from(fps), self.own_rate_hz());
                 self.acquisition =
@@ -148,9 +149,9 @@ impl VirtualSensor {
     fn take_frame(&mut self, at: Instant, run_length: bool, period: Duration) {
         self.sample(at);
         let tick = self.tick(at);
-        let Self { voice, tamper, counts, .. } = self;
-        let bytes = tamper.frame(at, |elements| voice.frame(tick, counts, run_length, elements));
-        if self.tamper.is_dripping(at) {
+        let Self { codec, link_faults, counts, .. } = self;
+        let bytes = link_faults.frame(at, |elements| codec.frame(tick, counts, run_length, elements));
+        if self.link_faults.is_dripping(at) {
             self.outbox.drip(at, period, &bytes);
         } else {
             self.outbox.push(at, bytes);
@@ -169,7 +170,7 @@ impl VirtualSensor {
     /// What the device's clock shows; 0 if it has none.
     fn tick(&self, at: Instant) -> u64 {
         let running = at.duration_since(self.powered_up);
-        self.voice.clock().map_or(0, |clock| clock.shows(running, self.clock_offset_ticks))
+        self.codec.clock().map_or(0, |clock| clock.shows(running, self.clock_offset_ticks))
     }
 
     /// What an element reads at present.
@@ -188,9 +189,9 @@ impl Device for VirtualSensor {
         if self.is_booting {
             return;
         }
-        for asked in self.voice.hear(bytes) {
+        for asked in self.codec.decode(bytes) {
             let answer = self.answer(asked, now);
-            if !self.tamper.is_stalled(now) {
+            if !self.link_faults.is_stalled(now) {
                 self.outbox.push(now, answer);
             }
         }
@@ -207,7 +208,7 @@ impl Device for VirtualSensor {
             }
             self.acquisition = Some(Acquisition { next: acquisition.next + 1, ..acquisition });
             if at + BACKLOG < now {
-                self.voice.pass_over();
+                self.codec.skip_frame();
                 continue;
             }
             self.take_frame(at, acquisition.run_length, Duration::from_secs_f64(1.0 / acquisition.rate_hz));
@@ -222,20 +223,20 @@ impl Device for VirtualSensor {
 
     fn output(&mut self, now: Instant) -> Vec<u8> {
         let bytes = self.outbox.take_due(now);
-        self.tamper.pass(bytes)
+        self.link_faults.pass(bytes)
     }
 
     fn fault(&mut self, fault: SensorFault, now: Instant) {
         match fault {
-            SensorFault::Link(fault) => self.tamper.arm(fault, now),
+            SensorFault::Link(fault) => self.link_faults.arm(fault, now),
             SensorFault::ClockJump { ms } => {
                 let by = Duration::from_millis(ms.unsigned_abs());
-                let ticks = self.voice.clock().map_or(0, |clock| clock.ticks(by));
+                let ticks = self.codec.clock().map_or(0, |clock| clock.ticks(by));
                 self.clock_offset_ticks += if ms < 0 { -ticks } else { ticks };
             }
             SensorFault::ClockWrap => {
                 let shown = self.tick(now);
-                if let Some(clock) = self.voice.clock() {
+                if let Some(clock) = self.codec.clock() {
                     self.clock_offset_ticks += clock.until_wrap(shown, WRAPS_AFTER);
                 }
             }
@@ -254,7 +255,7 @@ impl Device for VirtualSensor {
             }
             SensorFault::Clear => {
                 self.overridden.clear();
-                self.tamper.clear();
+                self.link_faults.clear();
             }
         }
     }

@@ -1,19 +1,19 @@
 use tactus_wire::weiss::{DecodedFrame, Decoder, Packet, acquire, query_controller, query_matrix};
 
 use super::*;
-use crate::bench::{Bench, sim_rig};
 use crate::faults::LinkFault;
+use crate::test_bench::{DeviceBench, sim_rig};
 
-fn switched_on(seed: u64) -> Bench<VirtualSensor> {
+fn switched_on(seed: u64) -> DeviceBench<VirtualSensor> {
     speaking(&SensorCodec::default(), seed)
 }
 
-fn speaking(codec: &SensorCodec, seed: u64) -> Bench<VirtualSensor> {
-    Bench::new(&sim_rig(), seed, |world, now| VirtualSensor::new(world, codec, now))
+fn speaking(codec: &SensorCodec, seed: u64) -> DeviceBench<VirtualSensor> {
+    DeviceBench::new(&sim_rig(), seed, |world, now| VirtualSensor::new(world, codec, now))
 }
 
 /// Booted and pushing plain frames, with nothing unread.
-fn pushing(seed: u64) -> Bench<VirtualSensor> {
+fn pushing(seed: u64) -> DeviceBench<VirtualSensor> {
     let mut bench = switched_on(seed);
     bench.bytes(100);
     bench.send(&acquire(true, false, 30));
@@ -208,7 +208,7 @@ fn unplugged_and_plugged_in_it_boots_again_with_a_new_clock() {
 #[test]
 fn a_singletact_board_answers_by_address_and_says_that_it_is_simulated() {
     use tactus_wire::singletact::{Decoder, Operation, Request};
-    fn ask(bench: &mut Bench<VirtualSensor>, address: u8, operation: Operation<'_>) -> (bool, Vec<u8>) {
+    fn ask(bench: &mut DeviceBench<VirtualSensor>, address: u8, operation: Operation<'_>) -> (bool, Vec<u8>) {
         bench.send(&Request { address, id: 7, operation }.encode().unwrap());
         let bytes = bench.bytes(0);
         let mut decoder = Decoder::new();

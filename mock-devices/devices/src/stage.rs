@@ -15,8 +15,8 @@ use tokio::time::Instant;
 
 use crate::cable::Device;
 use crate::faults::{ControllerFault, StageFault};
-use crate::truth::Draw;
-use crate::world::Shared;
+use crate::truth::RandomStream;
+use crate::world::SharedWorld;
 use grbl::GrblController;
 use zaber::ZaberController;
 
@@ -67,7 +67,7 @@ trait Controller: std::fmt::Debug + Send {
 
 impl VirtualStage {
     /// A controller that is switched on now.
-    pub(crate) fn new(world: Shared, now: Instant) -> Self {
+    pub(crate) fn new(world: SharedWorld, now: Instant) -> Self {
         let (seed, protocol) = {
             let world = world.lock();
             (world.truth().seed, world.truth().stage_protocol.clone())
@@ -86,7 +86,7 @@ impl VirtualStage {
             unheard: Vec::new(),
             echoes: false,
             echo: Vec::new(),
-            rng: Draw::StageLink.rng(seed),
+            rng: RandomStream::StageLink.rng(seed),
         }
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tactus_hidden::{Climate, Dose, Sensor};
+use tactus_hidden::{Climate, Dose, HiddenSensor};
 use tactus_model::{
     Covering, Effect, EffectError, ForwardModel, Indenter, Pipeline, Readout, Registration, Response,
     Simulator,
@@ -13,7 +13,7 @@ use tactus_model::{
 use tactus_schema::Rig;
 use tactus_schema::rig::{ElementFault, GrblAxes, SimulatedStage, Simulation, StageProtocol};
 
-use crate::feel::Feel;
+use crate::sensor_model::SensorModel;
 use crate::twin::simulation_of;
 
 /// The true sensor, stage and tool behind a rig description; all of it follows from the description and a seed.
@@ -47,7 +47,7 @@ pub struct Truth {
 
 /// What draws random numbers: each has a stream of its own, so that one does not disturb the others.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Draw {
+pub(crate) enum RandomStream {
     Gains,
     Noise,
     SensorLink,
@@ -55,7 +55,7 @@ pub(crate) enum Draw {
     StageController,
 }
 
-impl Draw {
+impl RandomStream {
     /// The stream's generator for a seed.
     pub(crate) fn rng(self, seed: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -119,12 +119,12 @@ impl Truth {
 
     /// What feels, under a covering. Stuck and noisy elements are not in it: their faults come after the signal,
     /// where they are read.
-    pub(crate) fn feel(&self, covering: Covering) -> Result<Box<dyn Feel>, EffectError> {
+    pub(crate) fn sensor_model(&self, covering: Covering) -> Result<Box<dyn SensorModel>, EffectError> {
         let sensor = self.sensor(covering)?;
         if self.physics.is_empty() {
             return Ok(Box::new(Pipeline::new(&sensor)?));
         }
-        let mut sensor = Sensor::new(&sensor, &self.physics, Climate::new(self.seed), self.seed);
+        let mut sensor = HiddenSensor::new(&sensor, &self.physics, Climate::new(self.seed), self.seed);
         sensor.wire(self.wiring().collect());
         Ok(Box::new(sensor))
     }
@@ -154,7 +154,7 @@ impl Truth {
 
 /// Each declared sensitivity times one plus a normal deviate of standard deviation `spread`.
 fn spread(declared: &[f64], spread: f64, seed: u64) -> Vec<f64> {
-    let mut rng = Draw::Gains.rng(seed);
+    let mut rng = RandomStream::Gains.rng(seed);
     let deviates = StandardNormal.sample_iter(&mut rng);
     declared
         .iter()

@@ -1,7 +1,7 @@
 use tactus_model::{Covering, Moment, Trail};
 
 use super::*;
-use crate::bench::sim_rig;
+use crate::test_bench::sim_rig;
 
 const DIGITACTS: &str = include_str!("../../../config/models/digitacts.toml");
 
@@ -92,8 +92,8 @@ fn physics_of_no_strength_reads_what_the_rigs_own_simulation_does() {
 
 /// Counts while the tip stands half a millimetre deep, where two elements answer for their neighbours.
 fn pressed(truth: &Truth, covering: Covering, [x_mm, y_mm]: &[f64; 2]) -> Vec<f64> {
-    let mut feel = truth.feel(covering).unwrap();
-    feel.step(Moment::at(0.0), &Trail::new(0.0, [*x_mm, *y_mm, -0.5])).to_vec()
+    let mut sensor_model = truth.sensor_model(covering).unwrap();
+    sensor_model.step(Moment::at(0.0), &Trail::new(0.0, [*x_mm, *y_mm, -0.5])).to_vec()
 }
 
 #[test]

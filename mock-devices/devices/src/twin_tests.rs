@@ -1,5 +1,5 @@
 use super::*;
-use crate::bench::sim_rig;
+use crate::test_bench::sim_rig;
 
 #[test]
 fn a_twin_gives_nothing_away() {

@@ -1,4 +1,4 @@
-//! The one true state that both virtual devices share: where the tip is, what it presses, what the elements feel.
+//! The one true state that both virtual devices share: where the tip is, what it presses, what the elements read.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -8,13 +8,13 @@ use tactus_model::{Covering, Moment, Trail};
 use tactus_schema::rig::{ElementFault, SimulatedStage, StageProtocol};
 use tokio::time::Instant;
 
-use crate::feel::Feel;
 use crate::motion::{Motion, Point};
-use crate::truth::{Draw, Truth};
+use crate::sensor_model::SensorModel;
+use crate::truth::{RandomStream, Truth};
 
 /// The world, shared by the devices and their controls. Held for one look or one change at a time.
 #[derive(Debug, Clone)]
-pub(crate) struct Shared(Arc<Mutex<World>>);
+pub(crate) struct SharedWorld(Arc<Mutex<World>>);
 
 /// The truth, and what changes in it.
 #[derive(Debug)]
@@ -28,12 +28,12 @@ pub(crate) struct World {
     surface_mm: f64,
     deepest_mm: f64,
     noise: ChaCha8Rng,
-    feel: Box<dyn Feel>,
+    sensor_model: Box<dyn SensorModel>,
     /// The zero of time of what feels, when it was first looked at, and where the tip was since.
     trail: Option<(Instant, Trail)>,
 }
 
-impl Shared {
+impl SharedWorld {
     pub(crate) fn new(world: World) -> Self {
         Self(Arc::new(Mutex::new(world)))
     }
@@ -54,7 +54,7 @@ impl World {
     pub(crate) fn new(truth: Arc<Truth>, covering: Covering) -> Self {
         let [x_mm, y_mm, z_mm] = truth.stage.travel_mm;
         let tip_mm = [middle(x_mm), middle(y_mm), z_mm[1] - 0.1 * (z_mm[1] - z_mm[0])];
-        let feel = truth.feel(covering).expect("a checked truth feels");
+        let sensor_model = truth.sensor_model(covering).expect("a checked truth feels");
         let acceleration_mm_per_s2 = truth.stage.acceleration_mm_per_s2;
         let by_axis = match &truth.stage_protocol {
             StageProtocol::Grbl(_) => None,
@@ -70,8 +70,8 @@ impl World {
             covering,
             surface_mm: truth.surface_mm,
             deepest_mm: truth.surface_mm - tip_mm[2],
-            noise: Draw::Noise.rng(truth.seed),
-            feel,
+            noise: RandomStream::Noise.rng(truth.seed),
+            sensor_model,
             trail: None,
             truth,
         }
@@ -85,9 +85,9 @@ impl World {
     /// One reading of all elements at `at`, into `counts`: noise, saturation, quantisation upon the image there.
     pub(crate) fn sample(&mut self, at: Instant, counts: &mut Vec<u16>) {
         self.look(at);
-        let Self { truth, noise, feel, .. } = self;
+        let Self { truth, noise, sensor_model, .. } = self;
         counts.clear();
-        counts.extend(feel.counts().iter().enumerate().map(|(element, clean)| {
+        counts.extend(sensor_model.counts().iter().enumerate().map(|(element, clean)| {
             // Drawn for a stuck element too, so that its fault changes no other's noise.
             let deviate: f64 = StandardNormal.sample(noise);
             let noise_rms_counts = match truth.faults.get(&element) {
@@ -95,7 +95,7 @@ impl World {
                 Some(ElementFault::Noisy { noise_rms_counts }) => *noise_rms_counts,
                 Some(ElementFault::Miswired { .. } | ElementFault::Dead) | None => truth.noise_rms_counts,
             };
-            let read = feel.read(*clean, noise_rms_counts * deviate);
+            let read = sensor_model.read(*clean, noise_rms_counts * deviate);
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -115,7 +115,7 @@ impl World {
                 *clean
             }
         };
-        self.feel.counts().iter().enumerate().map(read).collect()
+        self.sensor_model.counts().iter().enumerate().map(read).collect()
     }
 
     /// Where the tip truly is, in the stage's steps.
@@ -189,20 +189,20 @@ impl World {
     /// Puts another covering in place, its surface where the former one's was.
     pub(crate) fn set_covering_mm(&mut self, thickness_mm: f64) {
         self.covering = Covering { thickness_mm: thickness_mm.max(0.0) };
-        self.feel.set_covering(self.covering);
+        self.sensor_model.set_covering(self.covering);
     }
 
     /// Moves the true surface, where the service believes 0.
     pub(crate) fn set_surface_mm(&mut self, surface_mm: f64, now: Instant) {
         self.settle(now);
         self.surface_mm = surface_mm;
-        self.feel.set_surface_mm(surface_mm);
+        self.sensor_model.set_surface_mm(surface_mm);
         self.settle(now);
     }
 
     /// Makes the covering answer `stiffness` times as strongly as the model says.
     pub(crate) fn set_stiffness(&mut self, stiffness: f64) {
-        self.feel.set_stiffness(stiffness);
+        self.sensor_model.set_stiffness(stiffness);
     }
 
     fn look(&mut self, at: Instant) {
@@ -210,7 +210,7 @@ impl World {
         let (started, trail) = self.trail.get_or_insert_with(|| (at, Trail::new(0.0, tip_mm)));
         let t_s = at.saturating_duration_since(*started).as_secs_f64();
         trail.push(t_s, tip_mm);
-        self.feel.step(Moment::at(t_s), trail);
+        self.sensor_model.step(Moment::at(t_s), trail);
     }
 
     fn in_steps(&self, [x, y, z]: Point) -> Point {

@@ -4,7 +4,7 @@ use tactus_schema::Rig;
 
 use super::*;
 use crate::TruthFile;
-use crate::bench::{sim_rig, world_of};
+use crate::test_bench::{sim_rig, world_of};
 
 /// Puts the tip at a place at once, as far as depth records go: by a move that has long ended.
 fn put(world: &mut World, tip_mm: Point, at: Instant) -> Instant {
@@ -47,7 +47,7 @@ fn a_model_in_place_of_the_simulation_gives_gains_noise_and_effects_and_leaves_t
     let model =
         include_str!("../../../config/models/digitacts.toml").replace("rms_counts = 2.0", "rms_counts = 0.0");
     let truth = TruthFile::from_toml(&format!("{model}{effect}")).unwrap().behind(&rig, 7).unwrap();
-    let shared = Shared::new(World::new(Arc::new(truth), rig.covering));
+    let shared = SharedWorld::new(World::new(Arc::new(truth), rig.covering));
     let mut world = shared.lock();
     let down_mm = over(&world, 21, -0.5);
     assert!((world.truth().registration.rotation_deg - 0.2).abs() < 1e-12, "the rig's error stays");

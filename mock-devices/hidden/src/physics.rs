@@ -1,4 +1,4 @@
-//! The catalogue: every physics, its knobs, and what it does at its stage.
+//! The catalogue of hidden physics, its parameters, and the hooks into the pipeline.
 
 mod contact;
 mod drift;
@@ -21,29 +21,29 @@ use tactus_model::{Path, Simulator};
 /// One physics that a simulated sensor may have.
 #[derive(Debug, Clone, Copy)]
 pub struct Definition {
-    /// Its name, unique.
+    /// Unique.
     pub id: &'static str,
-    /// The effect of the library that it is an instance of; `None` if the library has nothing like it.
+    /// The effect of the library of which it is an instance; `None` if there is none.
     pub effect: Option<&'static str>,
     /// What it does: equation and source.
     pub about: &'static str,
     /// True if it needs time steps finer than a frame.
     pub(crate) is_fine: bool,
-    pub(crate) make: fn(&mut Knobs<'_>) -> Stage,
+    pub(crate) make: fn(&mut Knobs<'_>) -> PipelineHook,
 }
 
 /// A physics at a strength.
 #[derive(Debug, Clone, Copy)]
 pub struct Dose {
-    /// What.
+    /// The physics.
     pub physics: &'static Definition,
-    /// How much: 0 is nothing, 1 what a bad rig has.
+    /// 0 is none, 1 is that of a bad rig; at most [`STRENGTH_MAX`].
     pub strength: f64,
-    /// Seed of its shape: time constants, directions, which elements.
+    /// Seed of its shape: time constants, directions, elements.
     pub seed: u64,
 }
 
-/// Beyond this strength no rig is.
+/// The greatest strength: no rig is worse.
 pub const STRENGTH_MAX: f64 = 8.0;
 
 /// Every physics, those of the library's effects first.
@@ -117,41 +117,41 @@ pub static CATALOGUE: &[&Definition] = &[
 ];
 
 impl Definition {
-    /// The physics of that id.
+    /// Finds a physics by its id.
     pub fn find(id: &str) -> Option<&'static Self> {
         CATALOGUE.iter().copied().find(|definition| definition.id == id)
     }
 }
 
-/// One instant, as physics sees it.
+/// The state at one instant, as hidden physics sees it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Now {
     pub(crate) t_s: f64,
-    /// Since the step before; 0 at the first.
+    /// Since the previous step; 0 at the first.
     pub(crate) dt_s: f64,
-    /// Of the tip, robot frame.
+    /// Velocity of the tip, robot frame.
     pub(crate) velocity_mm_per_s: [f64; 3],
     pub(crate) temperature_c: f64,
-    /// Where the tool stands; complete after the stage of motion.
+    /// Where the tool is; complete after the hooks on the path and the touch.
     pub(crate) touch: Touch,
 }
 
-/// The tool's place against the covering.
+/// The tool's position relative to the covering.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Touch {
     /// Sensor frame.
     pub(crate) point_mm: [f64; 2],
-    /// Below the surface; negative above it.
+    /// Depth below the surface; negative above it.
     pub(crate) depth_mm: f64,
 }
 
-/// The tool's face and how the covering spreads it.
+/// The tool's face and the spread of the covering.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Tool {
     pub(crate) diameter_mm: f64,
     /// Rise of the face per mm along the sensor's x and y.
     pub(crate) lean: [f64; 2],
-    /// Along x and y.
+    /// Spread along the sensor's x and y.
     pub(crate) sigma_mm: [f64; 2],
 }
 
@@ -161,25 +161,25 @@ type OnTool = Box<dyn FnMut(&Now, &mut Tool) + Send>;
 type OnElements = Box<dyn FnMut(&Now, &mut [f64]) + Send>;
 type OnCount = Box<dyn Fn(f64) -> f64 + Send>;
 
-/// What physics changes, in the order in which it acts.
-pub(crate) enum Stage {
-    /// Where the tip is, robot frame.
+/// Where in the pipeline a physics acts, with its function; in the order of action.
+pub(crate) enum PipelineHook {
+    /// Changes the tip's position, robot frame.
     Path(OnPath),
-    /// Where the tool stands against the covering.
+    /// Changes the tool's position relative to the covering.
     Touch(OnTouch),
-    /// The tool's face and the spread.
+    /// Changes the tool's face and the spread.
     Tool(OnTool),
-    /// Equivalent indentation of every element, mm.
+    /// Changes the equivalent indentation of every element, mm.
     Covering(OnElements),
-    /// Signal of every element above its baseline, counts.
+    /// Changes the signal of every element above its baseline, counts.
     Element(OnElements),
-    /// Reading of every element, counts.
+    /// Changes the reading of every element, counts.
     Readout(OnElements),
-    /// One reading with its noise, before the declared converter.
+    /// Changes one reading with its noise, before the declared converter.
     Converter(OnCount),
 }
 
-impl Stage {
+impl PipelineHook {
     fn path(f: impl FnMut(&Now, &dyn Path, &mut [f64; 3]) + Send + 'static) -> Self {
         Self::Path(Box::new(f))
     }
@@ -202,25 +202,25 @@ impl Stage {
         Self::Converter(Box::new(f))
     }
 
-    /// A covering that answers as if the tool stood at another depth: the image keeps its form.
+    /// A covering that responds as if the tool were at another depth: the image keeps its shape.
     fn depth(mut f: impl FnMut(&Now, f64) -> f64 + Send + 'static) -> Self {
         Self::covering(move |now, indentation_mm| {
             let depth_mm = now.touch.depth_mm.max(0.0);
-            // Asked out of contact too, so that it knows of the release.
-            let answers_mm = f(now, depth_mm).max(0.0);
+            // Called out of contact too, so that it notices the release.
+            let effective_mm = f(now, depth_mm).max(0.0);
             if depth_mm > 0.0 {
-                scale(indentation_mm, answers_mm / depth_mm);
+                scale(indentation_mm, effective_mm / depth_mm);
             }
         })
     }
 
-    /// Each element's signal or indentation by a function of itself.
+    /// Applies a function to each element's signal or indentation.
     fn each(f: impl Fn(f64) -> f64 + Send + 'static) -> OnElements {
         Box::new(move |_, values| values.iter_mut().for_each(|value| *value = f(*value)))
     }
 }
 
-/// What a physics is made from: its strength, the sensor it sits in, and random numbers for its shape. What is drawn
+/// Makes the parameters of one physics from its strength, its sensor and random numbers. Every parameter with a name
 /// is kept for the label.
 pub(crate) struct Knobs<'a> {
     pub(crate) sensor: &'a Simulator,
@@ -237,52 +237,52 @@ impl<'a> Knobs<'a> {
         Self { sensor, strength, shape: ChaCha8Rng::seed_from_u64(seed), seed, run, drawn: Vec::new() }
     }
 
-    /// What was drawn, by name.
+    /// The named parameters.
     pub(crate) fn into_drawn(self) -> Vec<(String, f64)> {
         self.drawn
     }
 
-    /// A parameter that is proportional to strength.
+    /// A parameter proportional to strength.
     fn scaled(&mut self, name: &str, at_one: f64) -> f64 {
         self.keep(name, self.strength * at_one)
     }
 
-    /// A parameter that is `at_one / strength`: endless without strength.
+    /// A parameter inversely proportional to strength: `at_one / strength`, at most 1e30.
     fn shrinking(&mut self, name: &str, at_one: f64) -> f64 {
-        // An endless limit has no place in a JSON label; 1e30 of anything here is as good.
+        // JSON has no infinity; here 1e30 has the same effect.
         self.keep(name, (at_one / self.strength).min(1e30))
     }
 
-    /// A share that is proportional to strength until all of it is taken.
+    /// A share proportional to strength, at most 1.
     fn share(&mut self, name: &str, at_one: f64) -> f64 {
         self.keep(name, (self.strength * at_one).min(1.0))
     }
 
-    /// A parameter of the shape, evenly between two values.
+    /// A parameter of the shape, uniform between two values.
     fn between(&mut self, name: &str, least: f64, greatest: f64) -> f64 {
         let value = self.shape.random_range(least..greatest);
         self.keep(name, value)
     }
 
-    /// A parameter of the shape, evenly on a logarithmic scale.
+    /// A parameter of the shape, uniform on a logarithmic scale.
     fn decade(&mut self, name: &str, least: f64, greatest: f64) -> f64 {
         let value = self.shape.random_range(least.ln()..greatest.ln()).exp();
         self.keep(name, value)
     }
 
-    /// -1 or 1.
+    /// -1 or 1, at random.
     fn sign(&mut self, name: &str) -> f64 {
         let value = if self.shape.random() { 1.0 } else { -1.0 };
         self.keep(name, value)
     }
 
-    /// A unit vector in the plane.
+    /// A random unit vector in the plane.
     fn direction(&mut self, name: &str) -> [f64; 2] {
         let (sin, cos) = self.between(name, 0.0, 360.0).to_radians().sin_cos();
         [cos, sin]
     }
 
-    /// Different elements of the array.
+    /// `count` different random elements of the array.
     fn several(&mut self, name: &str, count: usize) -> Vec<usize> {
         let mut elements: Vec<usize> = (0..self.elements()).collect();
         elements.shuffle(&mut self.shape);
@@ -293,20 +293,20 @@ impl<'a> Knobs<'a> {
         elements
     }
 
-    /// An element of the array.
+    /// A random element of the array.
     fn which(&mut self, name: &str) -> usize {
         let element = self.shape.random_range(0..self.elements());
         self.keep(name, element as f64);
         element
     }
 
-    /// One number per element, evenly between two values; not kept.
+    /// One number per element, uniform between two values; not kept for the label.
     fn per_element(&mut self, least: f64, greatest: f64) -> Vec<f64> {
         (0..self.elements()).map(|_| self.shape.random_range(least..greatest)).collect()
     }
 
-    /// Random numbers for what goes on in time: other ones in each run.
-    fn chance(&self) -> ChaCha8Rng {
+    /// Random numbers for processes in time; different in each run.
+    fn rng(&self) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(self.run + 1);
         rng
@@ -341,19 +341,19 @@ impl<'a> Knobs<'a> {
     }
 }
 
-/// What is left of something after a time.
+/// The share that an exponential decay leaves after a time.
 fn left(dt_s: f64, time_constant_s: f64) -> f64 {
     (-dt_s / time_constant_s).exp()
 }
 
-/// Every value times `by`.
+/// Multiplies every value by `by`.
 fn scale(values: &mut [f64], by: f64) {
     for value in values {
         *value *= by;
     }
 }
 
-/// Every value and `by`.
+/// Adds `by` to every value.
 fn shift(values: &mut [f64], by: f64) {
     for value in values {
         *value += by;

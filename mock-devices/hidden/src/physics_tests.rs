@@ -6,24 +6,24 @@ use super::hysteresis::Preisach;
 use super::motion::play;
 use super::relaxation::{Branches, power_law};
 use super::*;
-use crate::{Base, Climate, Sensor};
+use crate::{Climate, HiddenSensor, RandomRig};
 
 /// A sensor with one physics, and what that drew.
-fn sensor(base: &Base, id: &str, strength: f64) -> (Sensor, impl Fn(&str) -> f64 + use<>) {
+fn sensor(base: &RandomRig, id: &str, strength: f64) -> (HiddenSensor, impl Fn(&str) -> f64 + use<>) {
     let physics = Definition::find(id).unwrap();
-    let sensor = Sensor::new(&base.sensor, &[Dose { physics, strength, seed: 3 }], Climate::new(1), 0);
+    let sensor = HiddenSensor::new(&base.sensor, &[Dose { physics, strength, seed: 3 }], Climate::new(1), 0);
     let drawn = sensor.parameters()[0].clone();
     (sensor, move |name: &str| drawn.iter().find(|(drawn, _)| drawn == name).unwrap().1)
 }
 
 /// Over element 19, robot frame, at a height.
-fn above(base: &Base, z_mm: f64) -> [f64; 3] {
+fn above(base: &RandomRig, z_mm: f64) -> [f64; 3] {
     let [x, y] = base.rig.registration.to_robot(base.rig.array.centre_mm(19).unwrap());
     [x, y, z_mm]
 }
 
 /// Signal of element 19 in mm of equivalent indentation.
-fn indentation_mm(base: &Base, counts: &[f64]) -> f64 {
+fn indentation_mm(base: &RandomRig, counts: &[f64]) -> f64 {
     let response = base.sensor.model.response();
     (counts[19] - response.baseline_counts[19]) / response.sensitivity_counts_per_mm[19]
 }
@@ -40,7 +40,7 @@ fn every_effect_of_the_library_has_an_instance_and_some_physics_is_outside() {
 
 #[test]
 fn the_shape_of_physics_hangs_on_its_seed_and_not_on_its_strength() {
-    let base = Base::new(1).unwrap();
+    let base = RandomRig::new(1).unwrap();
     let (_, weak) = sensor(&base, "relaxation-prony", 0.1);
     let (_, strong) = sensor(&base, "relaxation-prony", 1.0);
     assert_eq!(weak("time_constant_2_s").to_bits(), strong("time_constant_2_s").to_bits());
@@ -49,7 +49,7 @@ fn the_shape_of_physics_hangs_on_its_seed_and_not_on_its_strength() {
 
 #[test]
 fn a_held_step_relaxes_as_a_prony_series() {
-    let base = Base::new(2).unwrap();
+    let base = RandomRig::new(2).unwrap();
     let (mut sensor, drawn) = sensor(&base, "relaxation-prony", 1.0);
     let path = |t_s: f64| above(&base, if t_s > 0.0 { -0.5 } else { 1.0 });
     sensor.step(0.0, &path);
@@ -72,7 +72,7 @@ fn a_held_step_relaxes_as_a_prony_series() {
 
 #[test]
 fn a_relaxing_covering_never_pulls_and_its_next_press_is_weaker() {
-    let base = Base::new(2).unwrap();
+    let base = RandomRig::new(2).unwrap();
     let (mut sensor, _) = sensor(&base, "relaxation-power-law", 1.0);
     let path = |t_s: f64| above(&base, if t_s.rem_euclid(5.0) > 1.0 { -0.5 } else { 1.0 });
     let mut at = |t_s: f64| indentation_mm(&base, sensor.step(t_s, &path));
@@ -159,7 +159,7 @@ fn preisach_goes_up_below_and_comes_down_above_its_mean_branch() {
 
 #[test]
 fn bouc_wen_goes_to_its_limit_on_the_way_down() {
-    let base = Base::new(2).unwrap();
+    let base = RandomRig::new(2).unwrap();
     let (mut sensor, drawn) = sensor(&base, "hysteresis-bouc-wen", 1.0);
     let path = |t_s: f64| above(&base, -0.02 * t_s);
     let frames = (0..=1500).map(|frame| f64::from(frame) / 30.0);
@@ -167,7 +167,7 @@ fn bouc_wen_goes_to_its_limit_on_the_way_down() {
         sensor.step(t_s, &path);
     }
     let plain_mm = {
-        let mut sensor = Sensor::new(&base.sensor, &[], Climate::new(1), 0);
+        let mut sensor = HiddenSensor::new(&base.sensor, &[], Climate::new(1), 0);
         indentation_mm(&base, sensor.step(0.0, &above(&base, -1.0)))
     };
     // One mm deep: dz = dx (1 - z/limit) has come to rest.
@@ -178,14 +178,14 @@ fn bouc_wen_goes_to_its_limit_on_the_way_down() {
 
 #[test]
 fn a_filter_of_second_order_answers_a_step_as_the_books_say() {
-    let base = Base::new(2).unwrap();
+    let base = RandomRig::new(2).unwrap();
     let (mut sensor, drawn) = sensor(&base, "low-pass-second-order", 3.0);
     let path = |t_s: f64| above(&base, if t_s > 0.0 { -0.5 } else { 1.0 });
     sensor.step(0.0, &path);
     sensor.step(1e-9, &path);
     let time_s = drawn("time_constant_s");
     let settled_mm = {
-        let mut plain = Sensor::new(&base.sensor, &[], Climate::new(1), 0);
+        let mut plain = HiddenSensor::new(&base.sensor, &[], Climate::new(1), 0);
         indentation_mm(&base, plain.step(0.0, &above(&base, -0.5)))
     };
     for t_s in [0.05, 0.1, 0.2, 0.5] {
@@ -199,11 +199,11 @@ fn a_filter_of_second_order_answers_a_step_as_the_books_say() {
 
 #[test]
 fn a_moving_average_lags_a_ramp_by_half_its_window_and_a_late_frame_by_its_lag() {
-    let base = Base::new(2).unwrap();
+    let base = RandomRig::new(2).unwrap();
     let path = |t_s: f64| above(&base, -0.2 * t_s);
     for (id, name, share) in [("low-pass-moving-average", "window_s", 0.5), ("late-frames", "lag_s", 1.0)] {
         let (mut lagging, drawn) = sensor(&base, id, 1.0);
-        let mut plain = Sensor::new(&base.sensor, &[], Climate::new(1), 0);
+        let mut plain = HiddenSensor::new(&base.sensor, &[], Climate::new(1), 0);
         let side = if id == "late-frames" && drawn("side") < 0.0 { -1.0 } else { 1.0 };
         for frame in 0..=60 {
             lagging.step(f64::from(frame) / 30.0, &path);
@@ -216,16 +216,16 @@ fn a_moving_average_lags_a_ramp_by_half_its_window_and_a_late_frame_by_its_lag()
 
 #[test]
 fn a_scan_samples_the_first_row_earliest_and_the_last_element_at_the_stamp() {
-    let base = Base::new(2).unwrap();
+    let base = RandomRig::new(2).unwrap();
     let (mut skewed, drawn) = sensor(&base, "scan-elements", 1.0);
-    let mut plain = Sensor::new(&base.sensor, &[], Climate::new(1), 0);
+    let mut plain = HiddenSensor::new(&base.sensor, &[], Climate::new(1), 0);
     let path = |t_s: f64| above(&base, -0.2 * t_s);
     for frame in 0..=60 {
         skewed.step(f64::from(frame) / 30.0, &path);
     }
     let now = plain.step(2.0, &path).to_vec();
     assert!((skewed.counts()[47] - now[47]).abs() < 1e-9);
-    let earlier = Sensor::new(&base.sensor, &[], Climate::new(1), 0)
+    let earlier = HiddenSensor::new(&base.sensor, &[], Climate::new(1), 0)
         .step(2.0 - drawn("scan_s") * 47.0 / 48.0, &path)
         .to_vec();
     assert!((skewed.counts()[0] - earlier[0]).abs() < 1e-9);
@@ -233,9 +233,9 @@ fn a_scan_samples_the_first_row_earliest_and_the_last_element_at_the_stamp() {
 
 #[test]
 fn a_column_shares_what_its_elements_read() {
-    let base = Base::new(2).unwrap();
+    let base = RandomRig::new(2).unwrap();
     let (mut shared, drawn) = sensor(&base, "crosstalk-column", 1.0);
-    let mut plain = Sensor::new(&base.sensor, &[], Climate::new(1), 0);
+    let mut plain = HiddenSensor::new(&base.sensor, &[], Climate::new(1), 0);
     let baselines = &base.sensor.model.response().baseline_counts;
     let clean: Vec<f64> =
         plain.step(0.0, &above(&base, -0.5)).iter().zip(baselines).map(|(count, b)| count - b).collect();
@@ -246,7 +246,7 @@ fn a_column_shares_what_its_elements_read() {
 
 #[test]
 fn an_imprint_shows_after_release_only_and_closes() {
-    let base = Base::new(2).unwrap();
+    let base = RandomRig::new(2).unwrap();
     let (mut sensor, drawn) = sensor(&base, "imprint-two-exponentials", 1.0);
     let path = |t_s: f64| above(&base, if t_s > 0.0 && t_s < 2.0 { -0.5 } else { 1.0 });
     let mut at = |t_s: f64| indentation_mm(&base, sensor.step(t_s, &path));

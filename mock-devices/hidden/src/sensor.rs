@@ -1,4 +1,4 @@
-//! A sensor with physics in it, stepped along a path.
+//! A sensor with hidden physics, stepped along a path.
 
 mod face;
 
@@ -6,28 +6,28 @@ use std::fmt;
 
 use tactus_model::{Contact, Covering, Indenter, Path, Readout, Simulator};
 
-use crate::base::Climate;
-use crate::physics::{Dose, Knobs, Now, Stage, Tool, Touch};
+use crate::climate::Climate;
+use crate::physics::{Dose, Knobs, Now, PipelineHook, Tool, Touch};
 use face::Face;
 
-/// A virtual sensor with hidden physics: the base model's image of every instant, changed on its way by each dose.
+/// A virtual sensor with hidden physics. Each dose changes the base model's image at its stage of the pipeline.
 ///
 /// ```text
 /// path -> tool's place -> tool's face and spread -> indentations -> signals -> readings -> noise, converter
 /// ```
 ///
-/// Without doses it reads what [`tactus_model::ForwardModel`] does (to 1e-12 of a reading). Steps must go forward in
-/// time (one back in time counts as none); the first is a sensor at rest without a past.
-pub struct Sensor {
+/// Without doses it reads what [`tactus_model::ForwardModel`] does (to 1e-12 of a reading). Steps go forward in time; one
+/// back in time counts as a step of 0 s. At the first step the sensor is at rest, without history.
+pub struct HiddenSensor {
     base: Simulator,
     readout: Readout,
     climate: Climate,
     doses: Vec<Dose>,
     run: u64,
-    stages: Vec<Stage>,
+    hooks: Vec<PipelineHook>,
     stiffness: f64,
     parameters: Vec<Vec<(String, f64)>>,
-    /// Steps within one asked for are no longer than this.
+    /// A requested step is divided into steps of at most this length.
     longest_step_s: f64,
     last_s: Option<f64>,
     now: Option<Now>,
@@ -35,7 +35,7 @@ pub struct Sensor {
     counts: Vec<f64>,
 }
 
-/// What is kept of a cylinder's image while only its depth changes.
+/// The image of a cylinder, kept while only its depth changes.
 #[derive(Debug)]
 struct Imprint {
     point_mm: [f64; 2],
@@ -44,7 +44,7 @@ struct Imprint {
 }
 
 impl Imprint {
-    /// True if it is of this place and tool, to the bit: what is kept is not for a place nearby.
+    /// True if it was made for exactly this place and tool, to the bit.
     fn touches(&self, point_mm: [f64; 2], tool: &Tool) -> bool {
         let is_same = |one: [f64; 2], other: [f64; 2]| one.map(f64::to_bits) == other.map(f64::to_bits);
         is_same(self.point_mm, point_mm) && self.tool == *tool
@@ -53,32 +53,32 @@ impl Imprint {
 
 #[derive(Debug)]
 enum Kept {
-    /// As declared: the base model's own image at this depth, to which others are proportional.
+    /// The declared tool: the base model's image at this depth. Images at other depths are proportional.
     Declared { depth_mm: f64, indentation_mm: Vec<f64> },
-    /// Any other.
+    /// Any other tool.
     Changed(Face),
 }
 
-/// Physics that needs finer steps gets these.
+/// Step for physics with [`Definition::is_fine`](crate::Definition).
 const FINE_STEP_S: f64 = 1.0 / 240.0;
-/// However long nothing was asked, no more steps than these are made.
+/// A requested step is divided into at most this many, however long it is.
 const STEPS_MAX: f64 = 64.0;
-/// Speeds are taken over this time, backwards.
+/// Speeds are backward differences over this time.
 const SPEED_OVER_S: f64 = 0.002;
 
-impl Sensor {
-    /// A sensor at rest with doses in it. `run` chooses among random courses of the same physics.
+impl HiddenSensor {
+    /// A sensor at rest. `run` selects the random numbers in time of the same physics.
     ///
-    /// `base.effects` and `base.noise_rms_counts` are not used: physics here is what `doses` say.
+    /// `base.effects` and `base.noise_rms_counts` are ignored: the physics is `doses`.
     pub fn new(base: &Simulator, doses: &[Dose], climate: Climate, run: u64) -> Self {
         let mut parameters = Vec::new();
         let mut make = |dose: &Dose| {
             let mut knobs = Knobs::new(dose, base, run);
-            let stage = (dose.physics.make)(&mut knobs);
+            let hook = (dose.physics.make)(&mut knobs);
             parameters.push(knobs.into_drawn());
-            stage
+            hook
         };
-        let stages = doses.iter().map(&mut make).collect();
+        let hooks = doses.iter().map(&mut make).collect();
         let is_fine = doses.iter().any(|dose| dose.physics.is_fine);
         let elements = base.model.array().elements();
         Self {
@@ -87,7 +87,7 @@ impl Sensor {
             climate,
             doses: doses.to_vec(),
             run,
-            stages,
+            hooks,
             parameters,
             longest_step_s: if is_fine { FINE_STEP_S } else { f64::INFINITY },
             last_s: None,
@@ -98,14 +98,14 @@ impl Sensor {
         }
     }
 
-    /// What each dose drew, by name, in the order of the doses.
+    /// Parameters that each dose drew, by name, in the order of the doses.
     pub fn parameters(&self) -> &[Vec<(String, f64)>] {
         &self.parameters
     }
 
-    /// Makes elements answer for others: which, for which, and with what share of its indentation.
+    /// Rewires elements. Each entry is an element, the element whose indentation it gets, and the share of it.
     pub fn wire(&mut self, wiring: Vec<(usize, usize, f64)>) {
-        self.stages.push(Stage::Covering(Box::new(move |_, indentation_mm| {
+        self.hooks.push(PipelineHook::Covering(Box::new(move |_, indentation_mm| {
             let felt_mm = indentation_mm.to_vec();
             for (element, answers_for, share) in &wiring {
                 indentation_mm[*element] = share * felt_mm[*answers_for];
@@ -113,28 +113,28 @@ impl Sensor {
         })));
     }
 
-    /// Puts another covering in place, which has no past.
+    /// Puts another covering in place, without history.
     pub fn set_covering(&mut self, covering: Covering) {
         self.base.covering = covering;
         self.imprint = None;
-        for (stage, dose) in self.stages.iter_mut().zip(&self.doses) {
-            if let Stage::Covering(_) | Stage::Tool(_) = stage {
-                *stage = (dose.physics.make)(&mut Knobs::new(dose, &self.base, self.run));
+        for (hook, dose) in self.hooks.iter_mut().zip(&self.doses) {
+            if let PipelineHook::Covering(_) | PipelineHook::Tool(_) = hook {
+                *hook = (dose.physics.make)(&mut Knobs::new(dose, &self.base, self.run));
             }
         }
     }
 
-    /// Moves the covering's surface.
+    /// Moves the covering's surface to this height, robot frame.
     pub fn set_surface_mm(&mut self, surface_mm: f64) {
         self.base.surface_mm = surface_mm;
     }
 
-    /// Makes the covering answer so many times as strongly.
+    /// Multiplies every indentation by `stiffness`.
     pub fn set_stiffness(&mut self, stiffness: f64) {
         self.stiffness = stiffness;
     }
 
-    /// Goes on to a time, in s; the counts of every element there, row-major, without noise.
+    /// Advances to `t_s`. Returns the counts of every element then, row-major, without noise.
     pub fn step(&mut self, t_s: f64, path: &impl Path) -> &[f64] {
         let last_s = self.last_s.unwrap_or(t_s);
         let steps = ((t_s - last_s) / self.longest_step_s).ceil().clamp(1.0, STEPS_MAX);
@@ -152,26 +152,26 @@ impl Sensor {
         &self.counts
     }
 
-    /// Temperature at the last step.
+    /// Temperature at the last step, degrees Celsius; `None` before the first.
     pub fn temperature_c(&self) -> Option<f64> {
         self.now.map(|now| now.temperature_c)
     }
 
-    /// What the converter gives of clean counts when noise comes upon them.
+    /// The converter's output for clean counts plus noise: clipped, in whole steps.
     pub fn read(&self, counts: f64, noise_counts: f64) -> f64 {
         self.readout.read(self.convert(counts + noise_counts), 0.0)
     }
 
-    /// What the converter makes of counts before it takes whole steps of them: exact but for its own physics.
+    /// The converter's output before quantisation: exact except for hidden physics of the converter.
     pub fn convert(&self, counts: f64) -> f64 {
-        self.stages.iter().fold(counts, |counts, stage| match stage {
-            Stage::Converter(convert) => convert(counts),
-            Stage::Path(_)
-            | Stage::Touch(_)
-            | Stage::Tool(_)
-            | Stage::Covering(_)
-            | Stage::Element(_)
-            | Stage::Readout(_) => counts,
+        self.hooks.iter().fold(counts, |counts, hook| match hook {
+            PipelineHook::Converter(convert) => convert(counts),
+            PipelineHook::Path(_)
+            | PipelineHook::Touch(_)
+            | PipelineHook::Tool(_)
+            | PipelineHook::Covering(_)
+            | PipelineHook::Element(_)
+            | PipelineHook::Readout(_) => counts,
         })
     }
 
@@ -185,8 +185,8 @@ impl Sensor {
             temperature_c: self.climate.at(t_s),
             touch: Touch { point_mm: [0.0; 2], depth_mm: 0.0 },
         };
-        for stage in &mut self.stages {
-            if let Stage::Path(on_path) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Path(on_path) = hook {
                 on_path(&now, path, &mut tip_mm);
             }
         }
@@ -194,42 +194,42 @@ impl Sensor {
             point_mm: self.base.registration.to_sensor([tip_mm[0], tip_mm[1]]),
             depth_mm: self.base.surface_mm - tip_mm[2],
         };
-        for stage in &mut self.stages {
-            if let Stage::Touch(on_touch) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Touch(on_touch) = hook {
                 let mut touch = now.touch;
                 on_touch(&now, &mut touch);
                 now.touch = touch;
             }
         }
         let mut tool = self.tool();
-        for stage in &mut self.stages {
-            if let Stage::Tool(on_tool) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Tool(on_tool) = hook {
                 on_tool(&now, &mut tool);
             }
         }
         self.press(now.touch, tool);
-        for stage in &mut self.stages {
-            if let Stage::Covering(on_covering) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Covering(on_covering) = hook {
                 on_covering(&now, &mut self.counts);
             }
         }
         self.counts.iter_mut().for_each(|value| *value *= self.stiffness);
         self.base.model.respond(&mut self.counts);
         self.amplify(&now);
-        for stage in &mut self.stages {
-            if let Stage::Readout(on_readout) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Readout(on_readout) = hook {
                 on_readout(&now, &mut self.counts);
             }
         }
         self.now = Some(now);
     }
 
-    /// The stage of elements: on the signal above the baseline.
+    /// Applies physics of elements, on the signal above the baseline.
     fn amplify(&mut self, now: &Now) {
         let baselines = &self.base.model.response().baseline_counts;
         let mut signal: Option<Vec<f64>> = None;
-        for stage in &mut self.stages {
-            if let Stage::Element(on_element) = stage {
+        for hook in &mut self.hooks {
+            if let PipelineHook::Element(on_element) = hook {
                 let signal = signal
                     .get_or_insert_with(|| self.counts.iter().zip(baselines).map(|(c, b)| c - b).collect());
                 on_element(now, signal);
@@ -248,7 +248,7 @@ impl Sensor {
         Tool { diameter_mm: diameter_mm(&self.base.indenter), lean: [0.0; 2], sigma_mm: [sigma_mm; 2] }
     }
 
-    /// Equivalent indentations of the tool where it stands, into `counts`.
+    /// Writes the equivalent indentations of the tool at this place into `counts`, mm.
     fn press(&mut self, touch: Touch, tool: Tool) {
         let Touch { point_mm, depth_mm } = touch;
         if depth_mm <= 0.0 {
@@ -256,10 +256,10 @@ impl Sensor {
             return;
         }
         let Indenter::Cylinder { .. } = self.base.indenter else {
-            // Physics of the tool's face is known for cylinders only.
+            // Hidden physics of the tool's face supports cylinders only.
             return self.exact(point_mm, depth_mm);
         };
-        // A cylinder goes no deeper than the covering.
+        // A cylinder cannot go deeper than the covering is thick.
         let depth_mm = depth_mm.min(self.base.covering.thickness_mm);
         let kept = self.imprint.take().filter(|kept| kept.touches(point_mm, &tool));
         let imprint =
@@ -291,9 +291,9 @@ impl Sensor {
     }
 }
 
-impl fmt::Debug for Sensor {
+impl fmt::Debug for HiddenSensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Sensor")
+        f.debug_struct("HiddenSensor")
             .field("parameters", &self.parameters)
             .field("now", &self.now)
             .finish_non_exhaustive()
@@ -306,7 +306,7 @@ fn speed(before_mm: f64, after_mm: f64) -> f64 {
     if mm_per_s.abs() < 1e-6 { 0.0 } else { mm_per_s }
 }
 
-/// Diameter of a round tool; 0 of another.
+/// Diameter of a round tool; 0 for others.
 pub(crate) fn diameter_mm(indenter: &Indenter) -> f64 {
     match indenter {
         Indenter::Cylinder { diameter_mm }

@@ -1,12 +1,12 @@
 use tactus_model::{Contact, Trail};
 
 use super::*;
-use crate::{Base, Definition};
+use crate::{Definition, RandomRig};
 
 #[test]
 fn without_doses_it_is_the_base_model() {
-    let base = Base::new(5).unwrap();
-    let mut sensor = Sensor::new(&base.sensor, &[], Climate::new(5), 0);
+    let base = RandomRig::new(5).unwrap();
+    let mut sensor = HiddenSensor::new(&base.sensor, &[], Climate::new(5), 0);
     let mut exact = vec![0.0; 48];
     for (step, (position_mm, depth_mm)) in
         [([2.9, 4.9], 0.3), ([2.9, 4.9], 0.65), ([9.3, 1.2], 0.1), ([9.3, 1.2], 1.4), ([9.3, 1.2], -0.2)]
@@ -25,8 +25,8 @@ fn without_doses_it_is_the_base_model() {
 
 #[test]
 fn the_quadrature_of_a_flat_face_agrees_with_the_base_model() {
-    let base = Base::new(5).unwrap();
-    let sensor = Sensor::new(&base.sensor, &[], Climate::new(5), 0);
+    let base = RandomRig::new(5).unwrap();
+    let sensor = HiddenSensor::new(&base.sensor, &[], Climate::new(5), 0);
     let (position_mm, depth_mm) = ([7.7, 6.1], 0.4);
     let (mut exact, mut ours) = (vec![0.0; 48], vec![0.0; 48]);
     let contact =
@@ -41,8 +41,8 @@ fn the_quadrature_of_a_flat_face_agrees_with_the_base_model() {
 #[test]
 fn a_leaning_face_all_in_the_covering_presses_as_its_middle_does() {
     // The mean depth of a tilted disc is that of its middle, which lies R tan(a) above its lowest point.
-    let base = Base::new(5).unwrap();
-    let sensor = Sensor::new(&base.sensor, &[], Climate::new(5), 0);
+    let base = RandomRig::new(5).unwrap();
+    let sensor = HiddenSensor::new(&base.sensor, &[], Climate::new(5), 0);
     let tool = Tool { lean: [0.0, 0.1], ..sensor.tool() };
     // Far from the edges nothing is lost: compare the sums of all elements.
     let sum = |tool: &Tool, depth_mm: f64| {
@@ -56,24 +56,25 @@ fn a_leaning_face_all_in_the_covering_presses_as_its_middle_does() {
 
 #[test]
 fn another_covering_has_no_past_and_reads_as_the_model_says() {
-    let base = Base::new(5).unwrap();
+    let base = RandomRig::new(5).unwrap();
     let physics = Definition::find("softening-exponential").unwrap();
     let doses = [Dose { physics, strength: 1.0, seed: 1 }];
     let [x, y] = base.rig.registration.to_robot([2.9, 4.9]);
     let covering = Covering { thickness_mm: 2.54 };
-    let mut swapped = Sensor::new(&base.sensor, &doses, Climate::new(5), 0);
+    let mut swapped = HiddenSensor::new(&base.sensor, &doses, Climate::new(5), 0);
     swapped.step(0.0, &[x, y, -0.6]);
     swapped.set_covering(covering);
     let fresh_base = Simulator { covering, ..base.sensor.clone() };
-    let mut fresh = Sensor::new(&fresh_base, &doses, Climate::new(5), 0);
+    let mut fresh = HiddenSensor::new(&fresh_base, &doses, Climate::new(5), 0);
     assert_eq!(swapped.step(1.0, &[x, y, -0.4]), fresh.step(1.0, &[x, y, -0.4]));
 }
 
 #[test]
 fn the_converter_takes_noise_before_it_rounds() {
-    let base = Base::new(5).unwrap();
+    let base = RandomRig::new(5).unwrap();
     let physics = Definition::find("coarse-steps").unwrap();
-    let sensor = Sensor::new(&base.sensor, &[Dose { physics, strength: 0.5, seed: 1 }], Climate::new(5), 0);
+    let sensor =
+        HiddenSensor::new(&base.sensor, &[Dose { physics, strength: 0.5, seed: 1 }], Climate::new(5), 0);
     // Steps of 8: 100.9 lies nearer to 104, 99.5 nearer to 96.
     assert_eq!(
         [sensor.read(100.0, 0.9), sensor.read(99.0, 0.5)].map(|count| format!("{count}")),
@@ -84,13 +85,13 @@ fn the_converter_takes_noise_before_it_rounds() {
 
 #[test]
 fn a_virtual_device_can_hold_it_and_give_it_its_trail() {
-    let base = Base::new(5).unwrap();
+    let base = RandomRig::new(5).unwrap();
     let doses = ["low-pass-second-order", "lost-motion", "drift-common-walk"].map(|id| Dose {
         physics: Definition::find(id).unwrap(),
         strength: 1.0,
         seed: 1,
     });
-    let mut sensor = Sensor::new(&base.sensor, &doses, Climate::new(5), 0);
+    let mut sensor = HiddenSensor::new(&base.sensor, &doses, Climate::new(5), 0);
     let [x, y] = base.rig.registration.to_robot([2.9, 4.9]);
     let mut trail = Trail::new(0.0, [x, y, 1.0]);
     // Devices look whenever they like, also twice at one time; another thread may do it.

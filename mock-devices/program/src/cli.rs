@@ -1,4 +1,4 @@
-//! The program `tactus-mock`: a virtual rig at pseudo-terminals or on USB; test data with hidden physics.
+//! The command line, and what `rig` and `usb` share.
 
 use std::fs;
 use std::io::{self, BufRead, IsTerminal, Write};
@@ -27,25 +27,25 @@ use crate::usb::UsbArgs;
 #[command(name = "tactus-mock", version)]
 pub(crate) struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: MockCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum MockCommand {
     /// Serves a simulated rig at two pseudo-terminals, whose paths it prints.
     ///
-    /// It then reads faults from standard input, one a line such as `sensor stall 2s`, answers each with
-    /// `ok` or `error: ...`, the line `truth` with where the tip truly is, as one JSON object, and runs until it is
+    /// It then reads faults from standard input, one per line, such as `sensor stall 2s`, and answers each with `ok` or
+    /// `error: ...`. It answers the line `truth` with the true position of the tip as one JSON object. It runs until it is
     /// terminated.
     Rig(RigArgs),
     /// Plugs virtual USB devices into this machine's kernel (Linux, root, `modprobe vhci-hcd`).
     ///
-    /// It then reads commands from standard input, one a line: `sensor unplug`, `sensor plug`, `sensor plug
-    /// elsewhere`, `sensor halt` (its endpoint stalls until the host clears that), `sensor slow 50ms`, the same
-    /// for `stage`, and every fault that `rig` takes. It answers each with `ok` or `error: ...`, and runs until
-    /// it is terminated, which unplugs everything.
+    /// It then reads commands from standard input, one per line: `sensor unplug`, `sensor plug`, `sensor plug
+    /// elsewhere`, `sensor halt` (its endpoint stalls until the host clears the halt), `sensor slow 50ms`, the same
+    /// for `stage`, and every fault that `rig` takes. It answers each with `ok` or `error: ...`. It runs until it is
+    /// terminated, which unplugs everything.
     Usb(UsbArgs),
-    /// Test data for discovery: measurement tables with physics in them that the base model does not know.
+    /// Test data for discovery: measurement tables of sensors with physics that the base model does not know.
     Hidden(HiddenArgs),
 }
 
@@ -53,7 +53,7 @@ enum Command {
 struct RigArgs {
     #[command(flatten)]
     source: SourceArgs,
-    /// Folder in which the links `sensor` and `stage` always point to the present pseudo-terminals.
+    /// Folder in which the links `sensor` and `stage` always point to the current pseudo-terminals.
     #[arg(long)]
     link_dir: Option<PathBuf>,
     /// Print the paths as one JSON object.
@@ -64,16 +64,16 @@ struct RigArgs {
 /// What the devices are made from.
 #[derive(Debug, Args)]
 pub(crate) struct SourceArgs {
-    /// The rig file; its `[simulation]` is what the devices hide, and they speak as its `[sensor]` and `[stage]` say.
+    /// The rig file. The devices hide its `[simulation]`, and use the protocols of its `[sensor]` and `[stage]`.
     #[arg(long)]
     config: PathBuf,
-    /// What the sensor hides: a model file, in the place of the rig file's gains, noise and spread, or a file of
-    /// hidden physics that comes upon them.
+    /// What the sensor hides: a model file, which replaces the rig file's gains, noise and spread, or a file of hidden
+    /// physics, which is added to them.
     ///
-    /// The service does not know it: its recordings hold its rig file, whose `[simulation]` then is not so.
+    /// The service does not know this file: its recordings contain the rig file, whose `[simulation]` then does not hold.
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Seed of everything random, in the place of the rig file's.
+    /// Seed of everything random. Default: the rig file's.
     #[arg(long)]
     seed: Option<u64>,
     /// Faults at set times: a TOML file of `[[fault]]` entries with `at_s` and `command`.
@@ -81,7 +81,7 @@ pub(crate) struct SourceArgs {
     faults: Option<PathBuf>,
 }
 
-/// What was read of what the arguments name.
+/// The files that the arguments name, read and checked.
 pub(crate) struct Source {
     rig: Rig,
     codec: SensorCodec,
@@ -107,42 +107,41 @@ impl SourceArgs {
 }
 
 impl Source {
-    /// The array that the sensor is.
     pub(crate) fn array(&self) -> &Array {
         &self.rig.array
     }
 
-    /// How the sensor speaks.
+    /// The format of the sensor on the wire.
     pub(crate) fn codec(&self) -> &SensorCodec {
         &self.codec
     }
 
-    /// The same, with a sensor that speaks otherwise than the rig file says.
+    /// The same, with another sensor format than the rig file's.
     pub(crate) fn speaking(self, codec: SensorCodec) -> Self {
         Self { codec, ..self }
     }
 
-    /// Switches the devices on; gives the faults that are to happen by themselves, too.
+    /// Switches the devices on. Also returns the faults of `--faults`.
     pub(crate) fn start(self) -> (Started, FaultScript) {
         (start_devices(self.truth, self.rig.covering, &self.codec, Instant::now()), self.script)
     }
 }
 
 impl Cli {
-    /// Does what the arguments say.
+    /// Runs the command.
     ///
     /// # Errors
-    /// With the file and the place that are wrong, or what the system refused.
+    /// The message names the file and the place that are wrong, or what the system refused.
     pub(crate) fn run(self) -> Result<()> {
         match self.command {
-            Command::Rig(args) => in_runtime(serve(args)),
-            Command::Usb(args) => in_runtime(args.serve()),
-            Command::Hidden(args) => args.run(),
+            MockCommand::Rig(args) => in_runtime(serve(args)),
+            MockCommand::Usb(args) => in_runtime(args.serve()),
+            MockCommand::Hidden(args) => args.run(),
         }
     }
 }
 
-/// Runs what serves devices, with its log on standard error.
+/// Runs on a runtime of one thread, with the log on standard error.
 fn in_runtime(serving: impl Future<Output = Result<()>>) -> Result<()> {
     tracing_subscriber::fmt().with_writer(io::stderr).with_ansi(io::stderr().is_terminal()).init();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -169,7 +168,7 @@ async fn serve(args: RigArgs) -> Result<()> {
     Ok(())
 }
 
-/// SIGTERM and SIGINT, which end the program in order from when it listens to them: before it says that it is ready.
+/// SIGTERM and SIGINT. The program listens to them before it announces its devices, so that both always end it in order.
 pub(crate) struct Termination {
     terminate: Signal,
     interrupt: Signal,
@@ -181,16 +180,16 @@ impl Termination {
     }
 }
 
-/// Lets the devices run until the program is terminated. Meanwhile does what is typed, and answers each line.
+/// Lets the devices run until the program is terminated, and answers each line of standard input.
 ///
 /// # Errors
-/// If a device ends, or the script has a fault that the rig cannot have.
+/// If a device ends, or the rig refuses a fault of the script.
 pub(crate) async fn until_terminated<E: std::error::Error + Send + Sync + 'static>(
     Termination { mut terminate, mut interrupt }: Termination,
     devices: &mut JoinSet<Result<(), E>>,
     control: &RigControl,
     script: &FaultScript,
-    mut obey: impl AsyncFnMut(&str) -> Result<(), String>,
+    mut execute: impl AsyncFnMut(&str) -> Result<(), String>,
 ) -> Result<()> {
     let mut lines = standard_input()?;
     let played = control.play(script);
@@ -206,8 +205,8 @@ pub(crate) async fn until_terminated<E: std::error::Error + Send + Sync + 'stati
                 outcome.context("the fault script")?;
             }
             Some(line) = lines.recv() => match line.trim() {
-                "truth" => tell_truth(control)?,
-                _ => answer(obey(&line).await)?,
+                "truth" => print_truth(control)?,
+                _ => answer(execute(&line).await)?,
             },
         }
     }
@@ -234,9 +233,9 @@ fn announce(sensor: &TerminalPort, stage: &TerminalPort, as_json: bool) -> Resul
     Ok(out.flush()?)
 }
 
-/// Lines of standard input, read by a thread of its own: a read there cannot be cancelled.
+/// Lines of standard input. A separate thread reads them, because such a read cannot be cancelled.
 fn standard_input() -> Result<mpsc::Receiver<String>> {
-    // When it is full the thread waits, and with it whoever writes.
+    // When the channel is full the thread waits, and so does the writer.
     let (sender, lines) = mpsc::channel(16);
     thread::Builder::new().name("stdin".into()).spawn(move || {
         for line in io::stdin().lock().lines().map_while(Result::ok) {
@@ -248,8 +247,8 @@ fn standard_input() -> Result<mpsc::Receiver<String>> {
     Ok(lines)
 }
 
-/// Where the tip truly is, as one JSON object.
-fn tell_truth(control: &RigControl) -> Result<()> {
+/// Prints the true position of the tip as one JSON object.
+fn print_truth(control: &RigControl) -> Result<()> {
     let [x_mm, y_mm, z_mm] = control.tip_mm();
     let truth = json!({
         "x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm,

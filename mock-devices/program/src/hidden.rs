@@ -15,18 +15,18 @@ use tactus_sets::{Amount, Content, Label, NoiseKind, Plan, Recipe};
 #[derive(Debug, Args)]
 pub(crate) struct HiddenArgs {
     #[command(subcommand)]
-    command: Command,
+    command: HiddenCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
-    /// Lists every physics, the library's effect that it is an instance of, and what it does.
+enum HiddenCommand {
+    /// Lists all physics: id, the library's effect of which it is an instance, what it does.
     List {
         /// As JSON.
         #[arg(long)]
         json: bool,
     },
-    /// Makes measurement tables with hidden physics in them, and apart from them their labels.
+    /// Makes measurement tables with hidden physics, and their labels in another folder.
     Make(MakeArgs),
 }
 
@@ -47,34 +47,34 @@ struct MakeArgs {
     /// Physics by id, several with commas.
     #[arg(long, value_delimiter = ',')]
     physics: Vec<String>,
-    /// Any physics that is an instance of this effect; may be given several times.
+    /// Any physics that is an instance of this effect. Can be repeated.
     #[arg(long)]
     effect: Vec<String>,
-    /// So many different effects of the library, by chance.
+    /// Number of different effects of the library, chosen at random.
     #[arg(long)]
     combine: Option<usize>,
-    /// A physics that the library has nothing like, by chance.
+    /// A physics outside the library, chosen at random.
     #[arg(long)]
     outside: bool,
     /// No physics at all.
     #[arg(long, conflicts_with_all = ["physics", "effect", "combine", "outside"])]
     none: bool,
-    /// As much of each physics as an oracle tells from the base model by this many standard deviations.
+    /// Strength by separation: an oracle distinguishes each physics from the base model by this many standard deviations.
     #[arg(long, conflicts_with = "strength")]
     z: Option<f64>,
-    /// As `--z`, after the spread was recalibrated too.
+    /// As `--z`, after the point spread is recalibrated too.
     #[arg(long, conflicts_with_all = ["strength", "z"])]
     z_beyond_spread: Option<f64>,
-    /// Strength of each physics: 1 is what a bad rig has.
+    /// Strength of each physics: 1 is that of a bad rig.
     #[arg(long, default_value_t = 1.0)]
     strength: f64,
     /// What the stage does.
     #[arg(long, value_enum, default_value_t)]
     plan: Plan,
-    /// Frames of a set, if not the plan's own number.
+    /// Frames of a set. Default: the plan's number.
     #[arg(long)]
     frames: Option<usize>,
-    /// What noise comes upon the readings.
+    /// Noise of the readings.
     #[arg(long, value_enum, default_value_t)]
     noise: NoiseKind,
 }
@@ -82,8 +82,8 @@ struct MakeArgs {
 impl HiddenArgs {
     pub(crate) fn run(self) -> Result<()> {
         match self.command {
-            Command::List { json } => list(json),
-            Command::Make(args) => args.run(),
+            HiddenCommand::List { json } => list(json),
+            HiddenCommand::Make(args) => args.run(),
         }
     }
 }
@@ -166,11 +166,11 @@ impl MakeArgs {
     }
 }
 
-/// Says that a separation was out of reach, but not of what: the label says that.
+/// Warns if a separation was out of reach. Only the label says of which physics.
 fn warn_of_unreached(label: &Label) -> Result<()> {
     let mut err = io::stderr().lock();
     for _ in label.physics.iter().filter(|dosed| !dosed.reached) {
-        writeln!(err, "{}: the separation asked for is out of reach; its label has the nearest", label.set)?;
+        writeln!(err, "{}: the requested separation is out of reach; the label has the nearest", label.set)?;
     }
     Ok(())
 }

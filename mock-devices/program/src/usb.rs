@@ -17,7 +17,7 @@ use tokio::task::JoinSet;
 
 use crate::cli::{Source, SourceArgs, Termination, read, until_terminated};
 
-/// Orders that may wait for a plug: one line is answered before the next is read.
+/// Capacity of a plug's queue of orders. One is enough: each line is answered before the next is read.
 const ORDERS_WAITING: usize = 1;
 
 #[derive(Debug, Args)]
@@ -30,17 +30,17 @@ pub(crate) struct UsbArgs {
     /// Plug in the stage, as one of these.
     #[arg(long, value_name = "KIND")]
     stage: Option<StageKind>,
-    /// Both as one device, on one cable.
+    /// Plug in both as one composite device, on one cable.
     #[arg(long, requires = "sensor", requires = "stage")]
     composite: bool,
-    /// The format of the sensor's frames (`config/links`), in the place of what the rig file says; `hid` and `bulk` need
-    /// one, for `hid` with `[hid]`.
+    /// The format of the sensor's frames (`config/links`), instead of the rig file's. `hid` and `bulk` need one; for
+    /// `hid` it needs `[hid]`.
     #[arg(long, value_name = "FILE")]
     link: Option<PathBuf>,
-    /// The sensor's serial number, in the place of SIM-SENSOR; it begins with SIM.
+    /// The sensor's serial number. Default: SIM-SENSOR. It must begin with SIM.
     #[arg(long, value_name = "TEXT", value_parser = simulated_serial)]
     serial: Option<String>,
-    /// Print what was plugged in as one JSON object.
+    /// Print the plugged-in devices as one JSON object.
     #[arg(long)]
     json: bool,
 }
@@ -128,14 +128,14 @@ impl UsbArgs {
         announce(&said, self.json)?;
         let sends_packets = self.sends_packets();
         let outcome = until_terminated(termination, &mut running, &control, &script, async |line| {
-            obey(line, &plugged, &control, sends_packets).await
+            execute(line, &plugged, &control, sends_packets).await
         });
         outcome.await?;
         running.shutdown().await;
         Ok(())
     }
 
-    /// What the devices are made from; the sensor speaks as `--link` says, if it is given.
+    /// The files of the arguments. `--link` replaces the sensor's format.
     fn source_speaking(&self) -> Result<Source> {
         let source = self.source.read()?;
         let Some(path) = &self.link else { return Ok(source) };
@@ -147,7 +147,7 @@ impl UsbArgs {
         Ok(source.speaking(SensorCodec::Declared { format }))
     }
 
-    /// A frame is a packet.
+    /// True if each frame of the sensor is one USB packet.
     fn sends_packets(&self) -> bool {
         matches!(self.sensor, Some(SensorKind::Hid | SensorKind::Bulk))
     }
@@ -170,8 +170,8 @@ impl UsbArgs {
             several => {
                 if several.iter().any(|device| matches!(device.kind, FunctionKind::Ftdi)) {
                     bail!(
-                        "FTDI's chip is a device of its own, which no composite holds: \
-                         choose another kind, or leave --composite out"
+                        "an FTDI chip cannot be part of a composite device: \
+                         choose another kind, or leave out --composite"
                     );
                 }
                 Identity::own(5, "virtual rig", self.serial.as_deref().unwrap_or("SIM-RIG"))
@@ -180,7 +180,7 @@ impl UsbArgs {
     }
 }
 
-/// The function as which a sensor is plugged in; `format` is that of its frames, if a description gives it.
+/// The USB function of a sensor. `format` is the declared format of its frames, if it has one.
 fn sensor_function(kind: SensorKind, format: Option<&Format>) -> Result<FunctionKind> {
     Ok(match (kind, format) {
         (SensorKind::CdcAcm, _) => FunctionKind::Acm,
@@ -210,7 +210,7 @@ fn sensor_function(kind: SensorKind, format: Option<&Format>) -> Result<Function
     })
 }
 
-async fn obey(
+async fn execute(
     line: &str,
     plugged: &[PluggedDevice],
     control: &RigControl,
@@ -223,7 +223,7 @@ async fn obey(
         };
         let (done, outcome) = oneshot::channel();
         let order = Order { function: target.function, command, done };
-        // A plug takes orders until it ends, and then the program does.
+        // A plug takes orders until it ends; the program ends with it.
         let ended = |_| "the device has ended".to_owned();
         target.orders.send(order).await.map_err(|_| "the device has ended".to_owned())?;
         return outcome.await.map_err(ended)?.map_err(|error| format!("{device}: {error}"));
@@ -238,7 +238,7 @@ async fn obey(
     control.inject(fault).map_err(|error| error.to_string())
 }
 
-/// True for faults that leave a frame as long as its packet.
+/// True for faults that keep a frame as long as its packet.
 fn keeps_packets_whole(fault: SensorFault) -> bool {
     match fault {
         SensorFault::Link(LinkFault::Stall(_) | LinkFault::DropFrames(_))
@@ -286,6 +286,6 @@ fn simulated_serial(text: &str) -> Result<String, String> {
     if text.starts_with("SIM") && is_plain {
         Ok(text.to_owned())
     } else {
-        Err("a simulated device says so: SIM, then letters, digits and hyphens".to_owned())
+        Err("the serial number of a simulated device is SIM, then letters, digits and hyphens".to_owned())
     }
 }

@@ -1,4 +1,4 @@
-//! What is in a set: kept apart from it.
+//! The truth about a data set, stored in another folder.
 
 use std::collections::BTreeMap;
 
@@ -14,52 +14,51 @@ pub struct Label {
     pub set: String,
     /// Seed of everything random in it.
     pub seed: u64,
-    /// What the stage did.
+    /// What the stage does.
     pub plan: Plan,
     /// Frames of all runs.
     pub frames: usize,
-    /// The physics that is in it.
-    pub physics: Vec<Dosed>,
-    /// Separation of all of it together from the recalibrated base model (see [`Separation`](crate::Separation)); 0
-    /// without physics.
+    /// Its hidden physics.
+    pub physics: Vec<PhysicsLabel>,
+    /// [`Separation::z`](crate::Separation::z) of all physics together; 0 without physics.
     pub z: f64,
-    /// The same after the spread was recalibrated too.
+    /// [`Separation::z_beyond_spread`](crate::Separation::z_beyond_spread) of all physics together.
     pub z_beyond_spread: f64,
-    /// The noise.
+    /// Noise of the readings.
     pub noise: Noise,
     /// True sensitivities, counts per mm.
     pub sensitivity_counts_per_mm: Vec<f64>,
-    /// True baselines.
+    /// True baselines, counts.
     pub baseline_counts: Vec<f64>,
-    /// True spread without covering.
+    /// True spread without a covering.
     pub sigma_intercept_mm: f64,
-    /// True spread gained with each mm of covering.
+    /// True increase of the spread with each mm of covering.
     pub sigma_per_mm: f64,
 }
 
-/// One physics of a set.
+/// One physics of a data set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Dosed {
+pub struct PhysicsLabel {
     /// Its id in the catalogue.
     pub id: String,
-    /// The effect that it is an instance of; none outside the library.
+    /// The library's effect of which it is an instance; `None` outside the library.
     pub effect: Option<String>,
-    /// How much of it.
+    /// Strength of its dose.
     pub strength: f64,
-    /// Its separation alone.
+    /// [`Separation::z`](crate::Separation::z) of this physics alone.
     pub z: f64,
-    /// The same after the spread was recalibrated too.
+    /// [`Separation::z_beyond_spread`](crate::Separation::z_beyond_spread) of this physics alone.
     pub z_beyond_spread: f64,
-    /// False if no strength gives the separation that was asked for; then the nearest is in it.
+    /// False if no strength gives the requested separation; the strength is then that of the nearest.
     pub reached: bool,
     /// Seed of its shape.
     pub seed: u64,
-    /// What was drawn, by name.
+    /// Its parameters, by name.
     pub parameters: BTreeMap<String, f64>,
 }
 
 impl Label {
-    /// Names of the library's effects that are in the set.
+    /// Names of the library's effects in the set.
     pub fn effects(&self) -> Vec<&str> {
         self.physics.iter().filter_map(|dosed| dosed.effect.as_deref()).collect()
     }

@@ -1,8 +1,7 @@
 //! Test data for discovery: measurement tables of sensors with hidden physics, and their labels.
 //!
-//! A [`Recipe`] makes a whole [`Set`]: the measurement table of an experiment ([`plan`]) on a sensor of its own with
-//! physics of `tactus-hidden` in it, with noise, and apart from it the [`Label`] that says what is in it. The table
-//! contains nothing of the label.
+//! A [`Recipe`] makes a whole [`DataSet`]: the measurement table of an experiment ([`plan`]) on a random rig with noise and
+//! with physics of `tactus-hidden`, and the [`Label`] that names this physics. The table contains nothing of the label.
 //!
 //! ```
 //! use tactus_sets::{Content, NoiseKind, Plan, Recipe};
@@ -28,9 +27,9 @@ mod recipe;
 mod separation;
 mod set;
 
-pub use label::{Dosed, Label};
+pub use label::{Label, PhysicsLabel};
 pub use noise::{Noise, NoiseKind};
 pub use plan::Plan;
 pub use recipe::{Amount, Content, Recipe, RecipeError};
 pub use separation::Separation;
-pub use set::Set;
+pub use set::DataSet;

@@ -5,16 +5,16 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// What noise a set shall have.
+/// The kind of noise of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum NoiseKind {
     /// Independent readings, 0.5-4 counts.
     White,
     /// First-order autoregression with a coefficient of 0.3-0.9, 0.5-4 counts.
     Coloured,
-    /// 0.3-1 count, so that the steps of one count show.
+    /// Independent readings, 0.3-1 count, so that quantisation in steps of one count is visible.
     Quantised,
-    /// One of the three by chance.
+    /// One of the three at random.
     #[default]
     Any,
 }
@@ -22,9 +22,9 @@ pub enum NoiseKind {
 /// Gaussian noise of every element, `x_k = phi x_(k-1) + sqrt(1 - phi^2) rms n_k`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Noise {
-    /// Standard deviation.
+    /// Standard deviation of a reading.
     pub rms_counts: f64,
-    /// Correlation of a reading's noise with that of the reading before, in `[0, 1)`.
+    /// Correlation of a reading's noise with that of the previous reading, in `[0, 1)`.
     pub phi: f64,
 }
 
@@ -47,7 +47,7 @@ impl Noise {
         }
     }
 
-    /// Noise of as many readings: rows of one value per element.
+    /// A generator of noise. Each call fills one frame: one value per element.
     pub fn series(&self, rng: &mut ChaCha8Rng, elements: usize) -> impl FnMut(&mut [f64]) {
         let Self { rms_counts, phi } = *self;
         let fresh = (1.0 - phi * phi).sqrt();
@@ -61,8 +61,8 @@ impl Noise {
         }
     }
 
-    /// Standard deviation that a mean of many readings behaves as if it had, quantisation in steps of `step_counts`
-    /// included: `sqrt(rms^2 (1 + phi)/(1 - phi) + step^2/12)`.
+    /// The effective standard deviation of a reading in a mean of many readings, with quantisation in steps of
+    /// `step_counts`: `sqrt(rms^2 (1 + phi)/(1 - phi) + step^2/12)`.
     pub fn effective_rms_counts(&self, step_counts: f64) -> f64 {
         let Self { rms_counts, phi } = self;
         (rms_counts * rms_counts * (1.0 + phi) / (1.0 - phi) + step_counts * step_counts / 12.0).sqrt()

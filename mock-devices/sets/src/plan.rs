@@ -1,4 +1,4 @@
-//! What the stage does in a set: experiments made by procedure, for the simulated rig's array and tool.
+//! What the stage does in a set: generated experiments for the array and tool of the random rig.
 
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -10,38 +10,38 @@ use tactus_model::{Array, Covering, Phase, Registration, Trajectory, TrajectoryE
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Plan {
-    /// All that shows effects, within some 200 s: presses all over at two depths each, repeats, ladders, rates,
-    /// four directions, two holds of 12 s with rest, idle time.
+    /// Everything that shows effects, in about 200 s: presses over the whole array at two depths each, repeats, ladders of
+    /// depths, rates, four directions, two holds of 12 s with rest, idle time.
     #[default]
     Bundle,
     /// The paper's experiments only: two corners, all element centres at five depths, and a coarse grid sweep under
     /// two coverings.
     Paper,
-    /// The bundle's parts at the length of the `diagnose` experiment: some 20 minutes.
+    /// The parts of the bundle at the length of the `diagnose` experiment: about 20 minutes.
     Diagnose,
 }
 
-/// The stage's way through one run, and what it does when.
+/// The stage's path through one run, and the phases of it.
 #[derive(Debug, Clone)]
-pub struct Course {
-    /// The covering in place.
+pub struct PlannedRun {
+    /// The covering of this run.
     pub covering: Covering,
-    /// The tip's way, robot frame.
+    /// Path of the tip, robot frame.
     pub trajectory: Trajectory,
-    /// What it does, in order of time.
-    pub marks: Vec<Mark>,
-    /// Frames that are taken, the first at 0 s.
+    /// In order of time.
+    pub phases: Vec<PhaseInterval>,
+    /// Number of frames, the first at 0 s.
     pub frames: usize,
 }
 
-/// What the stage does from the end of the mark before until this one's.
+/// What the stage does from the end of the previous interval until the end of this one.
 #[derive(Debug, Clone, Copy)]
-pub struct Mark {
-    /// Its end.
+pub struct PhaseInterval {
+    /// Its end, since the start of the run.
     pub until_s: f64,
     /// Press index; -1 outside a press.
     pub press: i32,
-    /// What it does.
+    /// What the stage does.
     pub phase: Phase,
 }
 
@@ -49,68 +49,68 @@ const SAFE_MM: f64 = 2.0;
 const APPROACH_MM: f64 = 0.3;
 const TRAVEL_MM_PER_S: f64 = 20.0;
 const LOAD_MM_PER_S: f64 = 1.0;
-/// A press comes from there when its direction matters.
+/// Sideways distance from which a press approaches when its direction matters.
 const ASIDE_MM: f64 = 1.0;
-/// The sweep's other covering, of the paper's four.
+/// Second covering of the grid sweep, one of the paper's four.
 const THICKER: Covering = Covering { thickness_mm: 2.54 };
 
 impl Plan {
-    /// The runs of the plan on an array under `covering`. `frames`: so many in all, in which the last run's parts are
-    /// repeated or cut; without it the plan takes its own time.
+    /// The runs of the plan on an array under `covering`. With `frames`, the parts of the last run are repeated or cut so
+    /// that all runs together have this many frames. Without it the plan has its own length.
     ///
     /// # Errors
     /// None for arrays of the simulated rigs.
-    pub fn courses(
+    pub fn runs(
         self,
         array: &Array,
         registration: Registration,
         covering: Covering,
         frames: Option<usize>,
         seed: u64,
-    ) -> Result<Vec<Course>, TrajectoryError> {
+    ) -> Result<Vec<PlannedRun>, TrajectoryError> {
         let rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut stage = Stage::new(array, registration, covering, rng);
+        let mut builder = PlanBuilder::new(array, registration, covering, rng);
         let wanted_s = frames.map(|frames| frames as f64 / array.rate_hz());
-        let mut courses = Vec::new();
+        let mut planned = Vec::new();
         let mut taken_s = 0.0;
         match self {
-            Self::Bundle => stage.repeat(wanted_s, |stage| stage.bundle(&BUNDLE)),
-            Self::Diagnose => stage.repeat(wanted_s, |stage| stage.bundle(&DIAGNOSE)),
+            Self::Bundle => builder.repeat(wanted_s, |builder| builder.bundle(&BUNDLE)),
+            Self::Diagnose => builder.repeat(wanted_s, |builder| builder.bundle(&DIAGNOSE)),
             Self::Paper => {
-                stage.element_centres();
-                stage.grid_sweep();
-                taken_s = stage.t_s;
-                let rng = stage.rng.clone();
-                courses.push(stage.course(wanted_s)?);
-                stage = Stage::new(array, registration, THICKER, rng);
+                builder.element_centres();
+                builder.grid_sweep();
+                taken_s = builder.t_s;
+                let rng = builder.rng.clone();
+                planned.push(builder.run(wanted_s)?);
+                builder = PlanBuilder::new(array, registration, THICKER, rng);
                 let rest_s = wanted_s.map(|wanted_s| wanted_s - taken_s);
-                stage.repeat(rest_s, Stage::grid_sweep);
+                builder.repeat(rest_s, PlanBuilder::grid_sweep);
             }
         }
         let rest_s = wanted_s.map(|wanted_s| wanted_s - taken_s);
         if rest_s.is_none_or(|rest_s| rest_s > 0.0) {
-            courses.push(stage.course(rest_s)?);
+            planned.push(builder.run(rest_s)?);
         }
-        Ok(courses)
+        Ok(planned)
     }
 }
 
-impl Course {
-    /// What the stage does at each frame: press and phase.
-    pub fn doing(&self, rate_hz: f64) -> impl Iterator<Item = (i32, Phase)> {
+impl PlannedRun {
+    /// Press index and phase of each frame.
+    pub fn phases_of_frames(&self, rate_hz: f64) -> impl Iterator<Item = (i32, Phase)> {
         let mut mark = 0;
         (0..self.frames).map(move |frame| {
             let t_s = frame as f64 / rate_hz;
-            while mark + 1 < self.marks.len() && self.marks[mark].until_s < t_s {
+            while mark + 1 < self.phases.len() && self.phases[mark].until_s < t_s {
                 mark += 1;
             }
-            self.marks.get(mark).map_or((-1, Phase::Idle), |mark| (mark.press, mark.phase))
+            self.phases.get(mark).map_or((-1, Phase::Idle), |mark| (mark.press, mark.phase))
         })
     }
 }
 
-/// How much of each part.
-struct Parts {
+/// Numbers and durations of the parts of a bundle.
+struct PartSizes {
     rounds: usize,
     idle_s: f64,
     repeats: usize,
@@ -123,7 +123,7 @@ struct Parts {
     dwell_s: [f64; 2],
 }
 
-const BUNDLE: Parts = Parts {
+const BUNDLE: PartSizes = PartSizes {
     rounds: 1,
     idle_s: 3.0,
     repeats: 8,
@@ -136,7 +136,7 @@ const BUNDLE: Parts = Parts {
     dwell_s: [0.25, 0.5],
 };
 
-const DIAGNOSE: Parts = Parts {
+const DIAGNOSE: PartSizes = PartSizes {
     rounds: 4,
     idle_s: 60.0,
     repeats: 30,
@@ -149,18 +149,18 @@ const DIAGNOSE: Parts = Parts {
     dwell_s: [0.25, 0.5],
 };
 
-/// A press to be made.
-struct Press {
+/// One press of the plan.
+struct PlannedPress {
     /// Sensor frame.
     at_mm: [f64; 2],
     depths_mm: Vec<f64>,
     dwell_s: f64,
     load_mm_per_s: f64,
-    /// From where it comes at the approach height, robot frame.
+    /// Start of the approach, relative to the press, robot frame.
     from_mm: [f64; 2],
 }
 
-struct Stage {
+struct PlanBuilder {
     centres_mm: Vec<[f64; 2]>,
     cols: usize,
     rate_hz: f64,
@@ -169,12 +169,12 @@ struct Stage {
     rng: ChaCha8Rng,
     t_s: f64,
     points: Vec<(f64, [f64; 3])>,
-    marks: Vec<Mark>,
+    phases: Vec<PhaseInterval>,
     presses: i32,
 }
 
-impl Stage {
-    /// At rest at the safe height over the array's middle.
+impl PlanBuilder {
+    /// Starts at rest at the safe height above the array's middle.
     fn new(array: &Array, registration: Registration, covering: Covering, rng: ChaCha8Rng) -> Self {
         let middle_mm = array.extent_mm().map(|[least, greatest]| f64::midpoint(least, greatest));
         let [x, y] = registration.to_robot(middle_mm);
@@ -187,20 +187,20 @@ impl Stage {
             rng,
             t_s: 0.0,
             points: vec![(0.0, [x, y, SAFE_MM])],
-            marks: Vec::new(),
+            phases: Vec::new(),
             presses: 0,
         }
     }
 
-    fn course(self, wanted_s: Option<f64>) -> Result<Course, TrajectoryError> {
+    fn run(self, wanted_s: Option<f64>) -> Result<PlannedRun, TrajectoryError> {
         let length_s = wanted_s.map_or(self.t_s, |wanted_s| wanted_s.min(self.t_s));
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0")]
         let frames = (length_s * self.rate_hz).round() as usize;
         let trajectory = Trajectory::new(self.points)?;
-        Ok(Course { covering: self.covering, trajectory, marks: self.marks, frames })
+        Ok(PlannedRun { covering: self.covering, trajectory, phases: self.phases, frames })
     }
 
-    /// Makes a part once, or as often as the time asks.
+    /// Makes a part once, and again until the wanted time is over.
     fn repeat(&mut self, wanted_s: Option<f64>, mut part: impl FnMut(&mut Self)) {
         part(self);
         while wanted_s.is_some_and(|wanted_s| self.t_s < wanted_s) {
@@ -208,7 +208,7 @@ impl Stage {
         }
     }
 
-    fn bundle(&mut self, parts: &Parts) {
+    fn bundle(&mut self, parts: &PartSizes) {
         self.rest(parts.idle_s);
         for _ in 0..parts.rounds {
             self.all_over(parts);
@@ -216,14 +216,14 @@ impl Stage {
         }
         let site_mm = self.site();
         for _ in 0..parts.repeats {
-            self.press(&Press { dwell_s: 0.3, ..Press::at(site_mm, vec![self.share(0.45)]) });
+            self.press(&PlannedPress { dwell_s: 0.3, ..PlannedPress::at(site_mm, vec![self.share(0.45)]) });
             self.rest(0.5);
         }
         for _ in 0..3 * parts.ladder_rounds {
             let site_mm = self.site();
             let depths_mm =
                 [0.13, 0.26, 0.39, 0.52, 0.65, 0.52, 0.39, 0.26, 0.13].map(|share| self.share(share));
-            self.press(&Press { dwell_s: 0.25, ..Press::at(site_mm, depths_mm.to_vec()) });
+            self.press(&PlannedPress { dwell_s: 0.25, ..PlannedPress::at(site_mm, depths_mm.to_vec()) });
             self.rest(0.6);
         }
         self.rates(parts.rate_repeats);
@@ -231,13 +231,16 @@ impl Stage {
         self.rest(parts.idle_s / 2.0);
         for _ in 0..parts.holds {
             let site_mm = self.site();
-            self.press(&Press { dwell_s: parts.hold_s, ..Press::at(site_mm, vec![self.share(0.5)]) });
+            self.press(&PlannedPress {
+                dwell_s: parts.hold_s,
+                ..PlannedPress::at(site_mm, vec![self.share(0.5)])
+            });
             self.rest(parts.rest_s);
         }
     }
 
-    /// Every second element's centre, as on a chessboard, and a few places off centre, in random order, at two depths each.
-    fn all_over(&mut self, parts: &Parts) {
+    /// Every second element's centre, as on a chessboard, and four places off centre, in random order, at two depths each.
+    fn all_over(&mut self, parts: &PartSizes) {
         let odd = self.rng.random_range(0..2_usize);
         let mut sites_mm: Vec<[f64; 2]> = (self.centres_mm.iter().enumerate())
             .filter(|(element, _)| (element / self.cols + element % self.cols) % 2 == odd)
@@ -253,7 +256,10 @@ impl Stage {
             let deep = self.rng.random_range(0.35..0.65);
             let [least_s, most_s] = parts.dwell_s;
             let dwell_s = self.rng.random_range(least_s..most_s);
-            self.press(&Press { dwell_s, ..Press::at(site_mm, vec![self.share(light), self.share(deep)]) });
+            self.press(&PlannedPress {
+                dwell_s,
+                ..PlannedPress::at(site_mm, vec![self.share(light), self.share(deep)])
+            });
             let rest_s = self.rng.random_range(0.3..0.7);
             self.rest(rest_s);
         }
@@ -265,7 +271,7 @@ impl Stage {
         speeds.shuffle(&mut self.rng);
         for load_mm_per_s in speeds {
             let depths_mm = vec![self.share(0.4)];
-            self.press(&Press { load_mm_per_s, dwell_s: 0.4, ..Press::at(site_mm, depths_mm) });
+            self.press(&PlannedPress { load_mm_per_s, dwell_s: 0.4, ..PlannedPress::at(site_mm, depths_mm) });
             self.rest(0.5);
         }
     }
@@ -277,7 +283,7 @@ impl Stage {
         for way in ways {
             let depths_mm = vec![self.share(0.45)];
             let from_mm = way.map(|by| by * ASIDE_MM);
-            self.press(&Press { from_mm, dwell_s: 0.3, ..Press::at(site_mm, depths_mm) });
+            self.press(&PlannedPress { from_mm, dwell_s: 0.3, ..PlannedPress::at(site_mm, depths_mm) });
             self.rest(0.5);
         }
     }
@@ -287,16 +293,22 @@ impl Stage {
         self.rest(1.0);
         let count = self.centres_mm.len();
         for corner in [0, count - 1] {
-            self.press(&Press { dwell_s: 0.25, ..Press::at(self.centres_mm[corner], vec![0.2]) });
+            self.press(&PlannedPress {
+                dwell_s: 0.25,
+                ..PlannedPress::at(self.centres_mm[corner], vec![0.2])
+            });
             self.rest(0.3);
         }
         for element in 0..count {
             let depths_mm = vec![0.2, 0.3, 0.4, 0.5, 0.6];
-            self.press(&Press { dwell_s: 0.25, ..Press::at(self.centres_mm[element], depths_mm) });
+            self.press(&PlannedPress {
+                dwell_s: 0.25,
+                ..PlannedPress::at(self.centres_mm[element], depths_mm)
+            });
         }
     }
 
-    /// 7 x 7 places 0.1 mm apart about one element, at 30, 50 and 65 % of the thickness.
+    /// 7 x 7 places, 0.1 mm apart, around one element, at 30, 50 and 65 % of the thickness.
     fn grid_sweep(&mut self) {
         self.rest(1.0);
         let [x, y] = self.centres_mm[self.centres_mm.len() / 2 + 4];
@@ -304,12 +316,12 @@ impl Stage {
             for col in -3..=3 {
                 let at_mm = [x + 0.1 * f64::from(col), y + 0.1 * f64::from(row)];
                 let depths_mm = [0.3, 0.5, 0.65].map(|share| self.share(share));
-                self.press(&Press { dwell_s: 0.25, ..Press::at(at_mm, depths_mm.to_vec()) });
+                self.press(&PlannedPress { dwell_s: 0.25, ..PlannedPress::at(at_mm, depths_mm.to_vec()) });
             }
         }
     }
 
-    fn press(&mut self, press: &Press) {
+    fn press(&mut self, press: &PlannedPress) {
         let [x, y] = self.registration.to_robot(press.at_mm);
         let [dx, dy] = press.from_mm;
         self.go([x + dx, y + dy, SAFE_MM], TRAVEL_MM_PER_S, -1, Phase::Idle);
@@ -350,21 +362,21 @@ impl Stage {
     fn until(&mut self, duration_s: f64, at_mm: [f64; 3], press: i32, phase: Phase) {
         self.t_s += duration_s;
         self.points.push((self.t_s, at_mm));
-        self.marks.push(Mark { until_s: self.t_s, press, phase });
+        self.phases.push(PhaseInterval { until_s: self.t_s, press, phase });
     }
 
-    /// An element's centre by chance.
+    /// The centre of a random element, sensor frame.
     fn site(&mut self) -> [f64; 2] {
         self.centres_mm[self.rng.random_range(0..self.centres_mm.len())]
     }
 
-    /// Depth that is a share of the covering's thickness.
+    /// A share of the covering's thickness, mm.
     fn share(&self, share: f64) -> f64 {
         share * self.covering.thickness_mm
     }
 }
 
-impl Press {
+impl PlannedPress {
     fn at(at_mm: [f64; 2], depths_mm: Vec<f64>) -> Self {
         Self { at_mm, depths_mm, dwell_s: 0.25, load_mm_per_s: LOAD_MM_PER_S, from_mm: [0.0; 2] }
     }

@@ -1,61 +1,61 @@
-//! From what is asked for to a set.
+//! From a recipe to a data set.
 
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tactus_hidden::{Base, CATALOGUE, Climate, Definition, Dose, STRENGTH_MAX, Sensor};
+use tactus_hidden::{CATALOGUE, Climate, Definition, Dose, HiddenSensor, RandomRig, STRENGTH_MAX};
 use tactus_model::{ModelError, Simulator, TrajectoryError};
 use tactus_schema::Rig;
 use tactus_schema::table::Row;
 
-use crate::label::{Dosed, Label};
+use crate::label::{Label, PhysicsLabel};
 use crate::noise::{Noise, NoiseKind};
-use crate::plan::{Course, Plan};
+use crate::plan::{Plan, PlannedRun};
 use crate::separation::Separation;
-use crate::set::Set;
+use crate::set::DataSet;
 
-/// How to make one set. All of it follows from this.
+/// How to make one data set. Equal recipes make equal sets.
 #[derive(Debug, Clone)]
 pub struct Recipe {
-    /// Name of the set; its runs are named after it.
+    /// Name of the set, and prefix of its run ids.
     pub name: String,
     /// Seed of everything random.
     pub seed: u64,
     /// What the stage does.
     pub plan: Plan,
-    /// Frames, if not the plan's own number.
+    /// Number of frames; the plan's if `None`.
     pub frames: Option<usize>,
-    /// What noise comes upon the readings.
+    /// Noise of the readings.
     pub noise: NoiseKind,
-    /// Which physics.
+    /// Its physics.
     pub content: Content,
-    /// How much of each.
+    /// How strong each physics is.
     pub amount: Amount,
 }
 
-/// Which physics a set has. Without anything asked for: one of the library's effects by chance.
+/// Which physics a set has. The default is a random one of the library's effects.
 #[derive(Debug, Clone, Default)]
 pub struct Content {
-    /// These, by id.
+    /// Physics by id.
     pub physics: Vec<String>,
-    /// One instance by chance of each of these effects.
+    /// A random instance of each of these effects.
     pub effects: Vec<String>,
-    /// So many further effects of the library, all different; 1 if nothing else is asked for.
+    /// Number of further effects of the library, all different; 1 if nothing else is given.
     pub combine: Option<usize>,
-    /// One that the library has nothing like.
+    /// A random physics outside the library.
     pub outside: bool,
-    /// None.
+    /// No physics at all.
     pub none: bool,
 }
 
-/// How much of each physics.
+/// How strong each physics is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Amount {
-    /// At this strength.
+    /// This strength.
     Strength(f64),
-    /// As much as lies this far from the base model, each taken alone: [`Separation::z`].
+    /// The strength at which the physics alone has this [`Separation::z`].
     Separation(f64),
-    /// The same after the spread was recalibrated too: [`Separation::z_beyond_spread`].
+    /// The strength at which the physics alone has this [`Separation::z_beyond_spread`].
     BeyondSpread(f64),
 }
 
@@ -70,14 +70,8 @@ pub enum RecipeError {
     UnknownEffect(String),
     /// A number is out of its range.
     #[error("{field} must be {range}, not {value}")]
-    Range {
-        /// Which.
-        field: &'static str,
-        /// What it may be.
-        range: &'static str,
-        /// What it was.
-        value: f64,
-    },
+    #[expect(missing_docs, reason = "the message says what each field is")]
+    Range { field: &'static str, range: &'static str, value: f64 },
     /// The base model refused its parameters.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -88,12 +82,12 @@ pub enum RecipeError {
 
 const STRENGTH_MIN: f64 = 1e-5;
 const TRIALS_MAX: usize = 24;
-/// A separation is met within this share of it.
+/// Relative tolerance of a requested separation.
 const CLOSE: f64 = 0.01;
 
-/// What draws random numbers, each from a stream of its own.
+/// Uses of random numbers. Each has its own stream.
 #[derive(Debug, Clone, Copy)]
-enum Draw {
+enum RandomStream {
     Content,
     Shape,
     Base,
@@ -105,7 +99,7 @@ enum Draw {
 }
 
 impl Recipe {
-    /// A bundle of white, coloured or quantised noise with one effect of the library, by chance, at strength 1.
+    /// A bundle with random noise and one random effect of the library, at strength 1.
     pub fn new(seed: u64) -> Self {
         Self {
             name: "set-0000".into(),
@@ -121,21 +115,21 @@ impl Recipe {
     /// Makes the set.
     ///
     /// # Errors
-    /// [`RecipeError`] if something is asked for that there is not.
-    pub fn make(&self) -> Result<Set, RecipeError> {
+    /// [`RecipeError`] names the unknown physics or effect, or the number out of range.
+    pub fn make(&self) -> Result<DataSet, RecipeError> {
         self.check()?;
-        let chosen = self.content.choose(&mut self.rng(Draw::Content))?;
-        let base = Base::new(self.seed_of(Draw::Base))?;
+        let chosen = self.content.choose(&mut self.rng(RandomStream::Content))?;
+        let base = RandomRig::new(self.seed_of(RandomStream::Base))?;
         let Rig { array, registration, covering, .. } = &base.rig;
-        let courses =
-            self.plan.courses(array, *registration, *covering, self.frames, self.seed_of(Draw::Plan))?;
-        let climate = Climate::new(self.seed_of(Draw::Climate));
-        let noise = Noise::draw(self.noise, &mut self.rng(Draw::NoiseKind));
-        let bench = Bench::new(&base, courses, climate, noise);
-        let (doses, mut physics) = self.doses(&chosen, &bench);
-        let Readings { rows, clean } = self.read(&bench, &doses);
-        let Separation { z, z_beyond_spread, .. } = bench.separation_of(&clean);
-        // Of one alone it is that of the set.
+        let planned =
+            self.plan.runs(array, *registration, *covering, self.frames, self.seed_of(RandomStream::Plan))?;
+        let climate = Climate::new(self.seed_of(RandomStream::Climate));
+        let noise = Noise::draw(self.noise, &mut self.rng(RandomStream::NoiseKind));
+        let oracle = SeparationOracle::new(&base, planned, climate, noise);
+        let (doses, mut physics) = self.doses(&chosen, &oracle);
+        let Readings { rows, clean } = self.read(&oracle, &doses);
+        let Separation { z, z_beyond_spread, .. } = oracle.separation_of(&clean);
+        // The separation of a single physics is that of the set.
         if let [only] = &mut physics[..] {
             (only.z, only.z_beyond_spread) = (z, z_beyond_spread);
         }
@@ -155,24 +149,28 @@ impl Recipe {
             sigma_intercept_mm: psf.sigma_intercept_mm,
             sigma_per_mm: psf.sigma_per_mm,
         };
-        Ok(Set { rig: base.rig, rows, label })
+        Ok(DataSet { rig: base.rig, rows, label })
     }
 
-    /// How much of each physics, and what the label says of it.
-    fn doses(&self, chosen: &[&'static Definition], bench: &Bench<'_>) -> (Vec<Dose>, Vec<Dosed>) {
-        let mut seeds = self.rng(Draw::Shape);
+    /// The dose of each physics, and its label.
+    fn doses(
+        &self,
+        chosen: &[&'static Definition],
+        oracle: &SeparationOracle<'_>,
+    ) -> (Vec<Dose>, Vec<PhysicsLabel>) {
+        let mut seeds = self.rng(RandomStream::Shape);
         let dose_of = |physics: &&'static Definition| {
             let dose = Dose { physics, strength: 1.0, seed: seeds.random() };
             let (dose, separation, reached) = match self.amount {
                 Amount::Strength(strength) => {
                     let dose = Dose { strength, ..dose };
                     let is_alone = chosen.len() == 1;
-                    (dose, if is_alone { Separation::default() } else { bench.separation(dose) }, true)
+                    (dose, if is_alone { Separation::default() } else { oracle.separation(dose) }, true)
                 }
-                Amount::Separation(z) => bench.dose(dose, z, |separation| separation.z),
-                Amount::BeyondSpread(z) => bench.dose(dose, z, |separation| separation.z_beyond_spread),
+                Amount::Separation(z) => oracle.dose(dose, z, |separation| separation.z),
+                Amount::BeyondSpread(z) => oracle.dose(dose, z, |separation| separation.z_beyond_spread),
             };
-            let dosed = Dosed {
+            let dosed = PhysicsLabel {
                 id: physics.id.into(),
                 effect: physics.effect.map(Into::into),
                 strength: dose.strength,
@@ -180,28 +178,33 @@ impl Recipe {
                 z_beyond_spread: separation.z_beyond_spread,
                 reached,
                 seed: dose.seed,
-                parameters: bench.sensor(bench.base, &[dose], 0).parameters().concat().into_iter().collect(),
+                parameters: oracle
+                    .sensor(oracle.base, &[dose], 0)
+                    .parameters()
+                    .concat()
+                    .into_iter()
+                    .collect(),
             };
             (dose, dosed)
         };
         chosen.iter().map(dose_of).unzip()
     }
 
-    /// What the sensor reads in all runs.
-    fn read(&self, bench: &Bench<'_>, doses: &[Dose]) -> Readings {
-        let array = &bench.base.rig.array;
-        let has_thermometer = self.rng(Draw::Thermometer).random_bool(0.7);
-        let mut rng = self.rng(Draw::Noise);
-        let mut noise_of = bench.noise.series(&mut rng, array.elements());
+    /// The readings of all runs.
+    fn read(&self, oracle: &SeparationOracle<'_>, doses: &[Dose]) -> Readings {
+        let array = &oracle.base.rig.array;
+        let has_thermometer = self.rng(RandomStream::Thermometer).random_bool(0.7);
+        let mut rng = self.rng(RandomStream::Noise);
+        let mut noise_of = oracle.noise.series(&mut rng, array.elements());
         let mut noise_counts = vec![0.0; array.elements()];
         let mut readings = Readings::default();
-        for (index, course) in bench.courses.iter().enumerate() {
-            let mut sensor = bench.sensor(bench.base, doses, index);
+        for (index, planned) in oracle.planned.iter().enumerate() {
+            let mut sensor = oracle.sensor(oracle.base, doses, index);
             let run =
-                if bench.courses.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
-            for (frame, (press, phase)) in course.doing(array.rate_hz()).enumerate() {
+                if oracle.planned.len() == 1 { self.name.clone() } else { format!("{}-{index}", self.name) };
+            for (frame, (press, phase)) in planned.phases_of_frames(array.rate_hz()).enumerate() {
                 let t_s = frame as f64 / array.rate_hz();
-                sensor.step(t_s, &course.trajectory);
+                sensor.step(t_s, &planned.trajectory);
                 noise_of(&mut noise_counts);
                 let mut counts = Vec::with_capacity(array.elements());
                 for (clean, noise) in sensor.counts().iter().zip(&noise_counts) {
@@ -217,9 +220,9 @@ impl Recipe {
                     press,
                     phase,
                     t_ns,
-                    position_mm: course.trajectory.at(t_s),
-                    covering_mm: course.covering.thickness_mm,
-                    indenter: bench.base.rig.indenter.clone(),
+                    position_mm: planned.trajectory.at(t_s),
+                    covering_mm: planned.covering.thickness_mm,
+                    indenter: oracle.base.rig.indenter.clone(),
                     temperature_c,
                     counts,
                 });
@@ -243,19 +246,19 @@ impl Recipe {
         }
     }
 
-    fn rng(&self, draw: Draw) -> ChaCha8Rng {
+    fn rng(&self, draw: RandomStream) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(draw as u64);
         rng
     }
 
-    fn seed_of(&self, draw: Draw) -> u64 {
+    fn seed_of(&self, draw: RandomStream) -> u64 {
         self.rng(draw).random()
     }
 }
 
 impl Content {
-    /// The physics, in the order of the catalogue.
+    /// The chosen physics, in the order of the catalogue.
     fn choose(&self, rng: &mut ChaCha8Rng) -> Result<Vec<&'static Definition>, RecipeError> {
         let mut chosen: Vec<&'static Definition> = Vec::new();
         if self.none {
@@ -287,54 +290,54 @@ impl Content {
     }
 }
 
-/// What is read of a sensor.
+/// The readings of all runs.
 #[derive(Debug, Default)]
 struct Readings {
     rows: Vec<Row>,
-    /// The counts of all rows without noise and before rounding.
+    /// The counts of all rows without noise and quantisation.
     clean: Vec<f64>,
 }
 
-/// What a set is made on.
-struct Bench<'a> {
-    base: &'a Base,
-    courses: Vec<Course>,
+/// Computes how far physics is from the base model on the runs of one set.
+struct SeparationOracle<'a> {
+    base: &'a RandomRig,
+    planned: Vec<PlannedRun>,
     climate: Climate,
     noise: Noise,
     /// Counts of all frames, without physics and noise.
     clean: Vec<f64>,
-    /// The same under a spread that is wider by [`WIDER`].
+    /// The same with a spread that is [`WIDER`] times as wide.
     wider: Vec<f64>,
 }
 
-/// The spread of [`Bench::wider`], as a multiple of the true one.
+/// The spread of [`SeparationOracle::wider`], as a multiple of the true one.
 const WIDER: f64 = 1.001;
-/// A spread that is off by less than this share is near enough, and this often one comes nearer.
+/// The search for the nearest spread ends when its change is below this share, or after this many rounds.
 const SPREAD_CHANGE_LEAST: f64 = 5e-4;
 const SPREAD_ROUNDS: usize = 3;
 
-impl<'a> Bench<'a> {
-    fn new(base: &'a Base, courses: Vec<Course>, climate: Climate, noise: Noise) -> Self {
-        let mut bench = Self { base, courses, climate, noise, clean: Vec::new(), wider: Vec::new() };
-        bench.clean = bench.counts(base, &[]);
-        bench.wider =
-            base.spread_by(WIDER).map_or_else(|_| bench.clean.clone(), |wider| bench.counts(&wider, &[]));
-        bench
+impl<'a> SeparationOracle<'a> {
+    fn new(base: &'a RandomRig, planned: Vec<PlannedRun>, climate: Climate, noise: Noise) -> Self {
+        let mut oracle = Self { base, planned, climate, noise, clean: Vec::new(), wider: Vec::new() };
+        oracle.clean = oracle.counts(base, &[]);
+        oracle.wider =
+            base.spread_by(WIDER).map_or_else(|_| oracle.clean.clone(), |wider| oracle.counts(&wider, &[]));
+        oracle
     }
 
-    fn sensor(&self, base: &Base, doses: &[Dose], run: usize) -> Sensor {
-        let covering = self.courses[run].covering;
-        Sensor::new(&Simulator { covering, ..base.sensor.clone() }, doses, self.climate, run as u64)
+    fn sensor(&self, base: &RandomRig, doses: &[Dose], run: usize) -> HiddenSensor {
+        let covering = self.planned[run].covering;
+        HiddenSensor::new(&Simulator { covering, ..base.sensor.clone() }, doses, self.climate, run as u64)
     }
 
     /// Counts of all frames without noise.
-    fn counts(&self, base: &Base, doses: &[Dose]) -> Vec<f64> {
+    fn counts(&self, base: &RandomRig, doses: &[Dose]) -> Vec<f64> {
         let rate_hz = base.rig.array.rate_hz();
         let mut counts = Vec::new();
-        for (run, course) in self.courses.iter().enumerate() {
-            let mut sensor = self.sensor(base, doses, run);
-            for frame in 0..course.frames {
-                sensor.step(frame as f64 / rate_hz, &course.trajectory);
+        for (index, run) in self.planned.iter().enumerate() {
+            let mut sensor = self.sensor(base, doses, index);
+            for frame in 0..run.frames {
+                sensor.step(frame as f64 / rate_hz, &run.trajectory);
                 counts.extend(sensor.counts().iter().map(|count| sensor.convert(*count)));
             }
         }
@@ -352,7 +355,7 @@ impl<'a> Bench<'a> {
             Separation::new(clean, with, wider, array.elements(), sigma_counts)
         };
         let mut separation = from(&self.clean, &self.wider);
-        // Counts are linear in small changes of the spread only: what looks like a large one is held against that spread.
+        // Counts are linear only in small changes of the spread: a large change is compared again at the new spread.
         let mut spread = 1.0;
         for _ in 0..SPREAD_ROUNDS {
             let change = (WIDER - 1.0) * separation.spread_steps;
@@ -371,10 +374,10 @@ impl<'a> Bench<'a> {
         separation
     }
 
-    /// The strength at which a physics lies `wanted` from the base model: the dose, its separation, and whether it is
-    /// the one wanted. Where it cannot be (an element is dead or it is not), the nearest that is any.
+    /// Finds the strength at which a physics has the separation `wanted`. Returns the dose, its separation, and whether
+    /// that is the one wanted. If no strength has it (an element is dead or not), the result is the nearest.
     ///
-    /// Separation grows about in proportion to strength, which makes the first guess of each step.
+    /// Each step first guesses that separation is proportional to strength.
     fn dose(&self, dose: Dose, wanted: f64, z_of: fn(&Separation) -> f64) -> (Dose, Separation, bool) {
         let (mut low, mut high) = (STRENGTH_MIN, STRENGTH_MAX);
         let mut strength: f64 = 1.0;
@@ -409,7 +412,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// One physics by chance, of those that a condition lets through.
+/// A random physics among those that fulfil a condition.
 fn one_of(rng: &mut ChaCha8Rng, is_right: impl Fn(&Definition) -> bool) -> Option<&'static Definition> {
     let fitting: Vec<&'static Definition> =
         CATALOGUE.iter().copied().filter(|definition| is_right(definition)).collect();

@@ -15,7 +15,7 @@ fn short(content: Content) -> Recipe {
 fn a_set_without_physics_is_the_base_model_and_noise() {
     let recipe = Recipe { noise: NoiseKind::Coloured, ..short(Content { none: true, ..Content::default() }) };
     let set = recipe.make().unwrap();
-    let base = Base::new(recipe.seed_of(Draw::Base)).unwrap();
+    let base = RandomRig::new(recipe.seed_of(RandomStream::Base)).unwrap();
     let mut image = vec![0.0; 48];
     let (mut squares, mut largest) = (0.0, 0.0_f64);
     for row in &set.rows {
@@ -133,7 +133,7 @@ fn tables_with_and_without_physics_differ_in_their_counts_alone() {
     let none = set(Content { none: true, ..Content::default() });
     let some = set(Content { physics: vec!["late-frames".into()], ..Content::default() });
     assert_eq!(none.rig, some.rig);
-    let without_counts = |set: &Set| -> Vec<Row> {
+    let without_counts = |set: &DataSet| -> Vec<Row> {
         set.rows.iter().map(|row| Row { counts: Vec::new(), ..row.clone() }).collect()
     };
     assert_eq!(without_counts(&none), without_counts(&some));

@@ -1,7 +1,7 @@
-//! How far physics lies from the base model: what an oracle could tell.
+//! How far physics is from the base model: the best that an oracle could detect.
 
-/// A recalibration takes no more than this share off an element's gain, beside what all elements lose: a dead element is no matter of
-/// calibration, a tool that is half as wide is.
+/// A recalibration reduces an element's gain by at most this share, beyond the loss common to all elements. So it absorbs a tool that
+/// is half as wide, but not a dead element.
 const GAIN_LOSS_MAX: f64 = 0.5;
 
 /// Separation from the base model, in standard deviations of the noise.
@@ -14,18 +14,18 @@ const GAIN_LOSS_MAX: f64 = 0.5;
 /// element, `a_e` and `b_e` are the least-squares offset and gain, `1 + b_e` at least half of their median.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Separation {
-    /// After gains and baselines were recalibrated (`c = 0`).
+    /// After recalibration of gains and baselines (`c = 0`).
     pub z: f64,
-    /// After the spread was recalibrated too (`c` by least squares): where this is small, physics looks like another
+    /// After recalibration of the spread too (`c` by least squares). If this is small, the physics looks like another
     /// spread.
     pub z_beyond_spread: f64,
-    /// `c`: so many times the step to the wider spread.
+    /// `c`, in units of the step to the wider spread.
     pub spread_steps: f64,
 }
 
 impl Separation {
-    /// Of rows of `elements` counts each, all without noise: without physics, with it, and without it under a wider
-    /// spread. `sigma_counts` is the noise's, as it counts in a mean.
+    /// From frames of `elements` counts each, all without noise: without physics, with it, and without it under a wider
+    /// spread. `sigma_counts` is [`Noise::effective_rms_counts`](crate::Noise::effective_rms_counts).
     pub fn new(clean: &[f64], with: &[f64], wider: &[f64], elements: usize, sigma_counts: f64) -> Self {
         let mut fits = vec![Moments::default(); elements];
         let rows =
@@ -72,13 +72,13 @@ impl Moments {
         }
     }
 
-    /// The gain that takes up most of one; none where nothing changes without physics.
+    /// The least-squares gain of one quantity on the clean counts; none where the clean counts are constant.
     fn gain(&self, of: usize) -> Option<f64> {
         let clean = self.products[CLEAN][CLEAN];
         (clean > 0.0).then(|| self.products[CLEAN][of] / clean)
     }
 
-    /// Product of what gain, not below the least, and offset leave of two.
+    /// Product of the residuals of two quantities after gain (at least `least`) and offset.
     fn rest(&self, one: usize, other: usize, least: f64) -> f64 {
         let product = self.products[one][other];
         let clean = self.products[CLEAN][CLEAN];
@@ -89,7 +89,7 @@ impl Moments {
     }
 }
 
-/// What physics does to the gains of all elements: the median, the upper one of two.
+/// The median change of the elements' gains by physics; the upper one of two medians.
 fn common_gain(fits: &[Moments]) -> f64 {
     let mut gains: Vec<f64> = fits.iter().filter_map(|fit| fit.gain(CHANGE)).collect();
     gains.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! A set: the measurement table of a simulated experiment, and its label.
+//! A data set: the measurement table of a simulated experiment, and its label.
 
 use std::path::Path;
 
@@ -10,16 +10,16 @@ use crate::label::Label;
 
 /// A measurement table in memory, and the truth about it.
 #[derive(Debug, Clone)]
-pub struct Set {
-    /// The rig as declared.
+pub struct DataSet {
+    /// The declared rig.
     pub rig: Rig,
     /// The rows of all runs, run after run.
     pub rows: Vec<Row>,
-    /// The truth, which does not stand in the table.
+    /// The truth, which is not in the table.
     pub label: Label,
 }
 
-impl Set {
+impl DataSet {
     /// Writes the measurement table.
     ///
     /// # Errors

@@ -86,7 +86,7 @@ impl DeviceDescriptor {
 
 /// How an endpoint carries its data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Carrier {
+pub(crate) enum TransferType {
     Bulk,
     /// Asked at least every `interval`: in ms at full speed, in 2^(n-1) eighths of it at high speed.
     Interrupt {
@@ -99,15 +99,15 @@ pub(crate) enum Carrier {
 pub(crate) struct Endpoint {
     /// Its number, with [`IN`] where it sends.
     pub(crate) address: u8,
-    pub(crate) carrier: Carrier,
+    pub(crate) carrier: TransferType,
     pub(crate) packet_bytes: u16,
 }
 
 impl Endpoint {
     fn encode(self) -> impl Iterator<Item = u8> {
         let (attributes, interval) = match self.carrier {
-            Carrier::Bulk => (2, 0),
-            Carrier::Interrupt { interval } => (3, interval),
+            TransferType::Bulk => (2, 0),
+            TransferType::Interrupt { interval } => (3, interval),
         };
         let [low, high] = self.packet_bytes.to_le_bytes();
         [7, kind::ENDPOINT, self.address, attributes, low, high, interval].into_iter()
@@ -136,11 +136,11 @@ impl Interface {
 
 /// Interfaces that one driver serves: one, or two and more, which are associated.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Group {
+pub(crate) struct FunctionDescriptors {
     pub(crate) interfaces: Vec<Interface>,
 }
 
-impl Group {
+impl FunctionDescriptors {
     fn encode(&self, bytes: &mut Vec<u8>) {
         if let [first, _, ..] = &self.interfaces[..] {
             let Class(class, subclass, protocol) = first.class;
@@ -155,7 +155,7 @@ impl Group {
 }
 
 /// The only configuration: all interfaces, in the order of their numbers. The device takes 100 mA from the bus.
-pub(crate) fn configuration(groups: &[Group]) -> Vec<u8> {
+pub(crate) fn configuration(groups: &[FunctionDescriptors]) -> Vec<u8> {
     let mut body = Vec::new();
     for group in groups {
         group.encode(&mut body);

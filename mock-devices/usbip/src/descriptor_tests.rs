@@ -13,12 +13,12 @@ fn a_device_field_by_field() {
 #[test]
 fn a_configuration_field_by_field() {
     let endpoints = vec![
-        Endpoint { address: IN | 1, carrier: Carrier::Bulk, packet_bytes: 512 },
-        Endpoint { address: 2, carrier: Carrier::Interrupt { interval: 4 }, packet_bytes: 16 },
+        Endpoint { address: IN | 1, carrier: TransferType::Bulk, packet_bytes: 512 },
+        Endpoint { address: 2, carrier: TransferType::Interrupt { interval: 4 }, packet_bytes: 16 },
     ];
     let interface =
         Interface { number: 0, class: Class::VENDOR, class_descriptors: vec![3, 0x24, 0], endpoints };
-    let bytes = configuration(&[Group { interfaces: vec![interface] }]);
+    let bytes = configuration(&[FunctionDescriptors { interfaces: vec![interface] }]);
     // Table 9-10: length, type, length of all, interfaces, number, string, attributes (bit 7 is always set), mA / 2.
     assert_eq!(bytes[..9], [9, 2, 35, 0, 1, 1, 0, 0x80, 50]);
     // Table 9-12: length, type, number, setting, endpoints, class, subclass, protocol, string.
@@ -37,8 +37,8 @@ fn interfaces_that_belong_together_are_associated() {
         class_descriptors: Vec::new(),
         endpoints: Vec::new(),
     };
-    let alone = Group { interfaces: vec![interface(0)] };
-    let pair = Group { interfaces: vec![interface(1), interface(2)] };
+    let alone = FunctionDescriptors { interfaces: vec![interface(0)] };
+    let pair = FunctionDescriptors { interfaces: vec![interface(1), interface(2)] };
     let bytes = configuration(&[alone, pair]);
     assert_eq!(bytes.len(), 9 + 9 + 8 + 9 + 9);
     assert_eq!(bytes[4], 3, "interfaces");

@@ -12,12 +12,12 @@ use bulk::Bulk;
 use ftdi::Ftdi;
 use hid::Hid;
 
-use crate::descriptor::{Group, Speed};
+use crate::descriptor::{FunctionDescriptors, Speed};
 use crate::setup::{Refused, Setup};
 
 /// The first numbers that are a function's own within its device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct FirstNumbers {
     /// Of its interfaces.
     pub(crate) interface: u8,
     /// Of its endpoints: on this one it sends its data.
@@ -26,14 +26,14 @@ pub(crate) struct Place {
 
 /// What a function makes of a request of its class, or of its vendor.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Reply {
+pub(crate) enum ControlReply {
     /// An answer; empty where the host only tells something.
     Data(Vec<u8>),
     /// Bytes for the device behind.
     Heard(Vec<u8>),
 }
 
-impl Reply {
+impl ControlReply {
     /// The host told something, which is done.
     pub(crate) const DONE: Self = Self::Data(Vec::new());
 }
@@ -41,13 +41,13 @@ impl Reply {
 /// One function of a USB device. What its data endpoint hears goes to the device behind as it is.
 pub(crate) trait Function: Send {
     /// Its interfaces and endpoints. Every call gives the same, but for the place.
-    fn group(&self, place: Place) -> Group;
+    fn group(&self, place: FirstNumbers) -> FunctionDescriptors;
 
     /// A request of its class or vendor, or for a descriptor of its class; `data` are the host's.
     ///
     /// # Errors
     /// What it does not know.
-    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Reply, Refused>;
+    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<ControlReply, Refused>;
 
     /// Makes packets for the host of what the device behind sends.
     fn packets(&mut self, bytes: &[u8]) -> Vec<Vec<u8>>;

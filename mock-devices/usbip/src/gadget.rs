@@ -1,11 +1,11 @@
 //! A USB device: its descriptors, its functions, and what the host asks of it on the control endpoint.
 
 use crate::descriptor::{
-    self, Class, DeviceDescriptor, Endpoint, Group, IN, Speed, configuration, languages, string,
+    self, Class, DeviceDescriptor, Endpoint, FunctionDescriptors, IN, Speed, configuration, languages, string,
 };
-use crate::function::{Function, Place, Reply};
+use crate::function::{ControlReply, FirstNumbers, Function};
 use crate::identity::Identity;
-use crate::setup::{Kind, Recipient, Refused, Setup, standard};
+use crate::setup::{Recipient, Refused, RequestKind, Setup, standard};
 
 /// Self-powered: no; wakes the host: no; halted: no.
 const STATUS: [u8; 2] = [0, 0];
@@ -16,13 +16,13 @@ pub(crate) struct Gadget {
     device: DeviceDescriptor,
     configuration: Vec<u8>,
     strings: [String; 3],
-    parts: Vec<Part>,
+    parts: Vec<FunctionSlot>,
     configured: u8,
 }
 
-struct Part {
-    place: Place,
-    group: Group,
+struct FunctionSlot {
+    place: FirstNumbers,
+    group: FunctionDescriptors,
     function: Box<dyn Function>,
 }
 
@@ -79,15 +79,19 @@ impl Gadget {
     /// A request that concerns no single endpoint; `data` are the host's.
     pub(crate) fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Outcome, Refused> {
         match (setup.kind(), setup.recipient()) {
-            (Some(Kind::Standard), Some(Recipient::Device)) => self.standard(setup),
-            (Some(Kind::Standard), Some(Recipient::Interface)) => match setup.request {
+            (Some(RequestKind::Standard), Some(Recipient::Device)) => self.standard(setup),
+            (Some(RequestKind::Standard), Some(Recipient::Interface)) => match setup.request {
                 standard::GET_STATUS => Ok(Outcome::Data(STATUS.to_vec())),
                 standard::GET_INTERFACE => Ok(Outcome::Data(vec![0])),
                 standard::SET_INTERFACE if setup.value == 0 => Ok(Outcome::Renewed),
                 _ => self.ask_interface(setup, data),
             },
-            (Some(Kind::Class | Kind::Vendor), Some(Recipient::Interface)) => self.ask_interface(setup, data),
-            (Some(Kind::Class | Kind::Vendor), Some(Recipient::Device)) => self.ask_all(setup, data),
+            (Some(RequestKind::Class | RequestKind::Vendor), Some(Recipient::Interface)) => {
+                self.ask_interface(setup, data)
+            }
+            (Some(RequestKind::Class | RequestKind::Vendor), Some(Recipient::Device)) => {
+                self.ask_all(setup, data)
+            }
             _ => Err(Refused),
         }
     }
@@ -121,7 +125,8 @@ impl Gadget {
 
     fn ask_interface(&mut self, setup: Setup, data: &[u8]) -> Result<Outcome, Refused> {
         let asked = setup.index_low();
-        let has_it = |part: &Part| part.group.interfaces.iter().any(|interface| interface.number == asked);
+        let has_it =
+            |part: &FunctionSlot| part.group.interfaces.iter().any(|interface| interface.number == asked);
         let number = self.parts.iter().position(has_it).ok_or(Refused)?;
         self.ask(number, setup, data)
     }
@@ -134,19 +139,19 @@ impl Gadget {
     fn ask(&mut self, number: usize, setup: Setup, data: &[u8]) -> Result<Outcome, Refused> {
         let function = self.function(number).ok_or(Refused)?;
         Ok(match function.control(setup, data)? {
-            Reply::Data(data) => Outcome::Data(data),
-            Reply::Heard(bytes) => Outcome::Heard(number, bytes),
+            ControlReply::Data(data) => Outcome::Data(data),
+            ControlReply::Heard(bytes) => Outcome::Heard(number, bytes),
         })
     }
 }
 
 /// Gives each function its numbers, none twice.
-fn placed(functions: Vec<Box<dyn Function>>) -> Vec<Part> {
-    let mut place = Place { interface: 0, endpoint: 1 };
+fn placed(functions: Vec<Box<dyn Function>>) -> Vec<FunctionSlot> {
+    let mut place = FirstNumbers { interface: 0, endpoint: 1 };
     let mut parts = Vec::new();
     for function in functions {
         let group = function.group(place);
-        parts.push(Part { place, group: group.clone(), function });
+        parts.push(FunctionSlot { place, group: group.clone(), function });
         let endpoints = group.interfaces.iter().flat_map(|interface| &interface.endpoints);
         let last = endpoints.map(|endpoint| endpoint.address & !IN).max();
         place.endpoint = last.map_or(place.endpoint, |last| last + 1);

@@ -26,7 +26,7 @@ const NO_PACKETS: u32 = u32::MAX;
 
 /// What the host controller asks.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Request {
+pub(crate) enum UsbipRequest {
     /// A transfer.
     Submit(Transfer),
     /// To take a transfer back.
@@ -45,14 +45,14 @@ pub(crate) struct Transfer {
     pub(crate) seq: u32,
     /// Number of the endpoint, without its direction.
     pub(crate) endpoint: u8,
-    pub(crate) flow: Flow,
+    pub(crate) flow: Direction,
     /// For the control endpoint.
     pub(crate) setup: Setup,
 }
 
 /// Where a transfer's data go.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Flow {
+pub(crate) enum Direction {
     /// To the host, which has room for so many bytes.
     In(usize),
     /// To the device.
@@ -61,7 +61,7 @@ pub(crate) enum Flow {
 
 /// How a transfer ended; the kernel's error numbers, negative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Status {
+pub(crate) enum TransferStatus {
     Done,
     /// The endpoint has halted, or refuses the request (`EPIPE`).
     Stalled,
@@ -71,7 +71,7 @@ pub(crate) enum Status {
     Unlinked,
 }
 
-impl Status {
+impl TransferStatus {
     fn number(self) -> i32 {
         match self {
             Self::Done => 0,
@@ -119,7 +119,7 @@ impl Decoder {
     ///
     /// # Errors
     /// What is no request; every further call then says the same.
-    pub(crate) fn next_request(&mut self) -> Result<Option<Request>, MessageError> {
+    pub(crate) fn next_request(&mut self) -> Result<Option<UsbipRequest>, MessageError> {
         let Some((header, behind)) = self.bytes.split_first_chunk::<HEADER_BYTES>() else { return Ok(None) };
         let header = Header(header);
         let seq = header.word(4);
@@ -127,20 +127,20 @@ impl Decoder {
             CMD_UNLINK => {
                 let victim = header.word(20);
                 self.bytes.drain(..HEADER_BYTES);
-                Ok(Some(Request::Unlink { seq, victim }))
+                Ok(Some(UsbipRequest::Unlink { seq, victim }))
             }
             CMD_SUBMIT => {
                 let length = header.length()?;
                 let (endpoint, is_in) = header.endpoint()?;
                 let setup = header.setup();
                 let (flow, data_bytes) = if is_in {
-                    (Flow::In(length), 0)
+                    (Direction::In(length), 0)
                 } else {
                     let Some(data) = behind.get(..length) else { return Ok(None) };
-                    (Flow::Out(data.to_vec()), length)
+                    (Direction::Out(data.to_vec()), length)
                 };
                 self.bytes.drain(..HEADER_BYTES + data_bytes);
-                Ok(Some(Request::Submit(Transfer { seq, endpoint, flow, setup })))
+                Ok(Some(UsbipRequest::Submit(Transfer { seq, endpoint, flow, setup })))
             }
             kind => Err(MessageError::Kind(kind)),
         }
@@ -186,18 +186,18 @@ pub(crate) struct Answers {
 
 impl Answers {
     /// A transfer to the host ended.
-    pub(crate) fn sent(&mut self, seq: u32, status: Status, data: &[u8]) {
+    pub(crate) fn sent(&mut self, seq: u32, status: TransferStatus, data: &[u8]) {
         self.answer(RET_SUBMIT, seq, status, data.len());
         self.bytes.extend_from_slice(data);
     }
 
     /// A transfer to the device ended; it took so many bytes.
-    pub(crate) fn taken(&mut self, seq: u32, status: Status, bytes: usize) {
+    pub(crate) fn taken(&mut self, seq: u32, status: TransferStatus, bytes: usize) {
         self.answer(RET_SUBMIT, seq, status, bytes);
     }
 
     /// An unlinking ended.
-    pub(crate) fn unlinked(&mut self, seq: u32, status: Status) {
+    pub(crate) fn unlinked(&mut self, seq: u32, status: TransferStatus) {
         self.answer(RET_UNLINK, seq, status, 0);
     }
 
@@ -206,7 +206,7 @@ impl Answers {
         std::mem::take(&mut self.bytes)
     }
 
-    fn answer(&mut self, kind: u32, seq: u32, status: Status, bytes: usize) {
+    fn answer(&mut self, kind: u32, seq: u32, status: TransferStatus, bytes: usize) {
         // Transfers are bounded far below what the field holds.
         let length = u32::try_from(bytes).unwrap_or(u32::MAX);
         let mut header = [0; HEADER_BYTES];

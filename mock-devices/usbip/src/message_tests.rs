@@ -1,5 +1,5 @@
 use super::*;
-use crate::setup::Kind;
+use crate::setup::RequestKind;
 
 /// A request as the kernel sends it: the words before the setup data, that, and data behind.
 fn request(words: [u32; 10], setup: [u8; 8], data: &[u8]) -> Vec<u8> {
@@ -24,9 +24,9 @@ fn a_question_for_the_device_descriptor() {
     );
     let mut decoder = Decoder::default();
     decoder.push(&bytes);
-    let Ok(Some(Request::Submit(transfer))) = decoder.next_request() else { panic!("a transfer") };
-    assert_eq!((transfer.seq, transfer.endpoint, &transfer.flow), (0x0D05, 0, &Flow::In(0x40)));
-    assert_eq!((transfer.setup.kind(), transfer.setup.descriptor()), (Some(Kind::Standard), (1, 0)));
+    let Ok(Some(UsbipRequest::Submit(transfer))) = decoder.next_request() else { panic!("a transfer") };
+    assert_eq!((transfer.seq, transfer.endpoint, &transfer.flow), (0x0D05, 0, &Direction::In(0x40)));
+    assert_eq!((transfer.setup.kind(), transfer.setup.descriptor()), (Some(RequestKind::Standard), (1, 0)));
     assert_eq!(decoder.next_request(), Ok(None));
 }
 
@@ -44,10 +44,10 @@ fn requests_come_in_pieces_and_several_at_once() {
                 found.push(request);
             }
         }
-        let [Request::Submit(transfer), Request::Unlink { seq: 8, victim: 7 }] = &found[..] else {
+        let [UsbipRequest::Submit(transfer), UsbipRequest::Unlink { seq: 8, victim: 7 }] = &found[..] else {
             panic!("cut at {cut}: {found:?}")
         };
-        assert_eq!((transfer.endpoint, &transfer.flow), (2, &Flow::Out(b"abc".to_vec())));
+        assert_eq!((transfer.endpoint, &transfer.flow), (2, &Direction::Out(b"abc".to_vec())));
     }
 }
 
@@ -69,15 +69,15 @@ fn what_is_no_request_is_refused() {
 #[test]
 fn answers_to_the_byte() {
     let mut answers = Answers::default();
-    answers.sent(0x0D05, Status::Done, b"\x12\x01");
+    answers.sent(0x0D05, TransferStatus::Done, b"\x12\x01");
     let bytes = answers.take();
     // Kind, number, then zeros up to the status; length, first packet, packets (none are isochronous).
     assert_eq!(words(&bytes), (vec![3, 0x0D05, 0, 0, 0, 0, 2, 0, -1, 0, 0, 0], &b"\x12\x01"[..]));
-    answers.sent(1, Status::Stalled, &[]);
+    answers.sent(1, TransferStatus::Stalled, &[]);
     assert_eq!(words(&answers.take()).0[5..7], [-32, 0]);
-    answers.taken(2, Status::Done, 31);
+    answers.taken(2, TransferStatus::Done, 31);
     assert_eq!(words(&answers.take()).0[5..7], [0, 31]);
-    answers.unlinked(3, Status::Unlinked);
+    answers.unlinked(3, TransferStatus::Unlinked);
     assert_eq!(words(&answers.take()).0[..6], [4, 3, 0, 0, 0, -104]);
     assert_eq!(answers.take(), b"");
 }

@@ -7,9 +7,9 @@ use tokio::time::Instant;
 
 use crate::descriptor::IN;
 use crate::gadget::{Gadget, Outcome};
-use crate::message::{Answers, Decoder, Flow, MessageError, Request, Status, Transfer};
+use crate::message::{Answers, Decoder, Direction, MessageError, Transfer, TransferStatus, UsbipRequest};
 use crate::pipe::Pipe;
-use crate::setup::{ENDPOINT_HALT, Kind, Recipient, Refused, Setup, standard};
+use crate::setup::{ENDPOINT_HALT, Recipient, Refused, RequestKind, Setup, standard};
 
 /// A device that is plugged in; it neither waits nor reads a clock.
 ///
@@ -65,8 +65,8 @@ impl Peer {
         self.decoder.push(bytes);
         while let Some(request) = self.decoder.next_request()? {
             match request {
-                Request::Submit(transfer) => self.submit(transfer),
-                Request::Unlink { seq, victim } => self.unlink(seq, victim),
+                UsbipRequest::Submit(transfer) => self.submit(transfer),
+                UsbipRequest::Unlink { seq, victim } => self.unlink(seq, victim),
             }
         }
         self.wake(now);
@@ -141,30 +141,32 @@ impl Peer {
 
     fn submit(&mut self, Transfer { seq, endpoint, flow, setup }: Transfer) {
         match (endpoint, flow) {
-            (0, Flow::In(room)) => {
+            (0, Direction::In(room)) => {
                 let data = self.control(setup, &[]);
                 match data {
                     Ok(mut data) => {
                         data.truncate(room);
-                        self.answers.sent(seq, Status::Done, &data);
+                        self.answers.sent(seq, TransferStatus::Done, &data);
                     }
-                    Err(Refused) => self.answers.sent(seq, Status::Stalled, &[]),
+                    Err(Refused) => self.answers.sent(seq, TransferStatus::Stalled, &[]),
                 }
             }
-            (0, Flow::Out(data)) => match self.control(setup, &data) {
-                Ok(_) => self.answers.taken(seq, Status::Done, data.len()),
-                Err(Refused) => self.answers.taken(seq, Status::Stalled, 0),
+            (0, Direction::Out(data)) => match self.control(setup, &data) {
+                Ok(_) => self.answers.taken(seq, TransferStatus::Done, data.len()),
+                Err(Refused) => self.answers.taken(seq, TransferStatus::Stalled, 0),
             },
-            (number, Flow::In(room)) => match self.pipes.get_mut(&(IN | number)) {
+            (number, Direction::In(room)) => match self.pipes.get_mut(&(IN | number)) {
                 Some(pipe) => pipe.ask(seq, room),
-                None => self.answers.sent(seq, Status::Stalled, &[]),
+                None => self.answers.sent(seq, TransferStatus::Stalled, &[]),
             },
-            (number, Flow::Out(data)) => match self.ears.get(&number) {
+            (number, Direction::Out(data)) => match self.ears.get(&number) {
                 Some(Ear { function, is_halted: false }) => {
-                    self.answers.taken(seq, Status::Done, data.len());
+                    self.answers.taken(seq, TransferStatus::Done, data.len());
                     self.heard.push((*function, data));
                 }
-                Some(Ear { is_halted: true, .. }) | None => self.answers.taken(seq, Status::Stalled, 0),
+                Some(Ear { is_halted: true, .. }) | None => {
+                    self.answers.taken(seq, TransferStatus::Stalled, 0)
+                }
             },
         }
     }
@@ -172,11 +174,11 @@ impl Peer {
     fn unlink(&mut self, seq: u32, victim: u32) {
         let waited = self.pipes.values_mut().any(|pipe| pipe.unlink(victim));
         // What does not wait has been answered already.
-        self.answers.unlinked(seq, if waited { Status::Unlinked } else { Status::Done });
+        self.answers.unlinked(seq, if waited { TransferStatus::Unlinked } else { TransferStatus::Done });
     }
 
     fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Vec<u8>, Refused> {
-        if (setup.kind(), setup.recipient()) == (Some(Kind::Standard), Some(Recipient::Endpoint)) {
+        if (setup.kind(), setup.recipient()) == (Some(RequestKind::Standard), Some(Recipient::Endpoint)) {
             return self.endpoint_request(setup);
         }
         match self.gadget.control(setup, data)? {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::message::{Answers, Status};
+use crate::message::{Answers, TransferStatus};
 
 /// Packets that nobody fetches go after this long, as out of a small firmware's memory: a host that comes later
 /// reads nothing old.
@@ -124,7 +124,7 @@ impl Pipe {
         while let Some(transfer) = self.transfers.front() {
             let seq = transfer.seq;
             if self.is_halted {
-                answers.sent(seq, Status::Stalled, &[]);
+                answers.sent(seq, TransferStatus::Stalled, &[]);
             } else if self.busy_until.is_some_and(|until| now < until) {
                 return;
             } else {
@@ -133,9 +133,9 @@ impl Pipe {
                 self.waiting_bytes -= bytes;
                 let data: Vec<u8> = self.packets.drain(..packets).flat_map(|(_, packet)| packet).collect();
                 if bytes > room {
-                    answers.sent(seq, Status::Overflow, &[]);
+                    answers.sent(seq, TransferStatus::Overflow, &[]);
                 } else {
-                    answers.sent(seq, Status::Done, &data);
+                    answers.sent(seq, TransferStatus::Done, &data);
                 }
                 self.busy_until = (!self.slowness.is_zero()).then(|| now + self.slowness);
             }

@@ -17,7 +17,7 @@ use crate::function::FunctionKind;
 use crate::gadget::Gadget;
 use crate::identity::Identity;
 use crate::peer::Peer;
-use crate::vhci::{Vhci, VhciError, Wish};
+use crate::vhci::{PortChoice, Vhci, VhciError};
 
 /// Something is to be done to a function or to the plug.
 #[derive(Debug)]
@@ -85,7 +85,7 @@ impl Plug {
             Gadget::new(identity.clone(), speed, kinds.iter().map(|kind| kind.function()).collect())
         });
         let mut plug = Self { vhci, make, backing, orders, link: Link::Out(None), port: 0 };
-        plug.plug_in(Wish::Any).await?;
+        plug.plug_in(PortChoice::Any).await?;
         Ok(plug)
     }
 
@@ -108,11 +108,11 @@ impl Plug {
             match event {
                 PlugEvent::Bytes(count) => self.receive(buffer.get(..count).unwrap_or_default(), now),
                 PlugEvent::Closed => self.pull_out(None),
-                PlugEvent::Replug => self.plug_in_again(Wish::Port(self.port)).await?,
+                PlugEvent::Replug => self.plug_in_again(PortChoice::Port(self.port)).await?,
                 PlugEvent::Cable(CableFault::Disconnect(duration)) => self.pull_out(Some(now + duration)),
                 PlugEvent::Cable(CableFault::Renumber) => {
                     self.pull_out(None);
-                    self.plug_in_again(Wish::NotPort(self.port)).await?;
+                    self.plug_in_again(PortChoice::NotPort(self.port)).await?;
                 }
                 PlugEvent::Ordered(Order { function, command, done }) => {
                     let outcome = self.obey(function, command, now).await;
@@ -200,10 +200,10 @@ impl Plug {
         match (command, &mut self.link) {
             (PlugCommand::Unplug, Link::In(_)) => self.pull_out(None),
             (PlugCommand::Plug, Link::Out(_)) => {
-                self.plug_in_again(Wish::Port(self.port)).await.map_err(refused)?;
+                self.plug_in_again(PortChoice::Port(self.port)).await.map_err(refused)?;
             }
             (PlugCommand::PlugElsewhere, Link::Out(_)) => {
-                self.plug_in_again(Wish::NotPort(self.port)).await.map_err(refused)?;
+                self.plug_in_again(PortChoice::NotPort(self.port)).await.map_err(refused)?;
             }
             (PlugCommand::Halt, Link::In(connection)) => connection.peer.halt(function, now),
             (PlugCommand::Slow(slowness), Link::In(connection)) => {
@@ -227,7 +227,7 @@ impl Plug {
         self.link = Link::Out(until);
     }
 
-    async fn plug_in_again(&mut self, wish: Wish) -> Result<(), VhciError> {
+    async fn plug_in_again(&mut self, wish: PortChoice) -> Result<(), VhciError> {
         self.plug_in(wish).await?;
         let now = Instant::now();
         for device in &mut self.backing {
@@ -236,7 +236,7 @@ impl Plug {
         Ok(())
     }
 
-    async fn plug_in(&mut self, wish: Wish) -> Result<(), VhciError> {
+    async fn plug_in(&mut self, wish: PortChoice) -> Result<(), VhciError> {
         let gadget = (self.make)();
         let (port, stream) = self.vhci.plug_in(wish, gadget.speed()).await?;
         tracing::info!(port, "plugged in");

@@ -33,7 +33,7 @@ pub(crate) struct Setup {
 
 /// Who defines a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum RequestKind {
     Standard,
     Class,
     Vendor,
@@ -71,11 +71,11 @@ impl Setup {
     }
 
     /// Who defines the request; `None` for what the specification reserves.
-    pub(crate) fn kind(self) -> Option<Kind> {
+    pub(crate) fn kind(self) -> Option<RequestKind> {
         match self.request_type >> 5 & 0b11 {
-            0 => Some(Kind::Standard),
-            1 => Some(Kind::Class),
-            2 => Some(Kind::Vendor),
+            0 => Some(RequestKind::Standard),
+            1 => Some(RequestKind::Class),
+            2 => Some(RequestKind::Vendor),
             _ => None,
         }
     }

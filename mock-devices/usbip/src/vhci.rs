@@ -51,7 +51,7 @@ pub enum VhciError {
 
 /// Where a device is to go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Wish {
+pub(crate) enum PortChoice {
     /// Anywhere.
     Any,
     /// Into this port.
@@ -80,16 +80,20 @@ impl Vhci {
     ///
     /// # Errors
     /// If the system refuses, or no such port becomes free in time.
-    pub(crate) async fn plug_in(&self, wish: Wish, speed: Speed) -> Result<(u32, UnixStream), VhciError> {
+    pub(crate) async fn plug_in(
+        &self,
+        wish: PortChoice,
+        speed: Speed,
+    ) -> Result<(u32, UnixStream), VhciError> {
         let refused = |file| move |source| VhciError::Refused { file, source };
         let (ours, kernels) = UnixStream::pair().map_err(refused("attach"))?;
         let deadline = Instant::now() + FREED_WITHIN;
         loop {
             let status = fs::read_to_string(self.folder.join("status")).map_err(refused("status"))?;
             let port = free_ports(&status).find(|port| match wish {
-                Wish::Any => true,
-                Wish::Port(wanted) => *port == wanted,
-                Wish::NotPort(unwanted) => *port != unwanted,
+                PortChoice::Any => true,
+                PortChoice::Port(wanted) => *port == wanted,
+                PortChoice::NotPort(unwanted) => *port != unwanted,
             });
             if let Some(port) = port {
                 let order = attach_order(port, kernels.as_fd().as_raw_fd(), speed);

@@ -4,8 +4,8 @@ use serde_json::json;
 use tactus_plan::{Parameter, RigView};
 use tactus_runner::config;
 use tactus_runner::embedded::SIMULATED_RIG;
-use tactus_runner::order::{self, Ask};
-use tactus_runner::twin::{self, Plan};
+use tactus_runner::order::{self, RunRequest};
+use tactus_runner::twin::{self, DryRun};
 use tactus_schema::{Rig, WallTime};
 
 use super::run::experiment;
@@ -26,9 +26,14 @@ pub(crate) fn plan(common: &Common, args: &PlanArgs) -> anyhow::Result<Exit> {
         script.parameters(&RigView::of(&rig)).map_err(|error| Failure::new(Exit::Usage, error))?;
     let summary = script.doc().lines().next().unwrap_or_default().to_owned();
     let name = script.name().to_owned();
-    let ask = Ask { script, arguments, seed: Some(args.experiment.seed.unwrap_or(SEED)), who: "plan".into() };
+    let request = RunRequest {
+        script,
+        arguments,
+        seed: Some(args.experiment.seed.unwrap_or(SEED)),
+        who: "plan".into(),
+    };
     let order =
-        order::order(ask, &rig, WallTime::default()).map_err(|error| Failure::new(Exit::Usage, error))?;
+        order::order(request, &rig, WallTime::default()).map_err(|error| Failure::new(Exit::Usage, error))?;
     let values: serde_json::Value = serde_json::from_str(&order.arguments.to_json())?;
     let plan = twin::dry_run(&rig, order)?;
     if common.json {
@@ -44,7 +49,7 @@ fn to_json(
     rig: &Rig,
     parameters: &[Parameter],
     values: &serde_json::Value,
-    plan: &Plan,
+    plan: &DryRun,
 ) -> serde_json::Value {
     let outcome = &plan.outcome;
     json!({
@@ -76,7 +81,7 @@ fn print(
     rig: &Rig,
     parameters: &[Parameter],
     values: &serde_json::Value,
-    plan: &Plan,
+    plan: &DryRun,
 ) {
     println!("{name}: {summary}\n");
     let rows: Vec<_> = parameters
@@ -118,7 +123,7 @@ fn print(
 }
 
 /// Least and greatest x, y, z, if anything was moved.
-fn travel(plan: &Plan) -> Option<[[f64; 2]; 3]> {
+fn travel(plan: &DryRun) -> Option<[[f64; 2]; 3]> {
     let travel_mm = plan.outcome.travel_mm;
     travel_mm.iter().flatten().all(|bound| bound.is_finite()).then_some(travel_mm)
 }

@@ -21,8 +21,8 @@ use super::Controller;
 use crate::faults::ControllerFault;
 use crate::motion::Point;
 use crate::outbox::Outbox;
-use crate::truth::Draw;
-use crate::world::Shared;
+use crate::truth::RandomStream;
+use crate::world::SharedWorld;
 use gcode::{GrblError, MotionMode};
 use input::{Input, RealTime};
 use report::Status;
@@ -47,7 +47,7 @@ const ALARM_HOMING_FAILED: u8 = 9;
 /// The controller.
 #[derive(Debug)]
 pub(super) struct GrblController {
-    world: Shared,
+    world: SharedWorld,
     /// How its coordinates lie in the robot's frame.
     frame: Config,
     settings: Settings,
@@ -193,7 +193,7 @@ impl Controller for GrblController {
 }
 
 impl GrblController {
-    pub(super) fn new(world: Shared, frame: Config, now: Instant) -> Self {
+    pub(super) fn new(world: SharedWorld, frame: Config, now: Instant) -> Self {
         let truth = world.lock().truth().clone();
         let mut controller = Self {
             world,
@@ -207,7 +207,7 @@ impl GrblController {
             reports: 0,
             busy_until: None,
             limit_at: None,
-            rng: Draw::StageController.rng(truth.seed),
+            rng: RandomStream::StageController.rng(truth.seed),
             defects: Defects::default(),
         };
         controller.power_up(now);

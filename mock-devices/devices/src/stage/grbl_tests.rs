@@ -1,22 +1,22 @@
 use std::time::Duration;
 
-use crate::bench::{Bench, sim_rig};
 use crate::faults::{ControllerFault, StageFault};
 use crate::stage::{GARBAGE_BYTES, VirtualStage};
+use crate::test_bench::{DeviceBench, sim_rig};
 
-fn switched_on() -> Bench<VirtualStage> {
-    Bench::new(&sim_rig(), 1, VirtualStage::new)
+fn switched_on() -> DeviceBench<VirtualStage> {
+    DeviceBench::new(&sim_rig(), 1, VirtualStage::new)
 }
 
 /// Homed and idle at x 1, y 1, z 29, with nothing unread.
-fn homed() -> Bench<VirtualStage> {
+fn homed() -> DeviceBench<VirtualStage> {
     let mut bench = switched_on();
     ask(&mut bench, "$H", 20_000);
     bench
 }
 
 /// Sends a line (real-time bytes go as they are) and gives what comes back within a time.
-fn ask(bench: &mut Bench<VirtualStage>, line: &str, ms: u64) -> String {
+fn ask(bench: &mut DeviceBench<VirtualStage>, line: &str, ms: u64) -> String {
     match line {
         "?" | "!" | "~" | "\x18" => bench.send(line.as_bytes()),
         _ => bench.send(format!("{line}\n").as_bytes()),
@@ -24,17 +24,17 @@ fn ask(bench: &mut Bench<VirtualStage>, line: &str, ms: u64) -> String {
     hear(bench, ms)
 }
 
-fn hear(bench: &mut Bench<VirtualStage>, ms: u64) -> String {
+fn hear(bench: &mut DeviceBench<VirtualStage>, ms: u64) -> String {
     String::from_utf8(bench.bytes(ms)).unwrap()
 }
 
 /// State and position of a status report, without what comes now and then.
-fn status(bench: &mut Bench<VirtualStage>) -> String {
+fn status(bench: &mut DeviceBench<VirtualStage>) -> String {
     let report = ask(bench, "?", 5);
     report.split("|Bf").next().unwrap().to_owned()
 }
 
-fn true_mm(bench: &Bench<VirtualStage>) -> [f64; 3] {
+fn true_mm(bench: &DeviceBench<VirtualStage>) -> [f64; 3] {
     bench.world.lock().tip_mm(bench.now)
 }
 
@@ -59,7 +59,9 @@ fn it_starts_locked_and_not_knowing_where_it_is() {
 #[test]
 fn now_and_then_a_boot_finds_its_settings_unreadable() {
     let greetings: Vec<_> = (0..20)
-        .map(|seed| hear(&mut Bench::new(&sim_rig(), seed, VirtualStage::new), 10).starts_with("error:7\r\n"))
+        .map(|seed| {
+            hear(&mut DeviceBench::new(&sim_rig(), seed, VirtualStage::new), 10).starts_with("error:7\r\n")
+        })
         .collect();
     assert!(greetings.contains(&true) && greetings.contains(&false));
 }
@@ -129,7 +131,7 @@ fn a_reset_at_a_stand_keeps_the_position_and_forgets_the_rest() {
 fn a_reset_in_motion_stops_dead_and_may_or_may_not_be_noticed() {
     let noticed: Vec<_> = (0..20)
         .map(|seed| {
-            let mut bench = Bench::new(&sim_rig(), seed, VirtualStage::new);
+            let mut bench = DeviceBench::new(&sim_rig(), seed, VirtualStage::new);
             ask(&mut bench, "$H", 20_000);
             ask(&mut bench, "G1 X11 F1200", 270);
             let answer = ask(&mut bench, "\x18", 10);

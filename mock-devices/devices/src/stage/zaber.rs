@@ -18,8 +18,8 @@ use tokio::time::Instant;
 use super::Controller;
 use crate::faults::ControllerFault;
 use crate::outbox::Outbox;
-use crate::truth::Draw;
-use crate::world::Shared;
+use crate::truth::RandomStream;
+use crate::world::SharedWorld;
 use axis::VirtualAxis;
 
 /// A reply leaves this long after its command.
@@ -31,7 +31,7 @@ const VERSION: &str = "7.38";
 /// The devices of a stage.
 #[derive(Debug)]
 pub(super) struct ZaberController {
-    world: Shared,
+    world: SharedWorld,
     axes: Vec<VirtualAxis>,
     ear: HostCommandDecoder,
     outbox: Outbox,
@@ -51,7 +51,7 @@ struct Defects {
 }
 
 impl ZaberController {
-    pub(super) fn new(world: Shared, config: &Config, now: Instant) -> Self {
+    pub(super) fn new(world: SharedWorld, config: &Config, now: Instant) -> Self {
         let truth = world.lock().truth().clone();
         let named = AxisName::ALL.into_iter().zip(config.axes);
         let axes = named.filter_map(|(name, axis)| Some(VirtualAxis::new(name, axis?, truth.stage)));
@@ -61,7 +61,7 @@ impl ZaberController {
             ear: HostCommandDecoder::default(),
             outbox: Outbox::default(),
             checksums: Vec::new(),
-            rng: Draw::StageController.rng(truth.seed),
+            rng: RandomStream::StageController.rng(truth.seed),
             defects: Defects::default(),
         };
         controller.power_up(now);

@@ -2,9 +2,9 @@ use std::time::Duration;
 
 use tactus_schema::Rig;
 
-use crate::bench::{Bench, sim_rig};
 use crate::faults::{ControllerFault, StageFault};
 use crate::stage::VirtualStage;
+use crate::test_bench::{DeviceBench, sim_rig};
 
 const LINES: &str = "protocol = \"zaber-ascii\"
 axes.x = { device = 1, axis = 1, um_per_microstep = 0.5 }
@@ -17,25 +17,25 @@ fn zaber_rig() -> Rig {
     Rig::from_toml(&toml.replace("protocol = \"grbl\"\n", LINES)).unwrap()
 }
 
-fn switched_on() -> Bench<VirtualStage> {
-    Bench::new(&zaber_rig(), 1, VirtualStage::new)
+fn switched_on() -> DeviceBench<VirtualStage> {
+    DeviceBench::new(&zaber_rig(), 1, VirtualStage::new)
 }
 
 /// Homed: x 0, y 0, z 30, which is z's position 0.
-fn homed() -> Bench<VirtualStage> {
+fn homed() -> DeviceBench<VirtualStage> {
     let mut bench = switched_on();
     ask(&mut bench, "/0 0 home", 10_000);
     bench
 }
 
 /// Sends a command and gives what comes back within a time, without line ends.
-fn ask(bench: &mut Bench<VirtualStage>, command: &str, ms: u64) -> Vec<String> {
+fn ask(bench: &mut DeviceBench<VirtualStage>, command: &str, ms: u64) -> Vec<String> {
     bench.send(format!("{command}\n").as_bytes());
     let said = String::from_utf8(bench.bytes(ms)).unwrap();
     said.lines().map(str::to_owned).collect()
 }
 
-fn true_mm(bench: &Bench<VirtualStage>) -> [f64; 3] {
+fn true_mm(bench: &DeviceBench<VirtualStage>) -> [f64; 3] {
     bench.world.lock().tip_mm(bench.now)
 }
 
@@ -207,6 +207,6 @@ fn a_hung_device_goes_on_moving_and_answers_later() {
 
 #[test]
 fn the_shipped_rig_speaks_grbl() {
-    let mut bench = Bench::new(&sim_rig(), 1, VirtualStage::new);
+    let mut bench = DeviceBench::new(&sim_rig(), 1, VirtualStage::new);
     assert!(String::from_utf8(bench.bytes(10)).unwrap().contains("Grbl 1.1h"));
 }

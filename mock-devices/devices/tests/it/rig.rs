@@ -18,7 +18,7 @@ use tactus_wire::weiss::Checksum;
 use tokio::time::{sleep, timeout};
 
 /// A rig with its drivers connected.
-struct Lab {
+struct ConnectedRig {
     rig: Rig,
     control: RigControl,
     sensor: SensorDriver,
@@ -34,11 +34,11 @@ fn ideal_rig() -> Rig {
     twin_of(&sim_rig())
 }
 
-async fn lab(rig: Rig, seed: u64) -> Lab {
+async fn lab(rig: Rig, seed: u64) -> ConnectedRig {
     lab_speaking(SensorCodec::default(), rig, seed).await
 }
 
-async fn lab_speaking(codec: SensorCodec, rig: Rig, seed: u64) -> Lab {
+async fn lab_speaking(codec: SensorCodec, rig: Rig, seed: u64) -> ConnectedRig {
     let clock = Clock::paused();
     let mut devices = VirtualRig::of(Truth::of_rig(&rig, seed), rig.covering, &codec);
     let sensor = SensorDriver::start(codec, devices.sensor_connector(), ArrayExpectation::of(&rig), clock);
@@ -53,10 +53,10 @@ async fn lab_speaking(codec: SensorCodec, rig: Rig, seed: u64) -> Lab {
         stage.clear_alarm().await.unwrap();
     }
     stage.home().await.unwrap();
-    Lab { rig, control: devices.control(), sensor, stage }
+    ConnectedRig { rig, control: devices.control(), sensor, stage }
 }
 
-impl Lab {
+impl ConnectedRig {
     /// Goes up, over the place, and down to a depth.
     async fn press(&self, [x, y]: [f64; 2], depth_mm: f64) -> Result<[f64; 3], StageError> {
         for z in [2.0, -depth_mm] {

@@ -43,12 +43,12 @@ axes.z = { device = 1, axis = 1, um_per_microstep = 0.124, direction = -1, origi
 const START_MM: [f64; 3] = [20.0, 15.0, 5.0];
 
 /// A virtual stage with its driver.
-struct Lab {
+struct ConnectedRig {
     stage: Arc<DrivenStage>,
     control: RigControl,
 }
 
-impl Lab {
+impl ConnectedRig {
     /// Connected, and not homed.
     fn new(lines: &str) -> Self {
         let rig = Rig::from_toml(&SIM.replace("protocol = \"grbl\"\n", lines)).unwrap();
@@ -112,7 +112,7 @@ fn near(got_mm: [f64; 3], want_mm: [f64; 3]) {
 #[tokio::test(start_paused = true)]
 async fn a_move_ends_where_it_was_told_and_truly_there() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         near(lab.control.tip_mm(), START_MM);
         let target_mm = [33.3, 11.1, 2.25];
         near(lab.go(target_mm).await.unwrap(), target_mm);
@@ -127,7 +127,7 @@ async fn a_move_ends_where_it_was_told_and_truly_there() {
 #[tokio::test(start_paused = true)]
 async fn a_stop_in_mid_move_ends_it_and_keeps_the_position() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         let moving = lab.under_way().await;
         let before_mm = lab.control.tip_mm();
         lab.stage.stop();
@@ -146,7 +146,7 @@ async fn a_stop_in_mid_move_ends_it_and_keeps_the_position() {
 #[tokio::test(start_paused = true)]
 async fn homing_can_be_stopped_and_leaves_the_stage_unhomed() {
     for lines in STAGES {
-        let lab = Lab::new(lines);
+        let lab = ConnectedRig::new(lines);
         lab.until(StageStatus::Unhomed).await;
         let stage = Arc::clone(&lab.stage);
         let homing = tokio::spawn(async move { stage.home().await });
@@ -162,7 +162,7 @@ async fn homing_can_be_stopped_and_leaves_the_stage_unhomed() {
 #[tokio::test(start_paused = true)]
 async fn an_unplugged_stage_fails_the_move_and_must_be_homed_when_it_is_back() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         let moving = lab.under_way().await;
         lab.inject("stage disconnect 3s");
         let result = moving.await.unwrap();
@@ -182,12 +182,12 @@ async fn an_unplugged_stage_fails_the_move_and_must_be_homed_when_it_is_back() {
 async fn a_reset_leaves_the_position_suspect() {
     for lines in STAGES {
         // At a stand, and in mid-move.
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         lab.inject("stage reset");
         lab.until(StageStatus::Unhomed).await;
         assert!(matches!(lab.go(START_MM).await, Err(StageError::Unhomed)), "{lines}");
 
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         let moving = lab.under_way().await;
         lab.inject("stage reset");
         let result = moving.await.unwrap();
@@ -200,7 +200,7 @@ async fn a_reset_leaves_the_position_suspect() {
 #[tokio::test(start_paused = true)]
 async fn a_stage_that_lies_is_not_there() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         lab.inject("stage lie 0.05");
         let result = lab.go([20.0, 15.0, 4.0]).await;
         let Err(StageError::NotThere { target_mm, position_mm }) = result else {
@@ -213,7 +213,7 @@ async fn a_stage_that_lies_is_not_there() {
 #[tokio::test(start_paused = true)]
 async fn a_move_that_is_accepted_and_not_made_is_not_done() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         lab.inject("stage ignore-moves");
         let result = lab.go([20.0, 15.0, 4.0]).await;
         let Err(StageError::NotThere { position_mm, .. }) = result else { panic!("{lines}: {result:?}") };
@@ -224,7 +224,7 @@ async fn a_move_that_is_accepted_and_not_made_is_not_done() {
 #[tokio::test(start_paused = true)]
 async fn a_refused_move_is_told_and_the_next_is_taken() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         lab.inject("stage refuse");
         let result = lab.go([20.0, 15.0, 4.0]).await;
         assert!(matches!(result, Err(StageError::Refused { .. })), "{lines}: {result:?}");
@@ -236,7 +236,7 @@ async fn a_refused_move_is_told_and_the_next_is_taken() {
 #[tokio::test(start_paused = true)]
 async fn a_move_that_does_not_end_is_overdue() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         lab.inject("stage never-idle");
         let result = lab.go([20.0, 15.0, 4.0]).await;
         assert!(matches!(result, Err(StageError::Overdue { .. })), "{lines}: {result:?}");
@@ -247,7 +247,7 @@ async fn a_move_that_does_not_end_is_overdue() {
 #[tokio::test(start_paused = true)]
 async fn an_alarm_stops_the_stage_until_it_is_cleared_and_homed() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         let moving = lab.under_way().await;
         lab.inject("stage alarm 1");
         let result = moving.await.unwrap();
@@ -269,7 +269,7 @@ async fn an_alarm_stops_the_stage_until_it_is_cleared_and_homed() {
 #[tokio::test(start_paused = true)]
 async fn homing_that_fails_is_an_alarm() {
     for lines in STAGES {
-        let lab = Lab::new(lines);
+        let lab = ConnectedRig::new(lines);
         lab.until(StageStatus::Unhomed).await;
         lab.inject("stage homing-fails");
         let result = lab.stage.home().await;
@@ -281,7 +281,7 @@ async fn homing_that_fails_is_an_alarm() {
 #[tokio::test(start_paused = true)]
 async fn what_is_beyond_the_travel_is_not_gone_to() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         let result = lab.go([20.0, 15.0, -6.5]).await;
         let refused = matches!(result, Err(StageError::Refused { .. } | StageError::Alarm { code: 2, .. }));
         assert!(refused, "{lines}: {result:?}");
@@ -292,7 +292,7 @@ async fn what_is_beyond_the_travel_is_not_gone_to() {
 #[tokio::test(start_paused = true)]
 async fn a_hung_stage_is_lost_and_not_done() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         let moving = lab.under_way().await;
         lab.inject("stage stall 20s");
         let result = moving.await.unwrap();
@@ -304,7 +304,7 @@ async fn a_hung_stage_is_lost_and_not_done() {
 #[tokio::test(start_paused = true)]
 async fn garbage_between_the_lines_harms_nothing() {
     for lines in STAGES {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         lab.inject("stage echo-garbage");
         near(lab.go([20.0, 15.0, 4.0]).await.unwrap(), [20.0, 15.0, 4.0]);
     }
@@ -325,7 +325,7 @@ async fn another_stage_than_the_rigs_is_refused_with_both_values() {
         ),
     ] {
         let told = true_lines.replace(from, to);
-        let lab = Lab::speaking(&of(true_lines), &protocol(of(&told)));
+        let lab = ConnectedRig::speaking(&of(true_lines), &protocol(of(&told)));
         let mut connection = lab.stage.connection();
         let lost =
             connection.wait_for(|now| matches!(now, Connection::Seeking(Some(_)))).await.unwrap().clone();
@@ -344,7 +344,7 @@ async fn what_answers_says_who_it_is() {
         "device 1 firmware 7.38, device 2 firmware 7.38",
         "device 3 firmware 7.38, device 2 firmware 7.38, device 1 firmware 7.38",
     ]) {
-        let lab = Lab::homed(lines).await;
+        let lab = ConnectedRig::homed(lines).await;
         let Connection::Connected(controller) = lab.stage.connection().borrow().clone() else { panic!() };
         assert_eq!(controller.identity, identity);
         assert!(!controller.settings.is_empty());

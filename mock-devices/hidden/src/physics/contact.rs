@@ -1,6 +1,6 @@
 //! Contact: the tool's face.
 
-use super::{Definition, Stage};
+use super::{Definition, PipelineHook};
 
 pub(super) const WORN_TOOL: Definition = Definition {
     id: "worn-tool",
@@ -9,7 +9,7 @@ pub(super) const WORN_TOOL: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let excess = (knobs.sign("side") * knobs.scaled("excess", 0.25)).max(-0.9);
-        Stage::tool(move |_, tool| tool.diameter_mm *= 1.0 + excess)
+        PipelineHook::tool(move |_, tool| tool.diameter_mm *= 1.0 + excess)
     },
 };
 
@@ -21,7 +21,7 @@ pub(super) const COCKED_TOOL: Definition = Definition {
     make: |knobs| {
         let toward = knobs.direction("direction_deg");
         let rise = knobs.scaled("lean_deg", 8.0).min(60.0).to_radians().tan();
-        Stage::tool(move |_, tool| {
+        PipelineHook::tool(move |_, tool| {
             tool.lean = [0, 1].map(|axis| tool.lean[axis] + rise * toward[axis]);
         })
     },

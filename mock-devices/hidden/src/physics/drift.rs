@@ -1,19 +1,19 @@
-//! Readout: zero and gain that wander.
+//! Readout: drift of baselines and gains.
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Definition, Stage, left, shift};
+use super::{Definition, PipelineHook, left, shift};
 
 pub(super) const COMMON_WALK: Definition = Definition {
     id: "drift-common-walk",
     effect: Some("baseline-drift"),
-    about: "b' = b + W(t), W one Wiener process for all elements: the reference voltage wanders",
+    about: "b' = b + W(t), W one Wiener process for all elements: the reference voltage drifts",
     is_fine: false,
     make: |knobs| {
         let counts_per_root_s = knobs.scaled("counts_per_root_s", 0.5);
-        let (mut rng, mut offset) = (knobs.chance(), 0.0);
-        Stage::readout(move |now, counts| {
+        let (mut rng, mut offset) = (knobs.rng(), 0.0);
+        PipelineHook::readout(move |now, counts| {
             offset += now.dt_s.sqrt() * normal(&mut rng);
             shift(counts, counts_per_root_s * offset);
         })
@@ -28,9 +28,9 @@ pub(super) const ORNSTEIN_UHLENBECK: Definition = Definition {
     make: |knobs| {
         let time_s = knobs.decade("time_constant_s", 15.0, 60.0);
         let rms_counts = knobs.scaled("rms_counts", 3.0);
-        let mut rng = knobs.chance();
+        let mut rng = knobs.rng();
         let mut offsets: Vec<f64> = (0..knobs.elements()).map(|_| normal(&mut rng)).collect();
-        Stage::readout(move |now, counts| {
+        PipelineHook::readout(move |now, counts| {
             let kept = left(now.dt_s, time_s);
             let fresh = (1.0 - kept * kept).sqrt();
             for (count, offset) in counts.iter_mut().zip(&mut offsets) {
@@ -50,7 +50,7 @@ pub(super) const WARM_UP: Definition = Definition {
         let time_s = knobs.decade("time_constant_s", 25.0, 120.0);
         let rise_counts = knobs.sign("side") * knobs.scaled("rise_counts", 10.0);
         let shares = knobs.per_element(0.5, 1.5);
-        Stage::readout(move |now, counts| {
+        PipelineHook::readout(move |now, counts| {
             let warm = 1.0 - left(now.t_s, time_s);
             counts.iter_mut().zip(&shares).for_each(|(count, share)| *count += rise_counts * share * warm);
         })
@@ -72,11 +72,11 @@ pub(super) const GAIN_WARM_UP: Definition = Definition {
 pub(super) const GAIN_WALK: Definition = Definition {
     id: "gain-walk",
     effect: Some("gain-drift"),
-    about: "s' = s (1 + W(t)), W one Wiener process for all elements: the excitation's amplitude wanders",
+    about: "s' = s (1 + W(t)), W one Wiener process for all elements: the excitation's amplitude drifts",
     is_fine: false,
     make: |knobs| {
         let per_root_s = knobs.scaled("per_root_s", 0.004);
-        let (mut rng, mut offset) = (knobs.chance(), 0.0);
+        let (mut rng, mut offset) = (knobs.rng(), 0.0);
         gain(knobs.baselines_counts(), move |_, dt_s, _| {
             offset += dt_s.sqrt() * normal(&mut rng);
             per_root_s * offset
@@ -98,9 +98,9 @@ pub(super) const GAIN_TEMPERATURE: Definition = Definition {
     },
 };
 
-/// A gain of all elements: one plus what `excess` says of the time, the step and the temperature.
-fn gain(baselines: Vec<f64>, mut excess: impl FnMut(f64, f64, f64) -> f64 + Send + 'static) -> Stage {
-    Stage::readout(move |now, counts| {
+/// A gain of all elements: 1 plus `excess` of the time, the time step and the temperature.
+fn gain(baselines: Vec<f64>, mut excess: impl FnMut(f64, f64, f64) -> f64 + Send + 'static) -> PipelineHook {
+    PipelineHook::readout(move |now, counts| {
         let by = excess(now.t_s, now.dt_s, now.temperature_c);
         counts.iter_mut().zip(&baselines).for_each(|(count, baseline)| *count += by * (*count - baseline));
     })

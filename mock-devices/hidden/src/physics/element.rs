@@ -1,6 +1,6 @@
 //! Element: wiring and amplifiers, on the signal above the baseline.
 
-use super::{Definition, Knobs, Stage};
+use super::{Definition, Knobs, PipelineHook};
 
 pub(super) const LADDER: Definition = Definition {
     id: "crosstalk-ladder",
@@ -11,7 +11,7 @@ pub(super) const LADDER: Definition = Definition {
         let leak = knobs.scaled("leak", 0.05).min(0.9);
         let cols = knobs.sensor.model.array().cols();
         let reaches: Vec<f64> = (0..cols).map(|apart| leak.powf(apart as f64)).collect();
-        Stage::element(move |_, signal| {
+        PipelineHook::element(move |_, signal| {
             for row in signal.chunks_exact_mut(cols) {
                 let clean = row.to_vec();
                 for (col, value) in row.iter_mut().enumerate() {
@@ -32,7 +32,7 @@ pub(super) const NEIGHBOURS: Definition = Definition {
         let across = knobs.between("across_corners", 0.2, 0.6);
         let share = knobs.scaled("share", 0.03);
         let (rows, cols) = grid(knobs);
-        Stage::element(move |_, signal| {
+        PipelineHook::element(move |_, signal| {
             let clean = signal.to_vec();
             for (element, value) in signal.iter_mut().enumerate() {
                 let (row, col) = (element / cols, element % cols);
@@ -59,7 +59,7 @@ pub(super) const COLUMN_SUM: Definition = Definition {
     make: |knobs| {
         let share = knobs.scaled("share", 0.03);
         let (_, cols) = grid(knobs);
-        Stage::element(move |_, signal| {
+        PipelineHook::element(move |_, signal| {
             let mut sums = vec![0.0; cols];
             for row in signal.chunks_exact(cols) {
                 row.iter().zip(&mut sums).for_each(|(value, sum)| *sum += value);
@@ -80,7 +80,7 @@ pub(super) const DEAD: Definition = Definition {
         let count = knobs.scaled("elements", 1.0).ceil();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a strength, rounded up")]
         let dead = knobs.several("element", count as usize);
-        Stage::element(move |_, signal| dead.iter().for_each(|element| signal[*element] = 0.0))
+        PipelineHook::element(move |_, signal| dead.iter().for_each(|element| signal[*element] = 0.0))
     },
 };
 
@@ -94,7 +94,9 @@ pub(super) const ANSWERS_FOR_NEIGHBOUR: Definition = Definition {
         let (_, cols) = grid(knobs);
         let beside = if element % cols + 1 < cols { element + 1 } else { element - 1 };
         let swapped = knobs.share("swapped", 1.0);
-        Stage::element(move |_, signal| signal[element] += swapped * (signal[beside] - signal[element]))
+        PipelineHook::element(move |_, signal| {
+            signal[element] += swapped * (signal[beside] - signal[element])
+        })
     },
 };
 
@@ -105,7 +107,7 @@ pub(super) const RATIONAL: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let limit_counts = knobs.shrinking("limit_counts", 3000.0);
-        Stage::Element(Stage::each(move |s| s / (1.0 + s.abs() / limit_counts)))
+        PipelineHook::Element(PipelineHook::each(move |s| s / (1.0 + s.abs() / limit_counts)))
     },
 };
 
@@ -116,7 +118,7 @@ pub(super) const EXPONENTIAL: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let limit_counts = knobs.shrinking("limit_counts", 1500.0);
-        Stage::Element(Stage::each(move |s| -limit_counts * (-s / limit_counts).exp_m1()))
+        PipelineHook::Element(PipelineHook::each(move |s| -limit_counts * (-s / limit_counts).exp_m1()))
     },
 };
 
@@ -128,7 +130,7 @@ pub(super) const KNEE: Definition = Definition {
     make: |knobs| {
         let beyond = knobs.between("slope_beyond", 0.0, 0.4);
         let knee_counts = knobs.shrinking("knee_counts", 350.0);
-        Stage::Element(Stage::each(move |s| {
+        PipelineHook::Element(PipelineHook::each(move |s| {
             if s > knee_counts { knee_counts + beyond * (s - knee_counts) } else { s }
         }))
     },

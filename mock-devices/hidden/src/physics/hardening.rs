@@ -1,6 +1,6 @@
 //! Covering: response that grows faster than depth.
 
-use super::{Definition, Stage};
+use super::{Definition, PipelineHook};
 
 pub(super) const EXPONENTIAL: Definition = Definition {
     id: "hardening-exponential",
@@ -9,7 +9,7 @@ pub(super) const EXPONENTIAL: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let by_mm = knobs.scaled("rate_per_mm", 0.6).max(1e-12);
-        Stage::depth(move |_, depth_mm| (by_mm * depth_mm).exp_m1() / by_mm)
+        PipelineHook::depth(move |_, depth_mm| (by_mm * depth_mm).exp_m1() / by_mm)
     },
 };
 
@@ -20,7 +20,7 @@ pub(super) const POWER: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let share = knobs.scaled("share_per_mm_0_5", 0.4);
-        Stage::Covering(Stage::each(move |u_mm| u_mm + share * u_mm.max(0.0).powf(1.5)))
+        PipelineHook::Covering(PipelineHook::each(move |u_mm| u_mm + share * u_mm.max(0.0).powf(1.5)))
     },
 };
 
@@ -31,6 +31,6 @@ pub(super) const QUADRATIC: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let quadratic_per_mm = knobs.scaled("quadratic_per_mm", 0.4);
-        Stage::Covering(Stage::each(move |u_mm| u_mm + quadratic_per_mm * u_mm * u_mm))
+        PipelineHook::Covering(PipelineHook::each(move |u_mm| u_mm + quadratic_per_mm * u_mm * u_mm))
     },
 };

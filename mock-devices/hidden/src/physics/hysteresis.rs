@@ -1,7 +1,7 @@
 //! Covering: loading and unloading differ, whatever the speed.
 
 use super::motion::play;
-use super::{Definition, Stage, left};
+use super::{Definition, PipelineHook, left};
 
 pub(super) const PRANDTL_ISHLINSKII: Definition = Definition {
     id: "hysteresis-prandtl-ishlinskii",
@@ -16,7 +16,7 @@ pub(super) const PRANDTL_ISHLINSKII: Definition = Definition {
         ];
         let weight = knobs.scaled("weight", 0.15);
         let mut plays_mm = [0.0; 3];
-        Stage::depth(move |_, depth_mm| {
+        PipelineHook::depth(move |_, depth_mm| {
             if depth_mm <= 0.0 {
                 plays_mm = [0.0; 3];
                 return 0.0;
@@ -39,7 +39,7 @@ pub(super) const PREISACH: Definition = Definition {
         let weight = knobs.scaled("weight", 0.25);
         let thickness_mm = knobs.sensor.covering.thickness_mm;
         let mut memory = Preisach::new(kappa);
-        Stage::depth(move |_, depth_mm| {
+        PipelineHook::depth(move |_, depth_mm| {
             let share = (depth_mm / thickness_mm).clamp(0.0, 1.0);
             let loop_share = memory.follow(share) - memory.mean_branch(share);
             depth_mm - weight * thickness_mm * loop_share
@@ -58,7 +58,7 @@ pub(super) const BOUC_WEN: Definition = Definition {
         let weight = knobs.scaled("weight", 0.4);
         let [b, g] = [pinch / limit_mm, (1.0 - pinch) / limit_mm];
         let (mut z_mm, mut last_mm) = (0.0_f64, 0.0);
-        Stage::depth(move |_, depth_mm| {
+        PipelineHook::depth(move |_, depth_mm| {
             if depth_mm <= 0.0 {
                 (z_mm, last_mm) = (0.0, 0.0);
                 return 0.0;

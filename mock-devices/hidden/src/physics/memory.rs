@@ -1,7 +1,7 @@
 //! Covering: what earlier presses left.
 
 use super::relaxation::power_law;
-use super::{Definition, Stage, left};
+use super::{Definition, PipelineHook, left};
 
 pub(super) const IMPRINT_POWER_LAW: Definition = Definition {
     id: "imprint-power-law",
@@ -40,7 +40,7 @@ pub(super) const MULLINS_EXPONENTIAL: Definition = Definition {
         let scale_mm = knobs.between("scale_mm", 0.1, 0.4);
         let loss = knobs.share("loss", 0.12);
         let mut largest_mm = vec![0.0_f64; knobs.elements()];
-        Stage::covering(move |_, indentation_mm| {
+        PipelineHook::covering(move |_, indentation_mm| {
             for (value, largest_mm) in indentation_mm.iter_mut().zip(&mut largest_mm) {
                 *largest_mm = largest_mm.max(*value);
                 *value *= 1.0 - loss * (1.0 - left(*largest_mm, scale_mm));
@@ -58,7 +58,7 @@ pub(super) const MULLINS_DISCONTINUOUS: Definition = Definition {
         let width_mm = knobs.between("width_mm", 0.05, 0.2);
         let loss = knobs.share("loss", 0.12);
         let mut largest_mm = vec![0.0_f64; knobs.elements()];
-        Stage::covering(move |_, indentation_mm| {
+        PipelineHook::covering(move |_, indentation_mm| {
             for (value, largest_mm) in indentation_mm.iter_mut().zip(&mut largest_mm) {
                 *largest_mm = largest_mm.max(*value);
                 *value *= 1.0 - loss * ((*largest_mm - *value) / width_mm).tanh();
@@ -68,9 +68,9 @@ pub(super) const MULLINS_DISCONTINUOUS: Definition = Definition {
 };
 
 /// Dents: each follows a press down at once and closes with a time constant; a share of what stands out shows.
-fn imprint(times_s: Vec<f64>, weights: Vec<f64>, share: f64) -> Stage {
+fn imprint(times_s: Vec<f64>, weights: Vec<f64>, share: f64) -> PipelineHook {
     let mut dents: Vec<Vec<f64>> = vec![Vec::new(); times_s.len()];
-    Stage::covering(move |now, indentation_mm| {
+    PipelineHook::covering(move |now, indentation_mm| {
         let mut left_mm = vec![0.0; indentation_mm.len()];
         for ((dent, time_s), weight) in dents.iter_mut().zip(&times_s).zip(&weights) {
             dent.resize(indentation_mm.len(), 0.0);

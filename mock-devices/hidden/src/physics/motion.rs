@@ -1,6 +1,6 @@
 //! Motion: where the tool is against where the stage says it is.
 
-use super::{Definition, Stage, dot, left, minus};
+use super::{Definition, PipelineHook, dot, left, minus};
 
 pub(super) const SHIFTED_MOUNT: Definition = Definition {
     id: "shifted-mount",
@@ -10,7 +10,7 @@ pub(super) const SHIFTED_MOUNT: Definition = Definition {
     make: |knobs| {
         let toward = knobs.direction("direction_deg");
         let shift_mm = knobs.scaled("shift_mm", 0.15);
-        Stage::touch(move |_, touch| {
+        PipelineHook::touch(move |_, touch| {
             touch.point_mm = [0, 1].map(|axis| touch.point_mm[axis] + shift_mm * toward[axis]);
         })
     },
@@ -29,7 +29,7 @@ pub(super) const TURNED_MOUNT: Definition = Definition {
         ];
         let side = knobs.sign("side");
         let (sin, cos) = (side * knobs.scaled("angle_deg", 1.5)).to_radians().sin_cos();
-        Stage::touch(move |_, touch| {
+        PipelineHook::touch(move |_, touch| {
             let [x, y] = minus(touch.point_mm, centre_mm);
             touch.point_mm = [centre_mm[0] + cos * x - sin * y, centre_mm[1] + sin * x + cos * y];
         })
@@ -44,7 +44,7 @@ pub(super) const STRETCHED_STAGE: Definition = Definition {
     make: |knobs| {
         let centre_mm = knobs.middle_mm();
         let stretch = 1.0 + knobs.sign("side") * knobs.scaled("stretch", 0.015);
-        Stage::touch(move |_, touch| {
+        PipelineHook::touch(move |_, touch| {
             touch.point_mm = [0, 1].map(|axis| {
                 touch.point_mm[axis] + (stretch - 1.0) * (touch.point_mm[axis] - centre_mm[axis])
             });
@@ -60,7 +60,7 @@ pub(super) const SHEARED_STAGE: Definition = Definition {
     make: |knobs| {
         let middle_mm = knobs.middle_mm();
         let slant = knobs.sign("side") * knobs.scaled("slant", 0.025);
-        Stage::touch(move |_, touch| touch.point_mm[0] += slant * (touch.point_mm[1] - middle_mm[1]))
+        PipelineHook::touch(move |_, touch| touch.point_mm[0] += slant * (touch.point_mm[1] - middle_mm[1]))
     },
 };
 
@@ -71,7 +71,7 @@ pub(super) const LATE_TOUCH: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let offset_mm = knobs.sign("side") * knobs.scaled("offset_mm", 0.05);
-        Stage::touch(move |_, touch| touch.depth_mm += offset_mm)
+        PipelineHook::touch(move |_, touch| touch.depth_mm += offset_mm)
     },
 };
 
@@ -82,7 +82,7 @@ pub(super) const DEAD_BAND: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let band_mm = knobs.scaled("band_mm", 0.06).max(1e-18);
-        Stage::touch(move |_, touch| {
+        PipelineHook::touch(move |_, touch| {
             let taken_mm = band_mm * (1.0 - left(touch.depth_mm.max(0.0), band_mm));
             touch.depth_mm -= taken_mm;
         })
@@ -102,7 +102,9 @@ pub(super) const SLOPING_SURFACE: Definition = Definition {
         ];
         let uphill = knobs.direction("direction_deg");
         let slope = knobs.scaled("slope", 0.01);
-        Stage::touch(move |_, touch| touch.depth_mm += slope * dot(uphill, minus(touch.point_mm, found_mm)))
+        PipelineHook::touch(move |_, touch| {
+            touch.depth_mm += slope * dot(uphill, minus(touch.point_mm, found_mm))
+        })
     },
 };
 
@@ -113,7 +115,7 @@ pub(super) const LATE_FRAMES: Definition = Definition {
     is_fine: false,
     make: |knobs| {
         let lag_s = knobs.sign("side") * knobs.scaled("lag_s", 0.04);
-        Stage::path(move |now, path, tip_mm| *tip_mm = path.at(now.t_s - lag_s))
+        PipelineHook::path(move |now, path, tip_mm| *tip_mm = path.at(now.t_s - lag_s))
     },
 };
 
@@ -126,7 +128,7 @@ pub(super) const LOST_MOTION: Definition = Definition {
         let shares = ["share_x", "share_y", "share_z"].map(|name| knobs.between(name, 0.3, 1.0));
         let play_mm = knobs.scaled("play_mm", 0.08);
         let mut carriage_mm: Option<[f64; 3]> = None;
-        Stage::path(move |_, _, tip_mm| {
+        PipelineHook::path(move |_, _, tip_mm| {
             let last_mm = carriage_mm.unwrap_or(*tip_mm);
             *tip_mm =
                 std::array::from_fn(|axis| play(last_mm[axis], tip_mm[axis], play_mm * shares[axis] / 2.0));

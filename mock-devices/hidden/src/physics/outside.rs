@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Definition, Knobs, Now, Stage, dot, left, minus, scale};
+use super::{Definition, Knobs, Now, PipelineHook, dot, left, minus, scale};
 
 pub(super) const SUPPLY_DROOP: Definition = Definition {
     id: "supply-droop",
@@ -12,7 +12,7 @@ pub(super) const SUPPLY_DROOP: Definition = Definition {
     make: |knobs| {
         let droop = knobs.scaled("droop", 0.06);
         let scale_counts = knobs.between("scale_counts", 5000.0, 9000.0);
-        Stage::element(move |_, signal| {
+        PipelineHook::element(move |_, signal| {
             let by = (1.0 - droop * (signal.iter().sum::<f64>() / scale_counts).powi(2)).max(0.0);
             scale(signal, by);
         })
@@ -29,7 +29,7 @@ pub(super) const DRAGGED_SPREAD: Definition = Definition {
         let sigma_mm = knobs.sigma_mm();
         let centres_mm = knobs.centres_mm();
         let mut travel = [0.0; 2];
-        Stage::covering(move |now, indentation_mm| {
+        PipelineHook::covering(move |now, indentation_mm| {
             let [vx, vy, _] = now.velocity_mm_per_s;
             if vx.hypot(vy) > 0.1 {
                 travel = [vx / vx.hypot(vy), vy / vx.hypot(vy)];
@@ -51,7 +51,7 @@ pub(super) const STICK_SLIP: Definition = Definition {
         let length_mm = knobs.between("length_mm", 0.05, 0.11);
         let slip_mm = knobs.scaled("slip_mm", 0.03);
         let (mut travel_mm, mut last_mm) = (0.0, 0.0_f64);
-        Stage::depth(move |_, depth_mm| {
+        PipelineHook::depth(move |_, depth_mm| {
             travel_mm += (depth_mm - last_mm).abs();
             last_mm = depth_mm;
             let phase = (travel_mm / length_mm).fract();
@@ -70,7 +70,7 @@ pub(super) const ADHESION: Definition = Definition {
         let pull_mm = knobs.scaled("pull_mm", 0.04);
         let bump = bump(knobs);
         let mut clings = false;
-        Stage::covering(move |now, indentation_mm| {
+        PipelineHook::covering(move |now, indentation_mm| {
             let height_mm = -now.touch.depth_mm;
             clings = height_mm < 0.0 || (clings && height_mm < reach_mm && now.velocity_mm_per_s[2] >= 0.0);
             if clings && height_mm >= 0.0 {
@@ -88,7 +88,7 @@ pub(super) const CONVERTER_RIPPLE: Definition = Definition {
     make: |knobs| {
         let period_counts = knobs.between("period_counts", 40.0, 140.0);
         let amplitude_counts = knobs.scaled("amplitude_counts", 3.0);
-        Stage::converter(move |count| count + amplitude_counts * (TAU * count / period_counts).sin())
+        PipelineHook::converter(move |count| count + amplitude_counts * (TAU * count / period_counts).sin())
     },
 };
 
@@ -102,7 +102,7 @@ pub(super) const RINGING: Definition = Definition {
         let time_s = knobs.between("time_constant_s", 0.2, 0.6);
         let swing_s = knobs.scaled("swing_s", 0.02);
         let (mut last_mm_per_s, mut since_s, mut struck_mm) = (0.0_f64, 0.0, 0.0);
-        Stage::depth(move |now, depth_mm| {
+        PipelineHook::depth(move |now, depth_mm| {
             let speed_mm_per_s = now.velocity_mm_per_s[2];
             since_s += now.dt_s;
             if speed_mm_per_s == 0.0 && last_mm_per_s != 0.0 {
@@ -125,7 +125,7 @@ pub(super) const STAGE_PICKUP: Definition = Definition {
     make: |knobs| {
         let counts = knobs.scaled("counts_at_10_mm_per_s", 6.0);
         let weights = knobs.per_element(-0.5, 1.5);
-        Stage::readout(move |now, readings| {
+        PipelineHook::readout(move |now, readings| {
             let speed = now.velocity_mm_per_s.map(|v| v * v).iter().sum::<f64>().sqrt() / 10.0;
             readings.iter_mut().zip(&weights).for_each(|(count, weight)| *count += counts * weight * speed);
         })
@@ -141,7 +141,7 @@ pub(super) const PROXIMITY: Definition = Definition {
         let scale_mm = knobs.between("scale_mm", 0.3, 1.0);
         let near_mm = knobs.scaled("near_mm", 0.03);
         let bump = bump(knobs);
-        Stage::covering(move |now, indentation_mm| {
+        PipelineHook::covering(move |now, indentation_mm| {
             bump(now, near_mm * left((-now.touch.depth_mm).max(0.0), scale_mm), indentation_mm);
         })
     },
@@ -155,7 +155,7 @@ pub(super) const GROUNDING: Definition = Definition {
     make: |knobs| {
         let shift_counts = knobs.sign("side") * knobs.scaled("shift_counts", 8.0);
         let weights = knobs.per_element(0.7, 1.3);
-        Stage::readout(move |now, counts| {
+        PipelineHook::readout(move |now, counts| {
             if now.touch.depth_mm > 0.0 {
                 counts.iter_mut().zip(&weights).for_each(|(count, weight)| *count += shift_counts * weight);
             }
@@ -172,7 +172,7 @@ pub(super) const ELECTRODE_TEXTURE: Definition = Definition {
         let length_mm = knobs.between("length_mm", 1.1, 1.7);
         let phase = knobs.between("phase_rad", 0.0, TAU);
         let contrast = knobs.scaled("contrast", 0.12);
-        Stage::depth(move |now, depth_mm| {
+        PipelineHook::depth(move |now, depth_mm| {
             let [x, y] = now.touch.point_mm.map(|at_mm| (TAU * at_mm / length_mm + phase).cos());
             depth_mm * (1.0 + contrast * x * y)
         })
@@ -189,7 +189,7 @@ pub(super) const BULGE: Definition = Definition {
         let width_mm = knobs.between("width_mm", 0.8, 1.5);
         let lift = knobs.scaled("lift", 0.06);
         let centres_mm = knobs.centres_mm();
-        Stage::covering(move |now, indentation_mm| {
+        PipelineHook::covering(move |now, indentation_mm| {
             let depth_mm = now.touch.depth_mm.max(0.0);
             for (value, centre_mm) in indentation_mm.iter_mut().zip(&centres_mm) {
                 let [x, y] = minus(*centre_mm, now.touch.point_mm);

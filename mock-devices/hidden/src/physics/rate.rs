@@ -1,6 +1,6 @@
 //! Covering: response that depends on the speed of loading.
 
-use super::{Definition, Stage};
+use super::{Definition, PipelineHook};
 
 pub(super) const POWER: Definition = Definition {
     id: "rate-power",
@@ -10,7 +10,7 @@ pub(super) const POWER: Definition = Definition {
     make: |knobs| {
         let exponent = knobs.between("exponent", 0.25, 0.6);
         let share = knobs.scaled("share_at_1_mm_per_s", 0.12);
-        Stage::depth(move |now, depth_mm| {
+        PipelineHook::depth(move |now, depth_mm| {
             let inward_mm_per_s = (-now.velocity_mm_per_s[2]).max(0.0);
             depth_mm * (1.0 + share * inward_mm_per_s.powf(exponent))
         })
@@ -26,7 +26,7 @@ pub(super) const LOGARITHMIC: Definition = Definition {
         let scale_mm_per_s = knobs.decade("scale_mm_per_s", 0.05, 0.5);
         let share = knobs.scaled("share", 0.05);
         let mut loaded_mm_per_s = 0.0;
-        Stage::depth(move |now, depth_mm| {
+        PipelineHook::depth(move |now, depth_mm| {
             let inward_mm_per_s = -now.velocity_mm_per_s[2];
             if depth_mm <= 0.0 {
                 loaded_mm_per_s = 0.0;

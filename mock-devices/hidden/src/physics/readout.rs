@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use super::relaxation::Branches;
-use super::{Definition, Stage, shift};
+use super::{Definition, PipelineHook, shift};
 
 pub(super) const SECOND_ORDER: Definition = Definition {
     id: "low-pass-second-order",
@@ -16,7 +16,7 @@ pub(super) const SECOND_ORDER: Definition = Definition {
         // About the baselines, where the branches begin.
         let baselines = knobs.baselines_counts();
         let mut poles = [Branches::new(vec![time_s]), Branches::new(vec![time_s])];
-        Stage::readout(move |now, counts| {
+        PipelineHook::readout(move |now, counts| {
             counts.iter_mut().zip(&baselines).for_each(|(count, baseline)| *count -= baseline);
             if now.dt_s > 0.0 {
                 for pole in &mut poles {
@@ -39,8 +39,8 @@ pub(super) const MOVING_AVERAGE: Definition = Definition {
     is_fine: true,
     make: |knobs| {
         let window_s = knobs.scaled("window_s", 0.07);
-        let mut past = Past::default();
-        Stage::readout(move |now, counts| {
+        let mut past = ReadingHistory::default();
+        PipelineHook::readout(move |now, counts| {
             past.push(now.t_s, counts, window_s);
             past.mean(now.t_s, window_s, counts);
         })
@@ -83,7 +83,7 @@ pub(super) const SINE: Definition = Definition {
         let phase = knobs.between("phase_rad", 0.0, TAU);
         let amplitude_counts = knobs.scaled("amplitude_counts", 3.0);
         let weights = knobs.per_element(0.6, 1.4);
-        Stage::readout(move |now, counts| {
+        PipelineHook::readout(move |now, counts| {
             let tone = amplitude_counts * (TAU * frequency_hz * now.t_s + phase).sin();
             counts.iter_mut().zip(&weights).for_each(|(count, weight)| *count += weight * tone);
         })
@@ -101,7 +101,7 @@ pub(super) const HARMONICS: Definition = Definition {
         let step = knobs.between("phase_per_row_rad", 0.0, 0.5);
         let amplitude_counts = knobs.scaled("amplitude_counts", 3.0);
         let cols = knobs.sensor.model.array().cols();
-        Stage::readout(move |now, counts| {
+        PipelineHook::readout(move |now, counts| {
             for (row, of_row) in counts.chunks_exact_mut(cols).enumerate() {
                 let angle = TAU * frequency_hz * now.t_s + step * row as f64;
                 let tone = amplitude_counts * (angle.sin() + harmonic * (2.0 * angle).sin());
@@ -120,17 +120,17 @@ pub(super) const COARSE_STEPS: Definition = Definition {
         let declared = knobs.sensor.model.array().step_counts();
         let steps = (16.0 * knobs.strength).round();
         knobs.keep("step_counts", steps * declared);
-        Stage::converter(move |count| {
+        PipelineHook::converter(move |count| {
             if steps > 1.0 { (count / (steps * declared)).round() * (steps * declared) } else { count }
         })
     },
 };
 
-/// Readings of a while ago, straight between steps: time, counts, and their integral since the first step.
+/// Past readings, linear between steps: time, counts, and their integral since the first step.
 #[derive(Debug, Default)]
-struct Past(VecDeque<(f64, Vec<f64>, Vec<f64>)>);
+struct ReadingHistory(VecDeque<(f64, Vec<f64>, Vec<f64>)>);
 
-impl Past {
+impl ReadingHistory {
     fn push(&mut self, t_s: f64, counts: &[f64], kept_s: f64) {
         let integral = match self.0.back() {
             Some((last_s, last, integral)) => {
@@ -147,7 +147,7 @@ impl Past {
         }
     }
 
-    /// Reading of an element at an earlier time; the earliest known before that.
+    /// Reading of an element at an earlier time; the earliest known one before that.
     fn at(&self, t_s: f64, element: usize) -> f64 {
         let after = self.after(t_s);
         let (after_s, later, _) = &self.0[after];
@@ -158,7 +158,7 @@ impl Past {
         earlier[element] + (later[element] - earlier[element]) * (t_s - before_s) / (after_s - before_s)
     }
 
-    /// Means over the last `window_s`, into `means`.
+    /// Writes the means over the last `window_s` into `means`.
     fn mean(&self, t_s: f64, window_s: f64, means: &mut [f64]) {
         let Some((_, _, until)) = self.0.back().filter(|_| window_s > 0.0) else { return };
         let from_s = t_s - window_s;
@@ -176,10 +176,10 @@ impl Past {
     }
 }
 
-fn skewed(delays_s: Vec<f64>) -> Stage {
+fn skewed(delays_s: Vec<f64>) -> PipelineHook {
     let kept_s = delays_s.iter().copied().fold(0.0, f64::max);
-    let mut past = Past::default();
-    Stage::readout(move |now, counts| {
+    let mut past = ReadingHistory::default();
+    PipelineHook::readout(move |now, counts| {
         past.push(now.t_s, counts, kept_s);
         for ((element, count), delay_s) in counts.iter_mut().enumerate().zip(&delays_s) {
             *count = past.at(now.t_s - delay_s, element);

@@ -1,6 +1,6 @@
-//! Covering: response that changes while depth is held.
+//! Covering: response that changes at constant depth.
 
-use super::{Definition, Stage, left};
+use super::{Definition, PipelineHook, left};
 
 pub(super) const PRONY: Definition = Definition {
     id: "relaxation-prony",
@@ -43,7 +43,7 @@ pub(super) const LOGARITHMIC: Definition = Definition {
         let time_s = knobs.decade("time_constant_s", 0.1, 1.0);
         let by_decade = knobs.scaled("per_decade", 0.05);
         let mut in_contact_s = 0.0;
-        Stage::depth(move |now, depth_mm| {
+        PipelineHook::depth(move |now, depth_mm| {
             in_contact_s = if depth_mm > 0.0 { in_contact_s + now.dt_s } else { 0.0 };
             depth_mm * (1.0 + by_decade * (1.0 + in_contact_s / time_s).log10())
         })
@@ -64,7 +64,7 @@ impl Branches {
         Self { values: vec![Vec::new(); times_s.len()], times_s, last: Vec::new() }
     }
 
-    /// Goes on to an input. At the first one all branches stand at rest, at 0.
+    /// Advances to an input. At the first one all branches are at rest, at 0.
     pub(super) fn follow(&mut self, dt_s: f64, input: &[f64]) {
         self.last.resize(input.len(), 0.0);
         for (time_s, values) in self.times_s.iter().zip(&mut self.values) {
@@ -86,11 +86,11 @@ impl Branches {
     }
 }
 
-/// `u - sum of weight times branch`, the stress of a relaxing solid, as far as it presses: a tool does not pull, and
-/// one that is gone presses nothing, but what the solid has forgotten by then is missing in the next press.
-fn relaxing(times_s: Vec<f64>, weights: Vec<f64>) -> Stage {
+/// The stress of a relaxing solid, `u - sum of weight times branch`, while the tool touches and never negative: a tool
+/// does not pull. The branches continue out of contact, so that the next press is weaker.
+fn relaxing(times_s: Vec<f64>, weights: Vec<f64>) -> PipelineHook {
     let mut branches = Branches::new(times_s);
-    Stage::covering(move |now, indentation_mm| {
+    PipelineHook::covering(move |now, indentation_mm| {
         branches.follow(now.dt_s, indentation_mm);
         if now.touch.depth_mm <= 0.0 {
             return;
@@ -103,8 +103,8 @@ fn relaxing(times_s: Vec<f64>, weights: Vec<f64>) -> Stage {
 }
 
 /// Time constants and weights of exponentials that add up to `(1 + t/T)^-b`: its Laplace mixture
-/// `1/Gamma(b) integral s^(b-1) exp(-s) exp(-s t/T) ds`, in equal steps of `ln s`. What is slower than the slowest
-/// step, `integral s^(b-1) ds = s^b/b` below it, stands for ever.
+/// `1/Gamma(b) integral s^(b-1) exp(-s) exp(-s t/T) ds`, in equal steps of `ln s`. The part that is slower than the
+/// slowest step, `integral s^(b-1) ds = s^b/b` below it, never decays.
 pub(super) fn power_law(exponent: f64, time_s: f64) -> (Vec<f64>, Vec<f64>) {
     const STEP: f64 = 0.75;
     let rate_of = |step: f64| (STEP * step).exp();

@@ -1,10 +1,10 @@
-//! Covering: how far the press spreads, and where.
+//! Covering: how far a press spreads, and differences over the array.
 
 use std::f64::consts::PI;
 
 use tactus_solid::layered::{Base, Layer};
 
-use super::{Definition, Knobs, Stage, left, minus, scale};
+use super::{Definition, Knobs, PipelineHook, left, minus, scale};
 
 pub(super) const LAYERED_TAIL: Definition = Definition {
     id: "layered-tail",
@@ -52,7 +52,9 @@ pub(super) const STRETCHED: Definition = Definition {
         let along_x = knobs.sign("along_x") > 0.0;
         let stretch = 1.0 + knobs.scaled("stretch", 0.08);
         let by = if along_x { [stretch, 1.0 / stretch] } else { [1.0 / stretch, stretch] };
-        Stage::tool(move |_, tool| tool.sigma_mm = [tool.sigma_mm[0] * by[0], tool.sigma_mm[1] * by[1]])
+        PipelineHook::tool(move |_, tool| {
+            tool.sigma_mm = [tool.sigma_mm[0] * by[0], tool.sigma_mm[1] * by[1]]
+        })
     },
 };
 
@@ -64,7 +66,7 @@ pub(super) const WIDER_WITH_DEPTH: Definition = Definition {
     make: |knobs| {
         let growth = knobs.scaled("growth", 0.5);
         let thickness_mm = knobs.sensor.covering.thickness_mm;
-        Stage::tool(move |now, tool| {
+        PipelineHook::tool(move |now, tool| {
             let widened = (1.0 + growth * now.touch.depth_mm.clamp(0.0, thickness_mm) / thickness_mm).sqrt();
             tool.sigma_mm = tool.sigma_mm.map(|sigma_mm| sigma_mm * widened);
         })
@@ -79,7 +81,7 @@ pub(super) const NARROWER_AT_FIRST: Definition = Definition {
     make: |knobs| {
         let scale_mm = knobs.between("scale_mm", 0.15, 0.3);
         let narrowed = knobs.share("narrowed_share", 0.2).min(0.9);
-        Stage::tool(move |now, tool| {
+        PipelineHook::tool(move |now, tool| {
             let by = 1.0 - narrowed * left(now.touch.depth_mm.max(0.0), scale_mm);
             tool.sigma_mm = tool.sigma_mm.map(|sigma_mm| sigma_mm * by);
         })
@@ -95,7 +97,7 @@ pub(super) const SOFT_EDGE: Definition = Definition {
         let length_mm = knobs.between("length_mm", 0.8, 2.5);
         let change = (knobs.sign("side") * knobs.scaled("change", 0.2)).max(-1.0);
         let extent_mm = knobs.sensor.model.array().extent_mm();
-        Stage::covering(move |now, indentation_mm| {
+        PipelineHook::covering(move |now, indentation_mm| {
             let to_edge_mm = |axis: usize| {
                 let at_mm = now.touch.point_mm[axis];
                 (at_mm - extent_mm[axis][0]).min(extent_mm[axis][1] - at_mm)
@@ -115,15 +117,15 @@ pub(super) const SEAM: Definition = Definition {
         let width_mm = knobs.between("width_mm", 1.2, 2.5);
         let loss = knobs.share("loss", 0.2);
         let seam_mm = knobs.middle_mm()[0];
-        Stage::covering(move |now, indentation_mm| {
+        PipelineHook::covering(move |now, indentation_mm| {
             let by = 1.0 - loss * (1.0 - (now.touch.point_mm[0] - seam_mm).abs() / width_mm).max(0.0);
             scale(indentation_mm, by);
         })
     },
 };
 
-/// A share of the press that spreads by another kernel, of unit volume, evaluated at the elements' centres.
-fn tail(knobs: &mut Knobs<'_>, per_mm2: impl Fn(f64) -> f64) -> Stage {
+/// Spreads a share of the press by another kernel of unit volume, evaluated at the elements' centres.
+fn tail(knobs: &mut Knobs<'_>, per_mm2: impl Fn(f64) -> f64) -> PipelineHook {
     const STEP_MM: f64 = 0.05;
     const REACH_MM: f64 = 30.0;
     let weight = knobs.share("weight", 0.1);
@@ -135,7 +137,7 @@ fn tail(knobs: &mut Knobs<'_>, per_mm2: impl Fn(f64) -> f64) -> Stage {
     let face_mm2 = crate::sensor::diameter_mm(&knobs.sensor.indenter).powi(2) * PI / 4.0;
     let per_mm = face_mm2 * width_mm * height_mm / knobs.sensor.model.reference_mm2();
     let thickness_mm = knobs.sensor.covering.thickness_mm;
-    Stage::covering(move |now, indentation_mm| {
+    PipelineHook::covering(move |now, indentation_mm| {
         let depth_mm = now.touch.depth_mm.clamp(0.0, thickness_mm);
         if depth_mm <= 0.0 {
             return;

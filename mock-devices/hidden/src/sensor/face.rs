@@ -1,5 +1,5 @@
 //! The image of a cylinder's face that may lean, under a spread that may differ along x and y: by quadrature of the
-//! disc, apart from the base model's own way.
+//! disc, independent of the base model's method.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,7 +16,7 @@ const FOUR: [(f64, f64); 4] = [
     (0.930_568_155_797_026_3, 0.173_927_422_568_727),
 ];
 
-/// A face at a place, ready for any depth.
+/// A face at a place, prepared for any depth.
 ///
 /// ```text
 /// u_e = 1/d_ref sum over points of the face of dA max(0, depth + lean . (p - c) - |lean| D/2) G_x G_y
@@ -31,9 +31,9 @@ pub(super) struct Face(Vec<Point>);
 struct Point {
     /// Its share of the face, in units of the reference press.
     share: f64,
-    /// How far it stands above the face's lowest point.
+    /// Height above the face's lowest point.
     above_mm: f64,
-    /// What of it arrives in each column, and in each row.
+    /// The share that arrives in each column, and in each row.
     of_cols: Vec<f64>,
     of_rows: Vec<f64>,
 }
@@ -41,7 +41,7 @@ struct Point {
 impl Face {
     pub(super) fn new(model: &ForwardModel, [x_mm, y_mm]: [f64; 2], tool: &Tool) -> Self {
         let steepness = tool.lean[0].hypot(tool.lean[1]);
-        // What leans has a corner where the surface cuts through it.
+        // The depth over a leaning face has a kink where the surface cuts it.
         let (rings, points): (&[_], u32) = if steepness > 0.0 { (&FOUR, 12) } else { (&TWO, 6) };
         let array = model.array();
         let [width_mm, height_mm] = array.element_mm();

@@ -2,20 +2,18 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use tactus_hidden::{Base, CATALOGUE, Climate, Dose, Sensor};
+use tactus_hidden::{CATALOGUE, Climate, Dose, HiddenSensor, RandomRig};
 use tactus_sets::{Plan, Separation};
 
 /// Counts of a short bundle, clean, with one physics or none.
-fn counts(base: &Base, dose: Option<Dose>) -> Vec<f64> {
+fn counts(base: &RandomRig, dose: Option<Dose>) -> Vec<f64> {
     let array = &base.rig.array;
-    let course = Plan::Bundle
-        .courses(array, base.rig.registration, base.rig.covering, Some(900), 1)
-        .unwrap()
-        .remove(0);
-    let mut sensor = Sensor::new(&base.sensor, dose.as_slice(), Climate::new(1), 0);
+    let run =
+        Plan::Bundle.runs(array, base.rig.registration, base.rig.covering, Some(900), 1).unwrap().remove(0);
+    let mut sensor = HiddenSensor::new(&base.sensor, dose.as_slice(), Climate::new(1), 0);
     let mut all = Vec::new();
-    for frame in 0..course.frames {
-        sensor.step(frame as f64 / array.rate_hz(), &course.trajectory);
+    for frame in 0..run.frames {
+        sensor.step(frame as f64 / array.rate_hz(), &run.trajectory);
         all.extend(sensor.counts().iter().map(|count| sensor.convert(*count)));
     }
     all
@@ -23,7 +21,7 @@ fn counts(base: &Base, dose: Option<Dose>) -> Vec<f64> {
 
 #[test]
 fn every_physics_is_the_base_model_at_no_strength_and_differs_at_full_strength() {
-    let base = Base::new(11).unwrap();
+    let base = RandomRig::new(11).unwrap();
     let clean = counts(&base, None);
     for physics in CATALOGUE {
         let at = |strength, seed| counts(&base, Some(Dose { physics, strength, seed }));

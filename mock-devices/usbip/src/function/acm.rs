@@ -4,8 +4,8 @@
 //! Class Definitions for Communication Devices 1.2, section 5.2.3 (functional descriptors), and its PSTN subclass
 //! 1.2: section 5.3 (descriptors), table 13 (requests), table 17 (line coding).
 
-use super::{Function, Place, Reply, ended_by_short};
-use crate::descriptor::{Carrier, Class, Endpoint, Group, IN, Interface, Speed};
+use super::{ControlReply, FirstNumbers, Function, ended_by_short};
+use crate::descriptor::{Class, Endpoint, FunctionDescriptors, IN, Interface, Speed, TransferType};
 use crate::setup::{Refused, Setup};
 
 const COMMUNICATION: Class = Class(2, 2, 1);
@@ -38,7 +38,7 @@ impl Acm {
 }
 
 impl Function for Acm {
-    fn group(&self, Place { interface, endpoint }: Place) -> Group {
+    fn group(&self, FirstNumbers { interface, endpoint }: FirstNumbers) -> FunctionDescriptors {
         let data = interface + 1;
         let class_descriptors = [
             // Header: release 1.10 of the class.
@@ -52,11 +52,12 @@ impl Function for Acm {
         ];
         let notifications = Endpoint {
             address: IN | (endpoint + 1),
-            carrier: Carrier::Interrupt { interval: 9 },
+            carrier: TransferType::Interrupt { interval: 9 },
             packet_bytes: 16,
         };
-        let bulk = |address| Endpoint { address, carrier: Carrier::Bulk, packet_bytes: self.packet_bytes };
-        Group {
+        let bulk =
+            |address| Endpoint { address, carrier: TransferType::Bulk, packet_bytes: self.packet_bytes };
+        FunctionDescriptors {
             interfaces: vec![
                 Interface {
                     number: interface,
@@ -74,18 +75,18 @@ impl Function for Acm {
         }
     }
 
-    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Reply, Refused> {
+    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<ControlReply, Refused> {
         match setup.request {
             SET_LINE_CODING => {
                 self.line_coding = data.try_into().map_err(|_| Refused)?;
-                Ok(Reply::DONE)
+                Ok(ControlReply::DONE)
             }
-            GET_LINE_CODING => Ok(Reply::Data(self.line_coding.to_vec())),
+            GET_LINE_CODING => Ok(ControlReply::Data(self.line_coding.to_vec())),
             SET_CONTROL_LINE_STATE => {
                 self.is_open = setup.value & DTR != 0;
-                Ok(Reply::DONE)
+                Ok(ControlReply::DONE)
             }
-            SEND_BREAK => Ok(Reply::DONE),
+            SEND_BREAK => Ok(ControlReply::DONE),
             _ => Err(Refused),
         }
     }

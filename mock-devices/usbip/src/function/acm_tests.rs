@@ -8,7 +8,7 @@ fn setup(request_type: u8, request: u8, value: u16) -> Setup {
 
 #[test]
 fn its_descriptors_to_the_byte() {
-    let group = Acm::new(Speed::High).group(Place { interface: 0, endpoint: 1 });
+    let group = Acm::new(Speed::High).group(FirstNumbers { interface: 0, endpoint: 1 });
     let golden = [
         &[9, 2, 75, 0, 2, 1, 0, 0x80, 50][..],
         // Both interfaces belong together; communication, abstract control.
@@ -32,9 +32,9 @@ fn its_descriptors_to_the_byte() {
 fn it_is_open_while_the_host_is_ready() {
     let mut acm = Acm::new(Speed::High);
     assert!(!acm.is_open());
-    assert_eq!(acm.control(setup(0x21, SET_CONTROL_LINE_STATE, 3), &[]), Ok(Reply::DONE));
+    assert_eq!(acm.control(setup(0x21, SET_CONTROL_LINE_STATE, 3), &[]), Ok(ControlReply::DONE));
     assert!(acm.is_open());
-    assert_eq!(acm.control(setup(0x21, SET_CONTROL_LINE_STATE, 0), &[]), Ok(Reply::DONE));
+    assert_eq!(acm.control(setup(0x21, SET_CONTROL_LINE_STATE, 0), &[]), Ok(ControlReply::DONE));
     assert!(!acm.is_open());
 }
 
@@ -43,11 +43,11 @@ fn it_keeps_its_line_coding_and_refuses_what_is_none() {
     let mut acm = Acm::new(Speed::High);
     // 115200 baud, 8N1.
     let get = setup(0xA1, GET_LINE_CODING, 0);
-    assert_eq!(acm.control(get, &[]), Ok(Reply::Data(vec![0x00, 0xC2, 0x01, 0x00, 0, 0, 8])));
+    assert_eq!(acm.control(get, &[]), Ok(ControlReply::Data(vec![0x00, 0xC2, 0x01, 0x00, 0, 0, 8])));
     let nine_thousand_six_hundred = [0x80, 0x25, 0, 0, 0, 0, 8];
     let set = setup(0x21, SET_LINE_CODING, 0);
-    assert_eq!(acm.control(set, &nine_thousand_six_hundred), Ok(Reply::DONE));
-    assert_eq!(acm.control(get, &[]), Ok(Reply::Data(nine_thousand_six_hundred.to_vec())));
+    assert_eq!(acm.control(set, &nine_thousand_six_hundred), Ok(ControlReply::DONE));
+    assert_eq!(acm.control(get, &[]), Ok(ControlReply::Data(nine_thousand_six_hundred.to_vec())));
     assert_eq!(acm.control(set, &[1, 2]), Err(Refused));
     assert_eq!(acm.control(setup(0x21, 0x55, 0), &[]), Err(Refused));
 }

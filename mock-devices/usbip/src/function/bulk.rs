@@ -5,8 +5,8 @@
 //! # Source
 //! USB 2.0, section 5.8.
 
-use super::{Function, Place, Reply, ended_by_short};
-use crate::descriptor::{Carrier, Class, Endpoint, Group, IN, Interface, Speed};
+use super::{ControlReply, FirstNumbers, Function, ended_by_short};
+use crate::descriptor::{Class, Endpoint, FunctionDescriptors, IN, Interface, Speed, TransferType};
 use crate::setup::{Refused, Setup};
 
 /// Frames at a bulk endpoint.
@@ -24,18 +24,19 @@ impl Bulk {
 }
 
 impl Function for Bulk {
-    fn group(&self, Place { interface, endpoint }: Place) -> Group {
-        let bulk = |address| Endpoint { address, carrier: Carrier::Bulk, packet_bytes: self.packet_bytes };
+    fn group(&self, FirstNumbers { interface, endpoint }: FirstNumbers) -> FunctionDescriptors {
+        let bulk =
+            |address| Endpoint { address, carrier: TransferType::Bulk, packet_bytes: self.packet_bytes };
         let interface = Interface {
             number: interface,
             class: Class::VENDOR,
             class_descriptors: Vec::new(),
             endpoints: vec![bulk(IN | endpoint), bulk(endpoint)],
         };
-        Group { interfaces: vec![interface] }
+        FunctionDescriptors { interfaces: vec![interface] }
     }
 
-    fn control(&mut self, _setup: Setup, _data: &[u8]) -> Result<Reply, Refused> {
+    fn control(&mut self, _setup: Setup, _data: &[u8]) -> Result<ControlReply, Refused> {
         Err(Refused)
     }
 

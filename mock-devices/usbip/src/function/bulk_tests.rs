@@ -3,7 +3,7 @@ use crate::descriptor::configuration;
 
 #[test]
 fn its_descriptors_to_the_byte() {
-    let group = Bulk::new(Speed::High, 106).group(Place { interface: 3, endpoint: 5 });
+    let group = Bulk::new(Speed::High, 106).group(FirstNumbers { interface: 3, endpoint: 5 });
     let golden = [
         &[9, 2, 32, 0, 1, 1, 0, 0x80, 50][..],
         &[9, 4, 3, 0, 2, 0xFF, 0xFF, 0xFF, 0],

@@ -9,9 +9,9 @@
 
 use std::time::Duration;
 
-use super::{Function, Place, Reply};
-use crate::descriptor::{Carrier, Class, Endpoint, Group, IN, Interface, Speed};
-use crate::setup::{Kind, Refused, Setup};
+use super::{ControlReply, FirstNumbers, Function};
+use crate::descriptor::{Class, Endpoint, FunctionDescriptors, IN, Interface, Speed, TransferType};
+use crate::setup::{Refused, RequestKind, Setup};
 
 const RESET: u8 = 0;
 const SET_MODEM_CTRL: u8 = 1;
@@ -61,20 +61,20 @@ impl Ftdi {
 }
 
 impl Function for Ftdi {
-    fn group(&self, Place { interface, endpoint }: Place) -> Group {
+    fn group(&self, FirstNumbers { interface, endpoint }: FirstNumbers) -> FunctionDescriptors {
         let packet_bytes = Self::SPEED.bulk_packet_bytes();
-        let bulk = |address| Endpoint { address, carrier: Carrier::Bulk, packet_bytes };
+        let bulk = |address| Endpoint { address, carrier: TransferType::Bulk, packet_bytes };
         let interface = Interface {
             number: interface,
             class: Class::VENDOR,
             class_descriptors: Vec::new(),
             endpoints: vec![bulk(IN | endpoint), bulk(endpoint + 1)],
         };
-        Group { interfaces: vec![interface] }
+        FunctionDescriptors { interfaces: vec![interface] }
     }
 
-    fn control(&mut self, setup: Setup, _data: &[u8]) -> Result<Reply, Refused> {
-        if setup.kind() != Some(Kind::Vendor) {
+    fn control(&mut self, setup: Setup, _data: &[u8]) -> Result<ControlReply, Refused> {
+        if setup.kind() != Some(RequestKind::Vendor) {
             return Err(Refused);
         }
         match setup.request {
@@ -82,18 +82,18 @@ impl Function for Ftdi {
                 if setup.value & DTR_MEANT != 0 {
                     self.is_open = setup.value & DTR != 0;
                 }
-                Ok(Reply::DONE)
+                Ok(ControlReply::DONE)
             }
             SET_LATENCY_TIMER => {
                 let latency_ms = u8::try_from(setup.value).ok().filter(|latency_ms| *latency_ms > 0);
                 self.latency_ms = latency_ms.ok_or(Refused)?;
-                Ok(Reply::DONE)
+                Ok(ControlReply::DONE)
             }
             RESET | SET_FLOW_CTRL | SET_BAUD_RATE | SET_DATA | SET_EVENT_CHAR | SET_ERROR_CHAR
-            | SET_BITMODE => Ok(Reply::DONE),
-            GET_MODEM_STATUS => Ok(Reply::Data(STATUS.to_vec())),
-            GET_LATENCY_TIMER => Ok(Reply::Data(vec![self.latency_ms])),
-            READ_EEPROM => Ok(Reply::Data(ERASED.to_vec())),
+            | SET_BITMODE => Ok(ControlReply::DONE),
+            GET_MODEM_STATUS => Ok(ControlReply::Data(STATUS.to_vec())),
+            GET_LATENCY_TIMER => Ok(ControlReply::Data(vec![self.latency_ms])),
+            READ_EEPROM => Ok(ControlReply::Data(ERASED.to_vec())),
             _ => Err(Refused),
         }
     }

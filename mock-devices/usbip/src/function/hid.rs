@@ -4,9 +4,9 @@
 //! Device Class Definition for Human Interface Devices 1.11: section 6.2.1 (the HID descriptor), section 6.2.2
 //! (report descriptors), section 7.2 (requests). USB 2.0, section 5.7.3: an interrupt endpoint's packets.
 
-use super::{Function, Place, Reply};
-use crate::descriptor::{Carrier, Class, Endpoint, Group, IN, Interface};
-use crate::setup::{Kind, Refused, Setup, standard};
+use super::{ControlReply, FirstNumbers, Function};
+use crate::descriptor::{Class, Endpoint, FunctionDescriptors, IN, Interface, TransferType};
+use crate::setup::{Refused, RequestKind, Setup, standard};
 
 const CLASS: Class = Class(3, 0, 0);
 
@@ -67,8 +67,8 @@ fn report_descriptor(report_bytes: u16, number: Option<u8>) -> Vec<u8> {
 }
 
 impl Function for Hid {
-    fn group(&self, Place { interface, endpoint }: Place) -> Group {
-        let carrier = Carrier::Interrupt { interval: INTERVAL };
+    fn group(&self, FirstNumbers { interface, endpoint }: FirstNumbers) -> FunctionDescriptors {
+        let carrier = TransferType::Interrupt { interval: INTERVAL };
         let reports = Endpoint { address: IN | endpoint, carrier, packet_bytes: self.report_bytes };
         let interface = Interface {
             number: interface,
@@ -76,20 +76,20 @@ impl Function for Hid {
             class_descriptors: self.hid_descriptor(),
             endpoints: vec![reports],
         };
-        Group { interfaces: vec![interface] }
+        FunctionDescriptors { interfaces: vec![interface] }
     }
 
-    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<Reply, Refused> {
+    fn control(&mut self, setup: Setup, data: &[u8]) -> Result<ControlReply, Refused> {
         match (setup.kind(), setup.request) {
-            (Some(Kind::Standard), standard::GET_DESCRIPTOR) => match setup.descriptor() {
-                (HID_DESCRIPTOR, 0) => Ok(Reply::Data(self.hid_descriptor())),
-                (REPORT_DESCRIPTOR, 0) => Ok(Reply::Data(self.descriptor.clone())),
+            (Some(RequestKind::Standard), standard::GET_DESCRIPTOR) => match setup.descriptor() {
+                (HID_DESCRIPTOR, 0) => Ok(ControlReply::Data(self.hid_descriptor())),
+                (REPORT_DESCRIPTOR, 0) => Ok(ControlReply::Data(self.descriptor.clone())),
                 _ => Err(Refused),
             },
-            (Some(Kind::Class), GET_REPORT) => Ok(Reply::Data(self.last.clone())),
-            (Some(Kind::Class), GET_IDLE) => Ok(Reply::Data(vec![0])),
-            (Some(Kind::Class), SET_IDLE) => Ok(Reply::DONE),
-            (Some(Kind::Class), SET_REPORT) => Ok(Reply::Heard(data.to_vec())),
+            (Some(RequestKind::Class), GET_REPORT) => Ok(ControlReply::Data(self.last.clone())),
+            (Some(RequestKind::Class), GET_IDLE) => Ok(ControlReply::Data(vec![0])),
+            (Some(RequestKind::Class), SET_IDLE) => Ok(ControlReply::DONE),
+            (Some(RequestKind::Class), SET_REPORT) => Ok(ControlReply::Heard(data.to_vec())),
             _ => Err(Refused),
         }
     }

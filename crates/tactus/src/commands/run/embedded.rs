@@ -9,7 +9,7 @@ use tactus_engine::{Engine, StopOrder};
 use tactus_plan::{Arguments, Script};
 use tactus_runner::config;
 use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, TruthError, TruthFile};
-use tactus_runner::order::Ask;
+use tactus_runner::order::RunRequest;
 use tactus_schema::pb::{self, RunPhase};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::{MissedTickBehavior, interval};
@@ -47,11 +47,11 @@ pub(super) fn run(
         let hidden = hidden.unwrap_or_default();
         println!("SIMULATED: running on the embedded simulated rig {:?} ({why}; {time}{hidden})", rig.name);
     }
-    let ask = Ask { script, arguments, seed: args.experiment.seed, who: args.who.clone() };
+    let request = RunRequest { script, arguments, seed: args.experiment.seed, who: args.who.clone() };
     let simulated = rig.simulated;
     let silent = common.json;
     let mut attending = None;
-    let done = embedded::run(&files, truth.as_ref(), ask, &args.out, pace, |engine, _| {
+    let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, |engine, _| {
         attending = attend(engine.clone(), silent);
     });
     if let Some(attending) = attending {

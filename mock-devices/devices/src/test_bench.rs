@@ -8,25 +8,25 @@ use tokio::time::Instant;
 
 use crate::cable::Device;
 use crate::truth::Truth;
-use crate::world::{Shared, World};
+use crate::world::{SharedWorld, World};
 
 pub(crate) fn sim_rig() -> Rig {
     Rig::from_toml(include_str!("../../../config/rigs/sim.toml")).unwrap()
 }
 
-pub(crate) fn world_of(rig: &Rig, seed: u64) -> Shared {
-    Shared::new(World::new(Arc::new(Truth::of_rig(rig, seed)), rig.covering))
+pub(crate) fn world_of(rig: &Rig, seed: u64) -> SharedWorld {
+    SharedWorld::new(World::new(Arc::new(Truth::of_rig(rig, seed)), rig.covering))
 }
 
 /// A device, the world around it, and the present instant.
-pub(crate) struct Bench<D> {
+pub(crate) struct DeviceBench<D> {
     pub(crate) device: D,
-    pub(crate) world: Shared,
+    pub(crate) world: SharedWorld,
     pub(crate) now: Instant,
 }
 
-impl<D: Device> Bench<D> {
-    pub(crate) fn new(rig: &Rig, seed: u64, device: impl FnOnce(Shared, Instant) -> D) -> Self {
+impl<D: Device> DeviceBench<D> {
+    pub(crate) fn new(rig: &Rig, seed: u64, device: impl FnOnce(SharedWorld, Instant) -> D) -> Self {
         let (world, now) = (world_of(rig, seed), Instant::now());
         Self { device: device(world.clone(), now), world, now }
     }

@@ -4,9 +4,9 @@ use tactus_bus::Publisher;
 use tactus_engine::Publish;
 use tactus_schema::{Frame, pb};
 
-pub(super) struct OnBus(pub(super) Publisher);
+pub(super) struct BusPublisher(pub(super) Publisher);
 
-impl Publish for OnBus {
+impl Publish for BusPublisher {
     fn sensor_info(&self, info: &pb::SensorInfo) {
         self.0.publish(info);
     }

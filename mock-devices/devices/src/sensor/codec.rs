@@ -30,7 +30,7 @@ const TEMPERATURE_C: f32 = 25.0;
 
 /// A protocol's device side.
 #[derive(Debug)]
-pub(super) enum Voice {
+pub(super) enum DeviceCodec {
     Weiss { checksum: Checksum, decoder: weiss::Decoder },
     SingleTact { addresses: Vec<u8>, decoder: singletact::Decoder },
     AnySkin,
@@ -39,7 +39,7 @@ pub(super) enum Voice {
 
 /// What a host asks.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Asked {
+pub(super) enum HostRequest {
     Weiss(Result<HostCommand, CommandError>),
     SingleTact { address: u8, id: u8, asked: Register },
 }
@@ -79,7 +79,7 @@ impl DeviceClock {
     }
 }
 
-impl Voice {
+impl DeviceCodec {
     pub(super) fn of(codec: &SensorCodec) -> Self {
         match codec {
             SensorCodec::WeissDsa { checksum } => {
@@ -128,13 +128,13 @@ impl Voice {
     }
 
     /// What it makes of bytes from the host. Real firmware does not answer what it cannot read.
-    pub(super) fn hear(&mut self, bytes: &[u8]) -> Vec<Asked> {
+    pub(super) fn decode(&mut self, bytes: &[u8]) -> Vec<HostRequest> {
         let mut asked = Vec::new();
         match self {
             Self::Weiss { decoder, .. } => {
                 decoder.push(bytes);
                 while let Some(packet) = decoder.next_packet() {
-                    asked.extend(packet.ok().map(|packet| Asked::Weiss(HostCommand::parse(&packet))));
+                    asked.extend(packet.ok().map(|packet| HostRequest::Weiss(HostCommand::parse(&packet))));
                 }
             }
             Self::SingleTact { decoder, .. } => {
@@ -147,7 +147,7 @@ impl Voice {
                         Operation::Read { location, bytes } => Register::Other { location, bytes },
                         Operation::Write { .. } | Operation::Calibrate { .. } => Register::Written,
                     };
-                    asked.push(Asked::SingleTact { address, id, asked: register });
+                    asked.push(HostRequest::SingleTact { address, id, asked: register });
                 }
             }
             Self::AnySkin | Self::Declared { .. } => {}
@@ -156,7 +156,7 @@ impl Voice {
     }
 
     /// A frame is not sent; a device that counts its frames counts it.
-    pub(super) fn pass_over(&mut self) {
+    pub(super) fn skip_frame(&mut self) {
         match self {
             Self::Declared { encoder, .. } => encoder.lose_frame(),
             Self::Weiss { .. } | Self::SingleTact { .. } | Self::AnySkin => {}

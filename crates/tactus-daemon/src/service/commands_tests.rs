@@ -34,7 +34,7 @@ async fn ask_while_homing() -> Result<u32, mpsc::RecvTimeoutError> {
     let service = rig.service.clone().unwrap();
     let opened = devices::open(&rig, &service, codec, || Truth::of_rig(&rig, 1), clock);
     let engine = Engine::start(rig.clone(), opened.devices, clock, Arc::new(Unpublished)).unwrap();
-    let desk = Desk::new(engine.clone(), config, bus.publisher());
+    let desk = CommandDesk::new(engine.clone(), config, bus.publisher());
 
     let homing = tokio::spawn(async move { engine.reset().await });
     let (done, ended) = mpsc::channel();

@@ -4,10 +4,10 @@ use std::fmt::Debug;
 
 use tactus_model::{Covering, Moment, Pipeline, Trail};
 
-use tactus_hidden::Sensor;
+use tactus_hidden::HiddenSensor;
 
 /// A sensor in time, as the world asks it.
-pub(crate) trait Feel: Debug + Send {
+pub(crate) trait SensorModel: Debug + Send {
     /// Counts of every element at a moment, row-major, before noise and converter.
     fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64];
 
@@ -27,7 +27,7 @@ pub(crate) trait Feel: Debug + Send {
     fn set_stiffness(&mut self, stiffness: f64);
 }
 
-impl Feel for Pipeline {
+impl SensorModel for Pipeline {
     fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64] {
         self.step(moment, trail)
     }
@@ -53,7 +53,7 @@ impl Feel for Pipeline {
     }
 }
 
-impl Feel for Sensor {
+impl SensorModel for HiddenSensor {
     fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64] {
         self.step(moment.t_s, trail)
     }

@@ -1,4 +1,4 @@
-//! The sensor below the physics: what a lab declares, and what is true.
+//! A rig drawn from a seed: what a lab declares, and the true sensor.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -9,28 +9,18 @@ use tactus_model::{
 use tactus_schema::Rig;
 use tactus_schema::rig::SensitivityReference;
 
-/// A rig as declared, and the true sensor behind it. The difference is for recalibration to find: gains differ by 10 %
-/// from element to element, baselines lie in 80-120 counts, both parameters of the spread are off by up to 5 %.
+/// A rig as declared, and the true sensor behind it. A recalibration finds the difference: gains scatter by 10 % from
+/// element to element, baselines are 80 to 120 counts, both parameters of the spread are off by up to 5 %.
 #[derive(Debug, Clone)]
-pub struct Base {
-    /// What stands in the table.
+pub struct RandomRig {
+    /// The rig in the measurement table.
     pub rig: Rig,
-    /// What makes the counts: the true base model, no effects.
+    /// The true base model, without effects and noise.
     pub sensor: Simulator,
 }
 
-/// The room's temperature: a mean, a slow trend and a slow swing.
-#[derive(Debug, Clone, Copy)]
-pub struct Climate {
-    mean_c: f64,
-    trend_c: f64,
-    swing_c: f64,
-    period_s: f64,
-    phase_rad: f64,
-}
-
-impl Base {
-    /// The base of a seed. Registration and surface are as declared.
+impl RandomRig {
+    /// The rig of a seed. Registration and surface are as declared.
     ///
     /// # Errors
     /// None for any seed: the parameters are within the model's ranges.
@@ -83,40 +73,16 @@ impl Base {
         };
         Ok(Self { rig, sensor })
     }
-}
 
-impl Base {
-    /// The same sensor under a spread so many times as wide.
+    /// The same sensor with a spread that is `by` times as wide.
     ///
     /// # Errors
-    /// If the spread is then out of the model's range.
+    /// If the model does not accept that spread.
     pub fn spread_by(&self, by: f64) -> Result<Self, ModelError> {
         let model = &self.sensor.model;
         let Psf { sigma_intercept_mm, sigma_per_mm } = model.psf();
         let psf = Psf { sigma_intercept_mm: by * sigma_intercept_mm, sigma_per_mm: by * sigma_per_mm };
         let model = ForwardModel::new(model.array().clone(), psf, model.response().clone())?;
         Ok(Self { rig: self.rig.clone(), sensor: Simulator { model, ..self.sensor.clone() } })
-    }
-}
-
-impl Climate {
-    /// The climate of a seed.
-    pub fn new(seed: u64) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        Self {
-            mean_c: rng.random_range(19.0..25.0),
-            trend_c: rng.random_range(-2.0..2.0),
-            swing_c: rng.random_range(0.3..1.2),
-            period_s: rng.random_range(80.0..400.0),
-            phase_rad: rng.random_range(0.0..std::f64::consts::TAU),
-        }
-    }
-
-    /// Temperature at a time.
-    pub fn at(&self, t_s: f64) -> f64 {
-        let Self { mean_c, trend_c, swing_c, period_s, phase_rad } = self;
-        // The trend is spent over a quarter of an hour.
-        let trend = trend_c * (1.0 - (-t_s / 300.0).exp());
-        mean_c + trend + swing_c * (std::f64::consts::TAU * t_s / period_s + phase_rad).sin()
     }
 }

@@ -5,11 +5,11 @@ use rand_chacha::ChaCha8Rng;
 use tokio::time::Instant;
 
 use crate::faults::LinkFault;
-use crate::truth::Draw;
+use crate::truth::RandomStream;
 
 /// Armed faults; each strikes the next frame or frames and is gone.
 #[derive(Debug)]
-pub(super) struct Tamper {
+pub(super) struct LinkFaults {
     rng: ChaCha8Rng,
     armed: Armed,
 }
@@ -35,9 +35,9 @@ struct Armed {
     burst: Vec<u8>,
 }
 
-impl Tamper {
+impl LinkFaults {
     pub(super) fn new(seed: u64) -> Self {
-        Self { rng: Draw::SensorLink.rng(seed), armed: Armed::default() }
+        Self { rng: RandomStream::SensorLink.rng(seed), armed: Armed::default() }
     }
 
     /// Has a fault strike from now on.

@@ -7,8 +7,8 @@ use tactus_bus::{CommandCall, Publisher, Request};
 use tactus_engine::{Engine, ResetError, StopOrder};
 use tactus_plan::{Arguments, Script};
 use tactus_runner::config::Config;
-use tactus_runner::order::{self, Ask};
-use tactus_runner::recorder::OnThread;
+use tactus_runner::order::{self, RunRequest};
+use tactus_runner::recorder::ThreadRecorder;
 use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
 use tactus_schema::{MonoTime, pb};
@@ -26,19 +26,19 @@ mod exit {
 }
 
 /// Answers commands for one engine.
-pub(super) struct Desk {
+pub(super) struct CommandDesk {
     engine: Engine,
     config: Config,
     publisher: Publisher,
 }
 
 /// Why a command was not done.
-struct No {
+struct Refusal {
     exit_code: u32,
     error: String,
 }
 
-impl Desk {
+impl CommandDesk {
     pub(super) fn new(engine: Engine, config: Config, publisher: Publisher) -> Self {
         Self { engine, config, publisher }
     }
@@ -83,77 +83,78 @@ impl Desk {
         }
     }
 
-    fn pause(&self) -> Result<(), No> {
-        if self.engine.pause() { Ok(()) } else { Err(No::failed("no run is in progress")) }
+    fn pause(&self) -> Result<(), Refusal> {
+        if self.engine.pause() { Ok(()) } else { Err(Refusal::failed("no run is in progress")) }
     }
 
-    fn resume(&self) -> Result<(), No> {
-        if self.engine.resume() { Ok(()) } else { Err(No::failed("no run is paused")) }
+    fn resume(&self) -> Result<(), Refusal> {
+        if self.engine.resume() { Ok(()) } else { Err(Refusal::failed("no run is paused")) }
     }
 
-    async fn reset(&self) -> Result<(), No> {
+    async fn reset(&self) -> Result<(), Refusal> {
         info!("reset: clearing the stage's alarm and homing");
         self.engine.reset().await.map_err(|error| match error {
-            ResetError::Busy(busy) => No::not_now(busy),
-            ResetError::Stopped(_) | ResetError::Stage(_) | ResetError::NotReady(_) => No::failed(error),
+            ResetError::Busy(busy) => Refusal::not_now(busy),
+            ResetError::Stopped(_) | ResetError::Stage(_) | ResetError::NotReady(_) => Refusal::failed(error),
         })
     }
 
     /// Checks everything that can be checked, dry-runs, and starts the run.
-    async fn run(&self, request: pb::RunRequest) -> Result<(), No> {
+    async fn run(&self, request: pb::RunRequest) -> Result<(), Refusal> {
         // From here on a stop ends this run, be it before the dry run is over.
-        let claim = self.engine.claim().map_err(No::not_now)?;
+        let claim = self.engine.claim().map_err(Refusal::not_now)?;
         if let Some(fault) = self.engine.fault() {
-            return Err(No::refused(format!(
+            return Err(Refusal::refused(format!(
                 "{fault}: see that the tip is free to move, then `tactus reset`"
             )));
         }
         let script = self.script(&request)?;
-        let arguments = Arguments::from_json(&request.parameters_json).map_err(No::usage)?;
+        let arguments = Arguments::from_json(&request.parameters_json).map_err(Refusal::usage)?;
         let who = if request.who.is_empty() { "unknown".into() } else { request.who };
-        let ask = Ask { script, arguments, seed: request.seed, who };
+        let request = RunRequest { script, arguments, seed: request.seed, who };
         let rig = self.engine.rig();
         let now = self.engine.clock().now().wall;
-        let mut order = order::order(ask, &rig, now).map_err(No::usage)?;
+        let mut order = order::order(request, &rig, now).map_err(Refusal::usage)?;
 
         let twin_order = order.clone();
         let twin_rig = rig.clone();
         let plan = tokio::task::spawn_blocking(move || twin::dry_run(&twin_rig, twin_order))
             .await
-            .map_err(No::failed)?
-            .map_err(No::failed)?;
+            .map_err(Refusal::failed)?
+            .map_err(Refusal::failed)?;
         if !plan.is_possible() {
             let refused = plan.outcome.exit_status == pb::ExitStatus::Refused;
             let exit_code = if refused { exit::REFUSED } else { exit::FAILED };
-            return Err(No { exit_code, error: plan.outcome.message });
+            return Err(Refusal { exit_code, error: plan.outcome.message });
         }
-        claim.check().map_err(No::failed)?;
+        claim.check().map_err(Refusal::failed)?;
         order.planned = Some(plan.promise());
         let texts = self.config.rig.texts.all();
         let (recording, path) =
-            order::recording(&order, &rig, texts, &self.config.recordings, now).map_err(No::failed)?;
+            order::recording(&order, &rig, texts, &self.config.recordings, now).map_err(Refusal::failed)?;
         let path = std::path::absolute(&path).unwrap_or(path);
         info!(run = order.run_id, recording = %path.display(), presses = plan.promise().presses, "run accepted");
-        let record = Box::new(OnThread::start(recording).map_err(No::failed)?);
+        let record = Box::new(ThreadRecorder::start(recording).map_err(Refusal::failed)?);
         order.recording = path.display().to_string();
         let run_id = order.run_id.clone();
         tokio::spawn(claim.run(order, record));
         // The answer tells the state of the run that was asked for, not of the one before it.
-        self.engine.state().wait_for(|state| state.run_id == run_id).await.map(drop).map_err(No::failed)
+        self.engine.state().wait_for(|state| state.run_id == run_id).await.map(drop).map_err(Refusal::failed)
     }
 
-    fn script(&self, request: &pb::RunRequest) -> Result<Script, No> {
+    fn script(&self, request: &pb::RunRequest) -> Result<Script, Refusal> {
         if request.script.is_empty() {
-            experiments::named(&request.experiment, self.config.experiments.as_deref()).map_err(No::usage)
+            experiments::named(&request.experiment, self.config.experiments.as_deref())
+                .map_err(Refusal::usage)
         } else {
-            Script::parse(&request.experiment, &request.script).map_err(No::usage)
+            Script::parse(&request.experiment, &request.script).map_err(Refusal::usage)
         }
     }
 
-    fn reply(&self, done: Result<(), No>) -> pb::CommandReply {
+    fn reply(&self, done: Result<(), Refusal>) -> pb::CommandReply {
         let (ok, error, exit_code) = match done {
             Ok(()) => (true, String::new(), 0),
-            Err(No { exit_code, error }) => (false, error, exit_code),
+            Err(Refusal { exit_code, error }) => (false, error, exit_code),
         };
         pb::CommandReply {
             ok,
@@ -168,7 +169,7 @@ impl Desk {
     }
 }
 
-impl No {
+impl Refusal {
     fn failed(error: impl fmt::Display) -> Self {
         Self { exit_code: exit::FAILED, error: format!("{error}") }
     }
@@ -187,5 +188,5 @@ impl No {
 }
 
 #[cfg(test)]
-#[path = "answer_tests.rs"]
+#[path = "commands_tests.rs"]
 mod tests;
