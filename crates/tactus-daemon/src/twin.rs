@@ -7,7 +7,7 @@ use tactus_device::{Clock, SensorCodec};
 use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, Unpublished};
 use tactus_mock::{Truth, twin_of};
 use tactus_schema::rig::Transport;
-use tactus_schema::{Frame, Rig, Stamp, pb};
+use tactus_schema::{Frame, Rig, TimeStamp, pb};
 use tokio::time::timeout;
 use tracing::subscriber::NoSubscriber;
 
@@ -108,7 +108,7 @@ async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
 struct Unrecorded;
 
 impl Record for Unrecorded {
-    fn sensor_info(&mut self, _: &pb::SensorInfo, _: Stamp) -> Result<(), RecordFailure> {
+    fn sensor_info(&mut self, _: &pb::SensorInfo, _: TimeStamp) -> Result<(), RecordFailure> {
         Ok(())
     }
 

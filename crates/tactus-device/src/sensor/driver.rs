@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use tactus_schema::{Frame, FrameFlags, Rig, Stamp, pb};
+use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp, pb};
 use tokio::sync::mpsc;
 use tokio::time::sleep;
 
@@ -237,7 +237,7 @@ impl Driver {
     /// Makes a frame of a reading, the first of `together` that came at once.
     fn reading(
         &mut self,
-        now: Stamp,
+        now: TimeStamp,
         reading: Reading,
         together: usize,
         cause: &mut Cause,
