@@ -1,5 +1,5 @@
 use super::*;
-use crate::{readings::Readings, sensor::THIN_MM, synthetic_sensor::SyntheticSensor};
+use crate::{readings::Readings, synthetic_sensor::SyntheticSensor, synthetic_sensor::THIN_MM};
 
 fn health(declared: &Declared, readings: &Readings) -> Health {
     let place = SensorPose::declared(declared, THIN_MM);
