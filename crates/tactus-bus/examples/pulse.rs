@@ -14,7 +14,7 @@ use std::{error::Error, future::pending, pin::pin, time::Duration};
 
 use tactus_bus::{Bus, BusConfig, CommandCall, Endpoint, Publisher, Request};
 use tactus_schema::{
-    Frame, FrameFlags, MonoTime, Stamp, WallTime,
+    Frame, FrameFlags, MonoTime, TimeStamp, WallTime,
     key::{Command, Keys},
     pb::{self, run_event::Event},
 };
@@ -196,9 +196,9 @@ impl Pulse {
     }
 
     /// There is no wall clock in this rig: it counts from its own start.
-    fn now(&self) -> Stamp {
+    fn now(&self) -> TimeStamp {
         let mono = MonoTime::default().after(self.start.elapsed());
-        Stamp { mono, wall: WallTime::from_ns(mono.ns()) }
+        TimeStamp { mono, wall: WallTime::from_ns(mono.ns()) }
     }
 }
 

@@ -61,7 +61,7 @@ pub const OFFSETS_BETWEEN: [f64; 10] = [0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65
 const STEP_PER_RESOLUTION: f64 = 0.02;
 
 /// What each of the five elements reads, in steps of the force resolution.
-pub type Reading = [i32; ELEMENTS];
+pub type QuantisedReading = [i32; ELEMENTS];
 
 /// Share of the amplitude of a frequency that a Gaussian spread lets through: `exp(-2 (pi sigma u)^2)`, `sigma` in
 /// element widths and `u` in cycles per element width (Sec. 4).
@@ -120,7 +120,7 @@ impl DiscretisingSensor {
     }
 
     /// What the elements read of points of unit force (Eq. 5-7).
-    pub fn reading<const N: usize>(&self, points: [f64; N]) -> Reading {
+    pub fn reading<const N: usize>(&self, points: [f64; N]) -> QuantisedReading {
         self.round(self.shares(points))
     }
 
@@ -165,7 +165,7 @@ impl DiscretisingSensor {
         start: [f64; N],
         velocity: [f64; N],
         last: f64,
-    ) -> impl Iterator<Item = (f64, Reading)> {
+    ) -> impl Iterator<Item = (f64, QuantisedReading)> {
         let mut next = 0.0;
         iter::from_fn(move || {
             let step = next;
@@ -188,7 +188,7 @@ impl DiscretisingSensor {
         shares
     }
 
-    fn round(&self, shares: [f64; ELEMENTS]) -> Reading {
+    fn round(&self, shares: [f64; ELEMENTS]) -> QuantisedReading {
         #[expect(clippy::cast_possible_truncation, reason = "at most 2 / 0.00001")]
         shares.map(|share| (share / self.force_resolution + 0.5).floor() as i32)
     }

@@ -6,10 +6,11 @@ use serde::Serialize;
 use tactus_model::{Covering, ModelError, Psf, Response};
 
 use crate::{
-    Declared, Estimate, Form, Health, Readings, RegistrationFit, ResponseFit, SpreadFit, ThicknessFit,
+    Declared, Estimate, Health, Readings, RegistrationFit, ResponseFit, ResponseForm, SpreadFit,
+    ThicknessFit,
     faults::examine,
     order::median,
-    registration::{Place, register},
+    registration::{SensorPose, register},
     response::respond,
     setting::{coverings_mm, same_covering},
     spread::spreads,
@@ -20,7 +21,7 @@ use crate::{
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibration {
     /// What it rests on.
-    pub data: Data,
+    pub data: DataSummary,
     /// Noise of the median element at rest, in counts.
     pub noise_rms_counts: Option<f64>,
     /// Each element's reading at rest.
@@ -43,7 +44,7 @@ pub struct Calibration {
 
 /// What a calibration rests on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Data {
+pub struct DataSummary {
     /// Ids of the runs.
     pub runs: Vec<String>,
     /// Presses in them.
@@ -74,7 +75,7 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
     let declared = &referred(declared, readings, &mut warnings)?;
     let reference_mm = declared.model.response().reference_covering.thickness_mm;
 
-    let mut place = Place::declared(declared, reference_mm);
+    let mut place = SensorPose::declared(declared, reference_mm);
     let mut health = examine(declared, readings, &place);
     let sound = health.sound(readings.elements);
     let registration = match register(declared, readings, &sound) {
@@ -98,7 +99,7 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
         }
     };
     let mut calibration = Calibration {
-        data: Data::of(readings, reference_mm),
+        data: DataSummary::of(readings, reference_mm),
         noise_rms_counts: median(readings.noise_rms_counts.iter().flatten().copied()),
         baseline_counts: readings
             .rest_counts
@@ -178,8 +179,10 @@ impl Calibration {
             response.sensitivity_counts_per_mm[one.element] = one.sensitivity_counts_per_mm.value;
             response.quadratic_per_mm[one.element] = one.quadratic_per_mm.value;
             errors[0][one.element] = one.sensitivity_counts_per_mm.standard_error;
-            errors[2][one.element] =
-                one.quadratic_per_mm.standard_error.max(if fitted.form == Form::Linear { bent } else { 0.0 });
+            errors[2][one.element] = one
+                .quadratic_per_mm
+                .standard_error
+                .max(if fitted.form == ResponseForm::Linear { bent } else { 0.0 });
         }
         for (element, baseline) in self.baseline_counts.iter().enumerate() {
             if let Some(baseline) = baseline {
@@ -191,7 +194,7 @@ impl Calibration {
     }
 }
 
-impl Data {
+impl DataSummary {
     fn of(readings: &Readings, reference_covering_mm: f64) -> Self {
         Self {
             runs: readings.runs.clone(),
@@ -215,8 +218,8 @@ fn referred(
         return Ok(declared.clone());
     }
     let known = || readings.presses.iter().filter(|press| declared.indenter(press).is_some());
-    let alike = |press: &&crate::Press| {
-        let of = |other: &&crate::Press| {
+    let alike = |press: &&crate::MeasuredPress| {
+        let of = |other: &&crate::MeasuredPress| {
             other.indenter == press.indenter && same_covering(other.covering_mm, press.covering_mm)
         };
         known().filter(of).count()

@@ -19,7 +19,7 @@ use tactus_model::{Contact, Covering};
 use crate::{
     order::{median, quantile},
     readings::{Readings, distinct_places},
-    registration::Place,
+    registration::SensorPose,
     setting::{Declared, across, goes_across},
 };
 
@@ -38,7 +38,7 @@ pub(crate) const WIRING_PLACES_LEAST: usize = 4;
 
 /// What is wrong with an element.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Fault {
+pub struct FaultyElement {
     /// The element.
     pub element: usize,
     /// What kind of fault it is.
@@ -74,7 +74,7 @@ pub enum FaultKind {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Health {
     /// What was found, in order of the elements.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<FaultyElement>,
     /// Elements that no press came near enough to: nothing is known of their response.
     pub not_judged: Vec<usize>,
 }
@@ -99,7 +99,7 @@ impl Health {
 }
 
 /// Judges every element.
-pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &Place) -> Health {
+pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &SensorPose) -> Health {
     let trials = Trials::of(declared, readings, place);
     // Elements that never change would make the others look noisy.
     let varying = readings.noise_rms_counts.iter().zip(&readings.constant_counts);
@@ -107,7 +107,7 @@ pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &Place) -
     let typical_noise = median(varying).unwrap_or(0.0);
     let (mut faults, mut not_judged) = (Vec::new(), Vec::new());
     for element in 0..readings.elements {
-        let fault = |kind, evidence| Fault { element, kind, evidence };
+        let fault = |kind, evidence| FaultyElement { element, kind, evidence };
         if let Some(counts) = stuck(readings, element, typical_noise) {
             let evidence = format!("reads {counts} in each of {} frames", readings.frames);
             faults.push(fault(FaultKind::Stuck { counts: f64::from(counts) }, evidence));
@@ -163,7 +163,7 @@ enum Verdict {
 }
 
 impl Trials {
-    fn of(declared: &Declared, readings: &Readings, place: &Place) -> Self {
+    fn of(declared: &Declared, readings: &Readings, place: &SensorPose) -> Self {
         let mut trials = Self {
             felt: Vec::new(),
             rises: Vec::new(),

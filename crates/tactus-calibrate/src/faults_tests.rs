@@ -1,30 +1,30 @@
 use super::*;
-use crate::{lab::Lab, lab::THIN_MM, readings::Readings};
+use crate::{readings::Readings, synthetic_sensor::SyntheticSensor, synthetic_sensor::THIN_MM};
 
 fn health(declared: &Declared, readings: &Readings) -> Health {
-    let place = Place::declared(declared, THIN_MM);
+    let place = SensorPose::declared(declared, THIN_MM);
     examine(declared, readings, &place)
 }
 
 #[test]
 fn a_sound_sensor_is_accused_of_nothing() {
-    let mut lab = Lab::new(1);
-    lab.centres();
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(1);
+    sensor.centres();
+    let (declared, readings) = sensor.readings();
     assert_eq!(health(&declared, &readings), Health { faults: Vec::new(), not_judged: Vec::new() });
 }
 
 #[test]
 fn each_kind_of_fault_is_found_and_named() {
-    let mut lab = Lab::new(2);
-    lab.spoil = Box::new(|counts, _| {
+    let mut sensor = SyntheticSensor::new(2);
+    sensor.spoil = Box::new(|counts, _| {
         counts[5] = 100.0;
         counts[18] = counts[19];
-        // A noise that the dice of the lab do not throw: it swings.
+        // A noise that the made-up sensor does not draw: it alternates.
         counts[30] += if (counts[30] * 1e6).to_bits() & 1 == 0 { 30.0 } else { -30.0 };
     });
-    lab.centres();
-    let (declared, mut readings) = lab.readings();
+    sensor.centres();
+    let (declared, mut readings) = sensor.readings();
     readings.constant_counts[40] = Some(812.0);
     readings.noise_rms_counts[40] = Some(12.0_f64.sqrt().recip());
     readings.noise_rms_counts[30] = Some(30.0);
@@ -43,11 +43,11 @@ fn each_kind_of_fault_is_found_and_named() {
 
 #[test]
 fn elements_that_nobody_pressed_are_not_judged() {
-    let mut lab = Lab::new(3);
+    let mut sensor = SyntheticSensor::new(3);
     for element in [9, 10, 17, 18, 19] {
-        lab.press(lab.centre_mm(element), THIN_MM, &[0.3]);
+        sensor.press(sensor.centre_mm(element), THIN_MM, &[0.3]);
     }
-    let (declared, readings) = lab.readings();
+    let (declared, readings) = sensor.readings();
     let health = health(&declared, &readings);
     assert!(health.faults.is_empty(), "{health:?}");
     assert!(health.not_judged.contains(&47) && !health.not_judged.contains(&10), "{:?}", health.not_judged);
@@ -55,28 +55,28 @@ fn elements_that_nobody_pressed_are_not_judged() {
 
 #[test]
 fn elements_that_fall_when_pressed_are_sound() {
-    let mut lab = Lab::new(4);
-    lab.spoil = Box::new(|counts, _| counts.iter_mut().for_each(|count| *count = 3000.0 - *count));
-    lab.centres();
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(4);
+    sensor.spoil = Box::new(|counts, _| counts.iter_mut().for_each(|count| *count = 3000.0 - *count));
+    sensor.centres();
+    let (declared, readings) = sensor.readings();
     assert!(health(&declared, &readings).faults.is_empty());
 }
 
 #[test]
 fn many_dead_elements_do_not_pass_for_the_rule() {
-    let mut lab = Lab::new(5);
-    lab.spoil = Box::new(|counts, _| counts[..30].fill(100.0));
-    lab.centres();
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(5);
+    sensor.spoil = Box::new(|counts, _| counts[..30].fill(100.0));
+    sensor.centres();
+    let (declared, readings) = sensor.readings();
     let dead: Vec<usize> = health(&declared, &readings).faults.iter().map(|fault| fault.element).collect();
     assert_eq!(dead, (0..30).collect::<Vec<_>>());
 }
 
 #[test]
 fn many_stuck_elements_do_not_make_the_others_noisy() {
-    let mut lab = Lab::new(6);
-    lab.centres();
-    let (declared, mut readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(6);
+    sensor.centres();
+    let (declared, mut readings) = sensor.readings();
     for element in 0..30 {
         readings.constant_counts[element] = Some(500.0);
         readings.noise_rms_counts[element] = Some(12.0_f64.sqrt().recip());
@@ -88,10 +88,10 @@ fn many_stuck_elements_do_not_make_the_others_noisy() {
 
 #[test]
 fn a_sensor_that_answers_to_nothing_is_not_judged() {
-    let mut lab = Lab::new(7);
-    lab.spoil = Box::new(|counts, _| counts.fill(100.0));
-    lab.centres();
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(7);
+    sensor.spoil = Box::new(|counts, _| counts.fill(100.0));
+    sensor.centres();
+    let (declared, readings) = sensor.readings();
     let health = health(&declared, &readings);
     assert_eq!((health.faults.len(), health.not_judged.len()), (0, 48));
 }

@@ -47,7 +47,7 @@ impl Normal {
     ///
     /// With `n_j` frames in a reading and `m` at rest, of one noise, the covariance is that of `diag(1/n) + 1/m`; its
     /// inverse is `diag(n) - n n^T / (m + sum n)` (Sherman and Morrison).
-    pub(crate) fn add_press(&mut self, readings: &[Reading], rest_frames: usize, noise: f64) {
+    pub(crate) fn add_press(&mut self, readings: &[Observation], rest_frames: usize, noise: f64) {
         let per_frame = 1.0 / (noise * noise);
         let (mut residual, mut frames) = (0.0, 0.0);
         let mut slopes: Vec<(usize, f64)> = Vec::new();
@@ -95,7 +95,7 @@ impl Normal {
 
 /// The mean over some frames, held against a prediction.
 #[derive(Debug, Clone)]
-pub(crate) struct Reading {
+pub(crate) struct Observation {
     /// Measured less predicted.
     pub(crate) residual: f64,
     /// Derivatives of the prediction by parameters, in the same order in every reading of a press.

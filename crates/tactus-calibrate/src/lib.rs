@@ -1,6 +1,6 @@
 //! Characterisation of a tactile array from measured presses, and the resolution that its covering allows.
 //!
-//! [`Gather`] makes presses and dwells of frames; [`calibrate`] takes them through the steps of the paper's Sections 2
+//! [`ReadingsBuilder`] makes presses and dwells of frames; [`calibrate`] takes them through the steps of the paper's Sections 2
 //! and 3: faulty elements, registration, element response, point spread, spread against thickness. Every number comes
 //! with its standard error, which holds the errors of the steps before.
 //!
@@ -15,8 +15,6 @@ pub mod design;
 mod calibration;
 mod estimate;
 mod faults;
-#[cfg(test)]
-mod lab;
 mod least_squares;
 mod order;
 mod readings;
@@ -24,14 +22,16 @@ mod registration;
 mod response;
 mod setting;
 mod spread;
+#[cfg(test)]
+mod synthetic_sensor;
 mod thickness;
 
-pub use calibration::{Calibration, Data, calibrate};
+pub use calibration::{Calibration, DataSummary, calibrate};
 pub use estimate::Estimate;
-pub use faults::{Fault, FaultKind, Health};
-pub use readings::{Dwell, Gather, Press, Readings, Rest, distinct_places};
+pub use faults::{FaultKind, FaultyElement, Health};
+pub use readings::{Dwell, MeasuredPress, Readings, ReadingsBuilder, Rest, distinct_places};
 pub use registration::RegistrationFit;
-pub use response::{ElementResponse, Form, ResponseFit, Trial};
+pub use response::{ElementResponse, ResponseFit, ResponseForm, Trial};
 pub use setting::Declared;
 pub use spread::SpreadFit;
 pub use thickness::{CoveringSpread, Curve, ThicknessFit};

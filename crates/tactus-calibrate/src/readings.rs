@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use tactus_model::Array;
 use tactus_schema::table::RowView;
 
-use segment::{Kind, Segment};
+use segment::{Segment, SegmentKind};
 
 /// Above this height nothing touches the covering, however wrong the believed surface may be.
 const CLEAR_MM: f64 = 0.3;
@@ -22,7 +22,7 @@ pub struct Readings {
     /// Ids of the runs.
     pub runs: Vec<String>,
     /// The presses, run by run, in order.
-    pub presses: Vec<Press>,
+    pub presses: Vec<MeasuredPress>,
     /// Of each element, its standard deviation at rest, at least that of rounding to the converter's step; none of an
     /// element that was never at rest.
     pub noise_rms_counts: Vec<Option<f64>>,
@@ -40,7 +40,7 @@ pub struct Readings {
 
 /// One contact at one place.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Press {
+pub struct MeasuredPress {
     /// Index of its run in [`Readings::runs`].
     pub run: usize,
     /// Its index in the run.
@@ -81,7 +81,7 @@ pub struct Dwell {
 
 /// Gathers rows into [`Readings`].
 #[derive(Debug)]
-pub struct Gather {
+pub struct ReadingsBuilder {
     elements: usize,
     step_counts: f64,
     readings: Readings,
@@ -89,20 +89,20 @@ pub struct Gather {
     segment: Segment,
     rest: Option<Rest>,
     loading: Vec<Dwell>,
-    noise: Vec<Noise>,
+    noise: Vec<RestSums>,
     range_counts: Vec<Option<[f32; 2]>>,
     indenters: BTreeMap<String, Arc<str>>,
 }
 
 /// Sums of one element's readings at rest.
 #[derive(Debug, Clone, Default)]
-struct Noise {
+struct RestSums {
     squares: f64,
     freedom: f64,
     means: Vec<f64>,
 }
 
-impl Press {
+impl MeasuredPress {
     /// Rise of an element at a dwell above its rest, and the variance of that in units of one frame's.
     ///
     /// `None` if nothing was at rest before the press, or the element is none.
@@ -123,7 +123,7 @@ impl Press {
     }
 }
 
-impl Gather {
+impl ReadingsBuilder {
     /// Nothing gathered yet, of an array.
     pub fn new(array: &Array) -> Self {
         let elements = array.elements();
@@ -144,7 +144,7 @@ impl Gather {
             segment: Segment::default(),
             rest: None,
             loading: Vec::new(),
-            noise: vec![Noise::default(); elements],
+            noise: vec![RestSums::default(); elements],
             range_counts: vec![None; elements],
             indenters: BTreeMap::new(),
         }
@@ -167,12 +167,12 @@ impl Gather {
             self.rest = None;
             self.readings.runs.push(row.run.to_owned());
         }
-        let kind = Kind::of(&row);
+        let kind = SegmentKind::of(&row);
         if kind != self.segment.kind {
             self.close();
             self.segment.kind = kind;
         }
-        if let Kind::Load(press) | Kind::Hold(press) = kind
+        if let SegmentKind::Load(press) | SegmentKind::Hold(press) = kind
             && self
                 .readings
                 .presses
@@ -182,7 +182,7 @@ impl Gather {
             self.end_press();
             self.begin_press(&row);
         }
-        if kind != Kind::Between {
+        if kind != SegmentKind::Between {
             self.segment.push(row.position_mm, row.counts);
         }
     }
@@ -218,10 +218,10 @@ impl Gather {
     fn close(&mut self) {
         let segment = std::mem::take(&mut self.segment);
         match segment.kind {
-            Kind::Between => {}
-            Kind::Rest => self.end_rest(&segment),
-            Kind::Load(_) => self.loading.extend(segment.frames()),
-            Kind::Hold(_) => self.end_hold(segment),
+            SegmentKind::Between => {}
+            SegmentKind::Rest => self.end_rest(&segment),
+            SegmentKind::Load(_) => self.loading.extend(segment.frames()),
+            SegmentKind::Hold(_) => self.end_hold(segment),
         }
     }
 
@@ -251,7 +251,7 @@ impl Gather {
         let name = row.indenter;
         let indenter = self.indenters.entry(name.to_owned()).or_insert_with(|| name.into());
         let indenter = Arc::clone(indenter);
-        self.readings.presses.push(Press {
+        self.readings.presses.push(MeasuredPress {
             run: self.readings.runs.len() - 1,
             index: row.press,
             place_mm: [x_mm, y_mm],
@@ -271,7 +271,7 @@ impl Gather {
     }
 }
 
-impl Noise {
+impl RestSums {
     fn rms(&self) -> Option<f64> {
         (self.freedom > 0.0).then(|| (self.squares / self.freedom).sqrt())
     }

@@ -22,9 +22,9 @@ use tactus_model::{Covering, ForwardModel, Gradient, Registration};
 
 use crate::{
     Estimate,
-    least_squares::{Fit, Normal, Reading, minimise},
+    least_squares::{Fit, Normal, Observation, minimise},
     order::median,
-    readings::{Dwell, Press, Readings, distinct_places, number_of},
+    readings::{Dwell, MeasuredPress, Readings, distinct_places, number_of},
     setting::{Declared, Setting, across, goes_across},
 };
 
@@ -84,7 +84,7 @@ impl RegistrationFit {
 
 /// What later steps take from a registration.
 #[derive(Debug, Clone)]
-pub(crate) struct Place {
+pub(crate) struct SensorPose {
     pub(crate) setting: Setting,
     pub(crate) sigma_mm: f64,
     /// Presses that contradict the others: index of the run, index in it.
@@ -93,10 +93,10 @@ pub(crate) struct Place {
     pub(crate) covariance: DMatrix<f64>,
 }
 
-impl Place {
+impl SensorPose {
     /// As declared, and taken for exact.
     pub(crate) fn declared(declared: &Declared, covering_mm: f64) -> Self {
-        let covariance = DMatrix::zeros(Self::UNSURE, Self::UNSURE);
+        let covariance = DMatrix::zeros(Self::UNCERTAIN, Self::UNCERTAIN);
         Self {
             setting: declared.setting(),
             sigma_mm: declared.sigma_mm(covering_mm),
@@ -106,10 +106,10 @@ impl Place {
     }
 
     /// Number of its parameters that are not sure.
-    pub(crate) const UNSURE: usize = 5;
+    pub(crate) const UNCERTAIN: usize = 5;
 
     /// True if nothing speaks against a press.
-    pub(crate) fn admits(&self, press: &Press) -> bool {
+    pub(crate) fn admits(&self, press: &MeasuredPress) -> bool {
         !self.contradicting.contains(&(press.run, press.index))
     }
 
@@ -131,8 +131,8 @@ pub(crate) fn register(
     declared: &Declared,
     readings: &Readings,
     sound: &[bool],
-) -> Result<(RegistrationFit, Place), String> {
-    let presses: Vec<&Press> =
+) -> Result<(RegistrationFit, SensorPose), String> {
+    let presses: Vec<&MeasuredPress> =
         across(declared, readings).into_iter().filter(|press| press.rest.is_some()).collect();
     if presses.is_empty() && !readings.presses.is_empty() {
         return Err("no reference press has frames at rest before it, with nothing on the covering".into());
@@ -194,7 +194,7 @@ const UNDETERMINED: &str = "the presses do not determine the sensor's place";
 /// The readings and what may move to explain them.
 struct Problem<'a> {
     declared: &'a Declared,
-    presses: Vec<&'a Press>,
+    presses: Vec<&'a MeasuredPress>,
     /// Elements that take part, and their noise.
     elements: Vec<(usize, f64)>,
     start: Vec<f64>,
@@ -206,7 +206,7 @@ impl<'a> Problem<'a> {
         declared: &'a Declared,
         readings: &Readings,
         sound: &[bool],
-        presses: Vec<&'a Press>,
+        presses: Vec<&'a MeasuredPress>,
     ) -> Result<Self, String> {
         let elements = taking_part(readings, sound, &presses);
         if elements.is_empty() {
@@ -269,7 +269,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Gives the readings of every element in every press: index of the press, noise, readings.
-    fn each(&self, parameters: &[f64], mut take: impl FnMut(usize, f64, &[Reading])) -> Option<()> {
+    fn each(&self, parameters: &[f64], mut take: impl FnMut(usize, f64, &[Observation])) -> Option<()> {
         let (model, setting) = (self.model(parameters)?, setting(parameters));
         for (index, press) in self.presses.iter().enumerate() {
             let (indenter, covering) =
@@ -287,7 +287,7 @@ impl<'a> Problem<'a> {
                     let [rise, _] = press.rise(dwell, *element)?;
                     let (predicted, slopes) =
                         Self::predict(parameters, gradient, by_setting, place, *element);
-                    Some(Reading {
+                    Some(Observation {
                         residual: rise - predicted,
                         slopes: slopes.to_vec(),
                         frames: dwell.frames,
@@ -330,15 +330,20 @@ impl<'a> Problem<'a> {
     }
 }
 
-fn place(fit: &Fit, contradicting: Vec<(usize, i32)>) -> Place {
+fn place(fit: &Fit, contradicting: Vec<(usize, i32)>) -> SensorPose {
     let order = [X, Y, ROTATION, SURFACE, SIGMA];
     let covariance = DMatrix::from_fn(order.len(), order.len(), |row, column| {
         fit.inflation() * fit.covariance[(order[row], order[column])]
     });
-    Place { setting: setting(&fit.parameters), sigma_mm: fit.parameters[SIGMA], contradicting, covariance }
+    SensorPose {
+        setting: setting(&fit.parameters),
+        sigma_mm: fit.parameters[SIGMA],
+        contradicting,
+        covariance,
+    }
 }
 
-fn rest_frames(press: &Press) -> usize {
+fn rest_frames(press: &MeasuredPress) -> usize {
     press.rest.as_ref().map_or(1, |rest| rest.frames)
 }
 
@@ -354,7 +359,7 @@ fn setting(parameters: &[f64]) -> Setting {
 }
 
 /// Sound elements that rose well above their noise, each with it.
-fn taking_part(readings: &Readings, sound: &[bool], presses: &[&Press]) -> Vec<(usize, f64)> {
+fn taking_part(readings: &Readings, sound: &[bool], presses: &[&MeasuredPress]) -> Vec<(usize, f64)> {
     let rises = |element: usize, noise: f64| {
         presses.iter().any(|press| {
             press.dwells.iter().any(|dwell| {

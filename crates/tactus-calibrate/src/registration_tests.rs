@@ -1,5 +1,5 @@
 use super::*;
-use crate::{lab::Lab, lab::THIN_MM, readings::Readings};
+use crate::{readings::Readings, synthetic_sensor::SyntheticSensor, synthetic_sensor::THIN_MM};
 
 fn registered(declared: &Declared, readings: &Readings) -> RegistrationFit {
     register(declared, readings, &vec![true; readings.elements]).unwrap().0
@@ -12,10 +12,10 @@ fn off(estimate: Estimate, truth: f64) -> f64 {
 
 #[test]
 fn place_and_surface_come_back_within_their_errors() {
-    let mut lab = Lab::new(1);
-    lab.centres();
-    let (truth, surface_mm) = (lab.registration, lab.surface_mm);
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(1);
+    sensor.centres();
+    let (truth, surface_mm) = (sensor.registration, sensor.surface_mm);
+    let (declared, readings) = sensor.readings();
     let found = registered(&declared, &readings);
     let errors = [
         off(found.origin_mm[0], truth.origin_mm[0]),
@@ -31,13 +31,13 @@ fn place_and_surface_come_back_within_their_errors() {
 
 #[test]
 fn a_stage_whose_steps_are_wrong_shows_in_the_scale() {
-    let mut lab = Lab::new(2);
+    let mut sensor = SyntheticSensor::new(2);
     for element in 0..48 {
         // The stage goes 1 % too far from the middle of its travel.
-        let place_mm = lab.centre_mm(element).map(|along| 25.0 + (along - 25.0) * 0.99);
-        lab.press(place_mm, THIN_MM, &[0.2, 0.4, 0.6]);
+        let place_mm = sensor.centre_mm(element).map(|along| 25.0 + (along - 25.0) * 0.99);
+        sensor.press(place_mm, THIN_MM, &[0.2, 0.4, 0.6]);
     }
-    let (declared, readings) = lab.readings();
+    let (declared, readings) = sensor.readings();
     // It still meets the sensor where that is, so that no place comes out wrong.
     let scale = registered(&declared, &readings).scale.unwrap();
     assert!(scale.covers(1.0), "{scale:?}");
@@ -62,15 +62,15 @@ fn a_stage_whose_steps_are_wrong_shows_in_the_scale() {
 
 #[test]
 fn a_press_that_contradicts_the_others_is_left_out_and_named() {
-    let mut lab = Lab::new(3);
-    lab.spoil = Box::new(|counts, press| {
+    let mut sensor = SyntheticSensor::new(3);
+    sensor.spoil = Box::new(|counts, press| {
         if press == 17 {
             counts.iter_mut().rev().for_each(|count| *count = 100.0 + (*count - 100.0) * 0.3);
         }
     });
-    lab.centres();
-    let truth = lab.registration;
-    let (declared, readings) = lab.readings();
+    sensor.centres();
+    let truth = sensor.registration;
+    let (declared, readings) = sensor.readings();
     let found = registered(&declared, &readings);
     assert_eq!(found.left_out, [("run".to_owned(), 17)]);
     assert!(off(found.origin_mm[0], truth.origin_mm[0]) < 4.0);
@@ -78,19 +78,19 @@ fn a_press_that_contradicts_the_others_is_left_out_and_named() {
 
 #[test]
 fn presses_close_together_tell_no_rotation() {
-    let mut lab = Lab::new(4);
-    lab.sweep(THIN_MM, 4);
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(4);
+    sensor.sweep(THIN_MM, 4);
+    let (declared, readings) = sensor.readings();
     let found = registered(&declared, &readings);
     assert_eq!((found.rotation_deg, found.scale), (None, None));
 }
 
 #[test]
 fn one_place_tells_nothing() {
-    let mut lab = Lab::new(5);
-    let place_mm = lab.centre_mm(20);
-    lab.press(place_mm, THIN_MM, &[0.2, 0.4]);
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(5);
+    let place_mm = sensor.centre_mm(20);
+    sensor.press(place_mm, THIN_MM, &[0.2, 0.4]);
+    let (declared, readings) = sensor.readings();
     let refused = register(&declared, &readings, &[true; 48]).unwrap_err();
     assert!(refused.contains("1 place was"), "{refused}");
 }

@@ -25,12 +25,12 @@ use tactus_model::Covering;
 
 use crate::{
     Estimate, Health,
-    readings::{Press, Readings},
-    registration::Place,
+    readings::{MeasuredPress, Readings},
+    registration::SensorPose,
     setting::Declared,
 };
 
-use fit::{Fitted, Group, HeldOut, fit, heldout};
+use fit::{CentrePress, FittedForm, HeldOutError, fit, heldout};
 
 /// A press counts as one at an element's centre if the element feels this share of what it would feel there.
 const NEAR: f64 = 0.9;
@@ -48,7 +48,7 @@ const STEP: f64 = 1e-4;
 /// A form of the response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Form {
+pub enum ResponseForm {
     /// `s_e u`.
     Linear,
     /// `s_e (u + k u^2)`.
@@ -57,7 +57,7 @@ pub enum Form {
     OwnQuadratic,
 }
 
-impl Form {
+impl ResponseForm {
     /// Every form, from few parameters to many.
     pub const ALL: [Self; 3] = [Self::Linear, Self::SharedQuadratic, Self::OwnQuadratic];
 
@@ -75,7 +75,7 @@ impl Form {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResponseFit {
     /// The form that the data want.
-    pub form: Form,
+    pub form: ResponseForm,
     /// How each form fares.
     pub trials: Vec<Trial>,
     /// The common curvature `k` of the shared quadratic, in 1/mm, if there is such a fit.
@@ -92,7 +92,7 @@ pub struct ResponseFit {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Trial {
     /// The form.
-    pub form: Form,
+    pub form: ResponseForm,
     /// Root mean square of the residuals, in counts.
     pub rms_counts: f64,
     /// The same on dwells that took no part in the fit; `None` where there are too few dwells to hold any out.
@@ -154,12 +154,12 @@ pub(crate) fn respond(
     declared: &Declared,
     readings: &Readings,
     health: &Health,
-    place: &Place,
+    place: &SensorPose,
 ) -> Result<(ResponseFit, Gains), String> {
     let sound = health.sound(readings.elements);
     let own = |element: usize| sound[element].then_some(element);
     // Which presses count is decided once: a hair's move of the sensor is not to change it.
-    let groups = |moved: &Place| groups(declared, readings, own, [place, moved]);
+    let groups = |moved: &SensorPose| groups(declared, readings, own, [place, moved]);
     let here = groups(place);
     if here.is_empty() {
         return Err(
@@ -167,27 +167,27 @@ pub(crate) fn respond(
                 .into(),
         );
     }
-    let fits = Form::ALL.map(|form| fit(form, &here, |_, _| true));
+    let fits = ResponseForm::ALL.map(|form| fit(form, &here, |_, _| true));
     let linear = fits[0].as_ref().ok_or("the readings do not determine the responses")?;
     let [_, shared, own] = &fits;
     // Where nothing can be held out, a curvature with its error says more than a straight line without.
-    let unheld = if shared.is_some() { Form::SharedQuadratic } else { Form::Linear };
-    let heldout = Form::ALL.map(|form| heldout(form, &here));
+    let unheld = if shared.is_some() { ResponseForm::SharedQuadratic } else { ResponseForm::Linear };
+    let heldout = ResponseForm::ALL.map(|form| heldout(form, &here));
     let form = chosen(&heldout).unwrap_or(unheld);
     let wanted = match form {
-        Form::Linear => linear,
-        Form::SharedQuadratic => shared.as_ref().unwrap_or(linear),
-        Form::OwnQuadratic => own.as_ref().unwrap_or(linear),
+        ResponseForm::Linear => linear,
+        ResponseForm::SharedQuadratic => shared.as_ref().unwrap_or(linear),
+        ResponseForm::OwnQuadratic => own.as_ref().unwrap_or(linear),
     };
     let elements = wanted.elements.clone();
     // A wrong place moves the responses.
-    let by_place = |fitted: &Fitted| {
+    let by_place = |fitted: &FittedForm| {
         let column = |parameter: usize| {
             let moved = fit(fitted.form, &groups(&place.moved(parameter, STEP)), |_, _| true);
             let moved = moved.filter(|moved| moved.elements == elements).unwrap_or_else(|| fitted.clone());
             (moved.expanded() - fitted.expanded()) / STEP
         };
-        DMatrix::from_columns(&(0..Place::UNSURE).map(column).collect::<Vec<_>>())
+        DMatrix::from_columns(&(0..SensorPose::UNCERTAIN).map(column).collect::<Vec<_>>())
     };
     let moved_by = |by_place: &DMatrix<f64>| by_place * &place.covariance * by_place.transpose();
     let (own_covariance, by_place_wanted) = (wanted.expanded_covariance(), by_place(wanted));
@@ -219,7 +219,7 @@ pub(crate) fn respond(
         form: wanted.form,
         trials: trials.collect(),
         shared_quadratic_per_mm: shared.as_ref().map(|shared| {
-            let variance = if wanted.form == Form::SharedQuadratic {
+            let variance = if wanted.form == ResponseForm::SharedQuadratic {
                 covariance[(count, count)]
             } else {
                 (shared.expanded_covariance() + moved_by(&by_place(shared)))[(count, count)]
@@ -247,18 +247,18 @@ fn cross_wired(
     declared: &Declared,
     readings: &Readings,
     health: &Health,
-    place: &Place,
-    wanted: &Fitted,
+    place: &SensorPose,
+    wanted: &FittedForm,
 ) -> Vec<ElementResponse> {
     let mut there = groups(declared, readings, |element| health.answers_for(element), [place, place]);
     let k = match wanted.form {
-        Form::Linear => 0.0,
-        Form::SharedQuadratic | Form::OwnQuadratic => wanted.typical_curvature(),
+        ResponseForm::Linear => 0.0,
+        ResponseForm::SharedQuadratic | ResponseForm::OwnQuadratic => wanted.typical_curvature(),
     };
     for point in there.iter_mut().flat_map(|group| &mut group.points) {
         point.u_mm += k * point.u_mm * point.u_mm;
     }
-    let Some(fitted) = fit(Form::Linear, &there, |_, _| true) else { return Vec::new() };
+    let Some(fitted) = fit(ResponseForm::Linear, &there, |_, _| true) else { return Vec::new() };
     let responses = fitted.elements.iter().enumerate().map(|(index, element)| ElementResponse {
         element: *element,
         points: Vec::new(),
@@ -272,10 +272,10 @@ fn cross_wired(
 
 /// The form with the fewest parameters that no other beats on held-out dwells, by each form's errors on them; `None` if
 /// none can be held out.
-fn chosen(heldout: &[Option<Vec<HeldOut>>; 3]) -> Option<Form> {
-    let mut best = Form::Linear;
+fn chosen(heldout: &[Option<Vec<HeldOutError>>; 3]) -> Option<ResponseForm> {
+    let mut best = ResponseForm::Linear;
     let mut best_errors = heldout[0].as_ref()?;
-    for (form, errors) in Form::ALL.into_iter().zip(heldout).skip(1) {
+    for (form, errors) in ResponseForm::ALL.into_iter().zip(heldout).skip(1) {
         let Some(errors) = errors else { continue };
         let mut by_element: BTreeMap<usize, f64> = BTreeMap::new();
         let mut by_dwell = Vec::new();
@@ -303,15 +303,15 @@ fn groups(
     declared: &Declared,
     readings: &Readings,
     signal_of: impl Fn(usize) -> Option<usize>,
-    [chosen_at, place]: [&Place; 2],
-) -> Vec<Group> {
-    let mut near: Vec<Vec<Group>> = vec![Vec::new(); readings.elements];
+    [chosen_at, place]: [&SensorPose; 2],
+) -> Vec<CentrePress> {
+    let mut near: Vec<Vec<CentrePress>> = vec![Vec::new(); readings.elements];
     let Ok(model) = declared.unit_model(chosen_at.sigma_mm) else { return Vec::new() };
     let Ok(felt_by) = declared.unit_model(place.sigma_mm) else { return Vec::new() };
     let centre_mm = declared.array().centre_mm(0).unwrap_or_default();
     let mut felt = vec![0.0; readings.elements];
     let mut felt_at_centre = felt.clone();
-    let trusted = |press: &&Press| declared.is_reference(press) && chosen_at.admits(press);
+    let trusted = |press: &&MeasuredPress| declared.is_reference(press) && chosen_at.admits(press);
     for press in readings.presses.iter().filter(trusted) {
         let (Some(indenter), Some(deepest)) = (declared.indenter(press), press.deepest()) else { continue };
         let covering = Covering { thickness_mm: press.covering_mm };
@@ -324,7 +324,7 @@ fn groups(
                 continue;
             };
             if felt[signal] > NEAR * felt_at_centre[0] {
-                groups.extend(Group::of(declared, &felt_by, place, press, [element, signal], noise));
+                groups.extend(CentrePress::of(declared, &felt_by, place, press, [element, signal], noise));
             }
         }
     }

@@ -1,9 +1,9 @@
 use super::*;
-use crate::{lab::Lab, registration::register};
+use crate::{registration::register, synthetic_sensor::SyntheticSensor};
 
-fn responded(lab: Lab) -> (ResponseFit, Vec<f64>) {
-    let gains = lab.model.response().sensitivity_counts_per_mm.clone();
-    let (declared, readings) = lab.readings();
+fn responded(sensor: SyntheticSensor) -> (ResponseFit, Vec<f64>) {
+    let gains = sensor.model.response().sensitivity_counts_per_mm.clone();
+    let (declared, readings) = sensor.readings();
     let sound = vec![true; readings.elements];
     let (_, place) = register(&declared, &readings, &sound).unwrap();
     let health = Health { faults: Vec::new(), not_judged: Vec::new() };
@@ -11,22 +11,22 @@ fn responded(lab: Lab) -> (ResponseFit, Vec<f64>) {
 }
 
 /// The same sensor with other curvatures.
-fn curved(seed: u64, quadratic_per_mm: impl Fn(usize) -> f64) -> Lab {
-    let mut lab = Lab::new(seed);
+fn curved(seed: u64, quadratic_per_mm: impl Fn(usize) -> f64) -> SyntheticSensor {
+    let mut sensor = SyntheticSensor::new(seed);
     let response = tactus_model::Response {
         quadratic_per_mm: (0..48).map(quadratic_per_mm).collect(),
-        ..lab.model.response().clone()
+        ..sensor.model.response().clone()
     };
-    lab.model =
-        tactus_model::ForwardModel::new(lab.model.array().clone(), lab.model.psf(), response).unwrap();
-    lab.centres();
-    lab
+    sensor.model =
+        tactus_model::ForwardModel::new(sensor.model.array().clone(), sensor.model.psf(), response).unwrap();
+    sensor.centres();
+    sensor
 }
 
 #[test]
 fn a_straight_response_is_found_straight() {
     let (fit, gains) = responded(curved(1, |_| 0.0));
-    assert_eq!(fit.form, Form::Linear);
+    assert_eq!(fit.form, ResponseForm::Linear);
     let worst = fit.elements.iter().map(|one| {
         (one.sensitivity_counts_per_mm.value - gains[one.element]).abs()
             / one.sensitivity_counts_per_mm.standard_error
@@ -37,7 +37,7 @@ fn a_straight_response_is_found_straight() {
 #[test]
 fn one_curvature_is_found_as_one() {
     let (fit, gains) = responded(curved(2, |_| 0.15));
-    assert_eq!(fit.form, Form::SharedQuadratic);
+    assert_eq!(fit.form, ResponseForm::SharedQuadratic);
     let curvature = fit.shared_quadratic_per_mm.unwrap();
     assert!((curvature.value - 0.15).abs() < 4.0 * curvature.standard_error + 1e-3, "{curvature:?}");
     for one in &fit.elements {
@@ -53,7 +53,7 @@ fn one_curvature_is_found_as_one() {
 #[test]
 fn curvatures_that_differ_are_found_to() {
     let (fit, _) = responded(curved(3, |element| if element % 2 == 0 { 0.1 } else { 0.5 }));
-    assert_eq!(fit.form, Form::OwnQuadratic);
+    assert_eq!(fit.form, ResponseForm::OwnQuadratic);
     let mean = |odd: usize| {
         let of =
             fit.elements.iter().filter(|one| one.element % 2 == odd).map(|one| one.quadratic_per_mm.value);
@@ -72,11 +72,11 @@ fn what_was_held_out_fares_worse_than_what_was_fitted() {
 
 #[test]
 fn a_cross_wired_element_keeps_its_own_sensitivity() {
-    let mut lab = Lab::new(5);
-    let [own, other] = [18, 19].map(|element| lab.model.response().sensitivity_counts_per_mm[element]);
-    lab.spoil = Box::new(move |counts, _| counts[18] = 100.0 + (counts[19] - 100.0) * own / other);
-    lab.centres();
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(5);
+    let [own, other] = [18, 19].map(|element| sensor.model.response().sensitivity_counts_per_mm[element]);
+    sensor.spoil = Box::new(move |counts, _| counts[18] = 100.0 + (counts[19] - 100.0) * own / other);
+    sensor.centres();
+    let (declared, readings) = sensor.readings();
     let fit = crate::calibrate(&declared, &readings).unwrap().response.unwrap();
     assert!(fit.elements.iter().all(|one| one.element != 18));
     let [crossed] = fit.cross_wired.as_slice() else { panic!("{:?}", fit.cross_wired) };
@@ -95,28 +95,28 @@ fn a_response_turned_round_is_the_root_near_the_line() {
 
 #[test]
 fn a_press_that_was_cut_off_does_not_make_the_response_straight() {
-    let mut lab = Lab::new(6);
-    lab.centres();
-    let (declared, mut readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(6);
+    sensor.centres();
+    let (declared, mut readings) = sensor.readings();
     readings.presses[20].dwells.truncate(2);
     let fit = crate::calibrate(&declared, &readings).unwrap().response.unwrap();
-    assert_eq!(fit.form, Form::SharedQuadratic);
+    assert_eq!(fit.form, ResponseForm::SharedQuadratic);
     assert!(fit.trials.iter().all(|trial| trial.heldout_rms_counts.is_some()));
 }
 
 #[test]
 fn two_depths_give_a_curvature_with_its_error_and_no_surface() {
-    let mut lab = Lab::new(7);
-    lab.surface_mm = 0.0;
+    let mut sensor = SyntheticSensor::new(7);
+    sensor.surface_mm = 0.0;
     for element in 0..48 {
-        lab.press(lab.centre_mm(element), crate::lab::THIN_MM, &[0.2, 0.5]);
+        sensor.press(sensor.centre_mm(element), crate::synthetic_sensor::THIN_MM, &[0.2, 0.5]);
     }
-    let gains = lab.model.response().sensitivity_counts_per_mm.clone();
-    let (declared, readings) = lab.readings();
+    let gains = sensor.model.response().sensitivity_counts_per_mm.clone();
+    let (declared, readings) = sensor.readings();
     let found = crate::calibrate(&declared, &readings).unwrap();
     assert!(found.registration.unwrap().surface_mm.is_none());
     let fit = found.response.unwrap();
-    assert_eq!(fit.form, Form::SharedQuadratic);
+    assert_eq!(fit.form, ResponseForm::SharedQuadratic);
     for one in &fit.elements {
         let sensitivity = one.sensitivity_counts_per_mm;
         assert!((sensitivity.value - gains[one.element]).abs() < 4.5 * sensitivity.standard_error, "{one:?}");
@@ -125,11 +125,11 @@ fn two_depths_give_a_curvature_with_its_error_and_no_surface() {
 
 #[test]
 fn elements_that_were_not_fitted_are_not_known_exactly() {
-    let mut lab = Lab::new(8);
+    let mut sensor = SyntheticSensor::new(8);
     for element in [9, 10, 17, 18, 19] {
-        lab.press(lab.centre_mm(element), crate::lab::THIN_MM, &[0.2, 0.3, 0.4, 0.5, 0.6]);
+        sensor.press(sensor.centre_mm(element), crate::synthetic_sensor::THIN_MM, &[0.2, 0.3, 0.4, 0.5, 0.6]);
     }
-    let (declared, readings) = lab.readings();
+    let (declared, readings) = sensor.readings();
     let found = crate::calibrate(&declared, &readings).unwrap();
     let (response, [errors, ..]) = found.responses(declared.model.response()).unwrap();
     assert!(errors[47] > 20.0 && errors[47] > 5.0 * errors[18], "{} {}", errors[47], errors[18]);

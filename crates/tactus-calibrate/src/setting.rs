@@ -6,7 +6,7 @@ use tactus_model::{
     Array, Contact, Covering, ForwardModel, Indenter, ModelError, Psf, Registration, Response,
 };
 
-use crate::readings::{Dwell, Press, Readings};
+use crate::readings::{Dwell, MeasuredPress, Readings};
 
 /// Presses go across the sensor if these many pitches lie between them: then they tell its rotation.
 const SPAN_LEAST_PITCHES: f64 = 2.0;
@@ -66,12 +66,12 @@ impl Declared {
     }
 
     /// The tool of a press.
-    pub(crate) fn indenter(&self, press: &Press) -> Option<&Indenter> {
+    pub(crate) fn indenter(&self, press: &MeasuredPress) -> Option<&Indenter> {
         self.indenters.get(&*press.indenter)
     }
 
     /// True if a press is of the kind for which sensitivity is stated, in tool and covering.
-    pub(crate) fn is_reference(&self, press: &Press) -> bool {
+    pub(crate) fn is_reference(&self, press: &MeasuredPress) -> bool {
         let response = self.model.response();
         same_covering(press.covering_mm, response.reference_covering.thickness_mm)
             && self.indenter(press) == Some(&response.reference_indenter)
@@ -85,7 +85,7 @@ impl Setting {
     }
 
     /// How a press stands on the sensor at a dwell.
-    pub(crate) fn contact(&self, press: &Press, dwell: &Dwell, indenter: &Indenter) -> Contact {
+    pub(crate) fn contact(&self, press: &MeasuredPress, dwell: &Dwell, indenter: &Indenter) -> Contact {
         Contact {
             indenter: indenter.clone(),
             position_mm: self.on_sensor(press.place_mm),
@@ -101,7 +101,7 @@ pub(crate) fn same_covering(one_mm: f64, other_mm: f64) -> bool {
 }
 
 /// The coverings pressed, by thickness.
-pub(crate) fn coverings_mm<'a>(presses: impl Iterator<Item = &'a Press>) -> Vec<f64> {
+pub(crate) fn coverings_mm<'a>(presses: impl Iterator<Item = &'a MeasuredPress>) -> Vec<f64> {
     let mut coverings_mm: Vec<f64> = presses.map(|press| press.covering_mm).collect();
     coverings_mm.sort_by(f64::total_cmp);
     coverings_mm.dedup_by(|next, last| same_covering(*next, *last));
@@ -111,7 +111,7 @@ pub(crate) fn coverings_mm<'a>(presses: impl Iterator<Item = &'a Press>) -> Vec<
 /// The reference presses of the runs that go across the sensor; where none does, all reference presses.
 ///
 /// Sweeps over one element would outweigh them and tell less.
-pub(crate) fn across<'a>(declared: &Declared, readings: &'a Readings) -> Vec<&'a Press> {
+pub(crate) fn across<'a>(declared: &Declared, readings: &'a Readings) -> Vec<&'a MeasuredPress> {
     let of_run = |run: usize| {
         readings
             .presses
@@ -129,7 +129,7 @@ pub(crate) fn across<'a>(declared: &Declared, readings: &'a Readings) -> Vec<&'a
 }
 
 /// True if presses lie so far apart that they tell a rotation.
-pub(crate) fn goes_across<'a>(declared: &Declared, presses: impl Iterator<Item = &'a Press>) -> bool {
+pub(crate) fn goes_across<'a>(declared: &Declared, presses: impl Iterator<Item = &'a MeasuredPress>) -> bool {
     let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     for press in presses {
         for (range, along) in range.iter_mut().zip(press.place_mm) {

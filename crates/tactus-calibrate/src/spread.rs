@@ -20,8 +20,8 @@ use tactus_model::{Contact, Covering, effect};
 use crate::{
     Estimate,
     order::median,
-    readings::{Dwell, Press, Readings, distinct_places},
-    registration::Place,
+    readings::{Dwell, MeasuredPress, Readings, distinct_places},
+    registration::SensorPose,
     response::{Gains, turned_round},
     setting::{Declared, coverings_mm, same_covering},
 };
@@ -76,10 +76,10 @@ pub(crate) fn spreads(
     declared: &Declared,
     readings: &Readings,
     gains: &Gains,
-    place: &Place,
+    place: &SensorPose,
 ) -> (Spreads, Vec<String>) {
     let groups = groups(declared, readings);
-    let one = |group: &Group<'_>| Search::new(declared, gains, place, group)?.run(readings, group);
+    let one = |group: &SpreadData<'_>| SigmaSearch::new(declared, gains, place, group)?.run(readings, group);
     let results: Vec<_> = groups.par_iter().with_max_len(1).map(one).collect();
     let (mut found, mut refused) = (Vec::new(), Vec::new());
     for (result, group) in results.into_iter().zip(&groups) {
@@ -100,23 +100,23 @@ pub(crate) fn spreads(
 }
 
 /// Presses of one run to one depth under one covering.
-struct Group<'a> {
+struct SpreadData<'a> {
     covering_mm: f64,
     height_mm: f64,
-    presses: Vec<(&'a Press, &'a Dwell)>,
+    presses: Vec<(&'a MeasuredPress, &'a Dwell)>,
 }
 
 /// Of each covering, the presses of the run with the most, by depth.
-fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<Group<'a>> {
-    let known = |press: &&Press| press.rest.is_some() && declared.indenter(press).is_some();
+fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<SpreadData<'a>> {
+    let known = |press: &&MeasuredPress| press.rest.is_some() && declared.indenter(press).is_some();
     let mut groups = Vec::new();
     for covering_mm in coverings_mm(readings.presses.iter().filter(known)) {
-        let under = |press: &&Press| same_covering(press.covering_mm, covering_mm);
+        let under = |press: &&MeasuredPress| same_covering(press.covering_mm, covering_mm);
         let of_run = |run: usize| {
             readings.presses.iter().filter(move |press| press.run == run).filter(known).filter(under)
         };
         let most = (0..readings.runs.len()).max_by_key(|run| (of_run(*run).count(), std::cmp::Reverse(*run)));
-        let mut presses: Vec<(&Press, &Dwell)> = most
+        let mut presses: Vec<(&MeasuredPress, &Dwell)> = most
             .into_iter()
             .flat_map(of_run)
             .flat_map(|press| press.dwells.iter().map(move |dwell| (press, dwell)))
@@ -127,7 +127,7 @@ fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<Group<'a>> {
             let height_mm = alike.iter().map(|(_, dwell)| dwell.height_mm).sum::<f64>() / alike.len() as f64;
             let places = distinct_places(alike.iter().map(|(press, _)| press.place_mm)).len();
             if places >= PLACES_LEAST {
-                groups.push(Group { covering_mm, height_mm, presses: alike.to_vec() });
+                groups.push(SpreadData { covering_mm, height_mm, presses: alike.to_vec() });
             }
         }
     }
@@ -135,7 +135,7 @@ fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<Group<'a>> {
 }
 
 /// One fit, and how it moves with what it rests on.
-struct Found {
+struct GroupFit {
     fit: SpreadFit,
     variance: f64,
     /// By all sensitivities, then all curvatures.
@@ -143,14 +143,15 @@ struct Found {
     by_place: DVector<f64>,
 }
 
-fn covariance(found: &[Found], gains: &Gains, place: &Place) -> DMatrix<f64> {
+fn covariance(found: &[GroupFit], gains: &Gains, place: &SensorPose) -> DMatrix<f64> {
     let count = found.len();
     let mut covariance = DMatrix::from_diagonal(&DVector::from_fn(count, |row, _| found[row].variance));
     if count > 0 {
         let by_gains = DMatrix::from_fn(count, gains.own.nrows(), |row, column| found[row].by_gains[column]);
         // A wrong place acts on its own, and through the responses.
-        let by_place = DMatrix::from_fn(count, Place::UNSURE, |row, column| found[row].by_place[column])
-            + &by_gains * &gains.by_place;
+        let by_place =
+            DMatrix::from_fn(count, SensorPose::UNCERTAIN, |row, column| found[row].by_place[column])
+                + &by_gains * &gains.by_place;
         covariance += &by_gains * &gains.own * by_gains.transpose();
         covariance += &by_place * &place.covariance * by_place.transpose();
     }
@@ -158,7 +159,7 @@ fn covariance(found: &[Found], gains: &Gains, place: &Place) -> DMatrix<f64> {
 }
 
 /// One image: where the tool stood, and what the elements read, as indentations of unit norm.
-struct Image {
+struct PressImage {
     contact: Contact,
     place_mm: [f64; 2],
     measured: Vec<f64>,
@@ -166,18 +167,18 @@ struct Image {
 }
 
 /// The search for one sigma.
-struct Search<'a> {
+struct SigmaSearch<'a> {
     declared: &'a Declared,
     gains: &'a Gains,
-    place: &'a Place,
+    place: &'a SensorPose,
     covering: Covering,
-    images: Vec<Image>,
+    images: Vec<PressImage>,
     /// Presses with an element beyond the turning point of its response.
     left_out: usize,
 }
 
 /// What one image says at a sigma.
-struct Slope {
+struct ImageSlope {
     likeness: f64,
     /// Derivative of the likeness by sigma.
     by_sigma: f64,
@@ -187,12 +188,12 @@ struct Slope {
     shape: Vec<f64>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> SigmaSearch<'a> {
     fn new(
         declared: &'a Declared,
         gains: &'a Gains,
-        place: &'a Place,
-        group: &Group<'_>,
+        place: &'a SensorPose,
+        group: &SpreadData<'_>,
     ) -> Result<Self, String> {
         let covering = Covering { thickness_mm: group.covering_mm };
         let mut search = Self { declared, gains, place, covering, images: Vec::new(), left_out: 0 };
@@ -210,7 +211,7 @@ impl<'a> Search<'a> {
             if norm_mm > 0.0 {
                 scale(&mut measured, 1.0 / norm_mm);
                 let contact = place.setting.contact(press, dwell, indenter);
-                search.images.push(Image { contact, place_mm: press.place_mm, measured, norm_mm });
+                search.images.push(PressImage { contact, place_mm: press.place_mm, measured, norm_mm });
             }
         }
         if search.images.len() < PLACES_LEAST {
@@ -219,7 +220,7 @@ impl<'a> Search<'a> {
         Ok(search)
     }
 
-    fn run(mut self, readings: &Readings, group: &Group<'_>) -> Result<Found, String> {
+    fn run(mut self, readings: &Readings, group: &SpreadData<'_>) -> Result<GroupFit, String> {
         // The median image's sigma is hardly moved by images that are like none.
         let (start_mm, slopes) =
             self.maximise(median_step, self.declared.sigma_mm(self.covering.thickness_mm), STEP_LEAST[0])?;
@@ -246,16 +247,16 @@ impl<'a> Search<'a> {
         };
         let by_gains = self.by_gains(&slopes) / curvature;
         let by_place = self.by_place(sigma_mm, &slopes) / curvature;
-        Ok(Found { fit, variance, by_gains, by_place })
+        Ok(GroupFit { fit, variance, by_gains, by_place })
     }
 
     /// Where steps end, from a start, and what every image says there.
     fn maximise(
         &self,
-        step: fn(&[Slope]) -> f64,
+        step: fn(&[ImageSlope]) -> f64,
         start_mm: f64,
         step_least: f64,
-    ) -> Result<(f64, Vec<Slope>), String> {
+    ) -> Result<(f64, Vec<ImageSlope>), String> {
         let [least, most] = SIGMA_PITCHES.map(|pitches| pitches * self.declared.array().pitch_mm());
         let mut sigma_mm = start_mm.clamp(least, most);
         for _ in 0..ROUNDS_MAX {
@@ -274,11 +275,11 @@ impl<'a> Search<'a> {
         Err(format!("the images fit no sigma between {least:.2} and {most:.0} mm"))
     }
 
-    fn slopes(&self, sigma_mm: f64) -> Vec<Slope> {
+    fn slopes(&self, sigma_mm: f64) -> Vec<ImageSlope> {
         self.images.iter().map(|image| self.slope(sigma_mm, image, &image.contact)).collect()
     }
 
-    fn slope(&self, sigma_mm: f64, image: &Image, contact: &Contact) -> Slope {
+    fn slope(&self, sigma_mm: f64, image: &PressImage, contact: &Contact) -> ImageSlope {
         // Two images a hair apart give the image between them and its slope, both to some 1e-8.
         let step_mm = STEP_SHARE * sigma_mm;
         let [less, more] = [sigma_mm - step_mm, sigma_mm + step_mm].map(|sigma_mm| {
@@ -303,7 +304,7 @@ impl<'a> Search<'a> {
         for (shape, modelled) in shape.iter_mut().zip(&modelled) {
             *shape = (*shape - along * modelled) / length;
         }
-        Slope {
+        ImageSlope {
             likeness: dot(&image.measured, &modelled),
             by_sigma: dot(&image.measured, &shape),
             curvature: dot(&shape, &shape),
@@ -312,7 +313,7 @@ impl<'a> Search<'a> {
     }
 
     /// How the sum of the slopes moves with the elements' responses.
-    fn by_gains(&self, slopes: &[Slope]) -> DVector<f64> {
+    fn by_gains(&self, slopes: &[ImageSlope]) -> DVector<f64> {
         let count = self.gains.elements.len();
         let mut by_gains = DVector::zeros(2 * count);
         for (image, slope) in self.images.iter().zip(slopes) {
@@ -328,8 +329,8 @@ impl<'a> Search<'a> {
     }
 
     /// How the sum of the slopes moves with the sensor's place.
-    fn by_place(&self, sigma_mm: f64, slopes: &[Slope]) -> DVector<f64> {
-        let mut by_place = DVector::zeros(Place::UNSURE);
+    fn by_place(&self, sigma_mm: f64, slopes: &[ImageSlope]) -> DVector<f64> {
+        let mut by_place = DVector::zeros(SensorPose::UNCERTAIN);
         for (image, slope) in self.images.iter().zip(slopes) {
             let mut along = [0.0; 2];
             for (axis, along) in along.iter_mut().enumerate() {
@@ -350,13 +351,13 @@ impl<'a> Search<'a> {
 }
 
 /// Newton's step to the maximum of the sum.
-fn step(slopes: &[Slope]) -> f64 {
-    let sum = |of: fn(&Slope) -> f64| slopes.iter().map(of).sum::<f64>();
+fn step(slopes: &[ImageSlope]) -> f64 {
+    let sum = |of: fn(&ImageSlope) -> f64| slopes.iter().map(of).sum::<f64>();
     sum(|slope| slope.by_sigma) / sum(|slope| slope.curvature)
 }
 
 /// The median of the images' own steps.
-fn median_step(slopes: &[Slope]) -> f64 {
+fn median_step(slopes: &[ImageSlope]) -> f64 {
     median(slopes.iter().map(|slope| slope.by_sigma / slope.curvature)).unwrap_or(f64::NAN)
 }
 

@@ -1,16 +1,16 @@
-use crate::{Calibration, calibrate, lab::Lab};
+use crate::{Calibration, calibrate, synthetic_sensor::SyntheticSensor};
 
 const COVERINGS_MM: [f64; 4] = [1.016, 2.54, 3.556, 5.08];
 
 fn whole(seed: u64, spoil: impl Fn(&mut [f64], i32) + 'static) -> Calibration {
-    let mut lab = Lab::new(seed);
-    lab.spoil = Box::new(spoil);
-    lab.centres();
+    let mut sensor = SyntheticSensor::new(seed);
+    sensor.spoil = Box::new(spoil);
+    sensor.centres();
     for covering_mm in COVERINGS_MM {
-        lab.next_run();
-        lab.sweep(covering_mm, 5);
+        sensor.next_run();
+        sensor.sweep(covering_mm, 5);
     }
-    let (declared, readings) = lab.readings();
+    let (declared, readings) = sensor.readings();
     calibrate(&declared, &readings).unwrap()
 }
 
@@ -49,9 +49,9 @@ fn an_image_like_no_other_is_left_out() {
 
 #[test]
 fn one_covering_gives_its_spread_and_no_line() {
-    let mut lab = Lab::new(3);
-    lab.centres();
-    let (declared, readings) = lab.readings();
+    let mut sensor = SyntheticSensor::new(3);
+    sensor.centres();
+    let (declared, readings) = sensor.readings();
     let found = calibrate(&declared, &readings).unwrap();
     let thickness = found.thickness.as_ref().unwrap();
     assert!(thickness.linear.is_none() && thickness.quadratic.is_none());
@@ -66,8 +66,8 @@ fn one_covering_gives_its_spread_and_no_line() {
 
 #[test]
 fn nothing_measured_is_said_and_no_number_given() {
-    let lab = Lab::new(4);
-    let (declared, readings) = lab.readings();
+    let sensor = SyntheticSensor::new(4);
+    let (declared, readings) = sensor.readings();
     let found = calibrate(&declared, &readings).unwrap();
     assert!(found.registration.is_none() && found.response.is_none() && found.thickness.is_none());
     assert!(found.missing.len() >= 3, "{:?}", found.missing);

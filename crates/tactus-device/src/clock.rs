@@ -2,7 +2,7 @@
 
 use std::time::{Duration, SystemTime};
 
-use tactus_schema::{MonoTime, Stamp, WallTime};
+use tactus_schema::{MonoTime, TimeStamp, WallTime};
 use tokio::time::Instant;
 
 /// The host's monotonic and wall clock, read together.
@@ -34,10 +34,10 @@ impl Clock {
 
     /// The present instant. A real clock reads the system's wall time at each call: a step of the system clock shows
     /// in the wall time and not in the monotonic time.
-    pub fn now(&self) -> Stamp {
+    pub fn now(&self) -> TimeStamp {
         let mono = MonoTime::default().after(self.start.elapsed());
         let wall = if self.is_virtual { self.wall_start.after(self.start.elapsed()) } else { wall_now() };
-        Stamp { mono, wall }
+        TimeStamp { mono, wall }
     }
 
     /// The tokio instant of a monotonic time.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use tactus_schema::{MonoTime, Stamp};
+use tactus_schema::{MonoTime, TimeStamp};
 use tactus_wire::declared::MAX_FRAME_BYTES;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::time::{sleep_until, timeout};
@@ -46,7 +46,7 @@ impl Link {
     pub(crate) async fn next(
         &mut self,
         deadline: Option<Duration>,
-    ) -> Result<(Stamp, LinkEvent<'_>), DeviceError> {
+    ) -> Result<(TimeStamp, LinkEvent<'_>), DeviceError> {
         let read = tokio::select! {
             // The deadline comes first: a device that sends without pause must not delay it.
             biased;
@@ -72,7 +72,7 @@ impl Link {
 }
 
 /// The time of a session: since the start of the clock.
-pub(crate) fn since_start(stamp: Stamp) -> Duration {
+pub(crate) fn since_start(stamp: TimeStamp) -> Duration {
     stamp.mono.since(MonoTime::default())
 }
 

@@ -1,4 +1,4 @@
-use tactus_schema::{FrameFlags, Stamp, WallTime};
+use tactus_schema::{FrameFlags, TimeStamp, WallTime};
 
 use super::*;
 
@@ -8,7 +8,7 @@ fn frame(at_ms: i64, count: f32, lost_before: u32) -> Frame {
         seq: 0,
         epoch: 0,
         device_tick: None,
-        received: Stamp { mono, wall: WallTime::default() },
+        received: TimeStamp { mono, wall: WallTime::default() },
         counts: vec![count, 2.0 * count].into(),
         flags: FrameFlags::default(),
         lost_before,

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use tactus_schema::{Frame, Stamp, pb};
+use tactus_schema::{Frame, TimeStamp, pb};
 
 /// A recording in the making. A failure fails the run.
 pub trait Record: Send {
@@ -10,7 +10,7 @@ pub trait Record: Send {
     ///
     /// # Errors
     /// If it could not be taken in; the recording is then incomplete.
-    fn sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordFailure>;
+    fn sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordFailure>;
     /// One frame.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-use tactus_schema::{FrameFlags, Rig, Stamp, WallTime};
+use tactus_schema::{FrameFlags, Rig, TimeStamp, WallTime};
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn frame(ms: i64, counts: &[f32]) -> Frame {
         seq: 0,
         epoch: 0,
         device_tick: None,
-        received: Stamp { mono: at_ms(ms), wall: WallTime::default() },
+        received: TimeStamp { mono: at_ms(ms), wall: WallTime::default() },
         counts: counts.into(),
         flags: FrameFlags::default(),
         lost_before: 0,

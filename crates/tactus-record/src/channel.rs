@@ -7,7 +7,7 @@ use std::{
 };
 
 use mcap::{Compression, McapError, WriteOptions, records::MessageHeader, write::NoSeek};
-use tactus_schema::{DESCRIPTOR_SET, Stamp, key::Keys};
+use tactus_schema::{DESCRIPTOR_SET, TimeStamp, key::Keys};
 
 use crate::{MessageKind, header::Header, message::Recorded};
 
@@ -29,7 +29,7 @@ pub(crate) struct ChannelWriter<W: Write> {
     /// Channels by kind of message.
     ids: [u16; MessageKind::ALL.len()],
     encoded: Vec<u8>,
-    chunk_began: Option<Stamp>,
+    chunk_began: Option<TimeStamp>,
     failed: bool,
 }
 
@@ -101,10 +101,15 @@ impl<W: Write> ChannelWriter<W> {
     }
 
     /// Writes a message to the channel of its kind, and closes the chunk in hand first if it spans enough time.
-    pub(crate) fn write<M: Recorded>(&mut self, message: &M, seq: u64, at: Stamp) -> Result<(), McapError> {
+    pub(crate) fn write<M: Recorded>(
+        &mut self,
+        message: &M,
+        seq: u64,
+        at: TimeStamp,
+    ) -> Result<(), McapError> {
         self.once_failed_always()?;
         // A clock that runs backwards closes the chunk, too.
-        let spans = |began: Stamp| at.mono < began.mono || at.mono.since(began.mono) >= CHUNK_SPAN;
+        let spans = |began: TimeStamp| at.mono < began.mono || at.mono.since(began.mono) >= CHUNK_SPAN;
         if self.chunk_began.is_some_and(spans) {
             self.flush()?;
         }

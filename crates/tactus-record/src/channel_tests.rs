@@ -5,7 +5,7 @@ use std::{
 };
 
 use mcap::McapError;
-use tactus_schema::{Frame, MonoTime, Rig, Stamp, WallTime, pb};
+use tactus_schema::{Frame, MonoTime, Rig, TimeStamp, WallTime, pb};
 
 use super::{CHUNK_SPAN, ChannelWriter};
 use crate::{Entry, Header, Message, Reader, Script};
@@ -66,8 +66,8 @@ fn frame(seq: u64) -> Frame {
     pb::Frame { seq, counts: vec![100.0; 48], ..pb::Frame::default() }.into()
 }
 
-fn at(seq: u64) -> Stamp {
-    Stamp { mono: MonoTime::from_ns(seq.cast_signed() * 33_333_333), wall: WallTime::from_ns(1) }
+fn at(seq: u64) -> TimeStamp {
+    TimeStamp { mono: MonoTime::from_ns(seq.cast_signed() * 33_333_333), wall: WallTime::from_ns(1) }
 }
 
 fn durable_frames(disk: &Disk) -> u64 {

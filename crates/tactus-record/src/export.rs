@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::{EpochClock, RowsError, Timeline, rows::Gathered, table::TableWriter};
+use crate::{EpochClock, RowsError, Timeline, rows::RowSources, table::TableWriter};
 
 /// Key of the file metadata that holds the clock estimates, as JSON.
 const CLOCK_METADATA_KEY: &str = "tactus.clock";
@@ -52,14 +52,14 @@ pub fn export<P: AsRef<Path>>(recordings: &[P], out: impl Into<PathBuf>) -> Resu
     let [first, rest @ ..] = recordings else { return Err(RowsError::Nothing) };
     let first = Timeline::read(first)?;
     let mut table = TableWriter::create(&out, first.rig_json())?;
-    let mut gathered = Gathered::default();
+    let mut sources = RowSources::default();
     let mut clocks = Vec::new();
     let mut add = |timeline: &Timeline| {
         clocks.push(RunClocks::of(timeline));
-        gathered.recording(timeline, |_, row| Ok(table.put(row)?))
+        sources.recording(timeline, |_, row| Ok(table.put(row)?))
     };
     let filled = add(&first).and_then(|()| rest.iter().try_for_each(|path| add(&Timeline::read(path)?)));
-    let source = match filled.and_then(|()| gathered.into_source()) {
+    let source = match filled.and_then(|()| sources.into_source()) {
         Ok(source) => source,
         Err(error) => {
             table.abandon();

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use prost::Message as _;
-use tactus_schema::{Frame, Message as Schema, MonoTime, Stamp, WallTime, key::Topic, pb};
+use tactus_schema::{Frame, Message as Schema, MonoTime, TimeStamp, WallTime, key::Topic, pb};
 
 use crate::Tally;
 
@@ -22,7 +22,7 @@ pub trait Recorded {
 /// A recorded message that has a time and a sequence number of its own.
 pub trait Timed: Recorded {
     /// When it was made; of a frame, when it was received.
-    fn at(&self) -> Stamp;
+    fn at(&self) -> TimeStamp;
 
     /// Its sequence number.
     fn seq(&self) -> u64;
@@ -86,7 +86,7 @@ macro_rules! kinds {
 
             /// When it was made, on both clocks of the host; `None` if the message does not say.
             #[allow(unreachable_patterns, reason = "the second list has those kinds too that have a time")]
-            pub fn at(&self) -> Option<Stamp> {
+            pub fn at(&self) -> Option<TimeStamp> {
                 match self {
                     $($(Self::$kind($timed) => Some($at),)?)*
                     $(Self::$kind(_) => None,)*
@@ -113,7 +113,7 @@ macro_rules! kinds {
             pub(crate) fn write<W: std::io::Write>(
                 &self,
                 writer: &mut crate::channel::ChannelWriter<W>,
-                at: Stamp,
+                at: TimeStamp,
             ) -> Result<(), mcap::McapError> {
                 match self {
                     $(Self::$kind(message) => writer.write::<$message>(message, 0, at),)*
@@ -144,7 +144,7 @@ macro_rules! kinds {
             }
 
             $(impl Timed for $message {
-                fn at(&self) -> Stamp {
+                fn at(&self) -> TimeStamp {
                     let $timed = self;
                     $at
                 }
@@ -197,8 +197,8 @@ kinds! {
     }
 }
 
-fn stamp(mono_ns: i64, wall_ns: i64) -> Stamp {
-    Stamp { mono: MonoTime::from_ns(mono_ns), wall: WallTime::from_ns(wall_ns) }
+fn stamp(mono_ns: i64, wall_ns: i64) -> TimeStamp {
+    TimeStamp { mono: MonoTime::from_ns(mono_ns), wall: WallTime::from_ns(wall_ns) }
 }
 
 /// What is sent for a message: itself, or its protobuf form.

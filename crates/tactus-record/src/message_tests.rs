@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use tactus_schema::{MonoTime, Rig, Stamp, WallTime};
+use tactus_schema::{MonoTime, Rig, TimeStamp, WallTime};
 
 use super::{Message, MessageKind};
 use crate::{Entry, Header, Reader, Script, channel::ChannelWriter};
@@ -24,7 +24,7 @@ fn every_kind_of_the_list_is_written_to_its_channel_and_read_back() {
         simulated: true,
     };
     let mut writer = ChannelWriter::new(Vec::new(), &header).unwrap();
-    let at = Stamp { mono: MonoTime::from_ns(1), wall: WallTime::from_ns(2) };
+    let at = TimeStamp { mono: MonoTime::from_ns(1), wall: WallTime::from_ns(2) };
     for message in Message::empty() {
         message.write(&mut writer, at).unwrap();
     }

@@ -13,7 +13,7 @@ use tactus_schema::WallTime;
 use crate::{
     Completeness, Message, RecordError,
     header::{Attachment, METADATA_NAME, RunMetadata},
-    scan::{Item, RawMessage, Scan},
+    scan::{RawMessage, Scan, ScanItem},
 };
 
 /// One thing in a recording.
@@ -99,12 +99,14 @@ impl<R: Read> Reader<R> {
     fn next_entry(&mut self) -> io::Result<Option<Entry>> {
         while let Some(item) = self.scan.next_item()? {
             let entry = match item {
-                Item::Metadata(record) if record.name == METADATA_NAME => RunMetadata::from_record(&record)
-                    .map(Entry::Run)
-                    .map_err(|field| format!("metadata {METADATA_NAME}: {field} is missing or wrong")),
-                Item::Metadata(_) => continue,
-                Item::Attachment(attachment) => Ok(Entry::Attachment(attachment)),
-                Item::Message(raw) => decode(&raw)
+                ScanItem::Metadata(record) if record.name == METADATA_NAME => {
+                    RunMetadata::from_record(&record)
+                        .map(Entry::Run)
+                        .map_err(|field| format!("metadata {METADATA_NAME}: {field} is missing or wrong"))
+                }
+                ScanItem::Metadata(_) => continue,
+                ScanItem::Attachment(attachment) => Ok(Entry::Attachment(attachment)),
+                ScanItem::Message(raw) => decode(&raw)
                     .map(|message| Entry::Message {
                         topic: self.topic(&raw),
                         at: WallTime::from_ns(i64::try_from(raw.header.log_time).unwrap_or(i64::MAX)),

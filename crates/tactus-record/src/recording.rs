@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use tactus_schema::{Stamp, pb};
+use tactus_schema::{TimeStamp, pb};
 
 use crate::{RecordError, Tally, Timed, channel::ChannelWriter, header::Header};
 
@@ -87,7 +87,7 @@ impl Recording {
     ///
     /// # Errors
     /// As [`Recording::write`].
-    pub fn write_sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordError> {
+    pub fn write_sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordError> {
         self.tally.time(at.mono);
         let nth = self.sensor_infos;
         self.sensor_infos += 1;

@@ -10,7 +10,7 @@ use std::{
 
 use mcap::McapError;
 use tactus_schema::{
-    DESCRIPTOR_SET, Stamp,
+    DESCRIPTOR_SET, TimeStamp,
     key::Keys,
     pb::{self, run_event::Event},
 };
@@ -21,7 +21,7 @@ use crate::{
     header::METADATA_NAME,
     info,
     reader::{decode, io_error},
-    scan::{Item, RawMessage, Scan},
+    scan::{RawMessage, Scan, ScanItem},
 };
 
 /// What recovery found and made.
@@ -62,24 +62,24 @@ pub fn recover(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<Recovery
 }
 
 #[derive(Clone, Copy)]
-struct Copied {
+struct CopyCounts {
     messages: u64,
     closed: bool,
 }
 
-fn rewrite(path: &Path, out: &Path, file: File) -> Result<Copied, RecordError> {
+fn rewrite(path: &Path, out: &Path, file: File) -> Result<CopyCounts, RecordError> {
     let unwritten = |source| RecordError::Write { path: out.to_owned(), source };
     let source = File::open(path).map_err(|source| io_error(path, source))?;
     let mut scan = Scan::new(std::io::BufReader::new(source));
-    let mut copy = Copy::new(file).map_err(unwritten)?;
+    let mut copy = RecordingCopy::new(file).map_err(unwritten)?;
     while let Some(item) = scan.next_item().map_err(|source| io_error(path, source))? {
         match item {
-            Item::Message(raw) => match decode(&raw) {
+            ScanItem::Message(raw) => match decode(&raw) {
                 Ok(message) => copy.message(raw, &message).map_err(unwritten)?,
                 Err(_) => break,
             },
-            Item::Metadata(record) => copy.metadata(&record).map_err(unwritten)?,
-            Item::Attachment(file) => copy
+            ScanItem::Metadata(record) => copy.metadata(&record).map_err(unwritten)?,
+            ScanItem::Attachment(file) => copy
                 .mcap
                 .attach(&mcap::Attachment {
                     log_time: unsigned(file.written.ns()),
@@ -95,10 +95,10 @@ fn rewrite(path: &Path, out: &Path, file: File) -> Result<Copied, RecordError> {
     let messages = copy.messages;
     let file = copy.finish().map_err(unwritten)?;
     file.sync_all().map_err(|source| RecordError::Io { action: "sync", path: out.to_owned(), source })?;
-    Ok(Copied { messages, closed })
+    Ok(CopyCounts { messages, closed })
 }
 
-fn verify(out: &Path, before: Info, copied: Copied) -> Result<Recovery, RecordError> {
+fn verify(out: &Path, before: Info, copied: CopyCounts) -> Result<Recovery, RecordError> {
     let after = info(out)?;
     let problem = |problem: String| RecordError::Unverified { path: out.to_owned(), problem };
     if let Completeness::Truncated { at_byte, reason } = &after.completeness {
@@ -118,16 +118,16 @@ fn verify(out: &Path, before: Info, copied: Copied) -> Result<Recovery, RecordEr
 }
 
 /// The recording being made.
-struct Copy<W: Write> {
+struct RecordingCopy<W: Write> {
     mcap: mcap::Writer<mcap::write::NoSeek<std::io::BufWriter<W>>>,
     messages: u64,
     tally: Tally,
     run: Option<RunMetadata>,
     last_event: Option<u64>,
-    last_time: Stamp,
+    last_time: TimeStamp,
 }
 
-impl<W: Write> Copy<W> {
+impl<W: Write> RecordingCopy<W> {
     fn new(sink: W) -> Result<Self, McapError> {
         Ok(Self {
             mcap: writer(sink)?,
@@ -135,7 +135,7 @@ impl<W: Write> Copy<W> {
             tally: Tally::default(),
             run: None,
             last_event: None,
-            last_time: Stamp::default(),
+            last_time: TimeStamp::default(),
         })
     }
 

@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use tactus_calibrate::{Gather, Readings};
+use tactus_calibrate::{Readings, ReadingsBuilder};
 use tactus_schema::{Frame, MonoTime, Rig, table::RowView};
 
 use crate::{
@@ -55,7 +55,7 @@ pub fn visit<P: AsRef<Path>>(
     paths: &[P],
     mut take: impl FnMut(&Rig, RowView<'_>),
 ) -> Result<Source, RowsError> {
-    let mut gathered = Gathered::default();
+    let mut sources = RowSources::default();
     let mut take = |rig: &Rig, row: RowView<'_>| {
         take(rig, row);
         Ok(())
@@ -63,14 +63,14 @@ pub fn visit<P: AsRef<Path>>(
     for path in paths.iter().map(AsRef::as_ref) {
         let start = first_bytes(path)?;
         if start == mcap::MAGIC {
-            gathered.recording(&Timeline::read(path)?, &mut take)?;
+            sources.recording(&Timeline::read(path)?, &mut take)?;
         } else if start.starts_with(PARQUET_MAGIC) {
-            gathered.table(TableReader::open(path)?, &mut take)?;
+            sources.table(TableReader::open(path)?, &mut take)?;
         } else {
             return Err(RowsError::Neither { path: path.to_owned() });
         }
     }
-    gathered.into_source()
+    sources.into_source()
 }
 
 /// The presses in recordings and measurement tables, as calibration takes them.
@@ -78,24 +78,24 @@ pub fn visit<P: AsRef<Path>>(
 /// # Errors
 /// As [`visit`].
 pub fn readings<P: AsRef<Path>>(paths: &[P]) -> Result<(Source, Readings), RowsError> {
-    let mut gather = None;
+    let mut builder = None;
     let source = visit(paths, |rig, row| {
-        gather.get_or_insert_with(|| Gather::new(&rig.array)).take(row);
+        builder.get_or_insert_with(|| ReadingsBuilder::new(&rig.array)).take(row);
     })?;
-    let readings = gather.unwrap_or_else(|| Gather::new(&source.rig.array)).finish();
+    let readings = builder.unwrap_or_else(|| ReadingsBuilder::new(&source.rig.array)).finish();
     Ok((source, readings))
 }
 
 /// Files that go together.
 #[derive(Debug, Default)]
-pub(crate) struct Gathered {
+pub(crate) struct RowSources {
     /// The first file, and its rig.
     first: Option<(PathBuf, Rig)>,
     runs: Vec<RunSource>,
     warnings: Vec<String>,
 }
 
-impl Gathered {
+impl RowSources {
     /// Gives the rows of a recording.
     pub(crate) fn recording(
         &mut self,
@@ -108,7 +108,7 @@ impl Gathered {
         if timeline.stage().is_empty() {
             return Err(RowsError::NoStage { path: path.to_owned() });
         }
-        let mut frames = Frames {
+        let mut frames = RowMaker {
             timeline,
             last: None,
             moved: 0,
@@ -150,7 +150,7 @@ impl Gathered {
         Ok(())
     }
 
-    /// What was gathered.
+    /// The rig of the first file, the runs and the warnings of all files.
     pub(crate) fn into_source(self) -> Result<Source, RowsError> {
         let Self { first, runs, warnings } = self;
         let (_, rig) = first.ok_or(RowsError::Nothing)?;
@@ -182,7 +182,7 @@ fn permanent(rig: &Rig) -> Rig {
 }
 
 /// Turns the frames of one recording into rows.
-struct Frames<'a> {
+struct RowMaker<'a> {
     timeline: &'a Timeline,
     last: Option<MonoTime>,
     /// Frames whose sampling time was not after the one before.
@@ -193,7 +193,7 @@ struct Frames<'a> {
     partly_read: u64,
 }
 
-impl Frames<'_> {
+impl RowMaker<'_> {
     fn row<'a>(&'a mut self, frame: &'a Frame) -> Result<RowView<'a>, RowsError> {
         let timeline = self.timeline;
         let sampling = timeline.sampling(frame);

@@ -38,7 +38,7 @@ pub enum Completeness {
 }
 
 /// What a file holds that matters here.
-pub(crate) enum Item {
+pub(crate) enum ScanItem {
     Metadata(mcap::records::Metadata),
     Attachment(Attachment),
     Message(RawMessage),
@@ -94,7 +94,7 @@ impl<R: Read> Scan<R> {
     }
 
     /// The next item; `None` at the end, whole or not. Errors are the source's own.
-    pub(crate) fn next_item(&mut self) -> io::Result<Option<Item>> {
+    pub(crate) fn next_item(&mut self) -> io::Result<Option<ScanItem>> {
         while self.end.is_none() {
             let given = match self.mcap.next_event() {
                 None => {
@@ -141,7 +141,11 @@ impl<R: Read> Scan<R> {
 }
 
 /// Reads one record; `None` if it carries nothing that matters here. The error says what is wrong with it.
-fn item(channels: &mut ChannelAccumulator<'static>, opcode: u8, body: &[u8]) -> Result<Option<Item>, String> {
+fn item(
+    channels: &mut ChannelAccumulator<'static>,
+    opcode: u8,
+    body: &[u8],
+) -> Result<Option<ScanItem>, String> {
     if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT) {
         return Ok(None);
     }
@@ -155,7 +159,7 @@ fn parsed(
     channels: &mut ChannelAccumulator<'static>,
     opcode: u8,
     body: &[u8],
-) -> Result<Option<Item>, McapError> {
+) -> Result<Option<ScanItem>, McapError> {
     #[expect(clippy::wildcard_enum_match_arm, reason = "the caller picked the kinds that matter")]
     Ok(match mcap::parse_record(opcode, body)? {
         McapRecord::Schema { header, data } => {
@@ -169,10 +173,10 @@ fn parsed(
         McapRecord::Message { header, data } => {
             let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
             let channel = channels.get(header.channel_id).ok_or(unknown)?;
-            Some(Item::Message(RawMessage { channel, header, data: data.into_owned() }))
+            Some(ScanItem::Message(RawMessage { channel, header, data: data.into_owned() }))
         }
-        McapRecord::Metadata(metadata) => Some(Item::Metadata(metadata)),
-        McapRecord::Attachment { header, data, .. } => Some(Item::Attachment(Attachment {
+        McapRecord::Metadata(metadata) => Some(ScanItem::Metadata(metadata)),
+        McapRecord::Attachment { header, data, .. } => Some(ScanItem::Attachment(Attachment {
             name: header.name,
             media_type: header.media_type,
             written: WallTime::from_ns(i64::try_from(header.log_time).unwrap_or(i64::MAX)),

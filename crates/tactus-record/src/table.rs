@@ -8,7 +8,7 @@ mod check;
 mod column;
 mod error;
 mod layout;
-mod part;
+mod part_file;
 mod read;
 mod residuals;
 mod write;
@@ -30,7 +30,7 @@ pub(crate) use read::TableReader;
 /// A checked measurement table in memory, by columns.
 #[derive(Debug, Clone)]
 pub struct Table {
-    head: Head,
+    head: TableHead,
     runs: Vec<RunRows>,
     press: Vec<i32>,
     phase: Vec<Phase>,
@@ -44,7 +44,7 @@ pub struct Table {
 
 /// What a table says of all its rows.
 #[derive(Debug, Clone)]
-pub struct Head {
+pub struct TableHead {
     /// The rig that was measured.
     pub rig: Rig,
     /// The file's metadata, the rig's text among it.
@@ -64,7 +64,7 @@ pub struct RunRows {
 #[derive(Debug, Clone)]
 pub struct Validated {
     /// What it says of all its rows.
-    pub head: Head,
+    pub head: TableHead,
     /// Number of rows.
     pub rows: u64,
     /// Number of runs.
@@ -76,7 +76,7 @@ pub struct Validated {
 /// # Errors
 /// [`TableError`] names the column, and the row where there is one.
 pub fn read(path: impl AsRef<Path>) -> Result<Table, TableError> {
-    let mut rows = Rows::default();
+    let mut rows = TableBuilder::default();
     let head = TableReader::open(path.as_ref())?.visit(|row| {
         rows.push(row);
         Ok::<_, TableError>(())
@@ -103,7 +103,7 @@ pub fn validate(path: impl AsRef<Path>) -> Result<Validated, TableError> {
 
 impl Table {
     /// What it says of all its rows.
-    pub fn head(&self) -> &Head {
+    pub fn head(&self) -> &TableHead {
         &self.head
     }
 
@@ -153,7 +153,7 @@ impl Table {
 
 /// A table in the making.
 #[derive(Default)]
-struct Rows {
+struct TableBuilder {
     runs: Vec<RunRows>,
     press: Vec<i32>,
     phase: Vec<Phase>,
@@ -165,7 +165,7 @@ struct Rows {
     counts: Vec<f32>,
 }
 
-impl Rows {
+impl TableBuilder {
     fn push(&mut self, row: RowView<'_>) {
         let index = self.t_ns.len();
         match self.runs.last_mut() {
@@ -186,7 +186,7 @@ impl Rows {
         self.counts.extend_from_slice(row.counts);
     }
 
-    fn into_table(self, head: Head) -> Table {
+    fn into_table(self, head: TableHead) -> Table {
         let Self { runs, press, phase, t_ns, position_mm, covering_mm, indenter, temperature_c, counts } =
             self;
         Table { head, runs, press, phase, t_ns, position_mm, covering_mm, indenter, temperature_c, counts }

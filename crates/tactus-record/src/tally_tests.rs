@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use tactus_schema::{
-    Frame, FrameFlags, MonoTime, Stamp, WallTime,
+    Frame, FrameFlags, MonoTime, TimeStamp, WallTime,
     pb::{self, run_event::Event},
 };
 
@@ -12,7 +12,7 @@ fn frame(seq: u64, lost_before: u32) -> Frame {
         seq,
         epoch: 0,
         device_tick: None,
-        received: Stamp {
+        received: TimeStamp {
             mono: MonoTime::from_ns(seq.cast_signed() * 1_000_000_000),
             wall: WallTime::default(),
         },

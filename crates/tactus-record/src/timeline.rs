@@ -1,14 +1,14 @@
 //! Where the stage was, and what it did, at any time of a run.
 
-mod gather;
-mod way;
+mod builder;
+mod stage_path;
 
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
 };
 
-use gather::Gathered;
+use builder::TimelineBuilder;
 use tactus_schema::{
     Frame, MonoTime, Rig,
     pb::{self, run_event::Event},
@@ -76,12 +76,12 @@ impl Timeline {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordError> {
         let path = path.as_ref();
         let (run, mut reader) = read_run(path)?;
-        let mut gathered = Gathered::default();
+        let mut builder = TimelineBuilder::default();
         for entry in reader.by_ref() {
-            gathered.take(entry.map_err(|source| io_error(path, source))?);
+            builder.take(entry.map_err(|source| io_error(path, source))?);
         }
         let completeness = reader.completeness().cloned().unwrap_or(Completeness::Complete);
-        gathered.into_timeline(path, run, completeness)
+        builder.into_timeline(path, run, completeness)
     }
 
     /// The recording.
@@ -145,7 +145,7 @@ impl Timeline {
     /// Where the stage was, in the robot's frame: between two reports as its speeds before and after say, before the
     /// first and after the last where they say. `None` if it never said.
     pub fn position_mm(&self, at: MonoTime) -> Option<[f64; 3]> {
-        way::position_mm(&self.stage, at)
+        stage_path::position_mm(&self.stage, at)
     }
 
     /// What the stage did, and the index of the press, -1 outside one; idle before the run began.

@@ -5,7 +5,7 @@ use std::thread::{self, JoinHandle};
 
 use tactus_engine::{Record, RecordFailure};
 use tactus_record::{RecordError, Recording};
-use tactus_schema::{Frame, Stamp, pb};
+use tactus_schema::{Frame, TimeStamp, pb};
 
 /// What may wait for the disk: a minute of frames, reports and events. If it is full the run fails, loudly.
 const QUEUE: usize = 4096;
@@ -34,7 +34,7 @@ enum QueueError {
 
 #[derive(Debug)]
 enum Entry {
-    SensorInfo(pb::SensorInfo, Stamp),
+    SensorInfo(pb::SensorInfo, TimeStamp),
     Frame(Frame),
     Stage(pb::StageState),
     Event(pb::RunEvent),
@@ -42,7 +42,7 @@ enum Entry {
 }
 
 impl Record for DirectRecorder {
-    fn sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordFailure> {
+    fn sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordFailure> {
         self.0.write_sensor_info(info, at).map_err(failure)
     }
 
@@ -91,7 +91,7 @@ impl ThreadRecorder {
 }
 
 impl Record for ThreadRecorder {
-    fn sensor_info(&mut self, info: &pb::SensorInfo, at: Stamp) -> Result<(), RecordFailure> {
+    fn sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordFailure> {
         self.hand(Entry::SensorInfo(info.clone(), at))
     }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 use tactus_device::{Clock, SensorCodec};
 use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, Unpublished};
 use tactus_schema::rig::Transport;
-use tactus_schema::{Frame, Rig, Stamp, pb};
+use tactus_schema::{Frame, Rig, TimeStamp, pb};
 use tactus_virtual::{Truth, twin_of};
 use tokio::time::timeout;
 use tracing::subscriber::NoSubscriber;
@@ -108,7 +108,7 @@ async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
 struct Unrecorded;
 
 impl Record for Unrecorded {
-    fn sensor_info(&mut self, _: &pb::SensorInfo, _: Stamp) -> Result<(), RecordFailure> {
+    fn sensor_info(&mut self, _: &pb::SensorInfo, _: TimeStamp) -> Result<(), RecordFailure> {
         Ok(())
     }
 

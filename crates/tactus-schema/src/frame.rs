@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{DeviceTick, MonoTime, Stamp, WallTime, pb};
+use crate::{DeviceTick, MonoTime, TimeStamp, WallTime, pb};
 
 /// One reading of all elements; cheap to clone, so that it can fan out.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +14,7 @@ pub struct Frame {
     /// The device's clock at the sampling, where it has one.
     pub device_tick: Option<DeviceTick>,
     /// When the last byte of the frame reached the host.
-    pub received: Stamp,
+    pub received: TimeStamp,
     /// Raw counts, row-major, one per element; always finite. One that was not read stands with its last reading
     /// of this epoch, or with 0.
     pub counts: Arc<[f32]>,
@@ -77,7 +77,7 @@ impl From<pb::Frame> for Frame {
             seq: message.seq,
             epoch: message.epoch,
             device_tick: message.device_tick.map(DeviceTick),
-            received: Stamp {
+            received: TimeStamp {
                 mono: MonoTime::from_ns(message.t_mono_ns),
                 wall: WallTime::from_ns(message.t_wall_ns),
             },

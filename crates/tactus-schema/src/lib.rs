@@ -17,7 +17,7 @@ pub use frame::{Frame, FrameFlags};
 pub use message::{Message, pb};
 pub use model::{Model, ModelFileError};
 pub use rig::{Rig, RigError};
-pub use time::{DeviceTick, MonoTime, Stamp, WallTime};
+pub use time::{DeviceTick, MonoTime, TimeStamp, WallTime};
 
 /// The compiled descriptor set of `tactus.v1`, as stock protobuf and MCAP tools read it.
 pub const DESCRIPTOR_SET: &[u8] = include_bytes!("../proto/tactus.binpb");

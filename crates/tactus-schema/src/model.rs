@@ -21,14 +21,14 @@ pub use file::SCHEMA;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     /// The base model.
-    pub base: Base,
+    pub base: BaseModel,
     /// What the base model lacks, in the order in which effects of one stage act.
     pub effects: Vec<KnownEffect>,
 }
 
 /// The base model's parameters, with standard errors where they were estimated.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Base {
+pub struct BaseModel {
     /// The elements.
     pub array: Array,
     /// Spread against covering thickness.
@@ -119,7 +119,7 @@ impl Model {
             reference_indenter: rig.indenters.get(&reference.indenter)?.clone(),
             reference_covering: reference.covering,
         };
-        Some(Self { base: Base::of(rig.array.clone(), rig.psf, response), effects: Vec::new() })
+        Some(Self { base: BaseModel::of(rig.array.clone(), rig.psf, response), effects: Vec::new() })
     }
 
     /// The characterisation carried to another array.
@@ -140,10 +140,10 @@ impl Model {
         };
         let effects = self.effects.iter().filter(|known| !known.effect.names_elements()).cloned().collect();
         Self {
-            base: Base {
+            base: BaseModel {
                 psf_se: self.base.psf_se,
                 noise_rms_counts: self.base.noise_rms_counts,
-                ..Base::of(array, self.base.psf, response)
+                ..BaseModel::of(array, self.base.psf, response)
             },
             effects,
         }
@@ -155,7 +155,7 @@ impl Model {
     /// [`ModelError`] if a parameter was changed to what no model can have, or an array is given for which
     /// there is no reference press.
     pub fn forward(&self) -> Result<ForwardModel, ModelError> {
-        let Base { array, psf, response, .. } = &self.base;
+        let BaseModel { array, psf, response, .. } = &self.base;
         ForwardModel::new(array.clone(), *psf, response.clone())
     }
 
@@ -182,7 +182,7 @@ impl Model {
     }
 }
 
-impl Base {
+impl BaseModel {
     /// Parameters that were not estimated, of a sensor without noise.
     pub fn of(array: Array, psf: Psf, response: Response) -> Self {
         Self {

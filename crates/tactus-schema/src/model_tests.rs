@@ -136,7 +136,7 @@ fn a_rig_gives_the_model_of_its_description() {
     let model = Model::of_rig(&rig).unwrap();
     let shipped = Model::from_toml(DIGITACTS).unwrap();
     // The simulated rig is the paper's sensor, and states no noise.
-    assert_eq!(model, Model { base: Base { noise_rms_counts: 0.0, ..shipped.base }, ..model.clone() });
+    assert_eq!(model, Model { base: BaseModel { noise_rms_counts: 0.0, ..shipped.base }, ..model.clone() });
 }
 
 #[test]

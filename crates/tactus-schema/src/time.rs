@@ -16,7 +16,7 @@ pub struct WallTime(i64);
 
 /// One instant on both host clocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Stamp {
+pub struct TimeStamp {
     /// On the monotonic clock.
     pub mono: MonoTime,
     /// On the wall clock.

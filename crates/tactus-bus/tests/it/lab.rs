@@ -6,7 +6,7 @@ use std::{net::TcpListener as StdListener, time::Duration};
 
 use tactus_bus::{Bus, BusConfig, BusError, Calls, Client, Endpoint};
 use tactus_schema::{
-    Frame, FrameFlags, MonoTime, Stamp, WallTime,
+    Frame, FrameFlags, MonoTime, TimeStamp, WallTime,
     key::{Command, Keys},
     pb,
 };
@@ -69,7 +69,7 @@ pub(crate) fn frame(seq: u64) -> Frame {
         seq,
         epoch: 1,
         device_tick: None,
-        received: Stamp { mono: MonoTime::from_ns(ns), wall: WallTime::from_ns(ns) },
+        received: TimeStamp { mono: MonoTime::from_ns(ns), wall: WallTime::from_ns(ns) },
         counts: vec![seq as f32; 48].into(),
         flags: FrameFlags::default(),
         lost_before: 0,

@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, fs};
 use crate::lab::{event, frame, open, raw_session};
 use prost::Message as _;
 use tactus_bus::{Bus, BusConfig, BusError, Client, History};
-use tactus_schema::{DeviceTick, Frame, FrameFlags, MonoTime, Stamp, WallTime, key::Keys, pb};
+use tactus_schema::{DeviceTick, Frame, FrameFlags, MonoTime, TimeStamp, WallTime, key::Keys, pb};
 use zenoh_ext::{AdvancedSubscriberBuilderExt, HistoryConfig, RecoveryConfig};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -88,7 +88,7 @@ async fn what_is_published_is_byte_for_byte_what_the_python_client_reads() {
         seq: 300,
         epoch: 2,
         device_tick: Some(DeviceTick(7)),
-        received: Stamp { mono: MonoTime::from_ns(1_000_000_000), wall: WallTime::from_ns(5) },
+        received: TimeStamp { mono: MonoTime::from_ns(1_000_000_000), wall: WallTime::from_ns(5) },
         counts: vec![100.0, -0.5].into(),
         flags: FrameFlags::GAP_BEFORE,
         lost_before: 3,

@@ -2,7 +2,7 @@
 
 use super::Calibration;
 use crate::{
-    Declared, Form, Health, Readings, RegistrationFit, ResponseFit, ThicknessFit,
+    Declared, Health, Readings, RegistrationFit, ResponseFit, ResponseForm, ThicknessFit,
     faults::{FaultKind, WIRING_PLACES_LEAST},
     readings::{distinct_places, number_of},
     setting::{across, goes_across},
@@ -160,10 +160,10 @@ impl Remarks {
         }
         if response.trials.iter().all(|trial| trial.heldout_rms_counts.is_none()) {
             self.missing.push(match response.form {
-                Form::Linear => "Form of the response: one depth was pressed. It is taken to be linear; as far as it is curved, \
+                ResponseForm::Linear => "Form of the response: one depth was pressed. It is taken to be linear; as far as it is curved, \
                                  sensitivities and spreads are off by more than their errors say."
                     .into(),
-                Form::SharedQuadratic | Form::OwnQuadratic => {
+                ResponseForm::SharedQuadratic | ResponseForm::OwnQuadratic => {
                     "Form of the response: it takes three depths in a press to hold one out. One curvature is taken for all."
                         .into()
                 }

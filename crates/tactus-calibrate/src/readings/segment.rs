@@ -14,7 +14,7 @@ const STILL_MM: f64 = 0.002;
 
 /// What a stretch of frames is good for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Kind {
+pub(super) enum SegmentKind {
     /// Nothing: on the way, or going up.
     #[default]
     Between,
@@ -26,7 +26,7 @@ pub(super) enum Kind {
     Hold(i32),
 }
 
-impl Kind {
+impl SegmentKind {
     pub(super) fn of(row: &RowView<'_>) -> Self {
         match row.phase {
             Phase::Idle => Self::Rest,
@@ -41,14 +41,14 @@ impl Kind {
 /// Frames of one kind.
 #[derive(Debug, Default)]
 pub(super) struct Segment {
-    pub(super) kind: Kind,
+    pub(super) kind: SegmentKind,
     heights_mm: Vec<f64>,
     /// Frame after frame.
     counts: Vec<f32>,
 }
 
 /// Mean over the frames of a segment.
-pub(super) struct Mean {
+pub(super) struct SegmentMean {
     pub(super) counts: Vec<f64>,
     /// Sum of the squared deviations of each element.
     pub(super) squares: Vec<f64>,
@@ -85,7 +85,7 @@ impl Segment {
     }
 
     /// The mean of each element over the frames in which none reads what noise cannot explain.
-    pub(super) fn mean(&self, step_counts: f64) -> Option<Mean> {
+    pub(super) fn mean(&self, step_counts: f64) -> Option<SegmentMean> {
         let elements = self.elements()?;
         let frames = self.heights_mm.len();
         let column =
@@ -115,7 +115,7 @@ impl Segment {
             squares.push(kept_counts().map(|count| (count - mean).powi(2)).sum());
             counts.push(mean);
         }
-        Some(Mean { counts, squares, frames: kept, left_out: frames - kept })
+        Some(SegmentMean { counts, squares, frames: kept, left_out: frames - kept })
     }
 
     /// Every frame by itself.

@@ -3,13 +3,13 @@
 use nalgebra::{DMatrix, DVector};
 use tactus_model::{Covering, ForwardModel};
 
-use super::{DWELLS_LEAST, Form, rms};
+use super::{DWELLS_LEAST, ResponseForm, rms};
 use crate::{
     Estimate,
-    least_squares::{self, Normal, Reading, minimise},
+    least_squares::{self, Normal, Observation, minimise},
     order::median,
-    readings::Press,
-    registration::Place,
+    readings::MeasuredPress,
+    registration::SensorPose,
     setting::Declared,
 };
 
@@ -18,16 +18,16 @@ const FOLDS: usize = 5;
 
 /// An element's readings in a press at its centre.
 #[derive(Debug, Clone)]
-pub(super) struct Group {
+pub(super) struct CentrePress {
     pub(super) element: usize,
-    pub(super) points: Vec<Point>,
+    pub(super) points: Vec<CentreDwell>,
     noise_counts: f64,
     rest_frames: usize,
 }
 
 /// One dwell.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Point {
+pub(super) struct CentreDwell {
     pub(super) u_mm: f64,
     pub(super) rise_counts: f64,
     frames: usize,
@@ -35,7 +35,7 @@ pub(super) struct Point {
 
 /// The error of a prediction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct HeldOut {
+pub(super) struct HeldOutError {
     pub(super) element: usize,
     pub(super) counts: f64,
     /// In units of its standard deviation.
@@ -44,20 +44,20 @@ pub(super) struct HeldOut {
 
 /// A fitted form.
 #[derive(Debug, Clone)]
-pub(super) struct Fitted {
-    pub(super) form: Form,
+pub(super) struct FittedForm {
+    pub(super) form: ResponseForm,
     /// The elements, in the order of their parameters.
     pub(super) elements: Vec<usize>,
     fit: least_squares::Fit,
 }
 
-impl Group {
+impl CentrePress {
     /// An element's readings in a press, which give some element's signal, with the sensor at a place.
     pub(super) fn of(
         declared: &Declared,
         model: &ForwardModel,
-        place: &Place,
-        press: &Press,
+        place: &SensorPose,
+        press: &MeasuredPress,
         [element, signal]: [usize; 2],
         noise_counts: f64,
     ) -> Option<Self> {
@@ -67,14 +67,14 @@ impl Group {
             let contact = place.setting.contact(press, dwell, indenter);
             model.indentation(&contact, Covering { thickness_mm: press.covering_mm }, &mut felt);
             let [rise_counts, _] = press.rise(dwell, element)?;
-            Some(Point { u_mm: felt[signal], rise_counts, frames: dwell.frames })
+            Some(CentreDwell { u_mm: felt[signal], rise_counts, frames: dwell.frames })
         });
         let points = points.collect();
         Some(Self { element, points, noise_counts, rest_frames })
     }
 }
 
-impl Fitted {
+impl FittedForm {
     /// `s` and `k` of the element at an index.
     pub(super) fn response(&self, index: usize) -> [f64; 2] {
         let parameters = &self.fit.parameters;
@@ -113,7 +113,7 @@ impl Fitted {
         self.fit.misfit.sqrt()
     }
 
-    pub(super) fn rms_counts(&self, groups: &[Group]) -> f64 {
+    pub(super) fn rms_counts(&self, groups: &[CentrePress]) -> f64 {
         rms(groups.iter().flat_map(|group| {
             group.points.iter().map(|point| point.rise_counts - self.predicted(group.element, point.u_mm))
         }))
@@ -133,9 +133,9 @@ impl Fitted {
     fn curvature_at(&self, index: usize) -> Option<usize> {
         let count = self.elements.len();
         match self.form {
-            Form::Linear => None,
-            Form::SharedQuadratic => Some(count),
-            Form::OwnQuadratic => Some(count + index),
+            ResponseForm::Linear => None,
+            ResponseForm::SharedQuadratic => Some(count),
+            ResponseForm::OwnQuadratic => Some(count + index),
         }
     }
 
@@ -147,19 +147,23 @@ impl Fitted {
 }
 
 /// Fits a form to the dwells that are kept; their group and their index in it decide.
-pub(super) fn fit(form: Form, groups: &[Group], keep: impl Fn(&Group, usize) -> bool) -> Option<Fitted> {
+pub(super) fn fit(
+    form: ResponseForm,
+    groups: &[CentrePress],
+    keep: impl Fn(&CentrePress, usize) -> bool,
+) -> Option<FittedForm> {
     let mut elements: Vec<usize> = groups.iter().map(|group| group.element).collect();
     elements.dedup();
     let count = elements.len();
     let curvatures = match form {
-        Form::Linear => 0,
-        Form::SharedQuadratic => 1,
-        Form::OwnQuadratic => count,
+        ResponseForm::Linear => 0,
+        ResponseForm::SharedQuadratic => 1,
+        ResponseForm::OwnQuadratic => count,
     };
     let free = vec![true; count + curvatures];
     let mut start: Vec<f64> = elements.iter().map(|element| slope(groups, *element)).collect();
     start.resize(count + curvatures, 0.0);
-    let mut fitted = Fitted {
+    let mut fitted = FittedForm {
         form,
         elements,
         fit: least_squares::Fit { parameters: start.clone(), covariance: DMatrix::zeros(0, 0), misfit: 1.0 },
@@ -171,13 +175,13 @@ pub(super) fn fit(form: Form, groups: &[Group], keep: impl Fn(&Group, usize) -> 
             let (s, at) = (parameters[index], fitted.curvature_at(index));
             let k = at.map_or(0.0, |at| parameters[at]);
             let kept = group.points.iter().enumerate().filter(|(dwell, _)| keep(group, *dwell));
-            let readings: Vec<Reading> = kept
+            let readings: Vec<Observation> = kept
                 .map(|(_, point)| {
                     let square = point.u_mm * point.u_mm;
                     let shape = point.u_mm + k * square;
                     let mut slopes = vec![(index, shape)];
                     slopes.extend(at.map(|at| (at, s * square)));
-                    Reading { residual: point.rise_counts - s * shape, slopes, frames: point.frames }
+                    Observation { residual: point.rise_counts - s * shape, slopes, frames: point.frames }
                 })
                 .collect();
             normal.add_press(&readings, group.rest_frames, group.noise_counts);
@@ -188,7 +192,7 @@ pub(super) fn fit(form: Form, groups: &[Group], keep: impl Fn(&Group, usize) -> 
 }
 
 /// Counts per mm of an element, as a line through zero has it: where every form starts.
-fn slope(groups: &[Group], element: usize) -> f64 {
+fn slope(groups: &[CentrePress], element: usize) -> f64 {
     let points = groups.iter().filter(|group| group.element == element).flat_map(|group| &group.points);
     let [above, below] = points.fold([0.0, 0.0], |[above, below], point| {
         [above + point.u_mm * point.rise_counts, below + point.u_mm * point.u_mm]
@@ -197,9 +201,9 @@ fn slope(groups: &[Group], element: usize) -> f64 {
 }
 
 /// Errors of predictions of dwells that took no part in the fit; `None` if the presses have too few dwells.
-pub(super) fn heldout(form: Form, groups: &[Group]) -> Option<Vec<HeldOut>> {
+pub(super) fn heldout(form: ResponseForm, groups: &[CentrePress]) -> Option<Vec<HeldOutError>> {
     // A press with fewer dwells, cut off perhaps, takes part in the fits but holds none out.
-    let whole = |group: &&Group| group.points.len() >= DWELLS_LEAST;
+    let whole = |group: &&CentrePress| group.points.len() >= DWELLS_LEAST;
     let folds = FOLDS.min(groups.iter().filter(whole).map(|group| group.points.len()).min()?);
     let mut errors = Vec::new();
     for fold in 0..folds {
@@ -209,7 +213,7 @@ pub(super) fn heldout(form: Form, groups: &[Group]) -> Option<Vec<HeldOut>> {
                 let counts = point.rise_counts - fitted.predicted(group.element, point.u_mm);
                 let variance = 1.0 / point.frames as f64 + 1.0 / group.rest_frames as f64;
                 let in_noise = counts / (group.noise_counts * variance.sqrt());
-                errors.push(HeldOut { element: group.element, counts, in_noise });
+                errors.push(HeldOutError { element: group.element, counts, in_noise });
             }
         }
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use tactus_schema::{DeviceTick, Frame, FrameFlags, Rig, Stamp, pb};
+use tactus_schema::{DeviceTick, Frame, FrameFlags, Rig, TimeStamp, pb};
 use tactus_wire::sensor::{Action, Cause, Loss, Reading, Session};
 use tokio::sync::mpsc;
 use tokio::time::sleep;
@@ -242,7 +242,7 @@ impl Driver {
     /// Makes a frame from a reading. `together` counts it and the readings behind it that arrived at the same time.
     fn reading(
         &mut self,
-        now: Stamp,
+        now: TimeStamp,
         reading: Reading,
         together: usize,
         cause: &mut GapCause,

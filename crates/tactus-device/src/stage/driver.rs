@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use tactus_schema::{Stamp, pb};
+use tactus_schema::{TimeStamp, pb};
 use tactus_wire::stage::{Action, Cause, Failure, Report, Session, Status};
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{mpsc, oneshot, watch};
@@ -155,7 +155,7 @@ where
     }
 
     /// Begins a command, or answers why not.
-    fn begin(&mut self, now: Stamp, request: CommandRequest, session: &mut S) -> Vec<Action<S::Error>> {
+    fn begin(&mut self, now: TimeStamp, request: CommandRequest, session: &mut S) -> Vec<Action<S::Error>> {
         let CommandRequest { command, stops_before, reply } = request;
         let refusal = if !self.progress.connected {
             self.not_connected()
@@ -181,7 +181,7 @@ where
 
     async fn carry_out(
         &mut self,
-        now: Stamp,
+        now: TimeStamp,
         actions: Vec<Action<S::Error>>,
         link: &mut Link,
         backoff: &mut Backoff,
@@ -215,7 +215,7 @@ where
         Ok(())
     }
 
-    fn report(&mut self, now: Stamp, report: Report) {
+    fn report(&mut self, now: TimeStamp, report: Report) {
         let status = match report.status {
             Status::Unhomed => pb::StageStatus::Unhomed,
             Status::Idle => pb::StageStatus::Idle,
@@ -229,7 +229,7 @@ where
 
     fn publish(
         &mut self,
-        now: Stamp,
+        now: TimeStamp,
         [x_mm, y_mm, z_mm]: [f64; 3],
         status: pb::StageStatus,
         alarm: Option<u32>,

@@ -8,7 +8,7 @@ use futures_util::future::BoxFuture;
 use tactus_device::{Clock, Sensor, SensorEvent, Stage, StageError, Target};
 use tactus_engine::{Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
 use tactus_plan::{Arguments, Limits, RigView, Script};
-use tactus_schema::{Frame, FrameFlags, Rig, Stamp, pb};
+use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp, pb};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
@@ -248,7 +248,7 @@ impl Memory {
 }
 
 impl Record for Memory {
-    fn sensor_info(&mut self, _: &pb::SensorInfo, _: Stamp) -> Result<(), RecordFailure> {
+    fn sensor_info(&mut self, _: &pb::SensorInfo, _: TimeStamp) -> Result<(), RecordFailure> {
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tactus_schema::{
-    DeviceTick, Frame, FrameFlags, MonoTime, Rig, Stamp, WallTime,
+    DeviceTick, Frame, FrameFlags, MonoTime, Rig, TimeStamp, WallTime,
     pb::{self, run_event::Event},
 };
 
@@ -267,9 +267,9 @@ pub(super) fn position(knots: &[(f64, [f64; 3])], at_s: f64) -> [f64; 3] {
     }
 }
 
-fn stamp(at_s: f64) -> Stamp {
+fn stamp(at_s: f64) -> TimeStamp {
     let ns = (at_s * 1e9).round() as i64;
-    Stamp { mono: MonoTime::from_ns(ns), wall: WallTime::from_ns(STARTED_NS + ns) }
+    TimeStamp { mono: MonoTime::from_ns(ns), wall: WallTime::from_ns(STARTED_NS + ns) }
 }
 
 /// xorshift64*; good enough for noise in tests.

@@ -25,7 +25,7 @@ mod maker;
 use std::{collections::BTreeMap, path::Path};
 
 use tactus_record::{Header, RecordError, Recording, Script, Summary};
-use tactus_schema::{Frame, Rig, Stamp, WallTime, pb};
+use tactus_schema::{Frame, Rig, TimeStamp, WallTime, pb};
 
 pub const RIG_TOML: &str = include_str!("../../../../config/rigs/sim.toml");
 pub const SCRIPT: &str = "def experiment(rig):\n    pass\n";
@@ -61,7 +61,7 @@ pub struct Press {
 /// What a recording is fed with, in order of time.
 #[derive(Debug, Clone)]
 pub enum Fed {
-    Info(pb::SensorInfo, Stamp),
+    Info(pb::SensorInfo, TimeStamp),
     Frame(Frame),
     Stage(pb::StageState),
     Event(pb::RunEvent),

@@ -17,7 +17,7 @@ pub(crate) struct Checker {
 
 /// What is wrong with a row.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Fault {
+pub(crate) struct RowFault {
     column: &'static str,
     problem: String,
 }
@@ -33,7 +33,7 @@ impl Checker {
         }
     }
 
-    pub(crate) fn check(&mut self, row: &RowView<'_>) -> Result<(), Fault> {
+    pub(crate) fn check(&mut self, row: &RowView<'_>) -> Result<(), RowFault> {
         self.order(row)?;
         if row.press < -1 {
             return Err(fault(
@@ -66,7 +66,7 @@ impl Checker {
         }
     }
 
-    fn order(&mut self, row: &RowView<'_>) -> Result<(), Fault> {
+    fn order(&mut self, row: &RowView<'_>) -> Result<(), RowFault> {
         if self.run.as_deref() != Some(row.run) {
             if self.finished_runs.contains(row.run) {
                 let problem =
@@ -83,17 +83,17 @@ impl Checker {
     }
 }
 
-impl Fault {
+impl RowFault {
     /// The fault of a row of a file.
     pub(crate) fn at(self, path: &Path, row: u64) -> TableError {
         TableError::Value { path: path.to_owned(), row, column: self.column, problem: self.problem }
     }
 }
 
-fn finite(column: &'static str, value: f64) -> Result<f64, Fault> {
+fn finite(column: &'static str, value: f64) -> Result<f64, RowFault> {
     if value.is_finite() { Ok(value) } else { Err(fault(column, format!("{value}; a finite number"))) }
 }
 
-fn fault(column: &'static str, problem: String) -> Fault {
-    Fault { column, problem }
+fn fault(column: &'static str, problem: String) -> RowFault {
+    RowFault { column, problem }
 }

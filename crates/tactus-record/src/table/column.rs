@@ -26,7 +26,7 @@ pub(super) struct Column<T> {
 }
 
 /// A file in which a column is read, and what errors say of it.
-pub(super) struct Source<'a> {
+pub(super) struct ColumnReader<'a> {
     pub(super) path: &'a Path,
     pub(super) group: &'a dyn RowGroupReader,
     pub(super) first_row: u64,
@@ -43,7 +43,7 @@ impl<T> Column<T> {
     }
 }
 
-impl Source<'_> {
+impl ColumnReader<'_> {
     /// A column of texts, none of them null.
     pub(super) fn texts(&self, leaf: usize, name: &'static str) -> Result<Vec<String>, TableError> {
         let column = self.column::<ByteArrayType>(leaf, name)?;
@@ -113,7 +113,7 @@ impl Source<'_> {
         let failed = |source: ParquetError| TableError::Parquet { path: self.path.to_owned(), source };
         let reader = get_typed_column_reader::<T>(self.group.get_column_reader(leaf).map_err(failed)?);
         let levels = Levels::read(reader).map_err(failed)?;
-        let column = levels.into_column(Form::of(&descriptor));
+        let column = levels.into_column(DefinitionLevels::of(&descriptor));
         let expected = usize::try_from(self.group.metadata().num_rows()).unwrap_or(0);
         if column.rows() == expected {
             return Ok(column);
@@ -134,14 +134,14 @@ struct Levels<T> {
 
 /// What the definition levels of a column mean.
 #[derive(Clone, Copy)]
-struct Form {
+struct DefinitionLevels {
     /// The level of a value; 0 if there can be no nulls.
     defined: i16,
     /// The level of a list without elements; its length says what is wrong with it.
     empty_list: Option<i16>,
 }
 
-impl Form {
+impl DefinitionLevels {
     fn of(column: &ColumnDescriptor) -> Self {
         let defined = column.max_def_level();
         let entry = defined - i16::from(column.self_type().is_optional());
@@ -162,7 +162,7 @@ impl<T> Levels<T> {
         }
     }
 
-    fn into_column(self, form: Form) -> Column<T> {
+    fn into_column(self, form: DefinitionLevels) -> Column<T> {
         let Self { values, definition, repetition } = self;
         if form.defined == 0 {
             return Column { starts: (0..=values.len()).collect(), values, null_rows: Vec::new() };

@@ -9,7 +9,7 @@ use super::error::TableError;
 
 /// The type of a column in the contract.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ColumnType {
     Text,
     Int32,
     Int64,
@@ -17,7 +17,7 @@ pub(super) enum Kind {
     ListOfFloat32,
 }
 
-impl Kind {
+impl ColumnType {
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Text => "string",
@@ -30,18 +30,18 @@ impl Kind {
 }
 
 /// The contract's columns, in its order.
-pub(super) const CONTRACT: [(&str, Kind); 11] = [
-    ("run", Kind::Text),
-    ("press", Kind::Int32),
-    ("phase", Kind::Text),
-    ("t_ns", Kind::Int64),
-    ("x_mm", Kind::Float64),
-    ("y_mm", Kind::Float64),
-    ("z_mm", Kind::Float64),
-    ("covering_mm", Kind::Float64),
-    ("indenter", Kind::Text),
-    ("temperature_c", Kind::Float64),
-    ("counts", Kind::ListOfFloat32),
+pub(super) const CONTRACT: [(&str, ColumnType); 11] = [
+    ("run", ColumnType::Text),
+    ("press", ColumnType::Int32),
+    ("phase", ColumnType::Text),
+    ("t_ns", ColumnType::Int64),
+    ("x_mm", ColumnType::Float64),
+    ("y_mm", ColumnType::Float64),
+    ("z_mm", ColumnType::Float64),
+    ("covering_mm", ColumnType::Float64),
+    ("indenter", ColumnType::Text),
+    ("temperature_c", ColumnType::Float64),
+    ("counts", ColumnType::ListOfFloat32),
 ];
 
 /// What is wrong with a column.
@@ -66,7 +66,7 @@ impl Misfit {
 }
 
 /// Finds a column of the contract; gives the index of its leaf.
-pub(super) fn find(schema: &SchemaDescriptor, name: &str, kind: Kind) -> Result<usize, Misfit> {
+pub(super) fn find(schema: &SchemaDescriptor, name: &str, kind: ColumnType) -> Result<usize, Misfit> {
     let leaves: Vec<usize> =
         (0..schema.num_columns()).filter(|&leaf| schema.get_column_root(leaf).name() == name).collect();
     let &[leaf] = leaves.as_slice() else {

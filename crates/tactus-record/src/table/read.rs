@@ -20,9 +20,9 @@ use tactus_schema::{
 };
 
 use super::{
-    Head, TableError,
+    TableError, TableHead,
     check::Checker,
-    column::{Column, Source},
+    column::{Column, ColumnReader},
     layout::{CONTRACT, find},
 };
 
@@ -30,7 +30,7 @@ use super::{
 pub(crate) struct TableReader {
     path: PathBuf,
     file: SerializedFileReader<File>,
-    head: Head,
+    head: TableHead,
     /// Indices of the leaves of the contract's columns, in the contract's order.
     leaves: [usize; CONTRACT.len()],
 }
@@ -58,7 +58,7 @@ impl TableReader {
     }
 
     /// What it says of all its rows.
-    pub(crate) fn head(&self) -> &Head {
+    pub(crate) fn head(&self) -> &TableHead {
         &self.head
     }
 
@@ -66,15 +66,15 @@ impl TableReader {
     pub(crate) fn visit<E: From<TableError>>(
         self,
         mut take: impl FnMut(RowView<'_>) -> Result<(), E>,
-    ) -> Result<Head, E> {
+    ) -> Result<TableHead, E> {
         let Self { path, file, head, leaves } = self;
         let mut checker = Checker::new(&head.rig);
         let mut first_row = 0;
         for index in 0..file.num_row_groups() {
             let group = file.get_row_group(index);
             let group = group.map_err(|source| TableError::Parquet { path: path.clone(), source })?;
-            let source = Source { path: &path, group: group.as_ref(), first_row };
-            let group = undamaged(&path, index, || Group::read(&source, &leaves))?;
+            let source = ColumnReader { path: &path, group: group.as_ref(), first_row };
+            let group = undamaged(&path, index, || RowGroup::read(&source, &leaves))?;
             first_row += group.visit(&source, &mut checker, &mut take)?;
         }
         Ok(head)
@@ -103,22 +103,22 @@ fn within(metadata: &ParquetMetaData, file_bytes: u64) -> Result<(), ParquetErro
 fn undamaged(
     path: &Path,
     index: usize,
-    decode: impl FnOnce() -> Result<Group, TableError>,
-) -> Result<Group, TableError> {
+    decode: impl FnOnce() -> Result<RowGroup, TableError>,
+) -> Result<RowGroup, TableError> {
     panic::catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
         let source = ParquetError::General(format!("row group {index}: its pages are damaged"));
         Err(TableError::Parquet { path: path.to_owned(), source })
     })
 }
 
-fn head(path: &Path, metadata: &ParquetMetaData) -> Result<Head, TableError> {
+fn head(path: &Path, metadata: &ParquetMetaData) -> Result<TableHead, TableError> {
     let pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     let metadata: BTreeMap<String, String> =
         pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
     let json = metadata.get(RIG_METADATA_KEY);
     let json = json.ok_or_else(|| TableError::RigMissing { path: path.to_owned() })?;
     match Rig::from_json(json) {
-        Ok(rig) => Ok(Head { rig, metadata }),
+        Ok(rig) => Ok(TableHead { rig, metadata }),
         Err(source) => Err(TableError::Rig { path: path.to_owned(), source }),
     }
 }
@@ -133,7 +133,7 @@ fn leaves(path: &Path, metadata: &ParquetMetaData) -> Result<[usize; CONTRACT.le
 }
 
 /// One row group in memory.
-struct Group {
+struct RowGroup {
     run: Vec<String>,
     press: Vec<i32>,
     phase: Vec<String>,
@@ -145,8 +145,8 @@ struct Group {
     counts: Column<f32>,
 }
 
-impl Group {
-    fn read(source: &Source<'_>, leaves: &[usize; CONTRACT.len()]) -> Result<Self, TableError> {
+impl RowGroup {
+    fn read(source: &ColumnReader<'_>, leaves: &[usize; CONTRACT.len()]) -> Result<Self, TableError> {
         let [run, press, phase, t_ns, x_mm, y_mm, z_mm, covering_mm, indenter, temperature_c, counts] =
             *leaves;
         let t_ns = source.int64s(t_ns, "t_ns")?;
@@ -170,7 +170,7 @@ impl Group {
     /// Checks and gives every row; the number of rows.
     fn visit<E: From<TableError>>(
         &self,
-        source: &Source<'_>,
+        source: &ColumnReader<'_>,
         checker: &mut Checker,
         take: &mut impl FnMut(RowView<'_>) -> Result<(), E>,
     ) -> Result<u64, E> {

@@ -14,7 +14,7 @@ use tactus_schema::{
 
 use super::{
     TableError,
-    part::{FrameColumns, GROUP_ROWS, Part, column, repetition},
+    part_file::{FrameColumns, GROUP_ROWS, PartFile, column, repetition},
 };
 
 /// Key of the file metadata that is `true` if no physical sensor was read, else `false`.
@@ -40,8 +40,8 @@ const SCHEMA: &str = "
 ///
 /// Until [`ResidualWriter::finish`] the rows stand in a file beside `path` with the ending `.part`.
 pub struct ResidualWriter {
-    part: Part,
-    group: Group,
+    part: PartFile,
+    group: RowGroup,
 }
 
 impl ResidualWriter {
@@ -50,10 +50,10 @@ impl ResidualWriter {
     /// # Errors
     /// If the file cannot be created.
     pub fn create(path: impl Into<PathBuf>, rig: &Rig, simulated: bool) -> Result<Self, TableError> {
-        let mut part = Part::create(path.into(), SCHEMA)?;
+        let mut part = PartFile::create(path.into(), SCHEMA)?;
         part.metadata(RIG_METADATA_KEY, rig.to_json());
         part.metadata(SIMULATED_METADATA_KEY, simulated.to_string());
-        Ok(Self { part, group: Group::default() })
+        Ok(Self { part, group: RowGroup::default() })
     }
 
     /// Adds a frame and what either model predicts of it, one value an element.
@@ -97,7 +97,7 @@ impl std::fmt::Debug for ResidualWriter {
 
 /// The columns of the row group in hand.
 #[derive(Default)]
-struct Group {
+struct RowGroup {
     frames: FrameColumns,
     held_out: Vec<bool>,
     /// Of either model.
@@ -106,7 +106,7 @@ struct Group {
     repeated: Vec<i16>,
 }
 
-impl Group {
+impl RowGroup {
     fn push(&mut self, row: &RowView<'_>, held_out: bool, before: &[f32], after: &[f32]) {
         self.frames.push(row);
         self.held_out.push(held_out);

@@ -15,7 +15,7 @@ use tactus_schema::{
 use super::{
     TableError,
     check::Checker,
-    part::{FrameColumns, GROUP_ROWS, Part, column, repetition, text},
+    part_file::{FrameColumns, GROUP_ROWS, PartFile, column, repetition, text},
 };
 
 /// The contract's columns as Parquet; pyarrow, pandas and polars read `counts` as a list of 32-bit floats.
@@ -38,10 +38,10 @@ const SCHEMA: &str = "
 ///
 /// Until [`TableWriter::finish`] the rows stand in a file beside `path` with the ending `.part`.
 pub struct TableWriter {
-    part: Part,
+    part: PartFile,
     checker: Checker,
     rows: u64,
-    group: Group,
+    group: RowGroup,
 }
 
 impl TableWriter {
@@ -55,9 +55,9 @@ impl TableWriter {
             Ok(rig) => rig,
             Err(source) => return Err(TableError::Rig { path, source }),
         };
-        let mut part = Part::create(path, SCHEMA)?;
+        let mut part = PartFile::create(path, SCHEMA)?;
         part.metadata(RIG_METADATA_KEY, rig_json.to_owned());
-        Ok(Self { part, checker: Checker::new(&rig), rows: 0, group: Group::default() })
+        Ok(Self { part, checker: Checker::new(&rig), rows: 0, group: RowGroup::default() })
     }
 
     /// Adds a row.
@@ -116,7 +116,7 @@ impl std::fmt::Debug for TableWriter {
 
 /// The columns of the row group in hand.
 #[derive(Default)]
-struct Group {
+struct RowGroup {
     frames: FrameColumns,
     covering_mm: Vec<f64>,
     indenter: Vec<ByteArray>,
@@ -126,7 +126,7 @@ struct Group {
     counts_repeated: Vec<i16>,
 }
 
-impl Group {
+impl RowGroup {
     fn push(&mut self, row: &RowView<'_>) {
         self.frames.push(row);
         self.covering_mm.push(row.covering_mm);

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_calibrate::{Estimate, Form, ResponseFit};
+use tactus_calibrate::{Estimate, ResponseFit, ResponseForm};
 
 use super::{
     CalibrationReport, Drawing, FigurePlacement,
@@ -160,7 +160,7 @@ fn sensitivities(
         health::place(report.array, most.element),
     )?;
     match (response.form, &response.shared_quadratic_per_mm) {
-        (Form::SharedQuadratic, Some(curvature)) => writeln!(
+        (ResponseForm::SharedQuadratic, Some(curvature)) => writeln!(
             f,
             "<p>Curvature k of all elements: {} per mm (95 % interval {}).</p>",
             estimate(curvature),
@@ -197,7 +197,8 @@ fn elements(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) -> fmt::
             response.and_then(|response| response.elements.iter().find(|one| one.element == element));
         let of = |found: Option<Estimate>| found.map_or_else(|| "\u{2013}".into(), |found| estimate(&found));
         let own = fitted.and_then(|one| one.quadratic).filter(|_| response.is_some_and(decided));
-        let curvature = fitted.filter(|_| response.is_some_and(|response| response.form != Form::Linear));
+        let curvature =
+            fitted.filter(|_| response.is_some_and(|response| response.form != ResponseForm::Linear));
         table.row([
             element.to_string(),
             health::place(array, element),

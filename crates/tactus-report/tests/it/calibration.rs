@@ -7,7 +7,7 @@
 use std::{env, fs, path::Path};
 
 use crate::made_up::{CURVATURE_PER_MM, FAULTY, empty, fault, report, sure, whole};
-use tactus_calibrate::{Calibration, FaultKind, Form};
+use tactus_calibrate::{Calibration, FaultKind, ResponseForm};
 use tactus_model::{Array, Registration};
 use tactus_report::calibration::{
     CalibrationReport, calibration_html, health_map, point_spreads, recalibrated, responses, sensitivity_map,
@@ -131,7 +131,7 @@ fn parts_that_are_missing_leave_the_others() {
 
     let mut undecided = whole();
     let response = undecided.response.as_mut().unwrap();
-    response.form = Form::Linear;
+    response.form = ResponseForm::Linear;
     response.shared_quadratic_per_mm = None;
     response.trials.iter_mut().for_each(|trial| trial.heldout_rms_counts = None);
     let html = page(&undecided);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use tactus_model::{Array, Covering, Effect, Psf, Response};
 
-use super::{Base, Evidence, KnownEffect, Model, ModelFileError};
+use super::{BaseModel, Evidence, KnownEffect, Model, ModelFileError};
 use crate::description::{
     OneOrEach, RawArray, RawIndenter, WrongField, check_schema, not_negative, positive, wrong,
 };
@@ -109,7 +109,7 @@ impl Model {
 }
 
 impl RawBase {
-    fn of(base: &Base) -> Self {
+    fn of(base: &BaseModel) -> Self {
         let [sigma_intercept_mm_se, sigma_per_mm_se] = base.psf_se;
         let response = &base.response;
         let each_se = |values: &Option<Vec<f64>>| values.as_deref().map(OneOrEach::of);
@@ -135,7 +135,7 @@ impl RawBase {
         }
     }
 
-    fn check(self) -> Result<Base, ModelFileError> {
+    fn check(self) -> Result<BaseModel, ModelFileError> {
         let array = self.array.check::<ModelFileError>("base.array")?;
         let each = |name: &str, raw: OneOrEach| raw.check(&format!("base.{name}"), array.elements());
         let each_se = |name: &str, raw: Option<OneOrEach>| {
@@ -147,7 +147,7 @@ impl RawBase {
         };
         let (psf, psf_se) = self.psf.check()?;
         let reference = self.sensitivity_reference;
-        Ok(Base {
+        Ok(BaseModel {
             psf,
             psf_se,
             response: Response {

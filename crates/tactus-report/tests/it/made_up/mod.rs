@@ -3,8 +3,8 @@
 pub(crate) mod discovery;
 
 use tactus_calibrate::{
-    Calibration, CoveringSpread, Curve, Data, ElementResponse, Estimate, Fault, FaultKind, Form, Health,
-    RegistrationFit, ResponseFit, SpreadFit, ThicknessFit, Trial,
+    Calibration, CoveringSpread, Curve, DataSummary, ElementResponse, Estimate, FaultKind, FaultyElement,
+    Health, RegistrationFit, ResponseFit, ResponseForm, SpreadFit, ThicknessFit, Trial,
 };
 use tactus_model::{Array, Psf, Registration};
 use tactus_report::calibration::CalibrationReport;
@@ -24,7 +24,7 @@ pub(crate) fn whole() -> Calibration {
         .flat_map(|covering| [0.3, 0.65].map(|share| spread(covering, share)))
         .collect();
     Calibration {
-        data: Data {
+        data: DataSummary {
             runs: vec!["corners-1".into(), "grid-2".into()],
             presses: 2_778,
             dwells: 2_970,
@@ -57,10 +57,14 @@ pub(crate) fn whole() -> Calibration {
             residual_in_noise: 1.004,
         }),
         response: Some(ResponseFit {
-            form: Form::SharedQuadratic,
+            form: ResponseForm::SharedQuadratic,
             trials: vec![
-                Trial { form: Form::Linear, rms_counts: 8.867, heldout_rms_counts: Some(10.41) },
-                Trial { form: Form::SharedQuadratic, rms_counts: 0.65, heldout_rms_counts: Some(0.8) },
+                Trial { form: ResponseForm::Linear, rms_counts: 8.867, heldout_rms_counts: Some(10.41) },
+                Trial {
+                    form: ResponseForm::SharedQuadratic,
+                    rms_counts: 0.65,
+                    heldout_rms_counts: Some(0.8),
+                },
             ],
             shared_quadratic_per_mm: Some(sure(CURVATURE_PER_MM, 0.001)),
             residual_in_noise: 1.0,
@@ -89,7 +93,7 @@ pub(crate) fn whole() -> Calibration {
 /// Nothing could be found, for want of presses.
 pub(crate) fn empty() -> Calibration {
     Calibration {
-        data: Data {
+        data: DataSummary {
             runs: Vec::new(),
             presses: 0,
             dwells: 0,
@@ -126,8 +130,8 @@ pub(crate) fn sure(value: f64, standard_error: f64) -> Estimate {
     Estimate { value, standard_error }
 }
 
-pub(crate) fn fault(element: usize, kind: FaultKind, evidence: &str) -> Fault {
-    Fault { element, kind, evidence: evidence.into() }
+pub(crate) fn fault(element: usize, kind: FaultKind, evidence: &str) -> FaultyElement {
+    FaultyElement { element, kind, evidence: evidence.into() }
 }
 
 fn element(element: usize) -> ElementResponse {

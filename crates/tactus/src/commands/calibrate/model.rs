@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use tactus_calibrate::FaultKind;
 use tactus_model::Effect;
 use tactus_schema::Model;
-use tactus_schema::model::{Base, KnownEffect};
+use tactus_schema::model::{BaseModel, KnownEffect};
 
 use super::Calibrated;
 
@@ -20,7 +20,7 @@ impl Calibrated {
             return None;
         }
         let mut base =
-            Base { noise_rms_counts: self.calibration.noise_rms_counts.unwrap_or(0.0), ..declared };
+            BaseModel { noise_rms_counts: self.calibration.noise_rms_counts.unwrap_or(0.0), ..declared };
         if let Some((psf, errors)) = psf {
             (base.psf, base.psf_se) = (psf, errors);
         }

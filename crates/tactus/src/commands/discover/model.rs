@@ -3,12 +3,12 @@
 use tactus_discover::{Discovery, Estimated, Step};
 use tactus_model::Effect;
 use tactus_schema::Model;
-use tactus_schema::model::{Base, Evidence, KnownEffect};
+use tactus_schema::model::{BaseModel, Evidence, KnownEffect};
 
 /// The model with the discovered effects, base and effects fitted jointly. Added effects have standard errors and name
 /// their data; effects known before keep their evidence.
 pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
-    let base = Base::of(before.base.array.clone(), found.grown.psf, found.grown.response.clone());
+    let base = BaseModel::of(before.base.array.clone(), found.grown.psf, found.grown.response.clone());
     let noise_rms_counts = found.noise_rms_counts.unwrap_or(before.base.noise_rms_counts);
     let effects = found.effects.iter().enumerate().map(|(nth, effect)| {
         let added = found.steps.iter().find_map(|step| Some((step, term(step, effect)?)));
@@ -35,7 +35,7 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
             }),
         }
     });
-    Model { effects: effects.collect(), base: Base { noise_rms_counts, ..base } }
+    Model { effects: effects.collect(), base: BaseModel { noise_rms_counts, ..base } }
 }
 
 /// The term of a step that belongs to this effect.

@@ -6,7 +6,7 @@ use anyhow::Context;
 use serde_json::{Value, json};
 use tactus_calibrate::acuity::NYQUIST_SIGMA;
 use tactus_calibrate::design::Wanted;
-use tactus_calibrate::{Estimate, Fault, FaultKind, Form};
+use tactus_calibrate::{Estimate, FaultKind, FaultyElement, ResponseForm};
 use tactus_model::{DIGITACTS_PITCH_MM, Psf};
 use tactus_record::Timeline;
 use tactus_report::figures::Widening;
@@ -77,7 +77,7 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuant
     let mut rows = vec![ComparedQuantity {
         paper: Some("two, answering a neighbour".into()),
         inside: planted.as_ref().map(|planted| {
-            let alike = |(found, (element, kind)): (&Fault, &(usize, FaultKind))| {
+            let alike = |(found, (element, kind)): (&FaultyElement, &(usize, FaultKind))| {
                 found.element == *element && alike(found.kind, *kind)
             };
             faults.len() == planted.len() && faults.iter().zip(planted).all(alike)
@@ -93,12 +93,12 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuant
         note: "chosen on held-out dwells".into(),
         ..text("response", "", fit.form.name().into())
     });
-    let curvature = if fit.form == Form::Linear {
+    let curvature = if fit.form == ResponseForm::Linear {
         fit.shared_quadratic_per_mm
     } else {
         fit.elements.first().map(|one| one.quadratic_per_mm)
     };
-    if fit.form != Form::OwnQuadratic {
+    if fit.form != ResponseForm::OwnQuadratic {
         let truth = truth.map(|truth| truth.model.response().quadratic_per_mm[0]);
         rows.push(row("curvature of the response", "1/mm", curvature, truth));
     }

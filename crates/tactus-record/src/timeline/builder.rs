@@ -14,7 +14,7 @@ use crate::{
 };
 
 #[derive(Default)]
-pub(super) struct Gathered {
+pub(super) struct TimelineBuilder {
     attachments: BTreeMap<String, Vec<u8>>,
     /// Frames by connection; `None` in place of a tick ends the hope for that connection's clock.
     ticks: BTreeMap<u32, Option<Vec<(DeviceTick, MonoTime)>>>,
@@ -28,7 +28,7 @@ pub(super) struct Gathered {
     tally: Tally,
 }
 
-impl Gathered {
+impl TimelineBuilder {
     pub(super) fn take(&mut self, entry: Entry) {
         let message = match entry {
             Entry::Run(_) => return,

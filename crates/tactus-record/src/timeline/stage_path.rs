@@ -64,5 +64,5 @@ fn speed(
 }
 
 #[cfg(test)]
-#[path = "way_tests.rs"]
+#[path = "stage_path_tests.rs"]
 mod tests;

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use tactus_model::{Array, Contact, Covering, ForwardModel, Indenter, Psf, Registration, Response};
 use tactus_schema::table::{Phase, RowView};
 
-use crate::{Declared, Gather, Readings};
+use crate::{Declared, Readings, ReadingsBuilder};
 
 /// The paper's cylinder.
 pub(crate) const TOOL: Indenter = Indenter::Cylinder { diameter_mm: 1.0 };
@@ -19,7 +19,7 @@ pub(crate) const THIN_MM: f64 = 1.016;
 type Spoil = Box<dyn Fn(&mut [f64], i32)>;
 
 /// A made-up sensor.
-pub(crate) struct Lab {
+pub(crate) struct SyntheticSensor {
     pub(crate) model: ForwardModel,
     pub(crate) registration: Registration,
     pub(crate) surface_mm: f64,
@@ -27,12 +27,12 @@ pub(crate) struct Lab {
     /// What is done to the counts of a frame, when, and by which press.
     pub(crate) spoil: Spoil,
     rng: ChaCha8Rng,
-    gather: Gather,
+    builder: ReadingsBuilder,
     press: i32,
     pub(crate) run: String,
 }
 
-impl Lab {
+impl SyntheticSensor {
     /// Gains that differ, one curvature, a place and a surface other than declared.
     pub(crate) fn new(seed: u64) -> Self {
         let array = Array::digitacts();
@@ -53,7 +53,7 @@ impl Lab {
             noise_counts: 2.0,
             spoil: Box::new(|_, _| ()),
             rng,
-            gather: Gather::new(&array),
+            builder: ReadingsBuilder::new(&array),
             press: 0,
             run: "run".into(),
         }
@@ -137,7 +137,7 @@ impl Lab {
             })
             .collect();
         let run = self.run.clone();
-        self.gather.take(RowView {
+        self.builder.take(RowView {
             run: &run,
             press,
             phase,
@@ -152,6 +152,6 @@ impl Lab {
 
     /// What was measured.
     pub(crate) fn readings(self) -> (Declared, Readings) {
-        (self.declared(), self.gather.finish())
+        (self.declared(), self.builder.finish())
     }
 }

@@ -25,13 +25,13 @@ use super::TableError;
 pub(super) const GROUP_ROWS: usize = 65_536;
 
 /// A Parquet file that stands beside its place, with the ending `.part`, until it is whole.
-pub(super) struct Part {
+pub(super) struct PartFile {
     path: PathBuf,
     beside: PathBuf,
     file: SerializedFileWriter<File>,
 }
 
-impl Part {
+impl PartFile {
     /// Begins a file of this schema.
     pub(super) fn create(path: PathBuf, schema: &str) -> Result<Self, TableError> {
         let mut beside = path.clone().into_os_string();
