@@ -138,10 +138,7 @@ pub(crate) fn remarks(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>
     notes(f, "To know before using a number", warnings)?;
     notes(f, "About the files", report.notes)?;
     if warnings.is_empty() && missing.is_empty() {
-        writeln!(
-            f,
-            "<p class=\"message good\">Every step was completed without warnings.</p>"
-        )?;
+        writeln!(f, "<p class=\"message good\">Every step was completed without warnings.</p>")?;
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 use tactus_calibrate::Estimate;
 
-use super::{probability, difference, digits, duration, interval, short, with_error};
+use super::{difference, digits, duration, interval, probability, short, with_error};
 
 #[test]
 fn durations_read_well() {

@@ -82,9 +82,14 @@ pub fn spread_against_thickness(spreads: &[SpreadFit], thickness: &ThicknessFit,
         return alone("Figure 5a: spread against thickness", [WIDTH_PX, ABOVE_PX], &above);
     };
 
-    let mut below = Figure::new("Distance from the line", along, Axis::new("distance from the line", "\u{b5}m"))
-        .size_px([WIDTH_PX, BELOW_PX])
-        .with(Series::line(curve([0.0, 1.06 * thickest_mm / pitch_mm], |_| 0.0)).ink(Ink::Red).width_px(2.0));
+    let mut below =
+        Figure::new("Distance from the line", along, Axis::new("distance from the line", "\u{b5}m"))
+            .size_px([WIDTH_PX, BELOW_PX])
+            .with(
+                Series::line(curve([0.0, 1.06 * thickest_mm / pitch_mm], |_| 0.0))
+                    .ink(Ink::Red)
+                    .width_px(2.0),
+            );
     let depths = by_depth(spreads);
     for (nth, (name, fits)) in depths.iter().enumerate() {
         let ink = INKS[nth % INKS.len()];

@@ -24,7 +24,10 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>
          and is not used; it should be 1.</p>"
     )?;
     match &report.calibration.registration {
-        None => writeln!(f, "<p>Not determined. All later steps use the declared registration and treat it as exact.</p>")?,
+        None => writeln!(
+            f,
+            "<p>Not determined. All later steps use the declared registration and treat it as exact.</p>"
+        )?,
         Some(registration) => found(f, report, registration)?,
     }
     writeln!(f, "</section>")

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     document::{Column, Table},
-    numbers::{probability, digits, estimate, interval, short, with_error},
+    numbers::{digits, estimate, interval, probability, short, with_error},
     plot::number,
 };
 

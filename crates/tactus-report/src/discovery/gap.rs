@@ -7,7 +7,7 @@ use tactus_discover::Discovery;
 use super::{DiscoveryReport, element_maps, residual_against, words};
 use crate::{
     document::{Column, Table},
-    numbers::{probability, digits},
+    numbers::{digits, probability},
 };
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {

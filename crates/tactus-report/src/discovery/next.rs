@@ -18,7 +18,7 @@ pub struct Proposal {
     /// Approximate duration on the rig.
     pub duration_s: f64,
     /// What it decides, such as `distinguishes backlash from hysteresis (z = 11); shows imprint (z = 4.1)`.
-    pub tells: String,
+    pub decides: String,
 }
 
 /// The proposed experiments in order of priority, each once.
@@ -34,12 +34,12 @@ pub fn proposals(found: &Discovery) -> Vec<Proposal> {
     let proposal = |(command, questions): (String, Vec<&NextExperiment>)| Proposal {
         command,
         duration_s: questions[0].duration_s,
-        tells: tells(&questions),
+        decides: decides(&questions),
     };
     commands.into_iter().map(proposal).collect()
 }
 
-fn tells(questions: &[&NextExperiment]) -> String {
+fn decides(questions: &[&NextExperiment]) -> String {
     let mut parts: Vec<String> = Vec::new();
     let mut shown: Vec<String> = Vec::new();
     for next in questions {
@@ -64,13 +64,13 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
         return writeln!(f, "<p>No experiment is proposed.</p>\n</section>");
     }
     writeln!(f, "<ol>")?;
-    for Proposal { command, duration_s, tells } in &proposals {
+    for Proposal { command, duration_s, decides } in &proposals {
         writeln!(
             f,
             "<li><code>{}</code> ({})<br>{}</li>",
             Text(command),
             duration(*duration_s),
-            Text(tells)
+            Text(decides)
         )?;
     }
     writeln!(

@@ -8,7 +8,7 @@ use super::words::{list, percent};
 use crate::{
     document::{Column, Table},
     markup::Text,
-    numbers::{probability, digits},
+    numbers::{digits, probability},
 };
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
@@ -61,7 +61,12 @@ fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round) -> fmt::Result {
     }
     if !scored.is_empty() {
         let scored = scored.iter().map(|candidate| {
-            format!("{} ({}, p {})", candidate.effect, digits(candidate.score, 2), probability(candidate.p_value))
+            format!(
+                "{} ({}, p {})",
+                candidate.effect,
+                digits(candidate.score, 2),
+                probability(candidate.p_value)
+            )
         });
         writeln!(f, "<p class=\"lead\">Scored only: {}.</p>", Text(list(scored)))?;
     }

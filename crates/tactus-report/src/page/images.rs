@@ -105,9 +105,7 @@ fn in_order(report: &RunReport, scale: Scale, dwells: usize) -> (Mosaic<'_>, Str
         tiles.push(tile([corner[0], corner[1] + CAPTION_PX], press, dwell, nth, [rows, cols]));
     }
     let lead = if shown < dwells {
-        format!(
-            "{shown} of {dwells} dwells, evenly chosen, in order of time; above each its depth."
-        )
+        format!("{shown} of {dwells} dwells, evenly chosen, in order of time; above each its depth.")
     } else {
         format!("All {dwells} dwells in order of time; above each its depth.")
     };

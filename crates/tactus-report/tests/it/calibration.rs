@@ -174,7 +174,9 @@ fn recalibrated_elements_lie_on_one_another() {
     let off = |s: f64, u: f64| (s * (u + CURVATURE_PER_MM * u * u) - line * u).powi(2);
     let squares = sensitivities.iter().flat_map(|s| [0.2, 0.3, 0.4, 0.5, 0.6].map(|u| off(*s, u)));
     let before = (squares.sum::<f64>() / (5.0 * 43.0)).sqrt();
-    let said = format!("The distance of the readings from one line for all is {before:.1} counts rms before and 0.000");
+    let said = format!(
+        "The distance of the readings from one line for all is {before:.1} counts rms before and 0.000"
+    );
     assert!(page(&whole()).contains(&said), "{said}");
 }
 
@@ -335,8 +337,14 @@ fn a_study_compares_first_and_shows_every_figure_in_the_order_of_the_paper() {
     );
     assert_eq!(html.matches("Figure 5a").count(), 2, "as a heading, and as the drawing's name");
 
-    let bare =
-        StudyReport { calibration: None, quantities: &[], runs: &[], figures: &[], simulated: false, ..study };
+    let bare = StudyReport {
+        calibration: None,
+        quantities: &[],
+        runs: &[],
+        figures: &[],
+        simulated: false,
+        ..study
+    };
     let html = study_html(&bare);
     assert!(
         html.contains("Nothing was found.")

@@ -313,7 +313,7 @@ fn an_experiment_that_answers_several_questions_is_proposed_once() {
         NextExperiment { separates: separates("relaxation", "nothing"), expected_z: 5.0, ..first },
     ]);
     let proposals = proposals(&found);
-    let told: Vec<[&str; 2]> = proposals.iter().map(|one| [&*one.command, &*one.tells]).collect();
+    let told: Vec<[&str; 2]> = proposals.iter().map(|one| [&*one.command, &*one.decides]).collect();
     assert_eq!(
         told,
         [
