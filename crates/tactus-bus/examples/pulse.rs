@@ -1,13 +1,13 @@
-//! A rig made of nothing: publishes synthetic frames, marked simulated, and answers commands.
+//! A synthetic rig that publishes frames, marked simulated, and answers commands.
 //!
-//! For trying clients without a daemon and without devices:
+//! It lets clients be tried without a daemon and without devices:
 //!
 //! ```text
 //! cargo run -p tactus-bus --example pulse -- [tcp/HOST:PORT [RATE_HZ [LOSE_EVERY]]]
 //! ```
 //!
-//! Each frame shows a soft spot that wanders over 6 x 8 elements. With `LOSE_EVERY` n, each n-th frame is
-//! lost as a device loses frames. One line of JSON on the standard output says when it is ready.
+//! Each frame shows a smooth peak that moves over 6 x 8 elements. With `LOSE_EVERY` n, each n-th frame is lost as at a
+//! device. One line of JSON on standard output shows that it is ready.
 #![expect(clippy::print_stdout, reason = "a program for the terminal")]
 
 use std::{error::Error, future::pending, pin::pin, time::Duration};
@@ -65,7 +65,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Ends with Ctrl-C; never, where that cannot be listened to.
+/// Completes at Ctrl-C; never if signals are not available.
 async fn interrupted() {
     if tokio::signal::ctrl_c().await.is_err() {
         pending::<()>().await;
@@ -75,9 +75,9 @@ async fn interrupted() {
 struct Pulse {
     out: Publisher,
     start: Instant,
-    /// The run that it pretends to do.
+    /// The pretended run.
     run: Option<pb::RunState>,
-    /// Events of that run so far.
+    /// Number of events of that run so far.
     events: u64,
     rate_hz: f64,
 }
@@ -195,7 +195,7 @@ impl Pulse {
         self.events += 1;
     }
 
-    /// There is no wall clock in this rig: it counts from its own start.
+    /// All times count from the start of the program; there is no wall clock.
     fn now(&self) -> TimeStamp {
         let mono = MonoTime::default().after(self.start.elapsed());
         TimeStamp { mono, wall: WallTime::from_ns(mono.ns()) }

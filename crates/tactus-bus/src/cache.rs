@@ -1,9 +1,8 @@
-//! The last messages of a topic, for those who come late or missed some.
+//! The last messages of a topic, for clients that join late or missed some.
 //!
-//! Answers as the cache of zenoh-ext's advanced publisher does, on the same keys and parameters, so that
-//! any advanced subscriber is served. That cache itself is not used: it answers on zenoh's receiving
-//! threads, of which there are two, so that two clients who ask for a long history and do not read it keep
-//! everybody's commands waiting (measured: a stop for 15 s and more).
+//! It replies like the cache of zenoh-ext's advanced publisher, on the same keys and parameters, so that it serves any
+//! advanced subscriber. That cache itself is not used, because it replies on zenoh's two receiving threads: two clients
+//! that ask for a long history and do not read it would delay everybody's commands (measured: a stop for 15 s and more).
 
 use std::{
     collections::VecDeque,
@@ -19,19 +18,19 @@ use zenoh::{
     session::EntityGlobalId,
 };
 
-use crate::{BusError, command::let_go, queue::Queue};
+use crate::{BusError, command::drop_on_blocking_thread, queue::Queue};
 
-/// Questions that may wait for an answer.
-const WAITING_QUESTIONS: usize = 64;
+/// Queries that can wait for a reply.
+const WAITING_HISTORY_QUERIES: usize = 64;
 
 /// Keeps the last messages of one publisher.
 #[derive(Debug)]
 pub(crate) struct Cache {
-    kept: Arc<Mutex<Kept>>,
+    kept: Arc<Mutex<KeptMessages>>,
     _queryable: Queryable<()>,
 }
 
-/// What goes with every message of a publisher.
+/// Key, publisher and encoding of cached messages.
 #[derive(Debug, Clone)]
 pub(crate) struct Source {
     pub(crate) key: String,
@@ -39,17 +38,17 @@ pub(crate) struct Source {
     pub(crate) encoding: Encoding,
 }
 
-/// Somebody asks for the past.
+/// A client's query for past messages.
 #[derive(Debug)]
-pub(crate) struct Question {
+pub(crate) struct HistoryQuery {
     query: Query,
-    kept: Arc<Mutex<Kept>>,
+    kept: Arc<Mutex<KeptMessages>>,
     source: Source,
 }
 
-/// The last messages, numbered as their publisher numbers them: 0, 1, 2, ...
+/// The last messages with their publisher's numbers: 0, 1, 2, ...
 #[derive(Debug)]
-struct Kept {
+struct KeptMessages {
     capacity: usize,
     next: u32,
     messages: VecDeque<(u32, ZBytes)>,
@@ -61,20 +60,20 @@ impl Cache {
         session: &Session,
         source: Source,
         capacity: usize,
-        questions: Arc<Queue<Question>>,
+        history_queries: Arc<Queue<HistoryQuery>>,
     ) -> Result<Self, BusError> {
         let key = format!("{}/@adv/pub/{}/{}/_", source.key, source.publisher.zid(), source.publisher.eid());
-        let kept = Arc::new(Mutex::new(Kept { capacity, next: 0, messages: VecDeque::new() }));
+        let kept = Arc::new(Mutex::new(KeptMessages { capacity, next: 0, messages: VecDeque::new() }));
         let queryable = session
             .declare_queryable(&key)
             .callback({
                 let kept = kept.clone();
                 let runtime = tokio::runtime::Handle::current();
                 move |query| {
-                    let question = Question { query, kept: kept.clone(), source: source.clone() };
-                    if let Some(displaced) = questions.push(question) {
-                        tracing::warn!("too many clients ask for the past; one gets nothing");
-                        let_go(displaced.query, &runtime);
+                    let question = HistoryQuery { query, kept: kept.clone(), source: source.clone() };
+                    if let Some(displaced) = history_queries.push(question) {
+                        tracing::warn!("too many clients ask for history; one gets nothing");
+                        drop_on_blocking_thread(displaced.query, &runtime);
                     }
                 }
             })
@@ -83,14 +82,14 @@ impl Cache {
         Ok(Self { kept, _queryable: queryable })
     }
 
-    /// Keeps a message that is about to be published. Before, not after: a client that comes in between
-    /// would get it neither from here nor live.
+    /// Keeps a message that is about to be published. It must be kept before it is published: otherwise a client that joins
+    /// in between would get it neither from here nor live.
     pub(crate) fn keep(&self, payload: ZBytes) {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner).push(payload);
     }
 }
 
-impl Kept {
+impl KeptMessages {
     fn push(&mut self, payload: ZBytes) {
         if self.messages.len() == self.capacity {
             self.messages.pop_front();
@@ -107,15 +106,15 @@ impl Kept {
     }
 }
 
-/// The way of questions from the caches to the thread that answers them, one at a time: zenoh closes a
-/// link that is full only when the last of those who wait for it has given up.
-pub(crate) fn questions() -> Arc<Queue<Question>> {
-    // Drop-oldest; a question that finds no place is answered with nothing, and logged.
-    Arc::new(Queue::new(WAITING_QUESTIONS))
+/// The queue of queries from the caches to the thread that replies, one at a time: zenoh closes a full link only when the
+/// last waiting sender gives up.
+pub(crate) fn history_queries() -> Arc<Queue<HistoryQuery>> {
+    // Drop-oldest; a dropped query gets an empty reply and a log line.
+    Arc::new(Queue::new(WAITING_HISTORY_QUERIES))
 }
 
-impl Question {
-    /// Sends all that is asked for; may wait for the client.
+impl HistoryQuery {
+    /// Sends the requested messages; may wait for the client.
     pub(crate) fn answer(self) {
         let Self { query, kept, source } = self;
         let (numbers, limit) = wanted(query.parameters().get("_sn"), query.parameters().get("_max"));
@@ -127,15 +126,15 @@ impl Question {
                 .source_info(SourceInfo::new(source.publisher, number))
                 .wait();
             if let Err(error) = sent {
-                tracing::debug!(key = source.key, %error, "a client that asked for the past has gone");
+                tracing::debug!(key = source.key, %error, "a client that asked for history disconnected");
                 return;
             }
         }
     }
 }
 
-/// What is asked for: numbers as `a..b` (both included, either absent) or one alone, and how many at most.
-/// What cannot be read is taken as not said.
+/// Parses the requested numbers, `a..b` (inclusive, either end optional) or a single one, and the limit. Unreadable values
+/// are ignored.
 fn wanted(numbers: Option<&str>, limit: Option<&str>) -> (RangeInclusive<u32>, usize) {
     let limit = limit.and_then(|text| text.parse().ok()).unwrap_or(usize::MAX);
     let text = numbers.unwrap_or("..");

@@ -1,10 +1,10 @@
 use std::collections::VecDeque;
 
-use super::{Kept, wanted};
+use super::{KeptMessages, wanted};
 
 /// The numbers found after so many messages, of which the last `capacity` are kept.
 fn check(published: u32, capacity: usize, numbers: Option<&str>, limit: Option<&str>) -> Vec<u32> {
-    let mut kept = Kept { capacity, next: 0, messages: VecDeque::new() };
+    let mut kept = KeptMessages { capacity, next: 0, messages: VecDeque::new() };
     for number in 0..published {
         kept.push(number.to_le_bytes().into());
     }

@@ -1,4 +1,4 @@
-//! A client's end of the bus.
+//! The bus on a client's side.
 
 use std::{io, time::Duration};
 
@@ -18,7 +18,7 @@ use crate::{
     Alive, BusError, Endpoint, History, Published, Subscription, config, liveness::Roster, topic::encoding,
 };
 
-/// How long a machine that does not answer at all is waited for.
+/// Time limit for a machine that does not answer.
 const REACH_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// A client of one rig's service.
@@ -31,11 +31,11 @@ pub struct Client {
 }
 
 impl Client {
-    /// Connects to the service at an endpoint; at once known to be absent if nothing listens there.
-    /// Without a rig's name it takes the one that is ready there.
+    /// Connects to the service at an endpoint; fails at once if nothing listens there. Without a rig's name it connects to
+    /// the only rig that is ready.
     ///
     /// # Errors
-    /// [`BusError::NoService`], [`BusError::Session`]; [`BusError::RigName`] for a name that is none;
+    /// [`BusError::NoService`], [`BusError::Session`]; [`BusError::RigName`] for an invalid name;
     /// without a name also [`BusError::NoRig`] and [`BusError::SeveralRigs`].
     ///
     /// # Panics
@@ -58,33 +58,33 @@ impl Client {
         Ok(Self { session, endpoint: endpoint.clone(), keys: Keys::new(rig), roster })
     }
 
-    /// The rig that this client talks to.
+    /// Name of the rig that this client commands.
     pub fn rig(&self) -> &str {
         self.keys.rig()
     }
 
-    /// Where its service was reached.
+    /// Endpoint of its service.
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
-    /// All rigs that are ready at this endpoint now, sorted.
+    /// Names of all rigs that are ready at this endpoint now, sorted.
     pub fn rigs(&self) -> Vec<String> {
         self.roster.rigs()
     }
 
-    /// Whether the service is ready, now and as it changes.
+    /// Follows whether the service is ready.
     pub fn alive(&self) -> Alive {
         self.roster.alive(self.rig())
     }
 
-    /// Asks the service something and waits for its answer. The request is a [`pb::RunRequest`] for
-    /// [`Command::Run`] and a [`pb::CommandRequest`] for all others; a stop travels before everything
-    /// else. An answer that says no is an answer: see [`pb::CommandReply::ok`].
+    /// Sends a command and waits for the reply. The request is a [`pb::RunRequest`] for [`Command::Run`] and a
+    /// [`pb::CommandRequest`] for all others. A stop has the highest priority. A refusal is a reply, not an error: see
+    /// [`pb::CommandReply::ok`].
     ///
     /// # Errors
-    /// [`BusError::NoAnswer`] if nobody answered in time or the service went away;
-    /// [`BusError::Answer`] if the answer cannot be read; [`BusError::Key`] if the session is closed.
+    /// [`BusError::NoAnswer`] if there is no reply in time or the service ended;
+    /// [`BusError::Answer`] if the reply cannot be decoded; [`BusError::Key`] if the session is closed.
     pub async fn command<M: Message>(
         &self,
         command: Command,
@@ -106,7 +106,7 @@ impl Client {
             .await
             .map_err(BusError::key(&key))?;
         while let Ok(reply) = replies.recv_async().await {
-            // Errors come from zenoh itself: a timeout, or a service that went away.
+            // Errors come from zenoh: a timeout, or a service that ended.
             if let Ok(sample) = reply.result() {
                 return <pb::CommandReply as prost::Message>::decode(&*sample.payload().to_bytes())
                     .map_err(|source| BusError::Answer { key, source });
@@ -115,7 +115,7 @@ impl Client {
         Err(BusError::NoAnswer { key, waited: patience })
     }
 
-    /// Listens to a message's topic.
+    /// Subscribes to a message's topic.
     ///
     /// # Errors
     /// [`BusError::Key`] if the session is closed.
@@ -123,16 +123,16 @@ impl Client {
         Subscription::declare(&self.session, &self.keys, history).await
     }
 
-    /// Takes leave of the service; subscriptions end.
+    /// Closes the connection; subscriptions end.
     ///
     /// # Errors
-    /// [`BusError::Close`] if the service could not be told.
+    /// [`BusError::Close`] if zenoh could not close the session cleanly.
     pub async fn close(self) -> Result<(), BusError> {
         self.session.close().await.map_err(|source| BusError::Close { source })
     }
 }
 
-/// A wildcard in a name would command every rig on the bus.
+/// Refuses names with wildcards, which would command every rig on the bus.
 fn check_rig_name(rig: &str) -> Result<(), BusError> {
     let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if rig.is_empty() || !rig.chars().all(fits) {
@@ -141,7 +141,7 @@ fn check_rig_name(rig: &str) -> Result<(), BusError> {
     Ok(())
 }
 
-/// Finds out by a plain connection whether anything listens, which zenoh takes seconds to tell.
+/// Checks with a plain connection whether anything listens; zenoh would need seconds.
 async fn reach(endpoint: &Endpoint) -> io::Result<()> {
     match timeout(REACH_TIMEOUT, TcpStream::connect(endpoint.address())).await {
         Ok(connected) => connected.map(drop),

@@ -1,4 +1,4 @@
-//! Commands as the service receives them.
+//! Commands on the service's side.
 
 use std::sync::Arc;
 
@@ -20,72 +20,72 @@ use zenoh::{
 
 use crate::{BusError, queue::Queue, topic::encoding};
 
-/// Commands that wait for the service; one more is refused with an answer that says so.
+/// Commands that can wait for the service. Further ones are refused with an error.
 const WAITING_COMMANDS: usize = 16;
 
-/// Answers that may wait to be sent.
+/// Replies that can wait to be sent.
 const WAITING_ANSWERS: usize = 256;
 
-/// The exit code of a request that makes no sense.
+/// Exit code of an invalid request.
 const EXIT_USAGE: u32 = 2;
-/// The exit code of a request that failed.
+/// Exit code of a failed request.
 const EXIT_FAILED: u32 = 1;
 
-/// What clients ask of the service.
+/// Commands from clients.
 ///
-/// A stop comes by a way of its own: give [`Calls::stops`] a task of its own, and it waits for nothing.
+/// Stops have their own channel. Read [`Calls::stops`] in its own task, so that a stop never waits for another command.
 #[derive(Debug)]
 pub struct Calls {
-    /// Calls of `cmd/stop` only.
+    /// Calls of `cmd/stop`.
     pub stops: mpsc::Receiver<CommandCall>,
-    /// All others, in the order of their arrival.
+    /// All other calls, in order of arrival.
     pub commands: mpsc::Receiver<CommandCall>,
 }
 
-/// One command, to be answered.
+/// A received command, which must be answered.
 #[derive(Debug)]
 pub struct CommandCall {
-    /// What is asked.
+    /// Which command.
     pub command: Command,
-    /// With what.
+    /// Its arguments.
     pub request: Request,
-    /// Where the answer goes. A client whose call is dropped learns that there is no answer.
+    /// Sends the reply. If it is dropped, the client learns that there is no answer.
     pub reply: Responder,
 }
 
-/// What comes with a command.
+/// Arguments of a command.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Request {
-    /// With [`Command::Run`].
+    /// Of [`Command::Run`].
     Run(pb::RunRequest),
-    /// With all others.
+    /// Of all other commands.
     Control(pb::CommandRequest),
 }
 
-/// The way back to the client that asked.
+/// Sends the reply to the client.
 #[derive(Debug)]
 pub struct Responder {
     query: Query,
     replies: Replies,
 }
 
-/// An answer on its way. One thread sends them all: a client that stands still can delay another's answer,
-/// but not what was asked for, and it is waited for once only.
+/// A reply waiting to be sent. One thread sends all replies: a stalled client can delay another client's reply, once,
+/// but not the execution of its command.
 #[derive(Debug)]
-pub(crate) struct Answer {
+pub(crate) struct PendingReply {
     query: Query,
     reply: pb::CommandReply,
 }
 
-/// Where answers go.
+/// Sends replies through the queue.
 #[derive(Debug, Clone)]
 pub(crate) struct Replies {
-    answers: Arc<Queue<Answer>>,
+    answers: Arc<Queue<PendingReply>>,
     runtime: Handle,
 }
 
 impl Responder {
-    /// Answers. Never waits.
+    /// Sends the reply. Never waits.
     pub fn reply(self, reply: pb::CommandReply) {
         let Self { query, replies } = self;
         replies.send(query, reply);
@@ -93,30 +93,30 @@ impl Responder {
 }
 
 impl Replies {
-    /// Answers go to this queue.
-    pub(crate) fn to(answers: Arc<Queue<Answer>>) -> Self {
+    /// Sends replies through this queue.
+    pub(crate) fn to(answers: Arc<Queue<PendingReply>>) -> Self {
         Self { answers, runtime: Handle::current() }
     }
 
     fn send(&self, query: Query, reply: pb::CommandReply) {
-        if let Some(displaced) = self.answers.push(Answer { query, reply }) {
+        if let Some(displaced) = self.answers.push(PendingReply { query, reply }) {
             tracing::warn!(
                 key = %displaced.query.key_expr(),
-                "an answer is not sent: too many are waiting, or the bus is closed"
+                "a reply is not sent: too many are waiting, or the bus is closed"
             );
-            let_go(displaced.query, &self.runtime);
+            drop_on_blocking_thread(displaced.query, &self.runtime);
         }
     }
 }
 
-/// The queue of answers.
-pub(crate) fn answers() -> Arc<Queue<Answer>> {
-    // Drop-oldest: whoever asks so much at once does without answers to the first.
+/// The queue of replies.
+pub(crate) fn answers() -> Arc<Queue<PendingReply>> {
+    // Drop-oldest: a client that sends so many commands at once loses the first replies.
     Arc::new(Queue::new(WAITING_ANSWERS))
 }
 
-impl Answer {
-    /// Sends it; may wait for the client.
+impl PendingReply {
+    /// Sends the reply; may wait for the client.
     pub(crate) fn send(self) {
         let Self { query, reply } = self;
         let sent = query
@@ -124,14 +124,13 @@ impl Answer {
             .encoding(encoding(pb::CommandReply::NAME))
             .wait();
         if let Err(error) = sent {
-            tracing::warn!(key = %query.key_expr(), %error, "the answer did not reach its client");
+            tracing::warn!(key = %query.key_expr(), %error, "the reply did not reach its client");
         }
     }
 }
 
-/// Ends a query unanswered. To let go of it is to send, which may wait for the client, so that is left to a
-/// thread that may wait.
-pub(crate) fn let_go(query: Query, runtime: &Handle) {
+/// Drops an unanswered query on a blocking thread. Dropping a query sends a message, which may wait for the client.
+pub(crate) fn drop_on_blocking_thread(query: Query, runtime: &Handle) {
     runtime.spawn_blocking(move || drop(query));
 }
 
@@ -141,7 +140,7 @@ pub(crate) async fn declare(
     keys: &Keys,
     replies: &Replies,
 ) -> Result<(Vec<Queryable<()>>, Calls), BusError> {
-    // Both bounded; a call that finds no place is answered at once and not executed.
+    // Both bounded; a call that does not fit is refused at once.
     let (stop, stops) = mpsc::channel(WAITING_COMMANDS);
     let (other, commands) = mpsc::channel(WAITING_COMMANDS);
     let mut queryables = Vec::new();
@@ -165,7 +164,10 @@ pub(crate) async fn declare(
     Ok((queryables, Calls { stops, commands }))
 }
 
-/// Passes a query on to the service, or says why not.
+/// Passes a query on to the service.
+///
+/// # Errors
+/// The refusal, with its query.
 fn take_in(
     command: Command,
     query: Query,
@@ -180,7 +182,7 @@ fn take_in(
     calls.try_send(call).map_err(|refused| {
         let (call, error) = match refused {
             TrySendError::Full(call) => (call, format!("{WAITING_COMMANDS} commands are waiting; try again")),
-            TrySendError::Closed(call) => (call, "the service is closing down".to_owned()),
+            TrySendError::Closed(call) => (call, "the service is shutting down".to_owned()),
         };
         Box::new((call.reply.query, refusal(EXIT_FAILED, error)))
     })
@@ -190,7 +192,7 @@ fn refusal(exit_code: u32, error: String) -> pb::CommandReply {
     pb::CommandReply { ok: false, error, exit_code, ..Default::default() }
 }
 
-/// Reads what came with a command. A stop is a stop, whatever came with it.
+/// Decodes the arguments of a command. A stop is valid whatever its arguments are.
 fn read(command: Command, query: &Query) -> Result<Request, String> {
     let payload = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
     match command {
@@ -200,7 +202,7 @@ fn read(command: Command, query: &Query) -> Result<Request, String> {
         }
         Command::Stop => {
             let request = decode::<pb::CommandRequest>(query.encoding(), &payload).unwrap_or_else(|error| {
-                tracing::warn!(%error, "a stop with an unreadable request; stopping all the same");
+                tracing::warn!(%error, "a stop with an unreadable request; stopping anyway");
                 pb::CommandRequest { who: "unknown".to_owned(), reason: error, abort: false }
             });
             Ok(Request::Control(request))
@@ -210,9 +212,9 @@ fn read(command: Command, query: &Query) -> Result<Request, String> {
 
 fn decode<M: Message>(given: Option<&Encoding>, payload: &[u8]) -> Result<M, String> {
     let expected = encoding(M::NAME);
-    // No encoding, or zenoh's word for "bytes", is what simple tools send.
+    // Simple tools send no encoding, or zenoh's default, bytes.
     if let Some(given) = given.filter(|given| **given != Encoding::ZENOH_BYTES && **given != expected) {
         return Err(format!("this command takes {expected}, not {given}"));
     }
-    M::decode(payload).map_err(|error: DecodeError| format!("this is no {}: {error}", M::NAME))
+    M::decode(payload).map_err(|error: DecodeError| format!("this is not a {}: {error}", M::NAME))
 }

@@ -1,16 +1,16 @@
-//! Whom the service listens to, and zenoh's settings for both sides.
+//! Endpoints of the bus, and zenoh's settings for service and client.
 
 use serde_json::{Value, json};
 use zenoh::Config;
 
 use crate::{BusError, Endpoint};
 
-/// Whom the service listens to and joins. Default: this machine only, nobody joined.
+/// Endpoints of the service. Default: listens on loopback, connects to nothing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BusConfig {
-    /// Where it accepts clients; empty means nowhere.
+    /// Endpoints that accept clients; may be empty.
     pub listen: Vec<Endpoint>,
-    /// Other zenoh routers or peers to join; looked for again and again until they are there.
+    /// Zenoh routers or peers to connect to; tried again until they answer.
     pub connect: Vec<Endpoint>,
 }
 
@@ -21,7 +21,7 @@ impl Default for BusConfig {
 }
 
 impl BusConfig {
-    /// True if only this machine can reach the service and it joins nobody elsewhere.
+    /// True if all endpoints are on this machine.
     pub fn is_loopback(&self) -> bool {
         self.listen.iter().chain(&self.connect).all(Endpoint::is_loopback)
     }
@@ -33,14 +33,13 @@ impl BusConfig {
             ("mode", json!("peer")),
             ("listen/endpoints", json!(listen)),
             ("connect/endpoints", json!(texts(&self.connect))),
-            // Room for 1 MiB each, where zenoh has 128 KiB: a burst of events, or a usual history, waits for
-            // no client.
+            // 1 MiB each instead of zenoh's 128 KiB: a burst of events, or a usual history, then fits without waiting.
             ("transport/link/tx/queue/size/interactive_low", json!(16)),
             ("transport/link/tx/queue/size/data_high", json!(16)),
             ("transport/link/tx/queue/size/data", json!(16)),
-            // A client whose link has been full for this long (microseconds) when it is to get an answer is
-            // disconnected. Until then it keeps a thread waiting, and in the end, for as long again, zenoh's
-            // one sending thread, hence everybody. Zenoh's default is 5 s.
+            // In microseconds: a client whose link stays full for so long while a reply waits is disconnected. Until then it
+            // blocks a thread and finally, for the same time, zenoh's only sending thread and so all clients. Zenoh's
+            // default is 5 s.
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(100_000)),
         ])
         .map_err(|source| BusError::Open { listen: listen.join(", "), source })
@@ -52,7 +51,7 @@ pub(crate) fn client(endpoint: &Endpoint) -> Result<Config, BusError> {
     zenoh_config(&[
         ("mode", json!("client")),
         ("connect/endpoints", json!([endpoint.to_string()])),
-        // One try at start; a connection lost later is taken up again for as long as the client lives.
+        // One attempt at start; a connection lost later is restored while the client exists.
         ("connect/timeout_ms", json!(0)),
         ("transport/unicast/open_timeout", json!(3_000)),
     ])
@@ -65,7 +64,7 @@ fn texts(endpoints: &[Endpoint]) -> Vec<String> {
 
 fn zenoh_config(settings: &[(&str, Value)]) -> Result<Config, zenoh::Error> {
     let mut config = Config::default();
-    // Nobody is looked for and nobody is told where we are.
+    // No discovery of or by others.
     config.insert_json5("scouting/multicast/enabled", "false")?;
     config.insert_json5("scouting/gossip/enabled", "false")?;
     for (name, value) in settings {

@@ -1,4 +1,4 @@
-//! Where a service listens: `tcp/HOST:PORT`.
+//! Address of a service: `tcp/HOST:PORT`.
 
 use std::{fmt, net::IpAddr, str::FromStr};
 
@@ -12,10 +12,10 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
-    /// Where the service listens unless told otherwise; zenoh's own port.
+    /// Default port, which is zenoh's.
     pub const DEFAULT_PORT: u16 = 7447;
 
-    /// This machine only, [`Endpoint::DEFAULT_PORT`].
+    /// The loopback address with [`Endpoint::DEFAULT_PORT`].
     pub fn loopback() -> Self {
         Self { address: format!("127.0.0.1:{}", Self::DEFAULT_PORT) }
     }
@@ -51,7 +51,7 @@ impl FromStr for Endpoint {
         if host.is_empty() || (host.contains(':') && !bracketed) {
             return Err(wrong("the host is a name, an IPv4 address or an [IPv6 address]"));
         }
-        // Everything else (`?`, `#`, `;`) would be options to zenoh.
+        // Zenoh would read `?`, `#` and `;` as options.
         let plain = |c: char| c.is_ascii_alphanumeric() || ".-_:[]%".contains(c);
         if !host.chars().all(plain) {
             return Err(wrong("the host is a name, an IPv4 address or an [IPv6 address]"));

@@ -1,9 +1,8 @@
-//! The bus: what the service publishes, what it answers, and how a client finds it; zenoh underneath.
+//! The bus between the service and its clients, based on zenoh: published messages, commands and liveliness.
 //!
-//! The service opens a [`Bus`] and hands out [`Publisher`]s, whose calls never wait; commands come
-//! to it as [`Calls`]. A client [`Client::connect`]s, asks [`Client::command`]s and
-//! [`Client::subscribe`]s to messages. Keys, messages and their encoding are those of
-//! `tactus-schema`, so that any zenoh client in any language can take part.
+//! The service opens a [`Bus`] and hands out [`Publisher`]s, whose calls never wait; it receives commands as [`Calls`]. A
+//! client uses [`Client::connect`], [`Client::command`] and [`Client::subscribe`]. Keys, messages and encoding are those
+//! of `tactus-schema`, so any zenoh client in any language can take part.
 //!
 //! | topic | kept for late joiners |
 //! |---|---|
@@ -11,16 +10,16 @@
 //! | `run/event` | the last 65,536 |
 //! | all others | the last one |
 //!
-//! A client that cannot keep up misses messages, and fetches again those that are still kept; nobody waits
-//! for it. A client that asks for something and does not take the answer is disconnected after 100 ms. Frames
-//! and the rest travel in separate queues and priorities, so that neither delays the other, and both stand
-//! behind commands. The sequence number inside a frame tells what was lost where.
+//! A client that cannot keep up misses messages and fetches those that are still kept; nobody waits for it. A client that
+//! asks for something and does not read the answer is disconnected after 100 ms. Frames and other messages have separate
+//! queues and priorities, so that neither delays the other; commands have priority over both. The sequence number in
+//! a frame shows where frames were lost.
 //!
 //! Everything here needs a **multi-thread tokio runtime**: zenoh panics on a current-thread one, and
-//! with it on a paused clock. What runs in virtual time runs without the bus.
+//! therefore also with a paused clock. Runs in virtual time do not use the bus.
 //!
-//! Unless configured otherwise nothing listens or is sent beyond loopback: multicast scouting and
-//! gossip are off, and the service listens on `tcp/127.0.0.1:7447` only.
+//! By default the bus uses loopback only: multicast scouting and gossip are off, and the service listens on
+//! `tcp/127.0.0.1:7447`.
 
 mod cache;
 mod client;

@@ -1,4 +1,4 @@
-//! Who is there: the service's token, and how clients see it.
+//! Liveliness: the service's token, and the clients' view of it.
 
 use std::{collections::BTreeSet, time::Duration};
 
@@ -13,26 +13,26 @@ use zenoh::{
 
 use crate::BusError;
 
-/// How long a client waits to be told who is there when it connects.
+/// Time limit for the list of ready rigs when a client connects.
 const ROLL_CALL_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Tells all clients that the service is ready; dropping it, or dying, tells them that it is not.
+/// Shows clients that the service is ready. They see it disappear when it is dropped or the process dies.
 #[derive(Debug)]
 #[must_use = "the service is alive only while it holds this"]
 pub struct AliveToken {
     _token: LivelinessToken,
 }
 
-/// Whether a rig's service is ready, as it changes.
+/// Follows whether a rig's service is ready.
 #[derive(Debug)]
 pub struct Alive {
     rig: String,
     ready: watch::Receiver<BTreeSet<String>>,
-    /// What the reader knows.
+    /// The state told last.
     known: bool,
 }
 
-/// The rigs that are ready, kept up to date.
+/// The set of ready rigs, kept up to date.
 #[derive(Debug)]
 pub(crate) struct Roster {
     ready: watch::Receiver<BTreeSet<String>>,
@@ -53,8 +53,8 @@ impl Alive {
         self.ready.borrow().contains(&self.rig)
     }
 
-    /// Waits for a state other than the one told last, at first that of the beginning, and tells it;
-    /// `None` once the client is closed. Cancel-safe.
+    /// Waits for a change and returns the new state; `None` once the client is closed. The first change is relative to the
+    /// state at creation. Cancel-safe.
     pub async fn changed(&mut self) -> Option<bool> {
         let (rig, known) = (&self.rig, self.known);
         self.ready.wait_for(|ready| ready.contains(rig) != known).await.ok()?;
@@ -64,12 +64,12 @@ impl Alive {
 }
 
 impl Roster {
-    /// Returns once it is known who is there.
+    /// Returns once the ready rigs are known.
     pub(crate) async fn keep(session: &Session) -> Result<Self, BusError> {
         let everyone = Keys::new("*").alive();
         // Only the latest state counts, and a watch keeps no more.
         let (told, ready) = watch::channel(BTreeSet::new());
-        // Tells who is there already, then who comes and goes.
+        // Reports present tokens first, then changes.
         let subscriber = session
             .liveliness()
             .declare_subscriber(&everyone)
@@ -85,8 +85,8 @@ impl Roster {
             })
             .await
             .map_err(BusError::key(&everyone))?;
-        // Nobody tells when all have been told. The end of a second roll call, behind the first on the
-        // same link, does; its answers are left aside, for zenoh may leave out those it knows already.
+        // The subscriber does not show when all present tokens were reported. The end of a query on the same link, sent
+        // after the subscription, does. Its replies are ignored, because zenoh may omit known tokens.
         let roll_call = session
             .liveliness()
             .get(&everyone)

@@ -15,7 +15,7 @@ fn check(
     past: Vec<Numbered<char, (char, u32)>>,
     after: Vec<Numbered<char, (char, u32)>>,
 ) -> (Vec<(char, u32)>, u64) {
-    let mut merge = Merge::awaiting_past();
+    let mut merge = Merge::awaiting_history();
     let mut out = Vec::new();
     for message in before {
         merge.present(message, |item| out.push(item));
@@ -74,7 +74,7 @@ fn numbers_go_on_after_the_largest() {
 
 #[test]
 fn a_publisher_that_does_not_count_is_passed_on_as_it_comes() {
-    let mut merge = Merge::<char, u32>::awaiting_past();
+    let mut merge = Merge::<char, u32>::awaiting_history();
     let mut out = Vec::new();
     merge.present(Numbered { origin: None, item: 1 }, |item| out.push(item));
     merge.join(vec![], |item| out.push(item));

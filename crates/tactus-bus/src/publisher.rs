@@ -1,4 +1,4 @@
-//! The way out: calls that never wait, and what hands their messages to zenoh.
+//! Publishing: calls that never wait, and queues that pass their messages to zenoh.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -16,13 +16,13 @@ use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, MissDetectionCon
 
 use crate::{
     BusError, Published,
-    cache::{Cache, Question, Source},
+    cache::{Cache, HistoryQuery, Source},
     queue::Queue,
     topic::{Lane, Policy, encoding, message_name},
 };
 
-/// How often the last sequence number of each topic is told, so that a client finds out that it
-/// missed the last message of a burst.
+/// Period at which each topic's last sequence number is sent, so that a client notices that it missed the last message of
+/// a burst.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
 /// Publishes for the service. Cheap to clone; no call ever waits.
@@ -31,11 +31,11 @@ pub struct Publisher {
     lanes: Arc<Lanes>,
 }
 
-/// What waits on its way out.
+/// The outgoing queues.
 #[derive(Debug)]
 pub(crate) struct Lanes {
     frames: Arc<Queue<Outgoing>>,
-    news: Arc<Queue<Outgoing>>,
+    updates: Arc<Queue<Outgoing>>,
 }
 
 /// One encoded message.
@@ -62,86 +62,86 @@ impl Publisher {
         let queue = self.lanes.queue(lane);
         if queue.push(Outgoing { topic: M::TOPIC, payload: message.encode_to_vec() }).is_some() {
             let dropped = queue.dropped();
-            // One line each time the count doubles: a flood of losses is no flood of lines.
+            // One line each time the count doubles, to limit the log.
             if dropped.is_power_of_two() {
                 tracing::warn!(?lane, dropped, "the bus cannot keep up; the oldest messages are dropped");
             }
         }
     }
 
-    /// Frames dropped on the service's side because the bus could not keep up. What the network then
-    /// drops for a single slow client is counted by that client: see [`crate::Losses`].
+    /// Frames dropped by the service because the bus could not keep up. Messages that the network drops for one slow client
+    /// are counted by that client: see [`crate::Losses`].
     pub fn dropped_frames(&self) -> u64 {
         self.lanes.frames.dropped()
     }
 
-    /// Events and states dropped on the service's side because the bus could not keep up.
-    pub fn dropped_news(&self) -> u64 {
-        self.lanes.news.dropped()
+    /// Events and states dropped by the service because the bus could not keep up.
+    pub fn dropped_updates(&self) -> u64 {
+        self.lanes.updates.dropped()
     }
 }
 
 impl Lanes {
     pub(crate) fn new() -> Self {
         Self {
-            // Drop-oldest, counted: 10 s of frames. More would only be stale.
+            // Drop-oldest, counted: 10 s of frames.
             frames: Arc::new(Queue::new(300)),
-            // Drop-oldest, counted: far more than a run says while clients that stand still cost a
-            // millisecond a message each.
-            news: Arc::new(Queue::new(8_192)),
+            // Drop-oldest, counted: far more than a run sends while stalled clients cost a millisecond per message each.
+            updates: Arc::new(Queue::new(8_192)),
         }
     }
 
     pub(crate) fn queue(&self, lane: Lane) -> &Arc<Queue<Outgoing>> {
         match lane {
             Lane::Frames => &self.frames,
-            Lane::News => &self.news,
+            Lane::Updates => &self.updates,
         }
     }
 }
 
 /// The publishers of one lane.
 #[derive(Debug)]
-pub(crate) struct Outlets(BTreeMap<Topic, Outlet>);
+pub(crate) struct TopicPublishers(BTreeMap<Topic, TopicPublisher>);
 
-/// One topic's way out.
+/// Publisher and cache of one topic.
 #[derive(Debug)]
-struct Outlet {
+struct TopicPublisher {
     publisher: AdvancedPublisher<'static>,
     cache: Cache,
 }
 
-impl Outlets {
+impl TopicPublishers {
     /// Declares the publishers of the lane's topics.
     pub(crate) async fn declare(
         session: &Session,
         keys: &Keys,
         lane: Lane,
-        questions: &Arc<Queue<Question>>,
+        history_queries: &Arc<Queue<HistoryQuery>>,
     ) -> Result<Self, BusError> {
-        let mut outlets = BTreeMap::new();
+        let mut publishers = BTreeMap::new();
         for topic in Topic::ALL {
             if Policy::of(topic).lane == lane {
-                outlets.insert(topic, Outlet::declare(session, keys, topic, questions).await?);
+                publishers
+                    .insert(topic, TopicPublisher::declare(session, keys, topic, history_queries).await?);
             }
         }
-        Ok(Self(outlets))
+        Ok(Self(publishers))
     }
 
-    /// Hands a message to zenoh; may wait for slow clients.
+    /// Passes a message to zenoh; may wait for slow clients.
     pub(crate) fn publish(&self, Outgoing { topic, payload }: Outgoing) {
-        if let Some(outlet) = self.0.get(&topic) {
-            outlet.publish(payload);
+        if let Some(publisher) = self.0.get(&topic) {
+            publisher.publish(payload);
         }
     }
 }
 
-impl Outlet {
+impl TopicPublisher {
     async fn declare(
         session: &Session,
         keys: &Keys,
         topic: Topic,
-        questions: &Arc<Queue<Question>>,
+        history_queries: &Arc<Queue<HistoryQuery>>,
     ) -> Result<Self, BusError> {
         let policy = Policy::of(topic);
         let key = keys.topic(topic);
@@ -152,13 +152,13 @@ impl Outlet {
             .priority(policy.priority)
             .congestion_control(CongestionControl::Drop)
             .reliability(Reliability::Reliable)
-            // Numbers its messages from 0 on, as the cache does.
+            // Numbers messages from 0, as the cache does.
             .sample_miss_detection(MissDetectionConfig::default().heartbeat(HEARTBEAT))
             .publisher_detection()
             .await
             .map_err(BusError::key(&key))?;
         let source = Source { key, publisher: publisher.id(), encoding };
-        let cache = Cache::declare(session, source, policy.history, questions.clone()).await?;
+        let cache = Cache::declare(session, source, policy.history, history_queries.clone()).await?;
         Ok(Self { publisher, cache })
     }
 

@@ -23,14 +23,14 @@ struct Inside<T> {
 }
 
 impl<T> Queue<T> {
-    /// A queue of at least one place.
+    /// A queue with the given capacity, at least 1.
     pub(crate) fn new(capacity: usize) -> Self {
         let inside = Inside { items: VecDeque::new(), dropped: 0, closed: false };
         Self { capacity: capacity.max(1), inside: Mutex::new(inside), ready: Notify::new() }
     }
 
-    /// Appends an item, and gives back the one that found no place: the oldest, or, once the queue is
-    /// closed, the item itself.
+    /// Appends an item and returns the displaced one: the oldest of a full queue or, once the queue is closed, the item
+    /// itself.
     pub(crate) fn push(&self, item: T) -> Option<T> {
         let displaced = {
             let mut inside = self.lock();
@@ -46,9 +46,9 @@ impl<T> Queue<T> {
         displaced
     }
 
-    /// Takes the oldest item, waiting for one; `None` once the queue is closed and empty.
+    /// Waits for the oldest item and takes it; `None` once the queue is closed and empty.
     ///
-    /// Cancel-safe. For one reader at a time.
+    /// Cancel-safe. Only one reader at a time.
     pub(crate) async fn pop(&self) -> Option<T> {
         loop {
             {
@@ -64,19 +64,19 @@ impl<T> Queue<T> {
         }
     }
 
-    /// Takes nothing in any more; what is inside can still be read.
+    /// Refuses further items; the items inside can still be read.
     pub(crate) fn close(&self) {
         self.lock().closed = true;
         self.ready.notify_one();
     }
 
-    /// Items that lost their place to newer ones.
+    /// Number of items displaced by newer ones.
     pub(crate) fn dropped(&self) -> u64 {
         self.lock().dropped
     }
 
     fn lock(&self) -> MutexGuard<'_, Inside<T>> {
-        // Nothing panics under this lock, and each of its states is whole.
+        // Nothing panics under this lock, and its state is always consistent.
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,4 +1,4 @@
-//! The service's end of the bus.
+//! The bus on the service's side.
 
 use std::sync::Arc;
 
@@ -7,34 +7,34 @@ use zenoh::{Session, query::Queryable};
 
 use crate::{
     AliveToken, BusConfig, BusError, Calls, Publisher,
-    cache::{self, Question},
-    command::{self, Answer, Replies},
-    publisher::{Lanes, Outgoing, Outlets},
+    cache::{self, HistoryQuery},
+    command::{self, PendingReply, Replies},
+    publisher::{Lanes, Outgoing, TopicPublishers},
     queue::Queue,
     topic::Lane,
     worker::Worker,
 };
 
-/// The service's end of the bus: publishers of all topics and the rig's commands.
+/// The bus on the service's side: publishers of all topics and the rig's commands.
 #[derive(Debug)]
 pub struct Bus {
     session: Session,
     keys: Keys,
     lanes: Arc<Lanes>,
-    /// In the order in which they finish: what is published, what is asked.
-    pumps: [Worker<Outgoing>; 2],
-    answering: Worker<Answer>,
-    recalling: Worker<Question>,
+    /// Finished first, in this order, when the bus closes.
+    publishing: [Worker<Outgoing>; 2],
+    command_replies: Worker<PendingReply>,
+    history_replies: Worker<HistoryQuery>,
     _queryables: Vec<Queryable<()>>,
 }
 
 impl Bus {
-    /// Opens the bus for a rig. Commands come in from here on; clients see the rig as ready only after
+    /// Opens the bus for a rig. Commands are received from now on; clients see the rig as ready after
     /// [`Bus::declare_alive`].
     ///
     /// # Errors
     /// [`BusError::Open`] if an endpoint cannot be listened on; [`BusError::Key`] if the rig's name
-    /// makes no key; [`BusError::Thread`] if the system is out of threads.
+    /// is not valid in a key; [`BusError::Thread`] if the system is out of threads.
     ///
     /// # Panics
     /// On a current-thread tokio runtime, as zenoh does.
@@ -42,37 +42,45 @@ impl Bus {
         if !config.is_loopback() {
             tracing::warn!(
                 ?config,
-                "the bus reaches beyond this machine; whoever reaches it may command the rig"
+                "the bus is reachable from other machines; whoever reaches it can command the rig"
             );
         }
         let session = zenoh::open(config.service()?).await.map_err(|source| {
             let listen: Vec<_> = config.listen.iter().map(ToString::to_string).collect();
             BusError::Open { listen: listen.join(", "), source }
         })?;
-        let questions = cache::questions();
-        let recalling = start("bus-past", &questions, Question::answer)?;
+        let history_queries = cache::history_queries();
+        let history_replies = start("bus-history", &history_queries, HistoryQuery::answer)?;
 
         let lanes = Arc::new(Lanes::new());
-        let frames = Outlets::declare(&session, &keys, Lane::Frames, &questions).await?;
-        let news = Outlets::declare(&session, &keys, Lane::News, &questions).await?;
-        let pumps = [
+        let frames = TopicPublishers::declare(&session, &keys, Lane::Frames, &history_queries).await?;
+        let updates = TopicPublishers::declare(&session, &keys, Lane::Updates, &history_queries).await?;
+        let publishing = [
             start("bus-frames", lanes.queue(Lane::Frames), move |message| frames.publish(message))?,
-            start("bus-news", lanes.queue(Lane::News), move |message| news.publish(message))?,
+            start("bus-updates", lanes.queue(Lane::Updates), move |message| updates.publish(message))?,
         ];
 
         let answers = command::answers();
-        let answering = start("bus-answers", &answers, Answer::send)?;
+        let command_replies = start("bus-answers", &answers, PendingReply::send)?;
         let (queryables, calls) = command::declare(&session, &keys, &Replies::to(answers)).await?;
-        let bus = Self { session, keys, lanes, pumps, answering, recalling, _queryables: queryables };
+        let bus = Self {
+            session,
+            keys,
+            lanes,
+            publishing,
+            command_replies,
+            history_replies,
+            _queryables: queryables,
+        };
         Ok((bus, calls))
     }
 
-    /// A handle for whoever has something to tell.
+    /// A handle that publishes.
     pub fn publisher(&self) -> Publisher {
         Publisher::new(self.lanes.clone())
     }
 
-    /// Tells clients that the service is ready, for as long as the token is held.
+    /// Shows clients that the service is ready while the token is held.
     ///
     /// # Errors
     /// [`BusError::Key`] if the session is closed.
@@ -80,17 +88,17 @@ impl Bus {
         AliveToken::declare(&self.session, &self.keys).await
     }
 
-    /// Sends what is still on its way, answers to commands included, and closes. Drop the
-    /// [`AliveToken`] before, so that clients hear of it first.
+    /// Sends all waiting messages and replies, then closes. Drop the [`AliveToken`] before, so that clients learn of it
+    /// first.
     ///
     /// # Errors
-    /// [`BusError::Close`] if zenoh could not take leave of every client.
+    /// [`BusError::Close`] if zenoh could not close the session cleanly.
     pub async fn close(self) -> Result<(), BusError> {
-        for pump in self.pumps {
-            pump.finish().await;
+        for worker in self.publishing {
+            worker.finish().await;
         }
-        self.answering.finish().await;
-        self.recalling.finish().await;
+        self.command_replies.finish().await;
+        self.history_replies.finish().await;
         self.session.close().await.map_err(|source| BusError::Close { source })
     }
 }

@@ -1,4 +1,4 @@
-//! A client's ear on one topic.
+//! A client's subscription to one topic.
 
 use std::{
     marker::PhantomData,
@@ -22,75 +22,77 @@ use crate::{
     topic::{Policy, encoding},
 };
 
-/// How long the past is waited for; what has come by then is what there is.
-const PAST_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time limit for the history; later replies are ignored.
+const HISTORY_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// What a subscriber gets of the time before it came.
+/// Messages from before the subscription that a subscriber gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum History {
-    /// Nothing, and what is missed later is counted but not fetched: for live views.
+    /// None; messages missed later are counted but not fetched. For live views.
     None,
-    /// The last message, then all that follow: for states.
+    /// The last message. For states.
     Last,
-    /// All that the service still keeps, then all that follow: for frames and events.
+    /// All messages that the service still keeps. For frames and events.
     All,
 }
 
-/// Messages that did not reach the reader, and why.
+/// Numbers of messages that did not reach the reader, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Losses {
-    /// Lost between service and client, and not to be had again. Found by zenoh's own numbering, so what
-    /// the service dropped before is not among them: the message's own sequence number tells that.
+    /// Lost between service and client, and not recovered. Counted by zenoh's numbers, so messages that the service dropped
+    /// earlier are not included; a message's own sequence number shows those.
     pub missed: u64,
-    /// Dropped here, the oldest first, because the reader was too slow.
+    /// Dropped by the client, oldest first, because the reader was too slow.
     pub overrun: u64,
-    /// Arrived, but not as the message that belongs on the topic.
+    /// Received, but not decodable as the topic's message.
     pub unreadable: u64,
 }
 
 /// Messages of one topic, in order.
 #[derive(Debug)]
 pub struct Subscription<M> {
-    ear: Arc<Ear>,
+    reception: Arc<Reception>,
     unreadable: u64,
     _subscriber: AdvancedSubscriber<()>,
     _message: PhantomData<fn() -> M>,
 }
 
-/// What has been heard and not yet read.
+/// Received messages that have not been read yet.
 #[derive(Debug)]
-struct Ear {
+struct Reception {
     merge: Mutex<Merge<EntityGlobalId, Sample>>,
     arrived: Queue<Sample>,
 }
 
 impl<M: Published> Subscription<M> {
-    /// Returns once the past is there.
+    /// Returns once the history has arrived.
     pub(crate) async fn declare(session: &Session, keys: &Keys, history: History) -> Result<Self, BusError> {
         let key = keys.topic(M::TOPIC);
-        let ear = Arc::new(Ear {
-            merge: Mutex::new(Merge::awaiting_past()),
+        let reception = Arc::new(Reception {
+            merge: Mutex::new(Merge::awaiting_history()),
             // Drop-oldest, counted; holds the whole history and as much again.
             arrived: Queue::new(1_024.max(2 * Policy::of(M::TOPIC).history)),
         });
-        let hearing = Hearing(ear.clone());
-        let builder =
-            session.declare_subscriber(key.clone()).callback(move |sample| hearing.0.hear(sample)).advanced();
+        let receiver = Receiver(reception.clone());
+        let builder = session
+            .declare_subscriber(key.clone())
+            .callback(move |sample| receiver.0.hear(sample))
+            .advanced();
         let recovery = RecoveryConfig::default().heartbeat();
         let subscriber = if history == History::None { builder } else { builder.recovery(recovery) }
             .await
             .map_err(BusError::key(&key))?;
-        // Asked for after the present is listened to, so that no message falls between the two.
-        ear.join(past(session, &key, history).await?);
-        Ok(Self { ear, unreadable: 0, _subscriber: subscriber, _message: PhantomData })
+        // Requested after the subscription, so that no message is lost between the two.
+        reception.join(past(session, &key, history).await?);
+        Ok(Self { reception, unreadable: 0, _subscriber: subscriber, _message: PhantomData })
     }
 
-    /// The next message; `None` once the client is closed. A service that goes and comes back is
-    /// waited for: see [`crate::Client::alive`]. Cancel-safe.
+    /// The next message; `None` once the client is closed. If the service restarts, the subscription continues: see
+    /// [`crate::Client::alive`]. Cancel-safe.
     pub async fn recv(&mut self) -> Option<M> {
         let expected = encoding(M::NAME);
         loop {
-            let sample = self.ear.arrived.pop().await?;
+            let sample = self.reception.arrived.pop().await?;
             if *sample.encoding() == expected
                 && let Ok(message) = M::decode(&*sample.payload().to_bytes())
             {
@@ -101,17 +103,17 @@ impl<M: Published> Subscription<M> {
         }
     }
 
-    /// What did not reach the reader so far.
+    /// Messages that did not reach the reader so far.
     pub fn losses(&self) -> Losses {
         Losses {
-            missed: self.ear.merge.lock().unwrap_or_else(PoisonError::into_inner).missed(),
-            overrun: self.ear.arrived.dropped(),
+            missed: self.reception.merge.lock().unwrap_or_else(PoisonError::into_inner).missed(),
+            overrun: self.reception.arrived.dropped(),
             unreadable: self.unreadable,
         }
     }
 }
 
-/// What the topic's publishers still keep of it: each answers on a key of zenoh-ext below the topic.
+/// Fetches the history from the topic's publishers; each replies on a zenoh-ext key below the topic.
 async fn past(
     session: &Session,
     key: &str,
@@ -127,7 +129,7 @@ async fn past(
         .target(QueryTarget::All)
         .consolidation(ConsolidationMode::None)
         .accept_replies(ReplyKeyExpr::Any)
-        .timeout(PAST_TIMEOUT)
+        .timeout(HISTORY_TIMEOUT)
         .await
         .map_err(BusError::key(&selector))?;
     let mut past = Vec::new();
@@ -146,7 +148,7 @@ fn numbered(sample: Sample) -> Numbered<EntityGlobalId, Sample> {
     }
 }
 
-impl Ear {
+impl Reception {
     fn hear(&self, sample: Sample) {
         let mut merge = self.merge.lock().unwrap_or_else(PoisonError::into_inner);
         merge.present(numbered(sample), |sample| self.keep(sample));
@@ -158,15 +160,15 @@ impl Ear {
     }
 
     fn keep(&self, sample: Sample) {
-        // The queue counts what it drops; `Losses` tells it.
+        // The queue counts dropped messages for `Losses`.
         let _dropped = self.arrived.push(sample);
     }
 }
 
-/// Zenoh's hold on an ear, which it lets go of when the session ends.
-struct Hearing(Arc<Ear>);
+/// Zenoh's handle, which it drops when the session ends.
+struct Receiver(Arc<Reception>);
 
-impl Drop for Hearing {
+impl Drop for Receiver {
     fn drop(&mut self) {
         self.0.arrived.close();
     }

@@ -1,11 +1,11 @@
-//! Which message stands on which topic, and how it travels.
+//! The message on each topic, and its queue, history and priority.
 
 use tactus_schema::{Message, key::Topic, pb};
 use zenoh::{bytes::Encoding, qos::Priority};
 
-/// A message that the service publishes, on a topic of its own.
+/// A message that the service publishes; each has its own topic.
 pub trait Published: Message {
-    /// Its topic.
+    /// The topic that carries this message.
     const TOPIC: Topic;
 }
 
@@ -34,42 +34,41 @@ on_topics! {
     SafetyEvent on SafetyState,
 }
 
-/// How a topic travels. Whatever is published is dropped for a client whose link is full: to wait for one
-/// client would be to wait for all, since zenoh's one sending thread waits along. A client fetches again
-/// what it missed.
+/// How a topic is sent. A message is dropped for a client whose link is full: waiting for one client would delay all,
+/// because zenoh has one sending thread. A client fetches missed messages again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Policy {
-    /// The queue it waits in on its way out.
+    /// Outgoing queue.
     pub(crate) lane: Lane,
-    /// Messages kept for late joiners and for those who missed some.
+    /// Number of messages kept for clients that join late or missed some.
     pub(crate) history: usize,
-    /// Each class has a priority of its own: zenoh holds a lock per client and priority while it waits for
-    /// room, and it answers for history at [`Priority::Data`], so nothing here uses that.
+    /// Each class has its own priority: zenoh holds a lock per client and priority while it waits for room, and history
+    /// replies use [`Priority::Data`], so nothing here uses that.
     pub(crate) priority: Priority,
 }
 
-/// The queues on the way out; neither waits for the other.
+/// The outgoing queues, which are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Lane {
-    /// Frames, many and soon stale.
+    /// Frames: many, soon outdated.
     Frames,
-    /// Everything else, few and each of them wanted.
-    News,
+    /// Events and states: few, each of them needed.
+    Updates,
 }
 
 impl Policy {
     pub(crate) const fn of(topic: Topic) -> Self {
         match topic {
             Topic::SensorFrame => Self { lane: Lane::Frames, history: 300, priority: Priority::DataHigh },
-            Topic::RunEvent => Self::news(65_536),
+            Topic::RunEvent => Self::update(65_536),
             Topic::SensorInfo | Topic::StageState | Topic::RunState | Topic::Health | Topic::SafetyState => {
-                Self::news(1)
+                Self::update(1)
             }
         }
     }
 
-    const fn news(history: usize) -> Self {
-        Self { lane: Lane::News, history, priority: Priority::InteractiveLow }
+    const fn update(history: usize) -> Self {
+        Self { lane: Lane::Updates, history, priority: Priority::InteractiveLow }
     }
 }
 

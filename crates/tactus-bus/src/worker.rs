@@ -1,8 +1,7 @@
-//! Threads for what zenoh may make wait.
+//! Threads for calls that may block in zenoh.
 //!
-//! A call that sends waits inside zenoh while the client's link is full. Such calls are made on threads of
-//! their own: not by the service's tasks, and not by zenoh's receiving threads, which carry everybody's
-//! commands.
+//! A sending call blocks in zenoh while the client's link is full. Such calls have their own threads, so that they block
+//! neither the service's tasks nor zenoh's receiving threads, which carry everybody's commands.
 
 use std::{io, sync::Arc, thread};
 
@@ -10,7 +9,7 @@ use tokio::runtime::Handle;
 
 use crate::queue::Queue;
 
-/// A thread that takes items from a queue, one by one, until the queue is closed and empty.
+/// A thread that processes the items of a queue until the queue is closed and empty.
 #[derive(Debug)]
 pub(crate) struct Worker<T> {
     queue: Arc<Queue<T>>,
@@ -18,7 +17,7 @@ pub(crate) struct Worker<T> {
 }
 
 impl<T: Send + 'static> Worker<T> {
-    /// Starts the thread. Ends when it is finished or dropped.
+    /// Starts the thread. It ends after [`Worker::finish`] or drop.
     pub(crate) fn start(
         name: &str,
         queue: Arc<Queue<T>>,
@@ -36,13 +35,13 @@ impl<T: Send + 'static> Worker<T> {
         Ok(Self { queue, thread: Some(thread) })
     }
 
-    /// Closes the queue and waits until all that is in it is done.
+    /// Closes the queue and waits until all its items are processed.
     pub(crate) async fn finish(mut self) {
         self.queue.close();
         let Some(thread) = self.thread.take() else { return };
         let joined = tokio::task::spawn_blocking(|| thread.join()).await;
         if !matches!(joined, Ok(Ok(()))) {
-            tracing::error!("a thread of the bus broke down");
+            tracing::error!("a thread of the bus panicked");
         }
     }
 }

@@ -1,8 +1,7 @@
-//! The report of a calibration: what was found about a sensor, how well it is known, and from what.
+//! The report of a calibration: results, errors and data.
 //!
-//! [`calibration_html`] makes the page. Its figures are functions of their own from what was fitted to a
-//! [`Sheet`], which displays itself as SVG: Figures 2a, 2b, 5a and 5b of the paper, and maps of the
-//! array.
+//! [`calibration_html`] makes the page. Its figures are separate functions from fits to a [`Sheet`], which displays itself
+//! as SVG: Figures 2a, 2b, 5a and 5b of the paper, and maps of the array.
 
 mod elements;
 mod figures;
@@ -26,30 +25,29 @@ use crate::{
 pub use elements::{health_map, sensitivity_map};
 pub use figures::{point_spreads, recalibrated, responses, spread_against_thickness};
 
-/// A calibration, and what it started from.
+/// A calibration and the values declared before it.
 #[derive(Debug, Clone, Copy)]
 pub struct CalibrationReport<'a> {
     /// The rig's name.
     pub rig: &'a str,
     /// True if no physical sensor was read.
     pub simulated: bool,
-    /// The elements.
+    /// The sensor's array.
     pub array: &'a Array,
-    /// Where the sensor was said to lie.
+    /// Registration in the rig file.
     pub declared_registration: Registration,
-    /// The spread it was said to have.
+    /// Point spread in the rig file.
     pub declared_psf: Psf,
-    /// What was found.
+    /// The result.
     pub calibration: &'a Calibration,
-    /// What is to be said of the files that were read; a sentence each.
+    /// Sentences about defects of the files.
     pub notes: &'a [String],
 }
 
 /// Makes the page of a calibration: HTML with its style and figures inline.
 ///
-/// It says first what everything rests on, what to beware of and what could not be determined; then where the sensor
-/// lies, which elements are faulty, how the others answer, and how the covering spreads. What is absent is said to be.
-/// All text from outside is escaped; nothing is loaded.
+/// The order is: data; warnings and what could not be determined; registration; faulty elements; responses; spread.
+/// Missing parts are named. All text from outside is escaped; nothing is loaded.
 pub fn calibration_html(report: &CalibrationReport<'_>) -> String {
     let page = fmt::from_fn(|f| {
         sensor_header(f, "Calibration", "Rig", report.rig, report.array, report.simulated)?;
@@ -60,31 +58,31 @@ pub fn calibration_html(report: &CalibrationReport<'_>) -> String {
     document(format!("Calibration \u{b7} {}", report.rig), page)
 }
 
-/// Where the paper's figures stand.
+/// Where the page shows the paper's figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FigurePlacement {
-    /// In their sections.
+    /// In the sections of their results.
     Inline,
     /// Elsewhere on the page.
     Elsewhere,
 }
 
-/// A figure and what is to be said of it.
+/// A figure of the paper with its caption.
 pub(crate) struct Drawing {
-    /// In the paper.
+    /// Number in the paper, such as `2a`.
     pub(crate) number: &'static str,
     pub(crate) title: &'static str,
     pub(crate) caption: String,
     pub(crate) sheet: Sheet,
 }
 
-/// The paper's figures that this calibration gives.
+/// The paper's figures that this calibration has results for.
 pub(crate) fn drawings(report: &CalibrationReport<'_>) -> Vec<Drawing> {
     let response = report.calibration.response.iter().flat_map(response::drawings);
     response.chain(spread::drawings(report)).collect()
 }
 
-/// All that was found, one section for each step.
+/// All results, one section per step.
 pub(crate) fn sections(
     f: &mut fmt::Formatter<'_>,
     report: &CalibrationReport<'_>,
@@ -96,7 +94,7 @@ pub(crate) fn sections(
     spread::section(f, report, figures)
 }
 
-/// What the calibration rests on.
+/// The data of the calibration.
 pub(crate) fn basis(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) -> fmt::Result {
     let data = &report.calibration.data;
     let left_out = match data.frames_left_out {
@@ -122,7 +120,7 @@ pub(crate) fn basis(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) 
     let coverings: Vec<String> = data.coverings_mm.iter().map(|covering| short(*covering, 3)).collect();
     let coverings = if coverings.is_empty() { "none".into() } else { coverings.join(", ") + " mm" };
     let noise = report.calibration.noise_rms_counts;
-    let noise = noise.map_or_else(|| "not known".into(), |rms| digits(rms, 3) + " counts rms");
+    let noise = noise.map_or_else(|| "unknown".into(), |rms| digits(rms, 3) + " counts rms");
     for (name, fact) in [
         ("coverings pressed", coverings),
         ("sensitivities for", format!("a covering of {} mm", short(data.reference_covering_mm, 3))),
@@ -133,22 +131,19 @@ pub(crate) fn basis(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) 
     writeln!(f, "</table>\n</div>")
 }
 
-/// What to know before any number: of the files, of the numbers, of what is absent.
+/// Reservations: undetermined results, warnings, defects of the files.
 pub(crate) fn remarks(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) -> fmt::Result {
     let Calibration { warnings, missing, .. } = report.calibration;
     notes(f, "Could not be determined", missing)?;
     notes(f, "To know before using a number", warnings)?;
-    notes(f, "Of the files", report.notes)?;
+    notes(f, "About the files", report.notes)?;
     if warnings.is_empty() && missing.is_empty() {
-        writeln!(
-            f,
-            "<p class=\"message good\">Every step could be done, and nothing speaks against its result.</p>"
-        )?;
+        writeln!(f, "<p class=\"message good\">Every step was completed without warnings.</p>")?;
     }
     Ok(())
 }
 
-/// A figure among the text of its section.
+/// Writes a figure with its caption.
 fn figure(f: &mut fmt::Formatter<'_>, drawing: &Drawing) -> fmt::Result {
     let Drawing { number, title, caption, sheet } = drawing;
     writeln!(

@@ -1,7 +1,7 @@
-//! The report of a discovery: what a model is missing, what was added, and how well that is known.
+//! The report of a discovery: which effects a model was missing, and how certain that is.
 //!
-//! [`discovery_html`] makes the page for people, [`discovery_json`] the numbers for machines. [`in_words`] is the verdict in a
-//! sentence or two, [`not_shown`] what the data cannot show. Figures are functions of their own, as in
+//! [`discovery_html`] makes the page, [`discovery_json`] the numbers. [`in_words`] is the verdict in a sentence or two,
+//! [`not_shown`] the effects that the data cannot show. Figures are separate functions, as in
 //! [`calibration`](crate::calibration).
 
 mod active;
@@ -33,43 +33,42 @@ pub use json::discovery_json;
 pub use next::{Proposal, proposals};
 pub use words::in_words;
 
-/// A discovery, and what it was made from.
+/// A discovery and its data.
 #[derive(Debug, Clone, Copy)]
 pub struct DiscoveryReport<'a> {
     /// The rig's name.
     pub rig: &'a str,
     /// True if no physical sensor was read.
     pub simulated: bool,
-    /// The elements.
+    /// The sensor's array.
     pub array: &'a Array,
-    /// The runs, in order.
+    /// The analysed runs, in order of time.
     pub data: &'a [DataSource],
-    /// What is to be said of the files that were read; a sentence each.
+    /// Sentences about defects of the files.
     pub notes: &'a [String],
-    /// What was measured on the way to decide between explanations, in order; its recordings are among the data.
+    /// Experiments that were run to decide between explanations, in order; their recordings are among the data.
     pub active: &'a [ActiveRun],
-    /// What was found.
+    /// The result.
     pub discovery: &'a Discovery,
 }
 
-/// A run that was read.
+/// An analysed run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DataSource {
     /// Run id.
     pub id: String,
-    /// SHA-256 of its file, in hexadecimal; runs of one table share it.
+    /// SHA-256 of its file, in hexadecimal; the runs of one table share it.
     pub sha256: String,
-    /// Frames of the run.
+    /// Number of frames in the run.
     pub frames: u64,
-    /// Presses of the run.
+    /// Number of presses in the run.
     pub presses: u64,
 }
 
 /// Makes the page of a discovery: HTML with its style and figures inline.
 ///
-/// It says first what the data cannot show, then the verdict; then where the gap is, what was tried and what was added,
-/// the gap before and after, what stays unexplained, what to measure next, and what everything rests on. All text from
-/// outside is escaped; nothing is loaded.
+/// The order is: what the data cannot show; the verdict; where the gap is; what was tried and added; the gap before and
+/// after; what stays unexplained; what to measure next; the data. All text from outside is escaped; nothing is loaded.
 pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
     let page = fmt::from_fn(|f| {
         let about = "What the model of a sensor is missing &#183; rig";
@@ -86,7 +85,7 @@ pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
     document(format!("Discovery \u{b7} {}", report.rig), page)
 }
 
-/// Why these data cannot show some effects: each reason with the effects that it hides.
+/// The effects that these data cannot show, grouped by reason.
 pub fn not_shown(found: &Discovery) -> Vec<(&str, Vec<&'static str>)> {
     let mut reasons: Vec<(&str, Vec<&'static str>)> = Vec::new();
     for one in &found.not_shown {
@@ -98,19 +97,19 @@ pub fn not_shown(found: &Discovery) -> Vec<(&str, Vec<&'static str>)> {
     reasons
 }
 
-/// What to know before anything that was found.
+/// Reservations, ahead of the results.
 fn remarks(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {
     let found = report.discovery;
     let reasons =
         not_shown(found).into_iter().map(|(reason, effects)| format!("{}: {reason}", effects.join(", ")));
     let reasons: Vec<String> = reasons.collect();
-    notes(f, "What these data cannot show, so that its absence below means nothing", &reasons)?;
+    notes(f, "Effects that these data cannot show; their absence below means nothing", &reasons)?;
     notes(f, "To know before using a number", &found.warnings)?;
-    notes(f, "Of the files", report.notes)?;
+    notes(f, "About the files", report.notes)?;
     if reasons.is_empty() {
         writeln!(
             f,
-            "<p class=\"message good\">These data could show every effect of the library, were it large enough.</p>"
+            "<p class=\"message good\">These data can show every effect of the library, if it is large enough.</p>"
         )?;
     }
     Ok(())
@@ -136,7 +135,7 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     };
     let split = &found.split;
     for (name, figure) in [
-        ("noise / counts", noise.map_or_else(|| "not known".into(), |rms| digits(rms, 3))),
+        ("noise / counts", noise.map_or_else(|| "unknown".into(), |rms| digits(rms, 3))),
         ("residual before / counts", level(found.base.heldout_rms_counts)),
         ("residual after / counts", level(found.final_.level.heldout_rms_counts)),
         ("gap closed", found.final_.shrink.map_or_else(|| "\u{2013}".into(), words::percent)),

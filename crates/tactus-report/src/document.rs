@@ -1,4 +1,4 @@
-//! The frame of every page, and what pages are made of: one HTML document, its style inline, that loads nothing.
+//! The HTML document of every page, with inline style, and the parts that pages share.
 
 use std::fmt;
 
@@ -10,15 +10,15 @@ use crate::{
     plot,
 };
 
-/// Said of whatever no physical sensor was read for.
+/// Marks pages of simulated data.
 pub(crate) const SIMULATED_BADGE: &str =
     "<span class=\"badge warn\" title=\"No physical sensor was read.\">SIMULATED</span>";
 
-/// The same as the badge, in words.
-pub(crate) const SIMULATED_NOTICE: &str = "<p class=\"message warn\"><strong>No physical sensor was read: everything on this page is about \
-                                 a simulated one.</strong></p>";
+/// States in words that the data are simulated.
+pub(crate) const SIMULATED_NOTICE: &str = "<p class=\"message warn\"><strong>No physical sensor was read: all data on this page are \
+                                 simulated.</strong></p>";
 
-/// The head of a page about one sensor: what it is, `about` before the rig's name (markup), and which array.
+/// The header of a page about one sensor. `about` is HTML and stands before the rig's name.
 pub(crate) fn sensor_header(
     f: &mut fmt::Formatter<'_>,
     title: &str,
@@ -46,7 +46,7 @@ pub(crate) fn sensor_header(
     writeln!(f, "</header>")
 }
 
-/// A page of markup under a title, which is escaped.
+/// A complete page. The title is escaped; `body` is HTML.
 pub(crate) fn document(title: impl fmt::Display, body: impl fmt::Display) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -59,7 +59,7 @@ pub(crate) fn document(title: impl fmt::Display, body: impl fmt::Display) -> Str
     )
 }
 
-/// Sentences that must not be overlooked, under a heading if there is one; nothing without any.
+/// A highlighted list of sentences under a heading, which may be empty; nothing for an empty list.
 pub(crate) fn notes(f: &mut fmt::Formatter<'_>, heading: &str, notes: &[String]) -> fmt::Result {
     if notes.is_empty() {
         return Ok(());
@@ -75,21 +75,21 @@ pub(crate) fn notes(f: &mut fmt::Formatter<'_>, heading: &str, notes: &[String])
     writeln!(f, "</ul>\n</div>")
 }
 
-/// A table, row by row; displays itself as HTML. What stands in it is escaped.
+/// A table that displays itself as HTML. Cells are escaped.
 pub(crate) struct Table<'a> {
     columns: &'a [Column],
-    /// Cells, escaped.
+    /// Escaped cells.
     rows: Vec<Vec<String>>,
 }
 
-/// A column's head, and what stands below it.
+/// Heading and kind of a column.
 #[derive(Clone, Copy)]
 pub(crate) enum Column {
-    /// A word or two, never broken.
+    /// A few words on one line.
     Name(&'static str),
-    /// A number.
+    /// A right-aligned number.
     Number(&'static str),
-    /// As many lines as it takes.
+    /// Text that may wrap.
     Prose(&'static str),
 }
 
@@ -98,7 +98,7 @@ impl<'a> Table<'a> {
         Self { columns, rows: Vec::new() }
     }
 
-    /// One more row, below those before; one cell a column.
+    /// Appends a row with one cell per column.
     pub(crate) fn row<T: fmt::Display>(&mut self, cells: impl IntoIterator<Item = T>) {
         self.rows.push(cells.into_iter().map(|cell| Text(cell).to_string()).collect());
     }

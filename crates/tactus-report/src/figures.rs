@@ -42,27 +42,27 @@ pub(crate) use point_spreads::profiles;
 /// The paper's coverings: 0.04, 0.1, 0.14 and 0.2 inch.
 pub const COVERINGS: [Covering; 4] = Covering::PAPER;
 
-/// Why there are no figures.
+/// Why figures cannot be computed or written.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
-    /// A figure's model cannot be made.
+    /// A figure's model is invalid.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A figure's elastic layer cannot be made.
+    /// A figure's elastic layer is invalid.
     #[error(transparent)]
     Layer(#[from] LayerError),
-    /// A figure's row of elements cannot be made.
+    /// A figure's row of elements is invalid.
     #[error(transparent)]
     Acuity(#[from] AcuityError),
-    /// A figure's finite elements cannot be made.
+    /// A figure's finite-element mesh is invalid.
     #[error(transparent)]
     Bricks(#[from] BricksError),
     /// A file or folder cannot be written.
     #[error("{} cannot be written", path.display())]
     Write {
-        /// Which one.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -113,7 +113,7 @@ pub fn draw_all(out_dir: &Path, progress: impl FnMut(Progress) + Send) -> Result
 /// Computes the figures with these numbers, such as `["3", "6a"]`, in parallel; unknown numbers are ignored.
 ///
 /// # Errors
-/// If a figure's model cannot be made, which no shipped one does.
+/// If a figure's model is invalid; the shipped ones are valid.
 pub fn finished(numbers: &[&str]) -> Result<Vec<StudyFigure>, FigureError> {
     let find = |number: &&str| FIGURES.iter().find(|figure| figure.number == *number);
     let wanted: Vec<&PaperFigure> = numbers.iter().filter_map(find).collect();
@@ -131,7 +131,7 @@ pub fn finished(numbers: &[&str]) -> Result<Vec<StudyFigure>, FigureError> {
 
 /// One figure of the paper.
 struct PaperFigure {
-    /// In the paper.
+    /// Number in the paper.
     number: &'static str,
     title: &'static str,
     draw: fn() -> Result<Drawing, FigureError>,
@@ -152,7 +152,7 @@ const FIGURES: [PaperFigure; 10] = [
         draw: point_spreads::draw,
     },
     PaperFigure { number: "6a", title: "Locating a point", draw: acuity::draw_locations },
-    PaperFigure { number: "6b", title: "Telling two points apart", draw: acuity::draw_two_points },
+    PaperFigure { number: "6b", title: "Resolving two points", draw: acuity::draw_two_points },
     PaperFigure { number: "8a", title: "The H at several angles", draw: side_by_side::draw_angles },
     PaperFigure { number: "8b", title: "The H under each covering", draw: side_by_side::draw_coverings },
     PaperFigure { number: "9b", title: "The H in the covering", draw: views::draw_pressed },
@@ -160,7 +160,7 @@ const FIGURES: [PaperFigure; 10] = [
     PaperFigure { number: "10b", title: "Wrench and spaceship", draw: views::draw_tools },
 ];
 
-/// Elements that all answer alike: 1 count for each mm of equivalent indentation.
+/// A model of identical elements: 1 count per mm of equivalent indentation.
 fn uniform(array: Array, psf: Psf) -> Result<ForwardModel, ModelError> {
     let response = Response::uniform(array.elements(), 1.0, 0.0);
     ForwardModel::new(array, psf, response)
@@ -169,12 +169,12 @@ fn uniform(array: Array, psf: Psf) -> Result<ForwardModel, ModelError> {
 /// The paper's cylinder.
 const REFERENCE_INDENTER: Indenter = Indenter::Cylinder { diameter_mm: 1.0 };
 
-/// The middle of an array's active area.
+/// Centre of an array's active area.
 fn middle_mm(array: &Array) -> [f64; 2] {
     array.extent_mm().map(|[least, most]| f64::midpoint(least, most))
 }
 
-/// An image scaled so that its least value is 0 and its greatest 1; all 0 if they are equal.
+/// An image scaled to 0 to 1; all 0 if all values are equal.
 fn zero_to_one(image: &[f64]) -> Vec<f32> {
     let [least, most] = image.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| {
         [least.min(*value), most.max(*value)]
@@ -184,7 +184,7 @@ fn zero_to_one(image: &[f64]) -> Vec<f32> {
     image.iter().map(|value| ((value - least) / range) as f32).collect()
 }
 
-/// A covering's thickness as it is sold.
+/// A covering's thickness in inches, as it is sold.
 pub fn inches(covering: Covering) -> String {
     format!("{:.2} inch", covering.thickness_mm / 25.4)
 }

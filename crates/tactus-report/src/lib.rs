@@ -1,14 +1,14 @@
 //! Self-contained HTML reports with figures in SVG.
 //!
-//! A report is made in two steps: [`run_report`] reads one run's recording and computes everything that is to be
-//! said, as data; [`render_html`] makes one HTML page of it, with its style and figures inline, that loads nothing
-//! from anywhere. The same recording always gives the same page.
+//! A run's report is made in two steps: [`run_report`] reads the recording and computes the report's data;
+//! [`render_html`] makes one HTML page of them. The page contains its style and figures and loads nothing. The same
+//! recording always gives the same page.
 //!
-//! [`figures`] draws the paper's figures again from the model; [`calibration`] reports what was measured of a
-//! sensor, [`discovery`] what its model was missing, [`study`] all of the paper on one rig.
+//! [`figures`] computes the paper's figures from the model. [`calibration`] reports a calibration, [`discovery`] the
+//! effects that a model was missing, [`study`] a repetition of the paper on one rig.
 //!
 //! - [`fit`] fits polynomials by least squares, with standard errors.
-//! - [`plot`] draws figures and heat images as SVG; it knows nothing of runs.
+//! - [`plot`] draws figures and heat images as SVG; it does not depend on the reports.
 
 pub mod calibration;
 pub mod discovery;

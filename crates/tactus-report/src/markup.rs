@@ -1,8 +1,8 @@
-//! Text that is safe inside HTML and SVG.
+//! Escaping of text in HTML and SVG.
 
 use std::fmt;
 
-/// Displays text with every character that means something in markup escaped, also inside quoted attributes.
+/// Displays text with markup characters escaped, also for quoted attributes.
 pub(crate) struct Text<T>(pub(crate) T);
 
 impl<T: fmt::Display> fmt::Display for Text<T> {
@@ -23,7 +23,7 @@ impl fmt::Write for Escaping<'_, '_> {
                 '>' => self.0.write_str("&gt;")?,
                 '"' => self.0.write_str("&quot;")?,
                 '\'' => self.0.write_str("&#39;")?,
-                // No place in a page, and some are not even allowed there.
+                // Control characters are not allowed in HTML.
                 c if c.is_control() && !matches!(c, '\n' | '\t') => self.0.write_str("\u{fffd}")?,
                 c => fmt::Write::write_char(self.0, c)?,
             }

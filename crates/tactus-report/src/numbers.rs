@@ -1,13 +1,13 @@
-//! Numbers for people.
+//! Formatting of numbers.
 
 use tactus_calibrate::Estimate;
 
 use crate::plot::number;
 
-/// Digits after which no number here means anything.
+/// Decimals at most.
 const DECIMALS_MAX: f64 = 9.0;
 
-/// A whole number with its thousands apart.
+/// A whole number with separated thousands.
 pub(crate) fn count(value: u64) -> String {
     number(value as f64, 0)
 }
@@ -17,7 +17,7 @@ pub(crate) fn plural(value: u64, noun: &str) -> String {
     format!("{} {noun}{}", count(value), if value == 1 { "" } else { "s" })
 }
 
-/// A time span in the two units that matter.
+/// A time span in its two largest units.
 pub(crate) fn duration(seconds: f64) -> String {
     if seconds < 59.95 {
         return format!("{} s", number(seconds, 1));
@@ -27,18 +27,18 @@ pub(crate) fn duration(seconds: f64) -> String {
     if hours > 0.0 { format!("{hours} h {minutes} min") } else { format!("{minutes} min {} s", whole % 60.0) }
 }
 
-/// A number to so many decimals at most, without zeros at its end: `1.016`, `2.54`, `20`.
+/// A number with at most so many decimals, without trailing zeros: `1.016`, `2.54`, `20`.
 pub(crate) fn short(value: f64, decimals: usize) -> String {
     let text = number(value, decimals);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// A number to so many digits, wherever its point is.
+/// A number with so many significant digits.
 pub(crate) fn digits(value: f64, digits: u32) -> String {
     number(value, decimals(value.abs(), digits))
 }
 
-/// A value and its standard error, to the digits that the error leaves: `2.7256 ± 0.0007`.
+/// A value and its standard error, rounded to the error: `2.7256 ± 0.0007`.
 ///
 /// The error has two digits if its first three are below 355, otherwise one: the rounding of the particle data group.
 pub(crate) fn with_error(value: f64, error: f64) -> String {
@@ -49,12 +49,12 @@ pub(crate) fn with_error(value: f64, error: f64) -> String {
     format!("{} \u{b1} {}", number(value, decimals), number(error, decimals))
 }
 
-/// The same of an [`Estimate`].
+/// [`with_error`] of an [`Estimate`].
 pub(crate) fn estimate(estimate: &Estimate) -> String {
     with_error(estimate.value, estimate.standard_error)
 }
 
-/// Its 95 % interval, to the digits of its error; a dash if it has no error.
+/// The 95 % interval, rounded to the error; a dash without an error.
 pub(crate) fn interval(estimate: &Estimate) -> String {
     let error = estimate.standard_error;
     if !(error > 0.0 && error.is_finite()) {
@@ -64,18 +64,18 @@ pub(crate) fn interval(estimate: &Estimate) -> String {
     format!("{lo} to {hi}")
 }
 
-/// A difference that an error belongs to, with its sign.
+/// A signed difference, rounded to an error.
 pub(crate) fn difference(value: f64, error: f64) -> String {
     let text = number(value, of_error(error));
     if text.starts_with(|c: char| c.is_ascii_digit()) { format!("+{text}") } else { text }
 }
 
-/// A chance; below one in a thousand it is only said to be so small.
-pub(crate) fn chance(chance: f64) -> String {
-    if chance < 1e-3 { "< 0.001".into() } else { number(chance, 3) }
+/// A probability; below 0.001 only the bound.
+pub(crate) fn probability(value: f64) -> String {
+    if value < 1e-3 { "< 0.001".into() } else { number(value, 3) }
 }
 
-/// Decimals for a value of this error.
+/// Decimals for a value with this error.
 fn of_error(error: f64) -> usize {
     let leading = error / 10_f64.powf(error.log10().floor());
     decimals(error, if leading < 3.55 { 2 } else { 1 })

@@ -1,6 +1,6 @@
 use tactus_calibrate::Estimate;
 
-use super::{chance, difference, digits, duration, interval, short, with_error};
+use super::{difference, digits, duration, interval, probability, short, with_error};
 
 #[test]
 fn durations_read_well() {
@@ -51,6 +51,6 @@ fn short_numbers_lose_their_zeros() {
     assert_eq!(short(20.0, 3), "20");
     assert_eq!(digits(0.000_123_4, 2), "0.00012");
     assert_eq!(digits(123.4, 2), "123");
-    assert_eq!(chance(1e-12), "< 0.001");
-    assert_eq!(chance(0.51658), "0.517");
+    assert_eq!(probability(1e-12), "< 0.001");
+    assert_eq!(probability(0.51658), "0.517");
 }

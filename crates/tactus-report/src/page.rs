@@ -1,4 +1,4 @@
-//! The report as one HTML page that loads nothing.
+//! The HTML page of a run's report.
 
 mod images;
 mod response;
@@ -17,12 +17,12 @@ use crate::{
 /// Width of the page's content.
 const WIDTH_PX: f64 = 1080.0;
 
-/// More lines of the event log than this are not shown.
+/// Lines of the event log that are shown at most.
 const EVENTS_MAX: usize = 1500;
 
 /// Makes the report's page: HTML with its style and figures inline.
 ///
-/// Everything that comes from the recording is escaped; there is no script and no reference to anything outside.
+/// Text from the recording is escaped. The page has no script and loads nothing.
 pub fn render_html(report: &RunReport) -> String {
     let title = format!("{} \u{b7} {}", report.summary.experiment, report.summary.run_id);
     document(title, fmt::from_fn(|f| body(f, report)))

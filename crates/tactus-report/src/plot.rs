@@ -1,8 +1,8 @@
 //! Figures as SVG text: axes with rounded ticks and units, lines, points, stems and heat images.
 //!
-//! Everything here is a value that displays itself as one `<svg>` element. Colours are those of [`STYLE`], which the
-//! page holds once, so that one figure reads well on light and dark ground and on paper. A [`Sheet`] puts several
-//! panels beside each other and holds its style itself, as a file that stands alone.
+//! Each type displays itself as one `<svg>` element. The colours are in [`STYLE`], which a page includes once; they suit
+//! light and dark backgrounds and print. A [`Sheet`] combines several panels and contains its style, so that it can be a
+//! file of its own.
 //!
 //! ```
 //! use tactus_report::plot::{Axis, Figure, Ink, Series};
@@ -35,5 +35,5 @@ pub use view::{Face, ObliqueView, Paint};
 
 pub(crate) use axis::{number, round_step};
 
-/// The figures' part of a page's style sheet.
+/// Style sheet of the figures.
 pub const STYLE: &str = include_str!("plot/figure.css");

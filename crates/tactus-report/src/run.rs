@@ -1,4 +1,4 @@
-//! What is to be said about one run, computed from its recording.
+//! The data of a run's report, computed from its recording.
 
 mod frames;
 mod log;
@@ -20,52 +20,52 @@ pub use summary::RunSummary;
 use frames::FrameStatistics;
 use presses::Presses;
 
-/// Everything that a report says of one run.
+/// The data of a run's report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunReport {
-    /// What run it was, and what it came to.
+    /// Identity, settings and outcome of the run.
     pub summary: RunSummary,
-    /// What is missing, damaged or left out; a sentence each.
+    /// Sentences about what is missing, damaged or left out.
     pub notes: Vec<String>,
-    /// The elements.
+    /// The sensor's array.
     pub array: Array,
-    /// The presses that count, in order, each with its dwells.
+    /// The presses in order, without those that were repeated.
     pub presses: Vec<PressSummary>,
-    /// What the rises of the dwells are against.
+    /// Source of the baseline that was subtracted.
     pub baseline: Baseline,
-    /// The response curves, if elements were pressed at their centres through several depths.
+    /// The response curves; `None` unless elements were pressed at their centres at several depths.
     pub response: Option<ResponseCurves>,
     /// Depth and signal over time.
     pub trace: Trace,
-    /// Where frames are missing.
+    /// Gaps in the sequence of frames.
     pub losses: Vec<FrameLoss>,
     /// The time between frames.
     pub timing: Timing,
-    /// All events of the run and acts of the safety supervisor, in order of time.
+    /// All events of the run and of the safety supervisor, in order of time.
     pub events: Vec<LoggedEvent>,
 }
 
-/// Why there is no report.
+/// Why a report cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The recording cannot be read, or does not say which run and rig it is of.
+    /// The recording cannot be read, or does not name its run and rig.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// Reading failed on the way.
+    /// A read of the recording failed.
     #[error("cannot read {}: {source}", path.display())]
     Io {
-        /// The recording.
+        /// Path of the recording.
         path: std::path::PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
 
-/// Reads a recording, whole or damaged, and computes what is to be reported.
+/// Reads a recording, complete or damaged, and computes the report's data.
 ///
 /// # Errors
-/// If the file cannot be read, or is not so much of a recording that it says which run and which rig it is of. What
-/// is missing beyond that is no error: [`RunReport::notes`] says it.
+/// If the file cannot be read, or does not name its run and rig. Anything else that is missing is listed in
+/// [`RunReport::notes`].
 pub fn run_report(recording: &Path) -> Result<RunReport, ReportError> {
     let timeline = Timeline::read(recording)?;
     let frames = FrameStatistics::read(recording, &timeline)?;
@@ -91,7 +91,7 @@ fn notes(timeline: &Timeline, presses: &Presses, summary: &RunSummary) -> Vec<St
     let mut notes = Vec::new();
     if let Completeness::Truncated { at_byte, reason } = timeline.completeness() {
         notes.push(format!(
-            "The file is readable up to byte {at_byte} only ({reason}): this report is of what stands before it."
+            "The file is readable up to byte {at_byte} only ({reason}); this report covers the part before it."
         ));
     }
     match timeline.tally().finished() {
@@ -109,7 +109,7 @@ fn notes(timeline: &Timeline, presses: &Presses, summary: &RunSummary) -> Vec<St
         notes.push("No frame was recorded: there is no signal and no timing to show.".into());
     }
     if timeline.stage().is_empty() {
-        notes.push("The stage never said where it was.".into());
+        notes.push("The stage never reported its position.".into());
     }
     if summary.dwells == 0 {
         notes.push("No dwell was done: there are no response curves and no images.".into());
@@ -125,13 +125,13 @@ fn notes(timeline: &Timeline, presses: &Presses, summary: &RunSummary) -> Vec<St
     if !presses.void.is_empty() {
         let list: Vec<String> = presses.void.iter().map(ToString::to_string).collect();
         notes.push(format!(
-            "Broken off, begun again, and left out of all that follows: press {}.",
+            "Interrupted, repeated, and therefore left out of this report: press {}.",
             list.join(", ")
         ));
     }
     if presses.malformed_dwells > 0 {
         notes.push(format!(
-            "{} dwells are left out, because they do not hold one finite number per element.",
+            "{} dwells are left out, because they do not have one finite number per element.",
             presses.malformed_dwells
         ));
     }
@@ -139,10 +139,10 @@ fn notes(timeline: &Timeline, presses: &Presses, summary: &RunSummary) -> Vec<St
         match presses.baseline {
             Baseline::Tare => {}
             Baseline::FirstFrames(frames) => notes.push(format!(
-                "Before some presses nothing was tared: their baseline is the mean of the first {frames} frames."
+                "Some presses had no tare before them: their baseline is the mean of the first {frames} frames."
             )),
             Baseline::RigFile => notes.push(
-                "Nothing was tared and no frame came before the first press: the baseline is the rig file's.".into(),
+                "There was no tare and no frame before the first press: the baseline is the rig file's.".into(),
             ),
         }
     }

@@ -1,7 +1,7 @@
-//! The report of a study: everything in the paper, measured again on one rig.
+//! The report of a study, which repeats the paper on one rig.
 //!
-//! [`study_html`] makes one page: a table of every quantity beside the paper's, every figure in the paper's order, and
-//! the details of the calibration.
+//! [`study_html`] makes one page: a table of all quantities with the paper's values, all figures in the paper's order,
+//! and the details of the calibration.
 
 use std::fmt;
 
@@ -14,82 +14,82 @@ use crate::{
     numbers::{count, duration, estimate, interval, plural, short},
 };
 
-/// Everything that a study found.
+/// The results of a study.
 #[derive(Debug, Clone, Copy)]
 pub struct StudyReport<'a> {
     /// The rig's name.
     pub rig: &'a str,
     /// True if no physical sensor was read.
     pub simulated: bool,
-    /// The runs that were made, in order.
+    /// The runs in order of time.
     pub runs: &'a [StudyRun],
-    /// What there is to compare, in the paper's order.
-    pub rows: &'a [ComparedQuantity],
-    /// The calibration, if there is one. Its Figures 2a, 2b, 5a and 5b take their places among the others.
+    /// The compared quantities in the paper's order.
+    pub quantities: &'a [ComparedQuantity],
+    /// The calibration, if there is one. Its Figures 2a, 2b, 5a and 5b are shown among the others.
     pub calibration: Option<CalibrationReport<'a>>,
     /// The other figures, in any order.
     pub figures: &'a [StudyFigure],
-    /// What could not be done, and what it would take; a sentence each.
+    /// Sentences about what could not be done, and what it would take.
     pub missing: &'a [String],
-    /// What a reader must know before using a number; a sentence each.
+    /// Sentences to read before using a number.
     pub warnings: &'a [String],
 }
 
 /// One run of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyRun {
-    /// Its experiment's name.
+    /// Name of the step.
     pub name: String,
     /// Its id.
     pub run_id: String,
-    /// Presses that were done.
+    /// Number of completed presses.
     pub presses: u64,
-    /// By the rig's clock.
+    /// Duration by the rig's clock.
     pub duration_s: f64,
-    /// Where its recording is.
+    /// Path of its recording.
     pub path: String,
 }
 
-/// One quantity: what the paper says of it, and what this rig does.
+/// One quantity: the paper's value and this rig's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComparedQuantity {
-    /// What it is.
+    /// Name of the quantity.
     pub quantity: String,
     /// Its unit; empty for a pure number.
     pub unit: String,
-    /// The paper's figure, in its words.
+    /// The paper's value in words.
     pub paper: Option<String>,
-    /// This rig's.
+    /// This rig's value.
     pub found: FoundValue,
-    /// What it is by construction; known of simulated rigs only.
+    /// True value; known for simulated rigs only.
     pub truth: Option<f64>,
-    /// Whether the truth (where none is known, the paper's figure) lies inside the 95 % interval.
+    /// Whether the truth lies inside the 95 % interval.
     pub inside: Option<bool>,
-    /// What else is to be said; may be empty.
+    /// A remark; may be empty.
     pub note: String,
 }
 
-/// What was found of a quantity.
+/// This rig's value of a quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FoundValue {
     /// A number with its standard error.
     Estimate(Estimate),
-    /// Something that has none, in words.
+    /// A result without a standard error, in words.
     Text(String),
-    /// Nothing; the row's note says why.
+    /// Not determined; the quantity's note says why.
     Nothing,
 }
 
 /// A finished figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyFigure {
-    /// In the paper, such as `3a`; empty if the paper has none like it: it then comes after all others.
+    /// Number in the paper, such as `3a`. Figures with an empty number come last.
     pub number: String,
     /// What it shows.
     pub title: String,
-    /// What to see in it.
+    /// Text below the figure.
     pub caption: String,
-    /// The drawing, as a [`Sheet`](crate::plot::Sheet) displays itself. It is put on the page as it is.
+    /// SVG text of a [`Sheet`](crate::plot::Sheet). It is not escaped.
     pub svg: String,
 }
 
@@ -115,7 +115,7 @@ fn header(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Result {
     let seconds: f64 = report.runs.iter().map(|run| run.duration_s).sum();
     writeln!(
         f,
-        "<header>\n<div class=\"headline\"><h1>The paper on one rig</h1>{badge}</div>\n<p class=\"under\">Rig {} &#183; {}, {} presses, \
+        "<header>\n<div class=\"headline\"><h1>The paper repeated on one rig</h1>{badge}</div>\n<p class=\"under\">Rig {} &#183; {}, {} presses, \
          {} by the rig's clock &#183; after <cite>Characterization and Simulation of Tactile Sensors</cite></p>\n{unreal}\n</header>",
         Text(report.rig),
         plural(report.runs.len() as u64, "run"),
@@ -127,22 +127,22 @@ fn header(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Result {
 fn comparison(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Result {
     writeln!(
         f,
-        "<section>\n<h2>Every quantity</h2>\n<p class=\"lead\">After &#177;: standard error. The intervals hold 95 %.{}</p>",
-        if report.simulated { " The truth is what the simulated rig was made of." } else { "" }
+        "<section>\n<h2>Every quantity</h2>\n<p class=\"lead\">After &#177;: standard error. Intervals are 95 % intervals.{}</p>",
+        if report.simulated { " The truth is a parameter of the simulated rig." } else { "" }
     )?;
-    if report.rows.is_empty() {
+    if report.quantities.is_empty() {
         return writeln!(f, "<p>Nothing was found.</p>\n</section>");
     }
-    let truths = report.rows.iter().any(|row| row.truth.is_some());
+    let truths = report.quantities.iter().any(|row| row.truth.is_some());
     let truth_head = if truths { "<th class=\"n\">truth</th>" } else { "" };
     writeln!(
         f,
         "<div class=\"scroll\"><table class=\"numbers\">\n<thead><tr><th>quantity</th><th class=\"n\">paper</th><th class=\"n\">this rig</th>\
          <th class=\"n\">95 % interval</th>{truth_head}<th>inside</th></tr></thead>\n<tbody>"
     )?;
-    report.rows.iter().try_for_each(|row| compared(f, row, truths))?;
+    report.quantities.iter().try_for_each(|row| compared(f, row, truths))?;
     writeln!(f, "</tbody></table></div>")?;
-    let judged = report.rows.iter().filter(|row| row.truth.is_some()).filter_map(|row| row.inside);
+    let judged = report.quantities.iter().filter(|row| row.truth.is_some()).filter_map(|row| row.inside);
     let (inside, all) = judged.fold((0, 0), |(inside, all), one| (inside + u64::from(one), all + 1));
     if all > 0 {
         writeln!(
@@ -217,7 +217,7 @@ fn runs(f: &mut fmt::Formatter<'_>, runs: &[StudyRun]) -> fmt::Result {
 fn figures(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Result {
     let measured = report.calibration.iter().flat_map(calibration::drawings).map(StudyFigure::from);
     let mut figures: Vec<StudyFigure> = measured.chain(report.figures.iter().cloned()).collect();
-    // Stable: figures of one number stay in their order.
+    // Stable: figures with the same number keep their order.
     figures.sort_by_cached_key(|figure| place(&figure.number));
     for StudyFigure { number, title, caption, svg } in figures {
         let number = if number.is_empty() { String::new() } else { format!("Figure {number}. ") };
@@ -232,7 +232,7 @@ fn figures(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Result 
     Ok(())
 }
 
-/// Where a figure stands in the paper: its number, then its letter.
+/// Sort key of a figure: its number, then its letter.
 fn place(number: &str) -> (u32, String) {
     let digits = number.len() - number.trim_start_matches(|c: char| c.is_ascii_digit()).len();
     (number[..digits].parse().unwrap_or(u32::MAX), number[digits..].to_owned())
@@ -241,7 +241,7 @@ fn place(number: &str) -> (u32, String) {
 fn details(f: &mut fmt::Formatter<'_>, report: &StudyReport<'_>) -> fmt::Result {
     writeln!(f, "<section>\n<h1>The calibration</h1>")?;
     match &report.calibration {
-        None => writeln!(f, "<p>There is none.</p>\n</section>"),
+        None => writeln!(f, "<p>There is no calibration.</p>\n</section>"),
         Some(calibration) => {
             calibration::basis(f, calibration)?;
             calibration::remarks(f, calibration)?;

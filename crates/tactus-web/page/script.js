@@ -1,9 +1,9 @@
 "use strict";
 
 const TRACE_S = 60;
-// Twenty views a second at most.
+// At most 20 views per second.
 const POINTS_MAX = 20 * TRACE_S;
-// A rise that fills the colours, in counts, when nothing rises more.
+// Least span of the colour scale, in counts.
 const SPAN_MIN_COUNTS = 50;
 const SILENCE_MS = 4000;
 // Dark blue over green to yellow: five anchors of the viridis map (van der Walt and Smith, 2015, CC0).
@@ -31,7 +31,7 @@ function makeCells(rows, cols) {
   array.style.gridTemplateColumns = `repeat(${cols}, 1fr)`;
   cells = new Array(rows * cols);
   const inOrder = [];
-  // Row 0 is at the origin: below.
+  // Row 0 is at the bottom, where the origin is.
   for (let row = rows - 1; row >= 0; row -= 1) {
     for (let col = 0; col < cols; col += 1) {
       const cell = document.createElement("div");
@@ -120,7 +120,7 @@ function showRun(run) {
   at("progress").hidden = !active;
   at("recording").textContent = run?.recording ?? "";
   if (!run || !run.run_id) {
-    at("run").textContent = "none since the start";
+    at("run").textContent = "none since the service started";
     return;
   }
   const ended = run.phase === "finished" ? `: ${run.exit_status}` : "";
@@ -158,7 +158,7 @@ async function command(name, answer, patience_s) {
 }
 
 function stop() {
-  // A browser opens few connections to one place, and other windows may hold the rest: this one's goes to the stop.
+  // A browser limits connections per site, and other windows may use the rest: this page frees its own for the stop.
   views?.close();
   command("stop", at("stopped"), 15).finally(open);
 }
@@ -190,13 +190,13 @@ function open() {
     heard = Date.now();
     const isFirst = latest === null;
     latest = JSON.parse(event.data);
-    // Drawn when the screen is: what comes in between is not.
+    // Drawn with the next screen frame; views in between are skipped.
     if (isFirst) requestAnimationFrame(() => { const view = latest; latest = null; show(view); drawTrace(); });
   });
 }
 
 document.addEventListener("visibilitychange", open);
-// The service tells of its health every second: whoever says nothing for longer is not there.
+// The service sends its health every second; a longer silence means that it is unreachable.
 setInterval(() => {
   if (document.hidden || Date.now() - heard < SILENCE_MS) return;
   at("problem").hidden = false;

@@ -1,8 +1,8 @@
-//! Who may ask: browsers that were led here by this site's own name, and commands from its own page only.
+//! Checks requests: they must use one of this site's names, and commands must come from its own page.
 //!
-//! A page of another site can have a visitor's browser send requests here, and by a name that it points to this machine
-//! (DNS rebinding) even read the answers. The first is told by `Origin` and `Sec-Fetch-Site`, which no page can forge, the
-//! second by `Host`.
+//! A page of another site can make a visitor's browser send requests here and, with a name that resolves to this machine
+//! (DNS rebinding), even read the answers. `Origin` and `Sec-Fetch-Site`, which no page can forge, reveal the first;
+//! `Host` reveals the second.
 
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use axum::response::{IntoResponse, Response};
 
 const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
-/// The names under which this site may be asked for.
+/// The names of this site.
 #[derive(Debug)]
 pub(crate) struct Hosts {
     listens_on: IpAddr,
@@ -31,25 +31,25 @@ impl Hosts {
         let name = name_of(authority);
         let address = name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
         name == "localhost"
-            // A name can be made to point here; an address of this machine is one of this machine.
+            // A foreign name can resolve to this machine; a literal address is safe.
             || address.is_ok_and(|address| {
                 address.is_loopback() || address == self.listens_on || self.listens_on.is_unspecified()
             })
             || self.names.iter().any(|known| known.eq_ignore_ascii_case(name))
     }
 
-    /// Why a request is refused, if it is.
+    /// The reason for refusing a request, if any.
     fn refusal(&self, method: &Method, headers: &HeaderMap) -> Option<&'static str> {
         let text =
             |name: HeaderName| headers.get(name).and_then(|value: &header::HeaderValue| value.to_str().ok());
-        let Some(host) = text(header::HOST) else { return Some("the request names no host") };
+        let Some(host) = text(header::HOST) else { return Some("the request has no Host header") };
         if !self.has(host) {
             return Some("this dashboard is not known by that name: start it with --host NAME");
         }
         if method == Method::GET {
             return None;
         }
-        // A browser that says where a request comes from is believed; behind a proxy the two names may differ.
+        // Browsers report the origin of a request truthfully; behind a proxy the two names may differ.
         let is_own = match (text(SEC_FETCH_SITE), headers.get(header::ORIGIN)) {
             (Some(site), _) => site == "same-origin",
             (None, Some(origin)) => {
@@ -59,11 +59,11 @@ impl Hosts {
             }
             (None, None) => true,
         };
-        (!is_own).then_some("commands come from the dashboard's own page only")
+        (!is_own).then_some("only the dashboard's own page may send commands")
     }
 }
 
-/// Answers a request, or refuses it.
+/// Middleware that refuses foreign requests.
 pub(crate) async fn guard(State(hosts): State<Arc<Hosts>>, request: Request, next: Next) -> Response {
     match hosts.refusal(request.method(), request.headers()) {
         Some(refusal) => (StatusCode::FORBIDDEN, refusal).into_response(),

@@ -1,15 +1,15 @@
 //! The dashboard: a page with the live image, the stage, the run, and STOP.
 //!
-//! It is a process of its own, without devices or files, and a client of the bus like any other: whatever a browser
-//! sends, nothing of it is parsed where frames are acquired.
+//! It is a separate process without devices or files, and an ordinary client of the bus. Input from browsers never reaches
+//! the process that acquires frames.
 //!
 //! | path | what |
 //! |---|---|
-//! | `GET /` | the page; its script and style beside it |
-//! | `GET /live` | server-sent events, each the whole view as JSON, at most 20 a second |
-//! | `POST /stop`, `/pause`, `/resume`, `/reset` | the command of that name, for the service |
+//! | `GET /` | the page; its script and style have their own paths |
+//! | `GET /live` | server-sent events, each with the whole view as JSON, at most 20 per second |
+//! | `POST /stop`, `/pause`, `/resume`, `/reset` | sends the command of that name to the service |
 //!
-//! A browser that is slow misses views, never delays one. Requests from pages of other sites are refused.
+//! A slow browser misses views and delays nothing. Requests from pages of other sites are refused.
 
 mod guard;
 mod live;
@@ -35,21 +35,22 @@ use live::Live;
 #[derive(Debug, Parser)]
 #[command(name = "tactus-web", version, about)]
 struct Options {
-    /// Where the service's bus is.
+    /// Address of the service.
     #[arg(long, env = "TACTUS_ENDPOINT", default_value = "tcp/127.0.0.1:7447")]
     endpoint: Endpoint,
-    /// The rig, if there are several.
+    /// Name of the rig, if several are served.
     #[arg(long, env = "TACTUS_RIG")]
     rig: Option<String>,
-    /// Where browsers find the page. Whoever reaches it can stop, pause and reset: only this machine, unless you say otherwise.
+    /// Address of the page. Whoever reaches it can stop, pause, resume and reset; the default is reachable from this
+    /// machine only.
     #[arg(long, env = "TACTUS_WEB_LISTEN", default_value = "127.0.0.1:7480")]
     listen: SocketAddr,
-    /// A name under which browsers of other machines ask for the page, as behind a proxy; several with commas.
+    /// Host name that browsers of other machines use for the page, for example behind a proxy; several with commas.
     #[arg(long, env = "TACTUS_WEB_HOST", value_name = "NAME", value_delimiter = ',')]
     host: Vec<String>,
 }
 
-/// The program.
+/// Runs `tactus-web` with the process's arguments.
 pub fn main() -> ExitCode {
     let options = Options::parse();
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,zenoh=error"));
@@ -64,23 +65,23 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Serves until it is told to end.
+/// Serves until SIGTERM or Ctrl-C.
 fn run(options: Options) -> anyhow::Result<()> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()
-        .context("the system gives no runtime")?;
+        .context("cannot start the async runtime")?;
     runtime.block_on(async {
         let listener = TcpListener::bind(options.listen).await.with_context(|| {
-            format!("cannot listen on {}: choose another place with --listen", options.listen)
+            format!("cannot listen on {}: choose another address with --listen", options.listen)
         })?;
-        let address = listener.local_addr().context("the place that it listens on")?;
+        let address = listener.local_addr().context("cannot read the listening address")?;
         let live = Live::start(options.endpoint, options.rig);
         let site = site::site(live, guard::Hosts::new(address, options.host));
         let mut terminated = signal(SignalKind::terminate()).context("SIGTERM")?;
         info!("http://{address}");
-        // Nothing happens where there is no systemd.
+        // Without systemd this does nothing.
         let _told = sd_notify::notify(&[NotifyState::Ready]);
         tokio::select! {
             served = axum::serve(listener, site) => served.context("the server ended"),

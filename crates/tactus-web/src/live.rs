@@ -1,4 +1,4 @@
-//! The connection to the service, found again whenever it is lost, and what came over it last.
+//! The connection to the service, restored whenever it is lost, and the latest view.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,15 +12,16 @@ use tracing::{info, warn};
 
 use crate::view::View;
 
-/// Between two tries to reach the service.
+/// Time between two attempts to connect.
 const AGAIN: Duration = Duration::from_secs(1);
-/// How long an answer may take; homing takes longer.
+/// Time limit for replies, except to `reset`.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// A command that comes while the connection is made anew waits for it this long.
+/// How long a command waits for the connection to be restored.
 const RECONNECTED: Duration = Duration::from_secs(2);
+/// Time limit for the reply to `reset`, because homing is slow.
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
 
-/// The rig as it is now.
+/// Connection to the rig, and its latest view.
 #[derive(Debug, Clone)]
 pub(crate) struct Live {
     client: watch::Receiver<Option<Arc<Client>>>,
@@ -28,7 +29,7 @@ pub(crate) struct Live {
 }
 
 impl Live {
-    /// Connects, and stays connected.
+    /// Connects, and reconnects whenever the connection is lost.
     pub(crate) fn start(endpoint: Endpoint, rig: Option<String>) -> Self {
         let (to_client, client) = watch::channel(None);
         let problem = format!("no service at {endpoint} yet");
@@ -44,7 +45,7 @@ impl Live {
                         let ended = follow(&client, &to_view).await;
                         let problem = ended.map_or_else(
                             |error| error.to_string(),
-                            |()| format!("the service of rig {} is not there", client.rig()),
+                            |()| format!("the service of rig {} has ended", client.rig()),
                         );
                         warn!(problem, "connection lost");
                         problem
@@ -59,15 +60,15 @@ impl Live {
         Self { client, view }
     }
 
-    /// What there is to see, now and as it changes.
+    /// The latest view and its changes.
     pub(crate) fn view(&self) -> watch::Receiver<View> {
         self.view.clone()
     }
 
-    /// Has the service do something.
+    /// Sends a command to the service.
     ///
     /// # Errors
-    /// Why it was not done, for a person.
+    /// A message for the user.
     pub(crate) async fn command(&self, command: Command) -> Result<(), String> {
         let mut clients = self.client.clone();
         let client = match timeout(RECONNECTED, clients.wait_for(Option::is_some)).await {
@@ -83,7 +84,7 @@ impl Live {
     }
 }
 
-/// Keeps `view` up to date until the service goes away.
+/// Keeps `view` up to date until the service ends.
 async fn follow(client: &Client, view: &watch::Sender<View>) -> Result<(), BusError> {
     let mut alive = client.alive();
     if !alive.now() {

@@ -1,4 +1,4 @@
-//! The paths and their answers.
+//! The paths of the site.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -19,15 +19,15 @@ use tokio::time::{Instant, sleep_until};
 use crate::guard::{Hosts, guard};
 use crate::live::Live;
 
-/// Between two views of one page.
+/// Shortest time between two views sent to one page.
 const PERIOD: Duration = Duration::from_millis(50);
-/// Pages at once.
+/// Open pages at most.
 const PAGES_MAX: usize = 64;
 
 const HTML: &str = include_str!("../page/index.html");
 const STYLE: &str = include_str!("../page/style.css");
 const SCRIPT: &str = include_str!("../page/script.js");
-/// The page loads nothing from elsewhere, and runs in no other page.
+/// The page loads nothing from other sites and cannot be embedded in other pages.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -70,7 +70,7 @@ async fn live_views(State(Shared { live, pages }): State<Shared>) -> Response {
     Sse::new(views(&live, page)).keep_alive(KeepAlive::default()).into_response()
 }
 
-/// The latest view whenever it is another one, at most once a [`PERIOD`]; `held` is given back when the page is closed.
+/// The latest view after each change, at most once per [`PERIOD`]; `held` is released when the page is closed.
 fn views<H>(live: &Live, held: H) -> impl Stream<Item = Result<Event, Infallible>> + use<H> {
     let mut view = live.view();
     view.mark_changed();

@@ -1,16 +1,16 @@
-//! What the page shows.
+//! The content of the page.
 
 use serde_json::{Value, json};
 use tactus_schema::pb;
 
-/// All that is known of a rig now; each message replaces the one before it.
+/// Latest state of a rig; each message replaces the previous one.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct View {
-    /// Why there is no service; empty while there is one.
+    /// Why there is no service; empty while connected.
     pub(crate) problem: String,
     pub(crate) rig: String,
     pub(crate) frame: Option<pb::Frame>,
-    /// Frames that the bus lost on the way here.
+    /// Frames lost on the bus or dropped here.
     pub(crate) missed: u64,
     pub(crate) info: Option<pb::SensorInfo>,
     pub(crate) stage: Option<pb::StageState>,
@@ -20,7 +20,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// For the page's script. Lengths in mm, times in s; counts row by row from the origin's corner.
+    /// JSON for the page's script. Lengths in mm, times in s; counts are row-major from the origin corner.
     pub(crate) fn json(&self) -> Value {
         json!({
             "problem": self.problem,

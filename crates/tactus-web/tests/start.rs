@@ -1,4 +1,4 @@
-//! How the program starts, and how it does not.
+//! Starting the program, with and without errors.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::net::TcpListener;

@@ -1,4 +1,4 @@
-//! Commands reach the service and answers come back; a stop waits for nothing.
+//! Commands reach the service, and replies reach the client; a stop never waits.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use tactus_bus::{BusError, Client, CommandCall, Request};
 use tactus_schema::{key::Command, pb};
 use tokio::{net::TcpListener, sync::mpsc};
 
-/// Longer than any test runs: a call that is lost hangs the test, and none passes by waiting.
+/// Longer than any test runs, so that a lost call hangs the test instead of passing it.
 const PATIENCE: Duration = Duration::from_hours(1);
 
 fn asked_by(who: &str) -> pb::CommandRequest {

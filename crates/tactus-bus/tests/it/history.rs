@@ -1,4 +1,4 @@
-//! A client that comes late gets what went before, once and in order.
+//! A client that joins late gets the history, once and in order.
 
 use crate::lab::{event, frame, open, settled};
 use tactus_bus::{Client, History, Losses};
@@ -84,7 +84,7 @@ async fn a_late_joiner_gets_the_whole_run_and_the_last_state() {
     while state.recv().await.unwrap().frames != 1_999 {}
     let mut again = client.subscribe::<pb::RunState>(History::Last).await.unwrap();
     assert_eq!(again.recv().await.unwrap().frames, 1_999);
-    assert_eq!(publisher.dropped_news(), 0);
+    assert_eq!(publisher.dropped_updates(), 0);
     service.bus.close().await.unwrap();
 }
 

@@ -1,4 +1,4 @@
-//! What the bus's tests stand on: a service on a free port, raw zenoh clients, and a link that can stand still.
+//! Test fixtures: a service on a free port, raw zenoh clients, and a link that can stall.
 #![allow(dead_code, reason = "each test takes what it needs")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -17,7 +17,7 @@ use tokio::{
     task::JoinHandle,
 };
 
-/// A service for a rig named `bench`, and where it listens.
+/// A service for a rig named `bench`, and its endpoint.
 pub(crate) struct Service {
     pub(crate) bus: Bus,
     pub(crate) calls: Calls,
@@ -30,7 +30,7 @@ pub(crate) fn free_endpoint() -> Endpoint {
     format!("tcp/127.0.0.1:{port}").parse().unwrap()
 }
 
-/// Opens a service; `connect` is whom it joins.
+/// Opens a service that connects to `connect`.
 pub(crate) async fn open(rig: &str, connect: &[Endpoint]) -> Service {
     loop {
         let endpoint = free_endpoint();
@@ -44,7 +44,7 @@ pub(crate) async fn open(rig: &str, connect: &[Endpoint]) -> Service {
     }
 }
 
-/// A zenoh session that knows nothing of `tactus-bus`.
+/// A plain zenoh session.
 pub(crate) async fn raw_session(endpoint: &Endpoint) -> zenoh::Session {
     let mut config = zenoh::Config::default();
     config.insert_json5("mode", "\"client\"").unwrap();
@@ -53,8 +53,8 @@ pub(crate) async fn raw_session(endpoint: &Endpoint) -> zenoh::Session {
     zenoh::open(config).await.unwrap()
 }
 
-/// Returns once the service has taken in all that the client declared before: declarations and
-/// commands of one session keep their order.
+/// Returns once the service has processed the client's earlier declarations: declarations and commands of one session keep
+/// their order.
 pub(crate) async fn settled(client: &Client, calls: &mut Calls) {
     let request = pb::CommandRequest::default();
     let asked = client.command(Command::Status, &request, Duration::from_hours(1));
@@ -83,7 +83,7 @@ pub(crate) fn event(seq: u64) -> pb::RunEvent {
     pb::RunEvent { seq, run_id: "run-1".to_owned(), ..Default::default() }
 }
 
-/// A link between client and service that can stand still or break.
+/// A link between client and service that can stall or break.
 pub(crate) struct Link {
     pub(crate) endpoint: Endpoint,
     state: watch::Sender<LinkState>,
@@ -112,17 +112,17 @@ impl Link {
         Self { endpoint, state, task }
     }
 
-    /// From here on nothing of what the service sends goes through.
+    /// Stops passing on data from the service.
     pub(crate) fn stand_still(&self) {
         self.state.send_replace(LinkState::Still);
     }
 
-    /// Everything goes through again.
+    /// Passes on all data again.
     pub(crate) fn flow(&self) {
         self.state.send_replace(LinkState::Flowing);
     }
 
-    /// Breaks all connections, as a dying service does, and takes no new ones.
+    /// Breaks all connections, as a crashing service does, and accepts no new ones.
     pub(crate) fn break_off(&self) {
         self.state.send_replace(LinkState::Broken);
         self.task.abort();

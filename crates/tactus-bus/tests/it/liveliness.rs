@@ -1,4 +1,4 @@
-//! Clients see a rig come, go and die.
+//! Clients see a rig appear, disappear and crash.
 
 use crate::lab::{Link, event, open};
 use tactus_bus::{Bus, BusConfig, BusError, Client, History, Losses};

@@ -1,4 +1,4 @@
-//! A client that stands still harms nobody else, and what it lost is counted.
+//! A stalled client does not affect others, and its losses are counted.
 
 use std::time::Duration;
 
@@ -78,7 +78,7 @@ async fn a_client_that_stands_still_delays_neither_stop_nor_events_and_catches_u
     for seq in 1..EVENTS {
         assert_eq!(slow_events.recv().await.unwrap().seq, seq);
     }
-    assert_eq!(publisher.dropped_news(), 0);
+    assert_eq!(publisher.dropped_updates(), 0);
     service.bus.close().await.unwrap();
 }
 

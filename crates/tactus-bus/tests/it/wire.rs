@@ -1,4 +1,4 @@
-//! What a client without this crate sees, and who can reach the service at all.
+//! The service as seen by plain zenoh clients, and its reachability.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -163,7 +163,7 @@ fn listening_sockets() -> Vec<String> {
     sockets
 }
 
-/// `0100007F:1D17` to `127.0.0.1:7447`; IPv6 stays as it is.
+/// `0100007F:1D17` to `127.0.0.1:7447`; IPv6 is unchanged.
 fn address(hex: &str) -> String {
     let (host, port) = hex.split_once(':').unwrap();
     let port = u16::from_str_radix(port, 16).unwrap();

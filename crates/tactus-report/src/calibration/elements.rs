@@ -1,4 +1,4 @@
-//! Maps of the array: what is known of each element's health, and its sensitivity.
+//! Maps of the array: health and sensitivity of each element.
 
 use std::fmt;
 
@@ -10,12 +10,12 @@ use crate::{
     plot::{ColourBar, HeatMap, Image, Label, Panel, Scale, Sheet},
 };
 
-/// Room for a map.
+/// Largest size of a map.
 const MAP_PX: [f64; 2] = [336.0, 300.0];
-/// Elements smaller than this have no number in them.
+/// Elements smaller than this show no number.
 const NUMBERED_PX: f64 = 18.0;
 
-/// Every element where it stands on the sensor: faulty ones marked at their corners, those not judged dashed; a line goes from a
+/// The elements at their positions: faulty ones marked at their corners, unjudged ones dashed. A line goes from a
 /// cross-wired element to the one whose signal it gives.
 pub fn health_map(array: &Array, health: &Health) -> Sheet {
     let map = HealthMap { array, health };
@@ -104,7 +104,7 @@ impl HealthMap<'_> {
 
 impl Panel for HealthMap<'_> {
     fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // A little smaller, so that strokes do not run into each other.
+        // Slightly smaller, so that outlines do not overlap.
         let size_px = self.array.element_mm().map(|side| (side * self.px_per_mm() - 2.0).max(1.0));
         for element in 0..self.array.elements() {
             let Some([x, y]) = self.centre_px(element) else { continue };
@@ -120,7 +120,7 @@ impl Panel for HealthMap<'_> {
             else {
                 continue;
             };
-            // Beside the elements' numbers, not through them.
+            // Beside the elements' numbers.
             let aside = 0.3 * size_px[0].min(size_px[1]) / (x1 - x0).hypot(y1 - y0).max(1.0);
             let [dx, dy] = [aside * (y0 - y1), aside * (x1 - x0)];
             let [x0, y0, x1, y1] = [x0 + dx, y0 + dy, x1 + dx, y1 + dy];
@@ -140,7 +140,7 @@ impl Panel for ElementState {
 }
 
 impl ElementState {
-    /// With its upper left corner at a place.
+    /// Draws a square with its upper left corner at a position.
     fn square(self, f: &mut fmt::Formatter<'_>, [x, y]: [f64; 2], [width, height]: [f64; 2]) -> fmt::Result {
         let style = match self {
             Self::Sound => r#"class="line muted" stroke-opacity="0.5""#,
@@ -149,7 +149,7 @@ impl ElementState {
         };
         write!(f, r#"<path {style} d="M{x:.1} {y:.1}h{width:.1}v{height:.1}h-{width:.1}z"#)?;
         if matches!(self, Self::Faulty) {
-            // From every corner a little inwards: the number stays free.
+            // Short strokes from each corner, which leave the number readable.
             let [dx, dy] = [0.28 * width, 0.28 * height];
             for [right, down] in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
                 let corner = [x + right * width, y + down * height];

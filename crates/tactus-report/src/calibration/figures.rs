@@ -1,4 +1,4 @@
-//! Figures 2a, 2b, 5a and 5b of the paper, of the sensor that was calibrated.
+//! Figures 2a, 2b, 5a and 5b of the paper for the calibrated sensor.
 
 use tactus_calibrate::{ElementResponse, ResponseFit, SpreadFit, ThicknessFit};
 use tactus_model::{DIGITACTS_PITCH_MM, Psf};
@@ -9,16 +9,15 @@ use crate::{
     plot::{Axis, Figure, Ink, Series, Sheet, number},
 };
 
-/// Points along a curve; more are not seen.
+/// Points along a curve.
 const CURVE_POINTS: u32 = 60;
 const INKS: [Ink; 4] = [Ink::Blue, Ink::Green, Ink::Amber, Ink::Red];
-/// Two beside each other on a page.
+/// Size of one of two figures in a row.
 const HALF_PX: [f64; 2] = [504.0, 380.0];
 
-/// Figure 2a: what each element answered to presses on its own centre, and the mean of the elements' fits.
+/// Figure 2a: response of each element to presses on its own centre, and the mean of the elements' fits.
 ///
-/// The means are left out where sensitivities of both signs would cancel, the quadratic one where depths are too few
-/// to tell it from a line.
+/// The means are omitted if sensitivities have both signs; the quadratic one also if there are too few depths.
 pub fn responses(response: &ResponseFit) -> Sheet {
     let mut figure = over_indentation("Response of the elements", "response above rest");
     figure = with_elements(figure, response, |_, point| point);
@@ -35,8 +34,8 @@ pub fn responses(response: &ResponseFit) -> Sheet {
     alone("Figure 2a: response of the elements", HALF_PX, &figure)
 }
 
-/// Figure 2b: the same readings, each turned into indentation by its own element's response and stated at the mean
-/// sensitivity. What lies beyond an element's turning point is left out.
+/// Figure 2b: the same readings, converted to indentation by each element's own response and scaled by the mean
+/// sensitivity. Readings beyond an element's turning point are left out.
 pub fn recalibrated(response: &ResponseFit) -> Sheet {
     let uniform = uniform_counts_per_mm(response);
     let mut figure = over_indentation("Responses made uniform", "recalibrated response");
@@ -47,7 +46,7 @@ pub fn recalibrated(response: &ResponseFit) -> Sheet {
 }
 
 /// Figure 5a: the spread of each covering at each depth against the covering's thickness, both in pitches, with 95 %
-/// intervals, the fitted curves and the paper's Eq. 4; below it how far the points lie off the fitted line.
+/// intervals, the fitted curves and the paper's Eq. 4; below, the distances from the fitted line.
 pub fn spread_against_thickness(spreads: &[SpreadFit], thickness: &ThicknessFit, pitch_mm: f64) -> Sheet {
     const WIDTH_PX: f64 = 640.0;
     const ABOVE_PX: f64 = 350.0;
@@ -57,7 +56,7 @@ pub fn spread_against_thickness(spreads: &[SpreadFit], thickness: &ThicknessFit,
     let over = |spread_mm: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> {
         curve([0.0, 1.06 * thickest_mm], spread_mm).into_iter().map(|at| at.map(|mm| mm / pitch_mm)).collect()
     };
-    // Eq. 4 is in pitches, whatever they are.
+    // Eq. 4 is in units of the pitch.
     let paper = |covering_mm: f64| {
         Psf::PAPER.sigma_intercept_mm / DIGITACTS_PITCH_MM * pitch_mm + Psf::PAPER.sigma_per_mm * covering_mm
     };
@@ -83,13 +82,18 @@ pub fn spread_against_thickness(spreads: &[SpreadFit], thickness: &ThicknessFit,
         return alone("Figure 5a: spread against thickness", [WIDTH_PX, ABOVE_PX], &above);
     };
 
-    let mut below = Figure::new("Off the line", along, Axis::new("off the line", "\u{b5}m"))
-        .size_px([WIDTH_PX, BELOW_PX])
-        .with(Series::line(curve([0.0, 1.06 * thickest_mm / pitch_mm], |_| 0.0)).ink(Ink::Red).width_px(2.0));
+    let mut below =
+        Figure::new("Distance from the line", along, Axis::new("distance from the line", "\u{b5}m"))
+            .size_px([WIDTH_PX, BELOW_PX])
+            .with(
+                Series::line(curve([0.0, 1.06 * thickest_mm / pitch_mm], |_| 0.0))
+                    .ink(Ink::Red)
+                    .width_px(2.0),
+            );
     let depths = by_depth(spreads);
     for (nth, (name, fits)) in depths.iter().enumerate() {
         let ink = INKS[nth % INKS.len()];
-        // Beside each other, or one would hide the others.
+        // Side by side, so that none hides the others.
         let aside = 0.012 * (nth as f64 - 0.5 * (depths.len() - 1) as f64) * thickest_mm / pitch_mm;
         let off_um = |covering_mm: f64, sigma_mm: f64| 1e3 * (sigma_mm - line.at(covering_mm));
         let at = |fit: &SpreadFit| fit.covering_mm / pitch_mm + aside;
@@ -108,7 +112,7 @@ pub fn spread_against_thickness(spreads: &[SpreadFit], thickness: &ThicknessFit,
     sheet
 }
 
-/// Figure 5b: the point spread function of each covering, of the mean spread over its depths; lengths in pitches.
+/// Figure 5b: the point spread function of each covering, with the mean spread over its depths; lengths in pitches.
 pub fn point_spreads(thickness: &ThicknessFit, pitch_mm: f64) -> Sheet {
     let of = |covering: &tactus_calibrate::CoveringSpread| {
         (format!("{} mm", short(covering.covering_mm, 3)), covering.sigma_mm.value / pitch_mm)
@@ -116,13 +120,13 @@ pub fn point_spreads(thickness: &ThicknessFit, pitch_mm: f64) -> Sheet {
     profiles(&thickness.coverings.iter().map(of).collect::<Vec<_>>())
 }
 
-/// Mean over the elements of the size of their sensitivities: that of the uniform response.
+/// Mean absolute sensitivity of the elements, which is the sensitivity of the uniform response.
 pub(super) fn uniform_counts_per_mm(response: &ResponseFit) -> f64 {
     mean(response, |element| element.sensitivity_counts_per_mm.value.abs())
 }
 
 /// Root mean square distance of all readings from one curve for all: the mean line before recalibration, the uniform
-/// response after it. `None` where it makes no sense.
+/// response after it. `None` if sensitivities have both signs.
 pub(super) fn scatter_counts(response: &ResponseFit) -> Option<[f64; 2]> {
     if !one_sign(response) {
         return None;
@@ -135,18 +139,18 @@ pub(super) fn scatter_counts(response: &ResponseFit) -> Option<[f64; 2]> {
     Some([before?, after?])
 }
 
-/// True if all sensitivities have one sign, so that their mean says something.
+/// True if all sensitivities have one sign, so that their mean is meaningful.
 pub(super) fn one_sign(response: &ResponseFit) -> bool {
     let signs = || response.elements.iter().map(|element| element.sensitivity_counts_per_mm.value);
     signs().all(|s| s > 0.0) || signs().all(|s| s < 0.0)
 }
 
-/// True if the data could tell a curve from a line.
+/// True if the data could distinguish a curve from a line.
 pub(super) fn decided(response: &ResponseFit) -> bool {
     response.trials.iter().any(|trial| trial.heldout_rms_counts.is_some())
 }
 
-/// `u` stays; the rise becomes what a uniform element would have given.
+/// The same indentation with the rise of a uniform element.
 fn recalibrate(element: &ElementResponse, uniform: f64, [u_mm, rise]: [f64; 2]) -> [f64; 2] {
     [u_mm, element.indentation_mm(rise).map_or(f64::NAN, |indentation_mm| uniform * indentation_mm)]
 }
@@ -172,7 +176,7 @@ fn over_indentation(name: &str, what: &str) -> Figure {
     Figure::new(name, x, Axis::new(what, "counts").from_zero()).size_px(HALF_PX)
 }
 
-/// From where to where elements were pressed.
+/// Range of indentations, which includes 0.
 fn range_mm(response: &ResponseFit) -> [f64; 2] {
     let all = response.elements.iter().flat_map(|element| element.points.iter().map(|point| point[0]));
     all.fold([0.0, 0.0], |[lo, hi], u: f64| [lo.min(u), hi.max(u)])
@@ -182,7 +186,7 @@ fn mean_linear(response: &ResponseFit) -> f64 {
     mean(response, |element| element.linear_counts_per_mm.value)
 }
 
-/// Mean coefficients of `u` and `u^2` over the elements' own parabolas; `None` if the data could tell none.
+/// Mean coefficients of `u` and `u^2` over the elements' own parabolas; `None` if not all elements have one.
 fn mean_quadratic(response: &ResponseFit) -> Option<[f64; 2]> {
     let all = response.elements.iter().all(|element| element.quadratic.is_some());
     let of = |power: fn([f64; 2]) -> f64| {
@@ -195,7 +199,7 @@ fn mean(response: &ResponseFit, of: impl Fn(&ElementResponse) -> f64) -> f64 {
     response.elements.iter().map(of).sum::<f64>() / response.elements.len().max(1) as f64
 }
 
-/// Of what is finite; `None` of nothing.
+/// Root mean square of the finite distances; `None` without any.
 fn rms(distances: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, number) = distances
         .filter(|distance| distance.is_finite())
@@ -208,7 +212,7 @@ fn curve([from, to]: [f64; 2], of: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     (0..=CURVE_POINTS).map(|step| [at(step), of(at(step))]).collect()
 }
 
-/// The shallowest presses of all coverings, then the next, and so on, each under a name.
+/// Groups of fits: the shallowest depth of each covering, then the second, and so on; each with a name.
 fn by_depth(spreads: &[SpreadFit]) -> Vec<(String, Vec<&SpreadFit>)> {
     let mut sorted: Vec<&SpreadFit> = spreads.iter().collect();
     sorted.sort_by(|one, other| {
@@ -238,7 +242,7 @@ fn by_depth(spreads: &[SpreadFit]) -> Vec<(String, Vec<&SpreadFit>)> {
     depths.into_iter().enumerate().map(|(nth, fits)| (name(nth, &fits), fits)).collect()
 }
 
-/// A figure as a sheet of its own.
+/// A figure as a separate sheet.
 fn alone(name: &str, size_px: [f64; 2], figure: &Figure) -> Sheet {
     let mut sheet = Sheet::new(name, size_px);
     sheet.put([0.0, 0.0], figure);

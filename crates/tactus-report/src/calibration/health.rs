@@ -1,4 +1,4 @@
-//! Which elements are faulty.
+//! Faulty elements.
 
 use std::fmt;
 
@@ -15,8 +15,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>
     let (array, health) = (report.array, &report.calibration.health);
     writeln!(
         f,
-        "<section>\n<h2>Faulty elements</h2>\n<p class=\"lead\">Found from what the elements read and when. Faulty ones are left \
-         out of every fit; an element is judged only if a press came near enough to it.</p>\n<div class=\"beside\">\n<div>"
+        "<section>\n<h2>Faulty elements</h2>\n<p class=\"lead\">Found from the elements' readings. Faulty elements are left \
+         out of every fit. An element is judged only if a press came near enough to it.</p>\n<div class=\"beside\">\n<div>"
     )?;
     if health.faults.is_empty() {
         writeln!(f, "<p>No fault was found.</p>")?;
@@ -58,7 +58,7 @@ pub(super) fn place(array: &Array, element: usize) -> String {
     format!("({}, {})", element / array.cols(), element % array.cols())
 }
 
-/// What is wrong, in a few words.
+/// A fault in a few words.
 pub(super) fn kind(array: &Array, kind: FaultKind) -> String {
     match kind {
         FaultKind::Dead => "dead".into(),

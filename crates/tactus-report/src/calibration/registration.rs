@@ -1,4 +1,4 @@
-//! Where the sensor lies.
+//! Registration: position and rotation of the sensor in the robot's frame.
 
 use std::fmt;
 
@@ -13,18 +13,21 @@ use crate::{
     plot::number,
 };
 
-/// More presses than this are not named.
+/// Left-out presses that are named at most.
 const NAMED_MAX: usize = 12;
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) -> fmt::Result {
     writeln!(
         f,
-        "<section>\n<h2>Where the sensor lies</h2>\n<p class=\"lead\">The sensor frame in the robot's frame, fitted to presses at \
-         several places at once with the elements' sensitivities and the spread. The scale is a check: it was fitted once more beside \
-         all others and takes no part; it should be 1.</p>"
+        "<section>\n<h2>Registration</h2>\n<p class=\"lead\">The sensor frame in the robot's frame, fitted to presses at \
+         several places jointly with the elements' sensitivities and the spread. The scale is a check: it comes from a second fit \
+         and is not used; it should be 1.</p>"
     )?;
     match &report.calibration.registration {
-        None => writeln!(f, "<p>Not determined; taken as declared, and for exact, in all that follows.</p>")?,
+        None => writeln!(
+            f,
+            "<p>Not determined. All later steps use the declared registration and treat it as exact.</p>"
+        )?,
         Some(registration) => found(f, report, registration)?,
     }
     writeln!(f, "</section>")
@@ -96,5 +99,5 @@ fn left_out(f: &mut fmt::Formatter<'_>, presses: &[(String, i32)]) -> fmt::Resul
         .collect();
     let more = presses.len().saturating_sub(NAMED_MAX);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    writeln!(f, "<p>Left out, because the others contradict them: press {}{more}.</p>", named.join("; "))
+    writeln!(f, "<p>Left out, because they contradict the others: press {}{more}.</p>", named.join("; "))
 }

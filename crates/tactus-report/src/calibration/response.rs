@@ -1,4 +1,4 @@
-//! How the elements answer.
+//! Responses of the elements.
 
 use std::fmt;
 
@@ -25,11 +25,11 @@ pub(super) fn drawings(response: &ResponseFit) -> [Drawing; 2] {
         (true, false) => {
             "The solid red line is the mean of the elements' linear fits; depths are too few for parabolas."
         }
-        (false, _) => "Sensitivities of both signs: no mean is drawn.",
+        (false, _) => "The sensitivities have both signs: no mean is drawn.",
     };
     let scatter = scatter_counts(response).map_or_else(String::new, |[before, after]| {
         format!(
-            " Readings lie {} counts rms off one line for all before it and {} counts after.",
+            " The distance of the readings from one line for all is {} counts rms before and {} counts after.",
             digits(before, 3),
             digits(after, 3)
         )
@@ -39,8 +39,8 @@ pub(super) fn drawings(response: &ResponseFit) -> [Drawing; 2] {
             number: "2a",
             title: "Response of the elements",
             caption: format!(
-                "Each element's rise above rest in presses near its own centre, dotted; a point is one dwell, over the indentation of \
-                 an equal press on the very centre. {fits}"
+                "Dotted: each element's rise above rest in presses near its own centre. A point is one dwell, plotted against the indentation of \
+                 an equal press exactly on the centre. {fits}"
             ),
             sheet: responses(response),
         },
@@ -48,7 +48,7 @@ pub(super) fn drawings(response: &ResponseFit) -> [Drawing; 2] {
             number: "2b",
             title: "Responses made uniform",
             caption: format!(
-                "The same readings, each turned into indentation by its own element's response ({}) and stated at the mean \
+                "The same readings, converted to indentation by each element's own response ({}) and scaled by the mean \
                  sensitivity of {} counts/mm.{scatter}",
                 response.form.name(),
                 digits(uniform_counts_per_mm(response), 4),
@@ -91,7 +91,7 @@ pub(super) fn section(
     writeln!(f, "</section>")
 }
 
-/// Which form the data want.
+/// Comparison of the response forms.
 fn forms(f: &mut fmt::Formatter<'_>, response: &ResponseFit) -> fmt::Result {
     let mut table = Table::new(&[
         Column::Name("form"),
@@ -102,8 +102,8 @@ fn forms(f: &mut fmt::Formatter<'_>, response: &ResponseFit) -> fmt::Result {
     for trial in &response.trials {
         let heldout = trial.heldout_rms_counts.map_or_else(|| "\u{2013}".into(), |rms| digits(rms, 3));
         let wanted = match (trial.form == response.form, decided(response)) {
-            (true, true) => "wanted",
-            (true, false) => "taken",
+            (true, true) => "chosen",
+            (true, false) => "default",
             (false, _) => "",
         };
         table.row([trial.form.name().to_owned(), digits(trial.rms_counts, 3), heldout, wanted.into()]);
@@ -112,13 +112,13 @@ fn forms(f: &mut fmt::Formatter<'_>, response: &ResponseFit) -> fmt::Result {
     if decided(response) {
         writeln!(
             f,
-            "<p>Root mean square of the residuals; held out: each fifth of the dwells is predicted from the others. A form with more parameters must beat the one before \
-             by two standard errors over the elements to be wanted.</p>"
+            "<p>Root mean square of the residuals; held out: each fifth of the dwells is predicted from the others. A form with more parameters is chosen if it beats the one before \
+             by two standard errors over the elements.</p>"
         )
     } else {
         writeln!(
             f,
-            "<p>There are too few depths to hold any out: the data do not tell the form, and a line is taken.</p>"
+            "<p>There are too few depths to hold any out. The data do not determine the form; a line is used.</p>"
         )
     }
 }
@@ -170,7 +170,7 @@ fn sensitivities(
     }
 }
 
-/// Every element's numbers, folded away.
+/// A collapsed table of every element.
 fn elements(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) -> fmt::Result {
     let (array, calibration) = (report.array, report.calibration);
     let mut table = Table::new(&[
@@ -213,8 +213,8 @@ fn elements(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>) -> fmt::
     }
     writeln!(
         f,
-        "<details>\n<summary><h3>Every element</h3> {}</summary>\n<p class=\"lead\">After &#177;: standard error; at rest, the scatter from \
-         one rest to the next.</p>\n{table}</details>",
+        "<details>\n<summary><h3>Every element</h3> {}</summary>\n<p class=\"lead\">After &#177;: standard error; at rest, the scatter between \
+         rests.</p>\n{table}</details>",
         plural(array.elements() as u64, "element")
     )
 }

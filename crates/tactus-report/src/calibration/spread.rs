@@ -1,4 +1,4 @@
-//! How the coverings spread.
+//! Point spread of the coverings.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     document::{Column, Table},
-    numbers::{chance, digits, estimate, interval, short, with_error},
+    numbers::{digits, estimate, interval, probability, short, with_error},
     plot::number,
 };
 
@@ -19,7 +19,7 @@ pub(super) fn drawings(report: &CalibrationReport<'_>) -> Vec<Drawing> {
     let Some((spreads, thickness)) = found(report) else { return Vec::new() };
     let pitch_mm = report.array.pitch_mm();
     let below = if thickness.linear.is_some() {
-        " Below: how far they lie off the line, the depths drawn beside each other; errors of one covering are largely common, so that \
+        " Below: their distances from the line, with the depths drawn side by side. The errors within one covering are largely common, so \
          its depths may scatter by less than their bars."
     } else {
         ""
@@ -38,8 +38,8 @@ pub(super) fn drawings(report: &CalibrationReport<'_>) -> Vec<Drawing> {
         Drawing {
             number: "5b",
             title: "Point spread functions of the coverings",
-            caption: "Left: cuts through the Gaussian of each covering, of the mean spread over its depths and of unit volume, so that a \
-                      wider one is lower. Right: the same from above, each on its own scale; the ring stands one \u{3c3} from the press."
+            caption: "Left: profiles of each covering's Gaussian of unit volume, with the mean spread over its depths; a wider one is \
+                      lower. Right: the same from above, each on its own scale; the ring is one \u{3c3} from the press."
                 .into(),
             sheet: point_spreads(thickness, pitch_mm),
         },
@@ -54,8 +54,8 @@ pub(super) fn section(
     writeln!(
         f,
         "<section>\n<h2>Spread of the coverings</h2>\n<p class=\"lead\">The \u{3c3}+ that maximises the sum of inner products between \
-         measured and modelled images, both of unit L2 norm (Eq. 3). Its standard error holds those of the responses and of the \
-         sensor's place.</p>"
+         measured and modelled images, both of unit L2 norm (Eq. 3). Its standard error includes those of the responses and of the \
+         registration.</p>"
     )?;
     match found(report) {
         None => writeln!(f, "<p>Not determined.</p>")?,
@@ -106,7 +106,7 @@ fn by_depth(f: &mut fmt::Formatter<'_>, spreads: &[SpreadFit], pitch_mm: f64) ->
     writeln!(
         f,
         "{table}\n<p class=\"lead\">Depth: also as a share of the thickness. Likeness: mean cosine between measured and modelled images, \
-         1 if the spread is a Gaussian and nothing is amiss. Of the standard errors, more presses would lessen a part of {} to {} \
+         1 for a perfect fit. The part of the standard errors that more presses would reduce is {} to {} \
          mm.</p>",
         digits(least, 2),
         digits(most, 2)
@@ -121,7 +121,7 @@ fn by_covering(f: &mut fmt::Formatter<'_>, thickness: &ThicknessFit, pitch_mm: f
         Column::Number("\u{3c3}+ / pitches"),
         Column::Number("Eq. 4 / pitches"),
         Column::Number("between depths / mm"),
-        Column::Number("chance of that"),
+        Column::Number("p"),
     ]);
     for covering in &thickness.coverings {
         table.row([
@@ -131,13 +131,13 @@ fn by_covering(f: &mut fmt::Formatter<'_>, thickness: &ThicknessFit, pitch_mm: f
             estimate(&covering.sigma_mm.in_units_of(pitch_mm)),
             number(PAPER_PITCHES + Psf::PAPER.sigma_per_mm * covering.covering_mm / pitch_mm, 3),
             digits(covering.range_mm, 2),
-            covering.chance.map_or_else(|| "\u{2013}".into(), chance),
+            covering.chance.map_or_else(|| "\u{2013}".into(), probability),
         ]);
     }
     writeln!(
         f,
-        "{table}\n<p class=\"lead\">Mean over the depths of each covering; the greatest difference between two depths, and how often chance \
-         alone would bring so much if spread did not depend on depth.</p>"
+        "{table}\n<p class=\"lead\">Mean over the depths of each covering; the greatest difference between two depths; p: the probability of such a \
+         difference if the spread does not depend on depth.</p>"
     )
 }
 
@@ -183,13 +183,13 @@ fn curves(
     if thickness.linear.is_some() {
         writeln!(f, "{table}")?;
     }
-    let scatter = |name: &str, rms_mm: f64, by_chance: Option<f64>| {
-        let by_chance =
-            by_chance.map_or_else(String::new, |p| format!(" (chance of that if it holds: {})", chance(p)));
+    let scatter = |name: &str, rms_mm: f64, p_value: Option<f64>| {
+        let p_value =
+            p_value.map_or_else(String::new, |p| format!(" (p-value if it holds: {})", probability(p)));
         format!(
             "<p>The points lie {} mm rms off the {name}{}.</p>\n",
             digits(rms_mm, 2),
-            by_chance.replace('<', "&lt;")
+            p_value.replace('<', "&lt;")
         )
     };
     if let Some(line) = &thickness.linear {
@@ -202,19 +202,19 @@ fn curves(
         (Some(_), Some(_)) => Ok(()),
         (Some((psf, [error, _])), None) => writeln!(
             f,
-            "<p>One covering gives no line. With the declared slope of {} its spread makes the intercept {} mm.</p>",
+            "<p>One covering does not determine a line. With the declared slope of {}, its spread gives an intercept of {} mm.</p>",
             short(psf.sigma_per_mm, 6),
             with_error(psf.sigma_intercept_mm, error.unwrap_or(0.0))
         ),
         (None, _) => writeln!(
             f,
-            "<p class=\"warn\">This is no spread that a model can have: its intercept must be positive and its slope not below 0. What is \
-             declared is kept.</p>"
+            "<p class=\"warn\">A model cannot have this spread: its intercept must be positive and its slope not negative. The declared \
+             spread is kept.</p>"
         ),
     }
 }
 
-/// How many took part, and how many did not.
+/// Number of presses used and left out.
 fn presses(fit: &SpreadFit) -> String {
     match fit.left_out {
         0 => fit.presses.to_string(),
@@ -222,7 +222,7 @@ fn presses(fit: &SpreadFit) -> String {
     }
 }
 
-/// To two digits of what it lacks to 1.
+/// To two significant digits of its difference from 1.
 fn likeness(likeness: f64) -> String {
     let lacks = (1.0 - likeness).abs().max(1e-9);
     let decimals = digits(lacks, 2).split_once('.').map_or(2, |(_, decimals)| decimals.len());

@@ -1,4 +1,4 @@
-//! Experiments that were chosen and run to decide between explanations.
+//! Experiments that were run to decide between explanations.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use crate::{
     numbers::digits,
 };
 
-/// An experiment that was run because of what an analysis could not decide, and what the next one could not.
+/// An experiment that was run to decide between explanations, and the undecided effects before and after it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActiveRun {
     /// Name of the experiment.
@@ -17,24 +17,24 @@ pub struct ActiveRun {
     pub parameters: Vec<(&'static str, String)>,
     /// Run id of its recording.
     pub recording: String,
-    /// How long it took on the rig.
+    /// Duration on the rig.
     pub duration_s: f64,
-    /// What it was to tell apart.
+    /// The two explanations that it was to distinguish.
     pub separates: [String; 2],
-    /// By how many standard errors, if that could be foreseen.
+    /// Expected difference between them in standard errors, if predicted.
     pub expected_z: Option<f64>,
-    /// The effects that had been added before, each with those that could not be told from it.
+    /// Effects added before, each with those that could not be distinguished from it.
     pub before: Vec<AmbiguousEffect>,
     /// The same with this experiment among the data.
     pub after: Vec<AmbiguousEffect>,
 }
 
-/// An effect, and those that the data cannot tell from it.
+/// An added effect, and the effects that the data cannot distinguish from it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AmbiguousEffect {
     /// The effect that was added.
     pub effect: &'static str,
-    /// What would do as well.
+    /// Effects that predict the held-out presses as well.
     pub equivalent: Vec<&'static str>,
 }
 
@@ -49,7 +49,7 @@ impl AmbiguousEffect {
     }
 }
 
-/// What to type to run an experiment.
+/// The command line that runs an experiment.
 pub fn command(experiment: &str, parameters: &[(&'static str, String)]) -> String {
     let parameters = parameters.iter().map(|(name, value)| {
         let is_plain = value.chars().all(|c| c.is_ascii_alphanumeric() || ".,_-".contains(c));
@@ -62,14 +62,14 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, runs: &[ActiveRun]) -> fmt::Re
     if runs.is_empty() {
         return Ok(());
     }
-    writeln!(f, "<section>\n<h2>What was measured to decide</h2>")?;
+    writeln!(f, "<section>\n<h2>Experiments that were run to decide</h2>")?;
     let mut table = Table::new(&[
         Column::Name("experiment"),
-        Column::Name("to tell apart"),
+        Column::Name("to distinguish"),
         Column::Number("expected, standard errors"),
         Column::Number("took, s"),
         Column::Name("explained before by"),
-        Column::Name("and after by"),
+        Column::Name("after by"),
     ]);
     for run in runs {
         table.row([

@@ -1,4 +1,4 @@
-//! What was added to the model.
+//! The effects that were added to the model.
 
 use std::fmt;
 
@@ -24,7 +24,7 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
     known.retain(|name| found.steps.iter().all(|step| step.effect != *name));
     known.dedup();
     if !known.is_empty() {
-        writeln!(f, "<p>In the model before, and fitted anew with the rest: {}.</p>", Text(list(known)))?;
+        writeln!(f, "<p>Already in the model, and fitted again with the rest: {}.</p>", Text(list(known)))?;
     }
     writeln!(f, "</section>")
 }
@@ -34,7 +34,7 @@ fn step(f: &mut fmt::Formatter<'_>, step: &Step) -> fmt::Result {
     let summary = definition.map_or("", |definition| definition.summary);
     writeln!(f, "<h3>{}</h3>\n<p>{}.</p>", Text(step.effect), Text(capital(summary)))?;
     let mut nth = 0;
-    // Terms of one name may be of two forms.
+    // Terms of one effect may have different parameters.
     for terms in step.terms.chunk_by(|one, other| names(one).eq(names(other))) {
         let parameters = terms.first().map_or(&[][..], Vec::as_slice);
         let columns: Vec<Column> =
@@ -47,26 +47,26 @@ fn step(f: &mut fmt::Formatter<'_>, step: &Step) -> fmt::Result {
         }
         if let Some(definition) = definition {
             let range = |found: &Estimated| range(definition, found);
-            table.row(["can lie".to_owned()].into_iter().chain(parameters.iter().map(range)));
+            table.row(["possible range".to_owned()].into_iter().chain(parameters.iter().map(range)));
         }
         writeln!(f, "{table}")?;
     }
     writeln!(
         f,
-        "<p>On held-out presses the residual is {} counts rms without it, all else fitted anew, and {} with it; noise alone brings such a \
-         gain with a chance of {} (false-discovery rate {} over all that was tried in its round).</p>",
+        "<p>On held-out presses the residual is {} counts rms without it (all else fitted again) and {} with it. The probability of such a \
+         gain by noise alone is {} (false-discovery rate {} over all effects tried in its round).</p>",
         digits(step.heldout_rms_before_counts, 3),
         digits(step.heldout_rms_after_counts, 3),
-        words::chance(step.p_value),
-        words::chance(step.q_value)
+        words::probability(step.p_value),
+        words::probability(step.q_value)
     )?;
     if step.equivalent.is_empty() {
-        writeln!(f, "<p>The data tell it from every other effect that they can show.</p>")
+        writeln!(f, "<p>The data distinguish it from every other effect that they can show.</p>")
     } else {
         writeln!(
             f,
-            "<p class=\"warn\">These data cannot tell it from {}: in its place that predicts the held-out presses as well, so that either may be \
-             the cause. It stands in the model as one way to describe what was measured.</p>",
+            "<p class=\"warn\">These data cannot distinguish it from {}, which predicts the held-out presses equally well. Either may be the cause; \
+             the model contains this one as one possible description.</p>",
             Text(either(&step.equivalent))
         )
     }
@@ -83,7 +83,7 @@ fn value(parameter: &Estimated) -> String {
     }
 }
 
-/// From where to where a parameter that was estimated could have come to lie.
+/// The possible range of an estimated parameter.
 fn range(definition: &Definition, found: &Estimated) -> String {
     let parameter = definition.parameters.iter().find(|parameter| parameter.name == found.name);
     match parameter.filter(|_| found.standard_error.is_some()) {

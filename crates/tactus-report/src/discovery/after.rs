@@ -1,4 +1,4 @@
-//! What the additions are worth, what stays, and what to do about it.
+//! The gap before and after, what stays unexplained, and what to measure next.
 
 use std::fmt;
 
@@ -52,11 +52,11 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
     writeln!(
         f,
         "<section>\n<h2>The gap before and after</h2>\n<figure>\n{}\n<figcaption>Root mean square of the residual on held-out presses, in \
-         counts.</figcaption>\n</figure>\n{table}\n<p class=\"lead\">The gap is what the residual has beyond noise: the square root of the \
+         counts.</figcaption>\n</figure>\n{table}\n<p class=\"lead\">The gap is the part of the residual beyond noise: the square root of the \
          difference of their mean squares. {}</p>\n</section>",
         levels(found),
         found.final_.shrink.map_or_else(String::new, |share| format!(
-            "Of the base model's, in mean squares, {} was closed.",
+            "{} of the base model's gap was closed, in mean squares.",
             percent(share)
         ))
     )
@@ -66,12 +66,12 @@ fn unexplained(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     let share = percent(found.unexplained.share);
     writeln!(f, "<section>\n<h2>What stays unexplained</h2>")?;
     if found.unexplained.depends_on.is_empty() {
-        writeln!(f, "<p>Beyond noise nothing is left that depends on any covariate that was looked at.</p>")?;
+        writeln!(f, "<p>Nothing beyond noise is left that depends on any covariate examined.</p>")?;
     } else {
         writeln!(
             f,
-            "<p class=\"warn\">{share} of the gap is left. It depends on {}, and no effect of the library is it; so it has no name, and the \
-             grown model does not contain it.</p>",
+            "<p class=\"warn\">{share} of the gap is left. It depends on {}, and no effect of the library explains it, so the grown model does \
+             not contain it.</p>",
             Text(list(&found.unexplained.depends_on))
         )?;
     }

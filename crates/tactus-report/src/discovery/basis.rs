@@ -1,4 +1,4 @@
-//! What a discovery rests on.
+//! The data behind a discovery.
 
 use std::fmt;
 
@@ -16,11 +16,11 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
         if values.is_empty() { "none".into() } else { values.join(", ") + " mm" }
     };
     let noise = match found.noise_rms_counts {
-        Some(rms) => format!("{} counts rms, from frames that repeat each other", digits(rms, 3)),
-        None => "not known: no frames repeat each other".into(),
+        Some(rms) => format!("{} counts rms, from repeated frames", digits(rms, 3)),
+        None => "unknown: no frames are repeats".into(),
     };
     let sensor = if report.simulated { "SIMULATED: no physical sensor was read" } else { "physical" };
-    writeln!(f, "<section>\n<h2>What this rests on</h2>\n<div class=\"facts\">\n<table>")?;
+    writeln!(f, "<section>\n<h2>Data</h2>\n<div class=\"facts\">\n<table>")?;
     for (name, fact) in [
         ("sensor", sensor.into()),
         ("frames", count(split.frames as u64)),

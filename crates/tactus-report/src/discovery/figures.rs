@@ -10,19 +10,19 @@ use crate::{
     plot::{Axis, ColourBar, Figure, HeatMap, Image, Ink, Label, Panel, Scale, Series, Sheet},
 };
 
-/// The models that are compared.
+/// Names of the two models.
 const BEFORE: &str = "base model";
 const AFTER: &str = "grown model";
-/// Three beside each other on a page.
+/// Size of one of three curves in a row.
 const CURVE_PX: [f64; 2] = [344.0, 240.0];
-/// Between two maps.
+/// Width between two maps.
 const GUTTER_PX: f64 = 40.0;
-/// Room for the names of bars, and for the longest of them.
+/// Width of the bars' names, and of the longest bar.
 const BARS_PX: [f64; 2] = [290.0, 480.0];
-/// Height of a bar with what is between two.
+/// Height of a bar and the space below it.
 const BAR_PX: f64 = 26.0;
 
-/// The mean residual along a covariate with standard errors, of the base model and, where that differs, of the grown one.
+/// Mean residual against a covariate, with standard errors: base model and, if different, grown model.
 pub fn residual_against(curve: &Curve) -> Figure {
     let x = Axis::new(curve.covariate, curve.unit).tight();
     let y = Axis::new("residual", curve.of).from_zero();
@@ -41,8 +41,8 @@ pub fn residual_against(curve: &Curve) -> Figure {
     figure.with(bars.ink(Ink::Blue)).with(dots.ink(Ink::Blue).label(AFTER))
 }
 
-/// The root mean square residual of each element, of the base model and, where that differs, of the grown one, on one
-/// scale: in units of the noise where that is known, else in counts.
+/// Root mean square residual of each element, of the base model and, if different, of the grown model, on one scale: in
+/// units of the noise if that is known, else in counts.
 pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Option<f64>) -> Sheet {
     let (rows, cols) = (array.rows(), array.cols());
     let unit_counts = noise_rms_counts.unwrap_or(1.0);
@@ -53,7 +53,7 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
     let before = values(|element| element.before_rms_counts);
     let after = values(|element| element.after_rms_counts);
     let greatest = before.iter().chain(&after).map(|value| f64::from(*value)).fold(0.0, f64::max);
-    // Where nothing but noise is left, its ups and downs are no reason for bright colours.
+    // Noise alone is not drawn in bright colours.
     let scale = Scale::new(0.0, if noise_rms_counts.is_some() { greatest.max(2.0) } else { greatest });
     let maps = [(BEFORE, &before), (AFTER, &after)];
     let maps = if before == after { &maps[..1] } else { &maps[..] };
@@ -72,7 +72,7 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
     sheet
 }
 
-/// The held-out residual of the base model, of the grown model without each effect, of the grown model, and the noise.
+/// Held-out residuals of the base model, of the grown model without each effect, and of the grown model; and the noise.
 pub fn levels(found: &Discovery) -> Sheet {
     let mut bars =
         vec![LevelBar::new(format!("{BEFORE}, recalibrated"), found.base.heldout_rms_counts, Ink::Red)];

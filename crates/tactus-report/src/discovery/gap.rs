@@ -1,4 +1,4 @@
-//! Where model and data disagree.
+//! Covariates and elements at which model and data disagree.
 
 use std::fmt;
 
@@ -7,23 +7,23 @@ use tactus_discover::Discovery;
 use super::{DiscoveryReport, element_maps, residual_against, words};
 use crate::{
     document::{Column, Table},
-    numbers::{chance, digits},
+    numbers::{digits, probability},
 };
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {
     let found = report.discovery;
     writeln!(
         f,
-        "<section>\n<h2>Where the gap is</h2>\n<p class=\"lead\">The residual is what was measured minus what the model predicts. Before \
-         anything is looked for, the base model is fitted anew to the data (gains, zeros, spread), so that an error of these is not \
+        "<section>\n<h2>Where the gap is</h2>\n<p class=\"lead\">The residual is the measurement minus the model's prediction. The base model is first \
+         fitted to the data again (gains, zeros, spread), so that an error in these is not \
          taken for an effect.</p>"
     )?;
     table(f, found)?;
     if !found.curves.is_empty() {
         writeln!(
             f,
-            "<h3>The residual against each covariate</h3>\n<p class=\"lead\">Means over the frames near each place, with their standard errors, of the recalibrated base model and of \
-             the grown one, if it grew. Where a model is right, nothing but noise lies about zero.</p>\n<div class=\"multiples\">"
+            "<h3>The residual against each covariate</h3>\n<p class=\"lead\">Means over nearby frames with their standard errors, for the recalibrated base model and for \
+             the grown model, if there is one. If a model is right, its residual is noise about zero.</p>\n<div class=\"multiples\">"
         )?;
         for curve in &found.curves {
             writeln!(f, "{}", residual_against(curve))?;
@@ -46,17 +46,17 @@ fn table(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     let global = found.global;
     writeln!(
         f,
-        "<p>Is there structure beyond noise at all? The largest of all standardised scores is {}; data sets whose residuals have their \
-         signs flipped block by block give a larger one with a chance of {}.</p>",
+        "<p>Is there structure beyond noise? The largest standardised score is {}. The probability of a larger one in data whose residuals \
+         have randomly flipped signs, block by block, is {}.</p>",
         digits(global.statistic, 3),
-        words::chance(global.p_value)
+        words::probability(global.p_value)
     )?;
     if found.gap.is_empty() {
-        return writeln!(f, "<p>The residual depends on no covariate that was looked at.</p>");
+        return writeln!(f, "<p>The residual depends on no covariate examined.</p>");
     }
     let mut table = Table::new(&[
         Column::Name("the residual depends on"),
-        Column::Number("most from"),
+        Column::Number("largest from"),
         Column::Number("to"),
         Column::Name(""),
         Column::Number("size / noise"),
@@ -65,11 +65,11 @@ fn table(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     for gap in &found.gap {
         let [from, to] = gap.range.map(|end| digits(end, 3));
         let size = digits(gap.effect_size, 3);
-        table.row([gap.covariate, &from, &to, gap.unit, &size, &chance(gap.q_value)]);
+        table.row([gap.covariate, &from, &to, gap.unit, &size, &probability(gap.q_value)]);
     }
     writeln!(
         f,
         "{table}\n<p class=\"lead\">Size: root mean square of the dependence in units of the noise of one reading. q: the false-discovery \
-         rate if everything down to this row is believed.</p>"
+         rate if all rows down to this one are accepted.</p>"
     )
 }

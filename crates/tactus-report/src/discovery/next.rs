@@ -1,4 +1,4 @@
-//! What to measure next: each experiment once, with all that it would tell.
+//! Proposed experiments, each once, with everything that it would decide.
 
 use std::fmt;
 
@@ -10,18 +10,18 @@ use crate::{
     numbers::{digits, duration},
 };
 
-/// An experiment to be made next.
+/// A proposed experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
-    /// What to type to run it.
+    /// The command line that runs it.
     pub command: String,
-    /// How long it takes on the rig, roughly.
+    /// Approximate duration on the rig.
     pub duration_s: f64,
-    /// What it tells, such as `tells backlash from hysteresis (z = 11); shows imprint (z = 4.1)`.
-    pub tells: String,
+    /// What it decides, such as `distinguishes backlash from hysteresis (z = 11); shows imprint (z = 4.1)`.
+    pub decides: String,
 }
 
-/// The proposed experiments in their order, each once.
+/// The proposed experiments in order of priority, each once.
 pub fn proposals(found: &Discovery) -> Vec<Proposal> {
     let mut commands: Vec<(String, Vec<&NextExperiment>)> = Vec::new();
     for next in &found.next_experiments {
@@ -34,12 +34,12 @@ pub fn proposals(found: &Discovery) -> Vec<Proposal> {
     let proposal = |(command, questions): (String, Vec<&NextExperiment>)| Proposal {
         command,
         duration_s: questions[0].duration_s,
-        tells: tells(&questions),
+        decides: decides(&questions),
     };
     commands.into_iter().map(proposal).collect()
 }
 
-fn tells(questions: &[&NextExperiment]) -> String {
+fn decides(questions: &[&NextExperiment]) -> String {
     let mut parts: Vec<String> = Vec::new();
     let mut shown: Vec<String> = Vec::new();
     for next in questions {
@@ -48,7 +48,7 @@ fn tells(questions: &[&NextExperiment]) -> String {
         if other == "nothing" {
             shown.push(format!("{one} (z = {z})"));
         } else {
-            parts.push(format!("tells {one} from {other} (z = {z})"));
+            parts.push(format!("distinguishes {one} from {other} (z = {z})"));
         }
     }
     if !shown.is_empty() {
@@ -64,18 +64,18 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
         return writeln!(f, "<p>No experiment is proposed.</p>\n</section>");
     }
     writeln!(f, "<ol>")?;
-    for Proposal { command, duration_s, tells } in &proposals {
+    for Proposal { command, duration_s, decides } in &proposals {
         writeln!(
             f,
             "<li><code>{}</code> ({})<br>{}</li>",
             Text(command),
             duration(*duration_s),
-            Text(tells)
+            Text(decides)
         )?;
     }
     writeln!(
         f,
-        "</ol>\n<p>z: by how many standard errors two explanations would differ, or a small effect would stand out. Then give the \
+        "</ol>\n<p>z: expected difference between two explanations, or size of a small effect, in standard errors. Give the \
          new recording together with these data to <code>tactus discover</code>.</p>\n</section>"
     )
 }

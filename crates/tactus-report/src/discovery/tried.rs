@@ -1,4 +1,4 @@
-//! What was tried, round by round.
+//! The effects tried in each round.
 
 use std::fmt;
 
@@ -8,19 +8,19 @@ use super::words::{list, percent};
 use crate::{
     document::{Column, Table},
     markup::Text,
-    numbers::{chance, digits},
+    numbers::{digits, probability},
 };
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     writeln!(f, "<section>\n<h2>What was tried</h2>")?;
     if found.rounds.is_empty() {
-        return writeln!(f, "<p>Nothing: there is no structure that wants an explanation.</p>\n</section>");
+        return writeln!(f, "<p>Nothing: there is no structure to explain.</p>\n</section>");
     }
     writeln!(
         f,
-        "<p class=\"lead\">In each round every effect that the data can show is scored on the fitted presses: would the smallest amount of it \
-         lessen the residual? The best are then fitted, together with the base model and what was added before, and compared on presses \
-         that no fit has seen.</p>"
+        "<p class=\"lead\">In each round every effect that the data can show is scored on the fitted presses: would a small amount of it \
+         reduce the residual? The best are then fitted jointly with the base model and the effects added before, and compared on \
+         held-out presses.</p>"
     )?;
     for (nth, round) in found.rounds.iter().enumerate() {
         self::round(f, nth + 1, round)?;
@@ -51,7 +51,7 @@ fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round) -> fmt::Result {
             table.row([
                 candidate.effect,
                 &digits(candidate.score, 3),
-                &chance(candidate.p_value),
+                &probability(candidate.p_value),
                 &candidate.heldout_rms_counts.map_or_else(|| "\u{2013}".into(), |rms| digits(rms, 3)),
                 &candidate.shrink.map_or_else(|| "\u{2013}".into(), percent),
                 taken,
@@ -61,7 +61,12 @@ fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round) -> fmt::Result {
     }
     if !scored.is_empty() {
         let scored = scored.iter().map(|candidate| {
-            format!("{} ({}, p {})", candidate.effect, digits(candidate.score, 2), chance(candidate.p_value))
+            format!(
+                "{} ({}, p {})",
+                candidate.effect,
+                digits(candidate.score, 2),
+                probability(candidate.p_value)
+            )
         });
         writeln!(f, "<p class=\"lead\">Scored only: {}.</p>", Text(list(scored)))?;
     }

@@ -1,18 +1,18 @@
-//! A discovery in a sentence or two.
+//! The verdict of a discovery in words.
 
 use tactus_discover::{Discovery, Verdict};
 
 use crate::numbers::{digits, short};
 use crate::plot::number;
 
-/// The verdict in plain words, with the numbers that it rests on.
+/// The verdict in a sentence or two, with its numbers.
 pub fn in_words(found: &Discovery) -> String {
     let before = digits(found.base.heldout_rms_counts, 3);
     let after = digits(found.final_.level.heldout_rms_counts, 3);
     let noise = found.noise_rms_counts.map(|rms| digits(rms, 3));
     let added = list(found.steps.iter().map(|step| step.effect));
     let noise_is = noise.as_ref().map_or_else(
-        || "how large the noise is, these data do not tell".into(),
+        || "the size of the noise is unknown".into(),
         |noise| format!("the noise is {noise} counts"),
     );
     let closed = found.final_.shrink.map_or_else(String::new, |share| {
@@ -23,9 +23,9 @@ pub fn in_words(found: &Discovery) -> String {
     );
     match found.verdict {
         Verdict::NothingMissing => format!(
-            "Nothing that these data can show is missing from the model: on held-out presses its residual is {before} counts rms, {noise_is}, \
-             and noise alone shows as much structure with a chance of {}.",
-            chance(found.global.p_value)
+            "The model is missing no effect that these data can show: on held-out presses its residual is {before} counts rms and {noise_is}. \
+             The probability of as much structure by noise alone is {}.",
+            probability(found.global.p_value)
         ),
         Verdict::Explained => format!("The model was missing {added}. {falls}"),
         Verdict::PartlyExplained => format!(
@@ -33,20 +33,20 @@ pub fn in_words(found: &Discovery) -> String {
             left(found)
         ),
         Verdict::Unexplained => format!(
-            "The model is missing something that no known effect matches: on held-out presses its residual is {before} counts rms, and \
+            "The model is missing something that no known effect matches: on held-out presses its residual is {before} counts rms and \
              {noise_is}. {}",
             left(found)
         ),
     }
 }
 
-/// What is left, and on what it depends.
+/// The unexplained share, and the covariates on which it depends.
 fn left(found: &Discovery) -> String {
     let share = percent(found.unexplained.share);
     match &found.unexplained.depends_on[..] {
-        [] => format!("What is left, {share} of the gap, depends on no covariate that was looked at."),
+        [] => format!("The remaining {share} of the gap depends on no covariate examined."),
         depends_on => {
-            format!("What is left, {share} of the gap, depends on {}.", list(depends_on.iter().copied()))
+            format!("The remaining {share} of the gap depends on {}.", list(depends_on.iter().copied()))
         }
     }
 }
@@ -66,13 +66,13 @@ pub(super) fn list<T: AsRef<str>>(names: impl IntoIterator<Item = T>) -> String 
     text
 }
 
-/// `97 %`, `99.2 %`: one decimal where a whole number would hide what is lacking.
+/// `97 %`, `99.2 %`: one decimal near 0 % and 100 %.
 pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     format!("{} %", short(percent, usize::from((percent - 100.0).abs() < 2.0 || percent.abs() < 2.0)))
 }
 
-/// A chance within a sentence.
-pub(super) fn chance(chance: f64) -> String {
-    if chance < 1e-3 { "less than 0.001".into() } else { number(chance, 3) }
+/// A probability within a sentence.
+pub(super) fn probability(value: f64) -> String {
+    if value < 1e-3 { "less than 0.001".into() } else { number(value, 3) }
 }

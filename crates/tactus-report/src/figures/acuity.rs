@@ -8,12 +8,12 @@ use super::{Drawing, FigureError};
 use crate::plot::{Axis, ColourBar, Figure, HeatMap, Image, Ink, Label, Panel, Scale, Series, Sheet, number};
 
 const CELL_PX: f64 = 9.0;
-/// Places of the panels and of what stands beside them.
+// Positions of the panels and of the plots beside them.
 const TOP_PX: f64 = 42.0;
 const PANELS_PX: [f64; 2] = [52.0, 344.0];
 const BESIDE_PX: f64 = 596.0;
 
-/// The paper's panel, the same for force steps that are hardly ever whole, and some of both against the spread.
+/// The paper's panel; the same for force steps that are mostly not whole; and profiles of both against the spread.
 pub(super) fn draw_locations() -> Result<Drawing, FigureError> {
     let panel = |heading, below, grid: Grid| {
         let counts = grid.map(|sensor| Some(sensor.locations() as f64))?;
@@ -49,15 +49,15 @@ pub(super) fn draw_locations() -> Result<Drawing, FigureError> {
         whole.best().map(|(row, _, count)| count * whole.grid.force_resolutions[row]).collect();
     let ridge = span(whole.best().map(|(_, sigma, _)| sigma));
     let caption = format!(
-        "Distinct readings of five elements as a point goes over the middle one in steps of 0.02 f, against the spread \u{3c3} \
-         (in element widths) and the force resolution f: an upper bound of the places that can be told apart. The paper \
-         gives no ranges; here \u{3c3} is {} to {} and 1/f is {} to {}, 25 of each. Dots: the least spread with the most \
-         readings. Left, 1/f is a whole number, as a converter with so many steps has: a ridge at \u{3c3} = {ridge}, near the \
-         paper's 0.3 at all resolutions, with {} readings times f. It is there because, under a small spread, a point is on two \
-         elements only, whose shares sum to 1: with a whole 1/f both change at once, and half of the readings are lost. \
-         Middle and right, for other 1/f they do not, and there is a plateau of about 2/f readings from \u{3c3} = 0.05 to 0.2 \
-         and no ridge. The dashed line is the spread that forbids aliasing, 3/\u{3c0} = {NYQUIST_SIGMA:.3}, which the paper \
-         rounds to 1.0. Eq. 6 as printed rounds to two values at most; it is read as rounding to multiples of f, as the text says.",
+        "Distinct readings of five elements as a point moves over the middle one in steps of 0.02 f, against the spread \u{3c3} \
+         (in element widths) and the force resolution f: an upper bound of the positions that can be distinguished. The paper \
+         gives no ranges; here \u{3c3} is {} to {} and 1/f is {} to {}, 25 values each. Dots: the least spread with the most \
+         readings. Left: 1/f is a whole number, as for a converter with so many steps. There is a ridge at \u{3c3} = {ridge}, near the \
+         paper's 0.3 at all resolutions, with {} readings times f. Its cause: with a small spread a point loads only two \
+         elements, whose shares sum to 1; with a whole 1/f both readings change at once, and half of the readings are lost. \
+         Middle and right: for other 1/f they change separately, and there is a plateau of about 2/f readings from \u{3c3} = 0.05 to 0.2 \
+         and no ridge. Dashed line: the least spread without aliasing, 3/\u{3c0} = {NYQUIST_SIGMA:.3}, which the paper \
+         rounds to 1.0. Eq. 6 as printed rounds to at most two values; here it rounds to multiples of f, as the paper's text says.",
         Grid::SIGMAS[0],
         Grid::SIGMAS[1],
         Grid::FORCE_STEPS[0],
@@ -67,7 +67,7 @@ pub(super) fn draw_locations() -> Result<Drawing, FigureError> {
     Ok(Drawing { sheet, caption })
 }
 
-/// The panel for the paper's offsets, the same for those between them, one row of both, and where their optima are.
+/// The panel for the paper's offsets; the same for offsets between them; a profile of both; and their optima.
 pub(super) fn draw_two_points() -> Result<Drawing, FigureError> {
     const ROW_STEPS: f64 = 64.0;
     let panel = |heading, below, offsets: &[f64]| {
@@ -77,7 +77,7 @@ pub(super) fn draw_two_points() -> Result<Drawing, FigureError> {
     };
     let paper = panel("offsets 0, 0.1, ..., 0.9", "the paper's", &OFFSETS)?;
     let between = panel("offsets 0.05, 0.15, ..., 0.95", "between the paper's", &OFFSETS_BETWEEN)?;
-    let title = "log\u{2081}\u{2080} of the separation in element widths; blank: never";
+    let title = "log\u{2081}\u{2080} of the separation in element widths; blank: none";
     let mut sheet = sheet("Separation of two points", [&paper, &between], Scale::new(-1.5, 1.0), title);
 
     let mut profiles = beside("Mean separation against spread", "separation");
@@ -112,25 +112,25 @@ pub(super) fn draw_two_points() -> Result<Drawing, FigureError> {
     };
     let [[p10, p50, p90], [b10, b50, b90]] = [&paper, &between].map(optimum);
     let caption = format!(
-        "Separation at which two points about the same middle first read otherwise than one of twice the force, in steps of \
-         0.02 f, mean over ten places of the middle; ranges as in Figure 6a, 1/f whole. Dots: the least separation of each row. \
-         Left, for the paper's places the optimum is mostly {p10} to {p90}, in the middle {p50}: the paper's 0.35. Beside it, for \
-         as many places between those it is {b10} to {b90}, in the middle {b50}. So the optimum hangs on the places 0 and 0.5, an \
-         element's edge and middle: under a small spread, two points must part from there by two elements or one until any \
-         reading changes. It also jumps from row to row (lower right), because the curves are flat and ragged (upper right). \
-         Blank cells: nothing ever reads half a step, so that no separation is told. The dashed line is the spread that \
-         forbids aliasing, {NYQUIST_SIGMA:.3}."
+        "Separation at which two points first read differently from one point of twice the force at their middle, in steps of \
+         0.02 f, mean over ten positions of the middle; ranges as in Figure 6a, with 1/f whole. Dots: the least separation of each row. \
+         Left: for the paper's positions the optimum is mostly {p10} to {p90}, with median {p50}, as the paper's 0.35. Next to it: for \
+         as many positions between those it is {b10} to {b90}, with median {b50}. So the optimum depends on the positions 0 and 0.5, an \
+         element's edge and middle: with a small spread, two points must separate from there by two elements or one before any \
+         reading changes. The optimum also jumps from row to row (lower right), because the curves are flat and irregular (upper right). \
+         Blank cells: no reading reaches half a step, so no separation can be detected. Dashed line: the least spread without \
+         aliasing, {NYQUIST_SIGMA:.3}."
     );
     Ok(Drawing { sheet, caption })
 }
 
-/// A quantity over spreads and force resolutions, both on logarithmic scales; its origin is the cells' upper left corner.
+/// A quantity over spread and force resolution, both on logarithmic scales; the origin is the cells' upper left corner.
 struct LogPanel {
     headings: [&'static str; 2],
     grid: Grid,
-    /// Row-major, the coarsest force resolution first; not a number where there is none.
+    /// Row-major, the coarsest force resolution first; NaN for missing values.
     log10: Vec<f32>,
-    /// The column that is best, row by row, and its value.
+    /// Best column and its value, for each row.
     best: Vec<Option<(usize, f64)>>,
 }
 
@@ -151,7 +151,7 @@ impl LogPanel {
         Self { headings, grid, log10, best }
     }
 
-    /// Row, spread and value of the best of every row.
+    /// Row, spread and value of the best cell of each row.
     fn best(&self) -> impl Iterator<Item = (usize, f64, f64)> {
         let rows = self.best.iter().enumerate();
         rows.filter_map(|(row, best)| best.map(|(col, value)| (row, self.grid.sigmas[col], value)))
@@ -207,13 +207,13 @@ impl Panel for LogPanel {
     }
 }
 
-/// Where a value stands among values on a logarithmic scale, from the outer side of the first cell.
+/// Position of a value on the logarithmic scale of `values`, from the outer edge of the first cell.
 fn along(values: &[f64], value: f64, length_px: f64) -> f64 {
     let [Some(first), Some(last)] = [values.first(), values.last()] else { return 0.0 };
     CELL_PX / 2.0 + (length_px - CELL_PX) * (value / first).ln() / (last / first).ln()
 }
 
-/// Two panels beside each other, their headings and their colours.
+/// Two panels side by side with headings and colour scale.
 fn sheet(name: &str, panels: [&LogPanel; 2], scale: Scale, bar: &str) -> Sheet {
     let mut sheet = Sheet::new(name, [1070.0, 374.0]);
     for (panel, x) in panels.into_iter().zip(PANELS_PX) {
@@ -229,7 +229,7 @@ fn sheet(name: &str, panels: [&LogPanel; 2], scale: Scale, bar: &str) -> Sheet {
     sheet
 }
 
-/// Axes over the spread, for what stands beside the panels.
+/// Axes for a plot against the spread, beside the panels.
 fn beside(name: &str, quantity: &str) -> Figure {
     Figure::new(
         name,
@@ -242,7 +242,7 @@ fn nyquist_line(range: [f64; 2]) -> Series {
     Series::line(range.map(|y| [NYQUIST_SIGMA, y]).to_vec()).ink(Ink::Muted).dotted()
 }
 
-/// Spreads in hundredths, under one force resolution.
+/// A fine grid of spreads for one force resolution.
 fn fine_sigmas(force_steps: f64) -> Grid {
     Grid {
         sigmas: (2..=120).map(|hundredths| f64::from(hundredths) / 100.0).collect(),
@@ -250,7 +250,7 @@ fn fine_sigmas(force_steps: f64) -> Grid {
     }
 }
 
-/// From the least to the greatest.
+/// Least and greatest value as text.
 fn span(values: impl Iterator<Item = f64>) -> String {
     let [least, most] =
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], value| [a.min(value), b.max(value)]);

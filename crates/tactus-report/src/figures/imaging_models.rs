@@ -1,4 +1,4 @@
-//! Figure 4: one press through different imaging models.
+//! Figure 4: one press in four imaging models.
 
 use tactus_model::{Array, Contact, Covering, Psf};
 use tactus_solid::fem::Bricks;
@@ -8,7 +8,7 @@ use super::{
 };
 use crate::plot::{ColourBar, HeatMap, Image, Label, Scale, Sheet, number};
 
-/// Poisson's ratio of the covering: rubber hardly changes its volume.
+/// Poisson's ratio of the covering: rubber is nearly incompressible.
 const POISSON_RATIO: f64 = 0.49;
 /// Bricks along a side and layers of them, under each covering.
 const ACROSS: u32 = 480;
@@ -20,9 +20,9 @@ const SEED: u64 = 4;
 /// One press of the 1 mm cylinder, imaged by four models.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelledPress {
-    /// The covering.
+    /// The pressed covering.
     pub covering: Covering,
-    /// Where the press is, in words.
+    /// Position of the press in words.
     pub place: &'static str,
     /// Spread of the Gaussian fitted to the finite elements' response to a point.
     pub fitted_sigma_mm: f64,
@@ -33,7 +33,7 @@ pub struct ModelledPress {
 }
 
 impl ModelledPress {
-    /// Images a press at a place of the `DigiTacts` array under a covering.
+    /// Images a press at a position of the `DigiTacts` array under a covering.
     pub(super) fn new(
         covering: Covering,
         place: &'static str,
@@ -78,8 +78,8 @@ impl ModelledPress {
     }
 }
 
-/// Draws presses on the `DigiTacts` array below each other, their four images side by side, with the largest
-/// difference to the finite elements' image under each.
+/// Draws presses on the `DigiTacts` array in rows of four images, with the largest difference from the finite elements'
+/// image below each.
 pub fn imaging_models(presses: &[ModelledPress]) -> Sheet {
     const CELL_PX: f64 = 19.0;
     const LEFT_PX: f64 = 118.0;
@@ -149,14 +149,14 @@ pub(super) fn draw() -> Result<Drawing, FigureError> {
     };
     let caption = format!(
         "The 1 mm cylinder, imaged by the 6 x 8 array at the centre of an element and between four of them, under the \
-         thinnest and the thickest covering. Under each image stands its largest difference from that of the finite elements, \
-         in percent of the peak. They are {ACROSS} x {ACROSS} x {LAYERS} cubes, bonded to the base, with a Poisson's ratio of \
-         {POISSON_RATIO}; the elements' images are within 0.2 % of those of the elastic layer that the bricks stand for. \
-         Once the elements have integrated the forces, a Gaussian fitted to the response to a point is within {} %: as far as \
-         the covering goes, a point spread function will do, as the paper found. The spread of Eq. 4 is larger: it holds \
-         the sensor's own spread of 1.11 element widths, which no elastic covering explains. The paper's actual sensor is \
-         here a virtual one, simulated with Eq. 4, gains that differ, noise and a converter, and corrected by its linear \
-         response; it agrees with Eq. 4 within {} % by its making, which says nothing about a real sensor.",
+         thinnest and the thickest covering. Below each image is its largest difference from the finite elements' image, \
+         in percent of the peak. The mesh has {ACROSS} x {ACROSS} x {LAYERS} cubes, bonded to the base, with a Poisson's ratio of \
+         {POISSON_RATIO}; its images are within 0.2 % of those of the elastic layer that it represents. \
+         After the elements integrate the forces, a Gaussian fitted to the response to a point is within {} %, so a point \
+         spread function describes the covering well, as the paper found. The spread of Eq. 4 is larger: it includes \
+         the sensor's own spread of 1.11 element widths, which no elastic covering explains. The virtual sensor \
+         replaces the paper's; it is simulated with Eq. 4, different gains, noise and a converter, and corrected by its linear \
+         response. It agrees with Eq. 4 within {} % by construction, which says nothing about a real sensor.",
         most(1, 0),
         most(3, 2)
     );

@@ -1,4 +1,4 @@
-//! Figure 3: the impulse response of coverings by finite elements, and the Gaussians beside it.
+//! Figure 3: impulse responses of coverings by finite elements, and the paper's Gaussians.
 
 use std::f64::consts::PI;
 
@@ -16,28 +16,28 @@ use crate::{
 /// Bricks along a side, and layers of them (paper, Fig. 3).
 const ACROSS: u32 = 100;
 const LAYERS: [u32; 6] = [5, 6, 7, 8, 9, 10];
-/// Of the responses drawn; the paper gives none.
+/// Poisson's ratio of the drawn responses; the paper gives none.
 const POISSON_RATIO: f64 = 0.45;
-/// Between these lies what coverings are made of.
+/// Range of Poisson's ratios of covering materials, and a value between.
 const POISSON_RATIOS: [f64; 3] = [0.3, 0.45, 0.49];
 /// The paper's spread in bricks: `0.5 t + 0.9` at `t` layers.
 const PAPER: [f64; 2] = [0.9, 0.5];
 
-/// How the Gaussian that is most like the response widens with the thickness, in cubes of side 1.
+/// Spread of the best-fitting Gaussian against thickness, in cubes of side 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Widening {
-    /// Of the covering.
+    /// Poisson's ratio of the covering.
     pub poisson_ratio: f64,
     /// Thickness in layers and spread in bricks.
     pub sigmas: Vec<[f64; 2]>,
-    /// Intercept in bricks, and slope, of the line through them.
+    /// Intercept in bricks and slope of the fitted line.
     pub line: [f64; 2],
-    /// Spread over thickness of the elastic layer that the bricks stand for.
+    /// Spread divided by thickness for a continuous elastic layer.
     pub of_layer: f64,
 }
 
 impl Widening {
-    /// Finds the spreads of coverings of 5 to 10 layers.
+    /// Computes the spreads of coverings of 5 to 10 layers.
     ///
     /// # Errors
     /// If Poisson's ratio is not in `[0, 0.5)`.
@@ -52,8 +52,8 @@ impl Widening {
     }
 }
 
-/// Draws the forces along the middle of the base under coverings of so many layers, the paper's Gaussians for them, and
-/// how the best Gaussians widen. Up to six responses, and up to three widenings, of cubes of side 1.
+/// Draws the forces along the middle of the base for coverings of several layers, the paper's Gaussians for them, and the
+/// spread of the best Gaussians against thickness. Up to six responses and three widenings, in cubes of side 1.
 pub fn impulse_responses(responses: &[(u32, Reaction)], widenings: &[Widening]) -> Sheet {
     const INKS: [Ink; 6] = [Ink::Red, Ink::Amber, Ink::Green, Ink::Blue, Ink::Muted, Ink::Text];
     const REACH: f64 = 20.0;
@@ -102,7 +102,7 @@ pub fn impulse_responses(responses: &[(u32, Reaction)], widenings: &[Widening]) 
     sheet
 }
 
-/// The lines of the widenings and the paper's, in numbers.
+/// Table of the fitted lines and the paper's.
 fn table(sheet: &mut Sheet, [x, y]: [f64; 2], widenings: &[Widening]) {
     const COLUMNS_PX: [f64; 4] = [0.0, 138.0, 206.0, 330.0];
     const ROW_PX: f64 = 24.0;
@@ -128,10 +128,10 @@ fn table(sheet: &mut Sheet, [x, y]: [f64; 2], widenings: &[Widening]) {
     }
     let notes = [
         "Slope: elasticity. An elastic layer has one length, its thickness,",
-        "and its response can only widen in proportion to it.",
-        "Intercept: about 0.2 bricks are the mesh's, whose load and whose",
-        "nodes are each a brick wide. The other 0.7 of the paper's 0.9",
-        "are neither the covering's nor the mesh's.",
+        "and its response can widen only in proportion to it.",
+        "Intercept: about 0.2 bricks come from the mesh, whose load and",
+        "nodes are each one brick wide. The other 0.7 of the paper's 0.9",
+        "come neither from the covering nor from the mesh.",
     ];
     for (line, note) in notes.into_iter().enumerate() {
         sheet.put([x, y + ROW_PX * 6.0 + 18.0 * line as f64], &Label::new(note).muted());
@@ -148,12 +148,12 @@ pub(super) fn draw() -> Result<Drawing, FigureError> {
     let caption = format!(
         "(a) Vertical forces on the nodes along the middle of the base under a force of 1 on the node at the middle of the \
          top: {ACROSS} x {ACROSS} bricks in 5 to 10 layers, linear elastic, bonded to the base, sides on rollers. The paper \
-         gives neither units, nor the bricks' shape, nor Poisson's ratio; taken are cubes, lengths in their side, and \
-         {POISSON_RATIO}, and bricks with mean dilatation, which do not lock. Right below the load the forces are off those of \
+         gives neither units, nor the bricks' shape, nor Poisson's ratio; here the bricks are cubes of side 1 with a ratio of \
+         {POISSON_RATIO} and mean dilatation, which prevents locking. Directly below the load the forces differ from those of \
          an elastic layer by 10 % of the peak with 5 layers and 4 % with 10. (b) The same force convolved with the paper's \
          Gaussian of \u{3c3} = 0.5 t + 0.9, t in layers, each of unit volume. It is lower and wider than (a). (c) The spread \
-         of the Gaussian that is most like all forces of the base (Eq. 3), and lines through the spreads: the slope is {} \
-         to {}, near the paper's 0.5, for Poisson's ratios from 0.30 to 0.49; the intercept of 0.9 is not reproduced, and no \
+         of the Gaussian most similar to all forces of the base (Eq. 3), and lines fitted to the spreads. The slope is {} \
+         to {}, near the paper's 0.5, for Poisson's ratios from 0.30 to 0.49. The intercept of 0.9 is not reproduced, and no \
          elastic covering gives it.",
         number(least, 2),
         number(most, 2),
@@ -161,7 +161,7 @@ pub(super) fn draw() -> Result<Drawing, FigureError> {
     Ok(Drawing { sheet: impulse_responses(&responses, &widenings), caption })
 }
 
-/// The base's forces under cubes of side 1 with a force on the middle of their top.
+/// Forces at the base of cubes of side 1 with a force at the middle of the top.
 fn respond(layers: u32, poisson_ratio: f64) -> Result<Reaction, BricksError> {
     Ok(Bricks::cubes(ACROSS, layers, 1.0, poisson_ratio)?.under_point())
 }

@@ -1,4 +1,4 @@
-//! All figures on one page that loads nothing.
+//! A page of all figures.
 
 use super::{Drawing, FIGURES};
 use crate::{
@@ -22,8 +22,8 @@ pub(super) fn page(drawings: &[Drawing]) -> String {
         .collect();
     let header = format!(
         "<header>\n<div class=\"headline\"><h1>The paper's figures</h1>{SIMULATED_BADGE}</div>\n\
-         <p class=\"under\">Characterization and simulation of tactile sensors, drawn again from the model. No physical \
-         sensor was read: where the paper shows one, a virtual sensor stands in.</p>\n</header>\n"
+         <p class=\"under\">Characterization and Simulation of Tactile Sensors, computed from the model. No physical \
+         sensor was read; a virtual sensor replaces the paper's.</p>\n</header>\n"
     );
     document("The paper's figures", header + &sections.concat())
 }

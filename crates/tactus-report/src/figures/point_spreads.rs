@@ -7,14 +7,14 @@ use tactus_model::{Covering, DIGITACTS_PITCH_MM, Psf};
 use super::{COVERINGS, Drawing, FigureError, inches};
 use crate::plot::{Axis, Figure, HeatMap, Image, Ink, Label, Panel, Scale, Series, Sheet};
 
-/// Draws the Gaussian of each covering: as a profile of unit volume, and as an image of its own scale. Lengths are in
+/// Draws the Gaussian of each covering as a profile of unit volume and as an image on its own scale. Lengths are in
 /// pitches.
 pub fn point_spreads(psf: Psf, pitch_mm: f64, coverings: &[Covering]) -> Sheet {
     let spread = |covering: &Covering| (inches(*covering), psf.sigma_mm(*covering) / pitch_mm);
     profiles(&coverings.iter().map(spread).collect::<Vec<_>>())
 }
 
-/// The same of spreads in pitches, each with its covering's name.
+/// Draws Gaussians of spreads in pitches, each with its covering's name.
 pub(crate) fn profiles(spreads: &[(String, f64)]) -> Sheet {
     const INKS: [Ink; 5] = [Ink::Blue, Ink::Green, Ink::Amber, Ink::Red, Ink::Text];
     const PIXELS: u32 = 60;

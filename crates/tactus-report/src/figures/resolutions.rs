@@ -8,17 +8,17 @@ use tactus_scene::shapes::{SCENES, Scene};
 use super::{COVERINGS, Drawing, FigureError, middle_mm, uniform, zero_to_one};
 use crate::plot::{ColourBar, HeatMap, Image, Label, Scale, Sheet, number};
 
-/// Images of several tools on one array.
+/// Images of all tools on one array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resolution {
-    /// The array.
+    /// The array that reads the images.
     pub array: Array,
-    /// One image a tool, row-major, 0 to 1.
+    /// One image per tool, row-major, 0 to 1.
     pub images: Vec<Vec<f32>>,
 }
 
 impl Resolution {
-    /// Tools pressed into the middle of an array whose spread is one element width (paper, Sec. 5).
+    /// Presses tools into the middle of an array whose spread is one element width (paper, Sec. 5).
     pub(super) fn new(array: Array, tools: &[Scene]) -> Result<Self, FigureError> {
         let psf = Psf { sigma_intercept_mm: array.pitch_mm(), sigma_per_mm: 0.0 };
         let [.., thickest] = COVERINGS;
@@ -36,7 +36,7 @@ impl Resolution {
     }
 }
 
-/// Rotation and depth at which a tool fits on the smallest array and presses with all that is to be seen.
+/// Rotation in degrees and depth in mm at which a tool fits on the smallest array and all of its visible shape presses.
 pub(super) fn pose(tool: Scene) -> (f64, f64) {
     match tool {
         Scene::H => (0.0, 0.5),
@@ -45,7 +45,7 @@ pub(super) fn pose(tool: Scene) -> (f64, f64) {
     }
 }
 
-/// Draws tools (rows) on arrays (columns), all to one scale of length.
+/// Draws tools (rows) on arrays (columns), all to the same scale.
 pub fn resolutions(tools: &[&str], resolutions: &[Resolution]) -> Sheet {
     const PX_PER_MM: f64 = 9.6;
     const LEFT_PX: f64 = 88.0;
@@ -85,9 +85,9 @@ pub(super) fn draw() -> Result<Drawing, FigureError> {
     let arrays = Array::shipped().into_iter().map(|array| Resolution::new(array, &SCENES));
     let sheet = resolutions(&["H", "wrench", "spaceship"], &arrays.collect::<Result<Vec<_>, _>>()?);
     let caption = "The H, the wrench and the spaceship on arrays of the resolution of the paper's sensor, of the human \
-                   fingertip and of the Tekscan sensor 5027, all to one scale of length. The spread is one element width \
-                   everywhere and all elements answer alike; every image is scaled from zero to one by itself. The finer the \
-                   elements, the more of the jaw, the hexagon and the wings is there to be recognised."
+                   fingertip and of the Tekscan sensor 5027, all to the same scale. The spread is one element width \
+                   everywhere and all elements are identical; each image is scaled to 0 to 1. Finer \
+                   elements show more of the jaw, the hexagon and the wings."
         .into();
     Ok(Drawing { sheet, caption })
 }

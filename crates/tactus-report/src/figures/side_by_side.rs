@@ -12,7 +12,7 @@ use super::{
 };
 use crate::plot::{ColourBar, HeatMap, Image, Label, Scale, Sheet, number};
 
-/// Presses as lightly as the full scale of the sensor asks for.
+/// Light enough for the full scale of the sensor.
 const DEPTH_MM: f64 = 0.15;
 const ANGLES_DEG: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 90.0];
 const SEED: u64 = 8;
@@ -20,7 +20,7 @@ const SEED: u64 = 8;
 /// One contact as the virtual sensor and as the model image it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideBySide {
-    /// What is special about it.
+    /// Heading above the images.
     pub heading: String,
     /// The virtual sensor's image, row-major, 0 to 1.
     pub sensor: Vec<f32>,
@@ -45,7 +45,7 @@ impl SideBySide {
         Ok(Self::scaled(heading, &sensor.indentation_mm(&contact, covering), &model))
     }
 
-    /// Two images, row-major, each scaled from its least to its greatest.
+    /// Two images, row-major, each scaled to 0 to 1.
     pub fn scaled(heading: String, sensor: &[f64], model: &[f64]) -> Self {
         Self { heading, sensor: zero_to_one(sensor), model: zero_to_one(model) }
     }
@@ -57,7 +57,7 @@ impl SideBySide {
     }
 }
 
-/// Draws contacts on the `DigiTacts` array beside each other, the virtual sensor's image above the model's.
+/// Draws contacts on the `DigiTacts` array side by side, the virtual sensor's image above the model's.
 pub fn side_by_side(name: &str, contacts: &[SideBySide]) -> Sheet {
     const CELL_PX: f64 = 14.0;
     const LEFT_PX: f64 = 108.0;
@@ -99,10 +99,10 @@ pub fn side_by_side(name: &str, contacts: &[SideBySide]) -> Sheet {
 pub(super) fn draw_angles() -> Result<Drawing, FigureError> {
     let caption = format!(
         "The H in the middle of the array at several angles from upright, counter-clockwise, under the thinnest covering. \
-         Above, the virtual sensor in the place of the paper's actual one: simulated, with gains that differ by {} %, {} \
-         counts of noise and a 12-bit converter, averaged over 250 ms and corrected by the linear response that was fitted \
-         to each element. Below, the model. Every image is scaled from zero to one by itself; at the foot, the largest \
-         difference of the two.",
+         Above: the virtual sensor, which replaces the paper's; simulated, with gains that differ by {} %, {} \
+         counts of noise and a 12-bit converter, averaged over 250 ms and corrected by the linear response fitted \
+         to each element. Below: the model. Each image is scaled to 0 to 1; the largest difference of the two is at the \
+         bottom.",
         100.0 * GAIN_SPREAD,
         NOISE_COUNTS
     );
@@ -110,9 +110,9 @@ pub(super) fn draw_angles() -> Result<Drawing, FigureError> {
 }
 
 pub(super) fn draw_coverings() -> Result<Drawing, FigureError> {
-    let caption = "The H upright under each of the four coverings, as in Figure 8a. The thicker the covering, the further \
-                   the image spreads, on the virtual sensor and in the model alike. By Eq. 4 the spread is 1.36 element \
-                   widths even under the thinnest covering, and so the two strokes, 3 widths apart, are one already."
+    let caption = "The H upright under each of the four coverings, as in Figure 8a. A thicker covering spreads the image more, \
+                   on the virtual sensor and in the model. By Eq. 4 the spread is 1.36 element \
+                   widths even under the thinnest covering, so the two strokes, 3 widths apart, already merge."
         .into();
     Ok(Drawing { sheet: side_by_side("The H under each covering", &coverings()?), caption })
 }

@@ -1,11 +1,11 @@
-//! What a covering's thickness costs and gains: not a figure of the paper, but what follows from its Figure 6.
+//! Costs and benefits of a covering's thickness; derived from the paper's Figure 6.
 
 use tactus_calibrate::design::{Covered, Design};
 
 use crate::plot::{Axis, Figure, Ink, Label, Series, Sheet, number};
 
-/// Draws spread, locations, separation and what passes at the Nyquist frequency against a covering's thickness, with
-/// the recommended covering marked.
+/// Draws spread, locations, separation and the amplitude passed at the Nyquist frequency against a covering's thickness,
+/// and marks the recommended covering.
 pub fn trade_off(design: &Design) -> Sheet {
     const SIZE_PX: [f64; 2] = [500.0, 250.0];
     let Design { pitch_mm, force_steps, min_sigma, recommended, curve, .. } = design;
@@ -42,7 +42,7 @@ pub fn trade_off(design: &Design) -> Sheet {
         number(recommended.acuity.sigma, 2)
     );
     sheet.put([0.0, 12.0], &Label::new(heading).heading());
-    let below = "computed for five elements in a row without noise: bounds, not promises; spread by Eq. 4";
+    let below = "computed for five elements in a row without noise, so these are bounds; spread by Eq. 4";
     sheet.put([0.0, 29.0], &Label::new(below).muted());
     for (nth, panel) in panels.iter().enumerate() {
         let [col, row] = [nth % 2, nth / 2];

@@ -1,4 +1,4 @@
-//! Figures 9b and 10b: tools and sensor seen obliquely.
+//! Figures 9b and 10b: oblique views of tools and sensor.
 
 use tactus_model::{Array, Covering};
 use tactus_scene::shapes::{Scene, Surface};
@@ -11,9 +11,9 @@ const YELLOW: Paint = Paint { rgb: [255.0, 220.0, 70.0], opacity: 0.42 };
 const RED: Paint = Paint { rgb: [222.0, 62.0, 50.0], opacity: 1.0 };
 const STEEL: Paint = Paint { rgb: [172.0, 182.0, 196.0], opacity: 1.0 };
 
-/// Height of the blocks that stand for the elements.
+/// Height of the blocks that represent the elements.
 const BLOCK_MM: f64 = 1.2;
-/// How far the covering reaches beyond the elements.
+/// Border of the covering beyond the elements.
 const BORDER_MM: f64 = 0.4;
 
 /// Draws a tool pressed into the middle of a covered array: blue elements, translucent yellow covering, red tool.
@@ -40,7 +40,7 @@ pub fn pressed_view(array: &Array, covering: Covering, tool: &Surface, depth_mm:
         corners_mm: corners.map(|[x, y, z]| [x, y, z - depth_mm]).to_vec(),
         paint: RED,
     });
-    // The covering is not cut, and the plane of the elements' tops parts them from the tool.
+    // The covering is first and stays whole; the plane of the elements' tops separates them from the tool.
     let faces = covering.into_iter().chain(tops).chain(tool).chain(sides.into_iter().flatten()).collect();
     let view = ObliqueView { faces, azimuth_deg: -62.0, elevation_deg: 32.0, px_per_mm: 26.0 };
     let mut sheet = Sheet::new("The H in the covering", [690.0, 560.0]);
@@ -70,24 +70,24 @@ pub fn tools_view(tools: &[(&str, Surface)]) -> Sheet {
     sheet
 }
 
-#[expect(clippy::unnecessary_wraps, reason = "as all figures are drawn")]
+#[expect(clippy::unnecessary_wraps, reason = "all figures have this signature")]
 pub(super) fn draw_pressed() -> Result<Drawing, FigureError> {
     const DEPTH_SHARE: f64 = 0.3;
     let covering = COVERINGS[1];
     let depth_mm = DEPTH_SHARE * covering.thickness_mm;
     let caption = format!(
         "The H pressed into the sensor, drawn to scale. Blue: the 48 elements with their gaps. Yellow: the covering of {}. \
-         Red: the H, which stands {depth_mm:.2} mm deep in it.",
+         Red: the H, which is {depth_mm:.2} mm deep in it.",
         inches(covering)
     );
     let sheet = pressed_view(&Array::digitacts(), covering, &Scene::H.surface(), depth_mm);
     Ok(Drawing { sheet, caption })
 }
 
-#[expect(clippy::unnecessary_wraps, reason = "as all figures are drawn")]
+#[expect(clippy::unnecessary_wraps, reason = "all figures have this signature")]
 pub(super) fn draw_tools() -> Result<Drawing, FigureError> {
     let tools = [Scene::Wrench, Scene::Spaceship].map(|tool| (tool.name(), tool.surface()));
-    let caption = "The wrench and the spaceship of Figure 10a from outside: left as they lie, right from below, where the \
+    let caption = "The wrench and the spaceship of Figure 10a: left from above, right from below, where the \
                    sensor meets them. Both are shapes of our own."
         .into();
     Ok(Drawing { sheet: tools_view(&tools), caption })

@@ -1,4 +1,4 @@
-//! The stand-in for the paper's sensor: simulated, with what makes a real one differ from the model.
+//! The virtual sensor that replaces the paper's: a simulation with gain differences, noise and a converter.
 
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -11,26 +11,26 @@ use crate::fit::Polynomial;
 const SENSITIVITY_COUNTS_PER_MM: f64 = 600.0;
 /// Relative standard deviation of the elements' gains.
 pub(super) const GAIN_SPREAD: f64 = 0.08;
-/// Standard deviation of one reading's noise.
+/// Standard deviation of the noise of one reading, in counts.
 pub(super) const NOISE_COUNTS: f64 = 2.0;
-/// Reading at rest.
+/// Reading at rest, in counts.
 const BASELINE_COUNTS: f64 = 40.0;
 /// Readings averaged in each contact: 250 ms at 30 Hz (paper, Sec. 2.1).
 const READINGS: u32 = 8;
 /// Depths of the presses to which an element's linear response is fitted (paper, Sec. 2.1).
 const DEPTHS_MM: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];
 
-/// A simulated array whose elements differ, each corrected by the linear response found for it (paper, Sec. 2.2).
+/// A simulated array of different elements, each corrected by its fitted linear response (paper, Sec. 2.2).
 pub(super) struct VirtualSensor {
     model: ForwardModel,
     readout: Readout,
     rng: ChaCha8Rng,
-    /// Fitted counts against depth, one an element.
+    /// Fitted counts against depth, one line per element.
     responses: Vec<Polynomial>,
 }
 
 impl VirtualSensor {
-    /// Draws the elements and calibrates them under the thinnest covering.
+    /// Draws random elements and calibrates them under the thinnest covering.
     pub(super) fn new(array: Array, seed: u64) -> Result<Self, ModelError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let elements = array.elements();
@@ -49,7 +49,7 @@ impl VirtualSensor {
         Ok(sensor)
     }
 
-    /// Equivalent indentation of every element as found from the readings, in mm.
+    /// Equivalent indentation of each element from its readings, in mm.
     pub(super) fn indentation_mm(&mut self, contact: &Contact, covering: Covering) -> Vec<f64> {
         let mut counts = self.counts(contact, covering);
         for (value, response) in counts.iter_mut().zip(&self.responses) {
@@ -60,7 +60,7 @@ impl VirtualSensor {
         counts
     }
 
-    /// The line through an element's readings under presses at its centre.
+    /// Line fitted to an element's readings in presses at its centre.
     fn calibrated(&mut self, element: usize) -> Option<Polynomial> {
         let position_mm = self.model.array().centre_mm(element)?;
         let presses = DEPTHS_MM.map(|depth_mm| {
@@ -70,7 +70,7 @@ impl VirtualSensor {
         Polynomial::fit(1, &presses)
     }
 
-    /// Mean reading of every element over one contact.
+    /// Mean reading of each element over one contact.
     fn counts(&mut self, contact: &Contact, covering: Covering) -> Vec<f64> {
         let mut counts = vec![0.0; self.model.array().elements()];
         self.model.image(contact, covering, &mut counts);

@@ -1,4 +1,4 @@
-//! The mean image of each dwell, as small multiples with one colour scale.
+//! The mean image of each dwell, all with one colour scale.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -8,11 +8,11 @@ use crate::{
     run::{DwellSummary, PressSummary, RunReport},
 };
 
-/// More cells than this make the page heavy.
+/// Limit of drawn cells, which bounds the size of the page.
 const CELLS_MAX: usize = 40_000;
-/// More images than this are not looked at.
+/// Limit of drawn images.
 const IMAGES_MAX: usize = 300;
-/// Room for a caption above an image.
+/// Height of a caption above an image.
 const CAPTION_PX: f64 = 13.0;
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
@@ -32,7 +32,7 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Re
     writeln!(f, "<div class=\"scroll\">{mosaic}</div>\n</section>")
 }
 
-/// Each element's press where the element is; `None` unless at least half of the elements were pressed once each.
+/// Puts each press at the position of its element; `None` unless at least half of the elements were pressed, each once.
 fn laid_out_like_the_array(report: &RunReport, scale: Scale) -> Option<(Mosaic<'_>, String)> {
     const GAP_PX: [f64; 2] = [12.0, 12.0];
     const BETWEEN_PX: f64 = 2.0;
@@ -73,14 +73,14 @@ fn laid_out_like_the_array(report: &RunReport, scale: Scale) -> Option<(Mosaic<'
         }
     }
     let lead = format!(
-        "{dwells} dwells. The presses are laid out like the array, each under the (row, column) of the element at whose \
-         centre it was: its {most} images, row by row from the first dwell to the last."
+        "{dwells} dwells. The presses are laid out like the array. Above each press is the (row, column) of the element at \
+         whose centre it was; below are its {most} images, row by row from the first dwell to the last."
     );
     let size_px = [cols as f64 * step_px[0] - GAP_PX[0], rows as f64 * step_px[1]];
     Some((Mosaic { name: "Mean image of each dwell".into(), size_px, cell_px, scale, tiles, captions }, lead))
 }
 
-/// Images one after the other, as they were taken; of many, an even choice.
+/// Images in order of time; an even selection if there are too many.
 fn in_order(report: &RunReport, scale: Scale, dwells: usize) -> (Mosaic<'_>, String) {
     const IMAGE_PX: f64 = 52.0;
     const GAP_PX: [f64; 2] = [8.0, 7.0];
@@ -97,25 +97,23 @@ fn in_order(report: &RunReport, scale: Scale, dwells: usize) -> (Mosaic<'_>, Str
         .collect();
     let (mut tiles, mut captions) = (Vec::new(), Vec::new());
     for n in 0..shown {
-        // Evenly, but for a wandering offset: experiments repeat depths at fixed strides.
-        let wander = (n as f64 * 0.618_034).fract();
-        let Some(&(press, nth, dwell)) = all.get(chosen(n as f64 + wander, dwells, shown)) else { continue };
+        // A varying offset, because experiments repeat depths at fixed strides.
+        let offset = (n as f64 * 0.618_034).fract();
+        let Some(&(press, nth, dwell)) = all.get(chosen(n as f64 + offset, dwells, shown)) else { continue };
         let corner = [(n % across) as f64 * step_px[0], (n / across) as f64 * step_px[1]];
         captions.push(([corner[0], corner[1] + CAPTION_PX - 3.0], format!("{:.3} mm", dwell.depth_mm)));
         tiles.push(tile([corner[0], corner[1] + CAPTION_PX], press, dwell, nth, [rows, cols]));
     }
     let lead = if shown < dwells {
-        format!(
-            "{shown} of {dwells} dwells, evenly chosen, in the order in which they were taken; above each its depth."
-        )
+        format!("{shown} of {dwells} dwells, evenly chosen, in order of time; above each its depth.")
     } else {
-        format!("All {dwells} dwells, in the order in which they were taken; above each its depth.")
+        format!("All {dwells} dwells in order of time; above each its depth.")
     };
     let size_px = [across.min(shown) as f64 * step_px[0], shown.div_ceil(across) as f64 * step_px[1]];
     (Mosaic { name: "Mean image of each dwell".into(), size_px, cell_px, scale, tiles, captions }, lead)
 }
 
-/// Where a place among `shown` stands among `dwells`; the same if all are shown.
+/// Index among all `dwells` of a position among the `shown` ones.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index into the dwells")]
 fn chosen(place: f64, dwells: usize, shown: usize) -> usize {
     if shown == dwells { place.floor() as usize } else { (place * dwells as f64 / shown as f64) as usize }

@@ -1,4 +1,4 @@
-//! The response curves and the polynomials over their mean: Fig. 2a of the paper.
+//! The response curves and the polynomials fitted to their mean: Fig. 2a of the paper.
 
 use std::fmt;
 
@@ -10,14 +10,14 @@ use crate::{
     run::ResponseCurves,
 };
 
-/// Points along a fitted curve; more are not seen.
+/// Points along a fitted curve.
 const CURVE_POINTS: u32 = 60;
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
     writeln!(f, "<section>\n<h2>Response of the elements</h2>")?;
     writeln!(
         f,
-        "<p class=\"lead\">Each element's own reading above the baseline, in presses at its own centre; a point is the mean of one dwell. The fits are over the mean of the curves.</p>"
+        "<p class=\"lead\">Reading of each element above the baseline, in presses at its own centre. Each point is the mean of one dwell. The polynomials are fitted to the mean of the curves.</p>"
     )?;
     writeln!(f, "<div class=\"beside\">\n<div>{}</div>\n<div>", figure(response))?;
     if let (Some(first), Some(last)) = (response.mean.first(), response.mean.last()) {
@@ -59,7 +59,7 @@ fn figure(response: &ResponseCurves) -> Figure {
     figure.with(Series::dots(response.mean.clone()).width_px(6.0).label("mean"))
 }
 
-/// A fit over the depths that were held.
+/// A fitted curve over the range of depths.
 fn along(fit: &Polynomial, response: &ResponseCurves) -> Vec<[f64; 2]> {
     let (Some([from, _]), Some([to, _])) = (response.mean.first(), response.mean.last()) else {
         return Vec::new();
@@ -79,13 +79,13 @@ fn unresponsive(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::R
         return Ok(());
     }
     if response.unresponsive.is_empty() {
-        return writeln!(f, "<p>Every pressed element answers to its own press.</p>");
+        return writeln!(f, "<p>Every pressed element responds to its own press.</p>");
     }
     writeln!(
         f,
-        "<p class=\"warn\">Left out, because they do not answer to their own press:</p>\n<table class=\"numbers\">"
+        "<p class=\"warn\">Left out, because they do not respond to their own press:</p>\n<table class=\"numbers\">"
     )?;
-    writeln!(f, "<thead><tr><th>element</th><th>(row, col)</th><th>answers to</th></tr></thead>")?;
+    writeln!(f, "<thead><tr><th>element</th><th>(row, col)</th><th>responds to</th></tr></thead>")?;
     for unresponsive in &response.unresponsive {
         let [row, col] = unresponsive.curve.place;
         let other =
@@ -110,7 +110,7 @@ fn spread(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result 
     let (Some(least), Some(most)) = (least, most) else { return Ok(()) };
     writeln!(
         f,
-        "<p>Slopes of the single elements: mean {} counts/mm, standard deviation {} counts/mm ({} %), from {} at ({}, {}) to {} at ({}, {}).</p>",
+        "<p>Slopes of the elements: mean {} counts/mm, standard deviation {} counts/mm ({} %), from {} at ({}, {}) to {} at ({}, {}).</p>",
         number(mean, 0),
         number(deviation, 0),
         number(100.0 * deviation / mean.abs(), 1),
@@ -143,7 +143,7 @@ fn table(f: &mut fmt::Formatter<'_>, response: &ResponseCurves) -> fmt::Result {
     }
     writeln!(
         f,
-        "</table></div>\n<p class=\"lead\">After &#177;: standard error, from the scatter of the mean about the fit.</p>"
+        "</table></div>\n<p class=\"lead\">After &#177;: standard error, from the residuals of the fit.</p>"
     )
 }
 

@@ -1,4 +1,4 @@
-//! The headline, and the facts of the run.
+//! The header and the facts of the run.
 
 use std::fmt;
 
@@ -61,7 +61,7 @@ pub(super) fn facts(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Resu
     writeln!(f, "</dl>\n<div class=\"facts\">\n<table>")?;
     let unknown = "not recorded";
     let array = &report.array;
-    row(f, "asked for by", Text(&summary.who))?;
+    row(f, "started by", Text(&summary.who))?;
     row(f, "started", Text(&summary.started))?;
     row(f, "rig", Text(&summary.rig))?;
     row(
@@ -97,7 +97,7 @@ pub(super) fn facts(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Resu
     writeln!(f, "</table>\n</div>")
 }
 
-/// A row of a table of facts; the value is markup.
+/// A row of a table of facts. `value` is HTML.
 fn row(f: &mut fmt::Formatter<'_>, name: &str, value: impl fmt::Display) -> fmt::Result {
     writeln!(f, "<tr><th>{name}</th><td>{value}</td></tr>")
 }

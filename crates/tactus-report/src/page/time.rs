@@ -1,4 +1,4 @@
-//! What happened over time: depth and signal, lost frames, the time between frames.
+//! Depth and signal over time, lost frames, and the time between frames.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -10,9 +10,9 @@ use crate::{
     run::{Intervals, RunReport, Timing},
 };
 
-/// More places of loss than this are not listed.
+/// Gaps that are listed at most.
 const LOSSES_MAX: usize = 40;
-/// More bins than this are not told apart.
+/// Bins of the histogram, roughly at most.
 const BINS_MAX: f64 = 60.0;
 
 pub(super) fn signal(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
@@ -22,7 +22,7 @@ pub(super) fn signal(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Res
     }
     writeln!(
         f,
-        "<section>\n<h2>Depth and signal over time</h2>\n<p class=\"lead\">The tip's depth below the covering's nominal surface (0 above it), and the sum of all elements above the baseline; least and greatest value of every pixel column.</p>"
+        "<section>\n<h2>Depth and signal over time</h2>\n<p class=\"lead\">The tip's depth below the covering's nominal surface (0 above it), and the sum of all elements above the baseline. Each pixel column shows its least and greatest value.</p>"
     )?;
     for (name, unit, points, ink) in
         [("depth", "mm", &trace.depth, Ink::Text), ("total signal", "counts", &trace.signal, Ink::Blue)]
@@ -35,7 +35,7 @@ pub(super) fn signal(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Res
     if report.response.is_none() { against_depth(f, report) } else { Ok(()) }
 }
 
-/// For presses that are not at centres: the sum of all elements, dwell by dwell.
+/// For presses away from element centres: the sum of all elements against depth.
 fn against_depth(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result {
     const INKS: [Ink; 5] = [Ink::Blue, Ink::Red, Ink::Green, Ink::Amber, Ink::Muted];
     let mut by_covering: BTreeMap<String, Vec<[f64; 2]>> = BTreeMap::new();
@@ -56,7 +56,7 @@ fn against_depth(f: &mut fmt::Formatter<'_>, report: &RunReport) -> fmt::Result 
     }
     writeln!(
         f,
-        "<section>\n<h2>Signal against depth</h2>\n<p class=\"lead\">The sum of all elements above the baseline; a point is the mean of one dwell.</p>\n{figure}\n</section>"
+        "<section>\n<h2>Signal against depth</h2>\n<p class=\"lead\">The sum of all elements above the baseline. Each point is the mean of one dwell.</p>\n{figure}\n</section>"
     )
 }
 
@@ -116,7 +116,7 @@ pub(super) fn timing(f: &mut fmt::Formatter<'_>, timing: &Timing) -> fmt::Result
     }
     writeln!(
         f,
-        "<section>\n<h2>Time between frames</h2>\n<p class=\"lead\">Between frames with none lost between them; the sensor's rate promises {} ms. The outermost bins hold all that lies beyond them.</p>",
+        "<section>\n<h2>Time between frames</h2>\n<p class=\"lead\">Between consecutive frames without a loss. The nominal interval is {} ms. The outermost bins include everything beyond them.</p>",
         number(timing.expected_ms, 2)
     )?;
     if let Some(figure) = histogram(&clocks) {
@@ -128,7 +128,7 @@ pub(super) fn timing(f: &mut fmt::Formatter<'_>, timing: &Timing) -> fmt::Result
     )?;
     for (name, intervals, _) in &clocks {
         let Some(intervals) = intervals else {
-            writeln!(f, "<tr><td>{name}</td><td colspan=\"5\">not known</td></tr>")?;
+            writeln!(f, "<tr><td>{name}</td><td colspan=\"5\">unknown</td></tr>")?;
             continue;
         };
         write!(f, "<tr><td>{name}</td><td class=\"n\">{}</td>", count(intervals.sorted_ms.len() as u64))?;
@@ -149,7 +149,7 @@ pub(super) fn timing(f: &mut fmt::Formatter<'_>, timing: &Timing) -> fmt::Result
     writeln!(f, "</section>")
 }
 
-/// Both clocks' intervals in bins of one width; the rarest, far from all others, count in the outermost bins.
+/// Histogram of both clocks' intervals; the outermost bins include everything beyond them.
 fn histogram(clocks: &[(&str, &Option<Intervals>, Ink)]) -> Option<Figure> {
     let known =
         || clocks.iter().filter_map(|(name, intervals, ink)| Some((*name, intervals.as_ref()?, *ink)));
@@ -159,7 +159,7 @@ fn histogram(clocks: &[(&str, &Option<Intervals>, Ink)]) -> Option<Figure> {
         return None;
     }
     let width = round_step(((hi - lo) / BINS_MAX).max(0.05));
-    // Bins are centred at multiples of their width, so that whole ticks fall into their middle.
+    // Bins are centred at multiples of their width, so that intervals of whole clock ticks are at bin centres.
     let first = (lo / width).round() - 1.0;
     let bins = (hi / width).round() - first + 2.0;
     let x = Axis::new("interval", "ms").tight();
@@ -183,7 +183,7 @@ fn binned(sorted_ms: &[f64], first: f64, width: f64, bins: f64) -> Vec<u64> {
     counts
 }
 
-/// A figure over the time of the whole run.
+/// A figure whose x axis is the time of the whole run.
 fn over_time(report: &RunReport, name: &str, unit: &str, size_px: [f64; 2]) -> Figure {
     let trace = &report.trace;
     let ends = [trace.signal.first(), trace.signal.last(), trace.depth.first(), trace.depth.last()];

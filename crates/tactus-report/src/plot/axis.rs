@@ -1,6 +1,6 @@
-//! One axis: what it shows, from where to where, and its ticks.
+//! An axis: quantity, range and ticks.
 
-/// What an axis shows, and its range.
+/// Quantity, unit and range of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     quantity: String,
@@ -11,12 +11,12 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// An axis of a quantity in a unit (empty for a pure number), as wide as the data.
+    /// An axis of a quantity in a unit (empty for a pure number); its range follows the data.
     pub fn new(quantity: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { quantity: quantity.into(), unit: unit.into(), range: None, from_zero: false, tight: false }
     }
 
-    /// Over exactly this range, whatever the data.
+    /// With exactly this range.
     #[must_use]
     pub fn spanning(mut self, range: [f64; 2]) -> Self {
         self.range = Some(range);
@@ -30,7 +30,7 @@ impl Axis {
         self
     }
 
-    /// Ending at the data, not at the next tick.
+    /// Ending at the data instead of the next tick.
     #[must_use]
     pub fn tight(mut self) -> Self {
         self.tight = true;
@@ -46,7 +46,7 @@ impl Axis {
         }
     }
 
-    /// The scale over these data, with about `ticks` ticks.
+    /// The scale for these data, with about `ticks` ticks.
     pub(super) fn scale(&self, data: impl Iterator<Item = f64>, ticks: f64) -> AxisScale {
         let seed = if self.from_zero { Some([0.0, 0.0]) } else { None };
         let found = data.filter(|value| value.is_finite()).fold(seed, |range, value| {
@@ -92,26 +92,26 @@ impl AxisScale {
         }
     }
 
-    /// Where a value stands: 0 at the range's start, 1 at its end.
+    /// Position of a value: 0 at the range's start, 1 at its end.
     pub(super) fn share(&self, value: f64) -> f64 {
         let [lo, hi] = self.range;
         (value - lo) / (hi - lo)
     }
 
-    /// Whether a tick stands at either end.
+    /// True if there are ticks at both ends.
     pub(super) fn spans_range(&self) -> bool {
         let at =
             |tick: Option<&f64>, end: f64| tick.is_some_and(|tick| (self.share(*tick) - end).abs() < 1e-9);
         at(self.ticks.first(), 0.0) && at(self.ticks.last(), 1.0)
     }
 
-    /// A tick's text, with as many decimals as the ticks differ in.
+    /// A tick's text, with the decimals that the step needs.
     pub(super) fn label(&self, tick: f64) -> String {
         number(tick, self.decimals)
     }
 }
 
-/// A number for people: a true minus sign, thousands apart, no negative zero.
+/// Formats a number with a true minus sign, separated thousands and no negative zero; a dash if it is not finite.
 pub(crate) fn number(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "\u{2013}".into();
@@ -134,7 +134,7 @@ pub(crate) fn number(value: f64, decimals: usize) -> String {
     text
 }
 
-/// 1, 2 or 5 times a power of ten, nearest above the rough step.
+/// The least of 1, 2 or 5 times a power of ten that is not below the rough step.
 pub(crate) fn round_step(rough: f64) -> f64 {
     let power = 10_f64.powf(rough.log10().floor());
     let share = rough / power;
@@ -142,7 +142,7 @@ pub(crate) fn round_step(rough: f64) -> f64 {
     digit * power
 }
 
-/// A range of a width that can be divided.
+/// Widens a range that is too narrow for ticks.
 fn wide([lo, hi]: [f64; 2]) -> [f64; 2] {
     let least = 1e-9 * lo.abs().max(hi.abs()).max(1e-9);
     if hi - lo > least {
@@ -153,7 +153,7 @@ fn wide([lo, hi]: [f64; 2]) -> [f64; 2] {
 }
 
 fn multiples(first: f64, last: f64, step: f64) -> Vec<f64> {
-    // Never more than a few; the bound only guards against a range that no step divides.
+    // There are only a few; the bound guards against rounding in extreme ranges.
     let mut ticks: Vec<f64> = Vec::new();
     let mut index = first;
     while index <= last && ticks.len() < 100 {

@@ -1,4 +1,4 @@
-//! Values as colours.
+//! Colour scales.
 
 use std::fmt;
 
@@ -6,10 +6,10 @@ use super::axis::{AxisScale, number};
 use super::{Axis, Panel};
 use crate::markup::Text;
 
-/// Number of colours that a scale has; more are hardly told apart in small cells.
+/// Number of colours in a scale.
 const LEVELS: u8 = 48;
 
-/// Viridis at nine equally spaced places: equal steps look equally large, also in grey and to the colour-blind.
+/// Viridis at nine equally spaced positions. It is perceptually uniform, also in grey and for the colour-blind.
 ///
 /// # Source
 /// van der Walt and Smith's colour map of that name, released under CC0.
@@ -25,7 +25,7 @@ const VIRIDIS: [[f64; 3]; 9] = [
     [253.0, 231.0, 37.0],
 ];
 
-/// A range of values and the colours over it; values beyond its ends have the colours of the ends.
+/// A range of values mapped to colours; values beyond its ends have the colours of the ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     lo: f64,
@@ -33,22 +33,22 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Over a range; one without width is widened upwards by one.
+    /// A scale over a range. An empty range is extended upwards by one.
     pub fn new(lo: f64, hi: f64) -> Self {
         if hi > lo { Self { lo, hi } } else { Self { lo, hi: lo + 1.0 } }
     }
 
-    /// From zero (or the least value, if that lies clearly below) to the greatest; 0 to 1 without values.
+    /// From zero (or the least value, if clearly negative) to the greatest value; 0 to 1 without values.
     pub fn of(values: impl Iterator<Item = f64>) -> Self {
         let (lo, hi) = values
             .filter(|value| value.is_finite())
             .fold((0.0_f64, 0.0_f64), |(lo, hi), value| (lo.min(value), hi.max(value)));
-        // Noise below zero is not worth a part of the scale.
+        // Noise below zero does not extend the scale.
         let lo = if -lo < 0.05 * hi { 0.0 } else { lo };
         Self::new(lo, hi)
     }
 
-    /// Which of its colours a value has; `None` if it is not a number.
+    /// Index of a value's colour; `None` for NaN.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and LEVELS - 1")]
     pub(super) fn level(self, value: f64) -> Option<u8> {
         let share = (value - self.lo) / (self.hi - self.lo);
@@ -56,13 +56,13 @@ impl Scale {
     }
 }
 
-/// The colour of a level as `#rrggbb`.
+/// The colour with an index as `#rrggbb`.
 pub(super) fn colour(level: u8) -> String {
     let [r, g, b] = rgb(level);
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// The colour of a level: red, green, blue.
+/// The colour with an index: red, green, blue.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]
 pub(super) fn rgb(level: u8) -> [u8; 3] {
     let place = f64::from(level.min(LEVELS - 1)) / f64::from(LEVELS - 1) * (VIRIDIS.len() - 1) as f64;
@@ -76,15 +76,15 @@ pub(super) fn rgb(level: u8) -> [u8; 3] {
 /// A legend of a colour scale; displays itself as SVG.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourBar {
-    /// The scale.
+    /// The scale that is shown.
     pub scale: Scale,
-    /// What its values are, with their unit.
+    /// Quantity and unit of the values.
     pub title: String,
 }
 
-/// Room at both ends of a colour bar, for its ticks' labels.
+/// Margin at both ends of a colour bar for tick labels.
 const LEFT_PX: f64 = 12.0;
-/// Width of one colour in a colour bar.
+/// Width of one colour.
 const STEP_PX: f64 = 6.0;
 
 impl fmt::Display for ColourBar {

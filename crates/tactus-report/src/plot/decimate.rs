@@ -1,9 +1,9 @@
-//! Fewer points that look the same.
+//! Reduction of points without a visible change.
 
-/// Of the points in each of `columns` equal columns along x: the lowest and the highest, in their order.
+/// The lowest and the highest point of each of `columns` equal columns along x, in their order.
 ///
-/// Points come in order of x. A line through what is returned covers the same pixels as one through all, if a column
-/// is a pixel wide. Points that are not finite are left out.
+/// Points must be in order of x. If a column is a pixel wide, a line through the result covers the same pixels as a line
+/// through all points. Points that are not finite are left out.
 pub fn extremes(points: &[[f64; 2]], columns: usize) -> Vec<[f64; 2]> {
     let points: Vec<[f64; 2]> =
         points.iter().copied().filter(|point| point.iter().all(|value| value.is_finite())).collect();

@@ -1,22 +1,22 @@
-//! One figure: two axes and what is drawn over them.
+//! A figure: two axes and series of points.
 
 use std::fmt;
 
 use super::{Axis, Panel, Series, axis::AxisScale, series::Mark};
 use crate::markup::Text;
 
-/// Room left of the axes, for tick labels and the axis's title.
+/// Margin left of the axes for tick labels and the title.
 const LEFT_PX: f64 = 70.0;
-/// Room below the axes.
+/// Margin below the axes.
 const BELOW_PX: f64 = 44.0;
-/// Room right of the axes, so that the last tick's label fits.
+/// Margin right of the axes for the last tick label.
 const RIGHT_PX: f64 = 18.0;
-/// Room above the axes without a legend, and with one.
+/// Margin above the axes without and with a legend.
 const ABOVE_PX: [f64; 2] = [12.0, 32.0];
 /// Mean width of a letter in the legend.
 const LETTER_PX: f64 = 6.4;
 
-/// Two axes and series over them; displays itself as SVG.
+/// Two axes and series of points; displays itself as SVG.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     name: String,
@@ -27,19 +27,19 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// An empty figure of 720 x 400 px; the name is for those who cannot see it.
+    /// An empty figure of 720 x 400 px; the name is its title for screen readers.
     pub fn new(name: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self { name: name.into(), x, y, series: Vec::new(), size_px: [720.0, 400.0] }
     }
 
-    /// With one more series, over those before.
+    /// Adds a series in front of the others.
     #[must_use]
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
-    /// Of this width and height in all.
+    /// Sets the total width and height.
     #[must_use]
     pub fn size_px(mut self, size_px: [f64; 2]) -> Self {
         self.size_px = size_px;
@@ -78,7 +78,7 @@ impl Panel for Figure {
     }
 }
 
-/// The axes in pixels.
+/// The area between the axes, in pixels.
 struct PlotArea {
     x: AxisScale,
     y: AxisScale,

@@ -1,14 +1,14 @@
-//! Images of the array: one value an element.
+//! Images of the array with one value per element.
 
 use std::{collections::BTreeMap, fmt};
 
 use super::{Panel, Scale, colour::colour};
 use crate::markup::Text;
 
-/// One value for each of `rows x cols` elements, row-major; row 0 is drawn at the bottom, as y points up.
+/// One value for each of `rows x cols` elements, row-major. Row 0 is drawn at the bottom, because y points up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeatMap<'a> {
-    /// The values; what is missing or not finite is not drawn.
+    /// The values; NaN is not drawn.
     pub values: &'a [f32],
     /// Number of rows.
     pub rows: usize,
@@ -16,7 +16,7 @@ pub struct HeatMap<'a> {
     pub cols: usize,
 }
 
-/// A heat image with a colour scale of its own, for a [`Sheet`](super::Sheet); its origin is its upper left corner.
+/// A heat map with its own colour scale, for a [`Sheet`](super::Sheet); the origin is its upper left corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image<'a> {
     /// The values.
@@ -25,27 +25,27 @@ pub struct Image<'a> {
     pub cell_px: f64,
     /// The colours.
     pub scale: Scale,
-    /// What it shows, as a tooltip.
+    /// Tooltip.
     pub title: String,
 }
 
-/// A heat image and where it stands.
+/// A heat map at a position in a [`Mosaic`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tile<'a> {
     /// Upper left corner.
     pub at_px: [f64; 2],
     /// The image.
     pub heat: HeatMap<'a>,
-    /// What it shows, as a tooltip.
+    /// Tooltip.
     pub title: String,
 }
 
-/// Many heat images with one colour scale, and captions; displays itself as SVG.
+/// Many heat maps with one colour scale, and captions; displays itself as SVG.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mosaic<'a> {
-    /// What it shows, for those who cannot see it.
+    /// Title for screen readers.
     pub name: String,
-    /// Width and height in all.
+    /// Total width and height.
     pub size_px: [f64; 2],
     /// Side of an element's square.
     pub cell_px: f64,
@@ -53,7 +53,7 @@ pub struct Mosaic<'a> {
     pub scale: Scale,
     /// The images.
     pub tiles: Vec<Tile<'a>>,
-    /// Texts, by the lower left corner of each.
+    /// Texts with their lower left corners.
     pub captions: Vec<([f64; 2], String)>,
 }
 
@@ -94,7 +94,7 @@ impl fmt::Display for Mosaic<'_> {
 }
 
 impl HeatMap<'_> {
-    /// One path a colour, one unit a cell.
+    /// Writes one path per colour, with cells of one unit.
     fn write(&self, f: &mut fmt::Formatter<'_>, scale: Scale) -> fmt::Result {
         let mut cells: BTreeMap<u8, Vec<[usize; 2]>> = BTreeMap::new();
         for (index, value) in self.values.iter().enumerate().take(self.rows * self.cols) {

@@ -1,21 +1,21 @@
-//! An image of the array as a PNG file, for programs and eyes without a browser.
+//! An image of the array as a PNG file.
 
 use tactus_model::Array;
 
 use super::Scale;
 use super::colour::rgb;
 
-/// Between and around the elements.
+/// Background colour.
 const GROUND: [u8; 3] = [24, 24, 27];
-/// Around the array.
+/// Margin around the array.
 const MARGIN_MM: f64 = 0.5;
 
-/// Draws one value an element, row-major, each over its active square where it stands on the sensor; y points up.
+/// Draws one value per element, row-major, over the element's active area; y points up.
 ///
-/// `width_px` is the picture's width; its height follows from the array's extent. What is not finite stays dark.
+/// `width_px` is the picture's width; its height follows from the array's extent. NaN is not drawn.
 ///
 /// # Errors
-/// None is known: it writes to memory. The encoder's own are passed on.
+/// Those of the PNG encoder.
 pub fn png(
     array: &Array,
     values: &[f64],

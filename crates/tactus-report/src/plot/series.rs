@@ -1,6 +1,6 @@
-//! What is drawn over a figure's axes.
+//! Series of points in a figure.
 
-/// Points and how they are drawn.
+/// Points and their style.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     pub(super) points: Vec<[f64; 2]>,
@@ -12,21 +12,21 @@ pub struct Series {
     pub(super) opacity: f64,
 }
 
-/// Colours that read well on light and dark ground.
+/// Colours for light and dark backgrounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Ink {
     /// The colour of text.
     #[default]
     Text,
-    /// Less than text.
+    /// A lighter text colour.
     Muted,
-    /// Red.
+    /// Class `red` in the style sheet.
     Red,
-    /// Blue.
+    /// Class `blue` in the style sheet.
     Blue,
-    /// Green.
+    /// Class `green` in the style sheet.
     Green,
-    /// Amber.
+    /// Class `amber` in the style sheet.
     Amber,
 }
 
@@ -53,48 +53,48 @@ impl Series {
         Self::new(points, Mark::Stems, 1.5)
     }
 
-    /// A vertical bar from `lo` to `hi` at each `[x, lo, hi]`, as intervals are drawn.
+    /// A vertical bar from `lo` to `hi` at each `[x, lo, hi]`, for intervals.
     pub fn bars(bars: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let points = bars.into_iter().flat_map(|[x, lo, hi]| [[x, lo], [x, hi], [f64::NAN; 2]]);
         Self::new(points.collect(), Mark::Line, 1.5)
     }
 
-    /// In a colour.
+    /// Sets the colour.
     #[must_use]
     pub fn ink(mut self, ink: Ink) -> Self {
         self.ink = ink;
         self
     }
 
-    /// Named in the legend.
+    /// Adds a legend entry.
     #[must_use]
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.label = Some(label.into());
         self
     }
 
-    /// Of this width (a dot: diameter).
+    /// Sets the line width or the dots' diameter.
     #[must_use]
     pub fn width_px(mut self, width_px: f64) -> Self {
         self.width_px = width_px;
         self
     }
 
-    /// Let through what lies below: 0 invisible, 1 solid.
+    /// Sets the opacity: 0 invisible, 1 solid.
     #[must_use]
     pub fn opacity(mut self, opacity: f64) -> Self {
         self.opacity = opacity;
         self
     }
 
-    /// Dashed.
+    /// Draws the line dashed.
     #[must_use]
     pub fn dashed(mut self) -> Self {
         self.dashes = "7 4";
         self
     }
 
-    /// Dotted.
+    /// Draws the line dotted.
     #[must_use]
     pub fn dotted(mut self) -> Self {
         self.dashes = "1.5 2.5";
@@ -107,7 +107,7 @@ impl Series {
 }
 
 impl Ink {
-    /// Its class in the style sheet.
+    /// Class in the style sheet.
     pub(crate) fn class(self) -> &'static str {
         match self {
             Self::Text => "ink",

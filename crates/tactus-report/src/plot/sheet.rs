@@ -1,23 +1,23 @@
-//! Figures, images and labels on one sheet.
+//! A sheet of figures, images and labels.
 
 use std::fmt;
 
 use super::STYLE;
 use crate::markup::Text;
 
-/// Room around the panels.
+/// Margin around the panels.
 const MARGIN_PX: f64 = 12.0;
 
-/// What can stand on a [`Sheet`].
+/// A part of a [`Sheet`].
 pub trait Panel {
-    /// Writes its SVG, about an origin that the sheet puts in its place.
+    /// Writes its SVG relative to an origin that the sheet positions.
     ///
     /// # Errors
     /// Those of the formatter.
     fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
 
-/// Panels beside each other; displays itself as one SVG document that stands alone, its style inside.
+/// Panels on one sheet; displays itself as a complete SVG document with inline style.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
     name: String,
@@ -26,12 +26,12 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// An empty sheet with room for panels of a width and height; the name is for those who cannot see it.
+    /// An empty sheet of a width and height; the name is its title for screen readers.
     pub fn new(name: impl Into<String>, size_px: [f64; 2]) -> Self {
         Self { name: name.into(), size_px, panels: Vec::new() }
     }
 
-    /// Draws a panel with its origin at a place, over those before.
+    /// Draws a panel with its origin at a position, in front of the others.
     pub fn put(&mut self, [x, y]: [f64; 2], panel: &impl Panel) {
         let drawn = fmt::from_fn(|f| panel.draw(f));
         self.panels.push(format!(r#"<g transform="translate({x:.2} {y:.2})">{drawn}</g>"#));
@@ -51,7 +51,7 @@ impl fmt::Display for Sheet {
     }
 }
 
-/// A line of text; its origin is at the left of its base line.
+/// A line of text; the origin is the left end of its base line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {
     text: String,
@@ -60,33 +60,33 @@ pub struct Label {
 }
 
 impl Label {
-    /// In the colour of text.
+    /// A label in the colour of text.
     pub fn new(text: impl Into<String>) -> Self {
         Self { text: text.into(), class: "name", anchor: "start" }
     }
 
-    /// As a heading.
+    /// Styles the label as a heading.
     #[must_use]
     pub fn heading(mut self) -> Self {
         self.class = "name heading";
         self
     }
 
-    /// Less than text.
+    /// Uses a lighter text colour.
     #[must_use]
     pub fn muted(mut self) -> Self {
         self.class = "note";
         self
     }
 
-    /// With its origin in its middle.
+    /// Moves the origin to the middle.
     #[must_use]
     pub fn centred(mut self) -> Self {
         self.anchor = "middle";
         self
     }
 
-    /// With its origin at its right.
+    /// Moves the origin to the right end.
     #[must_use]
     pub fn right(mut self) -> Self {
         self.anchor = "end";

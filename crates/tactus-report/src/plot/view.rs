@@ -1,4 +1,4 @@
-//! Solids seen obliquely, in parallel projection, with flat shading.
+//! Oblique views of solids in parallel projection with flat shading.
 
 mod order;
 
@@ -6,42 +6,41 @@ use std::fmt;
 
 use super::Panel;
 
-/// A flat, convex face of a solid, seen from the side from which its corners run counter-clockwise.
+/// A flat, convex face of a solid; its corners run counter-clockwise as seen from outside.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Face {
-    /// Its corners in mm.
+    /// Corners in mm.
     pub corners_mm: Vec<[f64; 3]>,
-    /// Its colour.
+    /// Colour and opacity.
     pub paint: Paint,
 }
 
-/// A colour in full light, and how much of what lies behind it hides.
+/// A colour in full light, and its opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Paint {
     /// Red, green and blue, 0 to 255.
     pub rgb: [f64; 3],
-    /// 1 hides all.
+    /// 0 transparent, 1 opaque.
     pub opacity: f64,
 }
 
-/// Faces as a far viewer sees them; a panel whose origin is where the point (0, 0, 0) is seen.
+/// Faces as a distant viewer sees them; the panel's origin is the image of the point (0, 0, 0).
 ///
-/// What stands behind is drawn first, which is right for faces that intersect too.
+/// Faces are drawn back to front; intersecting faces are cut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObliqueView {
-    /// What is seen. A face may cut others where it stands before them in this list, so those that are not to
-    /// be cut come first.
+    /// The faces. A face may cut those after it in this list, so faces that must stay whole come first.
     pub faces: Vec<Face>,
-    /// Where the viewer stands, from x towards y.
+    /// Direction of the viewer in the plane, from x towards y.
     pub azimuth_deg: f64,
-    /// How high the viewer stands above the plane of x and y; negative below it.
+    /// Elevation of the viewer above the plane of x and y; negative below it.
     pub elevation_deg: f64,
-    /// Size.
+    /// Scale.
     pub px_per_mm: f64,
 }
 
 impl Face {
-    /// The six sides of a box `[x, y, z]`, each from where to where: top first, then those around, then the bottom.
+    /// The six sides of a box with these ranges of x, y and z: top, sides, bottom.
     pub fn of_box([x, y, z]: [[f64; 2]; 3], paint: Paint) -> [Self; 6] {
         let corner = |[i, j, k]: [usize; 3]| [x[i], y[j], z[k]];
         let around = [[0, 0], [1, 0], [1, 1], [0, 1]];
@@ -59,7 +58,7 @@ impl Face {
 }
 
 impl ObliqueView {
-    /// Where a point is seen, from the origin rightwards and down.
+    /// Image of a point, in px to the right of the origin and downwards.
     pub fn place_px(&self, point_mm: [f64; 3]) -> [f64; 2] {
         let [right, up, _] = self.axes();
         [self.px_per_mm * dot(point_mm, right), -self.px_per_mm * dot(point_mm, up)]
@@ -80,7 +79,7 @@ impl ObliqueView {
 impl Panel for ObliqueView {
     fn draw(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [right, _, viewer] = self.axes();
-        // Light comes over the viewer's left shoulder, and most on the side of the solid that is looked upon.
+        // Light comes from the viewer's upper left.
         let upright = [0.0, 0.0, viewer[2].signum()];
         let light = [0, 1, 2].map(|axis| 0.7 * viewer[axis] + 0.5 * upright[axis] - 0.35 * right[axis]);
         let seen = self.faces.iter().filter(|face| dot(order::normal(face), viewer) > 1e-9);

@@ -1,4 +1,4 @@
-//! What the frames say, one by one: signal, losses, timing.
+//! Signal, losses and timing, from each frame of the recording.
 
 use std::path::Path;
 
@@ -19,10 +19,10 @@ pub struct Trace {
     pub signal: Vec<[f64; 2]>,
 }
 
-/// A place at which frames are missing.
+/// A gap in the sequence of frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameLoss {
-    /// When the next frame came, from the start of the run.
+    /// Time of the next frame since the start of the run.
     pub at_s: f64,
     /// Frames that never arrived.
     pub frames: u64,
@@ -30,33 +30,33 @@ pub struct FrameLoss {
     pub after_seq: u64,
     /// Sequence number of the next frame.
     pub next_seq: u64,
-    /// Index of the press in which it happened, -1 outside one.
+    /// Index of the press in which it happened; -1 outside any press.
     pub press: i32,
 }
 
-/// The time between frames that follow each other with none lost between.
+/// The time between consecutive frames without a loss between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timing {
-    /// What the sensor's rate promises.
+    /// The nominal interval: one over the array's rate.
     pub expected_ms: f64,
-    /// By the device's clock; `None` if it has none, or it jumped.
+    /// By the device's clock; `None` without a clock that can be related to the host's.
     pub device: Option<Intervals>,
-    /// By the host's clock, at arrival.
+    /// By the host's clock at arrival.
     pub host: Option<Intervals>,
-    /// What is known of the device's clock, a sentence for each connection.
+    /// A sentence about the device's clock for each connection.
     pub clocks: Vec<String>,
 }
 
 /// Intervals between frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Intervals {
-    /// All of them, sorted.
+    /// All intervals, ascending.
     pub sorted_ms: Vec<f64>,
     /// Their standard deviation.
     pub jitter_ms: f64,
 }
 
-/// What one pass over the frames gathers.
+/// Statistics of one pass over the frames.
 #[derive(Default)]
 pub(super) struct FrameStatistics {
     pub(super) losses: Vec<FrameLoss>,
@@ -125,10 +125,10 @@ impl FrameStatistics {
         }
     }
 
-    /// Adds the frame to the baseline, if it came before the first press.
+    /// Adds a frame before the first press to the baseline.
     fn baseline(&mut self, timeline: &Timeline, frame: &Frame, at: MonoTime) {
         let elements = timeline.rig().array.elements();
-        // Once a press began, no later rest is a beginning.
+        // Frames at rest after the first press do not count.
         self.pressed |= timeline.phase(at).1 >= 0;
         let sound = frame.counts.len() == elements && frame.counts.iter().all(|counts| counts.is_finite());
         if self.pressed || !sound || self.first_count == FIRST_FRAMES_MAX {
@@ -141,7 +141,7 @@ impl FrameStatistics {
         self.first_count += 1;
     }
 
-    /// Mean of the first frames and their number; `None` if a press came first.
+    /// Mean of the frames before the first press and their number; `None` without any.
     #[expect(clippy::cast_possible_truncation, reason = "counts are far within f32")]
     pub(super) fn first_mean_counts(&self) -> Option<(Vec<f32>, u64)> {
         let mean = |sum: &f64| (sum / self.first_count as f64) as f32;
@@ -162,14 +162,14 @@ impl FrameStatistics {
     pub(super) fn timing(&self, timeline: &Timeline) -> Timing {
         let clocks = timeline.clocks().iter().map(|(epoch, clock)| match clock {
             Ok(clock) => format!(
-                "Connection {epoch}: a frame arrives {:.2} ms (median) and {:.2} ms (99th percentile) later than the \
-                 quickest; drift of the device's clock {:.1} ppm; tick {} ms.",
+                "Connection {epoch}: frames arrive {:.2} ms (median) and {:.2} ms (99th percentile) later than the \
+                 fastest one; drift of the device's clock {:.1} ppm; tick {} ms.",
                 clock.delay_p50_ns as f64 * 1e-6,
                 clock.delay_p99_ns as f64 * 1e-6,
                 clock.drift_ppm,
                 clock.tick_ns as f64 * 1e-6,
             ),
-            Err(reason) => format!("Connection {epoch}: frames are dated by their arrival, because {reason}."),
+            Err(reason) => format!("Connection {epoch}: frames have their arrival times, because {reason}."),
         });
         Timing {
             expected_ms: 1e3 / timeline.rig().array.rate_hz(),
@@ -181,7 +181,7 @@ impl FrameStatistics {
 }
 
 impl Intervals {
-    /// `None` of none.
+    /// `None` for an empty list.
     fn of(intervals_ms: &[f64]) -> Option<Self> {
         if intervals_ms.is_empty() {
             return None;
@@ -194,7 +194,7 @@ impl Intervals {
         Some(Self { sorted_ms, jitter_ms })
     }
 
-    /// The interval that a share of all is not above (nearest rank).
+    /// The quantile for a share from 0 to 1, by nearest rank.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rank in the list")]
     pub fn quantile_ms(&self, share: f64) -> f64 {
         let rank = (share * self.sorted_ms.len() as f64).ceil() as usize;

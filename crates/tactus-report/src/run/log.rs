@@ -1,4 +1,4 @@
-//! The events of a run as lines of text.
+//! The event log as lines of text.
 
 use tactus_record::Timeline;
 use tactus_schema::{
@@ -12,17 +12,17 @@ use super::frames::{FrameStatistics, seconds};
 /// One line of the event log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoggedEvent {
-    /// When, from the start of the run.
+    /// Time since the start of the run.
     pub at_s: f64,
-    /// What kind of event.
+    /// Name of the kind of event, such as `dwell`.
     pub kind: &'static str,
-    /// What it says.
+    /// The event's fields as text.
     pub detail: String,
-    /// True of what happens over and over in any run: steps, phases and dwells.
+    /// True for events that occur many times in every run: steps, phases, dwells and reads.
     pub routine: bool,
 }
 
-/// All events, and the acts of the safety supervisor among them, in order of time.
+/// All events of the run and of the safety supervisor, in order of time.
 pub(super) fn events(timeline: &Timeline, frames: &FrameStatistics) -> Vec<LoggedEvent> {
     let logged = |event: &pb::RunEvent| {
         let at_s = seconds(timeline, MonoTime::from_ns(event.t_mono_ns));

@@ -1,4 +1,4 @@
-//! The presses that count, and what each dwell read above its baseline.
+//! The presses, and the mean reading of each dwell above its baseline.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,19 +11,19 @@ use tactus_schema::{
 
 use super::frames::FrameStatistics;
 
-/// A press this near an element's centre, in pitches, is a press on that element.
+/// A press within this distance of an element's centre, in pitches, counts as a press on that element.
 const CENTRE_PITCHES: f64 = 0.3;
 
-/// One press that was not broken off.
+/// One completed press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressSummary {
-    /// Its index in the run.
+    /// Index of the press in the run.
     pub index: i32,
-    /// Where the tip was told to be, sensor frame.
+    /// Target position in the sensor frame.
     pub at_mm: [f64; 2],
-    /// The element at whose centre that is, within 0.3 pitch.
+    /// The element whose centre is within 0.3 pitch.
     pub element: Option<usize>,
-    /// Its dwells, in order.
+    /// The dwells in order of time.
     pub dwells: Vec<DwellSummary>,
 }
 
@@ -32,22 +32,22 @@ pub struct PressSummary {
 pub struct DwellSummary {
     /// Depth below the covering's nominal surface.
     pub depth_mm: f64,
-    /// The covering then in place.
+    /// Thickness of the covering in place.
     pub covering_mm: f64,
-    /// Frames averaged.
+    /// Number of frames averaged.
     pub frames: u32,
     /// Mean counts above the baseline, row-major.
     pub rise_counts: Vec<f32>,
 }
 
-/// What rises are against; of several, what the first dwell without a tare has.
+/// Source of the baseline. If some dwells had no tare before them, their source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Baseline {
-    /// The tare last taken before.
+    /// The last tare before the dwell.
     Tare,
     /// The mean of this many frames before the first press.
     FirstFrames(u64),
-    /// The baseline in the rig file.
+    /// The rig file.
     RigFile,
 }
 
@@ -62,9 +62,9 @@ impl DwellSummary {
 pub(super) struct Presses {
     pub(super) done: Vec<PressSummary>,
     pub(super) baseline: Baseline,
-    /// Presses that were broken off and begun again.
+    /// Presses that were interrupted and repeated.
     pub(super) void: BTreeSet<i32>,
-    /// Dwells whose counts are not one finite number per element.
+    /// Number of dwells whose counts are not one finite number per element.
     pub(super) malformed_dwells: u32,
     baselines: Baselines,
 }
@@ -114,7 +114,7 @@ impl Presses {
         Self { done: presses.into_values().collect(), baseline, void, malformed_dwells, baselines }
     }
 
-    /// Sum over all elements of the baseline in force.
+    /// Sum over all elements of the baseline at a time.
     pub(super) fn zero_total_counts(&self, at: MonoTime) -> f64 {
         self.baselines.at(at).0.iter().map(|counts| f64::from(*counts)).sum()
     }
@@ -148,7 +148,7 @@ impl Baselines {
         Self { tares, before, fallback }
     }
 
-    /// The baseline in force, and whether it is a tare.
+    /// The baseline at a time, and whether it is a tare.
     fn at(&self, at: MonoTime) -> (&[f32], bool) {
         let next = self.tares.partition_point(|(from, _)| *from <= at);
         match next.checked_sub(1).and_then(|index| self.tares.get(index)) {
@@ -169,7 +169,7 @@ fn fits(done: &pb::DwellDone, array: &Array) -> bool {
         && [done.x_mm, done.y_mm, done.depth_mm].iter().all(|mm| mm.is_finite())
 }
 
-/// The element at whose centre a place is.
+/// The element whose centre is within [`CENTRE_PITCHES`] of a position.
 pub(super) fn element_at(array: &Array, [x_mm, y_mm]: [f64; 2]) -> Option<usize> {
     let nearest = |centres: &[f64], at: f64| {
         let distance =
@@ -181,7 +181,7 @@ pub(super) fn element_at(array: &Array, [x_mm, y_mm]: [f64; 2]) -> Option<usize>
     (dx_mm.hypot(dy_mm) <= CENTRE_PITCHES * pitch_mm(array)).then_some(row * array.cols() + col)
 }
 
-/// The least distance of two centres along an axis; of a single element, its size.
+/// The least distance between two centres along an axis; for a single element, its size.
 fn pitch_mm(array: &Array) -> f64 {
     let apart = |centres: &[f64]| {
         centres.windows(2).filter_map(|pair| Some(pair.last()? - pair.first()?)).fold(f64::INFINITY, f64::min)

@@ -1,4 +1,4 @@
-//! The elements' responses to presses at their own centres (Sec. 2.2 and Fig. 2a of the paper).
+//! Responses of the elements to presses at their own centres (Sec. 2.2 and Fig. 2a of the paper).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,29 +7,29 @@ use tactus_schema::Rig;
 use super::presses::PressSummary;
 use crate::fit::Polynomial;
 
-/// An element that reads less than this share of the median at its own press does not answer.
+/// An element is unresponsive if it reads less than this share of the median element at its own press.
 const DEAD_SHARE: f64 = 0.25;
-/// An element that reads less than this share of its own greatest reading at its own press answers elsewhere.
+/// An element responds to another's press if its reading at its own press is less than this share of its greatest.
 const OWN_SHARE: f64 = 0.95;
-/// Two depths that differ by less are the same.
+/// Depths are compared in multiples of this.
 const DEPTH_STEP_MM: f64 = 1e-3;
 
-/// The response curves of a run, and polynomials over their mean.
+/// The response curves of a run, and polynomials fitted to their mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseCurves {
-    /// The curves of the elements that answer to their own press, in order of the presses.
+    /// Curves of the elements that respond to their own press, in order of the presses.
     pub curves: Vec<ElementCurve>,
-    /// The elements that do not, in order of their index; they are in no fit.
+    /// The other elements, in order of their index; they take part in no fit.
     pub unresponsive: Vec<UnresponsiveElement>,
-    /// The mean of the curves at each depth that at least half of them have: `[mm, counts]`.
+    /// Mean of the curves at each depth that at least half of them have: `[mm, counts]`.
     pub mean: Vec<[f64; 2]>,
-    /// The line through the mean.
+    /// Line fitted to the mean.
     pub linear: Option<Polynomial>,
-    /// The parabola through the mean.
+    /// Parabola fitted to the mean.
     pub quadratic: Option<Polynomial>,
 }
 
-/// The reading of one element against the depth at its own centre.
+/// Reading of one element against depth, in a press at its own centre.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElementCurve {
     /// Index of the element.
@@ -38,23 +38,23 @@ pub struct ElementCurve {
     pub place: [usize; 2],
     /// Index of the press.
     pub press: i32,
-    /// Depth in mm and rise in counts, dwell by dwell.
+    /// Depth in mm and rise in counts of each dwell.
     pub points: Vec<[f64; 2]>,
-    /// The line through these points.
+    /// Line fitted to these points.
     pub linear: Option<Polynomial>,
 }
 
-/// An element that does not answer to its own press.
+/// An element that does not respond to its own press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnresponsiveElement {
-    /// Its curve, all the same.
+    /// Its readings at its own press.
     pub curve: ElementCurve,
-    /// Row and column of the element at whose press it reads most; `None` if it reads nothing anywhere.
+    /// Row and column of the element at whose press it reads most; `None` if it responds to no press.
     pub answers_to: Option<[usize; 2]>,
 }
 
 impl ResponseCurves {
-    /// `None` unless some press at an element's centre held two depths.
+    /// `None` unless a press at an element's centre has dwells at two depths or more.
     pub(super) fn of(rig: &Rig, presses: &[PressSummary]) -> Option<Self> {
         let cols = rig.array.cols();
         let curves: Vec<ElementCurve> =
@@ -88,7 +88,7 @@ impl ResponseCurves {
         })
     }
 
-    /// Mean and standard deviation of the single elements' slopes, in counts per mm; `None` of fewer than two.
+    /// Mean and standard deviation of the elements' slopes, in counts per mm; `None` for fewer than two.
     pub fn slope_spread(&self) -> Option<[f64; 2]> {
         let slopes: Vec<f64> = self.curves.iter().filter_map(ElementCurve::slope_counts_per_mm).collect();
         let mean = slopes.iter().sum::<f64>() / slopes.len() as f64;
@@ -114,15 +114,15 @@ impl ElementCurve {
         })
     }
 
-    /// Slope of the line through its points.
+    /// Slope of the fitted line.
     pub fn slope_counts_per_mm(&self) -> Option<f64> {
         self.linear.as_ref()?.coefficients.get(1).map(|slope| slope.value)
     }
 }
 
-/// What every element read at the deepest dwell of each press at a centre.
+/// Readings of all elements at the deepest dwell of each press at a centre.
 struct DeepestReadings<'a> {
-    /// By the element that was pressed: depth and rises.
+    /// Depth and rises, by pressed element.
     deepest: BTreeMap<usize, (i64, &'a [f32])>,
     median_own: f64,
 }
@@ -142,9 +142,9 @@ impl<'a> DeepestReadings<'a> {
         Self { deepest, median_own }
     }
 
-    /// Where an element answers.
+    /// The press to which an element responds.
     fn of_element(&self, element: usize) -> RespondsAt {
-        // Sensors of other kinds fall when pressed.
+        // Some sensors' readings fall when pressed.
         let toward = |rises: &[f32]| rise(rises, element) * self.median_own.signum();
         let least = DEAD_SHARE * self.median_own.abs();
         let Some((depth, rises)) = self.deepest.get(&element) else { return RespondsAt::Nowhere };
@@ -163,7 +163,7 @@ impl<'a> DeepestReadings<'a> {
     }
 }
 
-/// The press at which an element answers.
+/// The press to which an element responds.
 enum RespondsAt {
     Own,
     To(usize),

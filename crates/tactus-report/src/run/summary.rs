@@ -1,4 +1,4 @@
-//! What run it was, and what it came to.
+//! Identity, settings and outcome of a run.
 
 use tactus_model::Indenter;
 use tactus_record::Timeline;
@@ -6,7 +6,7 @@ use tactus_schema::{WallTime, pb};
 
 use super::presses::Presses;
 
-/// What run it was, and what it came to.
+/// Identity, settings and outcome of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
     /// Id of the run.
@@ -15,45 +15,45 @@ pub struct RunSummary {
     pub experiment: String,
     /// Name of the rig.
     pub rig: String,
-    /// Who asked for it.
+    /// Who started it.
     pub who: String,
     /// True if no physical sensor was read.
     pub simulated: bool,
-    /// When it began, RFC 3339, UTC.
+    /// Start time, RFC 3339, UTC.
     pub started: String,
-    /// From the first message to the last.
+    /// Time from the first message to the last.
     pub duration_s: f64,
-    /// What the dry run promised; `None` if it is not known.
+    /// Duration of the dry run, if known.
     pub duration_planned_s: Option<f64>,
-    /// How it ended, such as `done`; `None` if it never said.
+    /// Exit status, such as `done`; `None` if the recording has none.
     pub exit_status: Option<&'static str>,
-    /// What it said when it ended.
+    /// The run's final message.
     pub message: String,
     /// Thickness of the covering at the start.
     pub covering_mm: f64,
-    /// The tool: its id and shape.
+    /// Id and shape of the indenter.
     pub indenter: String,
     /// Name of the script.
     pub script: String,
     /// Hash of the script.
     pub script_sha256: Option<String>,
-    /// Seed of everything random in the script.
+    /// Seed of the script's random numbers.
     pub seed: Option<u64>,
     /// The script's parameters and their values.
     pub parameters: Vec<(String, String)>,
-    /// Name and version of everything that had a part.
+    /// Names and versions of the software and devices.
     pub versions: Vec<(String, String)>,
     /// Frames recorded.
     pub frames: u64,
-    /// Frames that the sensor took and that never arrived.
+    /// Frames that the sensor took but that never arrived.
     pub frames_lost: u64,
-    /// Places at which frames are missing.
+    /// Number of gaps in the sequence of frames.
     pub gaps: u64,
-    /// Presses of which at least one dwell is done and counts.
+    /// Completed presses with at least one dwell.
     pub presses: u32,
-    /// Dwells done that count.
+    /// Dwells of these presses.
     pub dwells: u32,
-    /// Presses and dwells that the dry run promised.
+    /// Presses and dwells of the dry run.
     pub planned: Option<[u32; 2]>,
 }
 
@@ -110,7 +110,7 @@ fn describe(indenter: &Indenter) -> String {
     }
 }
 
-/// The members of a JSON object as text; none if it is no object.
+/// The members of a JSON object as text; empty for anything else.
 fn pairs(json: &[u8]) -> Vec<(String, String)> {
     let members: serde_json::Map<String, serde_json::Value> =
         serde_json::from_slice(json).unwrap_or_default();

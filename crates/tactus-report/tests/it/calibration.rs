@@ -52,7 +52,7 @@ fn what_to_beware_of_comes_before_every_number_that_was_found() {
             "Surface: one depth",
             "To know before using a number",
             "14 presses contradict",
-            "Where the sensor lies",
+            "<h2>Registration</h2>",
             "Faulty elements",
             "Response of the elements</h2>",
             "Spread of the coverings",
@@ -76,15 +76,15 @@ fn numbers_have_the_digits_of_their_errors() {
         "<td class=\"n\">1.36248 \u{b1} 0.00035</td><td class=\"n\">0.999969</td><td class=\"n\">222 (3 left out)</td>",
         "<td>linear: b</td><td class=\"n\">0.49697 \u{b1} 0.00026</td><td class=\"n\">0.49646 to 0.49748</td>\
          <td class=\"n\">0.497</td><td class=\"n\">0.497</td>",
-        "<td>quadratic, one curvature</td><td class=\"n\">0.650</td><td class=\"n\">0.800</td><td>wanted</td>",
+        "<td>quadratic, one curvature</td><td class=\"n\">0.650</td><td class=\"n\">0.800</td><td>chosen</td>",
         "<td class=\"n\">47</td><td>(5, 7)</td><td>sound</td><td class=\"n\">100.0 \u{b1} 0.6</td>\
          <td class=\"n\">1047.0 \u{b1} 1.3</td><td class=\"n\">0.1500 \u{b1} 0.0010</td>",
     ] {
         assert!(html.contains(row), "{row}");
     }
     // 1.362476 pitches, of which the paper states 1.36.
-    assert!(html.contains("<td class=\"n\">1.362</td>"), "Eq. 4 stands beside");
-    assert!(html.contains("chance of that if it holds: &lt; 0.001"));
+    assert!(html.contains("<td class=\"n\">1.362</td>"), "Eq. 4 is in the row");
+    assert!(html.contains("(p-value if it holds: &lt; 0.001)"));
     assert!(
         html.contains("press 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 of corners-1 and 2 more."),
         "12 of 14 presses are named"
@@ -125,9 +125,9 @@ fn parts_that_are_missing_leave_the_others() {
     let html = page(&one_covering);
     // 2.22 + 0.497 x 1.016 less the declared slope leaves the declared intercept.
     assert!(html.contains(
-        "With the declared slope of 0.497 its spread makes the intercept 2.2200 \u{b1} 0.0007 mm."
+        "With the declared slope of 0.497, its spread gives an intercept of 2.2200 \u{b1} 0.0007 mm."
     ));
-    assert!(html.contains("Figure 5a") && !html.contains("off the line / "));
+    assert!(html.contains("Figure 5a") && !html.contains("distance from the line / "));
 
     let mut undecided = whole();
     let response = undecided.response.as_mut().unwrap();
@@ -135,7 +135,7 @@ fn parts_that_are_missing_leave_the_others() {
     response.shared_quadratic_per_mm = None;
     response.trials.iter_mut().for_each(|trial| trial.heldout_rms_counts = None);
     let html = page(&undecided);
-    assert!(html.contains("<td>taken</td>") && html.contains("depths are too few for parabolas"));
+    assert!(html.contains("<td>default</td>") && html.contains("depths are too few for parabolas"));
     assert!(!responses(undecided.response.as_ref().unwrap()).to_string().contains("quadratic"));
     response_of_nothing();
 }
@@ -151,7 +151,7 @@ fn response_of_nothing() {
 fn a_line_that_is_no_spread_is_refused() {
     let mut falling = whole();
     falling.thickness.as_mut().unwrap().linear.as_mut().unwrap().coefficients[1] = sure(-0.1, 0.01);
-    assert!(page(&falling).contains("This is no spread that a model can have"));
+    assert!(page(&falling).contains("A model cannot have this spread"));
 }
 
 #[test]
@@ -174,7 +174,9 @@ fn recalibrated_elements_lie_on_one_another() {
     let off = |s: f64, u: f64| (s * (u + CURVATURE_PER_MM * u * u) - line * u).powi(2);
     let squares = sensitivities.iter().flat_map(|s| [0.2, 0.3, 0.4, 0.5, 0.6].map(|u| off(*s, u)));
     let before = (squares.sum::<f64>() / (5.0 * 43.0)).sqrt();
-    let said = format!("Readings lie {before:.1} counts rms off one line for all before it and 0.000");
+    let said = format!(
+        "The distance of the readings from one line for all is {before:.1} counts rms before and 0.000"
+    );
     assert!(page(&whole()).contains(&said), "{said}");
 }
 
@@ -184,7 +186,7 @@ fn sensitivities_of_both_signs_have_no_mean() {
     let first = &mut signed.response.as_mut().unwrap().elements[0];
     first.sensitivity_counts_per_mm.value *= -1.0;
     let html = page(&signed);
-    assert!(html.contains("Sensitivities of both signs: no mean is drawn."));
+    assert!(html.contains("The sensitivities have both signs: no mean is drawn."));
 }
 
 #[test]
@@ -248,7 +250,7 @@ fn pages_load_nothing_and_escape_all_text() {
         rig: HOSTILE,
         simulated: true,
         runs: &runs,
-        rows: &rows,
+        quantities: &rows,
         calibration: Some(report),
         figures: &figures,
         missing: &said,
@@ -300,7 +302,7 @@ fn a_study_compares_first_and_shows_every_figure_in_the_order_of_the_paper() {
         rig: "bench-3",
         simulated: true,
         runs: &runs,
-        rows: &rows,
+        quantities: &rows,
         calibration: Some(report(&array, &calibration)),
         figures: &figures,
         missing: &[],
@@ -330,18 +332,24 @@ fn a_study_compares_first_and_shows_every_figure_in_the_order_of_the_paper() {
             "id=\"f10b\"",
             "<h2>Drawing </h2>",
             "The calibration",
-            "Where the sensor lies",
+            "<h2>Registration</h2>",
         ],
     );
     assert_eq!(html.matches("Figure 5a").count(), 2, "as a heading, and as the drawing's name");
 
-    let bare =
-        StudyReport { calibration: None, rows: &[], runs: &[], figures: &[], simulated: false, ..study };
+    let bare = StudyReport {
+        calibration: None,
+        quantities: &[],
+        runs: &[],
+        figures: &[],
+        simulated: false,
+        ..study
+    };
     let html = study_html(&bare);
     assert!(
         html.contains("Nothing was found.")
             && html.contains("No run was made.")
-            && html.contains("There is none.")
+            && html.contains("There is no calibration.")
     );
     assert!(!html.contains("SIMULATED") && html.ends_with("</html>\n"));
 }

@@ -139,20 +139,20 @@ fn the_verdict_says_what_it_rests_on() {
     );
     assert_eq!(
         in_words(&nothing_missing()),
-        "Nothing that these data can show is missing from the model: on held-out presses its residual is 2.01 counts rms, the noise is \
-         2.00 counts, and noise alone shows as much structure with a chance of 0.431."
+        "The model is missing no effect that these data can show: on held-out presses its residual is 2.01 counts rms and the noise is \
+         2.00 counts. The probability of as much structure by noise alone is 0.431."
     );
     assert_eq!(
         in_words(&unexplained()),
-        "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms, and how large \
-         the noise is, these data do not tell. What is left, 100 % of the gap, depends on time since contact and depth."
+        "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms and the size \
+         of the noise is unknown. The remaining 100 % of the gap depends on time since contact and depth."
     );
     let partly = Discovery {
         verdict: Verdict::PartlyExplained,
         unexplained: Unexplained { depends_on: vec!["temperature"], share: 0.3 },
         ..explained()
     };
-    assert!(in_words(&partly).ends_with("What is left, 30 % of the gap, depends on temperature."));
+    assert!(in_words(&partly).ends_with("The remaining 30 % of the gap depends on temperature."));
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn what_cannot_be_shown_comes_first_and_what_it_rests_on_last() {
     for text in [
         "SIMULATED",
         "No physical sensor was read",
-        "What these data cannot show",
+        "Effects that these data cannot show",
         "softening, imprint: no press is followed",
         "To know before using a number",
         ">explained</span>",
@@ -186,8 +186,8 @@ fn what_cannot_be_shown_comes_first_and_what_it_rests_on_last() {
         "What stays unexplained",
         "What to measure next",
         "<code>tactus run diagnose -p parts=approach</code>",
-        "tells hysteresis from backlash (z = 11)",
-        "What this rests on",
+        "distinguishes hysteresis from backlash (z = 11)",
+        "<h2>Data</h2>",
         "no physical sensor was read",
     ] {
         let at = html[from..].find(text);
@@ -211,11 +211,11 @@ fn the_pages_numbers_are_those_that_were_found() {
         "Load and unload differ, independent of rate.",
         "<th class=\"n\">loss_share</th><th class=\"n\">threshold_mm</th>",
         "<td>found</td><td class=\"n\">0.123 \u{b1} 0.004</td><td class=\"n\">0.0510 \u{b1} 0.0020</td>",
-        "<td>can lie</td><td class=\"n\">\u{2212}1 to 5</td><td class=\"n\">0.001 to 2</td>",
+        "<td>possible range</td><td class=\"n\">\u{2212}1 to 5</td><td class=\"n\">0.001 to 2</td>",
         "<td>found, 2</td><td class=\"n\">19</td><td class=\"n\">18</td>",
-        "cannot tell it from backlash",
-        "The data tell it from every other effect",
-        "and fitted anew with the rest: misregistration.",
+        "cannot distinguish it from backlash",
+        "The data distinguish it from every other effect",
+        "and fitted again with the rest: misregistration.",
         "<td>grown model</td><td class=\"n\">2.08</td><td class=\"n\">1.04</td><td class=\"n\">1.08</td><td class=\"n\">0.571</td><td class=\"n\">0.286</td>",
         "whole coverings</th><td>2.54 mm",
         "<td>grid-sweep-2</td><td class=\"n\">16\u{202f}000</td>",
@@ -230,7 +230,7 @@ fn a_page_of_nothing_says_so() {
     let html = html(&nothing_missing());
     show("nothing-missing.html", &html);
     for text in [
-        "could show every effect",
+        "can show every effect",
         ">nothing-missing</span>",
         "depends on no covariate",
         "Nothing: there is no structure",
@@ -247,7 +247,7 @@ fn what_no_effect_matches_has_no_name() {
     show("unexplained.html", &html);
     for text in [
         ">unexplained</span>",
-        "<dd>not known</dd>",
+        "<dd>unknown</dd>",
         "depends on time since contact and depth",
         "None was taken",
     ] {
@@ -313,13 +313,13 @@ fn an_experiment_that_answers_several_questions_is_proposed_once() {
         NextExperiment { separates: separates("relaxation", "nothing"), expected_z: 5.0, ..first },
     ]);
     let proposals = proposals(&found);
-    let told: Vec<[&str; 2]> = proposals.iter().map(|one| [&*one.command, &*one.tells]).collect();
+    let told: Vec<[&str; 2]> = proposals.iter().map(|one| [&*one.command, &*one.decides]).collect();
     assert_eq!(
         told,
         [
             [
                 "tactus run diagnose -p parts=approach",
-                "tells hysteresis from backlash (z = 11); shows imprint (z = 4.0) and relaxation (z = 5.0)"
+                "distinguishes hysteresis from backlash (z = 11); shows imprint (z = 4.0) and relaxation (z = 5.0)"
             ],
             ["tactus run diagnose -p parts=hold", "shows imprint (z = 11)"],
         ]

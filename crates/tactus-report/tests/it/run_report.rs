@@ -131,7 +131,9 @@ fn an_empty_run_says_what_is_missing() {
     run.fed.retain(|fed| matches!(fed, Fed::Event(event) if matches!(event.event, Some(Event::Started(_)))));
     let report = report(&run);
     let html = page("empty", &report);
-    for missing in ["never closed", "No frame was recorded", "No dwell was done", "stage never said"] {
+    for missing in
+        ["never closed", "No frame was recorded", "No dwell was done", "stage never reported its position"]
+    {
         assert!(html.contains(missing), "{missing}: {:?}", report.notes);
     }
 }

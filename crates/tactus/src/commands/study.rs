@@ -53,18 +53,18 @@ pub(crate) fn study(common: &Common, args: &StudyArgs) -> anyhow::Result<Exit> {
     };
     tell("mechanics, acuity, figures");
     let mut figures = figures::finished(&FIGURES)?;
-    let rows = quantities::quantities(&calibrated, truth.as_ref(), images.as_ref())?;
+    let quantities = quantities::quantities(&calibrated, truth.as_ref(), images.as_ref())?;
     figures.extend(images.into_iter().flat_map(|images| images.figures));
     let mut warnings: Vec<String> = taken.iter().filter_map(|taken| taken.degraded.clone()).collect();
     warnings.extend(calibrated.notes.iter().chain(&calibrated.calibration.warnings).cloned());
-    let findings = Findings { rows, missing, warnings };
+    let findings = Findings { quantities, missing, warnings };
     write_report(args, &calibrated, &taken, &findings, &figures)?;
     finish(common, args, &calibrated, &findings, start)
 }
 
 /// Results of a study.
 struct Findings {
-    rows: Vec<ComparedQuantity>,
+    quantities: Vec<ComparedQuantity>,
     /// Parts that could not be done.
     missing: Vec<String>,
     /// Reservations about the numbers.
@@ -83,7 +83,7 @@ fn write_report(
         rig: &calibrated.rig.name,
         simulated: calibrated.simulated,
         runs: &runs,
-        rows: &findings.rows,
+        quantities: &findings.quantities,
         calibration: Some(calibrated.report()),
         figures,
         missing: &findings.missing,
@@ -104,14 +104,14 @@ fn finish(
     common: &Common,
     args: &StudyArgs,
     calibrated: &Calibrated,
-    Findings { rows, missing, warnings }: &Findings,
+    Findings { quantities, missing, warnings }: &Findings,
     start: Instant,
 ) -> anyhow::Result<Exit> {
     let report = std::path::absolute(args.out.join("report.html"))?;
-    let known = rows.iter().filter(|row| row.truth.is_some() && row.inside.is_some());
-    let (inside, known) = (known.clone().filter(|row| row.inside == Some(true)).count(), known.count());
+    let known = quantities.iter().filter(|one| one.truth.is_some() && one.inside.is_some());
+    let (inside, known) = (known.clone().filter(|one| one.inside == Some(true)).count(), known.count());
     if common.json {
-        let rows: Vec<_> = rows.iter().map(quantities::to_json).collect();
+        let rows: Vec<_> = quantities.iter().map(quantities::to_json).collect();
         let found = json!({
             "schema": "tactus.study/1",
             "rig": calibrated.rig.name,
@@ -126,7 +126,7 @@ fn finish(
         });
         output::write(&format!("{found}\n"))?;
     } else {
-        quantities::print(rows);
+        quantities::print(quantities);
         say("");
         if known > 0 {
             say(&format!("{inside} of {known} known truths inside their 95 % intervals"));

@@ -1,14 +1,13 @@
-//! Which face is drawn before which: binary space partition.
+//! Drawing order of faces by binary space partition.
 
 use super::{Face, dot};
 
-/// Points closer to a plane than this lie in it.
+/// Points closer to a plane than this count as lying in it.
 const FLAT_MM: f64 = 1e-6;
 
-/// Faces, all turned to the viewer, so that each comes after those that it hides; cut where they intersect.
+/// Orders faces that all face the viewer, so that each comes after those that it hides. Intersecting faces are cut.
 ///
-/// The plane of the first face parts all others: those behind it cannot hide it, those before it cannot be hidden
-/// by it.
+/// The plane of the first face separates all others: those behind it cannot hide it, and it cannot hide those in front.
 ///
 /// # Source
 /// Fuchs, Kedem and Naylor, On Visible Surface Generation by A Priori Tree Structures (1980).
@@ -42,7 +41,7 @@ fn append(ordered: &mut Vec<Face>, faces: Vec<Face>) {
     append(ordered, before);
 }
 
-/// What of a face stands at one side of a plane, above it or (sign -1) below.
+/// The part of a face above a plane or (sign -1) below it.
 fn part(face: &Face, heights: &[f64], sign: f64) -> Face {
     let corners = &face.corners_mm;
     let mut kept = Vec::with_capacity(corners.len() + 1);
@@ -62,7 +61,7 @@ fn part(face: &Face, heights: &[f64], sign: f64) -> Face {
 
 /// Unit normal towards the side from which the corners run counter-clockwise; zero for a face without area.
 pub(super) fn normal(face: &Face) -> [f64; 3] {
-    // Newell's sum, which does not mind corners in one line.
+    // Newell's sum, which allows collinear corners.
     let corners = &face.corners_mm;
     let mut sum = [0.0; 3];
     for (a, b) in corners.iter().zip(corners.iter().cycle().skip(1)) {

@@ -1,4 +1,4 @@
-//! Discoveries whose every number is known, as the page is to show them.
+//! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
     Base, Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment,
@@ -23,7 +23,7 @@ const COVARIATES: [(&str, &str, [f64; 2]); 12] = [
     ("temperature", "deg C", [21.0, 24.0]),
 ];
 
-/// Two effects were found, one of them twice; a third was known.
+/// Two effects were found, one of them twice; a third was known before.
 pub(crate) fn explained() -> Discovery {
     let (hysteresis, miswired) =
         (["loss_share", "threshold_mm"], ["element", "answers_for", "own_share", "other_share"]);
@@ -112,7 +112,7 @@ pub(crate) fn explained() -> Discovery {
     }
 }
 
-/// The base model is all that there is.
+/// Nothing is missing from the base model.
 pub(crate) fn nothing_missing() -> Discovery {
     let flat = |mut curve: Curve| {
         for point in &mut curve.points {
@@ -140,7 +140,7 @@ pub(crate) fn nothing_missing() -> Discovery {
     }
 }
 
-/// There is a gap, and no candidate closes it; no frames repeat each other.
+/// There is a gap that no candidate closes; the noise is unknown.
 pub(crate) fn unexplained() -> Discovery {
     let whole = explained();
     Discovery {
@@ -156,7 +156,7 @@ pub(crate) fn unexplained() -> Discovery {
     }
 }
 
-/// Nothing is in it, and what can be no number is none.
+/// Empty, with NaN wherever possible.
 pub(crate) fn empty() -> Discovery {
     let nowhere = Level { heldout_rms_counts: f64::NAN, heldout_chi2: f64::NAN };
     Discovery {

@@ -1,4 +1,4 @@
-//! A calibration whose every number is known, as the pages are to show it.
+//! Synthetic calibrations with known numbers.
 
 pub(crate) mod discovery;
 
@@ -9,14 +9,14 @@ use tactus_calibrate::{
 use tactus_model::{Array, Psf, Registration};
 use tactus_report::calibration::CalibrationReport;
 
-/// Faulty in this calibration, each in another way.
+/// Faulty elements, each with another fault.
 pub(crate) const FAULTY: [usize; 4] = [5, 7, 18, 33];
-/// Nothing was pressed near it.
+/// An element without a press near it.
 pub(crate) const NOT_JUDGED: usize = 40;
-/// Of all elements. The sensitivity of each is 1000 counts/mm and its index.
+/// Curvature of every element. Sensitivities are 1000 counts/mm plus the element's index.
 pub(crate) const CURVATURE_PER_MM: f64 = 0.15;
 
-/// Everything was found.
+/// A calibration with all results.
 pub(crate) fn whole() -> Calibration {
     let sound = (0..48).filter(|element| !FAULTY.contains(element) && *element != NOT_JUDGED);
     let spreads: Vec<SpreadFit> = [1.016, 2.54, 5.08]
@@ -90,7 +90,7 @@ pub(crate) fn whole() -> Calibration {
     }
 }
 
-/// Nothing could be found, for want of presses.
+/// A calibration without results, because there were no presses.
 pub(crate) fn empty() -> Calibration {
     Calibration {
         data: DataSummary {

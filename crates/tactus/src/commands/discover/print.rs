@@ -48,8 +48,8 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
     if !proposals.is_empty() {
         say("");
     }
-    for Proposal { command, duration_s, tells } in proposals {
-        say(&format!("next: {command}  ({})\n      {tells}", duration(duration_s)));
+    for Proposal { command, duration_s, decides } in proposals {
+        say(&format!("next: {command}  ({})\n      {decides}", duration(duration_s)));
     }
     say("");
     for path in paths {

@@ -54,7 +54,7 @@ pub(super) async fn run(
                 }
             }
             there = alive.changed() => if there != Some(true) {
-                bail!("the service went away during run {}; `tactus status` tells whether it is back", accepted.run_id);
+                bail!("the service disappeared during run {}; `tactus status` shows whether it is back", accepted.run_id);
             },
             state = states.recv() => {
                 let state = state.context("the connection to the service ended")?;

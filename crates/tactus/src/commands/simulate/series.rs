@@ -68,20 +68,20 @@ pub(super) fn write(
     Ok(Exit::Done)
 }
 
-/// Frames a second: as asked for, or the array's own.
+/// Frames per second from `--rate-hz`, or the rate of the array.
 pub(super) fn rate_hz(args: &SimulateArgs, scene: &Scene) -> anyhow::Result<f64> {
     let rate_hz = args.rate_hz.unwrap_or(scene.array().rate_hz());
     if !(rate_hz.is_finite() && rate_hz > 0.0 && rate_hz <= 1000.0) {
         return Err(Failure::new(
             Exit::Usage,
-            format!("--rate-hz must lie above 0 and at most at 1000, not {rate_hz}"),
+            format!("--rate-hz must be above 0 and at most 1000, not {rate_hz}"),
         )
         .into());
     }
     Ok(rate_hz)
 }
 
-/// Reads a path: lines of `t_s,x_mm,y_mm,z_mm`, after one that names them.
+/// Reads a path: a header line `t_s,x_mm,y_mm,z_mm`, then lines of numbers.
 pub(super) fn read(path: &Path) -> anyhow::Result<Trajectory> {
     let text = std::fs::read_to_string(path).with_context(|| format!("{} cannot be read", path.display()))?;
     parse(&text).map_err(|error| {
@@ -99,7 +99,7 @@ fn parse(text: &str) -> anyhow::Result<Trajectory> {
         let numbers: Vec<f64> = line
             .split(',')
             .map(|cell| {
-                cell.trim().parse().with_context(|| format!("line {}: {cell:?} is no number", index + 1))
+                cell.trim().parse().with_context(|| format!("line {}: {cell:?} is not a number", index + 1))
             })
             .collect::<anyhow::Result<_>>()?;
         match numbers[..] {

@@ -39,19 +39,19 @@ pub(super) fn quantities(
     truth: Option<&Truth>,
     images: Option<&Images>,
 ) -> anyhow::Result<Vec<ComparedQuantity>> {
-    let mut rows = registration(calibrated, truth);
-    rows.extend(response(calibrated, truth));
-    rows.extend(mechanics()?);
-    rows.extend(spread(calibrated, truth));
-    rows.extend(acuity()?);
+    let mut quantities = registration(calibrated, truth);
+    quantities.extend(response(calibrated, truth));
+    quantities.extend(mechanics()?);
+    quantities.extend(spread(calibrated, truth));
+    quantities.extend(acuity()?);
     if let Some(images) = images {
-        rows.push(ComparedQuantity {
+        quantities.push(ComparedQuantity {
             paper: Some("qualitatively similar".into()),
             note: "Fig. 8: largest difference between the rig's images of the H and the model's".into(),
             ..text("images of the H", "", format!("within {:.1} % of their range", images.worst_percent))
         });
     }
-    Ok(rows)
+    Ok(quantities)
 }
 
 fn registration(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuantity> {
@@ -59,13 +59,13 @@ fn registration(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQ
     let of = |of: fn(&Truth) -> f64| truth.map(of);
     let [x, y] = fit.origin_mm;
     vec![
-        row("origin, x", "mm", Some(x), of(|truth| truth.registration.origin_mm[0])),
-        row("origin, y", "mm", Some(y), of(|truth| truth.registration.origin_mm[1])),
-        row("rotation", "deg", fit.rotation_deg, of(|truth| truth.registration.rotation_deg)),
-        row("surface height", "mm", fit.surface_mm, of(|truth| truth.surface_mm)),
+        estimated("origin, x", "mm", Some(x), of(|truth| truth.registration.origin_mm[0])),
+        estimated("origin, y", "mm", Some(y), of(|truth| truth.registration.origin_mm[1])),
+        estimated("rotation", "deg", fit.rotation_deg, of(|truth| truth.registration.rotation_deg)),
+        estimated("surface height", "mm", fit.surface_mm, of(|truth| truth.surface_mm)),
         ComparedQuantity {
             note: "a check of element centres and stage".into(),
-            ..row("scale", "", fit.scale, truth.map(|_| 1.0))
+            ..estimated("scale", "", fit.scale, truth.map(|_| 1.0))
         },
     ]
 }
@@ -74,7 +74,7 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuant
     let calibration = &calibrated.calibration;
     let faults = &calibration.health.faults;
     let planted = truth.map(planted);
-    let mut rows = vec![ComparedQuantity {
+    let mut quantities = vec![ComparedQuantity {
         paper: Some("two, answering a neighbour".into()),
         inside: planted.as_ref().map(|planted| {
             let alike = |(found, (element, kind)): (&FaultyElement, &(usize, FaultKind))| {
@@ -87,8 +87,8 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuant
             .map_or_else(String::new, |planted| format!("planted: {}", in_words(planted.iter().copied()))),
         ..text("faulty elements", "", in_words(faults.iter().map(|fault| (fault.element, fault.kind))))
     }];
-    let Some(fit) = &calibration.response else { return rows };
-    rows.push(ComparedQuantity {
+    let Some(fit) = &calibration.response else { return quantities };
+    quantities.push(ComparedQuantity {
         paper: Some("linear at low force, else quadratic".into()),
         note: "chosen on held-out dwells".into(),
         ..text("response", "", fit.form.name().into())
@@ -100,7 +100,7 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuant
     };
     if fit.form != ResponseForm::OwnQuadratic {
         let truth = truth.map(|truth| truth.model.response().quadratic_per_mm[0]);
-        rows.push(row("curvature of the response", "1/mm", curvature, truth));
+        quantities.push(estimated("curvature of the response", "1/mm", curvature, truth));
     }
     if let Some(truth) = truth {
         let sensitivities = &truth.model.response().sensitivity_counts_per_mm;
@@ -108,13 +108,13 @@ fn response(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuant
             one.sensitivity_counts_per_mm.covers(sensitivities[one.element])
         };
         let (inside, of) = (fit.elements.iter().filter(inside).count(), fit.elements.len());
-        rows.push(ComparedQuantity {
+        quantities.push(ComparedQuantity {
             note: "95 % are expected on average over many rigs; on one rig their errors are correlated"
                 .into(),
             ..text("sensitivities inside their intervals", "", format!("{inside} of {of}"))
         });
     }
-    rows
+    quantities
 }
 
 /// The planted faults in order of the elements, as calibration reports faults.
@@ -165,7 +165,7 @@ fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuantit
     let pitch_mm = calibrated.rig.array.pitch_mm();
     let Some(thickness) = &calibrated.calibration.thickness else { return Vec::new() };
     let psf = truth.map(|truth| truth.model.psf());
-    let mut rows: Vec<ComparedQuantity> = thickness
+    let mut quantities: Vec<ComparedQuantity> = thickness
         .coverings
         .iter()
         .map(|covering| {
@@ -173,7 +173,7 @@ fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuantit
             let truth = psf.map(|psf| (psf.sigma_intercept_mm + psf.sigma_per_mm * t) / pitch_mm);
             ComparedQuantity {
                 paper: Some(format!("{:.2} (Eq. 4)", 1.11 + 0.497 * t / 2.0)),
-                ..row(
+                ..estimated(
                     &format!("spread under {t:.3} mm"),
                     "pitches",
                     Some(covering.sigma_mm.in_units_of(pitch_mm)),
@@ -184,29 +184,29 @@ fn spread(calibrated: &Calibrated, truth: Option<&Truth>) -> Vec<ComparedQuantit
         .collect();
     if let Some(line) = &thickness.linear {
         let [intercept, slope] = line.coefficients;
-        rows.push(ComparedQuantity {
+        quantities.push(ComparedQuantity {
             paper: Some("1.11".into()),
-            ..row(
+            ..estimated(
                 "Eq. 4, intercept",
                 "pitches",
                 Some(intercept.in_units_of(pitch_mm)),
                 psf.map(|psf| psf.sigma_intercept_mm / pitch_mm),
             )
         });
-        rows.push(ComparedQuantity {
+        quantities.push(ComparedQuantity {
             paper: Some("0.497".into()),
-            ..row("Eq. 4, slope", "", Some(slope), psf.map(|psf| psf.sigma_per_mm))
+            ..estimated("Eq. 4, slope", "", Some(slope), psf.map(|psf| psf.sigma_per_mm))
         });
     }
     if let Some(parabola) = &thickness.quadratic {
         let [_, _, bend] = parabola.coefficients;
         let found = Estimate { value: bend.value * pitch_mm, standard_error: bend.standard_error * pitch_mm };
-        rows.push(ComparedQuantity {
+        quantities.push(ComparedQuantity {
             note: "of the quadratic fit of Fig. 5a; 0 if the spread is linear in thickness".into(),
-            ..row("spread against thickness, bend", "1/pitch", Some(found), truth.map(|_| 0.0))
+            ..estimated("spread against thickness, bend", "1/pitch", Some(found), truth.map(|_| 0.0))
         });
     }
-    rows
+    quantities
 }
 
 fn acuity() -> anyhow::Result<Vec<ComparedQuantity>> {
@@ -234,7 +234,7 @@ fn acuity() -> anyhow::Result<Vec<ComparedQuantity>> {
     ])
 }
 
-fn row(quantity: &str, unit: &str, found: Option<Estimate>, truth: Option<f64>) -> ComparedQuantity {
+fn estimated(quantity: &str, unit: &str, found: Option<Estimate>, truth: Option<f64>) -> ComparedQuantity {
     ComparedQuantity {
         quantity: quantity.into(),
         unit: unit.into(),
@@ -274,8 +274,8 @@ pub(super) fn to_json(row: &ComparedQuantity) -> Value {
 }
 
 /// Prints the quantities as a table.
-pub(super) fn print(rows: &[ComparedQuantity]) {
-    let cells = rows.iter().map(|row| {
+pub(super) fn print(quantities: &[ComparedQuantity]) {
+    let cells = quantities.iter().map(|row| {
         let found = match &row.found {
             FoundValue::Estimate(found) => estimate(*found),
             FoundValue::Text(text) => text.clone(),

@@ -145,13 +145,13 @@ impl StudySteps {
         let known = self.taken.iter().find(|taken| taken.step == step.name && taken.recording.is_file());
         if let Some(known) = known {
             if !common.json {
-                say(&format!("{}: made already, run {}", step.name, known.run_id));
+                say(&format!("{}: already done, run {}", step.name, known.run_id));
             }
             return Ok(known.clone());
         }
         let rig_file = step.rig_file.as_ref().or(args.rig_file.as_ref());
         let summary = execute(
-            // The run's own first line would stand before every step.
+            // Suppresses the run's own first line.
             &Common { json: true, ..common.clone() },
             &RunArgs {
                 experiment: ExperimentArgs {
@@ -171,7 +171,7 @@ impl StudySteps {
         .with_context(|| format!("step {:?}", step.name))?;
         if !matches!(summary.exit_status, ExitStatus::Done | ExitStatus::Degraded) {
             let error = format!(
-                "step {:?} ended as {}: {}; the same command goes on from there",
+                "step {:?} ended as {}: {}; the same command continues from there",
                 step.name,
                 summary.exit_status.word(),
                 summary.message
