@@ -1,7 +1,7 @@
 //! The bounds that no script may cross, checked before anything moves.
 
 use tactus_model::Covering;
-use tactus_plan::{Place, Press, Step};
+use tactus_plan::{Position, Press, Step};
 use tactus_schema::Rig;
 use tactus_schema::rig::{Envelope, Motion};
 
@@ -127,7 +127,7 @@ impl Bounds {
         self.check_place(press.at)?;
         check_duration(press.dwell_s)?;
         if let Some([dx_mm, dy_mm]) = press.approach_from_mm {
-            self.check_place(Place { x_mm: press.at.x_mm + dx_mm, y_mm: press.at.y_mm + dy_mm })?;
+            self.check_place(Position { x_mm: press.at.x_mm + dx_mm, y_mm: press.at.y_mm + dy_mm })?;
         }
         check_speed(press.speed_mm_per_s, self.envelope.load_speed_max_mm_per_s, "load_speed_max_mm_per_s")?;
         for &depth_mm in &press.depths_mm {
@@ -151,7 +151,7 @@ impl Bounds {
         })
     }
 
-    fn check_place(&self, place: Place) -> Result<(), Outside> {
+    fn check_place(&self, place: Position) -> Result<(), Outside> {
         let [x_mm, y_mm] = self.registration.to_robot([place.x_mm, place.y_mm]);
         check_axis("x", x_mm, self.envelope.x_mm)?;
         check_axis("y", y_mm, self.envelope.y_mm)
