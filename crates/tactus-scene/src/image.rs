@@ -20,41 +20,24 @@ const CELLS_PER_TOOL: [f64; 2] = [64.0, 250.0];
 
 /// Why there is no image.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum RenderError {
     /// The covering has no thickness or no spread.
     #[error("{field} must be positive and finite, not {value} mm")]
-    Covering {
-        /// The thickness or the spread.
-        field: &'static str,
-        /// What it was.
-        value: f64,
-    },
+    Covering { field: &'static str, value: f64 },
     /// The cells are not positive, or too many to cover the array.
     #[error("cells must measure at least {least_mm} mm, not {cell_mm} mm")]
     Cell {
-        /// What was asked for.
         cell_mm: f64,
         /// Least side of a cell for this array and blur.
         least_mm: f64,
     },
     /// A pose holds something that is not a finite number.
     #[error("{field} of pose {pose} is not finite")]
-    Pose {
-        /// Index of the pose.
-        pose: usize,
-        /// Which of its values.
-        field: &'static str,
-    },
+    Pose { pose: usize, field: &'static str },
     /// Not one place for each element of each pose.
     #[error("{poses} poses of {elements} elements need {} places, not {places}", poses * elements)]
-    Length {
-        /// Poses given.
-        poses: usize,
-        /// Elements of the array.
-        elements: usize,
-        /// Places given.
-        places: usize,
-    },
+    Length { poses: usize, elements: usize, places: usize },
 }
 
 /// An orthographic camera that looks up at a tool through the covering (paper, Sec. 5), and the sensor behind.
