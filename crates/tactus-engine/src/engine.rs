@@ -80,8 +80,8 @@ pub struct Pulse {
 /// Another run is in progress.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("run {run_id} is in progress: wait for it, or stop it with `tactus stop`")]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub struct Busy {
-    /// The run in progress.
     pub run_id: String,
 }
 
@@ -129,15 +129,13 @@ pub enum ResetError {
 
 /// Why an engine could not be started.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum EngineError {
     /// The rig is a description of data, not of a service.
     #[error(
         "rig {rig:?} has no envelope, motion, policy, sensor and stage: it describes data, not a service"
     )]
-    NoService {
-        /// The rig's name.
-        rig: String,
-    },
+    NoService { rig: String },
 }
 
 /// What the run, the acquisition task and the handles share.

@@ -1,7 +1,7 @@
 //! The bounds that no script may cross, checked before anything moves.
 
 use tactus_model::Covering;
-use tactus_plan::{Place, Press, Step};
+use tactus_plan::{Position, Press, Step};
 use tactus_schema::Rig;
 use tactus_schema::rig::{Envelope, Motion};
 
@@ -22,22 +22,14 @@ pub struct Bounds {
 
 /// A step that would leave the envelope; the text says by how much, and which limit it is.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum Outside {
     /// Deeper than the covering allows.
     #[error(
         "{depth_mm} mm is too deep: the limit is {limit_mm:.3} mm ({share_percent:.0} % of the covering's {thickness_mm} mm; \
          envelope.depth_share_max)"
     )]
-    Depth {
-        /// What was asked.
-        depth_mm: f64,
-        /// The limit.
-        limit_mm: f64,
-        /// The limit as a share.
-        share_percent: f64,
-        /// Thickness of the covering in place.
-        thickness_mm: f64,
-    },
+    Depth { depth_mm: f64, limit_mm: f64, share_percent: f64, thickness_mm: f64 },
     /// Beyond the travel that the rig allows.
     #[error(
         "{axis} = {value_mm:.3} mm (robot frame) is outside {least_mm} to {greatest_mm} mm (envelope.{axis}_mm)"
@@ -45,31 +37,20 @@ pub enum Outside {
     Travel {
         /// x, y or z.
         axis: &'static str,
-        /// What was asked.
         value_mm: f64,
-        /// The lower bound.
         least_mm: f64,
-        /// The upper bound.
         greatest_mm: f64,
     },
     /// Longer than any step may last.
     #[error("{duration_s} s is too long for one step: the limit is {DURATION_MAX_S} s")]
-    Duration {
-        /// What was asked.
-        duration_s: f64,
-    },
+    Duration { duration_s: f64 },
     /// No covering is so thick.
     #[error("no covering is {thickness_mm} mm thick: the limit is {THICKNESS_MAX_MM} mm")]
-    Covering {
-        /// What was asked.
-        thickness_mm: f64,
-    },
+    Covering { thickness_mm: f64 },
     /// Faster than the rig allows.
     #[error("{speed_mm_per_s} mm/s is too fast: the limit is {limit_mm_per_s} mm/s (envelope.{limit})")]
     Speed {
-        /// What was asked.
         speed_mm_per_s: f64,
-        /// The limit.
         limit_mm_per_s: f64,
         /// Name of the limit in the rig file.
         limit: &'static str,
@@ -127,7 +108,7 @@ impl Bounds {
         self.check_place(press.at)?;
         check_duration(press.dwell_s)?;
         if let Some([dx_mm, dy_mm]) = press.approach_from_mm {
-            self.check_place(Place { x_mm: press.at.x_mm + dx_mm, y_mm: press.at.y_mm + dy_mm })?;
+            self.check_place(Position { x_mm: press.at.x_mm + dx_mm, y_mm: press.at.y_mm + dy_mm })?;
         }
         check_speed(press.speed_mm_per_s, self.envelope.load_speed_max_mm_per_s, "load_speed_max_mm_per_s")?;
         for &depth_mm in &press.depths_mm {
@@ -151,7 +132,7 @@ impl Bounds {
         })
     }
 
-    fn check_place(&self, place: Place) -> Result<(), Outside> {
+    fn check_place(&self, place: Position) -> Result<(), Outside> {
         let [x_mm, y_mm] = self.registration.to_robot([place.x_mm, place.y_mm]);
         check_axis("x", x_mm, self.envelope.x_mm)?;
         check_axis("y", y_mm, self.envelope.y_mm)

@@ -8,7 +8,7 @@ fn bounds() -> Bounds {
 
 fn press(x_mm: f64, depths_mm: &[f64]) -> Step {
     Step::Press(Press {
-        at: Place { x_mm, y_mm: 5.0 },
+        at: Position { x_mm, y_mm: 5.0 },
         depths_mm: depths_mm.to_vec(),
         dwell_s: 0.25,
         speed_mm_per_s: None,
@@ -48,7 +48,7 @@ fn what_is_not_a_number_is_inside_no_bounds() {
 #[test]
 fn a_move_stays_above_the_surface_and_within_the_speed() {
     let go = |height_mm, speed_mm_per_s| Step::Move {
-        to: Place { x_mm: 1.0, y_mm: 1.0 },
+        to: Position { x_mm: 1.0, y_mm: 1.0 },
         height_mm,
         speed_mm_per_s,
     };

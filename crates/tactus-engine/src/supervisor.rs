@@ -43,17 +43,15 @@ struct Limits {
 
 /// A rule that was broken; motion must stop and the tip retract.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum Violation {
     /// One element reads too much.
     #[error(
         "element {element} reads {rise_counts:.0} counts above {against}; the limit is {limit_counts} (envelope.element_max_counts)"
     )]
     ElementForce {
-        /// Index of the element.
         element: usize,
-        /// Its rise.
         rise_counts: f64,
-        /// The limit.
         limit_counts: f64,
         /// Above which zero: the current tare or the run's reference.
         against: &'static str,
@@ -62,50 +60,22 @@ pub enum Violation {
     #[error(
         "all elements together read {rise_counts:.0} counts above {against}; the limit is {limit_counts} (envelope.sum_max_counts)"
     )]
-    SumForce {
-        /// The sum of the rises.
-        rise_counts: f64,
-        /// The limit.
-        limit_counts: f64,
-        /// Above which zero.
-        against: &'static str,
-    },
+    SumForce { rise_counts: f64, limit_counts: f64, against: &'static str },
     /// No fresh frame while the tip was near the covering.
     #[error(
         "no frame for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
     )]
-    Silence {
-        /// Since the last frame.
-        silent_s: f64,
-        /// The limit.
-        limit_s: f64,
-        /// Height of the tip.
-        z_mm: f64,
-    },
+    Silence { silent_s: f64, limit_s: f64, z_mm: f64 },
     /// An element that was read at the run's first zero is not read any more: what presses it is not seen.
     #[error(
         "element {element} was not read for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
     )]
-    ElementSilence {
-        /// Index of the element.
-        element: usize,
-        /// Since it was last read.
-        silent_s: f64,
-        /// The limit.
-        limit_s: f64,
-        /// Height of the tip.
-        z_mm: f64,
-    },
+    ElementSilence { element: usize, silent_s: f64, limit_s: f64, z_mm: f64 },
     /// The stage reports a depth beyond the limit.
     #[error(
         "the stage reports a depth of {depth_mm:.3} mm; the limit is {limit_mm:.3} mm (envelope.depth_share_max)"
     )]
-    Depth {
-        /// What it reports.
-        depth_mm: f64,
-        /// The limit.
-        limit_mm: f64,
-    },
+    Depth { depth_mm: f64, limit_mm: f64 },
 }
 
 impl Violation {

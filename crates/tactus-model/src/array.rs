@@ -17,6 +17,7 @@ pub struct Array {
 
 /// Why a description is not an array.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ArrayError {
     /// No rows or no columns.
     #[error("an array needs at least one row and one column")]
@@ -26,7 +27,6 @@ pub enum ArrayError {
     NotPositive {
         /// Name of the field in the rig description.
         field: &'static str,
-        /// What stood there.
         value: f64,
     },
     /// Centres do not rise, or elements overlap.
@@ -34,9 +34,7 @@ pub enum ArrayError {
     Overlap {
         /// Name of the field in the rig description.
         field: &'static str,
-        /// Index of the offending centre.
         index: usize,
-        /// Size of an element along that axis.
         element_mm: f64,
     },
 }

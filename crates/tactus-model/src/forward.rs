@@ -22,27 +22,14 @@ pub struct Response {
 
 /// Why parameters do not make a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ModelError {
     /// A list has not one value per element.
     #[error("{field} has {values} values for {elements} elements")]
-    Length {
-        /// The parameter.
-        field: &'static str,
-        /// Values given.
-        values: usize,
-        /// Elements of the array.
-        elements: usize,
-    },
+    Length { field: &'static str, values: usize, elements: usize },
     /// A parameter is out of its range.
     #[error("{field} must be {range}, not {value}")]
-    Range {
-        /// The parameter.
-        field: &'static str,
-        /// What it may be.
-        range: &'static str,
-        /// What it was.
-        value: f64,
-    },
+    Range { field: &'static str, range: &'static str, value: f64 },
 }
 
 /// Beyond this spread an element's share is lost in rounding.

@@ -13,32 +13,20 @@ pub struct Mesh {
 
 /// Why triangles are not a tool.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum MeshError {
     /// No triangle can be seen from below: none is given, or all stand upright or have no area.
     #[error("no triangle of the mesh can be seen from below: it needs a surface that is not upright")]
     Empty,
     /// A coordinate is not a finite number.
     #[error("vertex {vertex} is not finite")]
-    NotFinite {
-        /// Index of the vertex.
-        vertex: usize,
-    },
+    NotFinite { vertex: usize },
     /// A triangle names a vertex that is not there.
     #[error("triangle {triangle} names vertex {vertex} of {vertices}")]
-    NoVertex {
-        /// Index of the triangle.
-        triangle: usize,
-        /// The vertex it names.
-        vertex: u32,
-        /// Number of vertices.
-        vertices: usize,
-    },
+    NoVertex { triangle: usize, vertex: u32, vertices: usize },
     /// Larger than any tool: most likely in other units.
     #[error("the mesh spans {span_mm} mm, more than {} mm: are its units millimetres?", Mesh::SPAN_MAX_MM)]
-    Huge {
-        /// Its greatest extent.
-        span_mm: f64,
-    },
+    Huge { span_mm: f64 },
 }
 
 impl Mesh {

@@ -56,45 +56,24 @@ struct Element {
 
 /// Why there is no press table, or no image of it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum PressTableError {
     /// The depth is beyond what the press table was made for, or not a number.
     #[error("depth {depth_mm} mm is beyond {depth_max_mm} mm, for which the press table was made")]
-    Depth {
-        /// What was asked for.
-        depth_mm: f64,
-        /// The greatest.
-        depth_max_mm: f64,
-    },
+    Depth { depth_mm: f64, depth_max_mm: f64 },
     /// The greatest depth asked for is not within the covering.
     #[error(
         "the greatest depth must lie above 0 and within the covering of {thickness_mm} mm, not at {depth_max_mm} mm"
     )]
-    DepthMax {
-        /// What was asked for.
-        depth_max_mm: f64,
-        /// Thickness of the covering.
-        thickness_mm: f64,
-    },
+    DepthMax { depth_max_mm: f64, thickness_mm: f64 },
     /// The blur is too fine against the elements or the tool for a table of it.
     #[error(
         "a blur of {sigma_mm} mm is too fine for a press table: it needs half an element ({element_mm} mm) and 1/200 of the tool ({tool_mm} mm)"
     )]
-    Fine {
-        /// The blur's standard deviation.
-        sigma_mm: f64,
-        /// The element's size.
-        element_mm: f64,
-        /// The tool's greatest extent.
-        tool_mm: f64,
-    },
+    Fine { sigma_mm: f64, element_mm: f64, tool_mm: f64 },
     /// The list for the image has not one place per element.
     #[error("an image of {elements} elements does not fit {places} places")]
-    Length {
-        /// Elements of the array.
-        elements: usize,
-        /// Places given.
-        places: usize,
-    },
+    Length { elements: usize, places: usize },
 }
 
 impl PressTable {

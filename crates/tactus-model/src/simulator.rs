@@ -61,7 +61,7 @@ pub struct Image {
 
 /// The images of a run, in order.
 #[derive(Debug)]
-struct Run<'a, D> {
+struct ImageSequence<'a, D> {
     pipeline: Pipeline,
     trajectory: &'a Trajectory,
     rate_hz: f64,
@@ -85,12 +85,13 @@ impl Simulator {
         draw: impl FnMut() -> f64 + 'a,
     ) -> Result<impl Iterator<Item = Image> + 'a, EffectError> {
         let noise_rms_counts = self.noise_rms_counts;
-        let mut run = Run { pipeline: Pipeline::new(self)?, trajectory, rate_hz, noise_rms_counts, draw };
-        Ok((0..frames).map(move |frame| run.image(frame)))
+        let mut images =
+            ImageSequence { pipeline: Pipeline::new(self)?, trajectory, rate_hz, noise_rms_counts, draw };
+        Ok((0..frames).map(move |frame| images.image(frame)))
     }
 }
 
-impl<D: FnMut() -> f64> Run<'_, D> {
+impl<D: FnMut() -> f64> ImageSequence<'_, D> {
     fn image(&mut self, frame: u32) -> Image {
         // From the run's beginning, so that nothing adds up.
         let t_s = self.trajectory.start_s() + f64::from(frame) / self.rate_hz;

@@ -17,30 +17,17 @@ pub trait Path {
 
 /// Why points are no trajectory.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum TrajectoryError {
     /// No point.
     #[error("a trajectory needs at least one point")]
     Empty,
     /// A time or coordinate is not a finite number.
     #[error("point {index} is not finite: t = {t_s} s, position = {position_mm:?} mm")]
-    NotFinite {
-        /// Index of the point.
-        index: usize,
-        /// Its time.
-        t_s: f64,
-        /// Its place.
-        position_mm: [f64; 3],
-    },
+    NotFinite { index: usize, t_s: f64, position_mm: [f64; 3] },
     /// A time does not exceed the one before it.
     #[error("times must rise: point {index} is at {t_s} s, after one at {before_s} s")]
-    Order {
-        /// Index of the point.
-        index: usize,
-        /// Its time.
-        t_s: f64,
-        /// Time of the point before it.
-        before_s: f64,
-    },
+    Order { index: usize, t_s: f64, before_s: f64 },
 }
 
 impl Trajectory {

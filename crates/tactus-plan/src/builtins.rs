@@ -11,7 +11,7 @@ use starlark::environment::{Globals, GlobalsBuilder};
 
 pub(crate) use values::{rig_value, to_json};
 
-/// Parameters, steps, chance and arithmetic.
+/// Parameters, steps, random numbers and arithmetic.
 pub(crate) fn globals() -> Globals {
     GlobalsBuilder::new()
         .with(parameters::functions)

@@ -10,7 +10,7 @@ use starlark::eval::{BeforeStmtFunc, BeforeStmtFuncDyn, Evaluator};
 use starlark::{Error, ErrorKind};
 
 use crate::builtins::{rig_value, to_json};
-use crate::session::{self, Halt, Message, Part, Session, Watch};
+use crate::context::{self, EvaluationContext, Halt, Message, ScriptSection, Watch};
 use crate::{
     Arguments, Exceeded, Limits, Location, Parameter, Refusal, Reply, RigView, Script, ScriptError, sandbox,
 };
@@ -53,15 +53,15 @@ pub(crate) struct Evaluated {
 
 /// Evaluates a script and sends what came of it.
 pub(crate) fn evaluate(job: Job) {
-    let session = Session::new(job).begin();
-    let ended = Module::with_temp_heap(|module| evaluate_in(&module, &session));
+    let context = EvaluationContext::new(job).begin();
+    let ended = Module::with_temp_heap(|module| evaluate_in(&module, &context));
     // If nobody listens any more, nobody wants to know.
-    drop(session.job.calls.send(Message::Ended(Box::new(ended))));
+    drop(context.job.calls.send(Message::Ended(Box::new(ended))));
 }
 
-fn evaluate_in(module: &Module<'_>, session: &Session) -> Result<Evaluated, ScriptError> {
-    let Job { script, limits, purpose, watch, .. } = &session.job;
-    let rig = rig_value(&session.job.rig, module.heap());
+fn evaluate_in(module: &Module<'_>, context: &EvaluationContext) -> Result<Evaluated, ScriptError> {
+    let Job { script, limits, purpose, watch, .. } = &context.job;
+    let rig = rig_value(&context.job.rig, module.heap());
     module.set("rig", rig);
     let mut eval = Evaluator::new(module);
     // Collection runs between top-level statements only, where scripts do nothing, and follows values
@@ -80,9 +80,9 @@ fn evaluate_in(module: &Module<'_>, session: &Session) -> Result<Evaluated, Scri
     eval.before_stmt_for_dap(BeforeStmtFunc::from_dyn(Box::new(BeforeStatement)));
 
     let mut evaluated = eval.eval_module(script.ast().clone(), &sandbox::GLOBALS).map(|_| Json::Null);
-    evaluated = evaluated.and_then(|none| Ok(session.check_arguments().map(|()| none)?));
+    evaluated = evaluated.and_then(|none| Ok(context.check_arguments().map(|()| none)?));
     if let (Ok(_), Purpose::Run { .. }) = (&evaluated, purpose) {
-        session.part.set(Part::Run);
+        context.part.set(ScriptSection::Run);
         watch.at_line(script.run_line());
         evaluated = match module.get("run") {
             Some(run) => eval.eval_function(run, &[rig], &[]).map(to_json),
@@ -91,14 +91,14 @@ fn evaluate_in(module: &Module<'_>, session: &Session) -> Result<Evaluated, Scri
     }
     match evaluated {
         Ok(result) => Ok(Evaluated {
-            parameters: session.parameters.take(),
-            values: session.values.take().into_iter().collect(),
+            parameters: context.parameters.take(),
+            values: context.values.take().into_iter().collect(),
             result,
-            steps: session.steps.get(),
+            steps: context.steps.get(),
             ticks: eval.get_total_tick_count(),
             heap_bytes: module.heap().allocated_bytes(),
         }),
-        Err(error) => Err(script_error(&error, &eval, session)),
+        Err(error) => Err(script_error(&error, &eval, context)),
     }
 }
 
@@ -112,19 +112,19 @@ impl<'e> BeforeStmtFuncDyn<'e> for BeforeStatement {
         _continued: bool,
         eval: &mut Evaluator<'v, '_, 'e>,
     ) -> starlark::Result<()> {
-        let session = session::current()?;
-        session.job.watch.at_line(sandbox::line(&span.to_file_span()));
-        Ok(session.check(eval)?)
+        let context = context::current()?;
+        context.job.watch.at_line(sandbox::line(&span.to_file_span()));
+        Ok(context.check(eval)?)
     }
 }
 
 /// The evaluator's error in our terms.
-fn script_error(error: &Error, eval: &Evaluator<'_, '_, '_>, session: &Session) -> ScriptError {
-    let script = session.job.script.name().to_owned();
-    let line = error.span().map_or_else(|| session.job.watch.line().max(1), sandbox::line);
+fn script_error(error: &Error, eval: &Evaluator<'_, '_, '_>, context: &EvaluationContext) -> ScriptError {
+    let script = context.job.script.name().to_owned();
+    let line = error.span().map_or_else(|| context.job.watch.line().max(1), sandbox::line);
     let at = Location { script: script.clone(), line };
     let call_stack = shortened(error.to_string());
-    match halt(error, eval, session) {
+    match halt(error, eval, context) {
         Halt::Failed(problem) => ScriptError::Evaluation { at, problem: shortened(problem), call_stack },
         Halt::Argument(problem) => ScriptError::Argument { script, problem: shortened(problem) },
         Halt::Refused(refusal) => ScriptError::Refused { at, refusal, call_stack },
@@ -132,8 +132,8 @@ fn script_error(error: &Error, eval: &Evaluator<'_, '_, '_>, session: &Session) 
     }
 }
 
-fn halt(error: &Error, eval: &Evaluator<'_, '_, '_>, session: &Session) -> Halt {
-    let Job { limits, watch, .. } = &session.job;
+fn halt(error: &Error, eval: &Evaluator<'_, '_, '_>, context: &EvaluationContext) -> Halt {
+    let Job { limits, watch, .. } = &context.job;
     if let ErrorKind::Native(native) = error.kind()
         && let Some(halt) = native.downcast_ref::<Halt>()
     {
@@ -145,7 +145,7 @@ fn halt(error: &Error, eval: &Evaluator<'_, '_, '_>, session: &Session) -> Halt 
     // The evaluator's own checks, once in a thousand ticks, have no kind of their own.
     if let ErrorKind::Other(_) = error.kind() {
         if let Some(stop) = watch.stopped() {
-            return session.halt(stop);
+            return context.halt(stop);
         }
         if eval.get_total_tick_count() > limits.ticks {
             return Exceeded::Ticks(limits.ticks).into();

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use crate::context::{Message, Stop, Watch};
 use crate::evaluate::{self, Evaluated, Job, Purpose};
-use crate::session::{Message, Stop, Watch};
 use crate::{Arguments, Exceeded, Host, Limits, Location, Refusal, RigView, Script, ScriptError};
 
 /// Stack of the script's thread: deep enough for the call depth and the nesting that are allowed, in a build

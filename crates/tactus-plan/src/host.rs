@@ -46,9 +46,9 @@ pub enum Reply {
     /// It is done and there is nothing to tell.
     Done,
     /// A press: one reading for each of its depths, in their order.
-    Pressed(Vec<Reading>),
+    Pressed(Vec<MeanReading>),
     /// A dwell, a read or a tare.
-    Reading(Reading),
+    Reading(MeanReading),
     /// A move: where the tip is now, in the sensor frame.
     Position {
         /// Along a row of elements.
@@ -62,7 +62,7 @@ pub enum Reply {
 
 /// The mean over some frames; one number per element, row-major.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Reading {
+pub struct MeanReading {
     /// Raw counts, averaged.
     pub mean_counts: Vec<f64>,
     /// `mean_counts` above the last tare; before any tare, above the run's own reading at rest.

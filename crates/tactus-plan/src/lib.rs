@@ -57,7 +57,7 @@
 
 mod arguments;
 mod builtins;
-mod chance;
+mod context;
 mod error;
 mod evaluate;
 mod execute;
@@ -67,16 +67,16 @@ mod parameter;
 mod rig_view;
 mod sandbox;
 mod script;
-mod session;
+mod script_rng;
 mod step;
 
 pub use arguments::Arguments;
 pub use builtins::reference;
 pub use error::ScriptError;
 pub use execute::{Outcome, execute};
-pub use host::{Call, Host, Location, Reading, Refusal, Reply};
+pub use host::{Call, Host, Location, MeanReading, Refusal, Reply};
 pub use limits::{Exceeded, Limits};
-pub use parameter::{Kind, Parameter};
+pub use parameter::{Parameter, ParameterType};
 pub use rig_view::{ElementView, RigView};
 pub use script::Script;
-pub use step::{Place, Press, Step};
+pub use step::{Position, Press, Step};

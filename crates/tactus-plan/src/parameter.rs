@@ -11,7 +11,7 @@ pub struct Parameter {
     /// Name by which it is set.
     pub name: String,
     /// Type of its values, taken from the default.
-    pub kind: Kind,
+    pub kind: ParameterType,
     /// Value unless set.
     pub default: Value,
     /// What it means.
@@ -29,7 +29,7 @@ pub struct Parameter {
 /// Type of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum ParameterType {
     /// `true` or `false`.
     Bool,
     /// Whole number of 64 bits.
@@ -44,7 +44,7 @@ pub enum Kind {
     ListOfFloat,
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for ParameterType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Bool => "true or false",
@@ -75,8 +75,10 @@ impl Parameter {
     /// The value in the parameter's own type, if it is allowed.
     pub(crate) fn accept(&self, value: &Value) -> Result<Value, String> {
         match self.kind {
-            Kind::Bool | Kind::Int | Kind::Float | Kind::String => self.accept_one(value),
-            Kind::ListOfInt | Kind::ListOfFloat => match value {
+            ParameterType::Bool | ParameterType::Int | ParameterType::Float | ParameterType::String => {
+                self.accept_one(value)
+            }
+            ParameterType::ListOfInt | ParameterType::ListOfFloat => match value {
                 Value::Array(values) if !values.is_empty() => values
                     .iter()
                     .map(|value| self.accept_one(value))
@@ -93,8 +95,8 @@ impl Parameter {
     /// The value that a text stands for: JSON, or for a text parameter the text itself.
     pub(crate) fn accept_text(&self, text: &str) -> Result<Value, String> {
         match (self.kind, serde_json::from_str::<Value>(text)) {
-            (Kind::String, Ok(value @ Value::String(_))) => self.accept(&value),
-            (Kind::String, _) => self.accept(&Value::String(text.to_owned())),
+            (ParameterType::String, Ok(value @ Value::String(_))) => self.accept(&value),
+            (ParameterType::String, _) => self.accept(&Value::String(text.to_owned())),
             (_, Ok(value)) => self.accept(&value),
             (_, Err(_)) => Err(self.mistyped(&Value::String(text.to_owned()))),
         }
@@ -121,12 +123,12 @@ impl Parameter {
 
     fn typed(&self, value: &Value) -> Option<Value> {
         match self.kind {
-            Kind::Bool => value.as_bool().map(Value::from),
-            Kind::Int | Kind::ListOfInt => value.as_i64().map(Value::from),
-            Kind::Float | Kind::ListOfFloat => {
+            ParameterType::Bool => value.as_bool().map(Value::from),
+            ParameterType::Int | ParameterType::ListOfInt => value.as_i64().map(Value::from),
+            ParameterType::Float | ParameterType::ListOfFloat => {
                 value.as_f64().filter(|number| number.is_finite()).map(Value::from)
             }
-            Kind::String => value.as_str().map(Value::from),
+            ParameterType::String => value.as_str().map(Value::from),
         }
     }
 
@@ -135,7 +137,7 @@ impl Parameter {
     }
 }
 
-impl Kind {
+impl ParameterType {
     /// The type of values like this one.
     pub(crate) fn of(value: &Value) -> Result<Self, &'static str> {
         match value {

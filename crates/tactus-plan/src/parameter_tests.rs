@@ -4,7 +4,7 @@ use serde_json::json;
 fn parameter(default: Value) -> Parameter {
     Parameter {
         name: "p".into(),
-        kind: Kind::of(&default).unwrap(),
+        kind: ParameterType::of(&default).unwrap(),
         default,
         doc: String::new(),
         unit: Some("mm".into()),
@@ -17,17 +17,17 @@ fn parameter(default: Value) -> Parameter {
 #[test]
 fn the_type_comes_from_the_default() {
     for (default, kind) in [
-        (json!(true), Kind::Bool),
-        (json!(3), Kind::Int),
-        (json!(3.0), Kind::Float),
-        (json!("a"), Kind::String),
-        (json!([1, 2]), Kind::ListOfInt),
-        (json!([1, 2.5]), Kind::ListOfFloat),
+        (json!(true), ParameterType::Bool),
+        (json!(3), ParameterType::Int),
+        (json!(3.0), ParameterType::Float),
+        (json!("a"), ParameterType::String),
+        (json!([1, 2]), ParameterType::ListOfInt),
+        (json!([1, 2.5]), ParameterType::ListOfFloat),
     ] {
-        assert_eq!(Kind::of(&default), Ok(kind), "{default}");
+        assert_eq!(ParameterType::of(&default), Ok(kind), "{default}");
     }
     for default in [json!(null), json!([]), json!(["a"]), json!({})] {
-        assert!(Kind::of(&default).is_err(), "{default}");
+        assert!(ParameterType::of(&default).is_err(), "{default}");
     }
 }
 

@@ -96,7 +96,7 @@ impl Script {
     }
 
     fn declare(&self, rig: &RigView, arguments: &Arguments) -> Result<Evaluated, ScriptError> {
-        converse(self, arguments, rig, &Limits::default(), Purpose::Declare, &mut Nobody)
+        converse(self, arguments, rig, &Limits::default(), Purpose::Declare, &mut NoHost)
     }
 
     pub(crate) fn ast(&self) -> &AstModule {
@@ -119,9 +119,9 @@ impl fmt::Debug for Script {
 }
 
 /// The host of an evaluation that performs nothing.
-struct Nobody;
+struct NoHost;
 
-impl Host for Nobody {
+impl Host for NoHost {
     fn perform(&mut self, _call: &Call) -> Result<Reply, Refusal> {
         Err(Refusal::Failed("nothing is performed while parameters are declared".into()))
     }

@@ -7,7 +7,7 @@ pub enum Step {
     /// Travel to a place at a height, up first and down last.
     Move {
         /// Where.
-        to: Place,
+        to: Position,
         /// Height above the surface; the rig's safe height if `None`.
         height_mm: Option<f64>,
         /// Speed; the rig's travel speed if `None`.
@@ -49,7 +49,7 @@ pub enum Step {
 
 /// A place in the plane, sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct Position {
     /// Along a row of elements.
     pub x_mm: f64,
     /// Along a column of elements.
@@ -60,7 +60,7 @@ pub struct Place {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Press {
     /// Where.
-    pub at: Place,
+    pub at: Position,
     /// Depths below the surface in the order they are held; going up is allowed (a load-unload ladder).
     pub depths_mm: Vec<f64>,
     /// How long readings are averaged at each depth.

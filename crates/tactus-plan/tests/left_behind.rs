@@ -7,9 +7,9 @@ use tactus_plan::{
 };
 use tactus_schema::Rig;
 
-struct Nobody;
+struct NoHost;
 
-impl Host for Nobody {
+impl Host for NoHost {
     fn perform(&mut self, _call: &Call) -> Result<Reply, Refusal> {
         Ok(Reply::Done)
     }
@@ -34,6 +34,6 @@ def run(rig):
     let rig = Rig::from_toml(include_str!("../../../config/rigs/sim.toml")).unwrap();
     let limits = Limits { think: Duration::from_millis(100), ..Limits::default() };
     let error =
-        execute(&script, &Arguments::default(), &RigView::of(&rig), 1, &limits, &mut Nobody).unwrap_err();
+        execute(&script, &Arguments::default(), &RigView::of(&rig), 1, &limits, &mut NoHost).unwrap_err();
     assert!(matches!(error, ScriptError::Limit { exceeded: Exceeded::Think(_), .. }), "{error}");
 }

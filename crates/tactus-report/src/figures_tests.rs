@@ -2,7 +2,7 @@ use std::fs;
 
 use tactus_model::{Array, Contact, Psf};
 use tactus_scene::shapes::{SCENES, Scene};
-use tactus_solid::layered::{Base, Layer};
+use tactus_solid::layered::{BaseContact, Layer};
 
 use super::{
     COVERINGS, FigureError, ModelledPress, Progress, REFERENCE_INDENTER, Resolution, Widening, draw_all,
@@ -78,7 +78,7 @@ fn the_elements_see_no_bricks() {
     let [width, height] = array.element_mm().map(|size_mm| size_mm / 2.0);
     for covering in [COVERINGS[0], COVERINGS[3]] {
         let press = ModelledPress::new(covering, "between four", [x, y]).unwrap();
-        let layer = Layer::new(covering.thickness_mm, 0.49, Base::Bonded).unwrap().under_disc(1.0);
+        let layer = Layer::new(covering.thickness_mm, 0.49, BaseContact::Bonded).unwrap().under_disc(1.0);
         let exact: Vec<_> = (0..array.elements())
             .map(|element| array.centre_mm(element).unwrap())
             .map(|[cx, cy]| {

@@ -88,7 +88,7 @@ pub(crate) fn facets(
         return Window::default();
     }
     let window = Window { first, cells: [end[0] - first[0], end[1] - first[1]] };
-    let frame = Frame::of(window);
+    let frame = WindowGrid::of(window);
     facets.extend(seen().filter_map(|(corners, bounds)| frame.facet(corners, bounds, foot_mm)));
     window
 }
@@ -125,7 +125,7 @@ fn seen(corners: &[[f64; 3]; 3], size: [usize; 2]) -> Option<[[usize; 2]; 2]> {
 }
 
 /// The window's integers.
-struct Frame {
+struct WindowGrid {
     first: [f64; 2],
     /// Its middle, in cells from its first.
     middle: [f64; 2],
@@ -134,7 +134,7 @@ struct Frame {
     normal: f64,
 }
 
-impl Frame {
+impl WindowGrid {
     fn of(Window { first, cells }: Window) -> Self {
         let [first, cells] = [first, cells].map(|window| window.map(|cells| cells as f64));
         Self {

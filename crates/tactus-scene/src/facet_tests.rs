@@ -60,7 +60,7 @@ fn facets_side_by_side_leave_no_sample_between_them() {
 
 #[test]
 fn each_sample_is_on_exactly_one_side_of_an_edge() {
-    let frame = Frame::of(Window { first: [0, 0], cells: [100, 100] });
+    let frame = WindowGrid::of(Window { first: [0, 0], cells: [100, 100] });
     for k in 0..200 {
         let at = f64::from(k);
         let [p, q] =

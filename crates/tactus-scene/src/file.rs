@@ -44,45 +44,23 @@ pub enum Format {
 
 /// Why a file gives no mesh.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum FileError {
     /// The file cannot be read.
     #[error("cannot read {}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    Io { path: PathBuf, source: io::Error },
     /// The extension names no format.
     #[error("cannot tell the format of {}: its name must end in .stl, .obj or .ply", path.display())]
-    UnknownFormat {
-        /// The file.
-        path: PathBuf,
-    },
+    UnknownFormat { path: PathBuf },
     /// More than a tool needs.
     #[error("the file holds {count} {what}, more than {most}: make the mesh coarser")]
-    TooLarge {
-        /// What there is too much of: bytes, triangles or vertices.
-        what: &'static str,
-        /// How many, or the number at which reading ended.
-        count: usize,
-        /// Most that are read.
-        most: usize,
-    },
+    TooLarge { what: &'static str, count: usize, most: usize },
     /// The bytes are not of the format, or end too early.
     #[error("the file is not a sound {format} file: {what}")]
-    Broken {
-        /// The format it should have.
-        format: Format,
-        /// What is wrong with it.
-        what: String,
-    },
+    Broken { format: Format, what: String },
     /// A sound file without faces, such as a point cloud.
     #[error("the {format} file has no faces")]
-    NoFaces {
-        /// The format of the file.
-        format: Format,
-    },
+    NoFaces { format: Format },
     /// The file was read, but what it holds is not a tool.
     #[error(transparent)]
     Mesh(#[from] MeshError),

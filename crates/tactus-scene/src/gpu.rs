@@ -5,11 +5,11 @@ use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bytemuck::cast_slice;
+use rayon::prelude::*;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BufferUsages, PollType};
 
 use crate::facet::{Facet, STEPS};
-use crate::image::{on_all_cores, share};
 use crate::lattice::{Axis, single};
 use crate::{Pose, RenderError, Renderer};
 
@@ -207,7 +207,8 @@ impl GpuRenderer {
 
     /// The views and facets of poses, in several parts.
     fn draw(&self, poses: &[Pose]) -> Vec<(Vec<View>, Vec<Words>)> {
-        on_all_cores(poses.chunks(share(poses.len())), |poses| {
+        let share = poses.len().div_ceil(rayon::current_num_threads()).max(1);
+        let draw = |poses: &[Pose]| {
             let (mut placed, mut facets) = (Vec::new(), Vec::new());
             let (mut views, mut words) = (Vec::new(), Vec::new());
             for pose in poses {
@@ -217,7 +218,8 @@ impl GpuRenderer {
                 words.extend(facets.iter().map(Facet::words));
             }
             (views, words)
-        })
+        };
+        poses.par_chunks(share).map(draw).collect()
     }
 
     fn submit<'a>(

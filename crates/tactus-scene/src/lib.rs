@@ -21,8 +21,10 @@
 //! | [`Renderer`] | its [`DepthMap`] and image on the CPU |
 //! | `GpuRenderer` | the same by compute shaders, many poses at once; with the feature `gpu` |
 //!
-//! Accuracy against [`ForwardModel::image`](tactus_model::ForwardModel::image), which needs no raster: 8e-4 of the
-//! image's peak at most over the three tools, three arrays and many poses (held to 1e-3); order 1.6 in the size of a cell.
+//! Accuracy: [`Renderer`] states the bound and what was measured. Compared with
+//! [`ForwardModel::image`](tactus_model::ForwardModel::image), which has no raster, 99 of 100 poses that touch 1000 cells
+//! or more agree to 1e-3 of the image's peak (worst 6e-3). Contacts with an edge or a corner touch fewer cells and are
+//! less accurate. The error falls with the power 1.5 of a cell's side.
 //! CPU and GPU agree to 1.3e-6 of full scale (held to 1e-5), since what a triangle covers is decided in integers that are
 //! made once for both.
 //!

@@ -72,6 +72,7 @@ pub struct Bricks {
 
 /// Why numbers are not a slab of bricks, or a load does not fit on it.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum BricksError {
     /// No node is in the middle, or there are too many bricks.
     #[error(
@@ -89,12 +90,7 @@ pub enum BricksError {
     PoissonRatio(f64),
     /// The disc is not one, or hangs over the slab's sides.
     #[error("a disc on these bricks must have a diameter from 0 to {width_mm} mm, not {diameter_mm}")]
-    Disc {
-        /// The disc's diameter.
-        diameter_mm: f64,
-        /// The slab's width.
-        width_mm: f64,
-    },
+    Disc { diameter_mm: f64, width_mm: f64 },
 }
 
 impl Bricks {

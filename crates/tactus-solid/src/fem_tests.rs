@@ -1,7 +1,7 @@
 use libm::exp;
 
 use super::*;
-use crate::layered::{Base, Layer};
+use crate::layered::{BaseContact, Layer};
 
 #[path = "fem/element_tests.rs"]
 mod element;
@@ -12,7 +12,7 @@ fn cubes(across: u32, layers: u32, poisson_ratio: f64) -> Bricks {
 }
 
 fn bonded(poisson_ratio: f64) -> Layer {
-    Layer::new(1.0, poisson_ratio, Base::Bonded).unwrap()
+    Layer::new(1.0, poisson_ratio, BaseContact::Bonded).unwrap()
 }
 
 #[test]
@@ -284,7 +284,7 @@ fn a_small_disc_is_a_point() {
 #[test]
 fn elements_measure_what_they_measure_under_the_elastic_layer() {
     // The paper's cylinder on its thinnest covering; the element below, its neighbour, and one askew.
-    let layer = Layer::new(1.016, 0.45, Base::Bonded).unwrap().under_disc(1.0);
+    let layer = Layer::new(1.016, 0.45, BaseContact::Bonded).unwrap().under_disc(1.0);
     let elements = [[[-0.9, 0.9], [-0.9, 0.9]], [[1.1, 2.9], [-0.9, 0.9]], [[-0.3, 1.5], [0.2, 2.0]]];
     for (layers, within) in [(5, 9e-3), (10, 4e-3), (40, 2e-4)] {
         let bricks = Bricks::cubes(10 * layers, layers, 1.016 / f64::from(layers), 0.45).unwrap();

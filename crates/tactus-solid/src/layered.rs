@@ -14,9 +14,9 @@
 //! small; deep presses into a soft covering are stiffer (paper, Sec. 3).
 //!
 //! ```
-//! use tactus_solid::layered::{Base, Layer};
+//! use tactus_solid::layered::{BaseContact, Layer};
 //!
-//! let covering = Layer::new(1.016, 0.45, Base::Bonded)?;
+//! let covering = Layer::new(1.016, 0.45, BaseContact::Bonded)?;
 //! let share = covering.under_disc(1.0).force_on([[-0.9, 0.9], [-0.9, 0.9]]);
 //! assert!(share > 0.7, "most of the force arrives at the element below");
 //! # Ok::<(), tactus_solid::layered::LayerError>(())
@@ -43,12 +43,12 @@ const REACH: f64 = 40.0;
 pub struct Layer {
     thickness_mm: f64,
     poisson_ratio: f64,
-    base: Base,
+    base: BaseContact,
 }
 
 /// How the layer lies on its base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Base {
+pub enum BaseContact {
     /// It sticks.
     Bonded,
     /// It slides; what arrives then does not depend on Poisson's ratio.
@@ -71,7 +71,7 @@ impl Layer {
     ///
     /// # Errors
     /// [`LayerError`] names the number that is out of range.
-    pub fn new(thickness_mm: f64, poisson_ratio: f64, base: Base) -> Result<Self, LayerError> {
+    pub fn new(thickness_mm: f64, poisson_ratio: f64, base: BaseContact) -> Result<Self, LayerError> {
         if !(thickness_mm.is_finite() && thickness_mm > 0.0) {
             return Err(LayerError::Thickness(thickness_mm));
         }
@@ -93,13 +93,15 @@ impl Layer {
         let e = exp(-k);
         let (less, more) = (-expm1(-2.0 * k), 1.0 + e * e);
         match self.base {
-            Base::Bonded => {
+            BaseContact::Bonded => {
                 let kappa = 3.0 - 4.0 * self.poisson_ratio;
                 let above = (kappa + 1.0) * e * (f64::midpoint(kappa, 1.0) * more + k * less);
                 above / (kappa * (1.0 + e.powi(4)) + (4.0 * k * k + 1.0 + kappa * kappa) * e * e)
             }
-            Base::Frictionless if k > 0.0 => e * (less + k * more) / (less * more / 2.0 + 2.0 * k * e * e),
-            Base::Frictionless => 1.0,
+            BaseContact::Frictionless if k > 0.0 => {
+                e * (less + k * more) / (less * more / 2.0 + 2.0 * k * e * e)
+            }
+            BaseContact::Frictionless => 1.0,
         }
     }
 

@@ -1,14 +1,14 @@
 use std::f64::consts::PI;
 
-use super::{Base, Layer, LayerError};
+use super::{BaseContact, Layer, LayerError};
 use crate::quadrature::integrate;
 
 fn bonded(poisson_ratio: f64) -> Layer {
-    Layer::new(1.0, poisson_ratio, Base::Bonded).unwrap()
+    Layer::new(1.0, poisson_ratio, BaseContact::Bonded).unwrap()
 }
 
 fn sliding() -> Layer {
-    Layer::new(1.0, 0.3, Base::Frictionless).unwrap()
+    Layer::new(1.0, 0.3, BaseContact::Frictionless).unwrap()
 }
 
 /// `p h^2 / P` at seven distances, found by a separate program that solves the layer's four boundary conditions
@@ -73,7 +73,7 @@ fn all_of_the_force_arrives() {
 
 #[test]
 fn the_force_on_a_rectangle_is_the_integral_of_the_pressure() {
-    let layer = Layer::new(1.016, 0.45, Base::Bonded).unwrap();
+    let layer = Layer::new(1.016, 0.45, BaseContact::Bonded).unwrap();
     for imprint in [layer.under_point(), layer.under_disc(1.0)] {
         for [x, y] in [[[-0.9, 0.9], [-0.9, 0.9]], [[1.1, 2.9], [-0.9, 0.9]], [[-0.3, 1.5], [0.2, 2.0]]] {
             let column = |x: f64| integrate(y, 0.5, |y| imprint.pressure_per_mm2(x.hypot(y)));
@@ -112,7 +112,7 @@ fn a_disc_is_a_sum_of_points() {
 
 #[test]
 fn lengths_scale_with_the_thickness() {
-    let thick = Layer::new(2.5, 0.45, Base::Bonded).unwrap();
+    let thick = Layer::new(2.5, 0.45, BaseContact::Bonded).unwrap();
     let (thin, thick) = (bonded(0.45).under_disc(0.8), thick.under_disc(2.0));
     assert!((thin.pressure_per_mm2(0.7) / 6.25 - thick.pressure_per_mm2(1.75)).abs() < 1e-13);
     let rectangle = [[0.1, 1.0], [-0.5, 0.6]];
@@ -130,9 +130,10 @@ fn the_best_gaussian_is_a_little_narrower_than_half_the_thickness() {
 
 #[test]
 fn numbers_out_of_range_are_named() {
-    assert_eq!(Layer::new(0.0, 0.3, Base::Bonded), Err(LayerError::Thickness(0.0)));
-    assert_eq!(Layer::new(1.0, 0.51, Base::Bonded), Err(LayerError::PoissonRatio(0.51)));
+    assert_eq!(Layer::new(0.0, 0.3, BaseContact::Bonded), Err(LayerError::Thickness(0.0)));
+    assert_eq!(Layer::new(1.0, 0.51, BaseContact::Bonded), Err(LayerError::PoissonRatio(0.51)));
     assert!(
-        Layer::new(f64::NAN, 0.3, Base::Bonded).is_err() && Layer::new(1.0, f64::NAN, Base::Bonded).is_err()
+        Layer::new(f64::NAN, 0.3, BaseContact::Bonded).is_err()
+            && Layer::new(1.0, f64::NAN, BaseContact::Bonded).is_err()
     );
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use tactus_model::Covering;
-use tactus_plan::{Call, Place, Press, Reading, Reply, Step};
+use tactus_plan::{Call, MeanReading, Position, Press, Reply, Step};
 use tactus_schema::pb::{self, run_event::Event};
 use tactus_schema::rig::OnGap;
 use tactus_schema::table::Phase;
@@ -81,7 +81,7 @@ impl Run<'_> {
 
     async fn go_to(
         &mut self,
-        to: Place,
+        to: Position,
         height_mm: Option<f64>,
         speed_mm_per_s: Option<f64>,
     ) -> Result<Reply, Broken> {
@@ -94,7 +94,7 @@ impl Run<'_> {
     }
 
     /// Presses, and begins again if frames were lost and the rig's policy says so.
-    async fn press(&mut self, press: &Press) -> Result<Vec<Reading>, Broken> {
+    async fn press(&mut self, press: &Press) -> Result<Vec<MeanReading>, Broken> {
         let mut repeats = 0;
         loop {
             let index = self.next_press;
@@ -119,7 +119,7 @@ impl Run<'_> {
         }
     }
 
-    async fn press_once(&mut self, press: &Press, index: i32) -> Result<Vec<Reading>, Broken> {
+    async fn press_once(&mut self, press: &Press, index: i32) -> Result<Vec<MeanReading>, Broken> {
         let motion = self.shared.service.motion.clone();
         let at_mm = self.shared.rig.registration.to_robot([press.at.x_mm, press.at.y_mm]);
         let speed_mm_per_s = press.speed_mm_per_s.unwrap_or(motion.load_speed_mm_per_s);
@@ -160,7 +160,13 @@ impl Run<'_> {
     }
 
     /// One dwell: settle, then average.
-    async fn hold(&self, press: &Press, index: i32, dwell: u32, depth_mm: f64) -> Result<Reading, Broken> {
+    async fn hold(
+        &self,
+        press: &Press,
+        index: i32,
+        dwell: u32,
+        depth_mm: f64,
+    ) -> Result<MeanReading, Broken> {
         self.wait(self.shared.service.motion.settle_s).await?;
         let average = self.average(Duration::from_secs_f64(press.dwell_s)).await?;
         if average.lost > 0 {
@@ -286,10 +292,15 @@ impl Run<'_> {
         }
     }
 
-    fn reading(&self, average: Average) -> Reading {
+    fn reading(&self, average: Average) -> MeanReading {
         let signal =
             average.mean_counts.iter().zip(&self.zero_counts).map(|(count, zero)| count - zero).collect();
-        Reading { mean_counts: average.mean_counts, signal, rms: average.rms_counts, frames: average.frames }
+        MeanReading {
+            mean_counts: average.mean_counts,
+            signal,
+            rms: average.rms_counts,
+            frames: average.frames,
+        }
     }
 
     fn note_travel(&mut self, [x_mm, y_mm]: [f64; 2], z_mm: f64) {

@@ -79,63 +79,26 @@ pub struct Effect {
 
 /// Why a name and parameters are no effect.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum EffectError {
     /// No effect of this name.
     #[error("no effect {name:?}; there is: {}", names(REGISTRY.iter().map(|known| known.name)))]
-    Unknown {
-        /// The name.
-        name: String,
-    },
+    Unknown { name: String },
     /// A parameter has no value.
     #[error("{effect}: {parameter} is missing")]
-    Missing {
-        /// The effect.
-        effect: &'static str,
-        /// The parameter.
-        parameter: &'static str,
-    },
+    Missing { effect: &'static str, parameter: &'static str },
     /// The effect has no such parameter.
     #[error("{effect}: no parameter {parameter:?}; there is: {known}")]
-    NoParameter {
-        /// The effect.
-        effect: &'static str,
-        /// The parameter.
-        parameter: String,
-        /// What it has.
-        known: String,
-    },
+    NoParameter { effect: &'static str, parameter: String, known: String },
     /// A parameter is given twice.
     #[error("{effect}: {parameter} is given twice")]
-    Twice {
-        /// The effect.
-        effect: &'static str,
-        /// The parameter.
-        parameter: &'static str,
-    },
+    Twice { effect: &'static str, parameter: &'static str },
     /// A value is out of its range.
     #[error("{effect}: {parameter} must lie from {} to {}, not at {value}", range[0], range[1])]
-    Range {
-        /// The effect.
-        effect: &'static str,
-        /// The parameter.
-        parameter: &'static str,
-        /// Least and greatest.
-        range: [f64; 2],
-        /// What it was.
-        value: f64,
-    },
+    Range { effect: &'static str, parameter: &'static str, range: [f64; 2], value: f64 },
     /// An index is none of an element of the array.
     #[error("{effect}: {parameter} must be one of the elements 0 to {last}, not {value}")]
-    Element {
-        /// The effect.
-        effect: &'static str,
-        /// The parameter.
-        parameter: &'static str,
-        /// Index of the array's last element.
-        last: usize,
-        /// What it was.
-        value: f64,
-    },
+    Element { effect: &'static str, parameter: &'static str, last: usize, value: f64 },
 }
 
 impl Definition {

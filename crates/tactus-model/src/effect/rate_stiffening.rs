@@ -49,11 +49,11 @@ struct RateStiffening {
     stiffening_share: f64,
     speed_mm_per_s: f64,
     recovery_s: f64,
-    past: Option<Past>,
+    past: Option<Previous>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Past {
+struct Previous {
     depth_mm: f64,
     /// Speed of loading that still acts, and how long it has not been reached.
     loading_mm_per_s: f64,
@@ -63,16 +63,16 @@ struct Past {
 impl OnCovering for RateStiffening {
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
         let depth_mm = contact.depth_mm;
-        let rest = Past { depth_mm, loading_mm_per_s: 0.0, age_s: 0.0 };
+        let rest = Previous { depth_mm, loading_mm_per_s: 0.0, age_s: 0.0 };
         let past = self.past.unwrap_or(rest);
         let fallen = past.loading_mm_per_s * (-now.dt_s / self.recovery_s).exp();
         let speed = if now.dt_s > 0.0 { (depth_mm - past.depth_mm) / now.dt_s } else { 0.0 };
         let past = if depth_mm <= 0.0 {
             rest
         } else if speed > fallen {
-            Past { loading_mm_per_s: speed, ..rest }
+            Previous { loading_mm_per_s: speed, ..rest }
         } else {
-            Past { depth_mm, loading_mm_per_s: fallen, age_s: past.age_s + now.dt_s }
+            Previous { depth_mm, loading_mm_per_s: fallen, age_s: past.age_s + now.dt_s }
         };
         self.past = Some(past);
         let factor = 1.0 + self.stiffening_share * self.efolds(past);
@@ -109,7 +109,7 @@ impl OnCovering for RateStiffening {
 }
 
 impl RateStiffening {
-    fn efolds(&self, past: Past) -> f64 {
+    fn efolds(&self, past: Previous) -> f64 {
         (past.loading_mm_per_s / self.speed_mm_per_s).ln_1p()
     }
 }

@@ -45,13 +45,13 @@ struct ScanSkew {
     /// Of a row and of a column.
     times_s: [f64; 2],
     /// Moments by their age, oldest first.
-    history: VecDeque<Past>,
+    history: VecDeque<PastFrame>,
     /// By either time.
     slope_counts: [Vec<f64>; 2],
 }
 
 #[derive(Debug)]
-struct Past {
+struct PastFrame {
     age_s: f64,
     counts: Vec<f64>,
 }
@@ -61,7 +61,7 @@ impl OnReadout for ScanSkew {
         for past in &mut self.history {
             past.age_s += now.dt_s;
         }
-        self.history.push_back(Past { age_s: 0.0, counts: counts.to_vec() });
+        self.history.push_back(PastFrame { age_s: 0.0, counts: counts.to_vec() });
         // The second oldest is older than any element's age: the oldest is not needed.
         let array = now.base.model.array();
         let scan_s = self.age_s(places_before(0, array));

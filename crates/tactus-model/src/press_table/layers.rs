@@ -149,7 +149,7 @@ impl Layers {
         };
         let turns = self.turns.weights(turn, &self.circle);
         let tool = [single(tool_x), single(tool_y)];
-        let place = Place { tool, turn: turn.map(single), columns, rows };
+        let place = TablePose { tool, turn: turn.map(single), columns, rows };
         match &self.depth {
             Depth::Flat(table) => {
                 let channels = [depth_mm];
@@ -175,7 +175,7 @@ impl Layers {
     fn taps<const C: usize, const N: usize>(
         &self,
         table: &[f32],
-        place: &Place<'_>,
+        place: &TablePose<'_>,
         channels: &[f32; C],
         values: &mut [f32],
     ) {
@@ -199,7 +199,7 @@ impl Layers {
     }
 
     /// Where some elements of a row fall among the nodes.
-    fn spots(&self, place: &Place<'_>, centres_x: &[f32], dy: f32) -> Spots {
+    fn spots(&self, place: &TablePose<'_>, centres_x: &[f32], dy: f32) -> Spots {
         let [sin, cos] = place.turn;
         let mut dx = [0.0_f32; LANES];
         for (dx, centre_x) in dx.iter_mut().zip(centres_x) {
@@ -298,7 +298,7 @@ impl Spline {
 }
 
 /// Where the tool stands, its turn as sine and cosine, and the elements' centres.
-struct Place<'a> {
+struct TablePose<'a> {
     tool: [f32; 2],
     turn: [f32; 2],
     columns: &'a [f32],

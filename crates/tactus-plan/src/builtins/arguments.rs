@@ -5,7 +5,7 @@ use starlark::values::list::ListRef;
 use starlark::values::tuple::TupleRef;
 use starlark::values::{UnpackValue, Value};
 
-use crate::session::Halt;
+use crate::context::Halt;
 
 /// Most depths in one press, and most values of any list of numbers.
 const NUMBERS_MAX: usize = 10_000;

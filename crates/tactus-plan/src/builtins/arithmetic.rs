@@ -5,7 +5,7 @@ use starlark::starlark_module;
 use starlark::values::float::UnpackFloat;
 
 use super::arguments::finite;
-use crate::session::Halt;
+use crate::context::Halt;
 
 #[starlark_module]
 pub(super) fn functions(builder: &mut GlobalsBuilder) {

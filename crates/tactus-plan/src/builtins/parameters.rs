@@ -13,8 +13,8 @@ use starlark::values::none::NoneOr;
 use super::arguments::finite;
 use super::values::{from_json, to_json};
 use crate::Parameter;
-use crate::parameter::Kind;
-use crate::session::{self, Halt};
+use crate::context::{self, Halt};
+use crate::parameter::ParameterType;
 
 #[starlark_module]
 pub(super) fn functions(builder: &mut GlobalsBuilder) {
@@ -33,7 +33,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         eval: &mut Evaluator<'v, '_, '_>,
     ) -> starlark::Result<Value<'v>> {
         let default = to_json(default);
-        let kind = Kind::of(&default).map_err(|problem| Halt::Failed(problem.into()))?;
+        let kind = ParameterType::of(&default).map_err(|problem| Halt::Failed(problem.into()))?;
         let bound = |name, bound: NoneOr<UnpackFloat>| {
             bound.into_option().map(|UnpackFloat(bound)| finite(name, bound)).transpose()
         };
@@ -47,17 +47,19 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
             min: bound("min", min)?,
             max: bound("max", max)?,
         };
-        let value = session::current()?.declare(declared)?;
+        let value = context::current()?.declare(declared)?;
         Ok(from_json(&value, eval.heap()))
     }
 }
 
 /// The choices in the parameter's own type, so that 1 and 1.0 are the same float.
-fn choices_of(kind: Kind, choices: Vec<Value<'_>>) -> Vec<Json> {
+fn choices_of(kind: ParameterType, choices: Vec<Value<'_>>) -> Vec<Json> {
     let float = |choice: Json| choice.as_f64().map_or(choice, Json::from);
     let choices = choices.into_iter().map(to_json);
     match kind {
-        Kind::Float | Kind::ListOfFloat => choices.map(float).collect(),
-        Kind::Bool | Kind::Int | Kind::String | Kind::ListOfInt => choices.collect(),
+        ParameterType::Float | ParameterType::ListOfFloat => choices.map(float).collect(),
+        ParameterType::Bool | ParameterType::Int | ParameterType::String | ParameterType::ListOfInt => {
+            choices.collect()
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Lists and texts: the bounded forms of standard functions, and chance.
+//! Lists and texts: the bounded forms of standard functions, and random numbers.
 
 use std::num::NonZeroI32;
 
@@ -14,8 +14,8 @@ use starlark::values::{StringValue, UnpackValue, Value};
 
 use super::arguments::finite;
 use crate::Exceeded;
+use crate::context::{self, Halt};
 use crate::sandbox::{Numbers, SEQUENCE_MAX, write_text};
-use crate::session::{self, Halt};
 
 #[starlark_module]
 pub(super) fn functions(builder: &mut GlobalsBuilder) {
@@ -45,7 +45,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
             shortest = Some(shortest.map_or(length, |shortest| shortest.min(length)));
         }
         check_size("a list", shortest.unwrap_or(0).saturating_mul(lists.items.len() as u64))?;
-        session::check_heap(eval)?;
+        context::check_heap(eval)?;
         let mut columns = Vec::new();
         for list in &lists.items {
             columns.push(list.iterate(heap)?);
@@ -65,7 +65,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
     ) -> starlark::Result<StringValue<'v>> {
         let mut text = String::new();
         write_text(value, Numbers::Whole, &mut text).map_err(Halt::from)?;
-        session::check_heap(eval)?;
+        context::check_heap(eval)?;
         Ok(eval.heap().alloc_str(&text))
     }
 
@@ -92,10 +92,10 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         eval: &mut Evaluator<'v, '_, '_>,
     ) -> starlark::Result<Value<'v>> {
         check_size("a list", u64::try_from(values.length()?).unwrap_or(0))?;
-        session::check_heap(eval)?;
+        context::check_heap(eval)?;
         let heap = eval.heap();
         let mut values: Vec<Value<'v>> = values.iterate(heap)?.collect();
-        session::current()?.chance.borrow_mut().shuffle(&mut values);
+        context::current()?.rng.borrow_mut().shuffle(&mut values);
         Ok(heap.alloc(AllocList(values)))
     }
 
@@ -105,7 +105,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         if low > high {
             return Err(Halt::Failed(format!("low is {low}, greater than high, which is {high}")).into());
         }
-        Ok(low + (high - low) * session::current()?.chance.borrow_mut().unit())
+        Ok(low + (high - low) * context::current()?.rng.borrow_mut().unit())
     }
 }
 

@@ -12,9 +12,9 @@ use starlark::values::tuple::UnpackTuple;
 
 use super::arguments::{finite, numbers, positive};
 use super::values::reading_value;
+use crate::context::{self, Halt};
 use crate::sandbox::{Numbers, write_text};
-use crate::session::{self, Halt};
-use crate::{Place, Press, Reply, Step};
+use crate::{Position, Press, Reply, Step};
 
 #[starlark_module]
 pub(super) fn functions(builder: &mut GlobalsBuilder) {
@@ -112,7 +112,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
 }
 
 fn perform<'v>(step: Step, eval: &mut Evaluator<'v, '_, '_>) -> starlark::Result<Value<'v>> {
-    let reply = session::current()?.perform(step, eval)?;
+    let reply = context::current()?.perform(step, eval)?;
     let heap = eval.heap();
     Ok(match reply {
         Reply::Done => Value::new_none(),
@@ -126,8 +126,8 @@ fn perform<'v>(step: Step, eval: &mut Evaluator<'v, '_, '_>) -> starlark::Result
     })
 }
 
-fn place(x_mm: &UnpackFloat, y_mm: &UnpackFloat) -> Result<Place, Halt> {
-    Ok(Place { x_mm: finite("x_mm", x_mm.0)?, y_mm: finite("y_mm", y_mm.0)? })
+fn place(x_mm: &UnpackFloat, y_mm: &UnpackFloat) -> Result<Position, Halt> {
+    Ok(Position { x_mm: finite("x_mm", x_mm.0)?, y_mm: finite("y_mm", y_mm.0)? })
 }
 
 fn speed(speed: NoneOr<UnpackFloat>) -> Result<Option<f64>, Halt> {

@@ -8,7 +8,7 @@ use starlark::values::structs::{AllocStruct, StructRef};
 use starlark::values::tuple::TupleRef;
 use starlark::values::{Heap, UnpackValue, Value};
 
-use crate::{ElementView, Reading, RigView};
+use crate::{ElementView, MeanReading, RigView};
 
 /// Most values, and bytes of texts among them, that are written into one JSON.
 const JSON_SIZE_MAX: usize = 1 << 20;
@@ -54,7 +54,7 @@ pub(crate) fn rig_value<'v>(rig: &RigView, heap: Heap<'v>) -> Value<'v> {
 }
 
 /// A reading, as scripts see it.
-pub(super) fn reading_value<'v>(reading: &Reading, heap: Heap<'v>) -> Value<'v> {
+pub(super) fn reading_value<'v>(reading: &MeanReading, heap: Heap<'v>) -> Value<'v> {
     let numbers = |numbers: &[f64]| heap.alloc(AllocList(numbers.iter().copied()));
     heap.alloc(AllocStruct([
         ("counts", numbers(&reading.mean_counts)),

@@ -9,7 +9,7 @@ use starlark::values::string::STRING_TYPE;
 use starlark::values::{UnpackValue, Value};
 
 use super::text::{Numbers, SEQUENCE_MAX, TEXT_MAX_BYTES, write_text};
-use crate::session::{self, Halt};
+use crate::context::{self, Halt};
 use crate::{Exceeded, sandbox::globals::OPERATORS};
 
 /// For the syntax tree: each guarded operator becomes a call of the function of the same name. No script can
@@ -30,7 +30,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         if let (Some(left), Some(right)) = (size(a), size(b)) {
             check_size(a, left.saturating_add(right))?;
         }
-        session::check_heap(eval)?;
+        context::check_heap(eval)?;
         a.add(b, eval.heap())
     }
 
@@ -46,7 +46,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
                 check_size(repeated, size.saturating_mul(u64::try_from(times).unwrap_or(0)))?;
             }
         }
-        session::check_heap(eval)?;
+        context::check_heap(eval)?;
         a.mul(b, eval.heap())
     }
 
@@ -59,7 +59,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
             let mut text = String::new();
             write_text(b, Numbers::Whole, &mut text).map_err(Halt::from)?;
         }
-        session::check_heap(eval)?;
+        context::check_heap(eval)?;
         a.percent(b, eval.heap())
     }
 
@@ -71,7 +71,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         if let (Some(left), Some(right)) = (size(a), size(b)) {
             check_size(a, left.saturating_add(right))?;
         }
-        session::check_heap(eval)?;
+        context::check_heap(eval)?;
         a.bit_or(b, eval.heap())
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::fake::FakeRig;
 use serde_json::Value;
-use tactus_plan::{Arguments, Call, Limits, Outcome, Place, Script, Step, execute};
+use tactus_plan::{Arguments, Call, Limits, Outcome, Position, Script, Step, execute};
 
 const ELEMENT_CENTRES: &str = include_str!("../../../../experiments/element-centres.star");
 const GRID_SWEEP: &str = include_str!("../../../../experiments/grid-sweep.star");
@@ -20,7 +20,7 @@ fn run(name: &str, source: &str, given: &[&str], seed: u64, rig: &mut FakeRig) -
     })
 }
 
-fn places(rig: &FakeRig) -> Vec<Place> {
+fn places(rig: &FakeRig) -> Vec<Position> {
     rig.presses().iter().map(|press| press.at).collect()
 }
 
@@ -51,8 +51,8 @@ fn the_seed_alone_gives_the_order() {
     assert_ne!(places_with(7, &[]), places_with(8, &[]));
     let raster = places_with(7, &["order=raster"]);
     assert_eq!(raster, places_with(8, &["order=raster"]));
-    assert_eq!(raster[0], Place { x_mm: 0.9, y_mm: 0.9 });
-    assert_eq!(raster[47], Place { x_mm: 15.3, y_mm: 10.9 });
+    assert_eq!(raster[0], Position { x_mm: 0.9, y_mm: 0.9 });
+    assert_eq!(raster[47], Position { x_mm: 15.3, y_mm: 10.9 });
 }
 
 #[test]
@@ -228,7 +228,7 @@ fn two_executions_ask_for_the_same_steps() {
     assert_eq!(calls(11), calls(11));
 }
 
-fn index_at(rig: &FakeRig, at: Place) -> usize {
+fn index_at(rig: &FakeRig, at: Position) -> usize {
     let view = rig.view();
     let element = view.elements.iter().find(|e| (e.x_mm - at.x_mm).hypot(e.y_mm - at.y_mm) < 1e-9);
     element.unwrap().index

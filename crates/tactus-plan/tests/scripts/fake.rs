@@ -1,7 +1,7 @@
 //! A host that performs nothing: it answers from a formula and keeps count.
 
 use tactus_model::Registration;
-use tactus_plan::{Call, Host, Press, Reading, Refusal, Reply, RigView, Step};
+use tactus_plan::{Call, Host, MeanReading, Press, Refusal, Reply, RigView, Step};
 use tactus_schema::Rig;
 
 const SIM: &str = include_str!("../../../../config/rigs/sim.toml");
@@ -73,7 +73,7 @@ impl FakeRig {
         self.calls.iter().filter_map(line).collect()
     }
 
-    fn reading(&mut self, depth_mm: f64, duration_s: f64) -> Reading {
+    fn reading(&mut self, depth_mm: f64, duration_s: f64) -> MeanReading {
         let registration = Registration { origin_mm: self.origin_mm, rotation_deg: self.rotation_deg };
         let [x_mm, y_mm] = registration.to_sensor(self.rig.registration.to_robot(self.at_mm));
         let sigma_mm = self.view.sigma_mm;
@@ -90,7 +90,7 @@ impl FakeRig {
             let noise = self.noise_counts / f64::from(frames).sqrt() * self.normal();
             signal.push(gain * depth_mm * (-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm)).exp() + noise);
         }
-        Reading {
+        MeanReading {
             mean_counts: signal.iter().map(|signal| signal + 100.0).collect(),
             rms: vec![self.noise_counts; signal.len()],
             signal,

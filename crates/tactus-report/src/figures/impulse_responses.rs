@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use tactus_solid::{
     fem::{Bricks, BricksError, Reaction},
-    layered::{Base, Layer},
+    layered::{BaseContact, Layer},
 };
 
 use super::{Drawing, FigureError};
@@ -47,7 +47,7 @@ impl Widening {
         let sigmas = LAYERS.iter().map(sigma).collect::<Result<Vec<_>, BricksError>>()?;
         let line =
             Polynomial::fit(1, &sigmas).map_or([0.0; 2], |line| [line.at(0.0), line.at(1.0) - line.at(0.0)]);
-        let of_layer = Layer::new(1.0, poisson_ratio, Base::Bonded)?.gaussian_sigma_mm();
+        let of_layer = Layer::new(1.0, poisson_ratio, BaseContact::Bonded)?.gaussian_sigma_mm();
         Ok(Self { poisson_ratio, sigmas, line, of_layer })
     }
 }

@@ -1,6 +1,6 @@
-//! How far the images of a raster stand from those made without one, which cut the tool exactly.
+//! Rendered images against the exact ones, for chosen poses.
 //!
-//! `cargo test --release -p tactus-scene --test accuracy -- --nocapture` prints what is measured.
+//! `cargo test --release -p tactus-scene --test it -- --nocapture accuracy` prints the differences.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use tactus_scene::{Attitude, Pose, Renderer};
 
 const COVERING: Covering = Covering { thickness_mm: 1.016 };
 
-/// Held for every scene, array and pose: what [`Renderer`] states.
+/// Holds for these poses; `random_poses` checks the bound that [`Renderer`] states for all.
 const TOLERANCE: f64 = 1e-3;
 
 /// The paper's `sigma` for the `DigiTacts` and one pitch for the other arrays (Fig. 10).

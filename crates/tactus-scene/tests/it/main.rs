@@ -4,3 +4,4 @@ mod accuracy;
 mod files;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod random_poses;

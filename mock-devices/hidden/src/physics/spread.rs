@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use tactus_solid::layered::{Base, Layer};
+use tactus_solid::layered::{BaseContact, Layer};
 
 use super::{Definition, Knobs, PipelineHook, left, minus, scale};
 
@@ -14,7 +14,7 @@ pub(super) const LAYERED_TAIL: Definition = Definition {
     make: |knobs| {
         // A layer's pressure is most like a Gaussian of 0.48 of its thickness (nu 0.3).
         let thickness_mm = knobs.between("wider_by", 1.8, 2.5) * knobs.sigma_mm() / 0.48;
-        let layer = Layer::new(thickness_mm, 0.3, Base::Bonded).map(|layer| layer.under_point());
+        let layer = Layer::new(thickness_mm, 0.3, BaseContact::Bonded).map(|layer| layer.under_point());
         tail(knobs, |distance_mm| layer.as_ref().map_or(0.0, |under| under.pressure_per_mm2(distance_mm)))
     },
 };

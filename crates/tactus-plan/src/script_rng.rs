@@ -6,9 +6,9 @@ use rand_chacha::ChaCha8Rng;
 
 /// `ChaCha8` (Bernstein 2008, 8 rounds) keyed with the seed: its eight bytes, least significant first, then zeros.
 #[derive(Debug)]
-pub(crate) struct Chance(ChaCha8Rng);
+pub(crate) struct ScriptRng(ChaCha8Rng);
 
-impl Chance {
+impl ScriptRng {
     pub(crate) fn seeded(seed: u64) -> Self {
         let mut key = [0; 32];
         for (to, from) in key.iter_mut().zip(seed.to_le_bytes()) {
@@ -37,5 +37,5 @@ impl Chance {
 }
 
 #[cfg(test)]
-#[path = "chance_tests.rs"]
+#[path = "script_rng_tests.rs"]
 mod tests;

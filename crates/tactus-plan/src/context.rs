@@ -1,6 +1,6 @@
 //! What the functions of a script share during one evaluation.
 //!
-//! An evaluation has a thread to itself, and the evaluator hands functions no context of ours, so the session
+//! An evaluation has a thread to itself, and the evaluator hands functions no context of ours, so the context
 //! is that thread's own.
 
 use std::cell::{Cell, RefCell};
@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use serde_json::Value;
 use starlark::eval::Evaluator;
 
-use crate::chance::Chance;
 use crate::evaluate::{Evaluated, Job, Purpose};
+use crate::script_rng::ScriptRng;
 use crate::{Call, Exceeded, Location, Parameter, Refusal, Reply, ScriptError, Step, sandbox};
 
 /// What the script's thread says to the caller's.
@@ -84,7 +84,7 @@ impl From<Halt> for starlark::Error {
 
 /// Which part of the script is under way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
+pub(crate) enum ScriptSection {
     /// The top level: parameters may be declared, nothing may be done.
     TopLevel,
     /// `run`: the other way round.
@@ -93,23 +93,23 @@ pub(crate) enum Part {
 
 /// One evaluation.
 #[derive(Debug)]
-pub(crate) struct Session {
+pub(crate) struct EvaluationContext {
     pub(crate) job: Job,
-    pub(crate) part: Cell<Part>,
+    pub(crate) part: Cell<ScriptSection>,
     pub(crate) parameters: RefCell<Vec<Parameter>>,
     pub(crate) values: RefCell<Vec<(String, Value)>>,
-    pub(crate) chance: RefCell<Chance>,
+    pub(crate) rng: RefCell<ScriptRng>,
     pub(crate) steps: Cell<u64>,
 }
 
 thread_local! {
-    static SESSION: RefCell<Option<Rc<Session>>> = const { RefCell::new(None) };
+    static SESSION: RefCell<Option<Rc<EvaluationContext>>> = const { RefCell::new(None) };
 }
 
-/// The session of this thread's evaluation.
-pub(crate) fn current() -> Result<Rc<Session>, Halt> {
-    let session = SESSION.with_borrow(Clone::clone);
-    session.ok_or_else(|| Halt::Failed("no script is being evaluated on this thread".into()))
+/// The context of this thread's evaluation.
+pub(crate) fn current() -> Result<Rc<EvaluationContext>, Halt> {
+    let context = SESSION.with_borrow(Clone::clone);
+    context.ok_or_else(|| Halt::Failed("no script is being evaluated on this thread".into()))
 }
 
 /// An error once the script's values take more memory than they may, or the script is to end.
@@ -117,7 +117,7 @@ pub(crate) fn check_heap(eval: &Evaluator<'_, '_, '_>) -> Result<(), Halt> {
     current()?.check(eval)
 }
 
-impl Session {
+impl EvaluationContext {
     pub(crate) fn new(job: Job) -> Self {
         let seed = match job.purpose {
             Purpose::Declare => 0,
@@ -125,19 +125,19 @@ impl Session {
         };
         Self {
             job,
-            part: Cell::new(Part::TopLevel),
+            part: Cell::new(ScriptSection::TopLevel),
             parameters: RefCell::default(),
             values: RefCell::default(),
-            chance: RefCell::new(Chance::seeded(seed)),
+            rng: RefCell::new(ScriptRng::seeded(seed)),
             steps: Cell::new(0),
         }
     }
 
-    /// Makes this the session of the present thread.
+    /// Makes this the context of the present thread.
     pub(crate) fn begin(self) -> Rc<Self> {
-        let session = Rc::new(self);
-        SESSION.set(Some(Rc::clone(&session)));
-        session
+        let context = Rc::new(self);
+        SESSION.set(Some(Rc::clone(&context)));
+        context
     }
 
     /// An error once the script's values take more memory than they may, or the script is to end.
@@ -159,7 +159,7 @@ impl Session {
 
     /// Declares a parameter; gives its value.
     pub(crate) fn declare(&self, parameter: Parameter) -> Result<Value, Halt> {
-        if self.part.get() != Part::TopLevel {
+        if self.part.get() != ScriptSection::TopLevel {
             return Err(Halt::Failed("parameters are declared at the top level, not inside run".into()));
         }
         let parameter = parameter.declare().map_err(Halt::Failed)?;
@@ -180,7 +180,7 @@ impl Session {
 
     /// Has the host perform a step.
     pub(crate) fn perform(&self, step: Step, eval: &Evaluator<'_, '_, '_>) -> Result<Reply, Halt> {
-        if self.part.get() != Part::Run {
+        if self.part.get() != ScriptSection::Run {
             return Err(Halt::Failed(
                 "only run(rig) may do something: the top level declares parameters".into(),
             ));
