@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
+use rayon::ThreadPoolBuilder;
 use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Registration, Response};
 
 use crate::candidates::Candidate;
@@ -36,7 +37,7 @@ pub struct Known {
 pub struct Options {
     /// The seed of the split and of the Monte-Carlo tests.
     pub seed: u64,
-    /// How many threads may compute.
+    /// How many threads compute; 0 counts as 1. The result does not depend on it.
     pub threads: usize,
     /// By which rule effects are added.
     pub rule: Rule,
@@ -73,6 +74,14 @@ pub enum DiscoverError {
     /// A known effect does not fit the array.
     #[error("the declared model: {0}")]
     Effect(#[from] EffectError),
+    /// The operating system starts no more threads.
+    #[error("cannot start {threads} threads: {reason}")]
+    Threads {
+        /// [`Options::threads`].
+        threads: usize,
+        /// From the operating system.
+        reason: String,
+    },
 }
 
 /// Follows the whole protocol.
@@ -80,6 +89,20 @@ pub enum DiscoverError {
 /// # Errors
 /// [`DiscoverError`].
 pub fn discover(
+    known: &Known,
+    frames: &Frames,
+    options: Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Discovery, DiscoverError> {
+    let threads = options.threads.max(1);
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| DiscoverError::Threads { threads, reason: error.to_string() })?;
+    pool.install(|| discover_on_threads(known, frames, options, progress))
+}
+
+fn discover_on_threads(
     known: &Known,
     frames: &Frames,
     options: Options,

@@ -19,7 +19,7 @@ use crate::DiscoverError;
 use crate::contacts::Contacts;
 use crate::linear::Linear;
 use crate::noise::Noise;
-use crate::parallel::Threads;
+use crate::parallel;
 use crate::scale::Scale;
 use crate::sensor::{Parameters, Sensor, Term};
 
@@ -61,7 +61,6 @@ pub(crate) struct Problem<'a> {
     pub(crate) spread_free: bool,
     /// Duration of the longest run.
     pub(crate) duration_s: f64,
-    pub(crate) threads: &'a Threads,
     /// By how much the variance of a sum of squares exceeds that of independent readings.
     pub(crate) squares_inflation: f64,
 }
@@ -88,7 +87,7 @@ pub(crate) enum Free {
 
 impl<'a> Problem<'a> {
     /// A fit of the rows that are not held out.
-    pub(crate) fn new(sensor: Sensor<'a>, noise: &Noise, threads: &'a Threads) -> Self {
+    pub(crate) fn new(sensor: Sensor<'a>, noise: &Noise) -> Self {
         let (rows, frames) = (sensor.rows, sensor.frames);
         let weigh = |(weight, heldout): (&f64, &bool)| if *heldout { 0.0 } else { *weight };
         let train: Vec<f64> = rows.weight.iter().zip(&rows.heldout).map(weigh).collect();
@@ -114,7 +113,6 @@ impl<'a> Problem<'a> {
             spread_free: Contacts::of(frames).distinct_places() > 1,
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
             sensor,
-            threads,
             squares_inflation: noise.squares_inflation(LONG_FRAMES),
         }
     }
@@ -220,7 +218,7 @@ impl<'a> Problem<'a> {
     /// Derivatives of every reading by each free parameter.
     pub(crate) fn columns(&self, at: &Parameters, predicted: &[f64]) -> Result<Vec<Vec<f64>>, DiscoverError> {
         let free = self.free(at);
-        self.threads.map(&free, |one| self.slope(at, predicted, *one)).into_iter().collect()
+        parallel::map(&free, |one| self.slope(at, predicted, *one)).into_iter().collect()
     }
 
     /// The best parameters near a start, in at most so many rounds. Derivatives by the parameters of effects that have
@@ -251,7 +249,7 @@ impl<'a> Problem<'a> {
                 None => self.slope(&at, &predicted, free[*place]),
             };
             let columns: Vec<Vec<f64>> =
-                self.threads.map(&places, column).into_iter().collect::<Result<_, DiscoverError>>()?;
+                parallel::map(&places, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             for ((kept, column), one) in kept.iter_mut().zip(&columns).zip(&free) {
                 if matches!(one, Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY) {
                     kept.get_or_insert_with(|| column.clone());

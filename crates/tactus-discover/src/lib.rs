@@ -5,7 +5,6 @@
 mod bench;
 mod bic;
 mod candidates;
-mod chance;
 mod contacts;
 mod covariates;
 mod discover;
@@ -21,6 +20,7 @@ mod noise;
 mod not_shown;
 mod parallel;
 mod prepare;
+mod rng;
 mod rows;
 mod scale;
 mod score;

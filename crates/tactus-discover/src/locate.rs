@@ -4,6 +4,7 @@ use crate::DiscoverError;
 use crate::covariates::{Feature, Form, Forms, features};
 use crate::discovery::{Curve, Gap, Point};
 use crate::fit::Fitted;
+use crate::parallel;
 use crate::score::{Score, flipped, largest, p_value, q_values};
 use crate::search::{FLIPS, Search};
 
@@ -36,7 +37,7 @@ impl Search<'_> {
             let z = fitting.wanted(&column) / fitting.size(&column).max(f64::MIN_POSITIVE);
             (fitting.score(&[column]), z, readings)
         };
-        let scored = self.problem.threads.map(&features, scored);
+        let scored = parallel::map(&features, scored);
         let mut covariates: Vec<&'static str> = features.iter().map(|feature| feature.covariate).collect();
         covariates.dedup();
         let of = |covariate: &str| -> Vec<usize> {
@@ -44,7 +45,7 @@ impl Search<'_> {
         };
         let groups: Vec<Vec<&Score>> =
             covariates.iter().map(|one| of(one).iter().map(|index| &scored[*index].0).collect()).collect();
-        let under_none = flipped(&groups, FLIPS, self.options.seed ^ STREAM, self.problem.threads);
+        let under_none = flipped(&groups, FLIPS, self.options.seed ^ STREAM);
         let statistics: Vec<f64> =
             groups.iter().map(|group| group.iter().map(|score| score.z).fold(0.0, f64::max)).collect();
         let p_values: Vec<f64> =

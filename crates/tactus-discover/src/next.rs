@@ -22,7 +22,7 @@ use tactus_model::effect::{Definition, Kind};
 use crate::discovery::{NextExperiment, NotShown};
 use crate::fit::{Free, Problem};
 use crate::noise::Noise;
-use crate::parallel::Threads;
+use crate::parallel;
 use crate::rows::{HeldOut, Rows};
 use crate::score::Fitting;
 use crate::sensor::{Parameters, Sensor, Term};
@@ -70,7 +70,6 @@ pub(crate) struct Setting<'a> {
     /// The data: no design goes deeper, or loads faster, than they did.
     pub(crate) frames: &'a Frames,
     pub(crate) noise: &'a Noise,
-    pub(crate) threads: &'a Threads,
 }
 
 impl Setting<'_> {
@@ -129,7 +128,7 @@ impl Setting<'_> {
         expect: impl Fn(&Design) -> Result<Expected, DiscoverError> + Sync,
     ) -> Result<Vec<NextExperiment>, DiscoverError> {
         let mut found: Vec<(&Design, Expected)> = Vec::new();
-        let expected = self.threads.map(designs, |design| expect(design));
+        let expected = parallel::map(designs, |design| expect(design));
         for (design, expected) in designs.iter().zip(expected) {
             found.push((design, expected?));
         }
@@ -215,7 +214,7 @@ impl Setting<'_> {
         let mut rows = Rows::of(frames, true)?;
         let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
         rows.weigh(frames, self.noise, &all);
-        work(&Problem::new(Sensor::new(self.known, frames, &rows), self.noise, self.threads))
+        work(&Problem::new(Sensor::new(self.known, frames, &rows), self.noise))
     }
 }
 

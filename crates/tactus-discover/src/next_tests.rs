@@ -1,7 +1,6 @@
 use tactus_model::{Phase, Registration};
 
 use super::*;
-use crate::parallel::Threads;
 use crate::{Frame, bench};
 
 /// A sensor that lies where the sample rig has it.
@@ -57,8 +56,7 @@ fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> 
     let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
     rows.weigh(frames, &noise, &all);
     rows.counts = Sensor::new(known, frames, &rows).predict(&right.parameters).unwrap();
-    let threads = Threads::new(2);
-    let problem = Problem::new(Sensor::new(known, frames, &rows), &noise, &threads);
+    let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
     let fitted = problem.fit_from(wrong.parameters, 8).unwrap();
     let without = Parameters::declared(known, 1);
     let gain = problem.cost(&problem.predict(&without).unwrap());
@@ -68,7 +66,7 @@ fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> 
 /// What each of the named designs tells of twins.
 fn separations<const N: usize>(of: [(&'static str, &[(&str, f64)]); 2], names: [&str; N]) -> [f64; N] {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: &Threads::new(2) };
+    let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let pair = twins(&known, of);
     let designs = Bench::of(&known, &frames).designs();
     names.map(|name| {
@@ -123,7 +121,7 @@ fn lost_motion_and_hysteresis_are_told_apart_by_reversals() {
 #[test]
 fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: &Threads::new(2) };
+    let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let pair = twins(
         &known,
         [
@@ -157,7 +155,7 @@ fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter
 #[test]
 fn nothing_is_proposed_between_an_explanation_and_itself() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: &Threads::new(2) };
+    let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let one = explanation(&known, "relaxation", &[("relaxed_share", 0.1)]);
     let pair = Pair { of: [one.clone(), one], without: Parameters::declared(&known, 1), gain: 100.0 };
     assert_eq!(setting.propose(&[pair]).unwrap(), []);
@@ -166,7 +164,7 @@ fn nothing_is_proposed_between_an_explanation_and_itself() {
 #[test]
 fn what_the_data_cannot_show_is_shown_by_an_experiment_of_its_own() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: &Threads::new(2) };
+    let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let not_shown = [NotShown { effect: "relaxation", reason: "no depth was held".into() }];
     let proposals = setting.show(&not_shown, &Parameters::declared(&known, 1)).unwrap();
     let [one] = &proposals[..] else { panic!("one proposal: {proposals:?}") };

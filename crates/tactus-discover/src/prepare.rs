@@ -2,7 +2,6 @@
 
 use crate::fit::{Fitted, Problem};
 use crate::noise::Noise;
-use crate::parallel::Threads;
 use crate::rows::{HeldOut, Rows, still};
 use crate::sensor::{Parameters, Sensor};
 use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum};
@@ -33,7 +32,6 @@ pub(crate) struct Prepared<'a> {
     /// Frequencies of lines in the spectrum of what the base model leaves: tones that no grid would find.
     pub(crate) frequencies_hz: Vec<f64>,
     pub(crate) warnings: Vec<String>,
-    pub(crate) threads: Threads,
 }
 
 impl<'a> Prepared<'a> {
@@ -59,17 +57,16 @@ impl<'a> Prepared<'a> {
         let replicates = replicated.is_some();
         let noise = replicated.unwrap_or_else(|| Noise::of_differences(frames, step_counts));
 
-        let threads = Threads::new(options.threads);
         let whole = Rows::of(frames, false)?;
         let mut rows = Rows::of(frames, true)?;
         rows.weigh(frames, &noise, &heldout);
-        let mut base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise, &threads))?;
+        let mut base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise))?;
         let frequencies_hz = lines_hz(&Sensor::new(known, frames, &whole), &base)?;
         if !frequencies_hz.is_empty() {
             // A tone is lost in rows of several frames.
             rows = Rows::of(frames, false)?;
             rows.weigh(frames, &noise, &heldout);
-            base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise, &threads))?;
+            base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise))?;
         }
         Ok(Self {
             known,
@@ -85,13 +82,12 @@ impl<'a> Prepared<'a> {
             base,
             frequencies_hz,
             warnings,
-            threads,
         })
     }
 
     /// The fit of its rows.
     pub(crate) fn problem(&self) -> Problem<'_> {
-        Problem::new(Sensor::new(self.known, self.frames, &self.rows), &self.noise, &self.threads)
+        Problem::new(Sensor::new(self.known, self.frames, &self.rows), &self.noise)
     }
 }
 

@@ -5,8 +5,8 @@
 
 use tactus_model::{Phase, Trajectory, TrajectoryError};
 
-use crate::chance::Chance;
 use crate::noise::Noise;
+use crate::rng::Rng;
 use crate::{DiscoverError, Frames};
 
 /// A tip that moved less did not move.
@@ -184,11 +184,11 @@ impl Rows {
 impl HeldOut {
     /// Holds out one press in three, whole, with the rest that follows it; and of what has several kinds one kind wholly.
     pub(crate) fn choose(frames: &Frames, seed: u64) -> Self {
-        let mut chance = Chance::new(seed);
+        let mut rng = Rng::new(seed);
         let presses = Presses::of(frames);
         let mut out = vec![false; presses.len()];
         let mut order: Vec<usize> = (0..presses.len()).collect();
-        chance.shuffle(&mut order);
+        rng.shuffle(&mut order);
         let wanted = presses.len() / HELDOUT_ONE_IN;
         let (mut depths_mm, mut coverings_mm) = (Vec::new(), Vec::new());
         // A kind in the middle: beyond the fitted range even the truth may look wrong.
@@ -211,7 +211,7 @@ impl HeldOut {
         for (press, out) in presses.iter().zip(&out) {
             of_frame[press.first..press.end].fill(*out);
         }
-        rests(frames, &presses, &mut chance, &mut of_frame);
+        rests(frames, &presses, &mut rng, &mut of_frame);
         let held = out.iter().filter(|out| **out).count();
         Self { frames: of_frame, train_presses: presses.len() - held, presses: held, depths_mm, coverings_mm }
     }
@@ -255,7 +255,7 @@ impl Presses {
 }
 
 /// Holds out one stretch in three of the frames that belong to no press.
-fn rests(frames: &Frames, presses: &[Presses], chance: &mut Chance, out: &mut [bool]) {
+fn rests(frames: &Frames, presses: &[Presses], rng: &mut Rng, out: &mut [bool]) {
     let mut taken = vec![false; frames.len()];
     for press in presses {
         taken[press.first..press.end].fill(true);
@@ -272,7 +272,7 @@ fn rests(frames: &Frames, presses: &[Presses], chance: &mut Chance, out: &mut [b
         let t_s = frames.t_s[frame];
         let (_, held) = *match &mut stretch {
             Some(begun) if t_s - begun.0 <= STRETCH_S => begun,
-            other => other.insert((t_s, chance.below(HELDOUT_ONE_IN) == 0)),
+            other => other.insert((t_s, rng.below(HELDOUT_ONE_IN) == 0)),
         };
         out[frame] = held;
     }

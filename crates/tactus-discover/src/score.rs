@@ -25,11 +25,11 @@
 use nalgebra::DMatrix;
 
 use crate::DiscoverError;
-use crate::chance::Chance;
 use crate::fit::{Problem, dot};
 use crate::linear::Linear;
 use crate::noise::median;
-use crate::parallel::Threads;
+use crate::parallel;
+use crate::rng::Rng;
 use crate::sensor::Parameters;
 
 /// Median of the squared standard normal distribution.
@@ -269,13 +269,13 @@ fn deviate(chi_square: f64, freedom: f64) -> f64 {
 }
 
 /// The largest of the scores in each of many data sets whose blocks had their signs flipped, for each group.
-pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64, threads: &Threads) -> Vec<Vec<f64>> {
+pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
     let blocks =
         groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
-    let mut chance = Chance::new(seed);
+    let mut rng = Rng::new(seed);
     let mut signs = vec![1.0_f32; flips * blocks];
     for chunk in signs.chunks_mut(blocks.max(1)).flat_map(|flip| flip.chunks_mut(64)) {
-        let bits = chance.bits();
+        let bits = rng.bits();
         for (place, sign) in chunk.iter_mut().enumerate() {
             *sign = if bits >> place & 1 == 1 { 1.0 } else { -1.0 };
         }
@@ -287,7 +287,7 @@ pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64, threads: 
         };
         (0..flips).map(of_flip).collect()
     };
-    threads.map(groups, largest)
+    parallel::map(groups, largest)
 }
 
 /// The largest of all groups in each flipped data set.
@@ -304,10 +304,10 @@ pub(crate) fn p_value(statistic: f64, under_none: &[f64]) -> f64 {
 
 /// Chance that gains as large come about by flipping their signs.
 pub(crate) fn sign_flip_p(gains: &[f64], flips: usize, seed: u64) -> f64 {
-    let mut chance = Chance::new(seed);
+    let mut rng = Rng::new(seed);
     let sum: f64 = gains.iter().sum();
     let flipped: Vec<f64> = (0..flips)
-        .map(|_| gains.iter().map(|gain| if chance.bits() & 1 == 1 { *gain } else { -gain }).sum())
+        .map(|_| gains.iter().map(|gain| if rng.bits() & 1 == 1 { *gain } else { -gain }).sum())
         .collect();
     p_value(sum, &flipped)
 }

@@ -13,6 +13,7 @@ use tactus_model::effect::{Definition, Kind};
 use crate::candidates::{Candidate, Screened, with};
 use crate::discovery;
 use crate::fit::{Fitted, Problem};
+use crate::parallel;
 use crate::score::{Fitting, Score, flipped, largest, p_value};
 use crate::sensor::{Parameters, Term};
 use crate::wander::WANDER;
@@ -146,7 +147,7 @@ impl Search<'_> {
         let candidates: Vec<&Candidate> =
             self.candidates.iter().filter(|one| among(one.definition.name)).collect();
         let screen = |one: &&Candidate| one.screen(fitting, self.problem, at);
-        self.problem.threads.map_longest_first(&candidates, |one| one.columns(), screen).into_iter().collect()
+        parallel::map_longest_first(&candidates, |one| one.columns(), screen).into_iter().collect()
     }
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
@@ -201,8 +202,7 @@ impl Search<'_> {
         let fitting = self.fitting(at)?;
         let screened = self.screen(&fitting, at)?;
         let groups: Vec<Vec<&Score>> = screened.iter().map(|one| one.scores.iter().collect()).collect();
-        let under_none =
-            flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1), self.problem.threads);
+        let under_none = flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1));
         let largest = largest(&under_none);
         let statistic = |one: &Screened| one.scores.iter().map(|score| score.z).fold(0.0, f64::max);
         let mut tried: Vec<discovery::Candidate> = screened
@@ -261,12 +261,10 @@ impl Search<'_> {
             let started = with(&at.parameters, start.clone());
             Ok((start.definition.name, self.problem.fit_from(started, FIRST_ROUNDS)?))
         };
-        let mut fits: Vec<(&'static str, Fitted)> = self
-            .problem
-            .threads
-            .map_longest_first(starts, |one| one.values.len(), fit)
-            .into_iter()
-            .collect::<Result<_, DiscoverError>>()?;
+        let mut fits: Vec<(&'static str, Fitted)> =
+            parallel::map_longest_first(starts, |one| one.values.len(), fit)
+                .into_iter()
+                .collect::<Result<_, DiscoverError>>()?;
         fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
         let best = fits.first().map_or(0.0, |(_, best)| at.cost - best.cost);
         fits.retain(|(_, fitted)| at.cost - fitted.cost > gain_least.max(BEHIND_SHARE * best));
@@ -274,7 +272,7 @@ impl Search<'_> {
         let finish = |(name, fitted): &(&'static str, Fitted)| {
             Ok((*name, self.problem.fit_from(fitted.parameters.clone(), TRIAL_ROUNDS)?))
         };
-        self.problem.threads.map(&fits, finish).into_iter().collect()
+        parallel::map(&fits, finish).into_iter().collect()
     }
 
     /// The model's tangent space and residual.
@@ -435,8 +433,7 @@ impl Search<'_> {
                 (self.progress)(&format!("without {name}"));
                 self.problem.fit_from(without(&at.parameters, name, self.known_terms), TRIAL_ROUNDS)
             };
-            let fits: Vec<Fitted> =
-                self.problem.threads.map(&names, without).into_iter().collect::<Result<_, _>>()?;
+            let fits: Vec<Fitted> = parallel::map(&names, without).into_iter().collect::<Result<_, _>>()?;
             let left = EARNS_SHARE * self.problem.surely_left(&at);
             let worth = |less: &Fitted| {
                 let [gain, error] = self.problem.heldout_gain(less, &at);

@@ -114,7 +114,7 @@ pub(crate) fn tell(
             gain: without.cost - grown.cost,
         }));
     }
-    let setting = Setting { known, frames, noise: &prepared.noise, threads: &prepared.threads };
+    let setting = Setting { known, frames, noise: &prepared.noise };
     let mut next_experiments = setting.propose(&pairs)?;
     next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
 

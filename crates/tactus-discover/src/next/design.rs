@@ -5,7 +5,7 @@
 
 use tactus_model::{Phase, Registration};
 
-use crate::chance::Chance;
+use crate::rng::Rng;
 use crate::rows::interval_s;
 use crate::{Frame, Frames, Known};
 
@@ -136,7 +136,7 @@ impl<'a> Bench<'a> {
         let depths_mm = ELEMENT_DEPTHS_MM.map(|depth_mm| (1000.0 * by * depth_mm).floor() / 1000.0);
         let mut stage = Stage::new(self, 1.0);
         let mut centres_mm = stage.centres_mm.clone();
-        stage.chance.shuffle(&mut centres_mm);
+        stage.rng.shuffle(&mut centres_mm);
         for centre_mm in centres_mm {
             stage.press(centre_mm, &depths_mm, DWELL_S);
         }
@@ -156,7 +156,7 @@ impl<'a> Bench<'a> {
                 presses.extend(shares.map(|share| (at_mm, share * self.covering_mm)));
             }
         }
-        stage.chance.shuffle(&mut presses);
+        stage.rng.shuffle(&mut presses);
         for (at_mm, depth_mm) in presses {
             stage.press(at_mm, &[depth_mm], DWELL_S);
         }
@@ -192,7 +192,7 @@ struct Stage<'a> {
     sites_mm: [[f64; 2]; 3],
     depth_mm: f64,
     scale: f64,
-    chance: Chance,
+    rng: Rng,
     t_s: f64,
     at_mm: [f64; 3],
     press: i32,
@@ -218,7 +218,7 @@ impl<'a> Stage<'a> {
             centres_mm,
             depth_mm: bench.depth_share * bench.covering_mm,
             scale,
-            chance: Chance::new(1),
+            rng: Rng::new(1),
             t_s: 0.0,
             at_mm: [x, y, bench.safe_mm],
             press: 0,
@@ -267,7 +267,7 @@ impl<'a> Stage<'a> {
 
     fn rates(&mut self) {
         let mut speeds = self.bench.speeds_mm_per_s().repeat(self.times(3));
-        self.chance.shuffle(&mut speeds);
+        self.rng.shuffle(&mut speeds);
         for load_mm_per_s in speeds {
             self.press_from(self.sites_mm[0], &[self.depth_mm], DWELL_S, load_mm_per_s, [0.0; 2]);
         }
@@ -319,7 +319,7 @@ impl<'a> Stage<'a> {
                 }
             }
         }
-        self.chance.shuffle(&mut places_mm);
+        self.rng.shuffle(&mut places_mm);
         places_mm.truncate(self.times(places_mm.len()));
         for place_mm in places_mm {
             self.press(place_mm, &[self.depth_mm], 2.0);
@@ -350,7 +350,7 @@ impl<'a> Stage<'a> {
         let cols = self.bench.known.array.cols();
         let some = self.centres_mm.iter().enumerate().filter(|(index, _)| is_one(index / cols, index % cols));
         let mut chosen_mm: Vec<[f64; 2]> = some.map(|(_, centre_mm)| *centre_mm).collect();
-        self.chance.shuffle(&mut chosen_mm);
+        self.rng.shuffle(&mut chosen_mm);
         chosen_mm.truncate(self.times(chosen_mm.len()));
         let depths_mm: Vec<f64> = shares.iter().map(|share| share * self.depth_mm).collect();
         for centre_mm in chosen_mm {
@@ -371,7 +371,7 @@ impl<'a> Stage<'a> {
     fn ways(&mut self, full: usize) -> Vec<[f64; 2]> {
         let four_mm = [[-ASIDE_MM, 0.0], [ASIDE_MM, 0.0], [0.0, -ASIDE_MM], [0.0, ASIDE_MM]];
         let mut ways_mm = four_mm.repeat(self.times(full));
-        self.chance.shuffle(&mut ways_mm);
+        self.rng.shuffle(&mut ways_mm);
         ways_mm
     }
 
