@@ -1,38 +1,37 @@
-//! The measured frames, gathered for analysis.
+//! Measured frames, stored by column.
 
 use tactus_model::Phase;
 
-/// One row of the measurement table.
+/// One row of the measurement table: a frame with the stage's state at its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame<'a> {
-    /// Run id; the frames of a run come one after the other, in order of time.
+pub struct MeasuredFrame<'a> {
+    /// Run id. The frames of one run follow each other in order of time.
     pub run: &'a str,
     /// Press index in the run; -1 outside a press.
     pub press: i32,
-    /// What the stage was doing.
+    /// Phase of the press.
     pub phase: Phase,
-    /// Time of sampling.
+    /// Time of sampling, on any clock.
     pub t_ns: i64,
-    /// Stage position, robot frame.
+    /// Position of the stage in the robot frame.
     pub position_mm: [f64; 3],
     /// Thickness of the covering in place.
     pub covering_mm: f64,
-    /// Id of the tool on the stage.
+    /// Id of the indenter on the stage.
     pub indenter: &'a str,
-    /// Temperature, where it was measured.
+    /// `None` where it was not measured.
     pub temperature_c: Option<f64>,
     /// Raw counts, row-major, one per element.
     pub counts: &'a [f32],
 }
 
-/// Frames of one or more runs, column by column.
+/// Frames of one or more runs, stored by column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frames {
-    /// Number of elements.
     pub(crate) elements: usize,
-    /// Ids of the runs, and where each ends.
+    /// Ids of the runs, and the frame after each one's last.
     pub(crate) runs: Vec<(String, usize)>,
-    /// Ids of the tools.
+    /// Ids of the indenters.
     pub(crate) indenters: Vec<String>,
     pub(crate) press: Vec<i32>,
     pub(crate) phase: Vec<Phase>,
@@ -40,9 +39,9 @@ pub struct Frames {
     pub(crate) t_s: Vec<f64>,
     pub(crate) position_mm: Vec<[f64; 3]>,
     pub(crate) covering_mm: Vec<f64>,
-    /// Index of the tool.
+    /// Index in `indenters`.
     pub(crate) indenter: Vec<u16>,
-    /// Not a number where it was not measured.
+    /// NaN where it was not measured.
     pub(crate) temperature_c: Vec<f32>,
     /// Row-major: frame by frame, element by element.
     pub(crate) counts: Vec<f32>,
@@ -50,16 +49,16 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// None yet, of an array of so many elements.
+    /// No frames yet, of an array with this number of elements.
     pub fn new(elements: usize) -> Self {
         Self { elements, ..Self::default() }
     }
 
-    /// Takes the next frame.
+    /// Adds the next frame.
     ///
     /// # Panics
-    /// If it has not one count per element.
-    pub fn push(&mut self, frame: Frame<'_>) {
+    /// If the frame does not have one count per element.
+    pub fn push(&mut self, frame: MeasuredFrame<'_>) {
         assert_eq!(frame.counts.len(), self.elements, "one count per element");
         if self.runs.last().is_none_or(|(run, _)| run != frame.run) {
             self.first_ns = frame.t_ns;

@@ -1,12 +1,12 @@
 use tactus_model::Phase;
 
 use super::wider_step;
-use crate::{Frame, Frames};
+use crate::{Frames, MeasuredFrame};
 
 fn readings(counts: impl Iterator<Item = f32>) -> Frames {
     let mut frames = Frames::new(1);
     for (t_ns, counts) in (0..).step_by(33_000_000).zip(counts) {
-        frames.push(Frame {
+        frames.push(MeasuredFrame {
             run: "a",
             press: -1,
             phase: Phase::Idle,

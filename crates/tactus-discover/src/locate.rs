@@ -29,7 +29,7 @@ impl Search<'_> {
         let fitting = self.fitting(at)?;
         let forms = Forms::of(problem, &at.parameters, &at.predicted)?;
         let features = features(problem, &forms);
-        let elements = problem.sensor.rows.elements;
+        let elements = problem.predictor.bins.elements;
         let scored = |feature: &Feature| {
             let mut column = forms.column(feature, elements);
             let readings = column.iter().filter(|value| **value != 0.0).count();
@@ -79,7 +79,7 @@ impl Search<'_> {
         let features = features(problem, &forms);
         let mut curves: Vec<Curve> = Vec::new();
         for feature in features.iter().filter(|one| matches!(one.form, Form::Signal | Form::Offset)) {
-            let column = forms.column(feature, problem.sensor.rows.elements);
+            let column = forms.column(feature, problem.predictor.bins.elements);
             let Some([before, standard_error]) = problem.share(&column, &base.predicted) else { continue };
             let Some([after, _]) = problem.share(&column, &grown.predicted) else { continue };
             let at = f64::midpoint(feature.range[0], feature.range[1]);

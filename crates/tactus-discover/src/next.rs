@@ -19,15 +19,15 @@ mod design;
 
 use tactus_model::effect::{Definition, Kind};
 
+use crate::bins::{Bins, HeldOut};
 use crate::discovery::{NextExperiment, NotShown};
 use crate::fit::{Free, Problem};
 use crate::noise::Noise;
 use crate::parallel;
-use crate::rows::{HeldOut, Rows};
+use crate::predictor::{Parameters, Predictor, Term};
 use crate::score::Fitting;
-use crate::sensor::{Parameters, Sensor, Term};
 use crate::{DiscoverError, Frames, Known};
-use design::{Bench, Design};
+use design::{Design, DesignSpace};
 
 /// A model that may be what the data show.
 #[derive(Debug, Clone)]
@@ -79,7 +79,7 @@ impl Setting<'_> {
         if pairs.is_empty() {
             return Ok(Vec::new());
         }
-        let designs = Bench::of(self.known, self.frames).designs();
+        let designs = DesignSpace::of(self.known, self.frames).designs();
         let mut proposals = Vec::new();
         for pair in pairs {
             let separates = pair.of.each_ref().map(|one| one.name.to_owned());
@@ -108,7 +108,7 @@ impl Setting<'_> {
         if not_shown.is_empty() {
             return Ok(Vec::new());
         }
-        let designs = Bench::of(self.known, self.frames).designs();
+        let designs = DesignSpace::of(self.known, self.frames).designs();
         let mut proposals = Vec::new();
         for NotShown { effect, .. } in not_shown {
             let definition = Definition::find(effect)?;
@@ -211,16 +211,16 @@ impl Setting<'_> {
         work: impl FnOnce(&Problem<'_>) -> Result<R, DiscoverError>,
     ) -> Result<R, DiscoverError> {
         let frames = &design.frames;
-        let mut rows = Rows::of(frames, true)?;
+        let mut bins = Bins::of(frames, true)?;
         let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
-        rows.weigh(frames, self.noise, &all);
-        work(&Problem::new(Sensor::new(self.known, frames, &rows), self.noise))
+        bins.weigh(frames, self.noise, &all);
+        work(&Problem::new(Predictor::new(self.known, frames, &bins), self.noise))
     }
 }
 
 /// The same model for a run of its own.
 fn once(of_runs: &Parameters) -> Parameters {
-    Parameters { baseline: vec![of_runs.mean_baseline()], wander: None, ..of_runs.clone() }
+    Parameters { baseline: vec![of_runs.mean_baseline()], walk: None, ..of_runs.clone() }
 }
 
 fn largest(predicted: &[f64], baseline: &[f64]) -> f64 {

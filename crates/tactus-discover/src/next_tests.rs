@@ -1,11 +1,11 @@
 use tactus_model::{Phase, Registration};
 
 use super::*;
-use crate::{Frame, bench};
+use crate::{MeasuredFrame, fixtures};
 
 /// A sensor that lies where the sample rig has it.
 fn known() -> Known {
-    Known { registration: Registration { origin_mm: [20.0, 15.0], rotation_deg: 0.0 }, ..bench::known() }
+    Known { registration: Registration { origin_mm: [20.0, 15.0], rotation_deg: 0.0 }, ..fixtures::known() }
 }
 
 /// One press to 0.6 mm at 1 mm/s, under the paper's thinnest covering.
@@ -13,7 +13,7 @@ fn measured() -> Frames {
     let mut frames = Frames::new(48);
     for frame in 0..30 {
         let t_s = f64::from(frame) / 30.0;
-        frames.push(Frame {
+        frames.push(MeasuredFrame {
             run: "r",
             press: 0,
             phase: Phase::Load,
@@ -50,13 +50,13 @@ fn explanation(known: &Known, name: &'static str, values: &[(&str, f64)]) -> Exp
 fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> Pair {
     let (frames, noise) = (measured(), noise());
     let [right, wrong] = [right, wrong].map(|(name, values)| explanation(known, name, values));
-    let designs = Bench::of(known, &frames).designs();
+    let designs = DesignSpace::of(known, &frames).designs();
     let frames = &designs.iter().find(|design| design.name == "element-centres").unwrap().frames;
-    let mut rows = Rows::of(frames, true).unwrap();
+    let mut bins = Bins::of(frames, true).unwrap();
     let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
-    rows.weigh(frames, &noise, &all);
-    rows.counts = Sensor::new(known, frames, &rows).predict(&right.parameters).unwrap();
-    let problem = Problem::new(Sensor::new(known, frames, &rows), &noise);
+    bins.weigh(frames, &noise, &all);
+    bins.counts = Predictor::new(known, frames, &bins).predict(&right.parameters).unwrap();
+    let problem = Problem::new(Predictor::new(known, frames, &bins), &noise);
     let fitted = problem.fit_from(wrong.parameters, 8).unwrap();
     let without = Parameters::declared(known, 1);
     let gain = problem.cost(&problem.predict(&without).unwrap());
@@ -68,7 +68,7 @@ fn separations<const N: usize>(of: [(&'static str, &[(&str, f64)]); 2], names: [
     let (known, frames, noise) = (known(), measured(), noise());
     let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let pair = twins(&known, of);
-    let designs = Bench::of(&known, &frames).designs();
+    let designs = DesignSpace::of(&known, &frames).designs();
     names.map(|name| {
         let design = designs.iter().find(|design| design.name == name).unwrap();
         setting.separation(design, &pair).unwrap().z
@@ -130,7 +130,7 @@ fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter
         ],
     );
     let share = |proposal: &NextExperiment| {
-        let designs = Bench::of(&known, &frames).designs();
+        let designs = DesignSpace::of(&known, &frames).designs();
         let design = designs.iter().find(|design| {
             (design.experiment, &design.parameters) == (proposal.experiment, &proposal.parameters)
         });
@@ -143,7 +143,7 @@ fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter
     assert!(shares.iter().rev().is_sorted(), "{shares:?}");
     assert!(proposals.windows(2).all(|pair| pair[1].duration_s < pair[0].duration_s), "{proposals:?}");
     let shown_by = ["imprint", "relaxation"].map(|name| Definition::find(name).unwrap().shown_by).concat();
-    let of_all = Bench::of(&known, &frames).designs();
+    let of_all = DesignSpace::of(&known, &frames).designs();
     let greatest = of_all
         .iter()
         .filter(|design| shown_by.contains(&design.name))
@@ -177,7 +177,7 @@ fn what_the_data_cannot_show_is_shown_by_an_experiment_of_its_own() {
 #[test]
 fn no_design_goes_deeper_or_loads_faster_than_the_data_did() {
     let (known, frames) = (known(), measured());
-    for design in Bench::of(&known, &frames).designs() {
+    for design in DesignSpace::of(&known, &frames).designs() {
         let deepest_mm = design.frames.position_mm.iter().map(|at| -at[2]).fold(0.0, f64::max);
         assert!(deepest_mm < 0.6 * 1.06, "{}: {deepest_mm}", design.name);
         if design.name == "rates" {

@@ -4,8 +4,8 @@ use rand_distr::{Distribution, StandardNormal};
 use tactus_model::Phase;
 
 use super::Noise;
-use crate::rows::still;
-use crate::{Frame, Frames};
+use crate::bins::still;
+use crate::{Frames, MeasuredFrame};
 
 /// A tip at rest under first-order autoregressive noise of standard deviation 3, beside a slow ramp.
 fn resting(phi: f64) -> Frames {
@@ -20,7 +20,7 @@ fn resting(phi: f64) -> Frames {
         let ramp = 0.002 * f64::from(index);
         #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
         let counts = noise.map(|noise| (100.0 + ramp + noise) as f32);
-        frames.push(Frame {
+        frames.push(MeasuredFrame {
             run: "a",
             press: -1,
             phase: Phase::Idle,

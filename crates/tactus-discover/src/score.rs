@@ -1,7 +1,7 @@
 //! Is a direction in which the model could change wanted by the residual?
 //!
 //! The score of a direction `f` (a derivative of the prediction, freed of all that is fitted already) is, block by
-//! block of rows,
+//! block of bins,
 //!
 //! ```text
 //! U_b = sum over block b of w r f        V_b = sum over block b of w f^2
@@ -29,8 +29,8 @@ use crate::fit::{Problem, dot};
 use crate::linear::Linear;
 use crate::noise::median;
 use crate::parallel;
+use crate::predictor::Parameters;
 use crate::rng::Rng;
-use crate::sensor::Parameters;
 
 /// Median of the squared standard normal distribution.
 const MEDIAN_SQUARE: f64 = 0.454_936;
@@ -157,15 +157,15 @@ impl<'a> Fitting<'a> {
     }
 
     fn score_of(&self, column: &[f64]) -> (f64, Vec<f32>) {
-        let rows = self.problem.sensor.rows;
-        let elements = rows.elements;
-        let mut wanted = vec![0.0; rows.blocks];
-        let mut variance = vec![0.0; rows.blocks];
-        for row in 0..rows.len() {
-            if self.problem.train[row] == 0.0 {
+        let bins = self.problem.predictor.bins;
+        let elements = bins.elements;
+        let mut wanted = vec![0.0; bins.blocks];
+        let mut variance = vec![0.0; bins.blocks];
+        for bin in 0..bins.len() {
+            if self.problem.train[bin] == 0.0 {
                 continue;
             }
-            let at = row * elements..(row + 1) * elements;
+            let at = bin * elements..(bin + 1) * elements;
             let (mut sum, mut squares) = (0.0, 0.0);
             for ((value, residual), weight) in
                 column[at.clone()].iter().zip(&self.weighted_residual[at.clone()]).zip(&self.weights[at])
@@ -173,12 +173,12 @@ impl<'a> Fitting<'a> {
                 sum += value * residual;
                 squares += value * value * weight;
             }
-            wanted[rows.block[row]] += sum;
-            variance[rows.block[row]] += squares;
+            wanted[bins.block[bin]] += sum;
+            variance[bins.block[bin]] += squares;
         }
         let total: f64 = variance.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
-            return (0.0, vec![0.0; rows.blocks]);
+            return (0.0, vec![0.0; bins.blocks]);
         }
         let common = wanted.iter().sum::<f64>() / total;
         // Blocks that hardly feel the direction say nothing of its scatter.

@@ -14,9 +14,9 @@ use crate::candidates::{Candidate, Screened, with};
 use crate::discovery;
 use crate::fit::{Fitted, Problem};
 use crate::parallel;
+use crate::predictor::{Parameters, Term};
+use crate::random_walk::RANDOM_WALK;
 use crate::score::{Fitting, Score, flipped, largest, p_value};
-use crate::sensor::{Parameters, Term};
-use crate::wander::WANDER;
 use crate::{DiscoverError, Options};
 
 /// Sign-flipped data sets of a test.
@@ -114,8 +114,8 @@ impl From<Fitted> for Grown {
 
 /// What a search is at.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Stage {
-    TakingBack,
+pub(crate) enum SearchPhase {
+    Pruning,
     Exchanging,
 }
 
@@ -131,8 +131,8 @@ impl Search<'_> {
     /// Scores of all candidates at a model.
     pub(crate) fn screen(&self, fitting: &Fitting<'_>, at: &Fitted) -> Result<Vec<Screened>, DiscoverError> {
         let mut screened = self.screen_among(|_| true, fitting, at)?;
-        if screened.iter().any(|one| one.definition.name == WANDER.name) {
-            screened.extend(self.problem.screen_wander(fitting, &at.parameters));
+        if screened.iter().any(|one| one.definition.name == RANDOM_WALK.name) {
+            screened.extend(self.problem.screen_random_walk(fitting, &at.parameters));
         }
         Ok(screened)
     }
@@ -151,17 +151,17 @@ impl Search<'_> {
     }
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
-    pub(crate) fn grow(&self, base: &Fitted, said: &dyn Fn(Stage)) -> Result<Grown, DiscoverError> {
+    pub(crate) fn grow(&self, base: &Fitted, said: &dyn Fn(SearchPhase)) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base.clone());
         let mut exchanges_left = EXCHANGES_MAX;
         loop {
             self.forward(&mut grown)?;
-            said(Stage::TakingBack);
+            said(SearchPhase::Pruning);
             grown.at = self.back(grown.at)?;
             if let Some(simpler) = self.simpler(base, &grown.at)? {
                 grown.at = simpler;
             }
-            said(Stage::Exchanging);
+            said(SearchPhase::Exchanging);
             match self.exchange(&grown.at, exchanges_left > 0)? {
                 Exchanged::Better(better) => {
                     exchanges_left -= 1;
@@ -205,9 +205,9 @@ impl Search<'_> {
         let under_none = flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1));
         let largest = largest(&under_none);
         let statistic = |one: &Screened| one.scores.iter().map(|score| score.z).fold(0.0, f64::max);
-        let mut tried: Vec<discovery::Candidate> = screened
+        let mut tried: Vec<discovery::TriedEffect> = screened
             .iter()
-            .map(|one| discovery::Candidate {
+            .map(|one| discovery::TriedEffect {
                 effect: one.definition.name,
                 score: statistic(one),
                 p_value: p_value(statistic(one), &largest),
@@ -395,7 +395,7 @@ impl Search<'_> {
     ) -> Result<bool, DiscoverError> {
         let (of_rival, of_model) =
             (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
-        let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.wander.is_none()) {
+        let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.walk.is_none()) {
             of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect()
         } else {
             // A wander takes up noise where it is fitted.

@@ -1,7 +1,7 @@
 //! A discovery for machines: `report.json`.
 
 use serde_json::{Map, Value, json};
-use tactus_discover::{Candidate, Estimated, Level, Point, Step};
+use tactus_discover::{AddedEffect, Estimated, Level, Point, TriedEffect};
 
 use super::{DiscoveryReport, active, in_words};
 
@@ -105,7 +105,7 @@ fn point(point: &Point) -> Value {
     })
 }
 
-fn candidate(candidate: &Candidate) -> Value {
+fn candidate(candidate: &TriedEffect) -> Value {
     json!({
         "effect": candidate.effect,
         "score": candidate.score,
@@ -115,7 +115,7 @@ fn candidate(candidate: &Candidate) -> Value {
     })
 }
 
-fn step(step: &Step) -> Value {
+fn step(step: &AddedEffect) -> Value {
     let mut parameters = Map::new();
     for (nth, term) in step.terms.iter().enumerate() {
         for parameter in term {

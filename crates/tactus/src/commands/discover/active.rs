@@ -142,8 +142,10 @@ impl Chosen {
 }
 
 fn undecided(found: &Discovery) -> Vec<Undecided> {
-    let of =
-        |step: &tactus_discover::Step| Undecided { effect: step.effect, equivalent: step.equivalent.clone() };
+    let of = |step: &tactus_discover::AddedEffect| Undecided {
+        effect: step.effect,
+        equivalent: step.equivalent.clone(),
+    };
     found.steps.iter().map(of).collect()
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use anyhow::bail;
-use tactus_discover::{Frame, Frames};
+use tactus_discover::{Frames, MeasuredFrame};
 use tactus_record::rows;
 use tactus_report::discovery::DataSource;
 use tactus_schema::Rig;
@@ -27,7 +27,7 @@ impl Measured {
         let mut frames: Option<Frames> = None;
         let mut runs: BTreeMap<String, (u64, BTreeSet<i32>)> = BTreeMap::new();
         let source = rows::visit(files, |rig, row| {
-            frames.get_or_insert_with(|| Frames::new(rig.array.elements())).push(Frame {
+            frames.get_or_insert_with(|| Frames::new(rig.array.elements())).push(MeasuredFrame {
                 run: row.run,
                 press: row.press,
                 phase: row.phase,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tactus_calibrate::Estimate;
-use tactus_discover::{Estimated, Step};
+use tactus_discover::{AddedEffect, Estimated};
 use tactus_report::discovery::{
     DiscoveryReport, Proposal, Undecided, command, in_words, not_shown, proposals,
 };
@@ -90,7 +90,7 @@ fn facts(report: &DiscoveryReport<'_>) {
 }
 
 /// A row for each term; what belongs to the whole step stands in the first.
-fn step(step: &Step) -> Vec<Vec<String>> {
+fn step(step: &AddedEffect) -> Vec<Vec<String>> {
     let of_step = |nth: usize, text: String| if nth == 0 { text } else { String::new() };
     let rows = step.terms.iter().enumerate().map(|(nth, term)| {
         let (before, after) = (step.heldout_rms_before_counts, step.heldout_rms_after_counts);

@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_model::{Array, Covering, Effect, Indenter, Phase, Psf, Registration, Response};
 
-use crate::{Base, Discovery, Frame, Frames, Known, Options, Rule, discover, predict};
+use crate::{BaseModel, Discovery, Frames, Known, MeasuredFrame, Options, Rule, discover, predict};
 
 pub(crate) const ELEMENTS: usize = 48;
 pub(crate) const INTERVAL_S: f64 = 0.1;
@@ -40,7 +40,7 @@ fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
         let depth_mm = if press % 2 == 0 { depth_mm } else { 0.7 * depth_mm };
         #[expect(clippy::cast_possible_truncation, reason = "counts are stored so")]
         let counts: Vec<f32> = counts(frame).into_iter().map(|counts| counts as f32).collect();
-        frames.push(Frame {
+        frames.push(MeasuredFrame {
             run: "a",
             press: if phase == Phase::Idle { -1 } else { i32::try_from(press).unwrap() },
             phase,
@@ -58,11 +58,11 @@ fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
 /// What a model with effects gives for the presses, and upon it what else there is: frame by frame, element by element.
 pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
     let blank = frames(known, |_| vec![0.0; ELEMENTS]);
-    let base = Base {
+    let base = BaseModel {
         psf: known.psf,
         response: known.response.clone(),
         run_baselines_counts: vec![vec![100.0; ELEMENTS]],
-        run_wander: None,
+        run_walks: None,
     };
     let clean = predict(known, &blank, &base, effects).unwrap();
     frames(known, |frame| {
