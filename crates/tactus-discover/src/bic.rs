@@ -8,8 +8,8 @@
 
 use crate::DiscoverError;
 use crate::fit::Fitted;
+use crate::predictor::Term;
 use crate::search::{FITTED_MAX, Grown, POLISH_ROUNDS, Search, TERMS_MAX};
-use crate::sensor::Term;
 
 impl Search<'_> {
     /// Grows a model as long as the criterion falls.

@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::{Definition, ParameterKind, REGISTRY};
 
 use crate::fit::{Fitted, Free, Problem, solve};
+use crate::predictor::{Parameters, Term};
 use crate::score::{Fitting, Score};
-use crate::sensor::{Parameters, Term};
 use crate::{DiscoverError, wiring};
 
 /// Values of a shape that spans orders of magnitude, and of any other.

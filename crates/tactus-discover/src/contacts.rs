@@ -3,7 +3,7 @@
 use tactus_model::Phase;
 
 use crate::Frames;
-use crate::rows::{pressing, still};
+use crate::bins::{pressing, still};
 
 /// Depths, places and speeds that differ by less are the same.
 const SAME_DEPTH_MM: f64 = 0.03;

@@ -1,11 +1,11 @@
-//! On what the residual may depend: covariates of the rows, each in ranges, and the forms that a dependence may take.
+//! On what the residual may depend: covariates of the bins, each in ranges, and the forms that a dependence may take.
 
 use tactus_model::effect::Definition;
 use tactus_model::{Contact, Covering, ForwardModel, Response};
 
 use crate::candidates::with;
 use crate::fit::{Free, Problem};
-use crate::sensor::{Parameters, Term};
+use crate::predictor::{Parameters, Term};
 use crate::{DiscoverError, Frames, Known};
 
 /// Depth at which a place's image is looked up where nothing is pressed.
@@ -43,14 +43,14 @@ pub(crate) struct Feature {
     pub(crate) form: Form,
     /// Range of the covariate; the whole of it for one that enters by its value.
     pub(crate) range: [f64; 2],
-    /// Of each row; or of each reading.
+    /// Of each bin; or of each reading.
     pub(crate) factor: Factor,
 }
 
 /// What multiplies a form.
 #[derive(Debug, Clone)]
 pub(crate) enum Factor {
-    Rows(Vec<f64>),
+    Bins(Vec<f64>),
     Readings(Vec<f64>),
 }
 
@@ -65,7 +65,7 @@ pub(crate) struct Forms {
     history: History,
 }
 
-/// Covariates of the rows.
+/// Covariates of the bins.
 #[derive(Debug)]
 struct History {
     since_contact_s: Vec<f64>,
@@ -92,21 +92,21 @@ impl Forms {
             let with = with(at, Term::neutral(Definition::find(name)?));
             problem.slope(&with, predicted, Free::Of { term: with.terms.len() - 1, parameter })
         };
-        let rows = problem.sensor.rows;
-        let elements = rows.elements;
+        let bins = problem.predictor.bins;
+        let elements = bins.elements;
         let mut signal: Vec<f64> = predicted
             .chunks_exact(elements)
-            .zip(&rows.run)
+            .zip(&bins.run)
             .flat_map(|(counts, run)| {
                 counts.iter().zip(&at.baseline[*run]).map(|(counts, base)| counts - base)
             })
             .collect();
-        if let Some(wander) = &at.wander {
-            wander.add(rows, -1.0, &mut signal);
+        if let Some(walk) = &at.walk {
+            walk.add(bins, -1.0, &mut signal);
         }
         let history = History::of(problem);
         let here: Vec<Option<[f64; 2]>> =
-            (0..rows.len()).map(|row| Some([history.place_mm[0][row], history.place_mm[1][row]])).collect();
+            (0..bins.len()).map(|bin| Some([history.place_mm[0][bin], history.place_mm[1][bin]])).collect();
         Ok(Self {
             signal,
             along: [slope("misregistration", 0)?, slope("misregistration", 1)?],
@@ -129,7 +129,7 @@ impl Forms {
             Form::LastPlace => Some(&self.last_place),
         };
         let factor = |reading: usize| match &feature.factor {
-            Factor::Rows(of_row) => of_row[reading / elements],
+            Factor::Bins(of_bin) => of_bin[reading / elements],
             Factor::Readings(of_reading) => of_reading[reading],
         };
         (0..self.signal.len())
@@ -144,27 +144,27 @@ fn images(
     at: &Parameters,
     places_mm: &[Option<[f64; 2]>],
 ) -> Result<Vec<f64>, DiscoverError> {
-    let (known, frames, rows) = (problem.sensor.known, problem.sensor.frames, problem.sensor.rows);
+    let (known, frames, bins) = (problem.predictor.known, problem.predictor.frames, problem.predictor.bins);
     let Known { array, response, registration, indenters, .. } = known;
-    let elements = rows.elements;
+    let elements = bins.elements;
     let response = Response {
         sensitivity_counts_per_mm: at.sensitivity.clone(),
         baseline_counts: vec![0.0; elements],
         ..response.clone()
     };
     let model = ForwardModel::new(array.clone(), at.psf, response)?;
-    let mut images = vec![0.0; rows.len() * elements];
+    let mut images = vec![0.0; bins.len() * elements];
     let mut last: Option<([f64; 2], usize)> = None;
-    for (row, place_mm) in places_mm.iter().enumerate() {
+    for (bin, place_mm) in places_mm.iter().enumerate() {
         let Some(place_mm) = *place_mm else { continue };
-        let target = row * elements..(row + 1) * elements;
+        let target = bin * elements..(bin + 1) * elements;
         if let Some((_, from)) =
             last.filter(|(before, _)| before.map(f64::to_bits) == place_mm.map(f64::to_bits))
         {
             images.copy_within(from * elements..(from + 1) * elements, target.start);
             continue;
         }
-        let frame = rows.first[row];
+        let frame = bins.first[bin];
         let tool = &frames.indenters[usize::from(frames.indenter[frame])];
         let Some(indenter) = indenters.get(tool).cloned() else { continue };
         let contact = Contact {
@@ -174,7 +174,7 @@ fn images(
             depth_mm: LOOK_MM,
         };
         model.image(&contact, Covering { thickness_mm: frames.covering_mm[frame] }, &mut images[target]);
-        last = Some((place_mm, row));
+        last = Some((place_mm, bin));
     }
     Ok(images)
 }
@@ -182,30 +182,30 @@ fn images(
 /// Every feature that the data have.
 pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     use Form::{AlongX, AlongY, LastPlace, Neighbours, Offset, Place, Signal};
-    let rows = problem.sensor.rows;
-    let array = &problem.sensor.known.array;
-    let registration = problem.sensor.known.registration;
+    let bins = problem.predictor.bins;
+    let array = &problem.predictor.known.array;
+    let registration = problem.predictor.known.registration;
     let history = &forms.history;
     let deep: Vec<bool> = history.depth_mm.iter().map(|depth| *depth > 0.0).collect();
     let free: Vec<bool> = deep.iter().map(|deep| !deep).collect();
-    let every = vec![true; rows.len()];
+    let every = vec![true; bins.len()];
     let (signal, offset, along) = ([Signal], [Offset], [AlongX, AlongY]);
     let mut made = Vec::new();
-    let mut add = |covariate, unit, values: &[f64], among: &[bool], bins: usize, forms: &[Form]| {
+    let mut add = |covariate, unit, values: &[f64], among: &[bool], parts: usize, forms: &[Form]| {
         let kept: Vec<f64> =
             values.iter().zip(among).filter(|(_, among)| **among).map(|(one, _)| *one).collect();
-        for range in ranges(values, among, bins) {
+        for range in ranges(values, among, parts) {
             let within = |(value, among): (&f64, &bool)| {
                 f64::from(u8::from(*among && *value >= range[0] && *value < range[1]))
             };
             let factor: Vec<f64> = values.iter().zip(among).map(within).collect();
             for form in forms {
-                let factor = Factor::Rows(factor.clone());
+                let factor = Factor::Bins(factor.clone());
                 made.push(Feature { covariate, unit, form: *form, range: closed(range, &kept), factor });
             }
         }
     };
-    add("time", "s", &rows.t_s, &every, 8, &[Offset, Signal]);
+    add("time", "s", &bins.t_s, &every, 8, &[Offset, Signal]);
     add("time since contact", "s", &history.since_contact_s, &deep, 6, &signal);
     add("time since release", "s", &history.since_release_s, &free, 6, &[LastPlace, Offset]);
     add("depth", "mm", &history.depth_mm, &deep, 8, &signal);
@@ -245,7 +245,7 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
         unit: "counts",
         form: Neighbours,
         range: closed(range, &forms.signal),
-        factor: Factor::Rows(vec![1.0; rows.len()]),
+        factor: Factor::Bins(vec![1.0; bins.len()]),
     });
     let strong: Vec<bool> = forms.signal.iter().map(|signal| signal.abs() > 0.0).collect();
     for range in ranges(&forms.signal, &strong, 8) {
@@ -258,8 +258,8 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     made
 }
 
-/// Ranges of values with as many rows in each, where the values differ at all.
-fn ranges(values: &[f64], among: &[bool], bins: usize) -> Vec<[f64; 2]> {
+/// Ranges of values with as many bins in each, where the values differ at all.
+fn ranges(values: &[f64], among: &[bool], parts: usize) -> Vec<[f64; 2]> {
     let mut sorted: Vec<f64> = values
         .iter()
         .zip(among)
@@ -274,7 +274,7 @@ fn ranges(values: &[f64], among: &[bool], bins: usize) -> Vec<[f64; 2]> {
     if most - least <= 1e-3 * most.abs().max(1.0) {
         return Vec::new();
     }
-    let mut edges: Vec<f64> = (1..bins).map(|k| sorted[k * sorted.len() / bins]).collect();
+    let mut edges: Vec<f64> = (1..parts).map(|k| sorted[k * sorted.len() / parts]).collect();
     edges.dedup();
     edges.retain(|edge| *edge > least);
     let starts = std::iter::once(f64::NEG_INFINITY).chain(edges.iter().copied());
@@ -299,10 +299,10 @@ fn negative(values: &[f64]) -> Vec<f64> {
 }
 
 impl History {
-    /// Of each row, from all the frames before it.
+    /// Of each bin, from all the frames before it.
     fn of(problem: &Problem<'_>) -> Self {
-        let (frames, rows) = (problem.sensor.frames, problem.sensor.rows);
-        let count = rows.len();
+        let (frames, bins) = (problem.predictor.frames, problem.predictor.bins);
+        let count = bins.len();
         let empty = || Vec::with_capacity(count);
         let mut history = Self {
             since_contact_s: empty(),
@@ -321,17 +321,17 @@ impl History {
         let mut state = State::default();
         let mut next = 0;
         let mut run = usize::MAX;
-        for row in 0..count {
-            if rows.run[row] != run {
-                run = rows.run[row];
+        for bin in 0..count {
+            if bins.run[bin] != run {
+                run = bins.run[bin];
                 state = State::default();
             }
-            while next < rows.first[row + 1] {
+            while next < bins.first[bin + 1] {
                 state.take(frames, next);
                 next += 1;
             }
-            let frame = rows.first[row];
-            let t_s = rows.t_s[row];
+            let frame = bins.first[bin];
+            let t_s = bins.t_s[bin];
             history.since_contact_s.push(t_s - state.contact_s);
             history.since_release_s.push(state.release_s.map_or(f64::NAN, |release_s| t_s - release_s));
             history.depth_mm.push(state.depth_mm);

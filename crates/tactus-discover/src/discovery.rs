@@ -1,25 +1,25 @@
-//! What a discovery found.
+//! The result of a discovery.
 
 use tactus_model::{Effect, Psf, Response};
 
-/// What the data say of a model, and what they add to it.
+/// What the data say about a model, and what they add to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Discovery {
     /// The seed of the split and of the Monte-Carlo tests.
     pub seed: u64,
-    /// Which effects these data cannot show, and why; to be told before all else.
+    /// Which effects these data cannot show, and why. A report states this first.
     pub not_shown: Vec<NotShown>,
-    /// What a reader should know of the data or of the fit, a sentence each.
+    /// What a reader should know about the data or the fit, one sentence each.
     pub warnings: Vec<String>,
-    /// Which presses were fitted and which were held out.
+    /// How many presses were fitted and how many were held out.
     pub split: Split,
-    /// Of each frame, in the order in which they were given, whether it was held out.
+    /// Whether each frame was held out, in the order in which the frames were given.
     pub heldout_frames: Vec<bool>,
-    /// Standard deviation of one reading, from frames that repeat each other; none where no frames do.
+    /// Standard deviation of one reading, from frames that repeat each other; `None` if no frames do.
     pub noise_rms_counts: Option<f64>,
-    /// The base model after its own recalibration, on the held-out presses.
+    /// How far the recalibrated base model is from the held-out presses.
     pub base: Level,
-    /// Is there structure beyond noise?
+    /// Whether the residual of the base model has structure beyond noise.
     pub global: GlobalTest,
     /// Where the recalibrated base model and the data disagree, strongest first.
     pub gap: Vec<Gap>,
@@ -27,69 +27,69 @@ pub struct Discovery {
     pub curves: Vec<Curve>,
     /// The gap of each element, row-major, before and after.
     pub elements: Vec<ElementGap>,
-    /// Each round of the search: what was tried, and how it fared.
+    /// Each round of the search: which effects were tried, and with what result.
     pub rounds: Vec<Round>,
-    /// What was added, in the order in which it was found; one step for each name.
-    pub steps: Vec<Step>,
-    /// The grown model on the held-out presses.
+    /// The effects that were added, in the order in which they were found; one entry for each name.
+    pub steps: Vec<AddedEffect>,
+    /// How far the grown model is from the held-out presses.
     pub final_: Final,
-    /// In one word.
+    /// The result in one word.
     pub verdict: Verdict,
-    /// What is left.
+    /// What the grown model leaves unexplained.
     pub unexplained: Unexplained,
-    /// What to measure next.
+    /// Experiments that would decide what these data leave open.
     pub next_experiments: Vec<NextExperiment>,
-    /// The base model, recalibrated alone.
-    pub recalibrated: Base,
-    /// The base of the grown model, recalibrated jointly with its effects.
-    pub grown: Base,
-    /// The effects of the grown model, those that it had before first; an effect may act more than once.
+    /// The base model, recalibrated without added effects.
+    pub recalibrated: BaseModel,
+    /// The base of the grown model, recalibrated together with its effects.
+    pub grown: BaseModel,
+    /// The effects of the grown model; those that it had before come first. An effect may act more than once.
     pub effects: Vec<Effect>,
 }
 
 /// The parameters of a base model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Base {
+pub struct BaseModel {
     /// Spread against covering thickness.
     pub psf: Psf,
-    /// How the elements answer; the baselines are the mean over the runs.
+    /// Response of the elements; its baselines are the mean over the runs.
     pub response: Response,
     /// Baselines of each run, one per element, in counts.
     pub run_baselines_counts: Vec<Vec<f64>>,
-    /// What the zeros of the runs wander beside the effects, which hold what they have in common.
-    pub run_wander: Option<RunWander>,
+    /// Random walks of each run's baselines, less the part common to all runs, which the effects contain.
+    pub run_walks: Option<RunWalks>,
 }
 
-/// How the zeros of each run wander.
+/// Random walks of the baselines, run by run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RunWander {
-    /// Time from knot to knot; straight between them, and constant after the last.
+pub struct RunWalks {
+    /// Time between knots. The walk is straight between knots and constant after the last.
     pub knot_s: f64,
-    /// Of each run, knot by knot from its start on, one per element, in counts.
+    /// For each run, knot by knot from its start, one value per element, in counts.
     pub runs_counts: Vec<Vec<f64>>,
 }
 
 /// An effect that the data cannot show.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NotShown {
-    /// Its name.
+    /// Name of the effect.
     pub effect: &'static str,
     /// What the data lack.
     pub reason: String,
 }
 
-/// Which presses were fitted and which were held out, whole.
+/// How the data were split into fitted and held-out presses. A press is never divided.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Split {
-    /// Frames in all.
+    /// All frames, fitted and held out.
     pub frames: usize,
-    /// Presses that were fitted.
+    /// Number of fitted presses.
     pub train_presses: usize,
-    /// Presses that were held out.
+    /// Number of held-out presses.
     pub heldout_presses: usize,
-    /// Greatest depths of presses that were held out as a whole.
+    /// Greatest depths of which every press was held out.
     pub heldout_depths_mm: Vec<f64>,
-    /// Coverings that were held out as a whole.
+    /// Covering thicknesses of which every press was held out.
     pub heldout_coverings_mm: Vec<f64>,
 }
 
@@ -98,16 +98,16 @@ pub struct Split {
 pub struct Level {
     /// Root mean square of the residuals.
     pub heldout_rms_counts: f64,
-    /// Their mean square in units of the noise's.
+    /// Mean square of the residuals, in units of the noise variance.
     pub heldout_chi2: f64,
 }
 
-/// A Monte-Carlo test for any structure, which stays calibrated under autocorrelated noise.
+/// A Monte-Carlo test for structure of any kind. It stays calibrated under autocorrelated noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GlobalTest {
     /// The largest of all standardised scores.
     pub statistic: f64,
-    /// Share of sign-flipped data sets with a larger one.
+    /// Share of sign-flipped data sets with a larger statistic.
     pub p_value: f64,
 }
 
@@ -118,9 +118,9 @@ pub struct Gap {
     pub covariate: &'static str,
     /// Unit of the covariate, such as `s`.
     pub unit: &'static str,
-    /// Where the residual is largest.
+    /// Range of the covariate in which the residual is largest.
     pub range: [f64; 2],
-    /// Root mean square of the dependence, in units of the noise.
+    /// Root mean square of the dependence, in standard deviations of the noise.
     pub effect_size: f64,
     /// Adjusted for the false-discovery rate (Benjamini and Hochberg).
     pub q_value: f64,
@@ -133,133 +133,133 @@ pub struct Curve {
     pub covariate: &'static str,
     /// Unit of the covariate.
     pub unit: &'static str,
-    /// What the residual is measured in, such as `share of the signal` or `counts`.
+    /// Unit of the residual: `share of the signal` or `counts`.
     pub of: &'static str,
-    /// Along the covariate.
+    /// In order of the covariate.
     pub points: Vec<Point>,
 }
 
 /// A point of a [`Curve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// The covariate.
+    /// Value of the covariate.
     pub at: f64,
     /// Mean residual of the recalibrated base model.
     pub before: f64,
     /// Mean residual of the grown model.
     pub after: f64,
-    /// Standard error of both, from whole blocks.
+    /// Standard error of either mean, from the scatter between blocks.
     pub standard_error: f64,
 }
 
-/// The gap of one element on the held-out presses.
+/// The residual of one element on the held-out presses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElementGap {
     /// Root mean square of the residual of the recalibrated base model.
     pub before_rms_counts: f64,
-    /// The same of the grown model.
+    /// The same for the grown model.
     pub after_rms_counts: f64,
 }
 
 /// A round of the search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Round {
-    /// What was in the model before it.
+    /// The effects in the model before this round.
     pub with: Vec<&'static str>,
-    /// What was tried, best first.
-    pub candidates: Vec<Candidate>,
-    /// What was taken.
+    /// The effects that were tried, best first.
+    pub candidates: Vec<TriedEffect>,
+    /// The effect that was added, if any.
     pub taken: Option<&'static str>,
 }
 
 /// An effect that was tried.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct TriedEffect {
     /// Its name.
     pub effect: &'static str,
-    /// Largest standardised score of its first steps away from nothing.
+    /// Largest standardised score of a first step away from zero effect.
     pub score: f64,
-    /// The score's p-value, corrected for all candidates of the round.
+    /// p-value of the score, corrected for all candidates of the round.
     pub p_value: f64,
-    /// Root mean square of the held-out residuals with it, if it was fitted.
+    /// Root mean square of the held-out residuals of the model with this effect, if it was fitted.
     pub heldout_rms_counts: Option<f64>,
-    /// What share of the gap it closes on the held-out presses, if it was fitted.
+    /// Share of the gap that it closes on the held-out presses, if it was fitted.
     pub shrink: Option<f64>,
 }
 
 /// An effect that was added.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Step {
+pub struct AddedEffect {
     /// Its name.
     pub effect: &'static str,
-    /// Its terms: more than one where it acts more than once, each with its parameters.
+    /// The parameters of each of its terms; an effect that acts more than once has several terms.
     pub terms: Vec<Vec<Estimated>>,
-    /// Of the paired comparison, block by block, on the held-out presses: the chance of such a gain by noise.
+    /// Probability that noise alone gives such a gain on the held-out presses, from a paired comparison of blocks.
     pub p_value: f64,
-    /// Adjusted for the false-discovery rate over all candidates of its round.
+    /// p-value, adjusted for the false-discovery rate over all added effects.
     pub q_value: f64,
-    /// Root mean square of the held-out residuals of the grown model without it, the rest fitted anew.
+    /// Root mean square of the held-out residuals of the grown model without this effect, refitted.
     pub heldout_rms_before_counts: f64,
-    /// The same of the grown model.
+    /// The same for the whole grown model.
     pub heldout_rms_after_counts: f64,
-    /// Effects that these data cannot tell from it.
+    /// Effects that these data cannot distinguish from this one.
     pub equivalent: Vec<&'static str>,
 }
 
 /// A parameter of an effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimated {
-    /// Its name, with the unit.
+    /// Name of the parameter, with its unit.
     pub name: &'static str,
-    /// Its value.
+    /// In the unit that the name ends with.
     pub value: f64,
-    /// Its standard error; none where it was not estimated, such as the index of an element.
+    /// `None` where no error was estimated, such as for the index of an element.
     pub standard_error: Option<f64>,
 }
 
 /// The grown model on the held-out presses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Final {
-    /// How far it is from the frames.
+    /// Its distance from the held-out frames.
     pub level: Level,
-    /// `(MSE_base - MSE_final) / (MSE_base - noise^2)`; none where there is no gap to close.
+    /// `(MSE_base - MSE_final) / (MSE_base - noise^2)`; `None` where there is no gap to close.
     pub shrink: Option<f64>,
 }
 
-/// A discovery in one word.
+/// The result of a discovery in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// Nothing beyond noise.
+    /// The residual has no structure beyond noise.
     NothingMissing,
-    /// What was missing has been named.
+    /// The added effects explain the gap.
     Explained,
-    /// Part of it has been named.
+    /// The added effects explain part of the gap.
     PartlyExplained,
-    /// There is structure, and no known effect is it.
+    /// There is structure that no effect of the library explains.
     Unexplained,
 }
 
-/// What is left between the grown model and the data.
+/// What remains between the grown model and the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unexplained {
-    /// The covariates on which it depends, strongest first; none where nothing beyond noise is left.
+    /// The covariates on which the remainder depends, strongest first; empty if only noise remains.
     pub depends_on: Vec<&'static str>,
     /// Share of the base model's gap.
     pub share: f64,
 }
 
-/// An experiment that would tell two explanations apart.
+/// An experiment that would distinguish two explanations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NextExperiment {
-    /// Name of the experiment, as `tactus run` takes it.
+    /// Name of the experiment for `tactus run`.
     pub experiment: &'static str,
-    /// Its parameters, each with its value as `tactus run --param` takes it.
+    /// Its parameters and their values for `tactus run --param`.
     pub parameters: Vec<(&'static str, String)>,
-    /// How long it takes on the rig, roughly.
+    /// Approximate duration on the rig.
     pub duration_s: f64,
-    /// The explanations.
+    /// The two explanations.
     pub separates: [String; 2],
-    /// By how many standard errors they would differ.
+    /// By how many standard errors their predictions would differ.
     pub expected_z: f64,
 }
 

@@ -1,7 +1,7 @@
 //! The joint fit: base parameters and effects together, by weighted least squares.
 //!
 //! ```text
-//! counts(row, e) = baseline(run, e) + gain_e m_e(row; sigma, effects) + ...
+//! counts(bin, e) = baseline(run, e) + gain_e m_e(bin; sigma, effects) + ...
 //! ```
 //!
 //! Baselines and gains each act on one element, so that they are eliminated in closed form: every residual and every
@@ -19,9 +19,9 @@ use crate::DiscoverError;
 use crate::contacts::Contacts;
 use crate::linear::Linear;
 use crate::noise::Noise;
-use crate::parallel::Threads;
+use crate::parallel;
+use crate::predictor::{Parameters, Predictor, Term};
 use crate::scale::Scale;
-use crate::sensor::{Parameters, Sensor, Term};
 
 /// A fit ends when a step promises to lessen the cost by less than this.
 const COST_LEAST: f64 = 0.05;
@@ -46,10 +46,10 @@ const PARAMETERS_MANY: usize = 6;
 /// What is to be fitted, and how readings weigh.
 #[derive(Debug)]
 pub(crate) struct Problem<'a> {
-    pub(crate) sensor: Sensor<'a>,
-    /// Inverse variance of a reading of each element, times that of the row.
+    pub(crate) predictor: Predictor<'a>,
+    /// Inverse variance of a reading of each element, times that of the bin.
     pub(crate) element_weight: Vec<f64>,
-    /// Weight of the fitted rows; 0 for those held out.
+    /// Weight of the fitted bins; 0 for those held out.
     pub(crate) train: Vec<f64>,
     /// The same for what is slow beside the noise's own memory.
     pub(crate) slow: Vec<f64>,
@@ -61,7 +61,6 @@ pub(crate) struct Problem<'a> {
     pub(crate) spread_free: bool,
     /// Duration of the longest run.
     pub(crate) duration_s: f64,
-    pub(crate) threads: &'a Threads,
     /// By how much the variance of a sum of squares exceeds that of independent readings.
     pub(crate) squares_inflation: f64,
 }
@@ -71,7 +70,7 @@ pub(crate) struct Problem<'a> {
 pub(crate) struct Fitted {
     pub(crate) parameters: Parameters,
     pub(crate) predicted: Vec<f64>,
-    /// Weighted sum of squared residuals of the fitted rows; if zeros wander, as much less than with zeros that stand still
+    /// Weighted sum of squared residuals of the fitted bins; if zeros wander, as much less than with zeros that stand still
     /// as the likelihood gains.
     pub(crate) cost: f64,
     /// Standard errors of the terms' parameters; not a number where one was not free.
@@ -87,17 +86,17 @@ pub(crate) enum Free {
 }
 
 impl<'a> Problem<'a> {
-    /// A fit of the rows that are not held out.
-    pub(crate) fn new(sensor: Sensor<'a>, noise: &Noise, threads: &'a Threads) -> Self {
-        let (rows, frames) = (sensor.rows, sensor.frames);
+    /// A fit of the bins that are not held out.
+    pub(crate) fn new(predictor: Predictor<'a>, noise: &Noise) -> Self {
+        let (bins, frames) = (predictor.bins, predictor.frames);
         let weigh = |(weight, heldout): (&f64, &bool)| if *heldout { 0.0 } else { *weight };
-        let train: Vec<f64> = rows.weight.iter().zip(&rows.heldout).map(weigh).collect();
+        let train: Vec<f64> = bins.weight.iter().zip(&bins.heldout).map(weigh).collect();
         let inflation = noise.inflation(LONG_FRAMES);
-        let slow = |(row, weight): (usize, &f64)| {
-            if *weight > 0.0 { rows.frames_in(row) as f64 / inflation } else { 0.0 }
+        let slow = |(bin, weight): (usize, &f64)| {
+            if *weight > 0.0 { bins.frames_in(bin) as f64 / inflation } else { 0.0 }
         };
         let slow: Vec<f64> = train.iter().enumerate().map(slow).collect();
-        let clear = |(row, weight): (usize, &f64)| if rows.is_clear(frames, row) { *weight } else { 0.0 };
+        let clear = |(bin, weight): (usize, &f64)| if bins.is_clear(frames, bin) { *weight } else { 0.0 };
         let slow_and_clear = slow.iter().enumerate().map(clear).collect();
         // A single element that is quieter than most is not told from rounding.
         let element_weight =
@@ -113,8 +112,7 @@ impl<'a> Problem<'a> {
             coverings: coverings_mm.len(),
             spread_free: Contacts::of(frames).distinct_places() > 1,
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
-            sensor,
-            threads,
+            predictor,
             squares_inflation: noise.squares_inflation(LONG_FRAMES),
         }
     }
@@ -144,10 +142,10 @@ impl<'a> Problem<'a> {
     }
 
     pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
-        self.sensor.predict(parameters)
+        self.predictor.predict(parameters)
     }
 
-    /// Weighted sum of squared residuals of the fitted rows.
+    /// Weighted sum of squared residuals of the fitted bins.
     pub(crate) fn cost(&self, predicted: &[f64]) -> f64 {
         self.residuals(predicted)
             .zip(self.weights())
@@ -155,18 +153,18 @@ impl<'a> Problem<'a> {
             .sum()
     }
 
-    /// Weighted sum of the squares of a column in the fitted rows.
+    /// Weighted sum of the squares of a column in the fitted bins.
     fn weighed_square(&self, column: &[f64]) -> f64 {
         column.iter().zip(self.weights()).map(|(value, weight)| weight * value * value).sum()
     }
 
     pub(crate) fn residuals<'b>(&'b self, predicted: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
-        self.sensor.rows.counts.iter().zip(predicted).map(|(counts, predicted)| counts - predicted)
+        self.predictor.bins.counts.iter().zip(predicted).map(|(counts, predicted)| counts - predicted)
     }
 
-    /// Weights of the fitted readings, row by row, element by element.
+    /// Weights of the fitted readings, bin by bin, element by element.
     pub(crate) fn weights(&self) -> impl Iterator<Item = f64> + '_ {
-        self.train.iter().flat_map(|row| self.element_weight.iter().map(move |element| row * element))
+        self.train.iter().flat_map(|bin| self.element_weight.iter().map(move |element| bin * element))
     }
 
     /// Derivative of every reading by a free parameter, and the step with which it was taken.
@@ -220,14 +218,14 @@ impl<'a> Problem<'a> {
     /// Derivatives of every reading by each free parameter.
     pub(crate) fn columns(&self, at: &Parameters, predicted: &[f64]) -> Result<Vec<Vec<f64>>, DiscoverError> {
         let free = self.free(at);
-        self.threads.map(&free, |one| self.slope(at, predicted, *one)).into_iter().collect()
+        parallel::map(&free, |one| self.slope(at, predicted, *one)).into_iter().collect()
     }
 
     /// The best parameters near a start, in at most so many rounds. Derivatives by the parameters of effects that have
     /// many, such as the knots of a curve, are taken once: the counts are nearly linear in them.
     pub(crate) fn fit_from(&self, start: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
         let free = self.free(&start);
-        let mut at = self.wandering(start)?;
+        let mut at = self.with_walk(start)?;
         let mut predicted = self.predict(&at)?;
         let mut linear = self.linear(&at, &predicted)?;
         if let Some((better, of_better)) = self.taken_up(&linear, &at, &predicted)? {
@@ -251,7 +249,7 @@ impl<'a> Problem<'a> {
                 None => self.slope(&at, &predicted, free[*place]),
             };
             let columns: Vec<Vec<f64>> =
-                self.threads.map(&places, column).into_iter().collect::<Result<_, DiscoverError>>()?;
+                parallel::map(&places, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             for ((kept, column), one) in kept.iter_mut().zip(&columns).zip(&free) {
                 if matches!(one, Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY) {
                     kept.get_or_insert_with(|| column.clone());
@@ -294,8 +292,8 @@ impl<'a> Problem<'a> {
         if covariance.as_ref().is_some_and(|gram| follow(&mut at, &free, gram)) {
             predicted = self.predict(&at)?;
         }
-        if at.wander.is_some() {
-            cost = self.wandering_cost(&at, &predicted);
+        if at.walk.is_some() {
+            cost = self.cost_with_walk(&at, &predicted);
         }
         let errors = self.errors(&at, &free, covariance);
         Ok(Fitted { parameters: at, predicted, cost, errors })
@@ -335,7 +333,7 @@ impl<'a> Problem<'a> {
         for (one, step) in free.iter().zip(step.iter()) {
             taken.push(match one {
                 Free::SigmaIntercept => {
-                    let floor = 0.2 * self.sensor.known.psf.sigma_intercept_mm.abs().max(0.1);
+                    let floor = 0.2 * self.predictor.known.psf.sigma_intercept_mm.abs().max(0.1);
                     let old = next.psf.sigma_intercept_mm;
                     next.psf.sigma_intercept_mm = (old + step.clamp(-0.5, 0.5)).max(floor.min(old));
                     next.psf.sigma_intercept_mm - old
@@ -387,7 +385,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Knots of a curve that hardly any fitted row sees go on from the knot before: a curve does not return where nobody looks.
+/// Knots of a curve that hardly any fitted bin sees go on from the knot before: a curve does not return where nobody looks.
 /// True if there are such.
 fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
     let mut any = false;

@@ -1,15 +1,14 @@
-//! The measured frames, gathered for analysis.
+//! Measured frames, stored by column.
 
 use tactus_schema::table::{Phase, RowView};
 
-/// Frames of one or more runs, column by column.
+/// Frames of one or more runs, stored by column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frames {
-    /// Number of elements.
     pub(crate) elements: usize,
-    /// Ids of the runs, and where each ends.
+    /// Ids of the runs, and the frame after each one's last.
     pub(crate) runs: Vec<(String, usize)>,
-    /// Ids of the tools.
+    /// Ids of the indenters.
     pub(crate) indenters: Vec<String>,
     pub(crate) press: Vec<i32>,
     pub(crate) phase: Vec<Phase>,
@@ -17,9 +16,9 @@ pub struct Frames {
     pub(crate) t_s: Vec<f64>,
     pub(crate) position_mm: Vec<[f64; 3]>,
     pub(crate) covering_mm: Vec<f64>,
-    /// Index of the tool.
+    /// Index in `indenters`.
     pub(crate) indenter: Vec<u16>,
-    /// Not a number where it was not measured.
+    /// NaN where it was not measured.
     pub(crate) temperature_c: Vec<f32>,
     /// Row-major: frame by frame, element by element.
     pub(crate) counts: Vec<f32>,
@@ -27,15 +26,15 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// None yet, of an array of so many elements.
+    /// No frames yet, of an array with this number of elements.
     pub fn new(elements: usize) -> Self {
         Self { elements, ..Self::default() }
     }
 
-    /// Takes the next row of the measurement table; the rows of a run come one after the other, in order of time.
+    /// Adds the next frame.
     ///
     /// # Panics
-    /// If it has not one count per element.
+    /// If the frame does not have one count per element.
     pub fn push(&mut self, frame: RowView<'_>) {
         assert_eq!(frame.counts.len(), self.elements, "one count per element");
         if self.runs.last().is_none_or(|(run, _)| run != frame.run) {

@@ -1,4 +1,4 @@
-//! How a model fares on the rows that chose nothing, and on all rows, block by block.
+//! How a model fares on the bins that chose nothing, and on all bins, block by block.
 
 use crate::fit::{Fitted, Problem};
 
@@ -10,7 +10,7 @@ const QUIET: f64 = 0.5;
 /// A gap of so many standard errors is known within a few percent.
 const LARGE_Z: f64 = 20.0;
 
-/// How far a model is from the held-out rows beyond their noise, in units of the noise's variance, summed.
+/// How far a model is from the held-out bins beyond their noise, in units of the noise's variance, summed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HeldOutGap {
     pub(crate) value: f64,
@@ -31,38 +31,38 @@ impl HeldOutGap {
 }
 
 impl Problem<'_> {
-    /// Weighted squared residuals of the rows that are held out, block by block, and the readings in each.
+    /// Weighted squared residuals of the bins that are held out, block by block, and the readings in each.
     fn heldout_blocks(&self, predicted: &[f64]) -> Vec<[f64; 2]> {
-        let heldout = &self.sensor.rows.heldout;
-        self.blocks_of(predicted, |row| heldout[row])
+        let heldout = &self.predictor.bins.heldout;
+        self.blocks_of(predicted, |bin| heldout[bin])
     }
 
-    /// Weighted squared residuals of all rows, fitted and held out, block by block.
+    /// Weighted squared residuals of all bins, fitted and held out, block by block.
     pub(crate) fn blocks(&self, predicted: &[f64]) -> Vec<f64> {
         self.blocks_of(predicted, |_| true).into_iter().map(|[squares, _]| squares).collect()
     }
 
     fn blocks_of(&self, predicted: &[f64], among: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
-        let rows = self.sensor.rows;
-        let elements = rows.elements;
-        let mut blocks = vec![[0.0; 2]; rows.blocks];
-        let of_rows = rows.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
-        for (row, (counts, predicted)) in of_rows.filter(|(row, _)| among(*row)) {
+        let bins = self.predictor.bins;
+        let elements = bins.elements;
+        let mut blocks = vec![[0.0; 2]; bins.blocks];
+        let of_bins = bins.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
+        for (bin, (counts, predicted)) in of_bins.filter(|(bin, _)| among(*bin)) {
             let squares = counts.iter().zip(predicted).zip(&self.element_weight);
             let sum: f64 = squares.map(|((counts, of), weight)| weight * (counts - of).powi(2)).sum();
-            let [total, readings] = &mut blocks[rows.block[row]];
-            *total += rows.weight[row] * sum;
-            *readings += if rows.weight[row] > 0.0 { elements as f64 } else { 0.0 };
+            let [total, readings] = &mut blocks[bins.block[bin]];
+            *total += bins.weight[bin] * sum;
+            *readings += if bins.weight[bin] > 0.0 { elements as f64 } else { 0.0 };
         }
         blocks
     }
 
-    /// By how much the held-out rows are nearer to one prediction than to another, block by block.
+    /// By how much the held-out bins are nearer to one prediction than to another, block by block.
     pub(crate) fn heldout_gains(&self, less: &[f64], more: &[f64]) -> Vec<f64> {
         gains(&self.heldout_blocks(less), &self.heldout_blocks(more))
     }
 
-    /// By how much the held-out rows are nearer to one model than to another, and the error of that, by whole blocks.
+    /// By how much the held-out bins are nearer to one model than to another, and the error of that, by whole blocks.
     pub(crate) fn heldout_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
         let (less, more) = (self.heldout_blocks(&less.predicted), self.heldout_blocks(&more.predicted));
         let gains = gains(&less, &more);
@@ -74,15 +74,15 @@ impl Problem<'_> {
         [sum, scatter.max(0.0).min(noise).sqrt()]
     }
 
-    /// How much of a column the residual of all rows holds, and the standard error of that, by whole blocks.
+    /// How much of a column the residual of all bins holds, and the standard error of that, by whole blocks.
     pub(crate) fn share(&self, column: &[f64], predicted: &[f64]) -> Option<[f64; 2]> {
-        let rows = self.sensor.rows;
-        let mut blocks = vec![[0.0; 2]; rows.blocks];
-        for (index, ((value, counts), of)) in column.iter().zip(&rows.counts).zip(predicted).enumerate() {
+        let bins = self.predictor.bins;
+        let mut blocks = vec![[0.0; 2]; bins.blocks];
+        for (index, ((value, counts), of)) in column.iter().zip(&bins.counts).zip(predicted).enumerate() {
             if *value != 0.0 {
-                let (row, element) = (index / rows.elements, index % rows.elements);
-                let weighted = rows.weight[row] * self.element_weight[element] * value;
-                let [along, squares] = &mut blocks[rows.block[row]];
+                let (bin, element) = (index / bins.elements, index % bins.elements);
+                let weighted = bins.weight[bin] * self.element_weight[element] * value;
+                let [along, squares] = &mut blocks[bins.block[bin]];
                 *along += weighted * (counts - of);
                 *squares += weighted * value;
             }
@@ -93,14 +93,14 @@ impl Problem<'_> {
         (squares > 0.0).then(|| [share, scatter.sqrt() / squares])
     }
 
-    /// Root mean square of the residuals of the rows that are held out, each weighed by its frames.
+    /// Root mean square of the residuals of the bins that are held out, each weighed by its frames.
     pub(crate) fn heldout_rms_counts(&self, predicted: &[f64]) -> f64 {
-        let rows = self.sensor.rows;
-        let elements = rows.elements;
+        let bins = self.predictor.bins;
+        let elements = bins.elements;
         let (mut sum, mut readings) = (0.0, 0.0);
-        let of_rows = rows.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
-        for (row, (counts, predicted)) in of_rows.filter(|(row, _)| rows.heldout[*row]) {
-            let frames = rows.frames_in(row) as f64;
+        let of_bins = bins.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
+        for (bin, (counts, predicted)) in of_bins.filter(|(bin, _)| bins.heldout[*bin]) {
+            let frames = bins.frames_in(bin) as f64;
             sum +=
                 frames * counts.iter().zip(predicted).map(|(counts, of)| (counts - of).powi(2)).sum::<f64>();
             readings += frames * elements as f64;
@@ -108,7 +108,7 @@ impl Problem<'_> {
         if readings > 0.0 { (sum / readings).sqrt() } else { 0.0 }
     }
 
-    /// How far a model is from the rows that are held out.
+    /// How far a model is from the bins that are held out.
     pub(crate) fn heldout_gap(&self, predicted: &[f64]) -> HeldOutGap {
         let blocks = self.heldout_blocks(predicted);
         let value = blocks.iter().map(|[squares, readings]| squares - readings).sum();
@@ -116,21 +116,21 @@ impl Problem<'_> {
         HeldOutGap { value, error: variance.sqrt() }
     }
 
-    /// What a model surely leaves of the held-out rows, in units of the noise's variance, summed: the readings with a signal
-    /// of all rows, fitted or held out, against those without, which have the same noise.
+    /// What a model surely leaves of the held-out bins, in units of the noise's variance, summed: the readings with a signal
+    /// of all bins, fitted or held out, against those without, which have the same noise.
     pub(crate) fn surely_left(&self, at: &Fitted) -> f64 {
-        let rows = self.sensor.rows;
-        let elements = rows.elements;
+        let bins = self.predictor.bins;
+        let elements = bins.elements;
         let (mut loud, mut quiet, mut held) = ([0.0; 2], [0.0; 2], [0.0; 2]);
-        let of_rows = rows.counts.chunks_exact(elements).zip(at.predicted.chunks_exact(elements)).enumerate();
-        for (row, (counts, predicted)) in of_rows.filter(|(row, _)| rows.weight[*row] > 0.0) {
-            held[usize::from(rows.heldout[row])] += 1.0;
-            let baseline = &at.parameters.baseline[rows.run[row]];
+        let of_bins = bins.counts.chunks_exact(elements).zip(at.predicted.chunks_exact(elements)).enumerate();
+        for (bin, (counts, predicted)) in of_bins.filter(|(bin, _)| bins.weight[*bin] > 0.0) {
+            held[usize::from(bins.heldout[bin])] += 1.0;
+            let baseline = &at.parameters.baseline[bins.run[bin]];
             for (((counts, of), weight), baseline) in
                 counts.iter().zip(predicted).zip(&self.element_weight).zip(baseline)
             {
                 let signal = (of - baseline).abs() * weight.sqrt();
-                let square = rows.weight[row] * weight * (counts - of).powi(2);
+                let square = bins.weight[bin] * weight * (counts - of).powi(2);
                 let [sum, readings] = if signal > LOUD {
                     &mut loud
                 } else if signal < QUIET {

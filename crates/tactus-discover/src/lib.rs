@@ -1,16 +1,16 @@
-//! What a simulation is missing: finds where it and measured frames disagree, names the effect, adds it to the model,
-//! and shows the gap shrink.
+//! Finds what a simulation is missing: where its predictions and measured frames disagree, which effect of the library
+//! explains the difference, and how far the gap shrinks with that effect added to the model.
 
-#[cfg(test)]
-mod bench;
 mod bic;
+mod bins;
 mod candidates;
-mod chance;
 mod contacts;
 mod covariates;
 mod discover;
 mod discovery;
 mod fit;
+#[cfg(test)]
+mod fixtures;
 mod frames;
 mod heldout;
 mod lattice;
@@ -20,20 +20,20 @@ mod next;
 mod noise;
 mod not_shown;
 mod parallel;
+mod predictor;
 mod prepare;
-mod rows;
+mod random_walk;
+mod rng;
 mod scale;
 mod score;
 mod search;
-mod sensor;
 mod spectrum;
-mod telling;
-mod wander;
+mod verdict;
 mod wiring;
 
 pub use discover::{DiscoverError, Known, Options, Progress, Rule, discover, predict};
 pub use discovery::{
-    Base, Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment,
-    NotShown, Point, Round, RunWander, Split, Step, Unexplained, Verdict,
+    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level,
+    NextExperiment, NotShown, Point, Round, RunWalks, Split, TriedEffect, Unexplained, Verdict,
 };
 pub use frames::Frames;

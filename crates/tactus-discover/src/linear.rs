@@ -3,8 +3,8 @@
 use crate::DiscoverError;
 use crate::fit::Problem;
 use crate::noise::median;
-use crate::sensor::Parameters;
-use crate::wander::Zeros;
+use crate::predictor::Parameters;
+use crate::random_walk::Baselines;
 
 /// Recalibration moves an element's gain within these, as ratios to what is typical of the array: an element beyond is
 /// not an element of another gain.
@@ -17,7 +17,7 @@ const GAIN_ERROR_MAX: f64 = 0.3;
 /// Derivatives at a point, freed of gains and baselines.
 pub(crate) struct Linear<'a> {
     problem: &'a Problem<'a>,
-    zeros: Zeros<'a>,
+    baselines: Baselines<'a>,
     /// Of the counts by each element's relative gain, freed of the zeros.
     by_gain: Vec<f64>,
     /// What the zeros took up of it: run by run, knot by knot.
@@ -38,9 +38,9 @@ impl<'a> Problem<'a> {
         for (slope, predicted) in by_gain.iter_mut().zip(predicted) {
             *slope = (*slope - predicted) / share;
         }
-        let elements = self.sensor.rows.elements;
-        let zeros = Zeros::of(self, at);
-        let by_gain_taken = zeros.centre(&mut by_gain);
+        let elements = self.predictor.bins.elements;
+        let baselines = Baselines::of(self, at);
+        let by_gain_taken = baselines.centre(&mut by_gain);
         let mut by_gain_squares = vec![0.0; elements];
         for ((slope, weight), element) in by_gain.iter().zip(self.weights()).zip((0..elements).cycle()) {
             by_gain_squares[element] += weight * slope * slope;
@@ -51,12 +51,12 @@ impl<'a> Problem<'a> {
                 *squares = 0.0;
             }
         }
-        Ok(Linear { problem: self, zeros, by_gain, by_gain_taken, by_gain_squares })
+        Ok(Linear { problem: self, baselines, by_gain, by_gain_taken, by_gain_squares })
     }
 
     /// Elements whose gain has come to the end of what recalibration may give it: there it stays, for an effect to explain.
     fn pinned(&self, at: &Parameters) -> Vec<bool> {
-        let declared = &self.sensor.known.response.sensitivity_counts_per_mm;
+        let declared = &self.predictor.known.response.sensitivity_counts_per_mm;
         let ratios: Vec<f64> =
             at.sensitivity.iter().zip(declared).map(|(now, declared)| now / declared).collect();
         let typical = median(&ratios);
@@ -71,9 +71,9 @@ impl<'a> Problem<'a> {
 }
 
 impl Linear<'_> {
-    /// Frees a column, row by row and element by element, of what gains and baselines can take up.
+    /// Frees a column, bin by bin and element by element, of what gains and baselines can take up.
     pub(crate) fn project(&self, column: &mut [f64]) {
-        self.zeros.centre(column);
+        self.baselines.centre(column);
         let elements = self.by_gain_squares.len();
         let shares = self.shares(column);
         for (values, slopes) in column.chunks_exact_mut(elements).zip(self.by_gain.chunks_exact(elements)) {
@@ -87,8 +87,8 @@ impl Linear<'_> {
     fn shares(&self, column: &[f64]) -> Vec<f64> {
         let elements = self.by_gain_squares.len();
         let mut sums = vec![0.0; elements];
-        let rows = column.chunks_exact(elements).zip(self.by_gain.chunks_exact(elements));
-        for ((values, slopes), weight) in rows.zip(&self.problem.train) {
+        let bins = column.chunks_exact(elements).zip(self.by_gain.chunks_exact(elements));
+        for ((values, slopes), weight) in bins.zip(&self.problem.train) {
             if *weight > 0.0 {
                 for ((sum, value), slope) in sums.iter_mut().zip(values).zip(slopes) {
                     *sum += weight * value * slope;
@@ -107,9 +107,9 @@ impl Linear<'_> {
     pub(crate) fn take_up(&self, left: &[f64], parameters: &mut Parameters) {
         let elements = self.by_gain_squares.len();
         let mut centred = left.to_vec();
-        let mut zeros = self.zeros.centre(&mut centred);
+        let mut baselines = self.baselines.centre(&mut centred);
         let shares = self.shares(&centred);
-        let declared = &self.problem.sensor.known.response.sensitivity_counts_per_mm;
+        let declared = &self.problem.predictor.known.response.sensitivity_counts_per_mm;
         let ratios: Vec<f64> = parameters
             .sensitivity
             .iter()
@@ -136,11 +136,11 @@ impl Linear<'_> {
             parameters.sensitivity[element] = next;
         }
         // What the zeros take up, less what the gains' change has moved of it.
-        for (zeros, by_gain) in zeros.iter_mut().zip(&self.by_gain_taken) {
-            for ((zero, by_gain), taken) in zeros.iter_mut().zip(by_gain).zip(taken.iter().cycle()) {
+        for (baselines, by_gain) in baselines.iter_mut().zip(&self.by_gain_taken) {
+            for ((zero, by_gain), taken) in baselines.iter_mut().zip(by_gain).zip(taken.iter().cycle()) {
                 *zero -= taken * by_gain;
             }
         }
-        self.zeros.put(zeros, parameters);
+        self.baselines.put(baselines, parameters);
     }
 }

@@ -4,6 +4,7 @@ use crate::DiscoverError;
 use crate::covariates::{Feature, Form, Forms, features};
 use crate::discovery::{Curve, Gap, Point};
 use crate::fit::Fitted;
+use crate::parallel;
 use crate::score::{Score, flipped, largest, p_value, q_values};
 use crate::search::{FLIPS, Search};
 
@@ -28,7 +29,7 @@ impl Search<'_> {
         let fitting = self.fitting(at)?;
         let forms = Forms::of(problem, &at.parameters, &at.predicted)?;
         let features = features(problem, &forms);
-        let elements = problem.sensor.rows.elements;
+        let elements = problem.predictor.bins.elements;
         let scored = |feature: &Feature| {
             let mut column = forms.column(feature, elements);
             let readings = column.iter().filter(|value| **value != 0.0).count();
@@ -36,7 +37,7 @@ impl Search<'_> {
             let z = fitting.wanted(&column) / fitting.size(&column).max(f64::MIN_POSITIVE);
             (fitting.score(&[column]), z, readings)
         };
-        let scored = self.problem.threads.map(&features, scored);
+        let scored = parallel::map(&features, scored);
         let mut covariates: Vec<&'static str> = features.iter().map(|feature| feature.covariate).collect();
         covariates.dedup();
         let of = |covariate: &str| -> Vec<usize> {
@@ -44,7 +45,7 @@ impl Search<'_> {
         };
         let groups: Vec<Vec<&Score>> =
             covariates.iter().map(|one| of(one).iter().map(|index| &scored[*index].0).collect()).collect();
-        let under_none = flipped(&groups, FLIPS, self.options.seed ^ STREAM, self.problem.threads);
+        let under_none = flipped(&groups, FLIPS, self.options.seed ^ STREAM);
         let statistics: Vec<f64> =
             groups.iter().map(|group| group.iter().map(|score| score.z).fold(0.0, f64::max)).collect();
         let p_values: Vec<f64> =
@@ -78,7 +79,7 @@ impl Search<'_> {
         let features = features(problem, &forms);
         let mut curves: Vec<Curve> = Vec::new();
         for feature in features.iter().filter(|one| matches!(one.form, Form::Signal | Form::Offset)) {
-            let column = forms.column(feature, problem.sensor.rows.elements);
+            let column = forms.column(feature, problem.predictor.bins.elements);
             let Some([before, standard_error]) = problem.share(&column, &base.predicted) else { continue };
             let Some([after, _]) = problem.share(&column, &grown.predicted) else { continue };
             let at = f64::midpoint(feature.range[0], feature.range[1]);

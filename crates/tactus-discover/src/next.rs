@@ -19,15 +19,15 @@ mod design;
 
 use tactus_model::effect::{Definition, ParameterKind};
 
+use crate::bins::{Bins, HeldOut};
 use crate::discovery::{NextExperiment, NotShown};
 use crate::fit::{Free, Problem};
 use crate::noise::Noise;
-use crate::parallel::Threads;
-use crate::rows::{HeldOut, Rows};
+use crate::parallel;
+use crate::predictor::{Parameters, Predictor, Term};
 use crate::score::Fitting;
-use crate::sensor::{Parameters, Sensor, Term};
 use crate::{DiscoverError, Frames, Known};
-use design::{Bench, Design};
+use design::{Design, DesignSpace};
 
 /// A model that may be what the data show.
 #[derive(Debug, Clone)]
@@ -70,7 +70,6 @@ pub(crate) struct Setting<'a> {
     /// The data: no design goes deeper, or loads faster, than they did.
     pub(crate) frames: &'a Frames,
     pub(crate) noise: &'a Noise,
-    pub(crate) threads: &'a Threads,
 }
 
 impl Setting<'_> {
@@ -80,7 +79,7 @@ impl Setting<'_> {
         if pairs.is_empty() {
             return Ok(Vec::new());
         }
-        let designs = Bench::of(self.known, self.frames).designs();
+        let designs = DesignSpace::of(self.known, self.frames).designs();
         let mut proposals = Vec::new();
         for pair in pairs {
             let separates = pair.of.each_ref().map(|one| one.name.to_owned());
@@ -109,7 +108,7 @@ impl Setting<'_> {
         if not_shown.is_empty() {
             return Ok(Vec::new());
         }
-        let designs = Bench::of(self.known, self.frames).designs();
+        let designs = DesignSpace::of(self.known, self.frames).designs();
         let mut proposals = Vec::new();
         for NotShown { effect, .. } in not_shown {
             let definition = Definition::find(effect)?;
@@ -129,7 +128,7 @@ impl Setting<'_> {
         expect: impl Fn(&Design) -> Result<Expected, DiscoverError> + Sync,
     ) -> Result<Vec<NextExperiment>, DiscoverError> {
         let mut found: Vec<(&Design, Expected)> = Vec::new();
-        let expected = self.threads.map(designs, |design| expect(design));
+        let expected = parallel::map(designs, |design| expect(design));
         for (design, expected) in designs.iter().zip(expected) {
             found.push((design, expected?));
         }
@@ -212,16 +211,16 @@ impl Setting<'_> {
         work: impl FnOnce(&Problem<'_>) -> Result<R, DiscoverError>,
     ) -> Result<R, DiscoverError> {
         let frames = &design.frames;
-        let mut rows = Rows::of(frames, true)?;
+        let mut bins = Bins::of(frames, true)?;
         let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
-        rows.weigh(frames, self.noise, &all);
-        work(&Problem::new(Sensor::new(self.known, frames, &rows), self.noise, self.threads))
+        bins.weigh(frames, self.noise, &all);
+        work(&Problem::new(Predictor::new(self.known, frames, &bins), self.noise))
     }
 }
 
 /// The same model for a run of its own.
 fn once(of_runs: &Parameters) -> Parameters {
-    Parameters { baseline: vec![of_runs.mean_baseline()], wander: None, ..of_runs.clone() }
+    Parameters { baseline: vec![of_runs.mean_baseline()], walk: None, ..of_runs.clone() }
 }
 
 fn largest(predicted: &[f64], baseline: &[f64]) -> f64 {

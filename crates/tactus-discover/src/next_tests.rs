@@ -2,12 +2,11 @@ use tactus_model::Registration;
 use tactus_schema::table::{Phase, RowView};
 
 use super::*;
-use crate::bench;
-use crate::parallel::Threads;
+use crate::fixtures;
 
 /// A sensor that lies where the sample rig has it.
 fn known() -> Known {
-    Known { registration: Registration { origin_mm: [20.0, 15.0], rotation_deg: 0.0 }, ..bench::known() }
+    Known { registration: Registration { origin_mm: [20.0, 15.0], rotation_deg: 0.0 }, ..fixtures::known() }
 }
 
 /// One press to 0.6 mm at 1 mm/s, under the paper's thinnest covering.
@@ -52,14 +51,13 @@ fn explanation(known: &Known, name: &'static str, values: &[(&str, f64)]) -> Exp
 fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> Pair {
     let (frames, noise) = (measured(), noise());
     let [right, wrong] = [right, wrong].map(|(name, values)| explanation(known, name, values));
-    let designs = Bench::of(known, &frames).designs();
+    let designs = DesignSpace::of(known, &frames).designs();
     let frames = &designs.iter().find(|design| design.name == "element-centres").unwrap().frames;
-    let mut rows = Rows::of(frames, true).unwrap();
+    let mut bins = Bins::of(frames, true).unwrap();
     let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
-    rows.weigh(frames, &noise, &all);
-    rows.counts = Sensor::new(known, frames, &rows).predict(&right.parameters).unwrap();
-    let threads = Threads::new(2);
-    let problem = Problem::new(Sensor::new(known, frames, &rows), &noise, &threads);
+    bins.weigh(frames, &noise, &all);
+    bins.counts = Predictor::new(known, frames, &bins).predict(&right.parameters).unwrap();
+    let problem = Problem::new(Predictor::new(known, frames, &bins), &noise);
     let fitted = problem.fit_from(wrong.parameters, 8).unwrap();
     let without = Parameters::declared(known, 1);
     let gain = problem.cost(&problem.predict(&without).unwrap());
@@ -69,9 +67,9 @@ fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> 
 /// What each of the named designs tells of twins.
 fn separations<const N: usize>(of: [(&'static str, &[(&str, f64)]); 2], names: [&str; N]) -> [f64; N] {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: &Threads::new(2) };
+    let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let pair = twins(&known, of);
-    let designs = Bench::of(&known, &frames).designs();
+    let designs = DesignSpace::of(&known, &frames).designs();
     names.map(|name| {
         let design = designs.iter().find(|design| design.name == name).unwrap();
         setting.separation(design, &pair).unwrap().z
@@ -124,7 +122,7 @@ fn lost_motion_and_hysteresis_are_told_apart_by_reversals() {
 #[test]
 fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: &Threads::new(2) };
+    let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let pair = twins(
         &known,
         [
@@ -133,7 +131,7 @@ fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter
         ],
     );
     let share = |proposal: &NextExperiment| {
-        let designs = Bench::of(&known, &frames).designs();
+        let designs = DesignSpace::of(&known, &frames).designs();
         let design = designs.iter().find(|design| {
             (design.experiment, &design.parameters) == (proposal.experiment, &proposal.parameters)
         });
@@ -146,7 +144,7 @@ fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter
     assert!(shares.iter().rev().is_sorted(), "{shares:?}");
     assert!(proposals.windows(2).all(|pair| pair[1].duration_s < pair[0].duration_s), "{proposals:?}");
     let shown_by = ["imprint", "relaxation"].map(|name| Definition::find(name).unwrap().shown_by).concat();
-    let of_all = Bench::of(&known, &frames).designs();
+    let of_all = DesignSpace::of(&known, &frames).designs();
     let greatest = of_all
         .iter()
         .filter(|design| shown_by.contains(&design.name))
@@ -158,7 +156,7 @@ fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter
 #[test]
 fn nothing_is_proposed_between_an_explanation_and_itself() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: &Threads::new(2) };
+    let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let one = explanation(&known, "relaxation", &[("relaxed_share", 0.1)]);
     let pair = Pair { of: [one.clone(), one], without: Parameters::declared(&known, 1), gain: 100.0 };
     assert_eq!(setting.propose(&[pair]).unwrap(), []);
@@ -167,7 +165,7 @@ fn nothing_is_proposed_between_an_explanation_and_itself() {
 #[test]
 fn what_the_data_cannot_show_is_shown_by_an_experiment_of_its_own() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise, threads: &Threads::new(2) };
+    let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let not_shown = [NotShown { effect: "relaxation", reason: "no depth was held".into() }];
     let proposals = setting.show(&not_shown, &Parameters::declared(&known, 1)).unwrap();
     let [one] = &proposals[..] else { panic!("one proposal: {proposals:?}") };
@@ -180,7 +178,7 @@ fn what_the_data_cannot_show_is_shown_by_an_experiment_of_its_own() {
 #[test]
 fn no_design_goes_deeper_or_loads_faster_than_the_data_did() {
     let (known, frames) = (known(), measured());
-    for design in Bench::of(&known, &frames).designs() {
+    for design in DesignSpace::of(&known, &frames).designs() {
         let deepest_mm = design.frames.position_mm.iter().map(|at| -at[2]).fold(0.0, f64::max);
         assert!(deepest_mm < 0.6 * 1.06, "{}: {deepest_mm}", design.name);
         if design.name == "rates" {

@@ -5,7 +5,7 @@ use tactus_schema::table::{Phase, RowView};
 
 use super::Noise;
 use crate::Frames;
-use crate::rows::still;
+use crate::bins::still;
 
 /// A tip at rest under first-order autoregressive noise of standard deviation 3, beside a slow ramp.
 fn resting(phi: f64) -> Frames {

@@ -13,7 +13,7 @@ const REACH_LEAST: f64 = 15.0;
 
 /// Effects that need what the data do not hold; no candidates, however well they may seem to fit.
 pub(crate) fn lacking(problem: &Problem<'_>, replicates: bool) -> Vec<NotShown> {
-    let frames = problem.sensor.frames;
+    let frames = problem.predictor.frames;
     let contacts = Contacts::of(frames);
     let unloads = frames.phase.contains(&Phase::Unload) || contacts.falls_in_contact();
     REGISTRY

@@ -1,10 +1,9 @@
-//! What a search starts from: the split, the noise, the rows, and the lines in the spectrum.
+//! What a search starts from: the split, the noise, the bins, and the lines in the spectrum.
 
+use crate::bins::{Bins, HeldOut, still};
 use crate::fit::{Fitted, Problem};
 use crate::noise::Noise;
-use crate::parallel::Threads;
-use crate::rows::{HeldOut, Rows, still};
-use crate::sensor::{Parameters, Sensor};
+use crate::predictor::{Parameters, Predictor};
 use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum};
 
 /// Presses that are fitted, at least.
@@ -26,14 +25,13 @@ pub(crate) struct Prepared<'a> {
     /// The wider step, if it is one, and the chance of that.
     pub(crate) lattice: Option<(f64, f64)>,
     /// Every frame for itself.
-    pub(crate) whole: Rows,
-    pub(crate) rows: Rows,
-    /// The base model, recalibrated on the rows.
+    pub(crate) whole: Bins,
+    pub(crate) bins: Bins,
+    /// The base model, recalibrated on the bins.
     pub(crate) base: Fitted,
     /// Frequencies of lines in the spectrum of what the base model leaves: tones that no grid would find.
     pub(crate) frequencies_hz: Vec<f64>,
     pub(crate) warnings: Vec<String>,
-    pub(crate) threads: Threads,
 }
 
 impl<'a> Prepared<'a> {
@@ -59,17 +57,16 @@ impl<'a> Prepared<'a> {
         let replicates = replicated.is_some();
         let noise = replicated.unwrap_or_else(|| Noise::of_differences(frames, step_counts));
 
-        let threads = Threads::new(options.threads);
-        let whole = Rows::of(frames, false)?;
-        let mut rows = Rows::of(frames, true)?;
-        rows.weigh(frames, &noise, &heldout);
-        let mut base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise, &threads))?;
-        let frequencies_hz = lines_hz(&Sensor::new(known, frames, &whole), &base)?;
+        let whole = Bins::of(frames, false)?;
+        let mut bins = Bins::of(frames, true)?;
+        bins.weigh(frames, &noise, &heldout);
+        let mut base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise))?;
+        let frequencies_hz = lines_hz(&Predictor::new(known, frames, &whole), &base)?;
         if !frequencies_hz.is_empty() {
-            // A tone is lost in rows of several frames.
-            rows = Rows::of(frames, false)?;
-            rows.weigh(frames, &noise, &heldout);
-            base = recalibrated(&Problem::new(Sensor::new(known, frames, &rows), &noise, &threads))?;
+            // A tone is lost in bins of several frames.
+            bins = Bins::of(frames, false)?;
+            bins.weigh(frames, &noise, &heldout);
+            base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise))?;
         }
         Ok(Self {
             known,
@@ -81,28 +78,27 @@ impl<'a> Prepared<'a> {
             step_counts,
             lattice,
             whole,
-            rows,
+            bins,
             base,
             frequencies_hz,
             warnings,
-            threads,
         })
     }
 
-    /// The fit of its rows.
+    /// The fit of its bins.
     pub(crate) fn problem(&self) -> Problem<'_> {
-        Problem::new(Sensor::new(self.known, self.frames, &self.rows), &self.noise, &self.threads)
+        Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise)
     }
 }
 
 /// The base model, recalibrated.
 fn recalibrated(problem: &Problem<'_>) -> Result<Fitted, DiscoverError> {
-    let Sensor { known, rows, .. } = problem.sensor;
-    problem.fit_from(Parameters::declared(known, rows.paths.len()), BASE_ROUNDS)
+    let Predictor { known, bins, .. } = problem.predictor;
+    problem.fit_from(Parameters::declared(known, bins.paths.len()), BASE_ROUNDS)
 }
 
 /// Frequencies of lines in the spectrum of what a model leaves of every frame.
-fn lines_hz(whole: &Sensor<'_>, base: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+fn lines_hz(whole: &Predictor<'_>, base: &Fitted) -> Result<Vec<f64>, DiscoverError> {
     let predicted = whole.predict(&base.parameters)?;
     let residual: Vec<f64> =
         whole.frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();

@@ -1,7 +1,7 @@
 //! Is a direction in which the model could change wanted by the residual?
 //!
 //! The score of a direction `f` (a derivative of the prediction, freed of all that is fitted already) is, block by
-//! block of rows,
+//! block of bins,
 //!
 //! ```text
 //! U_b = sum over block b of w r f        V_b = sum over block b of w f^2
@@ -25,12 +25,12 @@
 use nalgebra::DMatrix;
 
 use crate::DiscoverError;
-use crate::chance::Chance;
 use crate::fit::{Problem, dot};
 use crate::linear::Linear;
 use crate::noise::median;
-use crate::parallel::Threads;
-use crate::sensor::Parameters;
+use crate::parallel;
+use crate::predictor::Parameters;
+use crate::rng::Rng;
 
 /// Median of the squared standard normal distribution.
 const MEDIAN_SQUARE: f64 = 0.454_936;
@@ -157,15 +157,15 @@ impl<'a> Fitting<'a> {
     }
 
     fn score_of(&self, column: &[f64]) -> (f64, Vec<f32>) {
-        let rows = self.problem.sensor.rows;
-        let elements = rows.elements;
-        let mut wanted = vec![0.0; rows.blocks];
-        let mut variance = vec![0.0; rows.blocks];
-        for row in 0..rows.len() {
-            if self.problem.train[row] == 0.0 {
+        let bins = self.problem.predictor.bins;
+        let elements = bins.elements;
+        let mut wanted = vec![0.0; bins.blocks];
+        let mut variance = vec![0.0; bins.blocks];
+        for bin in 0..bins.len() {
+            if self.problem.train[bin] == 0.0 {
                 continue;
             }
-            let at = row * elements..(row + 1) * elements;
+            let at = bin * elements..(bin + 1) * elements;
             let (mut sum, mut squares) = (0.0, 0.0);
             for ((value, residual), weight) in
                 column[at.clone()].iter().zip(&self.weighted_residual[at.clone()]).zip(&self.weights[at])
@@ -173,12 +173,12 @@ impl<'a> Fitting<'a> {
                 sum += value * residual;
                 squares += value * value * weight;
             }
-            wanted[rows.block[row]] += sum;
-            variance[rows.block[row]] += squares;
+            wanted[bins.block[bin]] += sum;
+            variance[bins.block[bin]] += squares;
         }
         let total: f64 = variance.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
-            return (0.0, vec![0.0; rows.blocks]);
+            return (0.0, vec![0.0; bins.blocks]);
         }
         let common = wanted.iter().sum::<f64>() / total;
         // Blocks that hardly feel the direction say nothing of its scatter.
@@ -269,13 +269,13 @@ fn deviate(chi_square: f64, freedom: f64) -> f64 {
 }
 
 /// The largest of the scores in each of many data sets whose blocks had their signs flipped, for each group.
-pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64, threads: &Threads) -> Vec<Vec<f64>> {
+pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
     let blocks =
         groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
-    let mut chance = Chance::new(seed);
+    let mut rng = Rng::new(seed);
     let mut signs = vec![1.0_f32; flips * blocks];
     for chunk in signs.chunks_mut(blocks.max(1)).flat_map(|flip| flip.chunks_mut(64)) {
-        let bits = chance.bits();
+        let bits = rng.bits();
         for (place, sign) in chunk.iter_mut().enumerate() {
             *sign = if bits >> place & 1 == 1 { 1.0 } else { -1.0 };
         }
@@ -287,7 +287,7 @@ pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64, threads: 
         };
         (0..flips).map(of_flip).collect()
     };
-    threads.map(groups, largest)
+    parallel::map(groups, largest)
 }
 
 /// The largest of all groups in each flipped data set.
@@ -304,10 +304,10 @@ pub(crate) fn p_value(statistic: f64, under_none: &[f64]) -> f64 {
 
 /// Chance that gains as large come about by flipping their signs.
 pub(crate) fn sign_flip_p(gains: &[f64], flips: usize, seed: u64) -> f64 {
-    let mut chance = Chance::new(seed);
+    let mut rng = Rng::new(seed);
     let sum: f64 = gains.iter().sum();
     let flipped: Vec<f64> = (0..flips)
-        .map(|_| gains.iter().map(|gain| if chance.bits() & 1 == 1 { *gain } else { -gain }).sum())
+        .map(|_| gains.iter().map(|gain| if rng.bits() & 1 == 1 { *gain } else { -gain }).sum())
         .collect();
     p_value(sum, &flipped)
 }

@@ -13,9 +13,10 @@ use tactus_model::effect::{Definition, ParameterKind};
 use crate::candidates::{Candidate, Screened, with};
 use crate::discovery;
 use crate::fit::{Fitted, Problem};
+use crate::parallel;
+use crate::predictor::{Parameters, Term};
+use crate::random_walk::RANDOM_WALK;
 use crate::score::{Fitting, Score, flipped, largest, p_value};
-use crate::sensor::{Parameters, Term};
-use crate::wander::WANDER;
 use crate::{DiscoverError, Options};
 
 /// Sign-flipped data sets of a test.
@@ -113,8 +114,8 @@ impl From<Fitted> for Grown {
 
 /// What a search is at.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Stage {
-    TakingBack,
+pub(crate) enum SearchPhase {
+    Pruning,
     Exchanging,
 }
 
@@ -130,8 +131,8 @@ impl Search<'_> {
     /// Scores of all candidates at a model.
     pub(crate) fn screen(&self, fitting: &Fitting<'_>, at: &Fitted) -> Result<Vec<Screened>, DiscoverError> {
         let mut screened = self.screen_among(|_| true, fitting, at)?;
-        if screened.iter().any(|one| one.definition.name == WANDER.name) {
-            screened.extend(self.problem.screen_wander(fitting, &at.parameters));
+        if screened.iter().any(|one| one.definition.name == RANDOM_WALK.name) {
+            screened.extend(self.problem.screen_random_walk(fitting, &at.parameters));
         }
         Ok(screened)
     }
@@ -146,21 +147,21 @@ impl Search<'_> {
         let candidates: Vec<&Candidate> =
             self.candidates.iter().filter(|one| among(one.definition.name)).collect();
         let screen = |one: &&Candidate| one.screen(fitting, self.problem, at);
-        self.problem.threads.map_longest_first(&candidates, |one| one.columns(), screen).into_iter().collect()
+        parallel::map_longest_first(&candidates, |one| one.columns(), screen).into_iter().collect()
     }
 
     /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
-    pub(crate) fn grow(&self, base: &Fitted, said: &dyn Fn(Stage)) -> Result<Grown, DiscoverError> {
+    pub(crate) fn grow(&self, base: &Fitted, said: &dyn Fn(SearchPhase)) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base.clone());
         let mut exchanges_left = EXCHANGES_MAX;
         loop {
             self.forward(&mut grown)?;
-            said(Stage::TakingBack);
+            said(SearchPhase::Pruning);
             grown.at = self.back(grown.at)?;
             if let Some(simpler) = self.simpler(base, &grown.at)? {
                 grown.at = simpler;
             }
-            said(Stage::Exchanging);
+            said(SearchPhase::Exchanging);
             match self.exchange(&grown.at, exchanges_left > 0)? {
                 Exchanged::Better(better) => {
                     exchanges_left -= 1;
@@ -201,13 +202,12 @@ impl Search<'_> {
         let fitting = self.fitting(at)?;
         let screened = self.screen(&fitting, at)?;
         let groups: Vec<Vec<&Score>> = screened.iter().map(|one| one.scores.iter().collect()).collect();
-        let under_none =
-            flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1), self.problem.threads);
+        let under_none = flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1));
         let largest = largest(&under_none);
         let statistic = |one: &Screened| one.scores.iter().map(|score| score.z).fold(0.0, f64::max);
-        let mut tried: Vec<discovery::Candidate> = screened
+        let mut tried: Vec<discovery::TriedEffect> = screened
             .iter()
-            .map(|one| discovery::Candidate {
+            .map(|one| discovery::TriedEffect {
                 effect: one.definition.name,
                 score: statistic(one),
                 p_value: p_value(statistic(one), &largest),
@@ -261,12 +261,10 @@ impl Search<'_> {
             let started = with(&at.parameters, start.clone());
             Ok((start.definition.name, self.problem.fit_from(started, FIRST_ROUNDS)?))
         };
-        let mut fits: Vec<(&'static str, Fitted)> = self
-            .problem
-            .threads
-            .map_longest_first(starts, |one| one.values.len(), fit)
-            .into_iter()
-            .collect::<Result<_, DiscoverError>>()?;
+        let mut fits: Vec<(&'static str, Fitted)> =
+            parallel::map_longest_first(starts, |one| one.values.len(), fit)
+                .into_iter()
+                .collect::<Result<_, DiscoverError>>()?;
         fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
         let best = fits.first().map_or(0.0, |(_, best)| at.cost - best.cost);
         fits.retain(|(_, fitted)| at.cost - fitted.cost > gain_least.max(BEHIND_SHARE * best));
@@ -274,7 +272,7 @@ impl Search<'_> {
         let finish = |(name, fitted): &(&'static str, Fitted)| {
             Ok((*name, self.problem.fit_from(fitted.parameters.clone(), TRIAL_ROUNDS)?))
         };
-        self.problem.threads.map(&fits, finish).into_iter().collect()
+        parallel::map(&fits, finish).into_iter().collect()
     }
 
     /// The model's tangent space and residual.
@@ -397,7 +395,7 @@ impl Search<'_> {
     ) -> Result<bool, DiscoverError> {
         let (of_rival, of_model) =
             (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
-        let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.wander.is_none()) {
+        let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.walk.is_none()) {
             of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect()
         } else {
             // A wander takes up noise where it is fitted.
@@ -435,8 +433,7 @@ impl Search<'_> {
                 (self.progress)(&format!("without {name}"));
                 self.problem.fit_from(without(&at.parameters, name, self.known_terms), TRIAL_ROUNDS)
             };
-            let fits: Vec<Fitted> =
-                self.problem.threads.map(&names, without).into_iter().collect::<Result<_, _>>()?;
+            let fits: Vec<Fitted> = parallel::map(&names, without).into_iter().collect::<Result<_, _>>()?;
             let left = EARNS_SHARE * self.problem.surely_left(&at);
             let worth = |less: &Fitted| {
                 let [gain, error] = self.problem.heldout_gain(less, &at);

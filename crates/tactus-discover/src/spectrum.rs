@@ -4,8 +4,8 @@
 //! of the presses too: where that rhythm itself has one, none is taken.
 
 use crate::Frames;
+use crate::bins::interval_s;
 use crate::noise::median;
-use crate::rows::interval_s;
 
 /// A line stands out of what is around it by so many times the scatter of that: the more elements there are whose noise is their own,
 /// the less do their powers, summed, scatter.

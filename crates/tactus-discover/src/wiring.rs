@@ -14,12 +14,12 @@ const DEAD_SHARE: f64 = 0.3;
 
 /// Pairs of an element and the one for which it may answer, likeliest first; an element with itself may be dead.
 pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
-    let rows = problem.sensor.rows;
-    let elements = rows.elements;
+    let bins = problem.predictor.bins;
+    let elements = bins.elements;
     let signal: Vec<f64> = fitted
         .predicted
         .chunks_exact(elements)
-        .zip(&rows.run)
+        .zip(&bins.run)
         .flat_map(|(counts, run)| {
             let gains = counts.iter().zip(&fitted.parameters.baseline[*run]);
             gains
@@ -29,7 +29,7 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
         .collect();
     let sums = Sums::of(problem, &signal);
     let mut found: Vec<(f64, [usize; 2])> = Vec::new();
-    let declared = &problem.sensor.known.response.sensitivity_counts_per_mm;
+    let declared = &problem.predictor.known.response.sensitivity_counts_per_mm;
     for (element, declared) in declared.iter().enumerate() {
         let others = (0..elements).filter(|other| *other != element);
         let best = others.map(|other| (sums.gain(element, other), other)).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -46,7 +46,7 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
     found.into_iter().take(PAIRS_MAX).map(|(_, pair)| pair).collect()
 }
 
-/// Moments of the signals and of the readings in the fitted rows, centred and weighted.
+/// Moments of the signals and of the readings in the fitted bins, centred and weighted.
 struct Sums {
     elements: usize,
     /// Of two elements' signals.
@@ -57,8 +57,8 @@ struct Sums {
 
 impl Sums {
     fn of(problem: &Problem<'_>, signal: &[f64]) -> Self {
-        let rows = problem.sensor.rows;
-        let elements = rows.elements;
+        let bins = problem.predictor.bins;
+        let elements = bins.elements;
         let total: f64 = problem.train.iter().sum();
         let mean = |values: &[f64]| -> Vec<f64> {
             let mut mean = vec![0.0; elements];
@@ -67,14 +67,14 @@ impl Sums {
             }
             mean
         };
-        let (mean_signal, mean_counts) = (mean(signal), mean(&rows.counts));
+        let (mean_signal, mean_counts) = (mean(signal), mean(&bins.counts));
         let mut sums = Self {
             elements,
             signals: vec![0.0; elements * elements],
             readings: vec![0.0; elements * elements],
         };
-        let of_rows = signal.chunks_exact(elements).zip(rows.counts.chunks_exact(elements));
-        for ((signal, counts), weight) in of_rows.zip(&problem.train).filter(|(_, weight)| **weight > 0.0) {
+        let of_bins = signal.chunks_exact(elements).zip(bins.counts.chunks_exact(elements));
+        for ((signal, counts), weight) in of_bins.zip(&problem.train).filter(|(_, weight)| **weight > 0.0) {
             let centred: Vec<f64> = signal.iter().zip(&mean_signal).map(|(one, mean)| one - mean).collect();
             for element in 0..elements {
                 let of_signal = weight * centred[element];

@@ -3,7 +3,7 @@ use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
 
 use crate::Verdict;
-use crate::bench::{ELEMENTS, found, known, measured, processes};
+use crate::fixtures::{ELEMENTS, found, known, measured, processes};
 
 /// The paper's two faulty elements, which answer for a neighbour each, beside effects that are in the way of seeing them.
 #[test]

@@ -6,8 +6,8 @@
 use tactus_model::Registration;
 use tactus_schema::table::{Phase, RowView};
 
-use crate::chance::Chance;
-use crate::rows::interval_s;
+use crate::bins::interval_s;
+use crate::rng::Rng;
 use crate::{Frames, Known};
 
 /// An experiment that could be made.
@@ -24,7 +24,7 @@ pub(super) struct Design {
 
 /// What the rig has done so far, and can do again.
 #[derive(Debug)]
-pub(super) struct Bench<'a> {
+pub(super) struct DesignSpace<'a> {
     known: &'a Known,
     covering_mm: f64,
     indenter: &'a str,
@@ -52,26 +52,26 @@ const NEARLY: f64 = 1.05;
 const APPROACH_MM: f64 = 0.3;
 const TRAVEL_MM_PER_S: f64 = 20.0;
 
-type Part = fn(&mut Stage<'_>);
+type DiagnosePart = fn(&mut DesignBuilder<'_>);
 
-const PARTS: [(&str, Part); 11] = [
-    ("drift", |stage| stage.drift()),
-    ("repeats", |stage| stage.repeats()),
-    ("ladder", |stage| stage.ladder()),
-    ("rates", |stage| stage.rates()),
-    ("approach", |stage| stage.approach()),
-    ("reversals", |stage| stage.reversals()),
-    ("tilt", |stage| stage.tilt()),
-    ("depths", |stage| stage.depths()),
-    ("wide", |stage| stage.wide()),
-    ("hold", |stage| stage.hold()),
-    ("rests", |stage| stage.rests()),
+const PARTS: [(&str, DiagnosePart); 11] = [
+    ("drift", |builder| builder.drift()),
+    ("repeats", |builder| builder.repeats()),
+    ("ladder", |builder| builder.ladder()),
+    ("rates", |builder| builder.rates()),
+    ("approach", |builder| builder.approach()),
+    ("reversals", |builder| builder.reversals()),
+    ("tilt", |builder| builder.tilt()),
+    ("depths", |builder| builder.depths()),
+    ("wide", |builder| builder.wide()),
+    ("hold", |builder| builder.hold()),
+    ("rests", |builder| builder.rests()),
 ];
 
 /// Parts that press no element which must answer.
 const WITHOUT_SITES: [&str; 4] = ["drift", "tilt", "depths", "wide"];
 
-impl<'a> Bench<'a> {
+impl<'a> DesignSpace<'a> {
     /// As the last frames left it.
     pub(super) fn of(known: &'a Known, frames: &'a Frames) -> Self {
         let covering_mm = frames.covering_mm.last().copied().unwrap_or(1.0);
@@ -100,13 +100,13 @@ impl<'a> Bench<'a> {
         let mut designs: Vec<Design> = Vec::new();
         for (name, part) in PARTS {
             for scale in SCALES {
-                let mut stage = Stage::new(self, scale);
-                stage.wait(1.0);
+                let mut builder = DesignBuilder::new(self, scale);
+                builder.wait(1.0);
                 if !WITHOUT_SITES.contains(&name) {
-                    stage.find_sites();
+                    builder.find_sites();
                 }
-                stage.wait(0.5);
-                part(&mut stage);
+                builder.wait(0.5);
+                part(&mut builder);
                 let mut parameters = vec![("parts", name.to_owned())];
                 if scale < 1.0 {
                     parameters.push(("scale", scale.to_string()));
@@ -118,7 +118,7 @@ impl<'a> Bench<'a> {
                 if name == "rates" && speeds.len() < SPEEDS_MM_PER_S.len() {
                     parameters.push(("speeds_mm_per_s", list(&speeds)));
                 }
-                designs.push(stage.design(name, "diagnose", parameters));
+                designs.push(builder.design(name, "diagnose", parameters));
             }
         }
         designs.push(self.element_centres());
@@ -135,21 +135,21 @@ impl<'a> Bench<'a> {
         let deepest_mm = ELEMENT_DEPTHS_MM[4];
         let by = if NEARLY * self.deepest_mm >= deepest_mm { 1.0 } else { self.deepest_mm / deepest_mm };
         let depths_mm = ELEMENT_DEPTHS_MM.map(|depth_mm| (1000.0 * by * depth_mm).floor() / 1000.0);
-        let mut stage = Stage::new(self, 1.0);
-        let mut centres_mm = stage.centres_mm.clone();
-        stage.chance.shuffle(&mut centres_mm);
+        let mut builder = DesignBuilder::new(self, 1.0);
+        let mut centres_mm = builder.centres_mm.clone();
+        builder.rng.shuffle(&mut centres_mm);
         for centre_mm in centres_mm {
-            stage.press(centre_mm, &depths_mm, DWELL_S);
+            builder.press(centre_mm, &depths_mm, DWELL_S);
         }
         let parameters = if by < 1.0 { vec![("depths_mm", list(&depths_mm))] } else { Vec::new() };
-        stage.design("element-centres", "element-centres", parameters)
+        builder.design("element-centres", "element-centres", parameters)
     }
 
     /// Five by five places about the middle, under the covering in place.
     fn grid_sweep(&self) -> Design {
         let shares = [0.3, 0.5, 0.65].map(|share: f64| share.min(self.deepest_mm / self.covering_mm));
-        let mut stage = Stage::new(self, 1.0);
-        let [x_mm, y_mm] = stage.sites_mm[0];
+        let mut builder = DesignBuilder::new(self, 1.0);
+        let [x_mm, y_mm] = builder.sites_mm[0];
         let mut presses = Vec::new();
         for row in -2..=2 {
             for col in -2..=2 {
@@ -157,9 +157,9 @@ impl<'a> Bench<'a> {
                 presses.extend(shares.map(|share| (at_mm, share * self.covering_mm)));
             }
         }
-        stage.chance.shuffle(&mut presses);
+        builder.rng.shuffle(&mut presses);
         for (at_mm, depth_mm) in presses {
-            stage.press(at_mm, &[depth_mm], DWELL_S);
+            builder.press(at_mm, &[depth_mm], DWELL_S);
         }
         let mut parameters = vec![
             ("coverings_mm", list(&[self.covering_mm])),
@@ -169,7 +169,7 @@ impl<'a> Bench<'a> {
         if shares[2] < 0.65 {
             parameters.push(("depth_shares", list(&shares.map(|share| (100.0 * share).floor() / 100.0))));
         }
-        stage.design("grid-sweep", "grid-sweep", parameters)
+        builder.design("grid-sweep", "grid-sweep", parameters)
     }
 }
 
@@ -185,24 +185,24 @@ fn list(values: &[f64]) -> String {
 }
 
 /// The stage on its way.
-struct Stage<'a> {
-    bench: &'a Bench<'a>,
+struct DesignBuilder<'a> {
+    space: &'a DesignSpace<'a>,
     registration: Registration,
     centres_mm: Vec<[f64; 2]>,
     /// The middle element and two others, as `diagnose` chooses them where none is faulty.
     sites_mm: [[f64; 2]; 3],
     depth_mm: f64,
     scale: f64,
-    chance: Chance,
+    rng: Rng,
     t_s: f64,
     at_mm: [f64; 3],
     press: i32,
     frames: Frames,
 }
 
-impl<'a> Stage<'a> {
-    fn new(bench: &'a Bench<'a>, scale: f64) -> Self {
-        let array = &bench.known.array;
+impl<'a> DesignBuilder<'a> {
+    fn new(space: &'a DesignSpace<'a>, scale: f64) -> Self {
+        let array = &space.known.array;
         let centres_mm: Vec<[f64; 2]> =
             (0..array.elements()).filter_map(|element| array.centre_mm(element)).collect();
         let middle_mm = array.extent_mm().map(|[least, most]| f64::midpoint(least, most));
@@ -210,18 +210,18 @@ impl<'a> Stage<'a> {
         let away = |at: &[f64; 2]| (at[0] - middle_mm[0]).abs() + (at[1] - middle_mm[1]).abs();
         from_middle.sort_by(|one, other| away(one).total_cmp(&away(other)));
         let count = from_middle.len();
-        let [x, y] = bench.known.registration.to_robot(middle_mm);
+        let [x, y] = space.known.registration.to_robot(middle_mm);
         Self {
-            bench,
-            registration: bench.known.registration,
+            space,
+            registration: space.known.registration,
             sites_mm: [0, count / 3, 2 * count / 3]
                 .map(|place| from_middle.get(place).copied().unwrap_or(middle_mm)),
             centres_mm,
-            depth_mm: bench.depth_share * bench.covering_mm,
+            depth_mm: space.depth_share * space.covering_mm,
             scale,
-            chance: Chance::new(1),
+            rng: Rng::new(1),
             t_s: 0.0,
-            at_mm: [x, y, bench.safe_mm],
+            at_mm: [x, y, space.safe_mm],
             press: 0,
             frames: Frames::new(array.elements()),
         }
@@ -267,8 +267,8 @@ impl<'a> Stage<'a> {
     }
 
     fn rates(&mut self) {
-        let mut speeds = self.bench.speeds_mm_per_s().repeat(self.times(3));
-        self.chance.shuffle(&mut speeds);
+        let mut speeds = self.space.speeds_mm_per_s().repeat(self.times(3));
+        self.rng.shuffle(&mut speeds);
         for load_mm_per_s in speeds {
             self.press_from(self.sites_mm[0], &[self.depth_mm], DWELL_S, load_mm_per_s, [0.0; 2]);
         }
@@ -276,7 +276,7 @@ impl<'a> Stage<'a> {
 
     fn approach(&mut self) {
         for way_mm in self.ways(5) {
-            self.press_from(self.sites_mm[0], &[self.depth_mm], DWELL_S, self.bench.load_mm_per_s, way_mm);
+            self.press_from(self.sites_mm[0], &[self.depth_mm], DWELL_S, self.space.load_mm_per_s, way_mm);
         }
     }
 
@@ -295,7 +295,7 @@ impl<'a> Stage<'a> {
             }
             let depths_mm = [self.depth_mm / 4.0, self.depth_mm];
             for way_mm in self.ways(3) {
-                self.press_from([x + 0.5, y + 0.5], &depths_mm, DWELL_S, self.bench.load_mm_per_s, way_mm);
+                self.press_from([x + 0.5, y + 0.5], &depths_mm, DWELL_S, self.space.load_mm_per_s, way_mm);
             }
         }
     }
@@ -309,7 +309,7 @@ impl<'a> Stage<'a> {
     }
 
     fn wide(&mut self) {
-        let [rows, cols] = [self.bench.known.array.rows(), self.bench.known.array.cols()];
+        let [rows, cols] = [self.space.known.array.rows(), self.space.known.array.cols()];
         let mut places_mm = Vec::new();
         for row in [0, (rows - 1) / 2, rows - 1] {
             for col in [0, (cols - 1) / 2, cols - 1] {
@@ -320,7 +320,7 @@ impl<'a> Stage<'a> {
                 }
             }
         }
-        self.chance.shuffle(&mut places_mm);
+        self.rng.shuffle(&mut places_mm);
         places_mm.truncate(self.times(places_mm.len()));
         for place_mm in places_mm {
             self.press(place_mm, &[self.depth_mm], 2.0);
@@ -348,10 +348,10 @@ impl<'a> Stage<'a> {
 
     /// Presses beside some of the elements, in random order, to shares of the depth.
     fn elements(&mut self, is_one: fn(usize, usize) -> bool, pitches: f64, shares: &[f64], dwell_s: f64) {
-        let cols = self.bench.known.array.cols();
+        let cols = self.space.known.array.cols();
         let some = self.centres_mm.iter().enumerate().filter(|(index, _)| is_one(index / cols, index % cols));
         let mut chosen_mm: Vec<[f64; 2]> = some.map(|(_, centre_mm)| *centre_mm).collect();
-        self.chance.shuffle(&mut chosen_mm);
+        self.rng.shuffle(&mut chosen_mm);
         chosen_mm.truncate(self.times(chosen_mm.len()));
         let depths_mm: Vec<f64> = shares.iter().map(|share| share * self.depth_mm).collect();
         for centre_mm in chosen_mm {
@@ -360,19 +360,19 @@ impl<'a> Stage<'a> {
     }
 
     fn inwards(&self, [x, y]: [f64; 2], pitches: f64) -> [f64; 2] {
-        let middle_mm = self.bench.known.array.extent_mm().map(|[least, most]| f64::midpoint(least, most));
+        let middle_mm = self.space.known.array.extent_mm().map(|[least, most]| f64::midpoint(least, most));
         let by_mm = pitches * self.pitch_mm();
         [x + if x < middle_mm[0] { by_mm } else { -by_mm }, y + if y < middle_mm[1] { by_mm } else { -by_mm }]
     }
 
     fn pitch_mm(&self) -> f64 {
-        self.bench.known.array.pitch_mm()
+        self.space.known.array.pitch_mm()
     }
 
     fn ways(&mut self, full: usize) -> Vec<[f64; 2]> {
         let four_mm = [[-ASIDE_MM, 0.0], [ASIDE_MM, 0.0], [0.0, -ASIDE_MM], [0.0, ASIDE_MM]];
         let mut ways_mm = four_mm.repeat(self.times(full));
-        self.chance.shuffle(&mut ways_mm);
+        self.rng.shuffle(&mut ways_mm);
         ways_mm
     }
 
@@ -384,7 +384,7 @@ impl<'a> Stage<'a> {
     }
 
     fn press(&mut self, at_mm: [f64; 2], depths_mm: &[f64], dwell_s: f64) {
-        self.press_from(at_mm, depths_mm, dwell_s, self.bench.load_mm_per_s, [0.0; 2]);
+        self.press_from(at_mm, depths_mm, dwell_s, self.space.load_mm_per_s, [0.0; 2]);
     }
 
     fn press_from(
@@ -397,7 +397,7 @@ impl<'a> Stage<'a> {
     ) {
         let [x, y] = self.registration.to_robot(at_mm);
         let [aside_x, aside_y] = self.registration.to_robot([at_mm[0] + from_mm[0], at_mm[1] + from_mm[1]]);
-        let (safe_mm, index) = (self.bench.safe_mm, self.press);
+        let (safe_mm, index) = (self.space.safe_mm, self.press);
         self.press += 1;
         self.go([aside_x, aside_y, safe_mm], TRAVEL_MM_PER_S, -1, Phase::Idle);
         self.go([aside_x, aside_y, APPROACH_MM], TRAVEL_MM_PER_S, index, Phase::Approach);
@@ -429,7 +429,7 @@ impl<'a> Stage<'a> {
         self.at_mm = to_mm;
         let counts = vec![0.0; self.frames.elements];
         loop {
-            let t_s = self.frames.len() as f64 * self.bench.interval_s;
+            let t_s = self.frames.len() as f64 * self.space.interval_s;
             if t_s >= self.t_s {
                 return;
             }
@@ -442,8 +442,8 @@ impl<'a> Stage<'a> {
                 phase,
                 t_ns,
                 position_mm: [0, 1, 2].map(|axis| from_mm[axis] + share * (to_mm[axis] - from_mm[axis])),
-                covering_mm: self.bench.covering_mm,
-                indenter: self.bench.indenter,
+                covering_mm: self.space.covering_mm,
+                indenter: self.space.indenter,
                 temperature_c: None,
                 counts: &counts,
             });

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{Discovery, Estimated, Step};
+use tactus_discover::{AddedEffect, Discovery, Estimated};
 use tactus_model::{Effect, effect::Definition};
 
 use super::words::{self, list};
@@ -29,7 +29,7 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
     writeln!(f, "</section>")
 }
 
-fn step(f: &mut fmt::Formatter<'_>, step: &Step) -> fmt::Result {
+fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {
     let definition = Definition::find(step.effect).ok();
     let summary = definition.map_or("", |definition| definition.summary);
     writeln!(f, "<h3>{}</h3>\n<p>{}.</p>", Text(step.effect), Text(capital(summary)))?;

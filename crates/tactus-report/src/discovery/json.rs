@@ -5,7 +5,9 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use tactus_discover::{Candidate, Curve, Discovery, Estimated, Gap, Level, NextExperiment, Round, Step};
+use tactus_discover::{
+    AddedEffect, Curve, Discovery, Estimated, Gap, Level, NextExperiment, Round, TriedEffect,
+};
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
 
@@ -291,7 +293,7 @@ impl<'a> RoundJson<'a> {
 }
 
 impl<'a> CandidateJson<'a> {
-    fn of(candidate: &'a Candidate) -> Self {
+    fn of(candidate: &'a TriedEffect) -> Self {
         Self {
             effect: candidate.effect,
             score: candidate.score,
@@ -303,7 +305,7 @@ impl<'a> CandidateJson<'a> {
 }
 
 impl<'a> StepJson<'a> {
-    fn of(step: &'a Step) -> Self {
+    fn of(step: &'a AddedEffect) -> Self {
         let numbered = step.terms.iter().enumerate().flat_map(|(nth, term)| {
             let suffix = if nth == 0 { String::new() } else { format!("#{}", nth + 1) };
             term.iter().map(move |one| (format!("{}{suffix}", one.name), EstimateJson::of(one)))

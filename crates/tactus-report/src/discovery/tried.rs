@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{Candidate, Discovery, Round};
+use tactus_discover::{Discovery, Round, TriedEffect};
 
 use super::words::{list, percent};
 use crate::{
@@ -35,7 +35,7 @@ fn round(f: &mut fmt::Formatter<'_>, nth: usize, round: &Round) -> fmt::Result {
         format!("the model has {}", list(&round.with))
     };
     writeln!(f, "<h3>Round {nth}: {}</h3>", Text(with))?;
-    let (fitted, scored): (Vec<&Candidate>, Vec<&Candidate>) =
+    let (fitted, scored): (Vec<&TriedEffect>, Vec<&TriedEffect>) =
         round.candidates.iter().partition(|candidate| candidate.heldout_rms_counts.is_some());
     if !fitted.is_empty() {
         let mut table = Table::new(&[

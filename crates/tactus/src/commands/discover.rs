@@ -91,7 +91,7 @@ fn analysed(
         DiscoverError::TooLittle(_) => {
             anyhow!("{error}; `tactus run diagnose` measures enough; give its recording beside these data")
         }
-        DiscoverError::Model(_) | DiscoverError::Effect(_) => error.into(),
+        DiscoverError::Model(_) | DiscoverError::Effect(_) | DiscoverError::Threads { .. } => error.into(),
     })?;
     Ok(Discovered { measured, model, known, discovery, active: Vec::new() })
 }

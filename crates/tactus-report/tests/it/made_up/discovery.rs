@@ -1,8 +1,8 @@
 //! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
-    Base, Candidate, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level, NextExperiment,
-    NotShown, Point, Round, Split, Step, Unexplained, Verdict,
+    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level,
+    NextExperiment, NotShown, Point, Round, Split, TriedEffect, Unexplained, Verdict,
 };
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
 use tactus_report::discovery::{DataSource, DiscoveryReport};
@@ -59,7 +59,7 @@ pub(crate) fn explained() -> Discovery {
             .collect(),
         rounds: rounds(),
         steps: vec![
-            Step {
+            AddedEffect {
                 effect: "hysteresis",
                 terms: vec![vec![
                     estimated(hysteresis[0], 0.123_4, Some(0.004_1)),
@@ -71,7 +71,7 @@ pub(crate) fn explained() -> Discovery {
                 heldout_rms_after_counts: 2.08,
                 equivalent: vec!["backlash"],
             },
-            Step {
+            AddedEffect {
                 effect: "miswired",
                 terms: [[18.0, 19.0], [19.0, 18.0]]
                     .map(|[element, answers_for]| {
@@ -232,8 +232,8 @@ fn gap(covariate: &'static str, unit: &'static str, range: [f64; 2], effect_size
     Gap { covariate, unit, range, effect_size, q_value }
 }
 
-fn tried(effect: &'static str, score: f64, p_value: f64, fitted: Option<(f64, f64)>) -> Candidate {
-    Candidate {
+fn tried(effect: &'static str, score: f64, p_value: f64, fitted: Option<(f64, f64)>) -> TriedEffect {
+    TriedEffect {
         effect,
         score,
         p_value,
@@ -266,8 +266,8 @@ fn neutral(name: &str) -> Vec<(&'static str, f64)> {
     Effect::neutral(definition).parameters().collect()
 }
 
-fn base() -> Base {
-    Base {
+fn base() -> BaseModel {
+    BaseModel {
         psf: Psf::PAPER,
         response: Response {
             sensitivity_counts_per_mm: vec![1000.0; 48],
@@ -277,6 +277,6 @@ fn base() -> Base {
             reference_covering: Covering { thickness_mm: 1.016 },
         },
         run_baselines_counts: vec![vec![100.0; 48]],
-        run_wander: None,
+        run_walks: None,
     }
 }

@@ -144,7 +144,7 @@ impl ChosenExperiment {
 }
 
 fn undecided(found: &Discovery) -> Vec<AmbiguousEffect> {
-    let of = |step: &tactus_discover::Step| AmbiguousEffect {
+    let of = |step: &tactus_discover::AddedEffect| AmbiguousEffect {
         effect: step.effect,
         equivalent: step.equivalent.clone(),
     };

@@ -1,6 +1,6 @@
 //! The grown model of a discovery.
 
-use tactus_discover::{Discovery, Estimated, Step};
+use tactus_discover::{AddedEffect, Discovery, Estimated};
 use tactus_model::Effect;
 use tactus_schema::Model;
 use tactus_schema::model::{BaseModel, Evidence, KnownEffect};
@@ -13,7 +13,7 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
     let effects = found.effects.iter().enumerate().map(|(nth, effect)| {
         let added = found.steps.iter().find_map(|step| Some((step, term(step, effect)?)));
         // A random walk of each element is one step with many effects.
-        let is_part = |step: &&Step| nth >= before.effects.len() && step.effect == effect.name();
+        let is_part = |step: &&AddedEffect| nth >= before.effects.len() && step.effect == effect.name();
         let part = || found.steps.iter().find(is_part).map(|step| (step, &[][..]));
         let Some((step, term)) = added.or_else(part) else {
             let known = before.effects.get(nth).filter(|known| known.effect.name() == effect.name());
@@ -39,7 +39,7 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
 }
 
 /// The term of a step that belongs to this effect.
-fn term<'a>(step: &'a Step, effect: &Effect) -> Option<&'a [Estimated]> {
+fn term<'a>(step: &'a AddedEffect, effect: &Effect) -> Option<&'a [Estimated]> {
     let is = |term: &&Vec<Estimated>| term.iter().all(|one| effect.value(one.name) == Some(one.value));
     (step.effect == effect.name()).then(|| step.terms.iter().find(is)).flatten().map(Vec::as_slice)
 }

@@ -44,11 +44,11 @@ pub(crate) fn found(model: &Model) -> Discovery {
             .to_vec()
     };
     let level = Level { heldout_rms_counts: 2.0, heldout_chi2: 1.0 };
-    let base = tactus_discover::Base {
+    let base = tactus_discover::BaseModel {
         psf: model.base.psf,
         response: model.base.response.clone(),
         run_baselines_counts: vec![model.base.response.baseline_counts.clone()],
-        run_wander: None,
+        run_walks: None,
     };
     let mut grown = base.clone();
     grown.psf.sigma_intercept_mm = 2.3;
@@ -71,7 +71,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
         curves: Vec::new(),
         elements: Vec::new(),
         rounds: Vec::new(),
-        steps: vec![Step {
+        steps: vec![AddedEffect {
             effect: "miswired",
             terms: vec![term(miswired(18.0, 19.0)), term(miswired(19.0, 18.0))],
             p_value: 1e-5,
@@ -143,7 +143,7 @@ fn the_parts_of_a_wander_have_the_evidence_of_the_whole() {
     let part = Effect::neutral(Definition::find("baseline-drift").unwrap());
     let part = part.with("element", 20.0).unwrap().with("offset_01_counts", 0.5).unwrap();
     let whole = vec![Estimated { name: "rms_counts", value: 0.6, standard_error: None }];
-    found.steps.push(Step { effect: "baseline-drift", terms: vec![whole], ..found.steps[0].clone() });
+    found.steps.push(AddedEffect { effect: "baseline-drift", terms: vec![whole], ..found.steps[0].clone() });
     found.effects.push(part.clone());
     let model = grown(&before, &found, "a");
     let known = model.effects.last().unwrap();

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tactus_calibrate::Estimate;
-use tactus_discover::{Estimated, Step};
+use tactus_discover::{AddedEffect, Estimated};
 use tactus_report::discovery::{
     AmbiguousEffect, DiscoveryReport, Proposal, command, in_words, not_shown, proposals,
 };
@@ -90,7 +90,7 @@ fn facts(report: &DiscoveryReport<'_>) {
 }
 
 /// One line per term; the first also has the values of the whole step.
-fn step(step: &Step) -> Vec<Vec<String>> {
+fn step(step: &AddedEffect) -> Vec<Vec<String>> {
     let of_step = |nth: usize, text: String| if nth == 0 { text } else { String::new() };
     let rows = step.terms.iter().enumerate().map(|(nth, term)| {
         let (before, after) = (step.heldout_rms_before_counts, step.heldout_rms_after_counts);

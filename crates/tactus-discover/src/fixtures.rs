@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Registration, Response};
 use tactus_schema::table::{Phase, RowView};
 
-use crate::{Base, Discovery, Frames, Known, Options, Rule, discover, predict};
+use crate::{BaseModel, Discovery, Frames, Known, Options, Rule, discover, predict};
 
 pub(crate) const ELEMENTS: usize = 48;
 pub(crate) const INTERVAL_S: f64 = 0.1;
@@ -59,11 +59,11 @@ fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
 /// What a model with effects gives for the presses, and upon it what else there is: frame by frame, element by element.
 pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
     let blank = frames(known, |_| vec![0.0; ELEMENTS]);
-    let base = Base {
+    let base = BaseModel {
         psf: known.psf,
         response: known.response.clone(),
         run_baselines_counts: vec![vec![100.0; ELEMENTS]],
-        run_wander: None,
+        run_walks: None,
     };
     let clean = predict(known, &blank, &base, effects).unwrap();
     frames(known, |frame| {

@@ -2,7 +2,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::bench::{ELEMENTS, INTERVAL_S, found, known, measured, processes};
+use crate::fixtures::{ELEMENTS, INTERVAL_S, found, known, measured, processes};
 use crate::{Verdict, predict};
 
 const NOISE_COUNTS: f64 = 1.0;
@@ -42,9 +42,9 @@ fn kriging(readings: &[Vec<f64>], heldout: &[bool]) -> f64 {
 fn zeros_that_wander_each_for_itself_are_followed_nearly_as_well_as_can_be() {
     let known = known();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let wander = processes(ELEMENTS, RMS_COUNTS, TIME_S, &mut rng);
+    let walk = processes(ELEMENTS, RMS_COUNTS, TIME_S, &mut rng);
     let noise = processes(ELEMENTS, NOISE_COUNTS, 1e-3, &mut rng);
-    let upon = sum(&wander, &noise);
+    let upon = sum(&walk, &noise);
     let frames = measured(&known, &[], &upon);
     let found = found(&known, &frames);
     let names: Vec<&str> = found.steps.iter().map(|step| step.effect).collect();
@@ -78,9 +78,9 @@ fn zeros_that_wander_each_for_itself_are_followed_nearly_as_well_as_can_be() {
 fn a_zero_that_all_share_is_one_curve() {
     let known = known();
     let mut rng = ChaCha8Rng::seed_from_u64(6);
-    let wander = processes(1, RMS_COUNTS, 2.0 * TIME_S, &mut rng);
+    let walk = processes(1, RMS_COUNTS, 2.0 * TIME_S, &mut rng);
     let noise = processes(ELEMENTS, NOISE_COUNTS, 1e-3, &mut rng);
-    let found = found(&known, &measured(&known, &[], &sum(&wander, &noise)));
+    let found = found(&known, &measured(&known, &[], &sum(&walk, &noise)));
     assert_eq!(found.steps[0].effect, "baseline-drift");
     assert_eq!(found.steps[0].terms[0][2].name, "duration_s");
 }

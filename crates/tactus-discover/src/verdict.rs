@@ -3,18 +3,18 @@
 use tactus_model::{Effect, Response};
 
 use crate::discovery::{
-    Base, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, NotShown, Split, Step, Unexplained,
-    Verdict,
+    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, NotShown, Split,
+    Unexplained, Verdict,
 };
 use crate::fit::Fitted;
 use crate::locate::Located;
 use crate::next::{Explanation, Pair, Setting};
 use crate::noise::Noise;
+use crate::predictor::{Parameters, Predictor, Term};
 use crate::prepare::Prepared;
+use crate::random_walk::RandomWalk;
 use crate::score::{q_values, sign_flip_p};
 use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Rivals, Search, Tried, names, without};
-use crate::sensor::{Parameters, Sensor, Term};
-use crate::wander::Wander;
 use crate::{DiscoverError, Options, Rule, not_shown};
 
 /// What is left of the gap at most, for the verdict.
@@ -30,7 +30,7 @@ const LEFT_SHARE: f64 = 0.45;
 const LONE_SHARE: f64 = 0.5;
 
 /// What a search found.
-pub(crate) struct Found {
+pub(crate) struct SearchOutcome {
     /// Effects that were no candidates.
     pub(crate) lacking: Vec<NotShown>,
     pub(crate) base: Fitted,
@@ -43,7 +43,7 @@ pub(crate) struct Found {
 }
 
 /// A model against the held-out frames.
-struct Held {
+struct HeldOutResidual {
     level: Level,
     /// Root mean square of each element.
     elements_rms_counts: Vec<f64>,
@@ -52,14 +52,14 @@ struct Held {
 }
 
 /// Tells what was found.
-pub(crate) fn tell(
+pub(crate) fn conclude(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
-    found: Found,
+    found: SearchOutcome,
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { known, frames, heldout, lattice, .. } = prepared;
-    let Found { lacking, base, mut grown, rounds, equivalent, before, after } = found;
+    let SearchOutcome { lacking, base, mut grown, rounds, equivalent, before, after } = found;
     // Two tests, each at half the chance.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
@@ -93,7 +93,7 @@ pub(crate) fn tell(
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
     let floor = prepared.floor_counts(&of_grown);
     let in_noise = |level: Level| Level { heldout_chi2: (level.heldout_rms_counts / floor).powi(2), ..level };
-    let squares = |held: &Held| held.level.heldout_rms_counts.powi(2);
+    let squares = |held: &HeldOutResidual| held.level.heldout_rms_counts.powi(2);
     let (gap, closed) = (squares(&of_base) - floor.powi(2), squares(&of_base) - squares(&of_grown));
 
     let mut not_shown = lacking;
@@ -114,7 +114,7 @@ pub(crate) fn tell(
             gain: without.cost - grown.cost,
         }));
     }
-    let setting = Setting { known, frames, noise: &prepared.noise, threads: &prepared.threads };
+    let setting = Setting { known, frames, noise: &prepared.noise };
     let mut next_experiments = setting.propose(&pairs)?;
     next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
 
@@ -167,8 +167,8 @@ pub(crate) fn tell(
 }
 
 /// A converter that is coarser than declared: what was added where its readings say so.
-fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> Step {
-    Step {
+fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffect {
+    AddedEffect {
         effect: "quantisation",
         terms: vec![vec![Estimated { name: "step_counts", value: step_counts, standard_error: None }]],
         p_value,
@@ -180,25 +180,25 @@ fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> Step {
     }
 }
 
-fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> Base {
+fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> BaseModel {
     let response = Response {
         sensitivity_counts_per_mm: parameters.sensitivity.clone(),
         baseline_counts: parameters.mean_baseline(),
         ..prepared.known.response.clone()
     };
-    Base {
+    BaseModel {
         psf: parameters.psf,
         response,
         run_baselines_counts: parameters.baseline.clone(),
-        run_wander: parameters.wander.as_ref().and_then(Wander::apart),
+        run_walks: parameters.walk.as_ref().and_then(RandomWalk::apart),
     }
 }
 
 impl Prepared<'_> {
     /// How far a model is from the held-out frames, all together and element by element.
-    fn held(&self, parameters: &Parameters) -> Result<Held, DiscoverError> {
+    fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
         let Self { known, frames, heldout, noise, whole, .. } = self;
-        let predicted = Sensor::new(known, frames, whole).predict(parameters)?;
+        let predicted = Predictor::new(known, frames, whole).predict(parameters)?;
         let elements = frames.elements;
         let mut squares = vec![0.0; elements];
         let mut count = 0.0_f64;
@@ -214,7 +214,7 @@ impl Prepared<'_> {
         let mean = squares.iter().sum::<f64>() / (count * elements as f64);
         #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
         let residual = frames.counts.iter().zip(&predicted).map(|(counts, of)| counts - *of as f32).collect();
-        Ok(Held {
+        Ok(HeldOutResidual {
             level: Level { heldout_rms_counts: mean.sqrt(), heldout_chi2: mean / noise.rms_counts.powi(2) },
             elements_rms_counts: squares.into_iter().map(|sum| (sum / count).sqrt()).collect(),
             residual,
@@ -222,7 +222,7 @@ impl Prepared<'_> {
     }
 
     /// The noise once the model is known: a tone looks like noise until then.
-    fn floor_counts(&self, grown: &Held) -> f64 {
+    fn floor_counts(&self, grown: &HeldOutResidual) -> f64 {
         let left = Noise::of_residual(self.frames, &grown.residual, &self.still, self.step_counts);
         left.map_or(self.noise.rms_counts, |left| left.rms_counts.min(self.noise.rms_counts))
     }
@@ -253,7 +253,11 @@ impl Search<'_> {
     }
 
     /// What was added, each name once.
-    pub(crate) fn steps(&self, grown: &Fitted, equivalent: &Equivalent) -> Result<Vec<Step>, DiscoverError> {
+    pub(crate) fn steps(
+        &self,
+        grown: &Fitted,
+        equivalent: &Equivalent,
+    ) -> Result<Vec<AddedEffect>, DiscoverError> {
         let names = names(&grown.parameters, self.known_terms);
         let mut steps = Vec::new();
         for name in names {
@@ -277,7 +281,7 @@ impl Search<'_> {
                     .collect()
             };
             let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
-            steps.push(Step {
+            steps.push(AddedEffect {
                 effect: name,
                 terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
                 p_value,

@@ -1,58 +1,58 @@
-//! Frames made fewer: where the tip rests, consecutive frames become one row, their mean.
+//! Bins of frames: where the tip rests, consecutive frames are averaged into one bin.
 //!
-//! Frames in motion stay as they are. Once the tip rests, each row holds more frames than the one before, up to
-//! half a second: what relaxes is followed as closely as it changes.
+//! A frame in motion is a bin of its own. Once the tip rests, each bin holds more frames than the one before, up to half a
+//! second, so bins are short where relaxation is fast.
 
 use tactus_model::{Phase, Trajectory, TrajectoryError};
 
-use crate::chance::Chance;
 use crate::noise::Noise;
+use crate::rng::Rng;
 use crate::{DiscoverError, Frames};
 
-/// A tip that moved less did not move.
+/// A smaller movement counts as none.
 const STILL_MM: f64 = 0.001;
-/// A tip so high above the surface changes nothing, wherever it moves.
+/// Above this height, movements of the tip do not affect the readings.
 const CLEAR_MM: f64 = 0.25;
-/// A row holds at most this share of the frames since the tip came to rest.
+/// Greatest number of frames in a bin, as a share of the frames since the tip came to rest.
 const GROWTH: f64 = 0.25;
-/// A row holds at most so many frames.
+/// Greatest number of frames in a bin.
 const FRAMES_MAX: usize = 15;
-/// Readings further apart are taken to be independent; more if their noise says so.
+/// Least duration of a block. Readings of different blocks are taken to be independent.
 const BLOCK_S: f64 = 3.0;
-/// A stretch of rest this long is split between fitted and held-out rows.
+/// Longest stretch of rest that is fitted or held out as a unit.
 const STRETCH_S: f64 = 10.0;
-/// Near the surface, a frame at which the speed of the stage changes by more does not count: where the tip was, as it
-/// stopped or went off, is not known between two reports of the stage, and no stage does so at once.
+/// Near the surface, a frame at which the speed of the stage changes by more is ignored: the stage does not start or stop at
+/// once, and between two of its reports the position of the tip is not known.
 const TURN_MM_PER_S: f64 = 1.2;
 /// One press in so many is held out.
 const HELDOUT_ONE_IN: usize = 3;
 
-/// Rows in order of time, run by run.
+/// Bins in order of time, run by run.
 #[derive(Debug)]
-pub(crate) struct Rows {
+pub(crate) struct Bins {
     pub(crate) elements: usize,
-    /// First frame of each row; the last entry is the number of frames.
+    /// First frame of each bin; one more entry holds the number of frames.
     pub(crate) first: Vec<usize>,
     pub(crate) run: Vec<usize>,
-    /// Mean time of the row's frames.
+    /// Mean time of the bin's frames since the run's first frame.
     pub(crate) t_s: Vec<f64>,
-    /// Mean counts, row by row.
+    /// Mean counts, bin by bin.
     pub(crate) counts: Vec<f64>,
-    /// Inverse variance of a row's mean for a noise of one count; 0 for rows that are left out.
+    /// Inverse variance of a bin's mean for a noise of one count; 0 for bins that are ignored.
     pub(crate) weight: Vec<f64>,
-    /// Rows of one block may be dependent; blocks are not.
+    /// Block of each bin. Bins of one block may be dependent, blocks are independent.
     pub(crate) block: Vec<usize>,
     pub(crate) blocks: usize,
-    /// True for rows that are not fitted.
+    /// True for bins that are not fitted.
     pub(crate) heldout: Vec<bool>,
-    /// The way of the tip in each run.
+    /// Path of the tip in each run.
     pub(crate) paths: Vec<Trajectory>,
 }
 
-/// What was held out.
+/// The held-out part of the data.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct HeldOut {
-    /// Of each frame.
+    /// Whether each frame is held out.
     pub(crate) frames: Vec<bool>,
     pub(crate) train_presses: usize,
     pub(crate) presses: usize,
@@ -60,12 +60,12 @@ pub(crate) struct HeldOut {
     pub(crate) coverings_mm: Vec<f64>,
 }
 
-/// Of every frame, how many frames before it the tip stood at the same place, the frame itself not counted.
+/// For every frame, the number of frames directly before it in which the tip was at the same place.
 pub(crate) fn still(frames: &Frames) -> Vec<usize> {
     unchanged(frames, f64::INFINITY)
 }
 
-/// As [`still`], moves above a height not counted.
+/// As [`still`], but ignores moves above a height.
 fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
     let mut still = vec![0; frames.len()];
     let mut begin = 0;
@@ -87,9 +87,9 @@ fn unchanged(frames: &Frames, clear_mm: f64) -> Vec<usize> {
     still
 }
 
-impl Rows {
-    /// Rows of several frames where that loses nothing (`thin`), or of one each; none weighted yet.
-    pub(crate) fn of(frames: &Frames, thin: bool) -> Result<Self, DiscoverError> {
+impl Bins {
+    /// Bins of several frames where the tip rests (`average`), or of one frame each; not weighted yet.
+    pub(crate) fn of(frames: &Frames, average: bool) -> Result<Self, DiscoverError> {
         let unchanged = unchanged(frames, CLEAR_MM);
         let elements = frames.elements;
         let (mut first, mut run, mut t_s, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -100,8 +100,11 @@ impl Rows {
             let mut frame = begin;
             while frame < *end {
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
-                let most =
-                    if thin { ((GROWTH * unchanged[frame] as f64) as usize).clamp(1, FRAMES_MAX) } else { 1 };
+                let most = if average {
+                    ((GROWTH * unchanged[frame] as f64) as usize).clamp(1, FRAMES_MAX)
+                } else {
+                    1
+                };
                 let mut next = frame + 1;
                 while next < *end
                     && next - frame < most
@@ -125,7 +128,7 @@ impl Rows {
             }
             begin = *end;
         }
-        let rows = run.len();
+        let bins = run.len();
         first.push(frames.len());
         Ok(Self {
             elements,
@@ -133,10 +136,10 @@ impl Rows {
             run,
             t_s,
             counts,
-            weight: vec![1.0; rows],
-            block: vec![0; rows],
+            weight: vec![1.0; bins],
+            block: vec![0; bins],
             blocks: 1,
-            heldout: vec![false; rows],
+            heldout: vec![false; bins],
             paths,
         })
     }
@@ -145,53 +148,54 @@ impl Rows {
         self.run.len()
     }
 
-    /// Frames in a row.
-    pub(crate) fn frames_in(&self, row: usize) -> usize {
-        self.first[row + 1] - self.first[row]
+    /// Number of frames in a bin.
+    pub(crate) fn frames_in(&self, bin: usize) -> usize {
+        self.first[bin + 1] - self.first[bin]
     }
 
     /// True if the tip was clear of the surface.
-    pub(crate) fn is_clear(&self, frames: &Frames, row: usize) -> bool {
-        frames.position_mm[self.first[row]][2] > CLEAR_MM
+    pub(crate) fn is_clear(&self, frames: &Frames, bin: usize) -> bool {
+        frames.position_mm[self.first[bin]][2] > CLEAR_MM
     }
 
-    /// Weighs rows by their noise, and cuts them into blocks.
+    /// Sets the bins' weights from the noise, and divides them into blocks.
     pub(crate) fn weigh(&mut self, frames: &Frames, noise: &Noise, heldout: &HeldOut) {
         let interval_s = interval_s(frames);
         let block_s = BLOCK_S.max(10.0 * noise.memory_frames() as f64 * interval_s);
         let mut block = 0;
         let mut began = 0;
-        for row in 0..self.len() {
-            let (frame, start) = (self.first[row], self.first[began]);
-            self.heldout[row] = heldout.frames[frame];
-            let count = self.frames_in(row);
+        for bin in 0..self.len() {
+            let (frame, start) = (self.first[bin], self.first[began]);
+            self.heldout[bin] = heldout.frames[frame];
+            let count = self.frames_in(bin);
             let whole = count as f64 / noise.inflation(count);
-            self.weight[row] = if turns(frames, frame) { 0.0 } else { whole };
-            let other = self.run[row] != self.run[began]
+            self.weight[bin] = if turns(frames, frame) { 0.0 } else { whole };
+            let other = self.run[bin] != self.run[began]
                 || frames.press[frame] != frames.press[start]
                 || heldout.frames[frame] != heldout.frames[start]
-                || self.t_s[row] - self.t_s[began] > block_s;
+                || self.t_s[bin] - self.t_s[began] > block_s;
             if other {
                 block += 1;
-                began = row;
+                began = bin;
             }
-            self.block[row] = block;
+            self.block[bin] = block;
         }
         self.blocks = block + 1;
     }
 }
 
 impl HeldOut {
-    /// Holds out one press in three, whole, with the rest that follows it; and of what has several kinds one kind wholly.
+    /// Holds out one press in three with the rest that follows it. If the data have several coverings, or else several depths,
+    /// all presses of one of them are held out.
     pub(crate) fn choose(frames: &Frames, seed: u64) -> Self {
-        let mut chance = Chance::new(seed);
-        let presses = Presses::of(frames);
+        let mut rng = Rng::new(seed);
+        let presses = PressSpan::of(frames);
         let mut out = vec![false; presses.len()];
         let mut order: Vec<usize> = (0..presses.len()).collect();
-        chance.shuffle(&mut order);
+        rng.shuffle(&mut order);
         let wanted = presses.len() / HELDOUT_ONE_IN;
         let (mut depths_mm, mut coverings_mm) = (Vec::new(), Vec::new());
-        // A kind in the middle: beyond the fitted range even the truth may look wrong.
+        // One in the middle: outside the fitted range even the true model may look wrong.
         if let Some(covering_mm) = middle(presses.iter().map(|press| press.covering_mm)) {
             coverings_mm.push(covering_mm);
         } else if let Some(depth_mm) = middle(presses.iter().map(|press| press.depth_mm)) {
@@ -211,21 +215,21 @@ impl HeldOut {
         for (press, out) in presses.iter().zip(&out) {
             of_frame[press.first..press.end].fill(*out);
         }
-        rests(frames, &presses, &mut chance, &mut of_frame);
+        rests(frames, &presses, &mut rng, &mut of_frame);
         let held = out.iter().filter(|out| **out).count();
         Self { frames: of_frame, train_presses: presses.len() - held, presses: held, depths_mm, coverings_mm }
     }
 }
 
-/// A contact, from its first frame to the one before the next, but no longer than a stretch of rest after it.
-struct Presses {
+/// Frames of a press and of the rest after it, up to the next press or [`STRETCH_S`].
+struct PressSpan {
     first: usize,
     end: usize,
     depth_mm: f64,
     covering_mm: f64,
 }
 
-impl Presses {
+impl PressSpan {
     fn of(frames: &Frames) -> Vec<Self> {
         let mut presses: Vec<Self> = Vec::new();
         let mut begin = 0;
@@ -255,7 +259,7 @@ impl Presses {
 }
 
 /// Holds out one stretch in three of the frames that belong to no press.
-fn rests(frames: &Frames, presses: &[Presses], chance: &mut Chance, out: &mut [bool]) {
+fn rests(frames: &Frames, presses: &[PressSpan], rng: &mut Rng, out: &mut [bool]) {
     let mut taken = vec![false; frames.len()];
     for press in presses {
         taken[press.first..press.end].fill(true);
@@ -272,19 +276,19 @@ fn rests(frames: &Frames, presses: &[Presses], chance: &mut Chance, out: &mut [b
         let t_s = frames.t_s[frame];
         let (_, held) = *match &mut stretch {
             Some(begun) if t_s - begun.0 <= STRETCH_S => begun,
-            other => other.insert((t_s, chance.below(HELDOUT_ONE_IN) == 0)),
+            other => other.insert((t_s, rng.below(HELDOUT_ONE_IN) == 0)),
         };
         out[frame] = held;
     }
 }
 
-/// Of at least four different values, one in the middle.
+/// The middle one of at least four different values, if each occurs often.
 fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     let count = values.len();
     values.dedup_by(|a, b| same(*a, *b));
-    // Values that scatter are no kinds.
+    // Values that scatter are no distinct settings.
     (values.len() >= 4 && count >= 4 * values.len()).then(|| values[values.len() / 2])
 }
 
@@ -292,12 +296,12 @@ fn same(one: f64, other: f64) -> bool {
     (one - other).abs() < 0.005
 }
 
-/// True if the stage goes off or stops at a frame, near the surface or in contact.
+/// True if the stage starts or stops at a frame, near the surface or in contact.
 fn turns(frames: &Frames, frame: usize) -> bool {
     let Some(before) = frame.checked_sub(1).filter(|_| frame + 1 < frames.len()) else { return false };
     let z_mm = |frame: usize| frames.position_mm[frame][2];
     let speed = |from: usize| (z_mm(from + 1) - z_mm(from)) / (frames.t_s[from + 1] - frames.t_s[from]);
-    // From one run to the next time goes back.
+    // Time starts anew with each run.
     let is_one_run = frames.t_s[before] < frames.t_s[frame] && frames.t_s[frame] < frames.t_s[frame + 1];
     let least_mm = z_mm(before).min(z_mm(frame)).min(z_mm(frame + 1));
     is_one_run && least_mm < CLEAR_MM && (speed(frame) - speed(before)).abs() > TURN_MM_PER_S
@@ -323,7 +327,7 @@ fn path(frames: &Frames, begin: usize, end: usize) -> Result<Trajectory, Discove
         .map_err(|problem: TrajectoryError| DiscoverError::TooLittle(format!("the stage's path: {problem}")))
 }
 
-/// True where the tool is in a press at all.
+/// True between the first load and the end of the unload.
 pub(crate) fn pressing(phase: Phase) -> bool {
     matches!(phase, Phase::Load | Phase::Hold | Phase::Unload)
 }

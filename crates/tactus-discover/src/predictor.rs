@@ -1,4 +1,4 @@
-//! The model at work on the rows: what it gives for each, and how that changes with every parameter.
+//! The model at work on the bins: what it gives for each, and how that changes with every parameter.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use tactus_model::{
     Covering, Effect, ForwardModel, Images, Indenter, Moment, Pipeline, Psf, Response, Simulator,
 };
 
-use crate::rows::Rows;
-use crate::wander::{Wander, is_wander};
+use crate::bins::Bins;
+use crate::random_walk::{RandomWalk, is_random_walk};
 use crate::{DiscoverError, Frames, Known};
 
 /// Parameters of the whole model.
@@ -19,7 +19,7 @@ pub(crate) struct Parameters {
     /// Baselines, run by run, one per element.
     pub(crate) baseline: Vec<Vec<f64>>,
     /// What the zeros wander beside the baselines, if they do.
-    pub(crate) wander: Option<Wander>,
+    pub(crate) walk: Option<RandomWalk>,
     pub(crate) psf: Psf,
     pub(crate) terms: Vec<Term>,
 }
@@ -31,12 +31,12 @@ pub(crate) struct Term {
     pub(crate) values: Vec<f64>,
 }
 
-/// What the rows are of.
+/// What the bins are of.
 #[derive(Debug)]
-pub(crate) struct Sensor<'a> {
+pub(crate) struct Predictor<'a> {
     pub(crate) known: &'a Known,
     pub(crate) frames: &'a Frames,
-    pub(crate) rows: &'a Rows,
+    pub(crate) bins: &'a Bins,
     /// Images of presses, shared by all predictions.
     pub(crate) images: Arc<Images>,
 }
@@ -68,7 +68,7 @@ impl Parameters {
         Self {
             sensitivity: known.response.sensitivity_counts_per_mm.clone(),
             baseline: vec![known.response.baseline_counts.clone(); runs],
-            wander: None,
+            walk: None,
             psf: known.psf,
             terms: known.effects.iter().map(Term::of).collect(),
         }
@@ -83,33 +83,33 @@ impl Parameters {
 
     /// Its effects, each of them of the library.
     pub(crate) fn effects(&self) -> Result<Vec<Effect>, DiscoverError> {
-        let terms = self.terms.iter().filter(|term| !is_wander(term));
+        let terms = self.terms.iter().filter(|term| !is_random_walk(term));
         let mut effects = terms.map(Term::effect).collect::<Result<Vec<_>, _>>()?;
-        if let Some(wander) = &self.wander {
-            effects.extend(wander.effects(self.sensitivity.len())?);
+        if let Some(walk) = &self.walk {
+            effects.extend(walk.effects(self.sensitivity.len())?);
         }
         Ok(effects)
     }
 }
 
-impl<'a> Sensor<'a> {
-    pub(crate) fn new(known: &'a Known, frames: &'a Frames, rows: &'a Rows) -> Self {
+impl<'a> Predictor<'a> {
+    pub(crate) fn new(known: &'a Known, frames: &'a Frames, bins: &'a Bins) -> Self {
         // As many numbers, whatever the array.
-        let images = Arc::new(Images::new(IMAGES_MAX * 48 / rows.elements.max(1)));
-        Self { known, frames, rows, images }
+        let images = Arc::new(Images::new(IMAGES_MAX * 48 / bins.elements.max(1)));
+        Self { known, frames, bins, images }
     }
 
-    /// Counts of every row and element, before noise and converter.
+    /// Counts of every bin and element, before noise and converter.
     pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
-        let Self { known, frames, rows, .. } = self;
+        let Self { known, frames, bins, .. } = self;
         let effects = parameters.terms.iter().map(Term::effect).collect::<Result<Vec<_>, _>>()?;
-        let elements = rows.elements;
-        let mut predicted: Vec<f64> = Vec::with_capacity(rows.len() * elements);
-        let mut row = 0;
-        for (run, path) in rows.paths.iter().enumerate() {
+        let elements = bins.elements;
+        let mut predicted: Vec<f64> = Vec::with_capacity(bins.len() * elements);
+        let mut bin = 0;
+        for (run, path) in bins.paths.iter().enumerate() {
             let mut pipeline: Option<(u16, f64, Pipeline)> = None;
-            while row < rows.len() && rows.run[row] == run {
-                let frame = rows.first[row];
+            while bin < bins.len() && bins.run[bin] == run {
+                let frame = bins.first[bin];
                 let (tool, covering_mm) = (frames.indenter[frame], frames.covering_mm[frame]);
                 let covering = Covering { thickness_mm: covering_mm };
                 if pipeline.as_ref().is_none_or(|(known, ..)| *known != tool) {
@@ -123,13 +123,13 @@ impl<'a> Sensor<'a> {
                     }
                     let temperature_c = Some(f64::from(frames.temperature_c[frame]))
                         .filter(|temperature_c| temperature_c.is_finite());
-                    predicted.extend(pipeline.step(Moment { t_s: rows.t_s[row], temperature_c }, path));
+                    predicted.extend(pipeline.step(Moment { t_s: bins.t_s[bin], temperature_c }, path));
                 }
-                row += 1;
+                bin += 1;
             }
         }
-        if let Some(wander) = &parameters.wander {
-            wander.add(rows, 1.0, &mut predicted);
+        if let Some(walk) = &parameters.walk {
+            walk.add(bins, 1.0, &mut predicted);
         }
         let full_scale_counts = known.array.full_scale_counts();
         let least =

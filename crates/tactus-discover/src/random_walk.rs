@@ -1,4 +1,4 @@
-//! Zeros that wander, each element's for itself: the baselines' generalisation.
+//! Baselines that wander, each element's for itself: the baselines' generalisation.
 //!
 //! ```text
 //! zero(run, e, t) = baseline(run, e) + u(run, e, t)          u straight between knots, a random walk from knot to knot:
@@ -27,16 +27,16 @@ use nalgebra::{DMatrix, DVector};
 use tactus_model::Effect;
 use tactus_model::effect::{Definition, Make, Now, OnReadout, Parameter};
 
+use crate::bins::Bins;
 use crate::candidates::Screened;
 use crate::fit::Problem;
 use crate::noise::median;
-use crate::rows::Rows;
+use crate::predictor::{Parameters, Term};
 use crate::score::{Fitting, Score};
-use crate::sensor::{Parameters, Term};
-use crate::{DiscoverError, RunWander};
+use crate::{DiscoverError, RunWalks};
 
-/// A wander of every element for itself, as a term of a model: how much, not which way; that is [`Wander`].
-pub(crate) static WANDER: Definition = Definition {
+/// A wander of every element for itself, as a term of a model: how much, not which way; that is [`RandomWalk`].
+pub(crate) static RANDOM_WALK: Definition = Definition {
     name: "baseline-drift",
     summary: "the zero of each element wanders in time",
     parameters: &[
@@ -46,7 +46,7 @@ pub(crate) static WANDER: Definition = Definition {
     ],
     near_twins: &["imprint", "relaxation", "gain-drift"],
     shown_by: &["drift"],
-    make: Make::Readout(|_| Box::new(Elsewhere)),
+    make: Make::Readout(|_| Box::new(BesidePipeline)),
 };
 
 /// Knots of a `baseline-drift` of the library, which is what a wander is written as.
@@ -65,42 +65,42 @@ const BLOCKS_MAX: usize = 600;
 
 /// What the zeros of each run wander: knot by knot, element by element, from 0 on.
 #[derive(Debug, Clone)]
-pub(crate) struct Wander {
+pub(crate) struct RandomWalk {
     pub(crate) knot_s: f64,
     pub(crate) runs: Vec<Vec<f64>>,
 }
 
 /// What zeros can take up: constants, and what wanders if that is in the model.
 #[derive(Debug)]
-pub(crate) struct Zeros<'a> {
+pub(crate) struct Baselines<'a> {
     problem: &'a Problem<'a>,
-    /// Of the rows.
+    /// Of the bins.
     weights: &'a [f64],
     /// Infinite if nothing wanders.
     knot_s: f64,
     knots: usize,
     /// Precision of a step from knot to knot, in counts^-2.
     stiffness: f64,
-    /// Products of the knots' shares in the rows, run by run: each with itself, and with the next.
+    /// Products of the knots' shares in the bins, run by run: each with itself, and with the next.
     grams: Vec<Vec<[f64; 2]>>,
 }
 
 /// How much zeros wander.
 #[derive(Debug, Clone, Copy)]
-struct Walk {
+struct WalkEstimate {
     knot_s: f64,
     counts_per_root_s: f64,
     /// By how much it lessens the cost.
     gain: f64,
 }
 
-impl Wander {
-    /// Adds a multiple of it to readings, row by row and element by element.
-    pub(crate) fn add(&self, rows: &Rows, times: f64, readings: &mut [f64]) {
-        let elements = rows.elements;
-        for (row, readings) in readings.chunks_exact_mut(elements).enumerate() {
-            let of_run = &self.runs[rows.run[row]];
-            let (knot, share) = place(rows.t_s[row], self.knot_s, of_run.len() / elements);
+impl RandomWalk {
+    /// Adds a multiple of it to readings, bin by bin and element by element.
+    pub(crate) fn add(&self, bins: &Bins, times: f64, readings: &mut [f64]) {
+        let elements = bins.elements;
+        for (bin, readings) in readings.chunks_exact_mut(elements).enumerate() {
+            let of_run = &self.runs[bins.run[bin]];
+            let (knot, share) = place(bins.t_s[bin], self.knot_s, of_run.len() / elements);
             for (knot, share) in [(knot, 1.0 - share), (knot + 1, share)] {
                 for (reading, value) in readings.iter_mut().zip(of_run.iter().skip(knot * elements)) {
                     *reading += times * share * value;
@@ -109,15 +109,15 @@ impl Wander {
         }
     }
 
-    pub(crate) fn of(RunWander { knot_s, runs_counts }: &RunWander) -> Self {
+    pub(crate) fn of(RunWalks { knot_s, runs_counts }: &RunWalks) -> Self {
         Self { knot_s: *knot_s, runs: runs_counts.clone() }
     }
 
     /// What each run has apart from the others; none of one run.
-    pub(crate) fn apart(&self) -> Option<RunWander> {
+    pub(crate) fn apart(&self) -> Option<RunWalks> {
         let mean = self.mean();
         let less = |run: &Vec<f64>| run.iter().zip(&mean).map(|(value, mean)| value - mean).collect();
-        let apart = || RunWander { knot_s: self.knot_s, runs_counts: self.runs.iter().map(less).collect() };
+        let apart = || RunWalks { knot_s: self.knot_s, runs_counts: self.runs.iter().map(less).collect() };
         (self.runs.len() > 1).then(apart)
     }
 
@@ -132,7 +132,7 @@ impl Wander {
     /// What all runs have in common, as effects of the library: for each element one after another.
     pub(crate) fn effects(&self, elements: usize) -> Result<Vec<Effect>, DiscoverError> {
         let mean = self.mean();
-        let definition = Definition::find(WANDER.name)?;
+        let definition = Definition::find(RANDOM_WALK.name)?;
         let mut effects = Vec::new();
         for element in 0..elements {
             let knots: Vec<f64> = mean.iter().skip(element).step_by(elements).copied().collect();
@@ -168,10 +168,10 @@ impl Wander {
     }
 }
 
-impl<'a> Zeros<'a> {
+impl<'a> Baselines<'a> {
     /// Those of a model.
     pub(crate) fn of(problem: &'a Problem<'a>, at: &Parameters) -> Self {
-        match at.terms.iter().find(|term| is_wander(term)) {
+        match at.terms.iter().find(|term| is_random_walk(term)) {
             Some(Term { values, .. }) if values[0] > 0.0 && values[1] > 0.0 => {
                 Self::walking(problem, &problem.slow, values[1], values[0])
             }
@@ -187,11 +187,11 @@ impl<'a> Zeros<'a> {
     }
 
     fn new(problem: &'a Problem<'a>, weights: &'a [f64], knot_s: f64, knots: usize, stiffness: f64) -> Self {
-        let rows = problem.sensor.rows;
-        let mut grams = vec![vec![[0.0; 2]; knots]; rows.paths.len()];
-        for (row, weight) in weights.iter().enumerate() {
-            let (knot, share) = place(rows.t_s[row], knot_s, knots);
-            let of_run = &mut grams[rows.run[row]];
+        let bins = problem.predictor.bins;
+        let mut grams = vec![vec![[0.0; 2]; knots]; bins.paths.len()];
+        for (bin, weight) in weights.iter().enumerate() {
+            let (knot, share) = place(bins.t_s[bin], knot_s, knots);
+            let of_run = &mut grams[bins.run[bin]];
             of_run[knot][0] += weight * (1.0 - share).powi(2);
             if share > 0.0 {
                 of_run[knot][1] += weight * share * (1.0 - share);
@@ -204,7 +204,11 @@ impl<'a> Zeros<'a> {
     /// Takes off a column what the zeros take up; returns that, run by run, knot by knot, element by element.
     pub(crate) fn centre(&self, column: &mut [f64]) -> Vec<Vec<f64>> {
         let (taken, _) = self.taken(column);
-        Wander { knot_s: self.knot_s, runs: taken.clone() }.add(self.problem.sensor.rows, -1.0, column);
+        RandomWalk { knot_s: self.knot_s, runs: taken.clone() }.add(
+            self.problem.predictor.bins,
+            -1.0,
+            column,
+        );
         taken
     }
 
@@ -215,13 +219,13 @@ impl<'a> Zeros<'a> {
 
     /// Weighted sums of a column, as each knot sees it: run by run, knot by knot, element by element.
     fn sums(&self, column: &[f64]) -> Vec<Vec<f64>> {
-        let rows = self.problem.sensor.rows;
-        let elements = rows.elements;
-        let mut sums = vec![vec![0.0; self.knots * elements]; rows.paths.len()];
-        for ((row, values), weight) in column.chunks_exact(elements).enumerate().zip(self.weights) {
-            let (knot, share) = place(rows.t_s[row], self.knot_s, self.knots);
+        let bins = self.problem.predictor.bins;
+        let elements = bins.elements;
+        let mut sums = vec![vec![0.0; self.knots * elements]; bins.paths.len()];
+        for ((bin, values), weight) in column.chunks_exact(elements).enumerate().zip(self.weights) {
+            let (knot, share) = place(bins.t_s[bin], self.knot_s, self.knots);
             for (knot, share) in [(knot, 1.0 - share), (knot + 1, share)] {
-                let of_run = sums[rows.run[row]].iter_mut().skip(knot * elements);
+                let of_run = sums[bins.run[bin]].iter_mut().skip(knot * elements);
                 of_run.zip(values).for_each(|(sum, value)| *sum += weight * share * value);
             }
         }
@@ -242,7 +246,7 @@ impl<'a> Zeros<'a> {
     /// Solves `(G + stiffness / weight R) u = b` for one element, whose numbers are every so many; `R` charges for steps.
     /// Returns by how much a wander lessens the cost beside a constant: twice the logarithm of the likelihoods' ratio.
     fn solve(&self, gram: &[[f64; 2]], weight: f64, values: &mut [f64]) -> f64 {
-        let elements = self.problem.sensor.rows.elements;
+        let elements = self.problem.predictor.bins.elements;
         let stiff = self.stiffness / weight;
         let last = self.knots - 1;
         let whole: f64 = gram.iter().map(|[own, next]| own + 2.0 * next).sum();
@@ -277,49 +281,49 @@ impl Problem<'_> {
     /// What is left if the zeros stand still.
     pub(crate) fn standing(&self, at: &Parameters, predicted: &[f64]) -> Vec<f64> {
         let mut residual: Vec<f64> = self.residuals(predicted).collect();
-        if let Some(wander) = &at.wander {
-            wander.add(self.sensor.rows, 1.0, &mut residual);
+        if let Some(walk) = &at.walk {
+            walk.add(self.predictor.bins, 1.0, &mut residual);
         }
         residual
     }
 
     /// The parameters with zeros that wander as much as the residual says, if that is in the model at all.
-    pub(crate) fn wandering(&self, mut at: Parameters) -> Result<Parameters, DiscoverError> {
-        let Some(term) = at.terms.iter().position(is_wander) else {
-            at.wander = None;
+    pub(crate) fn with_walk(&self, mut at: Parameters) -> Result<Parameters, DiscoverError> {
+        let Some(term) = at.terms.iter().position(is_random_walk) else {
+            at.walk = None;
             return Ok(at);
         };
         let residual = self.standing(&at, &self.predict(&at)?);
-        let walk = self.walk(&residual, &self.slow);
+        let walk = self.estimate_walk(&residual, &self.slow);
         at.terms[term].values = vec![walk.counts_per_root_s, walk.knot_s, 0.0];
-        Zeros::of(self, &at).settle(&residual, &mut at);
+        Baselines::of(self, &at).settle(&residual, &mut at);
         Ok(at)
     }
 
     /// The cost of a model whose zeros wander: that of zeros that stand still, less what the likelihood gains.
-    pub(crate) fn wandering_cost(&self, at: &Parameters, predicted: &[f64]) -> f64 {
+    pub(crate) fn cost_with_walk(&self, at: &Parameters, predicted: &[f64]) -> f64 {
         let mut residual = self.standing(at, predicted);
-        let (_, gain) = Zeros::of(self, at).taken(&residual);
-        Zeros::new(self, &self.train, f64::INFINITY, 1, 0.0).centre(&mut residual);
+        let (_, gain) = Baselines::of(self, at).taken(&residual);
+        Baselines::new(self, &self.train, f64::INFINITY, 1, 0.0).centre(&mut residual);
         let weighted =
             residual.iter().zip(self.weights()).map(|(residual, weight)| weight * residual * residual);
         weighted.sum::<f64>() - gain
     }
 
-    /// The likeliest walk of what zeros that stand still leave, in rows of such weights.
-    fn walk(&self, residual: &[f64], weights: &[f64]) -> Walk {
+    /// The likeliest walk of what zeros that stand still leave, in bins of such weights.
+    fn estimate_walk(&self, residual: &[f64], weights: &[f64]) -> WalkEstimate {
         let noise_counts = median(&self.element_weight).powf(-0.5);
-        let mut best: Option<Walk> = None;
+        let mut best: Option<WalkEstimate> = None;
         let mut knots = KNOTS;
         loop {
             let knot_s = self.duration_s / knots as f64;
-            let mut zeros = Zeros::walking(self, weights, knot_s, noise_counts);
-            let sums = zeros.sums(residual);
+            let mut baselines = Baselines::walking(self, weights, knot_s, noise_counts);
+            let sums = baselines.sums(residual);
             let walks = (0..RATES).map(|step| {
                 let counts_per_root_s = RATE_LEAST * noise_counts * 2.0_f64.powf(0.5 * f64::from(step));
-                zeros.stiffness = stiffness(counts_per_root_s, knot_s);
-                let (_, gain) = zeros.solved(sums.clone());
-                Walk { knot_s, counts_per_root_s, gain }
+                baselines.stiffness = stiffness(counts_per_root_s, knot_s);
+                let (_, gain) = baselines.solved(sums.clone());
+                WalkEstimate { knot_s, counts_per_root_s, gain }
             });
             let Some(walk) = walks.max_by(|a, b| a.gain.total_cmp(&b.gain)) else { break };
             if best.is_some_and(|best| walk.gain < best.gain + FINER_GAIN) {
@@ -331,21 +335,21 @@ impl Problem<'_> {
                 break;
             }
         }
-        best.unwrap_or(Walk { knot_s: self.duration_s, counts_per_root_s: 0.0, gain: 0.0 })
+        best.unwrap_or(WalkEstimate { knot_s: self.duration_s, counts_per_root_s: 0.0, gain: 0.0 })
     }
 
     /// How much the residual of a model wants its zeros to wander; `None` if they do already. They must without contact
     /// too: in contact all that a model lacks looks like it.
-    pub(crate) fn screen_wander(&self, fitting: &Fitting<'_>, at: &Parameters) -> Option<Screened> {
-        if at.terms.iter().any(is_wander) {
+    pub(crate) fn screen_random_walk(&self, fitting: &Fitting<'_>, at: &Parameters) -> Option<Screened> {
+        if at.terms.iter().any(is_random_walk) {
             return None;
         }
-        let walk = self.walk(&fitting.residual(), &self.slow);
-        let clear = self.walk(&fitting.residual(), &self.slow_and_clear);
-        let mut start = Term::neutral(&WANDER);
+        let walk = self.estimate_walk(&fitting.residual(), &self.slow);
+        let clear = self.estimate_walk(&fitting.residual(), &self.slow_and_clear);
+        let mut start = Term::neutral(&RANDOM_WALK);
         start.values[..2].copy_from_slice(&[walk.counts_per_root_s, walk.knot_s]);
         Some(Screened {
-            definition: &WANDER,
+            definition: &RANDOM_WALK,
             scores: self.alike(&fitting.residual()),
             promise: walk.gain.min(clear.gain),
             start,
@@ -355,26 +359,26 @@ impl Problem<'_> {
 
     /// Are blocks that are near in time alike? A score for each kernel.
     fn alike(&self, residual: &[f64]) -> Vec<Score> {
-        let rows = self.sensor.rows;
-        let elements = rows.elements;
-        let mut sums = vec![0.0; rows.blocks * elements];
+        let bins = self.predictor.bins;
+        let elements = bins.elements;
+        let mut sums = vec![0.0; bins.blocks * elements];
         let (mut weights, mut times, mut runs) =
-            (vec![0.0; rows.blocks], vec![0.0; rows.blocks], vec![0; rows.blocks]);
-        for ((row, values), weight) in residual.chunks_exact(elements).enumerate().zip(&self.slow_and_clear) {
-            let block = rows.block[row];
-            runs[block] = rows.run[row];
+            (vec![0.0; bins.blocks], vec![0.0; bins.blocks], vec![0; bins.blocks]);
+        for ((bin, values), weight) in residual.chunks_exact(elements).enumerate().zip(&self.slow_and_clear) {
+            let block = bins.block[bin];
+            runs[block] = bins.run[bin];
             weights[block] += weight;
-            times[block] += weight * rows.t_s[row];
+            times[block] += weight * bins.t_s[bin];
             let of_block = sums[block * elements..].iter_mut().zip(values).zip(&self.element_weight);
             of_block.for_each(|((sum, value), of_element)| *sum += weight * of_element * value);
         }
-        let mut used: Vec<usize> = (0..rows.blocks).filter(|block| weights[*block] > 0.0).collect();
+        let mut used: Vec<usize> = (0..bins.blocks).filter(|block| weights[*block] > 0.0).collect();
         used.truncate(BLOCKS_MAX);
         let count = used.len();
         let sums = DMatrix::from_fn(count, elements, |b, e| sums[used[b] * elements + e]);
         let products = &sums * sums.transpose();
         // Flipped residuals have a mean, which the baseline of each run takes up.
-        let mut totals = vec![0.0; rows.paths.len()];
+        let mut totals = vec![0.0; bins.paths.len()];
         for block in &used {
             totals[runs[*block]] += weights[*block];
         }
@@ -396,13 +400,13 @@ impl Problem<'_> {
                 let centred = kernel[(b, c)] - means[b] - means[c] + of_run[runs[used[b]]];
                 if same(b, c) { centred * products[(b, c)] } else { 0.0 }
             });
-            Score::of_products(&products, &used, rows.blocks)
+            Score::of_products(&products, &used, bins.blocks)
         };
         KERNELS_S.iter().map(of).collect()
     }
 }
 
-impl Zeros<'_> {
+impl Baselines<'_> {
     /// Lets the zeros take up what is left if they stand still.
     fn settle(&self, residual: &[f64], at: &mut Parameters) {
         let (taken, _) = self.taken(residual);
@@ -411,22 +415,22 @@ impl Zeros<'_> {
 
     /// Moves baselines by what was taken up, and lets them wander by the rest of it.
     pub(crate) fn put(&self, mut taken: Vec<Vec<f64>>, at: &mut Parameters) {
-        let elements = self.problem.sensor.rows.elements;
+        let elements = self.problem.predictor.bins.elements;
         for (baseline, taken) in at.baseline.iter_mut().zip(&mut taken) {
             let first = taken[..elements].to_vec();
             baseline.iter_mut().zip(&first).for_each(|(baseline, first)| *baseline += first);
             taken.iter_mut().zip(first.iter().cycle()).for_each(|(value, first)| *value -= first);
         }
-        at.wander = (self.knots > 1).then_some(Wander { knot_s: self.knot_s, runs: taken });
-        let term = at.terms.iter_mut().find(|term| is_wander(term));
-        if let (Some(term), Some(wander)) = (term, &at.wander) {
-            term.values[2] = wander.rms_counts(elements);
+        at.walk = (self.knots > 1).then_some(RandomWalk { knot_s: self.knot_s, runs: taken });
+        let term = at.terms.iter_mut().find(|term| is_random_walk(term));
+        if let (Some(term), Some(walk)) = (term, &at.walk) {
+            term.values[2] = walk.rms_counts(elements);
         }
     }
 }
 
-pub(crate) fn is_wander(term: &Term) -> bool {
-    std::ptr::eq(term.definition, &raw const WANDER)
+pub(crate) fn is_random_walk(term: &Term) -> bool {
+    std::ptr::eq(term.definition, &raw const RANDOM_WALK)
 }
 
 /// Precision of a walk's step from knot to knot.
@@ -443,12 +447,12 @@ fn place(t_s: f64, knot_s: f64, knots: usize) -> (usize, f64) {
 
 /// A wander acts beside the pipeline, for every run has its own.
 #[derive(Debug)]
-struct Elsewhere;
+struct BesidePipeline;
 
-impl OnReadout for Elsewhere {
+impl OnReadout for BesidePipeline {
     fn counts(&mut self, _: Now<'_>, _: &mut [f64]) {}
 }
 
 #[cfg(test)]
-#[path = "wander_tests.rs"]
+#[path = "random_walk_tests.rs"]
 mod tests;
