@@ -69,7 +69,7 @@ fn a_capture_is_decoded_and_where_it_fails_is_told() {
     assert_eq!(capture["first_bad_checksum"]["at"], 3 + 20 * 106);
     assert_eq!(capture["strides"][0]["bytes"], 106);
     let aloud = check(folder.path(), &shipped(), &["--capture", "bytes.bin"]);
-    assert!(aloud.out.contains("frames            39, the first at byte 3"), "{aloud:?}");
+    assert!(aloud.out.contains("frames          39, the first at byte 3"), "{aloud:?}");
 }
 
 #[test]

@@ -12,7 +12,7 @@ fn a_place_that_is_taken_is_named_with_what_to_do() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1));
     assert!(
-        said.contains(&format!("cannot listen on {place}: choose another place with --listen")),
+        said.contains(&format!("cannot listen on {place}: choose another address with --listen")),
         "{said}"
     );
 }
