@@ -34,7 +34,7 @@ pub(crate) fn out_of_sight(screened: &[Screened]) -> Vec<NotShown> {
         .map(|one| NotShown {
             effect: one.definition.name,
             reason: format!(
-                "nothing in these data changes with it beyond what recalibration takes up; {} would show it",
+                "its change of these data is too small, or recalibration can reproduce it; {} would show it",
                 one.definition.shown_by.join(" or ")
             ),
         });
@@ -68,10 +68,10 @@ fn lacks(
             Some("all presses go to one depth")
         }
         "time-lag" | "low-pass" | "scan-skew" if contacts.frames_in_motion() < MOVING_LEAST => {
-            Some("hardly a frame shows the tool in motion while it presses")
+            Some("hardly any frame shows the tool in motion during a press")
         }
         "rate-stiffening" if contacts.distinct_speeds() < 2 => Some("all presses go in at one speed"),
-        "hysteresis" if !unloads => Some("no frame shows a press on its way back"),
+        "hysteresis" if !unloads => Some("no frame shows an unload"),
         "backlash" if !contacts.approaches() && !unloads => {
             Some("every place is reached from one direction only")
         }

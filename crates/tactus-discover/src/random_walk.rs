@@ -39,7 +39,7 @@ use crate::{DiscoverError, RunWalks};
 /// Random walks of the baselines as a term of a model. It has the statistics of the walks; [`RandomWalk`] has their values.
 pub(crate) static RANDOM_WALK: Definition = Definition {
     name: "baseline-drift",
-    summary: "the zero of each element wanders in time",
+    summary: "the baseline of each element follows a random walk in time",
     parameters: &[
         Parameter::given("counts_per_root_s", 0.0, [0.0, 1e6]),
         Parameter::given("knot_s", 0.0, [0.0, 1e6]),

@@ -12,7 +12,7 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
     let noise_rms_counts = found.noise_rms_counts.unwrap_or(before.base.noise_rms_counts);
     let effects = found.effects.iter().enumerate().map(|(nth, effect)| {
         let added = found.steps.iter().find_map(|step| Some((step, term(step, effect)?)));
-        // Of a wander of each element a step tells the whole, and the effects are its parts.
+        // For random walks of the elements a step has the whole, and the effects are its parts.
         let is_part = |step: &&AddedEffect| nth >= before.effects.len() && step.effect == effect.name();
         let part = || found.steps.iter().find(is_part).map(|step| (step, &[][..]));
         let Some((step, term)) = added.or_else(part) else {
