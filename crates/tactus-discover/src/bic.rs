@@ -1,7 +1,7 @@
-//! Selection by the Bayesian information criterion alone, which the protocol is compared to.
+//! Selection by the Bayesian information criterion alone, as a comparison for the protocol.
 //!
-//! Forward, the effect whose fit has the least `cost + parameters ln(readings)`, as long as that is less than before: no
-//! corrected test, nothing held out, nothing taken back. It trusts the noise to be white and the forms to be true.
+//! Forward selection adds the effect with the least `cost + parameters ln(readings)`, as long as this value falls. There is
+//! no corrected test, no held-out data and no removal. It assumes white noise and exact forms.
 //!
 //! # Source
 //! G. Schwarz, *Ann. Statist.* 6 (1978) 461.
@@ -34,7 +34,7 @@ impl Search<'_> {
         Ok(grown)
     }
 
-    /// The criterion, but for what is the same for all models.
+    /// The criterion less a constant that is the same for all models.
     fn criterion(&self, of: &Fitted) -> f64 {
         let parameters: usize = of.parameters.terms.iter().map(|term| term.values.len()).sum();
         let readings = self.problem.weights().filter(|weight| *weight > 0.0).count();

@@ -1,4 +1,4 @@
-//! Every effect of the library as a candidate, with what it would take to start a fit of it.
+//! Every effect of the library as a candidate, with the starts of its fits.
 
 use std::borrow::Cow;
 
@@ -10,19 +10,19 @@ use crate::predictor::{Parameters, Term};
 use crate::score::{Fitting, Score};
 use crate::{DiscoverError, wiring};
 
-/// Values of a shape that spans orders of magnitude, and of any other.
+/// Number of grid values of a shape parameter that spans orders of magnitude, and of any other.
 const VALUES_MANY: usize = 5;
 const VALUES_FEW: usize = 3;
 
-/// An element that seems to take more than this share of another's signal, or less than none, may answer for it alone: its
-/// gain is then that of a model in which it answers for itself, and says nothing.
+/// If an element's reading seems to contain more than this share of another's signal, or a negative share, the element may
+/// answer for the other alone. Its fitted gain then means nothing.
 const CROSSED_SHARE: f64 = 0.5;
 
-/// An effect of the library, as these data could show it.
+/// An effect of the library, with the parameters that these data could determine.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) definition: &'static Definition,
-    /// Parameters that change something by themselves.
+    /// Parameters that change the prediction if all others are neutral.
     amplitudes: Vec<usize>,
     /// Values of the others from which fits start.
     shapes: Shapes,
@@ -37,22 +37,22 @@ enum Shapes {
     Wiring,
 }
 
-/// A candidate at the residual of a model: how much it is wanted.
+/// The score of a candidate at the residual of a model.
 #[derive(Debug, Clone)]
 pub(crate) struct Screened {
     pub(crate) definition: &'static Definition,
     /// The scores of all its amplitudes at all its shapes.
     pub(crate) scores: Vec<Score>,
-    /// By how much a first step lessens the cost, at the best shape.
+    /// Reduction of the cost by a first linear step, at the best shape.
     pub(crate) promise: f64,
-    /// Where that step ends: a fit's start.
+    /// End of that step, at which a fit starts.
     pub(crate) start: Term,
-    /// How many standard errors its whole range is apart at the best shape: what these data can show of it.
+    /// Width of the amplitude's range in standard errors at the best shape: how well these data can show the effect.
     pub(crate) reach: f64,
 }
 
 impl Candidate {
-    /// All effects of the library, at a model without them and the frequencies of lines in the spectrum of what it leaves.
+    /// All effects of the library, given a model without them and the frequencies of lines in its residual's spectrum.
     pub(crate) fn all(
         problem: &Problem<'_>,
         at: &Fitted,
@@ -95,7 +95,7 @@ impl Candidate {
         Ok(Self { definition, amplitudes, shapes })
     }
 
-    /// Derivatives that a screening takes, about.
+    /// Approximate number of derivatives that a screening takes.
     pub(crate) fn columns(&self) -> usize {
         let shapes = match &self.shapes {
             Shapes::Grid(terms) => terms.len(),
@@ -104,7 +104,7 @@ impl Candidate {
         shapes * self.amplitudes.len()
     }
 
-    /// Terms from which fits of this effect on top of a model start, but for its amplitudes.
+    /// Starts of fits of this effect in addition to a model, with neutral amplitudes.
     fn shapes(&self, problem: &Problem<'_>, at: &Fitted) -> Cow<'_, [Term]> {
         match &self.shapes {
             Shapes::Grid(terms) => Cow::Borrowed(terms),
@@ -115,7 +115,7 @@ impl Candidate {
         }
     }
 
-    /// How much the residual of a model wants this effect.
+    /// Scores this effect at the residual of a model.
     pub(crate) fn screen(
         &self,
         fitting: &Fitting<'_>,
@@ -154,7 +154,7 @@ impl Candidate {
         Ok(screened)
     }
 
-    /// The linear step from nothing, within the ranges: by how much it lessens the cost, and where it ends.
+    /// The linear step from the neutral values within the ranges: its reduction of the cost, and its end.
     fn first_step(&self, fitting: &Fitting<'_>, shape: &Term, columns: &[Vec<f64>]) -> (f64, Term) {
         let mut active: Vec<usize> = (0..columns.len()).collect();
         let wires = matches!(self.shapes, Shapes::Wiring);
@@ -211,11 +211,11 @@ fn cross(shapes: &[Term], parameter: usize, values: &[f64]) -> Vec<Term> {
     shapes.iter().flat_map(|shape| values.iter().map(move |value| set(shape, *value))).collect()
 }
 
-/// Values of a shape parameter from which fits start.
+/// Values of a shape parameter at which fits start.
 fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> {
     let [mut least, mut most] = range;
     if name.ends_with("_s") {
-        // Nothing faster than a frame or slower than the data shows as such.
+        // The data do not show anything faster than a frame or slower than their duration.
         most = most.min(duration_s);
         least = least.max(0.02).min(most);
     }
@@ -227,11 +227,11 @@ fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> 
         return vec![least];
     }
     let count = if ratio > 300.0 { VALUES_MANY } else { VALUES_FEW };
-    // Within the ends: the middles of equal parts.
+    // The middles of equal parts of the logarithmic range.
     (0..count).map(|k| least * ratio.powf((k as f64 + 0.5) / count as f64)).collect()
 }
 
-/// A pair's term as far as it goes: the element answers for the other alone.
+/// A pair's term at the end of its range: the element answers for the other alone.
 fn crossed(mut pair: Term) -> Term {
     for (known, value) in pair.definition.parameters.iter().zip(&mut pair.values) {
         if known.kind == ParameterKind::Real {

@@ -1,20 +1,20 @@
-//! What was done to the sensor, press by press.
+//! The contacts in the data, and how they differ.
 
 use tactus_model::Phase;
 
 use crate::Frames;
 use crate::bins::{pressing, still};
 
-/// Depths, places and speeds that differ by less are the same.
+/// Depths, places and speeds that differ by less count as the same.
 const SAME_DEPTH_MM: f64 = 0.03;
 const SAME_PLACE_MM: f64 = 0.05;
 const SAME_SPEED_RATIO: f64 = 1.5;
 
-/// Contacts in order of time: frames without a break below the surface.
+/// Contacts in order of time: unbroken sequences of frames below the surface.
 #[derive(Debug)]
 pub(crate) struct Contacts<'a> {
     frames: &'a Frames,
-    /// First frame and the one after the last.
+    /// First frame, and the one after the last.
     spans: Vec<[usize; 2]>,
     still: Vec<usize>,
 }
@@ -37,7 +37,7 @@ impl<'a> Contacts<'a> {
         self.spans.len()
     }
 
-    /// Depths at which the tip rested, or the greatest of each contact where it never did.
+    /// Number of depths at which the tip rested, or that were the greatest of a contact.
     pub(crate) fn distinct_depths(&self) -> usize {
         let mut depths_mm: Vec<f64> = self
             .spans
@@ -64,7 +64,7 @@ impl<'a> Contacts<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// Longest time without contact after one.
+    /// Longest time without contact after a contact.
     pub(crate) fn longest_rest_s(&self) -> f64 {
         let starts = self.spans.iter().skip(1).map(|[first, _]| *first).chain([self.frames.len()]);
         self.spans
@@ -82,7 +82,7 @@ impl<'a> Contacts<'a> {
         })
     }
 
-    /// Speeds of going in.
+    /// Number of loading speeds.
     pub(crate) fn distinct_speeds(&self) -> usize {
         let mut speeds: Vec<f64> =
             self.spans.iter().filter_map(|[first, end]| self.speed_mm_per_s(*first, *end)).collect();
@@ -98,12 +98,12 @@ impl<'a> Contacts<'a> {
             .any(|(place, sides)| from.iter().any(|(other, others)| !far(*place, *other) && sides != others))
     }
 
-    /// True if one place was pressed again.
+    /// True if a place was pressed more than once.
     pub(crate) fn repeats(&self) -> bool {
         self.distinct_places() < self.count()
     }
 
-    /// Frames in contact whose tip moves.
+    /// Number of frames in contact with a moving tip.
     pub(crate) fn frames_in_motion(&self) -> usize {
         self.spans
             .iter()
@@ -123,7 +123,7 @@ impl<'a> Contacts<'a> {
         })
     }
 
-    /// Median speed of the frames that go in.
+    /// Median loading speed of a contact.
     fn speed_mm_per_s(&self, first: usize, end: usize) -> Option<f64> {
         let speed = |frame: usize| {
             let dt_s = self.frames.t_s[frame] - self.frames.t_s[frame - 1];
@@ -136,7 +136,7 @@ impl<'a> Contacts<'a> {
         speeds.get(speeds.len() / 2).copied()
     }
 
-    /// A contact's place, and whether its last sideways moves went up along x and y.
+    /// A contact's place, and whether it was last approached in the positive direction of x and of y.
     fn from(&self, first: usize) -> Option<([f64; 2], [bool; 2])> {
         let [x, y, _] = self.frames.position_mm[first];
         let before = (0..first).rev().take(600).map(|frame| self.frames.position_mm[frame]);
@@ -149,7 +149,7 @@ fn far([x, y]: [f64; 2], [other_x, other_y]: [f64; 2]) -> bool {
     (x - other_x).hypot(y - other_y) > SAME_PLACE_MM
 }
 
-/// Number of values in order that differ.
+/// Number of distinct values in a sorted list.
 fn distinct(sorted: &[f64], differ: impl Fn(f64, f64) -> bool) -> usize {
     let mut last: Option<f64> = None;
     sorted

@@ -1,4 +1,4 @@
-//! On what the residual may depend: covariates of the bins, each in ranges, and the forms that a dependence may take.
+//! Covariates on which the residual may depend, each divided into ranges, and the forms that a dependence may take.
 
 use tactus_model::effect::Definition;
 use tactus_model::{Contact, Covering, ForwardModel, Response};
@@ -8,53 +8,53 @@ use crate::fit::{Free, Problem};
 use crate::predictor::{Parameters, Term};
 use crate::{DiscoverError, Frames, Known};
 
-/// Depth at which a place's image is looked up where nothing is pressed.
+/// Depth of the imagined press at a place that is not pressed.
 const LOOK_MM: f64 = 0.3;
 /// A sideways move shorter than this has no direction.
 const ASIDE_MM: f64 = 0.05;
 
-/// Presses whose places in their elements differ by no more than this were all meant for one place there.
+/// Presses count as all at the same place within their elements if these places differ by no more than this.
 const CENTRED_MM: f64 = 0.02;
 
-/// What a dependence multiplies: a value for each reading.
+/// Form of a dependence: a value for each reading that the dependence multiplies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
-    /// All elements alike, in counts.
+    /// 1 for all elements; the dependence is in counts.
     Offset,
     /// The element's own signal.
     Signal,
-    /// The signal's change along x.
+    /// Derivative of the signal along x.
     AlongX,
-    /// The signal's change along y.
+    /// Derivative of the signal along y.
     AlongY,
     /// The neighbours' signals.
     Neighbours,
-    /// What a press at the tip's place would give.
+    /// Image of an imagined press at the tip's place.
     Place,
-    /// What a press at the last pressed place would give.
+    /// Image of an imagined press at the last pressed place.
     LastPlace,
 }
 
-/// A covariate in ranges, with the form of its dependence.
+/// A range of a covariate, with a form of dependence.
 #[derive(Debug, Clone)]
 pub(crate) struct Feature {
     pub(crate) covariate: &'static str,
     pub(crate) unit: &'static str,
     pub(crate) form: Form,
-    /// Range of the covariate; the whole of it for one that enters by its value.
+    /// Range of the covariate.
     pub(crate) range: [f64; 2],
-    /// Of each bin; or of each reading.
+    /// 1 where the covariate is in the range, else 0.
     pub(crate) factor: Factor,
 }
 
-/// What multiplies a form.
+/// Factor of a form, for each bin or for each reading.
 #[derive(Debug, Clone)]
 pub(crate) enum Factor {
     Bins(Vec<f64>),
     Readings(Vec<f64>),
 }
 
-/// The forms at a point, reading by reading.
+/// Values of the forms at a point of the parameters, reading by reading.
 #[derive(Debug)]
 pub(crate) struct Forms {
     signal: Vec<f64>,
@@ -138,7 +138,7 @@ impl Forms {
     }
 }
 
-/// What a press at each of the places would give, in counts above the baseline; nothing where there is no place.
+/// Images of imagined presses at the places, in counts above the baseline; 0 where there is no place.
 fn images(
     problem: &Problem<'_>,
     at: &Parameters,
@@ -179,7 +179,7 @@ fn images(
     Ok(images)
 }
 
-/// Every feature that the data have.
+/// All features of the data.
 pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     use Form::{AlongX, AlongY, LastPlace, Neighbours, Offset, Place, Signal};
     let bins = problem.predictor.bins;
@@ -258,7 +258,7 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     made
 }
 
-/// Ranges of values with as many bins in each, where the values differ at all.
+/// Divides the values into ranges with equal numbers of bins; no ranges if the values do not differ.
 fn ranges(values: &[f64], among: &[bool], parts: usize) -> Vec<[f64; 2]> {
     let mut sorted: Vec<f64> = values
         .iter()
@@ -270,7 +270,7 @@ fn ranges(values: &[f64], among: &[bool], parts: usize) -> Vec<[f64; 2]> {
     let (Some(least), Some(most)) = (sorted.first().copied(), sorted.last().copied()) else {
         return Vec::new();
     };
-    // A stage that holds a place is never still to the last digit.
+    // The reported position of a stage at rest still varies slightly.
     if most - least <= 1e-3 * most.abs().max(1.0) {
         return Vec::new();
     }
@@ -282,7 +282,7 @@ fn ranges(values: &[f64], among: &[bool], parts: usize) -> Vec<[f64; 2]> {
     starts.zip(ends).map(|(start, end)| [start, end]).collect()
 }
 
-/// A range with the least and greatest value for ends that are open.
+/// The range with open ends replaced by the least and greatest value.
 fn closed([start, end]: [f64; 2], values: &[f64]) -> [f64; 2] {
     let finite = || values.iter().copied().filter(|value| value.is_finite());
     let least = finite().fold(f64::INFINITY, f64::min);
@@ -299,7 +299,7 @@ fn negative(values: &[f64]) -> Vec<f64> {
 }
 
 impl History {
-    /// Of each bin, from all the frames before it.
+    /// The covariates of each bin, from all frames up to its end.
     fn of(problem: &Problem<'_>) -> Self {
         let (frames, bins) = (problem.predictor.frames, problem.predictor.bins);
         let count = bins.len();
@@ -318,13 +318,13 @@ impl History {
             last_place_mm: Vec::with_capacity(count),
             temperature_c: empty(),
         };
-        let mut state = State::default();
+        let mut state = SensorHistory::default();
         let mut next = 0;
         let mut run = usize::MAX;
         for bin in 0..count {
             if bins.run[bin] != run {
                 run = bins.run[bin];
-                state = State::default();
+                state = SensorHistory::default();
             }
             while next < bins.first[bin + 1] {
                 state.take(frames, next);
@@ -351,9 +351,9 @@ impl History {
     }
 }
 
-/// What a sensor could remember.
+/// History of the sensor up to a frame.
 #[derive(Debug, Default)]
-struct State {
+struct SensorHistory {
     last: Option<(f64, [f64; 3])>,
     depth_mm: f64,
     contact_s: f64,
@@ -369,7 +369,7 @@ struct State {
     last_place_mm: Option<[f64; 2]>,
 }
 
-impl State {
+impl SensorHistory {
     fn take(&mut self, frames: &Frames, frame: usize) {
         let (t_s, at) = (frames.t_s[frame], frames.position_mm[frame]);
         let depth_mm = -at[2];

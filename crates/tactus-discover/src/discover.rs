@@ -127,14 +127,16 @@ fn discover_on_threads(
     };
     let before = search.locate(&base)?;
     let phase = |phase: SearchPhase| match phase {
-        SearchPhase::Pruning => reporter.report("taking back what does not earn its place", 0.6),
-        SearchPhase::Exchanging => reporter.report("trying every other effect in each one's place", 0.7),
+        SearchPhase::Pruning => {
+            reporter.report("removing effects that the held-out presses do not support", 0.6)
+        }
+        SearchPhase::Exchanging => reporter.report("comparing each effect with others in its place", 0.7),
     };
     let Grown { at: grown, rounds, equivalent, .. } = match options.rule {
         Rule::Protocol => search.grow(&base, &phase)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
-    reporter.report("what is left", 0.9);
+    reporter.report("locating what remains", 0.9);
     let after = search.locate(&grown)?;
     reporter.report("planning what to measure next", 0.95);
     let told = conclude(

@@ -4,9 +4,9 @@
 //! counts(bin, e) = baseline(run, e) + gain_e m_e(bin; sigma, effects) + ...
 //! ```
 //!
-//! Baselines and gains each act on one element, so that they are eliminated in closed form: every residual and every
-//! derivative by another parameter is first freed of what an element's own baseline and gain can take up. What remains
-//! is a small problem in the spread and the parameters of the effects, solved by damped Gauss-Newton steps.
+//! A baseline and a gain each act on one element, so they are eliminated in closed form: every residual and every
+//! derivative by another parameter is first projected onto the complement of the element's own baseline and gain. What
+//! remains is a small problem in the spread and the parameters of the effects, solved by damped Gauss-Newton steps.
 //!
 //! # Source
 //! Variable projection: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413. Damping: Levenberg and
@@ -23,27 +23,27 @@ use crate::parallel;
 use crate::predictor::{Parameters, Predictor, Term};
 use crate::scale::Scale;
 
-/// A fit ends when a step promises to lessen the cost by less than this.
+/// A fit ends when the expected reduction of the cost by a step is less than this.
 const COST_LEAST: f64 = 0.05;
 const COST_SHARE_LEAST: f64 = 1e-4;
 
-/// Gains and baselines move before all else if they alone take up so much of the cost.
+/// Gains and baselines are fitted first if they alone remove this share of the cost.
 const TAKEN_UP_LEAST: f64 = 0.1;
 
-/// A parameter of whose square gains and baselines leave less than this share is damped as if they left so much: what they
-/// can do as well goes nowhere far.
+/// Least share of a derivative's square that counts as the parameter's own in the damping. A parameter whose action gains
+/// and baselines can nearly replace is thus kept from long steps.
 const OWN_SHARE_LEAST: f64 = 1e-3;
 
-/// A knot that is seen by less than this share of what sees the one before tells nothing of a curve.
+/// A knot is undetermined if the data determine it by less than this share of the knot before.
 const UNSEEN_SHARE: f64 = 0.1;
 
-/// Frames enough for a noise's memory to be short beside them.
+/// A number of frames long beside the correlation time of the noise.
 const LONG_FRAMES: usize = 1000;
 
-/// An effect with more parameters has many.
+/// Effects with more parameters have their derivatives taken once per fit.
 const PARAMETERS_MANY: usize = 6;
 
-/// What is to be fitted, and how readings weigh.
+/// A least-squares problem: the data with their weights, and the model.
 #[derive(Debug)]
 pub(crate) struct Problem<'a> {
     pub(crate) predictor: Predictor<'a>,
@@ -51,15 +51,15 @@ pub(crate) struct Problem<'a> {
     pub(crate) element_weight: Vec<f64>,
     /// Weight of the fitted bins; 0 for those held out.
     pub(crate) train: Vec<f64>,
-    /// The same for what is slow beside the noise's own memory.
+    /// The same for signals that are slow beside the correlation time of the noise.
     pub(crate) slow: Vec<f64>,
-    /// That without contact, where nothing of a press looks like it; 0 in contact.
+    /// `slow` without contact, where a missing effect of the presses cannot be mistaken for drift; 0 in contact.
     pub(crate) slow_and_clear: Vec<f64>,
-    /// Coverings in the data: with one the slope of the spread is not free.
+    /// Number of coverings in the data. With one, the slope of the spread is not fitted.
     pub(crate) coverings: usize,
-    /// True if the spread is free at all.
+    /// True if the spread is fitted.
     pub(crate) spread_free: bool,
-    /// Duration of the longest run.
+    /// Duration of the longest run; at least 1 s.
     pub(crate) duration_s: f64,
     /// By how much the variance of a sum of squares exceeds that of independent readings.
     pub(crate) squares_inflation: f64,
@@ -70,10 +70,10 @@ pub(crate) struct Problem<'a> {
 pub(crate) struct Fitted {
     pub(crate) parameters: Parameters,
     pub(crate) predicted: Vec<f64>,
-    /// Weighted sum of squared residuals of the fitted bins; if zeros wander, as much less than with zeros that stand still
-    /// as the likelihood gains.
+    /// Weighted sum of squared residuals of the fitted bins; with a random walk, that of constant baselines less the gain in
+    /// likelihood.
     pub(crate) cost: f64,
-    /// Standard errors of the terms' parameters; not a number where one was not free.
+    /// Standard errors of the terms' parameters; NaN where one was not fitted.
     pub(crate) errors: Vec<Vec<f64>>,
 }
 
@@ -86,7 +86,7 @@ pub(crate) enum Free {
 }
 
 impl<'a> Problem<'a> {
-    /// A fit of the bins that are not held out.
+    /// The problem of fitting the bins that are not held out.
     pub(crate) fn new(predictor: Predictor<'a>, noise: &Noise) -> Self {
         let (bins, frames) = (predictor.bins, predictor.frames);
         let weigh = |(weight, heldout): (&f64, &bool)| if *heldout { 0.0 } else { *weight };
@@ -98,7 +98,7 @@ impl<'a> Problem<'a> {
         let slow: Vec<f64> = train.iter().enumerate().map(slow).collect();
         let clear = |(bin, weight): (usize, &f64)| if bins.is_clear(frames, bin) { *weight } else { 0.0 };
         let slow_and_clear = slow.iter().enumerate().map(clear).collect();
-        // A single element that is quieter than most is not told from rounding.
+        // A single element that is quieter than most cannot be told from rounding.
         let element_weight =
             noise.by_element_counts.iter().map(|rms| rms.max(0.7 * noise.rms_counts).powi(-2)).collect();
         let mut coverings_mm = frames.covering_mm.clone();
@@ -117,7 +117,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// What a fit moves, of a model of such terms.
+    /// The parameters that a fit of a model varies.
     pub(crate) fn free(&self, parameters: &Parameters) -> Vec<Free> {
         let mut free = Vec::new();
         if self.spread_free {
@@ -129,7 +129,7 @@ impl<'a> Problem<'a> {
         for (term, Term { definition, values }) in parameters.terms.iter().enumerate() {
             let mut values = definition.parameters.iter().zip(values);
             if values.any(|(known, value)| known.kind == ParameterKind::ElementOrAll && *value >= 0.0) {
-                // How one element's zero wandered before is no shape to fit.
+                // The known drift of one element's baseline is not refitted.
                 continue;
             }
             for (parameter, known) in definition.parameters.iter().enumerate() {
@@ -167,7 +167,7 @@ impl<'a> Problem<'a> {
         self.train.iter().flat_map(|bin| self.element_weight.iter().map(move |element| bin * element))
     }
 
-    /// Derivative of every reading by a free parameter, and the step with which it was taken.
+    /// Derivative of every reading by a free parameter, by a finite difference.
     pub(crate) fn slope(
         &self,
         at: &Parameters,
@@ -185,7 +185,7 @@ impl<'a> Problem<'a> {
         Ok(slope)
     }
 
-    /// The parameters a small step further, and the step, in the units in which a fit moves the parameter.
+    /// The parameters after a small step for a derivative, and that step on the parameter's [`Scale`].
     fn moved(&self, at: &Parameters, free: Free) -> (Parameters, f64) {
         let mut moved = at.clone();
         let step = match free {
@@ -221,8 +221,8 @@ impl<'a> Problem<'a> {
         parallel::map(&free, |one| self.slope(at, predicted, *one)).into_iter().collect()
     }
 
-    /// The best parameters near a start, in at most so many rounds. Derivatives by the parameters of effects that have
-    /// many, such as the knots of a curve, are taken once: the counts are nearly linear in them.
+    /// The best parameters near a start, in at most `rounds` rounds. Derivatives by the parameters of effects with many
+    /// parameters, such as the knots of a curve, are taken once, because the counts are nearly linear in them.
     pub(crate) fn fit_from(&self, start: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
         let free = self.free(&start);
         let mut at = self.with_walk(start)?;
@@ -299,8 +299,8 @@ impl<'a> Problem<'a> {
         Ok(Fitted { parameters: at, predicted, cost, errors })
     }
 
-    /// The parameters with gains and baselines that take up what they can, and what that gives, if it is much: a start
-    /// whose effects are not neutral has the gains of a model without them.
+    /// The parameters with refitted gains and baselines, and their prediction, if this reduces the cost by much. A start whose
+    /// effects are not neutral needs it, because its gains are those of a model without these effects.
     fn taken_up(
         &self,
         linear: &Linear<'_>,
@@ -352,7 +352,7 @@ impl<'a> Problem<'a> {
                 }
             });
         }
-        // What the rest leaves, the elements' own gains and baselines take up.
+        // The elements' own gains and baselines fit what the other parameters leave.
         let mut left = residual.to_vec();
         for (column, taken) in columns.iter().zip(taken) {
             for (left, slope) in left.iter_mut().zip(column) {
@@ -385,8 +385,8 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Knots of a curve that hardly any fitted bin sees go on from the knot before: a curve does not return where nobody looks.
-/// True if there are such.
+/// Sets undetermined knots of a curve to the value of the knot before, so that the curve stays constant without data.
+/// Returns true if there are such knots.
 fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
     let mut any = false;
     for (index, pair) in free.windows(2).enumerate() {
@@ -426,7 +426,7 @@ pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
-/// A step of the damped normal equations; each parameter is held by the damping as a share of its square.
+/// A step of the damped normal equations. The damping of each parameter is relative to its entry in `squares`.
 pub(crate) fn solve(
     gram: &DMatrix<f64>,
     right: &DVector<f64>,
@@ -445,7 +445,7 @@ pub(crate) fn solve(
     DVector::from_fn(gram.nrows(), |i, _| if gram[(i, i)] > 0.0 { step[i] / scale[i] } else { 0.0 })
 }
 
-/// A Gram matrix with ones on its diagonal, or a little more.
+/// A Gram matrix scaled to `1 + more` on its diagonal.
 fn scaled(gram: &DMatrix<f64>, more: f64) -> DMatrix<f64> {
     let scale: Vec<f64> = (0..gram.nrows()).map(|i| positive_root(gram[(i, i)])).collect();
     DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {

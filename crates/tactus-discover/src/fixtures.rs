@@ -1,4 +1,4 @@
-//! What the tests press on.
+//! Simulated measurements for tests.
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -10,7 +10,7 @@ use crate::{BaseModel, Discovery, Frames, Known, Options, Rule, discover, predic
 pub(crate) const ELEMENTS: usize = 48;
 pub(crate) const INTERVAL_S: f64 = 0.1;
 
-/// The paper's sensor and tool, its elements all alike: 1000 counts per mm upon 100.
+/// The paper's sensor and tool. All elements have 1000 counts per mm and a baseline of 100 counts.
 pub(crate) fn known() -> Known {
     let array = Array::digitacts();
     Known {
@@ -26,7 +26,7 @@ pub(crate) fn known() -> Known {
     }
 }
 
-/// Presses on all elements in an order by no place, 3 s each, of such readings.
+/// Presses of 3 s on all elements, in an order unrelated to place, with given counts.
 fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
     let mut frames = Frames::new(ELEMENTS);
     for (frame, t_ns) in (0..30 * ELEMENTS).zip((0..).step_by(100_000_000)) {
@@ -56,7 +56,7 @@ fn frames(known: &Known, counts: impl Fn(usize) -> Vec<f64>) -> Frames {
     frames
 }
 
-/// What a model with effects gives for the presses, and upon it what else there is: frame by frame, element by element.
+/// The presses' frames: the prediction of a model with effects, plus `upon`, frame by frame, element by element.
 pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> Frames {
     let blank = frames(known, |_| vec![0.0; ELEMENTS]);
     let base = BaseModel {
@@ -72,7 +72,7 @@ pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> 
     })
 }
 
-/// Of each frame, independent processes of so many members: Ornstein and Uhlenbeck's.
+/// Independent Ornstein-Uhlenbeck processes, `members` of them, for each frame.
 pub(crate) fn processes(members: usize, rms_counts: f64, time_s: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
     let kept = (-INTERVAL_S / time_s).exp();
     let mut normal = || -> f64 { StandardNormal.sample(rng) };

@@ -1,43 +1,43 @@
-//! How a model fares on the bins that chose nothing, and on all bins, block by block.
+//! Residuals of a model on the held-out bins and on all bins, block by block.
 
 use crate::fit::{Fitted, Problem};
 
-/// The noise is known to so many standard errors.
+/// A remainder counts as certain beyond this many standard errors.
 const SURE_Z: f64 = 2.0;
-/// A signal of so many standard deviations of the noise is one, and one of so few is none.
+/// Readings have a signal above the first number of noise standard deviations, and none below the second.
 const LOUD: f64 = 5.0;
 const QUIET: f64 = 0.5;
-/// A gap of so many standard errors is known within a few percent.
+/// A gap of this many standard errors is known within a few percent.
 const LARGE_Z: f64 = 20.0;
 
-/// How far a model is from the held-out bins beyond their noise, in units of the noise's variance, summed.
+/// Sum of squared residuals on the held-out bins less that of the noise, in units of the noise variance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HeldOutGap {
     pub(crate) value: f64,
-    /// Its standard error, of noise alone: what a model misses is no uncertainty.
+    /// Standard error of `value` from the noise alone, not from errors of the model.
     pub(crate) error: f64,
 }
 
 impl HeldOutGap {
-    /// True if the doubt about the noise is a small part of it.
+    /// True if the uncertainty of the noise is small beside the gap.
     pub(crate) fn is_large(self) -> bool {
         self.value > LARGE_Z * self.error
     }
 
-    /// What is left beyond the doubt about the noise.
+    /// The gap less the uncertainty of the noise; not negative.
     pub(crate) fn sure(self) -> f64 {
         (self.value - SURE_Z * self.error).max(0.0)
     }
 }
 
 impl Problem<'_> {
-    /// Weighted squared residuals of the bins that are held out, block by block, and the readings in each.
+    /// Weighted sum of squared residuals and number of readings of the held-out bins, for each block.
     fn heldout_blocks(&self, predicted: &[f64]) -> Vec<[f64; 2]> {
         let heldout = &self.predictor.bins.heldout;
         self.blocks_of(predicted, |bin| heldout[bin])
     }
 
-    /// Weighted squared residuals of all bins, fitted and held out, block by block.
+    /// Weighted sum of squared residuals of all bins, fitted and held out, for each block.
     pub(crate) fn blocks(&self, predicted: &[f64]) -> Vec<f64> {
         self.blocks_of(predicted, |_| true).into_iter().map(|[squares, _]| squares).collect()
     }
@@ -57,24 +57,24 @@ impl Problem<'_> {
         blocks
     }
 
-    /// By how much the held-out bins are nearer to one prediction than to another, block by block.
+    /// By how much `more` is nearer to the held-out bins than `less`, block by block.
     pub(crate) fn heldout_gains(&self, less: &[f64], more: &[f64]) -> Vec<f64> {
         gains(&self.heldout_blocks(less), &self.heldout_blocks(more))
     }
 
-    /// By how much the held-out bins are nearer to one model than to another, and the error of that, by whole blocks.
+    /// By how much `more` is nearer to the held-out bins than `less`, and its standard error from the scatter of blocks.
     pub(crate) fn heldout_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
         let (less, more) = (self.heldout_blocks(&less.predicted), self.heldout_blocks(&more.predicted));
         let gains = gains(&less, &more);
         let sum: f64 = gains.iter().sum();
         let held = less.iter().filter(|[_, readings]| *readings > 0.0).count().max(1) as f64;
         let scatter: f64 = gains.iter().map(|gain| gain * gain).sum::<f64>() - sum * sum / held;
-        // A gain in one block only is no less of one: its noise is that of the difference of two predictions.
+        // A gain in a single block counts fully, so the error is at most that of the difference of two predictions.
         let noise = 4.0 * sum.abs();
         [sum, scatter.max(0.0).min(noise).sqrt()]
     }
 
-    /// How much of a column the residual of all bins holds, and the standard error of that, by whole blocks.
+    /// Coefficient of a column in the residual of all bins, and its standard error from the scatter of blocks.
     pub(crate) fn share(&self, column: &[f64], predicted: &[f64]) -> Option<[f64; 2]> {
         let bins = self.predictor.bins;
         let mut blocks = vec![[0.0; 2]; bins.blocks];
@@ -93,7 +93,7 @@ impl Problem<'_> {
         (squares > 0.0).then(|| [share, scatter.sqrt() / squares])
     }
 
-    /// Root mean square of the residuals of the bins that are held out, each weighed by its frames.
+    /// Root mean square of the residuals of the held-out bins, each weighted by its number of frames.
     pub(crate) fn heldout_rms_counts(&self, predicted: &[f64]) -> f64 {
         let bins = self.predictor.bins;
         let elements = bins.elements;
@@ -108,7 +108,7 @@ impl Problem<'_> {
         if readings > 0.0 { (sum / readings).sqrt() } else { 0.0 }
     }
 
-    /// How far a model is from the bins that are held out.
+    /// The gap of a model on the held-out bins.
     pub(crate) fn heldout_gap(&self, predicted: &[f64]) -> HeldOutGap {
         let blocks = self.heldout_blocks(predicted);
         let value = blocks.iter().map(|[squares, readings]| squares - readings).sum();
@@ -116,8 +116,8 @@ impl Problem<'_> {
         HeldOutGap { value, error: variance.sqrt() }
     }
 
-    /// What a model surely leaves of the held-out bins, in units of the noise's variance, summed: the readings with a signal
-    /// of all bins, fitted or held out, against those without, which have the same noise.
+    /// Certain remainder of a model on the held-out bins, as a sum in units of the noise variance. It compares readings with a
+    /// signal and readings without, which have the same noise, of all bins, and is scaled to the held-out ones.
     pub(crate) fn surely_left(&self, at: &Fitted) -> f64 {
         let bins = self.predictor.bins;
         let elements = bins.elements;

@@ -1,20 +1,20 @@
-//! Is the converter coarser than declared? Its readings then stand on a lattice of wider steps.
+//! Detects a converter that is coarser than declared: its readings lie on a lattice of wider steps.
 //!
-//! Means do not show it, and neither do residuals where noise dithers: the readings themselves do. With `n` different
-//! readings, all of them on a lattice `q` declared steps wide by chance has a probability of `(1 / q)^(n - 2)`.
+//! Means do not show this, nor do residuals if noise dithers; single readings do. The probability that `n` different
+//! readings lie on a lattice of `q` declared steps by chance is `(1 / q)^(n - 2)`.
 
 use std::collections::BTreeSet;
 
 use crate::Frames;
 
-/// Fewer different readings may stand on a lattice by chance.
+/// Least number of different readings; fewer may lie on a lattice by chance.
 const READINGS_LEAST: usize = 20;
-/// A lattice must be wider than declared by such a factor.
+/// Least ratio of the lattice's step to the declared one.
 const WIDER: f64 = 1.4;
-/// A reading stands on a lattice if it is off by no more than this share of a step.
+/// Greatest distance of a reading from the lattice, as a share of a step.
 const OFF_MAX: f64 = 0.02;
 
-/// The step of the readings in counts, if it is wider than declared, and the chance of that.
+/// The step of the readings in counts, if it is wider than declared, and its p-value.
 pub(crate) fn wider_step(frames: &Frames, declared_counts: f64) -> Option<(f64, f64)> {
     let different: BTreeSet<u32> = frames.counts.iter().map(|counts| counts.to_bits()).collect();
     let mut readings: Vec<f64> = different.into_iter().map(|bits| f64::from(f32::from_bits(bits))).collect();

@@ -1,4 +1,4 @@
-//! Gains and baselines eliminated: what of a residual or a derivative they cannot take up.
+//! Elimination of gains and baselines: the part of a residual or a derivative that they cannot fit.
 
 use crate::DiscoverError;
 use crate::fit::Problem;
@@ -6,28 +6,28 @@ use crate::noise::median;
 use crate::predictor::Parameters;
 use crate::random_walk::Baselines;
 
-/// Recalibration moves an element's gain within these, as ratios to what is typical of the array: an element beyond is
-/// not an element of another gain.
+/// Range of an element's recalibrated gain relative to the declared one, as a ratio to the array's typical value. An element
+/// outside has another fault than a different gain.
 const GAIN_RATIOS: [f64; 2] = [0.25, 4.0];
-/// So near to an end a gain is at it.
+/// A gain within this share of an end of the range counts as at the end.
 const PIN_MARGIN: f64 = 0.02;
-/// An element whose reading tells its gain worse than this share keeps its declared gain.
+/// An element keeps its declared gain if the relative error of its fitted gain would be greater than this.
 const GAIN_ERROR_MAX: f64 = 0.3;
 
-/// Derivatives at a point, freed of gains and baselines.
+/// Projection that removes gains and baselines, at one point of the parameters.
 pub(crate) struct Linear<'a> {
     problem: &'a Problem<'a>,
     baselines: Baselines<'a>,
-    /// Of the counts by each element's relative gain, freed of the zeros.
+    /// Derivative of the counts by each element's relative gain, less the part that the baselines fit.
     by_gain: Vec<f64>,
-    /// What the zeros took up of it: run by run, knot by knot.
+    /// The part of it that the baselines fit: run by run, knot by knot.
     by_gain_taken: Vec<Vec<f64>>,
-    /// Of every element, the weighted sum of squares of that; 0 where the gain is not free.
+    /// Weighted sum of squares of `by_gain` for every element; 0 where the gain is not fitted.
     by_gain_squares: Vec<f64>,
 }
 
 impl<'a> Problem<'a> {
-    /// Derivatives at a point.
+    /// The projection at a point.
     pub(crate) fn linear(&'a self, at: &Parameters, predicted: &[f64]) -> Result<Linear<'a>, DiscoverError> {
         let mut more = at.clone();
         let share = 1e-3;
@@ -54,7 +54,7 @@ impl<'a> Problem<'a> {
         Ok(Linear { problem: self, baselines, by_gain, by_gain_taken, by_gain_squares })
     }
 
-    /// Elements whose gain has come to the end of what recalibration may give it: there it stays, for an effect to explain.
+    /// Elements whose gain is at an end of its range. It stays there, and an effect may explain the rest.
     fn pinned(&self, at: &Parameters) -> Vec<bool> {
         let declared = &self.predictor.known.response.sensitivity_counts_per_mm;
         let ratios: Vec<f64> =
@@ -71,7 +71,7 @@ impl<'a> Problem<'a> {
 }
 
 impl Linear<'_> {
-    /// Frees a column, bin by bin and element by element, of what gains and baselines can take up.
+    /// Removes from a column the part that gains and baselines can fit; bin by bin, element by element.
     pub(crate) fn project(&self, column: &mut [f64]) {
         self.baselines.centre(column);
         let elements = self.by_gain_squares.len();
@@ -83,7 +83,7 @@ impl Linear<'_> {
         }
     }
 
-    /// The relative change of each gain that best takes up a column.
+    /// The relative change of each gain that fits a column best.
     fn shares(&self, column: &[f64]) -> Vec<f64> {
         let elements = self.by_gain_squares.len();
         let mut sums = vec![0.0; elements];
@@ -103,7 +103,7 @@ impl Linear<'_> {
         sums
     }
 
-    /// Moves gains and zeros so that they take up what is left if the zeros stand still.
+    /// Moves gains and baselines to fit `left`, a residual without random walks.
     pub(crate) fn take_up(&self, left: &[f64], parameters: &mut Parameters) {
         let elements = self.by_gain_squares.len();
         let mut centred = left.to_vec();
@@ -135,7 +135,7 @@ impl Linear<'_> {
             taken[element] = if now == 0.0 { 0.0 } else { next / now - 1.0 };
             parameters.sensitivity[element] = next;
         }
-        // What the zeros take up, less what the gains' change has moved of it.
+        // The baselines' fit, corrected for the change of the gains.
         for (baselines, by_gain) in baselines.iter_mut().zip(&self.by_gain_taken) {
             for ((zero, by_gain), taken) in baselines.iter_mut().zip(by_gain).zip(taken.iter().cycle()) {
                 *zero -= taken * by_gain;

@@ -1,4 +1,4 @@
-//! Where a model and the data disagree: on which covariates the residual depends, and how.
+//! Where a model and the data disagree: the covariates on which the residual depends.
 
 use crate::DiscoverError;
 use crate::covariates::{Feature, Form, Forms, features};
@@ -8,22 +8,22 @@ use crate::parallel;
 use crate::score::{Score, flipped, largest, p_value, q_values};
 use crate::search::{FLIPS, Search};
 
-/// Covariates are told with at most this share of false ones among them.
+/// Greatest false-discovery rate among the reported covariates.
 const Q_MAX: f64 = 0.05;
-/// The covariates' flips are not the candidates'.
+/// Changes the seed, so that covariates have other sign flips than candidates.
 const STREAM: u64 = 0x0010_ca7e;
 
 /// Where a model and the data disagree.
 pub(crate) struct Located {
-    /// The largest of all scores.
+    /// The largest of all standardised scores.
     pub(crate) statistic: f64,
-    /// Chance of so large a score if nothing were missing.
+    /// p-value of `statistic`.
     pub(crate) p_value: f64,
     pub(crate) gap: Vec<Gap>,
 }
 
 impl Search<'_> {
-    /// On what the residual of a model depends.
+    /// Tests on which covariates the residual of a model depends.
     pub(crate) fn locate(&self, at: &Fitted) -> Result<Located, DiscoverError> {
         let problem = self.problem;
         let fitting = self.fitting(at)?;
@@ -72,7 +72,7 @@ impl Search<'_> {
         Ok(Located { statistic, p_value: p_value(statistic, &largest(&under_none)), gap })
     }
 
-    /// The residual against each covariate, before and after.
+    /// The residual of the base and of the grown model against each covariate.
     pub(crate) fn curves(&self, base: &Fitted, grown: &Fitted) -> Result<Vec<Curve>, DiscoverError> {
         let problem = self.problem;
         let forms = Forms::of(problem, &base.parameters, &base.predicted)?;

@@ -1,16 +1,17 @@
-//! The next experiment: which one would tell two explanations apart that the data cannot.
+//! The next experiment: which one would distinguish two explanations that the data do not.
 //!
-//! Each explanation predicts the frames of every experiment that the rig could make ([`design`]). What their difference
-//! is to be worth is what a fit of the wrong one cannot take up, with its gains, baselines, spread and effects free:
+//! Each explanation predicts the frames of every experiment that the rig could make ([`design`]). The difference of the two
+//! predictions counts only as far as a fit of the wrong explanation, with its gains, baselines, spread and effects free,
+//! cannot reproduce it:
 //!
 //! ```text
-//! z = sqrt(sum of (d / noise)^2)        d = difference of the predictions, freed of the tangent space of the wrong one
+//! z = sqrt(sum of (d / noise)^2)        d = difference of the predictions, orthogonal to the wrong one's tangent space
 //! ```
 //!
-//! the smaller of the two, since nobody knows which is wrong. Only the new frames bind that fit: `z` is what the experiment
-//! tells by itself, and with the old data it tells no less. Nature has neither's very form, so that a wrong one must also
-//! leave a good part of what either closes, of old and new frames together: the experiment with the greatest such share
-//! comes first. Those come before all others of which an effect's definition says that they show it.
+//! Either explanation may be the wrong one, so the smaller `z` of the two is taken. The fit uses only the new frames; with
+//! the old data the distinction is no worse. Real physics has neither form exactly, so a wrong explanation must also leave a
+//! good share of the gap in old and new frames together. The experiment with the greatest share comes first. Experiments
+//! that an effect's definition names as showing it come before all others.
 //!
 //! # Source
 //! Designs that discriminate between models: A. C. Atkinson and V. V. Fedorov, *Biometrika* 62 (1975) 57 (T-optimality).
@@ -29,52 +30,51 @@ use crate::score::Fitting;
 use crate::{DiscoverError, Frames, Known};
 use design::{Design, DesignSpace};
 
-/// A model that may be what the data show.
+/// A model that may explain the data.
 #[derive(Debug, Clone)]
 pub(crate) struct Explanation {
-    /// The effect that it has and the other has not.
+    /// The effect that distinguishes it from the other explanation.
     pub(crate) name: &'static str,
     pub(crate) parameters: Parameters,
 }
 
-/// Explanations that the data do not tell apart.
+/// Two explanations that the data do not distinguish.
 #[derive(Debug, Clone)]
 pub(crate) struct Pair {
-    /// The one that is in the model, and another in its place.
+    /// The effect in the model, and another in its place.
     pub(crate) of: [Explanation; 2],
-    /// The model with neither.
+    /// The model with neither effect.
     pub(crate) without: Parameters,
-    /// By how much the one lessens the cost of the data.
+    /// Reduction of the cost by the effect in the model.
     pub(crate) gain: f64,
 }
 
-/// What an experiment is expected to tell.
+/// Expected result of an experiment.
 #[derive(Debug, Clone, Copy)]
 struct Expected {
     z: f64,
-    /// Which share of the gap the wrong one would leave.
+    /// Share of the gap that the wrong explanation would leave.
     share: f64,
 }
 
-/// An experiment that does worse is not proposed.
+/// Least `z` of a proposal.
 const WORTH_Z: f64 = 2.0;
-/// Proposals for one question.
+/// Greatest number of proposals for one pair.
 const PROPOSALS_MAX: usize = 3;
-/// An effect that was not shown is taken to move the largest signal of an experiment by this share of it.
+/// Assumed size of an effect that was not shown, as a share of the experiment's largest signal.
 const SMALL_SHARE: f64 = 0.02;
 
-/// What else a proposal rests on.
+/// Data and noise on which proposals are based.
 #[derive(Clone, Copy)]
 pub(crate) struct Setting<'a> {
     pub(crate) known: &'a Known,
-    /// The data: no design goes deeper, or loads faster, than they did.
+    /// The data. No design goes deeper or loads faster than they do.
     pub(crate) frames: &'a Frames,
     pub(crate) noise: &'a Noise,
 }
 
 impl Setting<'_> {
-    /// For each pair the experiments that tell it apart: the one that leaves the wrong one the greatest share, then
-    /// shorter ones.
+    /// For each pair, the experiments that distinguish it: first the one with the greatest share, then shorter ones.
     pub(crate) fn propose(self, pairs: &[Pair]) -> Result<Vec<NextExperiment>, DiscoverError> {
         if pairs.is_empty() {
             return Ok(Vec::new());
@@ -85,7 +85,7 @@ impl Setting<'_> {
             let separates = pair.of.each_ref().map(|one| one.name.to_owned());
             let [one, other] = pair.of.each_ref().map(|one| Definition::find(one.name));
             let shown_by = [one?.shown_by, other?.shown_by].concat();
-            // What is said to show either; small steps promise too much of the others.
+            // Experiments that definitions name for either effect. The linear prediction promises too much of the others.
             let (own, others): (Vec<&Design>, Vec<&Design>) =
                 designs.iter().partition(|design| shown_by.contains(&design.name));
             for designs in [own, others] {
@@ -99,7 +99,7 @@ impl Setting<'_> {
         Ok(proposals)
     }
 
-    /// For each effect that the data cannot show the experiments that would show it, were it small.
+    /// For each effect that the data cannot show, an experiment that would show it even if it is small.
     pub(crate) fn show(
         self,
         not_shown: &[NotShown],
@@ -136,7 +136,7 @@ impl Setting<'_> {
         found.sort_by(|(_, one), (_, other)| {
             other.share.total_cmp(&one.share).then(other.z.total_cmp(&one.z))
         });
-        // What tells less must take less time.
+        // An experiment with a smaller share must take less time.
         let mut shortest_s = f64::INFINITY;
         found.retain(|(design, _)| {
             let is_shorter = design.duration_s < shortest_s;
@@ -153,7 +153,7 @@ impl Setting<'_> {
         Ok(proposals.collect())
     }
 
-    /// The wrong one is the other, whichever is right; the right one is as in the model.
+    /// How well a design distinguishes a pair.
     fn separation(self, design: &Design, pair: &Pair) -> Result<Expected, DiscoverError> {
         self.on(design, |problem| {
             let [one, other, without] =
@@ -172,7 +172,7 @@ impl Setting<'_> {
         })
     }
 
-    /// How far a small effect lies from the model without it, the least of its own parameters.
+    /// How well a design shows a small effect, by the parameter that it shows best.
     fn visibility(
         self,
         design: &Design,
@@ -199,12 +199,12 @@ impl Setting<'_> {
                     best = best.max(fitting.size(&column) * SMALL_SHARE * signal / reach);
                 }
             }
-            // Nothing else would close any of it.
+            // There is no other explanation that would close any of it.
             Ok(Expected { z: best, share: 1.0 })
         })
     }
 
-    /// Does something with a model of the design's frames.
+    /// Calls `work` with the least-squares problem of the design's frames.
     fn on<R>(
         self,
         design: &Design,
@@ -218,7 +218,7 @@ impl Setting<'_> {
     }
 }
 
-/// The same model for a run of its own.
+/// The same model for a single new run, with mean baselines and without random walks.
 fn once(of_runs: &Parameters) -> Parameters {
     Parameters { baseline: vec![of_runs.mean_baseline()], walk: None, ..of_runs.clone() }
 }

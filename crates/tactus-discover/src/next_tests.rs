@@ -29,7 +29,7 @@ fn measured() -> Frames {
     frames
 }
 
-/// Well more than decides.
+/// Clearly more than [`WORTH_Z`].
 const CLEAR_Z: f64 = 8.0;
 
 fn noise() -> Noise {
@@ -47,7 +47,7 @@ fn explanation(known: &Known, name: &'static str, values: &[(&str, f64)]) -> Exp
     Explanation { name, parameters }
 }
 
-/// An explanation of the paper's experiment, and another fitted to what it predicts there: twins on that.
+/// An explanation, and another fitted to its prediction of the paper's experiment: twins in that experiment.
 fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> Pair {
     let (frames, noise) = (measured(), noise());
     let [right, wrong] = [right, wrong].map(|(name, values)| explanation(known, name, values));
@@ -64,7 +64,7 @@ fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> 
     Pair { of: [right, Explanation { parameters: fitted.parameters, name: wrong.name }], without, gain }
 }
 
-/// What each of the named designs tells of twins.
+/// How well each of the named designs distinguishes twins.
 fn separations<const N: usize>(of: [(&'static str, &[(&str, f64)]); 2], names: [&str; N]) -> [f64; N] {
     let (known, frames, noise) = (known(), measured(), noise());
     let setting = Setting { known: &known, frames: &frames, noise: &noise };
@@ -77,7 +77,7 @@ fn separations<const N: usize>(of: [(&'static str, &[(&str, f64)]); 2], names: [
 }
 
 #[test]
-fn relaxation_and_imprint_are_told_apart_by_rests_and_not_by_quick_presses() {
+fn relaxation_and_imprint_are_distinguished_by_rests_and_not_by_quick_presses() {
     let [rests, hold, repeats, approach] = separations(
         [
             ("imprint", &[("set_share", 0.05), ("recovery_s", 5.0)]),
@@ -90,7 +90,7 @@ fn relaxation_and_imprint_are_told_apart_by_rests_and_not_by_quick_presses() {
 }
 
 #[test]
-fn misregistration_and_tilt_are_told_apart_by_light_and_deep_presses() {
+fn misregistration_and_tilt_are_distinguished_by_light_and_deep_presses() {
     let [depths, drift] = separations(
         [("misregistration", &[("offset_x_mm", 0.05)]), ("surface-tilt", &[("slope_x_mm_per_mm", 0.002)])],
         ["depths", "drift"],
@@ -99,7 +99,7 @@ fn misregistration_and_tilt_are_told_apart_by_light_and_deep_presses() {
 }
 
 #[test]
-fn a_heavy_tail_and_crosstalk_are_told_apart_by_presses_all_over() {
+fn a_heavy_tail_and_crosstalk_are_distinguished_by_presses_all_over() {
     let [wide, rates, drift] = separations(
         [("heavy-tail", &[("tail_share", 0.05)]), ("crosstalk", &[("neighbour_share", 0.02)])],
         ["wide", "rates", "drift"],
@@ -108,7 +108,7 @@ fn a_heavy_tail_and_crosstalk_are_told_apart_by_presses_all_over() {
 }
 
 #[test]
-fn lost_motion_and_hysteresis_are_told_apart_by_reversals() {
+fn lost_motion_and_hysteresis_are_distinguished_by_reversals() {
     let [reversals, repeats, tilt] = separations(
         [
             ("backlash", &[("play_z_mm", 0.03)]),
@@ -120,7 +120,7 @@ fn lost_motion_and_hysteresis_are_told_apart_by_reversals() {
 }
 
 #[test]
-fn what_leaves_the_wrong_one_most_comes_first_and_what_leaves_it_less_is_shorter() {
+fn the_greatest_share_comes_first_and_experiments_with_less_are_shorter() {
     let (known, frames, noise) = (known(), measured(), noise());
     let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let pair = twins(
@@ -163,7 +163,7 @@ fn nothing_is_proposed_between_an_explanation_and_itself() {
 }
 
 #[test]
-fn what_the_data_cannot_show_is_shown_by_an_experiment_of_its_own() {
+fn an_effect_that_the_data_cannot_show_gets_an_experiment_of_its_own() {
     let (known, frames, noise) = (known(), measured(), noise());
     let setting = Setting { known: &known, frames: &frames, noise: &noise };
     let not_shown = [NotShown { effect: "relaxation", reason: "no depth was held".into() }];

@@ -1,40 +1,40 @@
 //! The noise of readings, from frames that repeat each other.
 //!
-//! Where the tip has rested for a while, readings differ by noise only. With `x(t)` a reading,
+//! Where the tip has rested for a while, readings differ by noise only. With a reading `x(t)`,
 //!
 //! ```text
 //! D(k) = mean (x(t + k) - x(t))^2 / 2 = noise^2 (1 - rho(k))
 //! ```
 //!
-//! so that the plateau of `D` is the variance of a reading and its rise the autocorrelation `rho`; what is slow, such as
-//! a drift, hardly enters a difference over a second. Nothing of this depends on the model.
+//! The plateau of `D` is the variance of a reading, and the rise of `D` gives the autocorrelation `rho`. Slow changes such
+//! as drift hardly contribute to a difference over a second. None of this depends on the model.
 
 use std::f64::consts::PI;
 
 use crate::Frames;
 
-/// The tip has come to rest if it stood still for so long.
+/// The tip is at rest if it was still for this time.
 const SETTLED_S: f64 = 1.0;
 /// Lags of the plateau, in frames: about a second of the paper's sensor.
 const PLATEAU: std::ops::RangeInclusive<usize> = 20..=30;
-/// Elements whose noise differs by fewer standard errors are taken to be alike.
+/// Elements whose noise differs by fewer standard errors are taken to have the same noise.
 const ALIKE_Z: f64 = 3.0;
-/// Fewer pairs of frames tell nothing.
+/// Least number of pairs of frames for an estimate.
 const PAIRS_LEAST: usize = 20;
 
-/// Median size of a standard normal deviate.
+/// Median absolute value of a standard normal deviate.
 const MEDIAN_SIZE: f64 = 0.674_490;
 
-/// How readings scatter.
+/// Statistics of the noise of readings.
 #[derive(Debug, Clone)]
 pub(crate) struct Noise {
     /// Standard deviation of one reading: the median over the elements.
     pub(crate) rms_counts: f64,
-    /// The same of every element.
+    /// Standard deviation of one reading of each element.
     pub(crate) by_element_counts: Vec<f64>,
-    /// Autocorrelation at a lag of 0, 1, ... frames.
+    /// Autocorrelation at lags of 0, 1, ... frames.
     pub(crate) correlation: Vec<f64>,
-    /// Of the variance of a reading, what the converter does to the same signal every time: no mean lessens it.
+    /// Share of a reading's variance that comes from rounding and repeats for the same signal, so averaging does not reduce it.
     pub(crate) rounding_share: f64,
 }
 
@@ -44,7 +44,7 @@ impl Noise {
         Self::of_residual(frames, &frames.counts, still, step_counts)
     }
 
-    /// The same of what a model leaves of the frames, frame by frame, element by element.
+    /// As [`Noise::of`], from a model's residual: frame by frame, element by element.
     pub(crate) fn of_residual(
         frames: &Frames,
         residual: &[f32],
@@ -72,7 +72,7 @@ impl Noise {
         let longest = (1..=lags).rev().find(|lag| pairs[*lag] >= PAIRS_LEAST)?;
         let plateau: Vec<usize> =
             if longest >= *PLATEAU.start() { (*PLATEAU.start()..=longest).collect() } else { vec![longest] };
-        // The variance of rounding an even distribution.
+        // The variance of rounding of a uniform distribution.
         let rounding = step_counts * step_counts / 12.0;
         let variance = |element: usize| {
             let (sum, count) = plateau.iter().fold((0.0, 0), |(sum, count), lag| {
@@ -93,7 +93,7 @@ impl Noise {
             })
             .collect();
         let independent = pairs[longest] as f64 / memory_frames(&correlation) as f64;
-        let variances = told_apart(&variances, ALIKE_Z * (2.0 / independent).sqrt());
+        let variances = pooled(&variances, ALIKE_Z * (2.0 / independent).sqrt());
         let typical = median(&variances);
         let rounding_share = bias_variance(typical - rounding, step_counts) / typical;
         Some(Self {
@@ -104,11 +104,11 @@ impl Noise {
         })
     }
 
-    /// From differences of consecutive frames, where none repeat each other: what is quick in the signal enters too.
+    /// From differences of consecutive frames, for data in which no frames repeat each other. Fast signals contribute too.
     pub(crate) fn of_differences(frames: &Frames, step_counts: f64) -> Self {
         let elements = frames.elements;
         let rms = |element: usize| {
-            // Straight lines leave nothing: x1 - 2 x2 + x3, of six times the variance.
+            // x1 - 2 x2 + x3 removes straight lines and has six times the variance.
             let bend = |frame: usize| {
                 let [a, b, c] = [frame - 2, frame - 1, frame].map(|one| frames.counts_of(one)[element]);
                 f64::from(a - 2.0 * b + c).abs()
@@ -134,16 +134,16 @@ impl Noise {
         correlated + (count - 1.0) * self.rounding_share
     }
 
-    /// By how much the variance of a sum of squares of readings exceeds that of independent ones, if the noise forgets as
-    /// fast in each frame as its means of `frames` readings say: `(1 + phi^2) / (1 - phi^2)`, where they have the
-    /// inflation `(1 + phi) / (1 - phi)`.
+    /// By how much the variance of a sum of squares of readings exceeds that of independent ones. This takes the noise to be
+    /// first-order autoregressive: means of `frames` readings have the inflation `(1 + phi) / (1 - phi)`, sums of squares
+    /// have `(1 + phi^2) / (1 - phi^2)`.
     pub(crate) fn squares_inflation(&self, frames: usize) -> f64 {
         let inflation = self.inflation(frames);
         let phi = ((inflation - 1.0) / (inflation + 1.0)).clamp(0.0, 0.98);
         (1.0 + phi * phi) / (1.0 - phi * phi)
     }
 
-    /// After so many frames readings are independent.
+    /// Number of frames after which readings are independent.
     pub(crate) fn memory_frames(&self) -> usize {
         memory_frames(&self.correlation)
     }
@@ -153,9 +153,9 @@ fn memory_frames(correlation: &[f64]) -> usize {
     correlation.iter().rposition(|rho| *rho > 0.1).unwrap_or(0) + 1
 }
 
-/// Variances that differ by no more than this share are the same, their mean: weights by what only chance makes differ
-/// would make quiet elements of lucky ones, and what is left of them look like more than noise.
-fn told_apart(variances: &[f64], share: f64) -> Vec<f64> {
+/// Replaces variances that differ by no more than this share by their mean. Weights from chance differences would make some
+/// elements look quiet, and their residuals look like more than noise.
+fn pooled(variances: &[f64], share: f64) -> Vec<f64> {
     let middle = median(variances);
     let is_alike = |variance: f64| variance < middle * (1.0 + share) && variance * (1.0 + share) > middle;
     let alike: Vec<f64> = variances.iter().copied().filter(|variance| is_alike(*variance)).collect();
@@ -163,8 +163,8 @@ fn told_apart(variances: &[f64], share: f64) -> Vec<f64> {
     variances.iter().map(|variance| if is_alike(*variance) { mean } else { *variance }).collect()
 }
 
-/// Variance of what rounding to a step adds to the mean of a signal under normal noise of some variance, over signals
-/// that lie anywhere in the step. None is left where noise dithers; without noise it is that of rounding itself.
+/// Variance of the bias that rounding to a step gives the mean of a signal under normal noise, over signals anywhere in the
+/// step. It vanishes if the noise dithers; without noise it is the variance of rounding itself.
 ///
 /// # Source
 /// B. Widrow and I. Kollar, *Quantization Noise* (2008), ch. 9, of a signal `x` under noise of a standard deviation `s`:
@@ -183,12 +183,12 @@ fn bias_variance(noise_variance: f64, step_counts: f64) -> f64 {
     square / (2.0 * PI * PI) * (1..=400).map(term).sum::<f64>()
 }
 
-/// Of every frame, whether the tip had been at rest for a while.
+/// Whether the tip was at rest for [`SETTLED_S`], for every frame.
 fn settled(frames: &Frames, still: &[usize]) -> Vec<bool> {
     (0..frames.len()).map(|frame| frames.t_s[frame] - frames.t_s[frame - still[frame]] >= SETTLED_S).collect()
 }
 
-/// The middle one, or the mean of the two in the middle; 0 of none.
+/// The median; 0 of no values.
 pub(crate) fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -200,7 +200,7 @@ pub(crate) fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// The median of sizes that come in steps, within the step about the middle one: else it would be off by up to half a step.
+/// The median of absolute values that come in steps, interpolated within its step to avoid an error of up to half a step.
 fn median_in_steps(sizes: &[f64], step: f64) -> f64 {
     let middle = median(sizes);
     let [least, most] = [(middle - step / 2.0).max(0.0), middle + step / 2.0];

@@ -36,7 +36,7 @@ fn resting(phi: f64) -> Frames {
 }
 
 #[test]
-fn the_noise_is_that_of_a_reading_however_it_hangs_together() {
+fn the_noise_is_that_of_one_reading_at_any_autocorrelation() {
     for phi in [0.0, 0.5, 0.8] {
         let frames = resting(phi);
         let noise = Noise::of(&frames, &still(&frames), 0.01).unwrap();
@@ -55,7 +55,7 @@ fn a_mean_of_many_readings_is_as_uncertain_as_its_correlation_makes_it() {
 }
 
 #[test]
-fn frames_that_never_repeat_tell_no_noise() {
+fn without_repeated_frames_the_noise_comes_from_differences() {
     let mut frames = resting(0.0);
     for (index, at) in (0_u32..).zip(&mut frames.position_mm) {
         at[0] = f64::from(index);
@@ -66,7 +66,7 @@ fn frames_that_never_repeat_tell_no_noise() {
 }
 
 #[test]
-fn what_rounding_does_to_a_mean_is_that_of_many_rounded_readings() {
+fn the_bias_by_rounding_is_that_of_the_mean_of_many_rounded_readings() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     for rms in [0.0, 0.1, 0.2, 0.35] {
         let mut square = 0.0;
@@ -85,8 +85,8 @@ fn what_rounding_does_to_a_mean_is_that_of_many_rounded_readings() {
 }
 
 #[test]
-fn elements_that_differ_by_chance_only_are_alike_and_a_noisy_one_is_told() {
-    let got = super::told_apart(&[0.9, 1.0, 1.2, 1.1, 50.0], 0.5);
+fn noise_that_differs_by_chance_is_pooled_and_a_noisy_element_is_not() {
+    let got = super::pooled(&[0.9, 1.0, 1.2, 1.1, 50.0], 0.5);
     let mean = (0.9 + 1.0 + 1.2 + 1.1) / 4.0;
     for (got, want) in got.into_iter().zip([mean, mean, mean, mean, 50.0]) {
         assert!((got - want).abs() < 1e-12, "{got}, not {want}");
@@ -94,7 +94,7 @@ fn elements_that_differ_by_chance_only_are_alike_and_a_noisy_one_is_told() {
 }
 
 #[test]
-fn differences_of_whole_counts_tell_the_noise_of_a_reading() {
+fn differences_of_whole_counts_give_the_noise_of_a_reading() {
     for step_counts in [0.0, 1.0, 4.0] {
         let mut frames = resting(0.0);
         for counts in &mut frames.counts {

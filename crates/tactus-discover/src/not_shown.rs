@@ -1,4 +1,4 @@
-//! Which effects these data cannot show, whatever their size, and what they lack for it.
+//! Effects that these data cannot show at any size, and what the data lack.
 
 use tactus_model::Phase;
 use tactus_model::effect::REGISTRY;
@@ -8,10 +8,10 @@ use crate::contacts::Contacts;
 use crate::discovery::NotShown;
 use crate::fit::Problem;
 
-/// An effect is out of sight if the whole of its range would be seen with no more than so many standard errors.
+/// An effect cannot be shown if its whole range is less than this many standard errors.
 const REACH_LEAST: f64 = 15.0;
 
-/// Effects that need what the data do not hold; no candidates, however well they may seem to fit.
+/// Effects for which the data lack something. They are no candidates, however well they seem to fit.
 pub(crate) fn lacking(problem: &Problem<'_>, replicates: bool) -> Vec<NotShown> {
     let frames = problem.predictor.frames;
     let contacts = Contacts::of(frames);
@@ -26,7 +26,7 @@ pub(crate) fn lacking(problem: &Problem<'_>, replicates: bool) -> Vec<NotShown> 
         .collect()
 }
 
-/// Effects that would hardly change anything in these data even at the end of their range.
+/// Effects that would hardly change these data even at the ends of their ranges.
 pub(crate) fn out_of_sight(screened: &[Screened]) -> Vec<NotShown> {
     let unseen = screened
         .iter()
@@ -34,19 +34,19 @@ pub(crate) fn out_of_sight(screened: &[Screened]) -> Vec<NotShown> {
         .map(|one| NotShown {
             effect: one.definition.name,
             reason: format!(
-                "nothing in these data changes with it beyond what recalibration takes up; {} would show it",
+                "its change of these data is too small, or recalibration can reproduce it; {} would show it",
                 one.definition.shown_by.join(" or ")
             ),
         });
     unseen.collect()
 }
 
-/// Fewer frames in motion are the ends of moves.
+/// Fewer frames in motion are only the ends of moves.
 const MOVING_LEAST: usize = 20;
-/// Effects that are seen in the readings themselves, not in their means.
+/// Effects that show in single readings or by other tests than the reach of a first step.
 const LATTICE: [&str; 3] = ["quantisation", "periodic-interference", "miswired"];
 
-/// What an effect of this name needs that is not there.
+/// What the data lack for an effect of this name; `None` if nothing.
 fn lacks(
     effect: &str,
     contacts: &Contacts<'_>,
@@ -68,10 +68,10 @@ fn lacks(
             Some("all presses go to one depth")
         }
         "time-lag" | "low-pass" | "scan-skew" if contacts.frames_in_motion() < MOVING_LEAST => {
-            Some("hardly a frame shows the tool in motion while it presses")
+            Some("hardly any frame shows the tool in motion during a press")
         }
         "rate-stiffening" if contacts.distinct_speeds() < 2 => Some("all presses go in at one speed"),
-        "hysteresis" if !unloads => Some("no frame shows a press on its way back"),
+        "hysteresis" if !unloads => Some("no frame shows an unload"),
         "backlash" if !contacts.approaches() && !unloads => {
             Some("every place is reached from one direction only")
         }

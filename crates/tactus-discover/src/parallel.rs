@@ -1,7 +1,7 @@
 //! Independent work on the threads of rayon's current pool.
 //!
-//! Items are handed out one by one, and no thread holds two items of one call: a thread that waits for work within its item
-//! helps there. So the memory in use grows with the number of threads and the depth of the nesting only.
+//! Items are handed out one by one, and no thread works on two items of one call at a time, also if calls are nested. This
+//! limits the memory in use.
 
 use std::cmp::Reverse;
 
@@ -12,7 +12,7 @@ pub(crate) fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) 
     map_longest_first(items, |_| 0, work)
 }
 
-/// The same, begun with what takes longest, so that no thread is left with it at the end.
+/// As [`map`], but starts with the longest items, so that no thread is left with one at the end.
 pub(crate) fn map_longest_first<T: Sync, R: Send>(
     items: &[T],
     length: impl Fn(&T) -> usize,

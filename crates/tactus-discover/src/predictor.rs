@@ -1,4 +1,4 @@
-//! The model at work on the bins: what it gives for each, and how that changes with every parameter.
+//! Predictions of a model for the bins.
 
 use std::sync::Arc;
 
@@ -18,30 +18,30 @@ pub(crate) struct Parameters {
     pub(crate) sensitivity: Vec<f64>,
     /// Baselines, run by run, one per element.
     pub(crate) baseline: Vec<Vec<f64>>,
-    /// What the zeros wander beside the baselines, if they do.
+    /// Random walks of the baselines, if the model has them.
     pub(crate) walk: Option<RandomWalk>,
     pub(crate) psf: Psf,
     pub(crate) terms: Vec<Term>,
 }
 
-/// An effect in the model, with its values as a fit moves them.
+/// An effect in the model, with the values of its parameters during a fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Term {
     pub(crate) definition: &'static Definition,
     pub(crate) values: Vec<f64>,
 }
 
-/// What the bins are of.
+/// The data and what is known of the rig, from which predictions are made.
 #[derive(Debug)]
 pub(crate) struct Predictor<'a> {
     pub(crate) known: &'a Known,
     pub(crate) frames: &'a Frames,
     pub(crate) bins: &'a Bins,
-    /// Images of presses, shared by all predictions.
+    /// Cached images of presses, shared by all predictions.
     pub(crate) images: Arc<Images>,
 }
 
-/// Images that are kept at most: some 130 MB of the paper's array.
+/// Greatest number of cached images of 48 elements, about 130 MB.
 const IMAGES_MAX: usize = 200_000;
 
 impl Term {
@@ -63,7 +63,7 @@ impl Term {
 }
 
 impl Parameters {
-    /// As declared.
+    /// The declared parameters, for a number of runs.
     pub(crate) fn declared(known: &Known, runs: usize) -> Self {
         Self {
             sensitivity: known.response.sensitivity_counts_per_mm.clone(),
@@ -81,7 +81,7 @@ impl Parameters {
         (0..self.sensitivity.len()).map(mean).collect()
     }
 
-    /// Its effects, each of them of the library.
+    /// The effects as effects of the library; a random walk becomes several.
     pub(crate) fn effects(&self) -> Result<Vec<Effect>, DiscoverError> {
         let terms = self.terms.iter().filter(|term| !is_random_walk(term));
         let mut effects = terms.map(Term::effect).collect::<Result<Vec<_>, _>>()?;
@@ -94,12 +94,12 @@ impl Parameters {
 
 impl<'a> Predictor<'a> {
     pub(crate) fn new(known: &'a Known, frames: &'a Frames, bins: &'a Bins) -> Self {
-        // As many numbers, whatever the array.
+        // The same number of values for every array.
         let images = Arc::new(Images::new(IMAGES_MAX * 48 / bins.elements.max(1)));
         Self { known, frames, bins, images }
     }
 
-    /// Counts of every bin and element, before noise and converter.
+    /// Counts of every bin and element, without noise and rounding.
     pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
         let Self { known, frames, bins, .. } = self;
         let effects = parameters.terms.iter().map(Term::effect).collect::<Result<Vec<_>, _>>()?;

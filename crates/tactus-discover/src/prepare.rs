@@ -1,4 +1,4 @@
-//! What a search starts from: the split, the noise, the bins, and the lines in the spectrum.
+//! Preparation of a search: split, noise, bins, recalibrated base model, and lines in the spectrum.
 
 use crate::bins::{Bins, HeldOut, still};
 use crate::fit::{Fitted, Problem};
@@ -6,12 +6,12 @@ use crate::noise::Noise;
 use crate::predictor::{Parameters, Predictor};
 use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum};
 
-/// Presses that are fitted, at least.
+/// Least number of fitted presses.
 const PRESSES_LEAST: usize = 3;
-/// Rounds of the base model's own fit.
+/// Greatest number of rounds of the base model's fit.
 const BASE_ROUNDS: usize = 12;
 
-/// Data made ready.
+/// The prepared data.
 pub(crate) struct Prepared<'a> {
     pub(crate) known: &'a Known,
     pub(crate) frames: &'a Frames,
@@ -20,16 +20,16 @@ pub(crate) struct Prepared<'a> {
     pub(crate) noise: Noise,
     /// True if frames repeat each other, so that the noise is known.
     pub(crate) replicates: bool,
-    /// Step of the converter: as declared, or wider.
+    /// Step of the converter: as declared, or wider if the readings show this.
     pub(crate) step_counts: f64,
-    /// The wider step, if it is one, and the chance of that.
+    /// The wider step, if there is one, and its p-value.
     pub(crate) lattice: Option<(f64, f64)>,
-    /// Every frame for itself.
+    /// One frame in each bin.
     pub(crate) whole: Bins,
     pub(crate) bins: Bins,
     /// The base model, recalibrated on the bins.
     pub(crate) base: Fitted,
-    /// Frequencies of lines in the spectrum of what the base model leaves: tones that no grid would find.
+    /// Frequencies of lines in the spectrum of the base model's residual; a grid of frequencies would miss them.
     pub(crate) frequencies_hz: Vec<f64>,
     pub(crate) warnings: Vec<String>,
 }
@@ -63,7 +63,7 @@ impl<'a> Prepared<'a> {
         let mut base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise))?;
         let frequencies_hz = lines_hz(&Predictor::new(known, frames, &whole), &base)?;
         if !frequencies_hz.is_empty() {
-            // A tone is lost in bins of several frames.
+            // Averaging over several frames would remove a tone.
             bins = Bins::of(frames, false)?;
             bins.weigh(frames, &noise, &heldout);
             base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise))?;
@@ -85,19 +85,19 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// The fit of its bins.
+    /// The least-squares problem of the bins.
     pub(crate) fn problem(&self) -> Problem<'_> {
         Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise)
     }
 }
 
-/// The base model, recalibrated.
+/// The base model, fitted to the bins.
 fn recalibrated(problem: &Problem<'_>) -> Result<Fitted, DiscoverError> {
     let Predictor { known, bins, .. } = problem.predictor;
     problem.fit_from(Parameters::declared(known, bins.paths.len()), BASE_ROUNDS)
 }
 
-/// Frequencies of lines in the spectrum of what a model leaves of every frame.
+/// Frequencies of lines in the spectrum of a model's residual of all frames.
 fn lines_hz(whole: &Predictor<'_>, base: &Fitted) -> Result<Vec<f64>, DiscoverError> {
     let predicted = whole.predict(&base.parameters)?;
     let residual: Vec<f64> =

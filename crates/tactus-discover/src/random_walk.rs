@@ -1,27 +1,28 @@
-//! Baselines that wander, each element's for itself: the baselines' generalisation.
+//! Baselines that follow a random walk in time, each element its own.
 //!
 //! ```text
-//! zero(run, e, t) = baseline(run, e) + u(run, e, t)          u straight between knots, a random walk from knot to knot:
+//! baseline(run, e, t) = baseline(run, e) + u(run, e, t)      u is linear between knots and a random walk over the knots:
 //! u(k + 1) - u(k) ~ N(0, rate^2 knot)
 //! ```
 //!
-//! Given the rate, `u` is eliminated in closed form, as the baselines are: it is the walk's mean given the readings, by
-//! least squares that charge its steps with their precision. One rate and one distance of knots serve all elements and
-//! runs; they are those of the greatest marginal likelihood, and what that likelihood gains is what such a wander lessens
-//! the cost by, however many numbers it takes. Noise counts here as what it is over long times, coloured or not.
+//! Given the rate, `u` is eliminated in closed form, like constant baselines: it is the mean of the walk given the readings,
+//! a least-squares solution that penalises each step by its precision. All elements and runs share one rate and one
+//! distance between knots, those with the greatest marginal likelihood. The gain in twice the logarithm of that likelihood
+//! is the walk's reduction of the cost; it already accounts for the number of knots. The noise level used here is that of
+//! long averages, so coloured noise is not taken for a walk.
 //!
-//! Whether it is wanted is tested like every effect, by flipping the signs of blocks: with `U_be` the sum of the weighted
-//! residual of element `e` in block `b` and `K_bc` a kernel that falls with the time between two blocks,
+//! The test for a random walk flips the signs of blocks, like that of every effect. With `U_be` the sum of the weighted
+//! residual of element `e` in block `b`, and `K_bc` a kernel that falls with the time between two blocks,
 //!
 //! ```text
 //! S = sum over b, c of K_bc sum over e of U_be U_ce
 //! ```
 //!
-//! whose terms of one block with itself no flip changes: blocks near in time must be alike.
+//! Flips do not change the products of a block with itself. `S` is large if blocks that are near in time are alike.
 //!
 //! # Source
-//! Walks given readings: G. Wahba, *Spline Models for Observational Data* (1990), ch. 1 and 4. Fits beside them, freed of
-//! what they take up: P. Speckman, *J. R. Stat. Soc. B* 50 (1988) 413. The test: X. Lin, *Biometrika* 84 (1997) 309.
+//! Random walks given readings: G. Wahba, *Spline Models for Observational Data* (1990), ch. 1 and 4. Fits beside them
+//! (partial splines): P. Speckman, *J. R. Stat. Soc. B* 50 (1988) 413. The test: X. Lin, *Biometrika* 84 (1997) 309.
 
 use nalgebra::{DMatrix, DVector};
 use tactus_model::Effect;
@@ -35,10 +36,10 @@ use crate::predictor::{Parameters, Term};
 use crate::score::{Fitting, Score};
 use crate::{DiscoverError, RunWalks};
 
-/// A wander of every element for itself, as a term of a model: how much, not which way; that is [`RandomWalk`].
+/// Random walks of the baselines as a term of a model. It has the statistics of the walks; [`RandomWalk`] has their values.
 pub(crate) static RANDOM_WALK: Definition = Definition {
     name: "baseline-drift",
-    summary: "the zero of each element wanders in time",
+    summary: "the baseline of each element follows a random walk in time",
     parameters: &[
         Parameter::given("counts_per_root_s", 0.0, [0.0, 1e6]),
         Parameter::given("knot_s", 0.0, [0.0, 1e6]),
@@ -49,53 +50,53 @@ pub(crate) static RANDOM_WALK: Definition = Definition {
     make: Make::Readout(|_| Box::new(BesidePipeline)),
 };
 
-/// Knots of a `baseline-drift` of the library, which is what a wander is written as.
+/// Knots of one `baseline-drift` effect of the library. A random walk is written as several of these.
 const KNOTS: usize = 16;
-/// Knots are no nearer than this, unless there are but so many.
+/// Least time between knots, if there are more than [`KNOTS`].
 const KNOT_S_LEAST: f64 = 3.0;
-/// Knots at half the distance must lessen the cost by so much.
+/// By how much knots at half the distance must reduce the cost.
 const FINER_GAIN: f64 = 10.0;
-/// Rates that are tried, in noise per root second: factors of the root of 2 up from the least.
+/// Rates that are tried, in noise standard deviations per root second: from the least in factors of the root of 2.
 const RATE_LEAST: f64 = 1e-3;
 const RATES: i32 = 32;
-/// Times over which the kernels of the test fall.
+/// Time constants of the kernels of the test.
 const KERNELS_S: [f64; 3] = [10.0, 40.0, 160.0];
-/// The test takes so many blocks at most.
+/// Greatest number of blocks in the test.
 const BLOCKS_MAX: usize = 600;
 
-/// What the zeros of each run wander: knot by knot, element by element, from 0 on.
+/// Random walks of the baselines of each run, knot by knot, element by element; they start at 0.
 #[derive(Debug, Clone)]
 pub(crate) struct RandomWalk {
     pub(crate) knot_s: f64,
     pub(crate) runs: Vec<Vec<f64>>,
 }
 
-/// What zeros can take up: constants, and what wanders if that is in the model.
+/// The baselines' part of a least-squares problem: constants, or random walks if the model has them.
 #[derive(Debug)]
 pub(crate) struct Baselines<'a> {
     problem: &'a Problem<'a>,
-    /// Of the bins.
+    /// Weight of each bin.
     weights: &'a [f64],
-    /// Infinite if nothing wanders.
+    /// Infinite for constants.
     knot_s: f64,
     knots: usize,
     /// Precision of a step from knot to knot, in counts^-2.
     stiffness: f64,
-    /// Products of the knots' shares in the bins, run by run: each with itself, and with the next.
+    /// Weighted products of the interpolation weights, run by run: of each knot with itself, and with the next.
     grams: Vec<Vec<[f64; 2]>>,
 }
 
-/// How much zeros wander.
+/// Estimated statistics of a random walk.
 #[derive(Debug, Clone, Copy)]
 struct WalkEstimate {
     knot_s: f64,
     counts_per_root_s: f64,
-    /// By how much it lessens the cost.
+    /// Reduction of the cost.
     gain: f64,
 }
 
 impl RandomWalk {
-    /// Adds a multiple of it to readings, bin by bin and element by element.
+    /// Adds a multiple of the walk to readings, which are ordered bin by bin, element by element.
     pub(crate) fn add(&self, bins: &Bins, times: f64, readings: &mut [f64]) {
         let elements = bins.elements;
         for (bin, readings) in readings.chunks_exact_mut(elements).enumerate() {
@@ -113,7 +114,7 @@ impl RandomWalk {
         Self { knot_s: *knot_s, runs: runs_counts.clone() }
     }
 
-    /// What each run has apart from the others; none of one run.
+    /// Each run's walk less the mean over the runs; `None` for one run.
     pub(crate) fn apart(&self) -> Option<RunWalks> {
         let mean = self.mean();
         let less = |run: &Vec<f64>| run.iter().zip(&mean).map(|(value, mean)| value - mean).collect();
@@ -129,7 +130,7 @@ impl RandomWalk {
         mean
     }
 
-    /// What all runs have in common, as effects of the library: for each element one after another.
+    /// The mean walk over the runs, as effects of the library, element by element.
     pub(crate) fn effects(&self, elements: usize) -> Result<Vec<Effect>, DiscoverError> {
         let mean = self.mean();
         let definition = Definition::find(RANDOM_WALK.name)?;
@@ -169,13 +170,13 @@ impl RandomWalk {
 }
 
 impl<'a> Baselines<'a> {
-    /// Those of a model.
+    /// The baselines of a model.
     pub(crate) fn of(problem: &'a Problem<'a>, at: &Parameters) -> Self {
         match at.terms.iter().find(|term| is_random_walk(term)) {
             Some(Term { values, .. }) if values[0] > 0.0 && values[1] > 0.0 => {
                 Self::walking(problem, &problem.slow, values[1], values[0])
             }
-            // Constants take noise as all else does.
+            // Constants use the same weights as other parameters.
             _ => Self::new(problem, &problem.train, f64::INFINITY, 1, 0.0),
         }
     }
@@ -201,7 +202,7 @@ impl<'a> Baselines<'a> {
         Self { problem, weights, knot_s, knots, stiffness, grams }
     }
 
-    /// Takes off a column what the zeros take up; returns that, run by run, knot by knot, element by element.
+    /// Subtracts from a column what the baselines fit. Returns that part, run by run, knot by knot, element by element.
     pub(crate) fn centre(&self, column: &mut [f64]) -> Vec<Vec<f64>> {
         let (taken, _) = self.taken(column);
         RandomWalk { knot_s: self.knot_s, runs: taken.clone() }.add(
@@ -212,12 +213,12 @@ impl<'a> Baselines<'a> {
         taken
     }
 
-    /// What the zeros take up of a column, and by how much their wandering lessens the cost.
+    /// The baselines fitted to a column, and by how much walks reduce the cost below constants.
     fn taken(&self, column: &[f64]) -> (Vec<Vec<f64>>, f64) {
         self.solved(self.sums(column))
     }
 
-    /// Weighted sums of a column, as each knot sees it: run by run, knot by knot, element by element.
+    /// Weighted sums of a column with each knot's interpolation weights: run by run, knot by knot, element by element.
     fn sums(&self, column: &[f64]) -> Vec<Vec<f64>> {
         let bins = self.problem.predictor.bins;
         let elements = bins.elements;
@@ -232,7 +233,7 @@ impl<'a> Baselines<'a> {
         sums
     }
 
-    /// The knots that such sums mean, and by how much their wandering lessens the cost.
+    /// The knots' values for such sums, and by how much walks reduce the cost below constants.
     fn solved(&self, mut sums: Vec<Vec<f64>>) -> (Vec<Vec<f64>>, f64) {
         let mut gain = 0.0;
         for (sums, gram) in sums.iter_mut().zip(&self.grams) {
@@ -243,8 +244,8 @@ impl<'a> Baselines<'a> {
         (sums, gain)
     }
 
-    /// Solves `(G + stiffness / weight R) u = b` for one element, whose numbers are every so many; `R` charges for steps.
-    /// Returns by how much a wander lessens the cost beside a constant: twice the logarithm of the likelihoods' ratio.
+    /// Solves `(G + stiffness / weight R) u = b` for one element; `R` penalises steps. `values` has the element's numbers at
+    /// a stride of the number of elements. Returns twice the logarithm of the likelihood ratio of walk and constant.
     fn solve(&self, gram: &[[f64; 2]], weight: f64, values: &mut [f64]) -> f64 {
         let elements = self.problem.predictor.bins.elements;
         let stiff = self.stiffness / weight;
@@ -278,7 +279,7 @@ impl<'a> Baselines<'a> {
 }
 
 impl Problem<'_> {
-    /// What is left if the zeros stand still.
+    /// Residual of a model without its random walk.
     pub(crate) fn standing(&self, at: &Parameters, predicted: &[f64]) -> Vec<f64> {
         let mut residual: Vec<f64> = self.residuals(predicted).collect();
         if let Some(walk) = &at.walk {
@@ -287,7 +288,7 @@ impl Problem<'_> {
         residual
     }
 
-    /// The parameters with zeros that wander as much as the residual says, if that is in the model at all.
+    /// The parameters with the random walk re-estimated from the residual, if the model has one.
     pub(crate) fn with_walk(&self, mut at: Parameters) -> Result<Parameters, DiscoverError> {
         let Some(term) = at.terms.iter().position(is_random_walk) else {
             at.walk = None;
@@ -300,7 +301,7 @@ impl Problem<'_> {
         Ok(at)
     }
 
-    /// The cost of a model whose zeros wander: that of zeros that stand still, less what the likelihood gains.
+    /// Cost of a model with a random walk: that of constant baselines less the gain in likelihood.
     pub(crate) fn cost_with_walk(&self, at: &Parameters, predicted: &[f64]) -> f64 {
         let mut residual = self.standing(at, predicted);
         let (_, gain) = Baselines::of(self, at).taken(&residual);
@@ -310,7 +311,7 @@ impl Problem<'_> {
         weighted.sum::<f64>() - gain
     }
 
-    /// The likeliest walk of what zeros that stand still leave, in bins of such weights.
+    /// The random walk with the greatest likelihood, given the residual of constant baselines and the bins' weights.
     fn estimate_walk(&self, residual: &[f64], weights: &[f64]) -> WalkEstimate {
         let noise_counts = median(&self.element_weight).powf(-0.5);
         let mut best: Option<WalkEstimate> = None;
@@ -338,8 +339,8 @@ impl Problem<'_> {
         best.unwrap_or(WalkEstimate { knot_s: self.duration_s, counts_per_root_s: 0.0, gain: 0.0 })
     }
 
-    /// How much the residual of a model wants its zeros to wander; `None` if they do already. They must without contact
-    /// too: in contact all that a model lacks looks like it.
+    /// Scores a random walk at the residual of a model; `None` if the model has one. The residual without contact must show
+    /// it too, because in contact any missing effect resembles a walk.
     pub(crate) fn screen_random_walk(&self, fitting: &Fitting<'_>, at: &Parameters) -> Option<Screened> {
         if at.terms.iter().any(is_random_walk) {
             return None;
@@ -357,7 +358,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Are blocks that are near in time alike? A score for each kernel.
+    /// Scores for each kernel whether blocks that are near in time are alike.
     fn alike(&self, residual: &[f64]) -> Vec<Score> {
         let bins = self.predictor.bins;
         let elements = bins.elements;
@@ -377,7 +378,7 @@ impl Problem<'_> {
         let count = used.len();
         let sums = DMatrix::from_fn(count, elements, |b, e| sums[used[b] * elements + e]);
         let products = &sums * sums.transpose();
-        // Flipped residuals have a mean, which the baseline of each run takes up.
+        // Flipped residuals have a mean. The baseline of each run fits it.
         let mut totals = vec![0.0; bins.paths.len()];
         for block in &used {
             totals[runs[*block]] += weights[*block];
@@ -407,13 +408,13 @@ impl Problem<'_> {
 }
 
 impl Baselines<'_> {
-    /// Lets the zeros take up what is left if they stand still.
+    /// Fits the baselines of a model to the residual of its constant baselines.
     fn settle(&self, residual: &[f64], at: &mut Parameters) {
         let (taken, _) = self.taken(residual);
         self.put(taken, at);
     }
 
-    /// Moves baselines by what was taken up, and lets them wander by the rest of it.
+    /// Adds a fit's first knot to the constant baselines, and makes the remainder the random walk.
     pub(crate) fn put(&self, mut taken: Vec<Vec<f64>>, at: &mut Parameters) {
         let elements = self.problem.predictor.bins.elements;
         for (baseline, taken) in at.baseline.iter_mut().zip(&mut taken) {
@@ -433,19 +434,19 @@ pub(crate) fn is_random_walk(term: &Term) -> bool {
     std::ptr::eq(term.definition, &raw const RANDOM_WALK)
 }
 
-/// Precision of a walk's step from knot to knot.
+/// Precision of a random walk's step from knot to knot, in counts^-2.
 fn stiffness(counts_per_root_s: f64, knot_s: f64) -> f64 {
     1.0 / (counts_per_root_s.powi(2) * knot_s)
 }
 
-/// The knot before a time, and how far on to the next.
+/// The knot before a time, and the share of the way to the next.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the last knot")]
 fn place(t_s: f64, knot_s: f64, knots: usize) -> (usize, f64) {
     let along = (t_s / knot_s).clamp(0.0, (knots - 1) as f64);
     (along as usize, along.fract())
 }
 
-/// A wander acts beside the pipeline, for every run has its own.
+/// Random walks act outside the pipeline, because every run has its own.
 #[derive(Debug)]
 struct BesidePipeline;
 

@@ -39,7 +39,7 @@ fn kriging(readings: &[Vec<f64>], heldout: &[bool]) -> f64 {
 }
 
 #[test]
-fn zeros_that_wander_each_for_itself_are_followed_nearly_as_well_as_can_be() {
+fn random_walks_of_each_baseline_are_followed_nearly_as_well_as_possible() {
     let known = known();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let walk = processes(ELEMENTS, RMS_COUNTS, TIME_S, &mut rng);
@@ -51,7 +51,7 @@ fn zeros_that_wander_each_for_itself_are_followed_nearly_as_well_as_can_be() {
     assert_eq!(names, ["baseline-drift"]);
     assert_eq!(found.verdict, Verdict::Explained);
     let rate = found.steps[0].terms[0][0].value;
-    // Of a process that is short against its memory: sqrt(2 / T) rms.
+    // For times short beside the process's correlation time: sqrt(2 / T) rms.
     let want = (2.0 / TIME_S).sqrt() * RMS_COUNTS;
     assert!((rate / want - 1.0).abs() < 0.25, "{rate} {want}");
     let gap = |mean_square: f64| mean_square - NOISE_COUNTS.powi(2);
@@ -61,7 +61,7 @@ fn zeros_that_wander_each_for_itself_are_followed_nearly_as_well_as_can_be() {
     let oracle = 1.0 - gap(best) / gap(before.powi(2));
     assert!(shrink > 0.95 * oracle, "{shrink} {oracle}");
 
-    // The effects alone say the same.
+    // The effects alone predict the same.
     let predicted = predict(&known, &frames, &found.grown, &found.effects).unwrap();
     let squares: f64 = predicted
         .chunks_exact(ELEMENTS)
@@ -75,7 +75,7 @@ fn zeros_that_wander_each_for_itself_are_followed_nearly_as_well_as_can_be() {
 }
 
 #[test]
-fn a_zero_that_all_share_is_one_curve() {
+fn a_drift_common_to_all_elements_is_one_curve() {
     let known = known();
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let walk = processes(1, RMS_COUNTS, 2.0 * TIME_S, &mut rng);
@@ -86,7 +86,7 @@ fn a_zero_that_all_share_is_one_curve() {
 }
 
 #[test]
-fn coloured_noise_is_no_wander() {
+fn coloured_noise_is_no_random_walk() {
     let known = known();
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let noise = processes(ELEMENTS, NOISE_COUNTS, 0.5, &mut rng);

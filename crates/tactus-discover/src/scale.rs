@@ -1,14 +1,14 @@
-//! How a fit moves a parameter: along its own scale, or along its logarithm where it spans orders of magnitude.
+//! Scale on which a fit varies a parameter: linear, or logarithmic if the range spans orders of magnitude.
 
 use tactus_model::effect::Parameter;
 
-/// A range with such a ratio spans orders of magnitude.
+/// Least ratio of a range that spans orders of magnitude.
 const ORDERS: f64 = 20.0;
-/// Relative step of such a parameter, for derivatives.
+/// Step for derivatives on a logarithmic scale.
 const LOG_STEP: f64 = 0.02;
-/// Step of any other, as a share of its range.
+/// Step for derivatives on a linear scale, as a share of the range.
 const STEP: f64 = 1e-3;
-/// A fit moves a parameter at once by at most a factor of so much, or by such a share of its range.
+/// Longest step of a fit: in logarithm, or as a share of the range.
 const LOG_STRIDE_MAX: f64 = 1.5;
 const STRIDE_MAX: f64 = 0.25;
 
@@ -23,7 +23,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// Of a parameter, in data of such a duration: no frequency is known better than one period over all of it.
+    /// Scale of a parameter, in data of a given duration, which determines the resolution of frequencies.
     pub(crate) fn of(parameter: &Parameter, duration_s: f64) -> Self {
         let range = parameter.range;
         if parameter.name.ends_with("_hz") {
@@ -37,7 +37,7 @@ impl Scale {
         Self { range, logarithmic: false, step: STEP * width, stride_max: STRIDE_MAX * width }
     }
 
-    /// A value moved by a step, within its range.
+    /// The value after a step, limited to the range.
     pub(crate) fn forward(&self, value: f64, step: f64) -> f64 {
         let moved = if self.logarithmic { value * step.exp() } else { value + step };
         moved.clamp(self.range[0], self.range[1])
@@ -48,12 +48,12 @@ impl Scale {
         if self.logarithmic { (to / from).ln() } else { to - from }
     }
 
-    /// A step no longer than a fit trusts.
+    /// A step limited to the longest that a fit takes.
     pub(crate) fn bounded(&self, step: f64) -> f64 {
         step.clamp(-self.stride_max, self.stride_max)
     }
 
-    /// The error of a value whose error along the scale is known.
+    /// Error of a value from its error on the scale.
     pub(crate) fn error(&self, value: f64, along: f64) -> f64 {
         if self.logarithmic { value * along } else { along }
     }

@@ -1,22 +1,22 @@
-//! Is a direction in which the model could change wanted by the residual?
+//! Score tests: would the residual shrink if the model changed in a given direction?
 //!
-//! The score of a direction `f` (a derivative of the prediction, freed of all that is fitted already) is, block by
-//! block of bins,
+//! The score of a direction `f` (a derivative of the prediction, less the part that the fitted
+//! parameters explain) is, over blocks of bins,
 //!
 //! ```text
 //! U_b = sum over block b of w r f        V_b = sum over block b of w f^2
 //! z   = sum U_b / sqrt(phi sum V_b)
 //! ```
 //!
-//! Under no effect `U_b` is as likely as `-U_b`, whatever the noise does within a block: so the distribution of the
-//! largest of many `z` comes from flipping the signs of whole blocks, the same for all directions. That keeps the
-//! chance of any false alarm among all of them, however they depend on each other, and under autocorrelated noise.
-//! `phi >= 1` is by how much blocks scatter about what they have in common more than their noise says, by the median: an
-//! effect hides itself neither in one block nor in all. For the same reason a block counts at most four standard
-//! deviations in the flipped sums.
+//! Without an effect, `U_b` is as likely as `-U_b`, whatever the noise does within a block. The distribution of the largest
+//! of many `z` therefore follows from flipping the signs of whole blocks, in the same way for all directions. This controls
+//! the probability of any false alarm among all directions, however they depend on each other, also under autocorrelated
+//! noise. `phi >= 1` is the median excess of the scatter of blocks about their common value over that of their noise. As a
+//! median it does not let an effect in a single block, or in all, inflate its own scatter. For the same reason a block
+//! counts at most four standard deviations in the flipped sums.
 //!
-//! Several directions of one effect, orthonormal under the weights, are taken together: the sum of their squares, which is
-//! chi-square, on the scale of a normal deviate by the cube root of Wilson and Hilferty.
+//! Several directions of one effect are made orthonormal under the weights and combined: the sum of the squares of their
+//! scores is chi-square, which Wilson and Hilferty's cube root brings to the scale of a normal deviate.
 //!
 //! # Source
 //! J. Hemerik, J. J. Goeman and L. Finos, *J. R. Stat. Soc. B* 82 (2020) 841 (sign-flipped scores); P. H. Westfall and
@@ -34,42 +34,42 @@ use crate::rng::Rng;
 
 /// Median of the squared standard normal distribution.
 const MEDIAN_SQUARE: f64 = 0.454_936;
-/// A block counts at most so many standard deviations under flipped signs.
+/// Greatest part of one block in a flipped sum, in standard deviations.
 const CLIP: f64 = 4.0;
-/// Fewer blocks do not tell how they scatter; they are taken to scatter so much more than their noise says.
+/// Least number of blocks from which the excess scatter is estimated, and the excess assumed for fewer.
 const BLOCKS_LEAST: usize = 8;
 const EXCESS_OF_FEW: f64 = 1.5;
 
-/// The score of one direction, or of several that are orthonormal together.
+/// The score of one direction, or of several orthonormal ones together.
 #[derive(Debug, Clone)]
 pub(crate) struct Score {
     /// On the scale of the standard normal distribution, not negative.
     pub(crate) z: f64,
-    /// Each block's part of each direction's, clipped.
+    /// For each direction, the part of each block, clipped.
     parts: Vec<Vec<f32>>,
     chi_square: ChiSquare,
 }
 
-/// How a sum of squares is distributed under flips: so many times chi-square of so many degrees of freedom.
+/// Distribution of a sum of squares under flips: `times` chi-square with `freedom` degrees of freedom.
 #[derive(Debug, Clone, Copy)]
 struct ChiSquare {
     times: f64,
     freedom: f64,
 }
 
-/// Directions that are fitted already: all else is freed of them.
+/// The tangent space of the fitted parameters, and the residual orthogonal to it.
 pub(crate) struct Fitting<'a> {
     problem: &'a Problem<'a>,
     linear: Linear<'a>,
     /// Orthonormal under the weights.
     directions: Vec<Vec<f64>>,
-    /// The residual, freed of gains and baselines, times its weight.
+    /// The residual orthogonal to the tangent space, times its weight.
     weighted_residual: Vec<f64>,
     weights: Vec<f64>,
 }
 
 impl<'a> Fitting<'a> {
-    /// All that is free at a point, and what it leaves.
+    /// The tangent space and residual at a point.
     pub(crate) fn at(
         problem: &'a Problem<'a>,
         parameters: &Parameters,
@@ -86,7 +86,7 @@ impl<'a> Fitting<'a> {
             let whole = fitting.size(&column);
             fitting.free(&mut column);
             let size = fitting.size(&column);
-            // What the others hold already is no direction of its own.
+            // Skips a direction that the others contain.
             if size > 1e-4 * whole && size > 0.0 {
                 shorten(&mut column, size);
                 let along = fitting.inner(&column, &fitting.weighted_residual);
@@ -100,13 +100,13 @@ impl<'a> Fitting<'a> {
         Ok(fitting)
     }
 
-    /// Frees a column of everything that is fitted already.
+    /// Removes from a column its part in the tangent space.
     pub(crate) fn free(&self, column: &mut [f64]) {
         self.linear.project(column);
         self.free_of(column, &self.directions);
     }
 
-    /// Frees a column of orthonormal others.
+    /// Removes from a column its part along orthonormal directions.
     fn free_of(&self, column: &mut [f64], directions: &[Vec<f64>]) {
         for direction in directions {
             take_off(column, self.inner(direction, column), direction);
@@ -118,23 +118,23 @@ impl<'a> Fitting<'a> {
         one.iter().zip(other).zip(&self.weights).map(|((a, b), w)| a * b * w).sum()
     }
 
-    /// Length of a column under the weights: in how many standard errors a unit of it is known.
+    /// Length of a column under the weights: its inverse is the standard error of the column's coefficient.
     pub(crate) fn size(&self, column: &[f64]) -> f64 {
         self.inner(column, column).sqrt()
     }
 
-    /// How much the residual wants a freed column.
+    /// Inner product of the residual and a column from which the tangent space was removed.
     pub(crate) fn wanted(&self, column: &[f64]) -> f64 {
         dot(&self.weighted_residual, column)
     }
 
-    /// The residual, freed of everything that is fitted already; 0 where it is not fitted.
+    /// The residual orthogonal to the tangent space; 0 for readings that are not fitted.
     pub(crate) fn residual(&self) -> Vec<f64> {
         let of = |(weighted, weight): (&f64, &f64)| if *weight > 0.0 { weighted / weight } else { 0.0 };
         self.weighted_residual.iter().zip(&self.weights).map(of).collect()
     }
 
-    /// The score of freed columns together.
+    /// The combined score of columns from which the tangent space was removed.
     pub(crate) fn score(&self, columns: &[Vec<f64>]) -> Score {
         let mut independent: Vec<Vec<f64>> = Vec::new();
         for column in columns {
@@ -181,7 +181,7 @@ impl<'a> Fitting<'a> {
             return (0.0, vec![0.0; bins.blocks]);
         }
         let common = wanted.iter().sum::<f64>() / total;
-        // Blocks that hardly feel the direction say nothing of its scatter.
+        // Blocks with hardly any weight in the direction say nothing about the scatter.
         let scatter: Vec<f64> = wanted
             .iter()
             .zip(&variance)
@@ -205,7 +205,7 @@ impl<'a> Fitting<'a> {
 }
 
 impl Score {
-    /// Its value if blocks had such signs.
+    /// Its value after a flip of the blocks' signs.
     fn flipped(&self, signs: &[f32]) -> f64 {
         let square = |parts: &Vec<f32>| {
             let sum: f32 = parts.iter().zip(signs).map(|(part, sign)| part * sign).sum();
@@ -215,13 +215,13 @@ impl Score {
         deviate(self.parts.iter().map(square).sum::<f64>() / times, freedom)
     }
 
-    /// Of a sum of products of pairs of blocks, which is positive whatever their signs. Flips leave the products of a block
-    /// with itself; those of two blocks scatter it (F. E. Satterthwaite, *Biometrics Bull.* 2 (1946) 110).
+    /// The score of a sum of products of pairs of blocks, which is positive for any signs. Flips do not change the products of
+    /// a block with itself; the others give the variance (F. E. Satterthwaite, *Biometrics Bull.* 2 (1946) 110).
     pub(crate) fn of_products(products: &DMatrix<f64>, blocks: &[usize], all_blocks: usize) -> Self {
         let mean = products.trace();
         let variance = 2.0 * (products.norm_squared() - products.diagonal().norm_squared());
         let none = Self { z: 0.0, parts: Vec::new(), chi_square: ChiSquare { times: 1.0, freedom: 0.0 } };
-        // Nothing of the diagonal's own hangs on signs.
+        // The diagonal does not depend on signs, so a small addition for the factorisation does no harm.
         let firm = DMatrix::from_diagonal_element(blocks.len(), blocks.len(), 1e-9 * mean);
         let Some(factors) = (products + firm).cholesky().filter(|_| variance > 0.0) else { return none };
         let chi_square = ChiSquare { times: variance / (2.0 * mean), freedom: 2.0 * mean * mean / variance };
@@ -242,14 +242,14 @@ impl Score {
     }
 }
 
-/// Takes so much of a direction off a column.
+/// Subtracts a multiple of a direction from a column.
 fn take_off(column: &mut [f64], along: f64, direction: &[f64]) {
     for (value, direction) in column.iter_mut().zip(direction) {
         *value -= along * direction;
     }
 }
 
-/// Brings a column of this size to a size of one.
+/// Scales a column of this size to unit size.
 fn shorten(column: &mut [f64], size: f64) {
     for value in column {
         *value /= size;
@@ -268,7 +268,7 @@ fn deviate(chi_square: f64, freedom: f64) -> f64 {
     (((chi_square / freedom).cbrt() - (1.0 - spread)) / spread.sqrt()).max(0.0)
 }
 
-/// The largest of the scores in each of many data sets whose blocks had their signs flipped, for each group.
+/// For each group, the largest of its scores in each of many sign-flipped data sets.
 pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
     let blocks =
         groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
@@ -296,13 +296,13 @@ pub(crate) fn largest(groups: &[Vec<f64>]) -> Vec<f64> {
     (0..flips).map(|flip| groups.iter().map(|group| group[flip]).fold(0.0, f64::max)).collect()
 }
 
-/// Share of Monte-Carlo statistics that reach one, the data's own counted as one of them.
+/// Share of the Monte-Carlo statistics, including the data's own, that reach the data's.
 pub(crate) fn p_value(statistic: f64, under_none: &[f64]) -> f64 {
     let reached = under_none.iter().filter(|other| **other >= statistic).count();
     (reached + 1) as f64 / (under_none.len() + 1) as f64
 }
 
-/// Chance that gains as large come about by flipping their signs.
+/// Probability that a sum of gains as large results from flips of their signs.
 pub(crate) fn sign_flip_p(gains: &[f64], flips: usize, seed: u64) -> f64 {
     let mut rng = Rng::new(seed);
     let sum: f64 = gains.iter().sum();

@@ -23,13 +23,13 @@ fn a_chi_square_number_becomes_a_normal_deviate() {
 }
 
 #[test]
-fn a_statistic_that_none_reaches_has_the_least_p_value_that_so_many_can_show() {
+fn a_statistic_that_no_other_reaches_has_the_least_possible_p_value() {
     assert!((p_value(5.0, &[1.0, 2.0, 3.0]) - 0.25).abs() < 1e-12);
     assert!((p_value(2.0, &[1.0, 2.0, 3.0]) - 0.75).abs() < 1e-12);
 }
 
 #[test]
-fn gains_of_one_sign_are_no_chance_and_gains_of_both_are() {
+fn gains_of_one_sign_are_significant_and_gains_of_both_are_not() {
     assert!(sign_flip_p(&[1.0; 12], 1999, 1) < 0.005);
     let both: Vec<f64> = (0..12).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
     assert!(sign_flip_p(&both, 1999, 1) > 0.3);

@@ -1,10 +1,10 @@
-//! The search: which effects, together with the base parameters, make of the residual noise.
+//! The search for the effects that, together with the base parameters, leave only noise.
 //!
-//! Forward: every effect of the library is scored at the residual of the model so far; those that the residual wants most
-//! are fitted jointly with all that is in the model, and the one that lessens the cost of the fitted presses most is
-//! taken. An effect may be taken again: physics rarely has the very form of the library, and a second term of one effect
-//! is a simpler explanation than another effect. Back: each effect must earn its place against the model without it, and
-//! against every other effect in its place.
+//! Forward: every effect of the library is scored at the residual of the present model. Those with the best first steps are
+//! fitted jointly with everything in the model, and the one that reduces the cost of the fitted presses most is added. An
+//! effect may be added again: real physics rarely has exactly the form in the library, and a second term of the same effect
+//! is a simpler explanation than another effect. Backward: each effect is compared with the model without it, and with
+//! every other effect in its place.
 
 use std::collections::BTreeMap;
 
@@ -19,90 +19,92 @@ use crate::random_walk::RANDOM_WALK;
 use crate::score::{Fitting, Score, flipped, largest, p_value};
 use crate::{DiscoverError, Options};
 
-/// Sign-flipped data sets of a test.
+/// Number of sign-flipped data sets in a test.
 pub(crate) const FLIPS: usize = 1999;
-/// Chance of adding anything to a model that lacks nothing.
+/// Probability of adding an effect to a complete model.
 pub(crate) const ALPHA: f64 = 0.005;
-/// So many candidates of a round are fitted.
+/// Greatest number of candidates that a round fits.
 pub(crate) const FITTED_MAX: usize = 7;
-/// Terms that a model may gain.
+/// Greatest number of added terms.
 pub(crate) const TERMS_MAX: usize = 7;
-/// Different effects that a model may gain.
+/// Greatest number of different added effects.
 const NAMES_MAX: usize = 4;
-/// A term of an effect that is in the model already is taken before another effect that lessens the gap by no more than
-/// this much better.
+/// Another term of an effect in the model is preferred to a new effect if its gain is more than this share of the new
+/// effect's gain.
 const AGAIN_SHARE: f64 = 0.5;
 /// Rounds of a fit that compares candidates.
 const TRIAL_ROUNDS: usize = 5;
-/// Rounds after which those far behind are given up, what that is, and how many go on.
+/// Rounds after which candidates are given up whose gain is below a share of the best, and how many candidates go on.
 const FIRST_ROUNDS: usize = 2;
 const BEHIND_SHARE: f64 = 0.4;
 const FINISHED_MAX: usize = 4;
-/// A term that gains less than this share of what all before it have gained polishes their form; it is not taken.
+/// A term whose gain is below this share of the gain of all before it only corrects their form. It is not added.
 const GAIN_SHARE_LEAST: f64 = 0.01;
-/// Rounds of a fit of a model that is taken.
+/// Rounds of a fit of a model that is kept.
 pub(crate) const POLISH_ROUNDS: usize = 8;
-/// What a term must lessen the cost by at least, and each of its parameters.
+/// By how much a term, and each of its parameters, must at least reduce the cost.
 const PENALTY: f64 = 10.0;
 const PENALTY_EACH: f64 = 6.0;
-/// Rivals of an effect that are fitted in its place, at most, and what their first step must promise.
+/// Greatest number of rivals that are fitted in an effect's place, and the least share of its gain that their first step
+/// must promise.
 const RIVALS_MAX: usize = 5;
 const RIVAL_SHARE: f64 = 0.15;
-/// What a rival must do in a few rounds of what it is to replace.
+/// Least share of the replaced effect's gain that a rival must reach within the first rounds.
 const RIVAL_FITTED_SHARE: f64 = 0.5;
 const EXCHANGES_MAX: usize = 3;
-/// Two models are not told apart by fewer standard errors than this, or where one closes so much of what the other does.
+/// Two models are indistinguishable if they differ by fewer standard errors than this, or if one closes at least this
+/// share of what the other closes.
 const INSEPARABLE_Z: f64 = 3.0;
 const INSEPARABLE_SHARE: f64 = 0.9;
-/// An effect stays if the held-out presses are further off without it by so many standard errors, and by such a share
-/// of what the whole model surely leaves of them.
+/// An effect stays if its gain on the held-out presses is at least this many standard errors, and at least this share of the
+/// certain remainder of the whole model.
 const EARNS_Z: f64 = 2.0;
 const EARNS_SHARE: f64 = 0.3;
-/// Several effects must bring the held-out presses nearer than one alone does, by so many standard errors and by such a
-/// share of what that one does.
+/// Several effects are kept in place of a single one if their additional gain on the held-out presses is at least this many
+/// standard errors, and at least this share of the single effect's gain.
 const SEVERAL_Z: f64 = 3.0;
 const SEVERAL_SHARE: f64 = 0.1;
 
-/// The search's tools.
+/// Data, candidates and options of a search.
 pub(crate) struct Search<'a> {
     pub(crate) problem: &'a Problem<'a>,
     pub(crate) candidates: &'a [Candidate],
     pub(crate) options: Options,
-    /// Terms that were known before and stay.
+    /// Number of terms of the known model, which are never removed.
     pub(crate) known_terms: usize,
-    /// How far the base model is from the held-out presses.
+    /// Gap of the base model on the held-out presses; see `HeldOutGap`.
     pub(crate) base_gap: f64,
     pub(crate) progress: &'a (dyn Fn(&str) + Sync),
 }
 
-/// For each effect that was added, what serves as well in its place.
+/// For each added effect, the rivals that explain the data as well in its place.
 pub(crate) type Equivalent = BTreeMap<&'static str, Rivals>;
 
-/// What serves as well in an effect's place.
+/// Effects that explain the data as well as an added one.
 pub(crate) struct Rivals {
     /// The model without the effect.
     pub(crate) without: Fitted,
-    /// The models with another effect in its place.
+    /// The models with a rival in its place.
     pub(crate) same: Vec<(&'static str, Fitted)>,
 }
 
-/// A round: what was tried, and what came of it.
+/// Results of one round.
 pub(crate) struct Tried {
     pub(crate) round: discovery::Round,
-    /// How every candidate was scored.
+    /// Scores of all candidates.
     pub(crate) screened: Vec<Screened>,
-    /// Fits that were made, best first.
+    /// The fits, best first.
     pub(crate) fits: Vec<(&'static str, Fitted)>,
-    /// Chance of so large a score of any candidate if nothing were missing.
+    /// p-value of the largest score of all candidates.
     pub(crate) p_value: f64,
 }
 
-/// A model as far as it has grown.
+/// The grown model, and the rounds that led to it.
 pub(crate) struct Grown {
     pub(crate) at: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
-    /// By how much effects whose form may be another in reality have lessened the cost.
+    /// Reduction of the cost by added effects whose real form may differ from the library's.
     gained: f64,
 }
 
@@ -112,18 +114,18 @@ impl From<Fitted> for Grown {
     }
 }
 
-/// What a search is at.
+/// The part of the protocol at which a search is, for progress reports.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum SearchPhase {
     Pruning,
     Exchanging,
 }
 
-/// Other effects in the places of a model's own.
+/// Result of the comparison of each effect with others in its place.
 enum Exchanged {
-    /// The model with one that serves better.
+    /// A model in which a rival is better.
     Better(Fitted),
-    /// None does.
+    /// No rival is better.
     Settled(Equivalent),
 }
 
@@ -137,7 +139,7 @@ impl Search<'_> {
         Ok(screened)
     }
 
-    /// Scores at a model of those effects of the library whose names are among some.
+    /// Scores at a model of the candidates that `among` selects by name.
     fn screen_among(
         &self,
         among: impl Fn(&str) -> bool,
@@ -150,7 +152,7 @@ impl Search<'_> {
         parallel::map_longest_first(&candidates, |one| one.columns(), screen).into_iter().collect()
     }
 
-    /// Grows a model until it lacks nothing that the library has, nothing in it is idle, and nothing serves better.
+    /// Grows a model until no effect is missing, unnecessary or worse than another.
     pub(crate) fn grow(&self, base: &Fitted, said: &dyn Fn(SearchPhase)) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base.clone());
         let mut exchanges_left = EXCHANGES_MAX;
@@ -175,7 +177,7 @@ impl Search<'_> {
         }
     }
 
-    /// Adds what the residual wants, until it wants nothing.
+    /// Adds effects until no candidate is significant.
     fn forward(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
         loop {
             let at = &grown.at;
@@ -196,7 +198,7 @@ impl Search<'_> {
         }
     }
 
-    /// Scores every candidate and fits those that are wanted.
+    /// Scores every candidate, and fits the best if the scores are significant.
     pub(crate) fn round(&self, at: &Fitted, index: usize) -> Result<Tried, DiscoverError> {
         (self.progress)(&format!("round {}: scoring the effects", index + 1));
         let fitting = self.fitting(at)?;
@@ -215,7 +217,7 @@ impl Search<'_> {
                 shrink: None,
             })
             .collect();
-        // Of two forms of one name the one that is wanted more.
+        // Of two forms with one name, the one with the greater score.
         tried.sort_by(|a, b| a.effect.cmp(b.effect).then(b.score.total_cmp(&a.score)));
         tried.dedup_by_key(|one| one.effect);
         let p_value = tried.iter().map(|one| one.p_value).fold(1.0, f64::min);
@@ -248,8 +250,8 @@ impl Search<'_> {
         })
     }
 
-    /// Fits of a model with each of the terms: all of them in few rounds, and then the best of them to the end, if they
-    /// lessen the cost by at least so much.
+    /// Fits of a model with each of the terms: first all in a few rounds, then the best to the end, if they reduce the cost by
+    /// more than `gain_least`.
     pub(crate) fn fits(
         &self,
         at: &Fitted,
@@ -295,7 +297,8 @@ impl Search<'_> {
         Some((name, fitted.clone()))
     }
 
-    /// One effect, acting twice perhaps, that does nearly all that several do: they may be what its form lacks.
+    /// A single effect, possibly with two terms, that explains nearly as much as several added ones. The others may only
+    /// correct its form.
     fn simpler(&self, base: &Fitted, at: &Fitted) -> Result<Option<Fitted>, DiscoverError> {
         let alone = keeping(&at.parameters, self.known_terms, is_exact);
         let [all, exact] = [&at.parameters, &alone].map(|one| names(one, self.known_terms).len());
@@ -331,7 +334,7 @@ impl Search<'_> {
         }))
     }
 
-    /// Where fits of the effects that a model's residual wants most begin, of those among which to look.
+    /// Starts of fits of the candidates with the best first steps, among those that `among` selects by name.
     fn starts(
         &self,
         at: &Fitted,
@@ -345,13 +348,13 @@ impl Search<'_> {
         Ok(screened.into_iter().map(|one| one.start).collect())
     }
 
-    /// Tries other effects in the place of each: what serves better than the model, or else what serves as well.
+    /// Tries other effects in the place of each added one. Returns a better model, or else the rivals that are as good.
     fn exchange(&self, at: &Fitted, may_exchange: bool) -> Result<Exchanged, DiscoverError> {
         let mut equivalent = Equivalent::new();
         let mut at_leaves_something = None;
         let exact = names(&keeping(&at.parameters, self.known_terms, is_exact), self.known_terms);
         let names = names(&at.parameters, self.known_terms);
-        // Nothing answers for a neighbour as a crossed wire does.
+        // No other effect acts like miswired elements.
         for name in names.iter().filter(|name| !exact.contains(name)) {
             let less = without(&at.parameters, name, self.known_terms);
             let less = self.problem.fit_from(less, TRIAL_ROUNDS)?;
@@ -359,7 +362,7 @@ impl Search<'_> {
             let mut rivals = self.screen(&fitting, &less)?;
             rivals.retain(|one| !names.contains(&one.definition.name) && one.promise > PENALTY);
             rivals.sort_by(|a, b| b.promise.total_cmp(&a.promise));
-            // What cannot take up a good part of the gap in a first step is no rival, however far it goes.
+            // An effect whose first step closes little of the gap is no rival.
             rivals.retain(|one| one.promise > RIVAL_SHARE * (less.cost - at.cost));
             rivals.truncate(RIVALS_MAX);
             let starts: Vec<Term> = rivals.into_iter().map(|one| one.start).collect();
@@ -381,11 +384,11 @@ impl Search<'_> {
         Ok(Exchanged::Settled(equivalent))
     }
 
-    /// True if the data cannot tell a rival from what is in the model: block by block it is hardly worse, or it closes
-    /// nearly all of the gap that the other does, so that the form of either may be what differs. That is no excuse for a
-    /// rival that leaves something where the model leaves nothing.
+    /// True if the data do not distinguish a rival from the effect in the model: it is hardly worse block by block, or it closes
+    /// nearly as much of the gap, so that they may differ by an error of form only. The latter does not count if the rival
+    /// leaves structure where the model leaves none.
     ///
-    /// `at_leaves_something`: whether the model does, once it is known.
+    /// `at_leaves_something` caches whether the model leaves structure.
     fn serves_as_well(
         &self,
         less: &Fitted,
@@ -398,7 +401,7 @@ impl Search<'_> {
         let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.walk.is_none()) {
             of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect()
         } else {
-            // A wander takes up noise where it is fitted.
+            // A random walk also fits noise where it is fitted.
             self.problem.heldout_gains(&rival.predicted, &at.predicted)
         };
         let sum: f64 = worse.iter().sum();
@@ -417,12 +420,12 @@ impl Search<'_> {
         Ok(at_does || !self.leaves_something(rival)?)
     }
 
-    /// True if what a model leaves depends on any covariate.
+    /// True if the residual of a model depends on any covariate.
     fn leaves_something(&self, one: &Fitted) -> Result<bool, DiscoverError> {
         Ok(self.locate(one)?.p_value <= ALPHA)
     }
 
-    /// Takes back what does not earn its place, and puts in its place what serves better.
+    /// Removes added effects that the held-out presses do not support, one at a time.
     fn back(&self, mut at: Fitted) -> Result<Fitted, DiscoverError> {
         loop {
             let names = names(&at.parameters, self.known_terms);
@@ -437,7 +440,7 @@ impl Search<'_> {
             let left = EARNS_SHARE * self.problem.surely_left(&at);
             let worth = |less: &Fitted| {
                 let [gain, error] = self.problem.heldout_gain(less, &at);
-                // Beyond noise, and as much again as a part of what the whole model leaves.
+                // Significant, and not small against the certain remainder of the whole model.
                 (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(if left > 0.0 {
                     gain / left
                 } else {
@@ -457,18 +460,18 @@ impl Search<'_> {
     }
 }
 
-/// True if nature cannot have another form of an effect: wiring is right or wrong.
+/// True if an effect has the same form in reality as in the library: wiring is right or wrong.
 fn is_exact(definition: &Definition) -> bool {
     definition.parameters.iter().any(|parameter| parameter.kind == ParameterKind::Element)
 }
 
-/// The cost of a model, its parameters charged for.
+/// Cost of a model plus a penalty for each parameter.
 fn charged(fitted: &Fitted) -> f64 {
     let parameters: usize = fitted.parameters.terms.iter().map(|term| term.values.len()).sum();
     fitted.cost + PENALTY_EACH * parameters as f64
 }
 
-/// The effects that were added, each once, in order.
+/// Names of the added effects, each once, in order.
 pub(crate) fn names(parameters: &Parameters, known_terms: usize) -> Vec<&'static str> {
     let mut names: Vec<&'static str> = Vec::new();
     for Term { definition, .. } in parameters.terms.iter().skip(known_terms) {
@@ -480,12 +483,12 @@ pub(crate) fn names(parameters: &Parameters, known_terms: usize) -> Vec<&'static
     names
 }
 
-/// A model without the terms of an effect that were added.
+/// A model without the added terms of an effect.
 pub(crate) fn without(parameters: &Parameters, name: &str, known_terms: usize) -> Parameters {
     keeping(parameters, known_terms, |definition| definition.name != name)
 }
 
-/// A model with those only of the added effects' terms.
+/// A model with only those added terms that `stays` selects.
 fn keeping(parameters: &Parameters, known_terms: usize, stays: impl Fn(&Definition) -> bool) -> Parameters {
     let mut less = parameters.clone();
     let mut index = 0;

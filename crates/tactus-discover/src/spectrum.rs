@@ -1,22 +1,22 @@
-//! Lines in the spectrum of the residual: tones that something adds to the readings.
+//! Lines in the spectrum of the residual, such as interference from the mains.
 //!
-//! Only frames without contact are looked at. What is slow in them, cut into pieces by the presses, has lines at the rhythm
-//! of the presses too: where that rhythm itself has one, none is taken.
+//! Only frames without contact are used. The presses interrupt them, so slow changes also have lines at the rhythm of the
+//! presses. Lines at which this rhythm itself has one are ignored.
 
 use crate::Frames;
 use crate::bins::interval_s;
 use crate::noise::median;
 
-/// A line stands out of what is around it by so many times the scatter of that: the more elements there are whose noise is their own,
-/// the less do their powers, summed, scatter.
+/// Least height of a line above the surrounding power, in units of the scatter of that power. The sum over elements with
+/// independent noise scatters less.
 const STANDS_OUT: f64 = 8.0;
-/// The rhythm of the presses stands out by such a factor.
+/// Factor over the surrounding power at which the rhythm of the presses has a line.
 const RHYTHM_STANDS_OUT: f64 = 6.0;
-/// Standard deviation of a normal distribution whose median distance from its middle is 1.
+/// Standard deviation of a normal distribution with a median absolute deviation of 1.
 const OF_NORMAL: f64 = 1.482_602_2;
-/// What is around a line: so many frequencies each way.
+/// Number of frequencies on each side that count as surrounding.
 const AROUND: usize = 40;
-/// Slower than so many periods in the data is a drift, not a tone.
+/// Least number of periods in the data; anything slower is a drift.
 const PERIODS_LEAST: f64 = 12.0;
 const LINES_MAX: usize = 3;
 
@@ -87,7 +87,7 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
             rhythm[peak - 1..=peak + 1].iter().any(|one| *one > RHYTHM_STANDS_OUT * middle)
         };
         if clearness > STANDS_OUT && !is_rhythm() {
-            // The top of a parabola through the logarithms of three.
+            // The top of a parabola through the logarithms of three powers.
             let [left, top, right] =
                 [power[peak - 1], power[peak], power[peak + 1]].map(|p| p.max(f64::MIN_POSITIVE).ln());
             let bend = left - 2.0 * top + right;
@@ -99,14 +99,14 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
     lines.into_iter().take(LINES_MAX).map(|(_, hz)| hz).collect()
 }
 
-/// By how many times the scatter of what is around it a power is above that.
+/// Height of a power above the surrounding ones, in units of their scatter.
 fn clearness(power: f64, around: &[f64]) -> f64 {
     let middle = median(around);
     let off: Vec<f64> = around.iter().map(|one| (one - middle).abs()).collect();
     (power - middle) / (OF_NORMAL * median(&off)).max(f64::MIN_POSITIVE)
 }
 
-/// The discrete Fourier transform, in place; a power of two of points.
+/// The discrete Fourier transform in place; the number of points is a power of two.
 ///
 /// # Source
 /// J. W. Cooley and J. W. Tukey, *Math. Comput.* 19 (1965) 297.

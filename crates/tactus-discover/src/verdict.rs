@@ -1,4 +1,4 @@
-//! From a search to what is told of it.
+//! The verdict on a search, and the [`Discovery`] that reports it.
 
 use tactus_model::{Effect, Response};
 
@@ -17,41 +17,41 @@ use crate::score::{q_values, sign_flip_p};
 use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Rivals, Search, Tried, names, without};
 use crate::{DiscoverError, Options, Rule, not_shown};
 
-/// What is left of the gap at most, for the verdict.
+/// Greatest remaining share of the gap for the verdict `Explained`.
 const EXPLAINED_SHARE: f64 = 0.1;
-/// What is left withdraws all names if it is certainly more than this share of the gap, or depends on any covariate and is
-/// more than this share of a gap that is well known,
+/// All added effects are withdrawn if more than this share of the gap certainly remains, or if the remainder depends on a
+/// covariate and is more than this share of a gap that is well known,
 const UNEXPLAINED_SHARE: f64 = 0.3;
-/// or, of one that is not, depends on one so clearly, and by so much of how clearly it did at first.
+/// or, if the gap is not well known, if the statistic of the dependence exceeds this value and this share of the initial one.
 const LEFT_Z: f64 = 5.2;
 const LEFT_SHARE: f64 = 0.45;
-/// A lone name is withdrawn, too, if it leaves more than this share and certainly more than is explained: several that are right may
-/// leave as much together.
+/// A single effect is also withdrawn if more than this share remains, and certainly more than [`EXPLAINED_SHARE`]. Several
+/// correct effects may leave as much together.
 const LONE_SHARE: f64 = 0.5;
 
-/// What a search found.
+/// The outcome of a search.
 pub(crate) struct SearchOutcome {
-    /// Effects that were no candidates.
+    /// Effects that were not tried, because the data cannot show them.
     pub(crate) lacking: Vec<NotShown>,
     pub(crate) base: Fitted,
     pub(crate) grown: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
-    /// Where the base model is off, and where the grown one still is.
+    /// Where the base model and the data disagree, and where the grown model still does.
     pub(crate) before: Located,
     pub(crate) after: Located,
 }
 
-/// A model against the held-out frames.
+/// The residual of a model on the held-out frames.
 struct HeldOutResidual {
     level: Level,
-    /// Root mean square of each element.
+    /// Root mean square for each element.
     elements_rms_counts: Vec<f64>,
-    /// Of all frames, frame by frame, element by element.
+    /// For all frames, fitted and held out: frame by frame, element by element.
     residual: Vec<f32>,
 }
 
-/// Tells what was found.
+/// Decides the verdict and builds the report of a search.
 pub(crate) fn conclude(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
@@ -60,25 +60,26 @@ pub(crate) fn conclude(
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { known, frames, heldout, lattice, .. } = prepared;
     let SearchOutcome { lacking, base, mut grown, rounds, equivalent, before, after } = found;
-    // Two tests, each at half the chance.
+    // Two tests: Bonferroni's correction.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
     let share = search.share_left(&base, &grown);
     let left = after.p_value <= ALPHA;
     let count = names(&grown.parameters, search.known_terms).len();
-    // Coarse steps scatter readings that move, and no others: that is not left.
+    // Coarse steps scatter only readings that change; this scatter does not count as a remainder.
     let certain = if count > 0 && lattice.is_none() { search.certain_share_left(&base, &grown) } else { 0.0 };
-    // A small gap is known by what depends on what only; a large one by how much of it is left.
+    // A small gap is judged by the dependence on covariates, a large one by the share that remains.
     let clear = after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic);
     let large = search.problem.heldout_gap(&base.predicted).is_large();
-    // What one effect leaves, of which it closes most, is what its form lacks; several that leave as much are a patchwork.
+    // The remainder of a single effect that closes most of the gap is an error of its form. Several effects that leave as
+    // much are a patchwork.
     let is_form = count == 1 && search.likely_share_left(&base, &grown) <= UNEXPLAINED_SHARE;
     let is_little = count == 1 && share > LONE_SHARE && certain > EXPLAINED_SHARE;
     let leaves_too_much = certain > UNEXPLAINED_SHARE
         || is_little
         || left && if large { share > UNEXPLAINED_SHARE } else { clear && !is_form };
     if leaves_too_much && options.rule == Rule::Protocol {
-        // A model that leaves so much is none of what it is named after.
+        // Effects that leave so much are not the explanation.
         grown = base.clone();
     }
     let named = !names(&grown.parameters, search.known_terms).is_empty();
@@ -143,7 +144,7 @@ pub(crate) fn conclude(
         steps,
         final_: Final {
             level: in_noise(of_grown.level),
-            // Noise may make what is left look smaller than noise.
+            // By chance the remainder may be smaller than the noise.
             shrink: (p_value <= ALPHA && gap > 0.0).then(|| (closed / gap).min(1.0)),
         },
         verdict,
@@ -166,14 +167,14 @@ pub(crate) fn conclude(
     })
 }
 
-/// A converter that is coarser than declared: what was added where its readings say so.
+/// The added effect for a converter that is coarser than declared.
 fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffect {
     AddedEffect {
         effect: "quantisation",
         terms: vec![vec![Estimated { name: "step_counts", value: step_counts, standard_error: None }]],
         p_value,
         q_value: p_value,
-        // No mean changes by it.
+        // It does not change a mean.
         heldout_rms_before_counts: heldout_rms_counts,
         heldout_rms_after_counts: heldout_rms_counts,
         equivalent: Vec::new(),
@@ -195,7 +196,7 @@ fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> BaseModel {
 }
 
 impl Prepared<'_> {
-    /// How far a model is from the held-out frames, all together and element by element.
+    /// The residual of a model on the held-out frames.
     fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
         let Self { known, frames, heldout, noise, whole, .. } = self;
         let predicted = Predictor::new(known, frames, whole).predict(parameters)?;
@@ -221,7 +222,7 @@ impl Prepared<'_> {
         })
     }
 
-    /// The noise once the model is known: a tone looks like noise until then.
+    /// The noise given the grown model. Before a tone is in the model, it looks like noise.
     fn floor_counts(&self, grown: &HeldOutResidual) -> f64 {
         let left = Noise::of_residual(self.frames, &grown.residual, &self.still, self.step_counts);
         left.map_or(self.noise.rms_counts, |left| left.rms_counts.min(self.noise.rms_counts))
@@ -229,19 +230,19 @@ impl Prepared<'_> {
 }
 
 impl Search<'_> {
-    /// What is left beyond the doubt about the noise, as a share of what there was.
+    /// Remaining share of the gap, less the uncertainty of the noise.
     fn share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
         let left = self.problem.heldout_gap(&grown.predicted).sure();
         self.share_of(base, grown, left)
     }
 
-    /// The same, the noise taken to be what it is most likely.
+    /// Remaining share of the gap for the most likely noise.
     fn likely_share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
         let left = self.problem.heldout_gap(&grown.predicted).value.max(0.0);
         self.share_of(base, grown, left)
     }
 
-    /// The same, of readings with a signal against those without: what no doubt about the noise explains away.
+    /// Remaining share of the gap from the comparison of readings with and without a signal, which does not need the noise.
     fn certain_share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
         let left = self.problem.surely_left(grown);
         if left > 0.0 { self.share_of(base, grown, left) } else { 0.0 }
@@ -252,7 +253,7 @@ impl Search<'_> {
         if closed + left > 0.0 { (left / (closed + left)).clamp(0.0, 1.0) } else { 1.0 }
     }
 
-    /// What was added, each name once.
+    /// The added effects, each name once.
     pub(crate) fn steps(
         &self,
         grown: &Fitted,
@@ -274,7 +275,7 @@ impl Search<'_> {
                     .map(|((known, value), error)| Estimated {
                         name: known.name,
                         value: *value,
-                        // Beyond its range these data do not tell it.
+                        // An error greater than the range means that the data do not determine it.
                         standard_error: Some(*error)
                             .filter(|error| *error <= known.range[1] - known.range[0]),
                     })

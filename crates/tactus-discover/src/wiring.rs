@@ -1,18 +1,19 @@
-//! Which elements may answer for another: those whose reading follows another's signal beside their own.
+//! Elements that may be miswired: their reading follows another element's signal besides their own.
 
 use crate::fit::{Fitted, Problem};
 use crate::noise::median;
 
-/// A pair is worth a try if the other's signal lessens the cost of the element's reading by so much,
+/// A pair is tried if the other's signal reduces the cost of the element's reading by more than this,
 const GAIN_LEAST: f64 = 30.0;
-/// And by so many times what is typical of the elements.
+/// and by more than this many times the typical reduction.
 const STANDS_OUT: f64 = 6.0;
-/// So many pairs at most.
+/// Greatest number of pairs.
 pub(crate) const PAIRS_MAX: usize = 4;
-/// An element that answers with less than this share of the typical gain may be dead.
+/// An element with less than this share of its declared gain may be dead.
 const DEAD_SHARE: f64 = 0.3;
 
-/// Pairs of an element and the one for which it may answer, likeliest first; an element with itself may be dead.
+/// Pairs of an element and the one for which it may answer, likeliest first. A pair of an element with itself means that it
+/// may be dead.
 pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
     let bins = problem.predictor.bins;
     let elements = bins.elements;
@@ -39,7 +40,7 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
             found.push((f64::INFINITY, [element, element]));
         }
     }
-    // The best of many pairs gains something by noise too, and more where noise hangs together: as much as most do.
+    // The best of many pairs gains something from noise alone, more so from autocorrelated noise. The median measures this.
     let typical = median(&found.iter().map(|(gain, _)| *gain).collect::<Vec<_>>());
     found.retain(|(gain, _)| *gain > GAIN_LEAST.max(STANDS_OUT * typical));
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -49,9 +50,9 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
 /// Moments of the signals and of the readings in the fitted bins, centred and weighted.
 struct Sums {
     elements: usize,
-    /// Of two elements' signals.
+    /// Products of two elements' signals.
     signals: Vec<f64>,
-    /// Of an element's reading with another's signal, reading by reading.
+    /// Products of an element's reading with another's signal.
     readings: Vec<f64>,
 }
 
@@ -93,7 +94,7 @@ impl Sums {
         sums
     }
 
-    /// By how much another's signal, beside its own, lessens the cost of an element's reading.
+    /// By how much another element's signal, besides its own, reduces the cost of an element's reading.
     fn gain(&self, element: usize, other: usize) -> f64 {
         let at = |one: usize, other: usize| one * self.elements + other;
         let own = self.signals[at(element, element)];

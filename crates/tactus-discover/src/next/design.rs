@@ -1,7 +1,6 @@
-//! Experiments as the rig would make them, as far as a prediction needs to know: the parts of `diagnose`, and two of the
-//! paper's.
+//! Frames that the rig would record in possible experiments: the parts of `diagnose`, and two experiments of the paper.
 //!
-//! Places, depths and times are those of the scripts in `experiments/`; a random order is some order.
+//! Places, depths and times are those of the scripts in `experiments/`. Random orders differ from those of the scripts.
 
 use tactus_model::Registration;
 use tactus_schema::table::{Phase, RowView};
@@ -10,44 +9,44 @@ use crate::bins::interval_s;
 use crate::rng::Rng;
 use crate::{Frames, Known};
 
-/// An experiment that could be made.
+/// A possible experiment.
 #[derive(Debug, Clone)]
 pub(super) struct Design {
-    /// Its own name, or that of the part of `diagnose`.
+    /// Name of the experiment, or of the part of `diagnose`.
     pub(super) name: &'static str,
     pub(super) experiment: &'static str,
     pub(super) parameters: Vec<(&'static str, String)>,
     pub(super) duration_s: f64,
-    /// Where the stage would be when; without counts.
+    /// Positions of the stage over time; the counts are 0.
     pub(super) frames: Frames,
 }
 
-/// What the rig has done so far, and can do again.
+/// Limits of possible experiments: what the rig has done so far.
 #[derive(Debug)]
 pub(super) struct DesignSpace<'a> {
     known: &'a Known,
     covering_mm: f64,
     indenter: &'a str,
     interval_s: f64,
-    /// Of the presses of `diagnose`; its ladder goes a fifth deeper.
+    /// Depth of the presses of `diagnose` as a share of the covering; its ladder goes a fifth deeper.
     depth_share: f64,
-    /// The deepest press under the covering in place.
+    /// Greatest depth reached with the present covering.
     deepest_mm: f64,
     load_mm_per_s: f64,
-    /// The fastest load.
+    /// Speed of the fastest load.
     fastest_mm_per_s: f64,
     safe_mm: f64,
 }
 
-/// What `diagnose` takes if nothing is said.
+/// Defaults of `diagnose`.
 const SHARE: f64 = 0.5;
 const SPEEDS_MM_PER_S: [f64; 6] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
 const ASIDE_MM: f64 = 1.0;
 const DWELL_S: f64 = 0.25;
 const ELEMENT_DEPTHS_MM: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];
-/// A short and a whole form of each part.
+/// Values of `diagnose`'s parameter `scale`: a short and a full form of each part.
 const SCALES: [f64; 2] = [0.3, 1.0];
-/// What was reached within this share was reached.
+/// Tolerance, as a factor, for depths and speeds that count as reached.
 const NEARLY: f64 = 1.05;
 const APPROACH_MM: f64 = 0.3;
 const TRAVEL_MM_PER_S: f64 = 20.0;
@@ -68,11 +67,11 @@ const PARTS: [(&str, DiagnosePart); 11] = [
     ("rests", |builder| builder.rests()),
 ];
 
-/// Parts that press no element which must answer.
+/// Parts that do not look for responding elements first.
 const WITHOUT_SITES: [&str; 4] = ["drift", "tilt", "depths", "wide"];
 
 impl<'a> DesignSpace<'a> {
-    /// As the last frames left it.
+    /// Limits from all frames, with the covering and indenter of the last.
     pub(super) fn of(known: &'a Known, frames: &'a Frames) -> Self {
         let covering_mm = frames.covering_mm.last().copied().unwrap_or(1.0);
         let tool = frames.indenter.last().and_then(|tool| frames.indenters.get(usize::from(*tool)));
@@ -95,7 +94,7 @@ impl<'a> DesignSpace<'a> {
         }
     }
 
-    /// All that it could do next.
+    /// All possible experiments.
     pub(super) fn designs(&self) -> Vec<Design> {
         let mut designs: Vec<Design> = Vec::new();
         for (name, part) in PARTS {
@@ -145,7 +144,7 @@ impl<'a> DesignSpace<'a> {
         builder.design("element-centres", "element-centres", parameters)
     }
 
-    /// Five by five places about the middle, under the covering in place.
+    /// Five by five places about the middle, with the present covering.
     fn grid_sweep(&self) -> Design {
         let shares = [0.3, 0.5, 0.65].map(|share: f64| share.min(self.deepest_mm / self.covering_mm));
         let mut builder = DesignBuilder::new(self, 1.0);
@@ -184,12 +183,12 @@ fn list(values: &[f64]) -> String {
     format!("{values:?}").replace(' ', "")
 }
 
-/// The stage on its way.
+/// Builds the frames of a design by following the path of the stage.
 struct DesignBuilder<'a> {
     space: &'a DesignSpace<'a>,
     registration: Registration,
     centres_mm: Vec<[f64; 2]>,
-    /// The middle element and two others, as `diagnose` chooses them where none is faulty.
+    /// The middle element and two others, as `diagnose` chooses them if none is faulty.
     sites_mm: [[f64; 2]; 3],
     depth_mm: f64,
     scale: f64,
@@ -236,7 +235,7 @@ impl<'a> DesignBuilder<'a> {
         Design { name, experiment, parameters, duration_s: self.t_s, frames: self.frames }
     }
 
-    /// Presses on the sites and their neighbours: `diagnose` makes sure that they answer.
+    /// Presses on the sites and their neighbours, by which `diagnose` checks that they respond.
     fn find_sites(&mut self) {
         let pitch_mm = self.pitch_mm();
         for [x, y] in self.sites_mm {
@@ -346,7 +345,7 @@ impl<'a> DesignBuilder<'a> {
         }
     }
 
-    /// Presses beside some of the elements, in random order, to shares of the depth.
+    /// Presses beside selected elements, in random order, to shares of the depth.
     fn elements(&mut self, is_one: fn(usize, usize) -> bool, pitches: f64, shares: &[f64], dwell_s: f64) {
         let cols = self.space.known.array.cols();
         let some = self.centres_mm.iter().enumerate().filter(|(index, _)| is_one(index / cols, index % cols));
@@ -376,7 +375,7 @@ impl<'a> DesignBuilder<'a> {
         ways_mm
     }
 
-    /// So many at full length, scaled; at least two.
+    /// A number of repetitions, scaled; at least two.
     fn times(&self, full: usize) -> usize {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some dozens")]
         let scaled = (full as f64 * self.scale) as usize;
@@ -422,7 +421,7 @@ impl<'a> DesignBuilder<'a> {
         self.until(way_mm / speed_mm_per_s, to_mm, press, phase);
     }
 
-    /// Takes the frames on the way.
+    /// Moves to a position in a given time, and adds the frames on the way.
     fn until(&mut self, duration_s: f64, to_mm: [f64; 3], press: i32, phase: Phase) {
         let (begin_s, from_mm) = (self.t_s, self.at_mm);
         self.t_s += duration_s;

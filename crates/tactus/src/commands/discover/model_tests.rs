@@ -137,7 +137,7 @@ fn without_repeats_the_noise_stays_as_it_was_said_to_be() {
 }
 
 #[test]
-fn the_parts_of_a_wander_have_the_evidence_of_the_whole() {
+fn the_parts_of_a_random_walk_have_the_evidence_of_the_whole() {
     let before = before();
     let mut found = found(&before);
     let part = Effect::neutral(Definition::find("baseline-drift").unwrap());
