@@ -15,18 +15,17 @@
 //! | element | [`OnElement`] | the elements' signals before their response; counts after it |
 //! | readout | [`OnReadout`] | counts in time; what stands before the converter |
 //!
-//! The [`Pipeline`](crate::Pipeline) calls the effects of a stage one after the other, in the order in which they
-//! are listed. History lives in the effect and is forgotten by `reset`. Between two moments an effect with memory
-//! takes its input as a straight line, so that a call more often changes nothing for such an input. At neutral
-//! parameters an effect changes nothing, to the bit.
+//! The [`Pipeline`](crate::Pipeline) calls the effects of a stage in the order in which they are listed. An effect keeps
+//! its own history, which `reset` clears. Between two moments an effect with memory interpolates its input linearly, so
+//! additional moments on a straight line change nothing. At neutral parameters an effect changes no bit of the result.
 //!
 //! **Derivatives.** Where a closed form exists, `slope` gives the derivative of the effect's own output by one of
 //! its parameters at the same input, with that of the memory; `None` or `false` where there is none. From there to
-//! counts: a [`Shift`] of the contact through [`ForwardModel::gradient`](crate::ForwardModel::gradient), a
-//! change of signal times `sensitivity (1 + 2 k u)`, a change of counts as it is, as long as no effect stands
-//! behind. Else two pipelines are differenced: [`Effect::with`] makes the other one.
+//! counts: a [`Shift`] of the contact through [`ForwardModel::gradient`](crate::ForwardModel::gradient), a change of signal
+//! times `sensitivity (1 + 2 k u)`, a change of counts as it is, provided that no later effect follows. Otherwise use
+//! finite differences of two pipelines: [`Effect::with`] makes the second effect.
 //!
-//! **There are**, in [`REGISTRY`]; these names are a contract of reports and model files:
+//! **Effects** in [`REGISTRY`]. These names are a contract of reports and model files:
 //!
 //! | stage | effects |
 //! |---|---|
@@ -37,11 +36,11 @@
 //! | element | `crosstalk`, `miswired`, `saturation` |
 //! | readout | `baseline-drift`, `gain-drift`, `low-pass`, `scan-skew`, `periodic-interference`, `quantisation` |
 //!
-//! **Cost**: an image is computed when the contact changes, as without effects; `heavy-tail` computes two, and one
-//! of a leaning tool takes several times as long. All else is some operations an element and moment.
+//! **Cost**: an image is computed when the contact changes, as without effects. `heavy-tail` computes two images, and an
+//! image of a leaning tool takes several times as long. Everything else takes a few operations per element and moment.
 //!
-//! **A lab's own effect** is one file of the kind below and one line in the registry (`docs/adding-an-effect.md`
-//! goes through it); or, without touching this crate, a `static` [`Definition`] given to [`Effect::of`].
+//! **A new effect** is one file like the one below and one line in the registry (`docs/adding-an-effect.md` explains an
+//! example). Without changes to this crate, pass a `static` [`Definition`] to [`Effect::of`].
 //!
 //! ```
 //! use tactus_model::effect::{BaseModel, Definition, Make, OnElement, Parameter};

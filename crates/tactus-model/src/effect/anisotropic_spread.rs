@@ -4,7 +4,7 @@
 //! sigma_x = sqrt(ratio) sigma          sigma_y = sigma / sqrt(ratio)
 //! ```
 //!
-//! The area that a point is spread over stays. Axes are the sensor's: a Gaussian that lies askew is no product of one
+//! The area of the spread does not change. The axes are the sensor's: a Gaussian at another angle is not a product of one
 //! along x and one along y.
 //!
 //! No derivative in closed form. Cost: one image.

@@ -1,12 +1,12 @@
-//! `backlash`: the tip is not where its stage says, but behind it, by direction of approach.
+//! `backlash`: the tip lags behind the position that the stage reports, depending on the direction of approach.
 //!
 //! ```text
 //! q(t) = max(x(t) - play / 2, min(x(t) + play / 2, q before))          on each of the robot's axes
 //! ```
 //!
-//! `x` is where the stage says that the tip is, `q` where it is. The tip follows half the play behind a stage that
-//! goes on, and rests for the whole play where the stage turns; of two opposite approaches the mean is the
-//! registration's, or the surface's. The tip begins amid its play.
+//! `x` is the reported position of the tip and `q` its true position. The tip follows the stage at a distance of half the
+//! play, and rests over the whole play when the stage reverses. The mean over two opposite approaches agrees with the
+//! registration or the surface. The tip starts in the middle of its play.
 //!
 //! Derivative in closed form, with memory. Cost: none.
 //!
@@ -17,7 +17,7 @@ use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipSta
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "backlash",
-    summary: "the tip's place depends on the direction from which it came",
+    summary: "the tip's position depends on the direction of approach",
     parameters: &[
         Parameter::real("play_x_mm", 0.0, [0.0, 1.0]),
         Parameter::real("play_y_mm", 0.0, [0.0, 1.0]),
@@ -33,11 +33,11 @@ struct Backlash {
     axes: [Axis; 3],
 }
 
-/// A nut on a screw.
+/// One axis: a nut with play on a screw.
 #[derive(Debug)]
 struct Axis {
     half_mm: f64,
-    /// Where it is, and by how much that changes with the play.
+    /// Position of the tip, and its derivative by the play.
     at: Option<(f64, f64)>,
 }
 

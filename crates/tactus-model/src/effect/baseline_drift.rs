@@ -1,15 +1,15 @@
-//! `baseline-drift`: the zero wanders in time, of all elements alike or of one.
+//! `baseline-drift`: the baseline changes in time, for all elements together or for one.
 //!
 //! ```text
 //! counts -> counts + c(t - start)          t since the start of the run
 //! c straight through 0 and offset_01_counts .. offset_16_counts, duration / 16 apart, and constant before and after
 //! ```
 //!
-//! The start is at 0, since the baselines are the base model's. A wander of any
-//! shape is followed, be it a trend, a warming up or a random walk, of which least squares leave 4 % of the variance;
-//! 12 knots would leave 5 % and 6 knots 10 %. What is faster than a sixteenth of the duration is not: it takes several
-//! effects, each starting where the one before ends. With `element` -1, or without it, all elements wander alike; each for
-//! itself takes an effect for each.
+//! The drift starts at 0 because the baselines belong to the base model. It follows a drift of any shape: a trend, a
+//! warm-up or a random walk, of which a least-squares fit leaves 4 % of the variance (5 % with 12 knots, 10 % with 6).
+//! It cannot follow changes faster than a sixteenth of the duration: these need several effects in sequence, each starting
+//! where the one before ends. With `element` -1, or without it, all elements drift together. Independent drifts need one
+//! effect per element.
 //!
 //! Derivatives in closed form. Cost: none.
 //!
@@ -22,7 +22,7 @@ use super::{Definition, Make, Now, OnReadout, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "baseline-drift",
-    summary: "the zero wanders in time",
+    summary: "the baseline drifts in time",
     parameters: &[
         Parameter::element_or_all("element"),
         Parameter::given("start_s", 0.0, [0.0, 1e6]),

@@ -8,8 +8,8 @@
 //!            + column_share        * (sum over the others of its column)
 //! ```
 //!
-//! Along a row that leaks from column to column, neighbours answer most and the rest of the row less: the two shares of
-//! a row together follow such a ladder.
+//! In a row that leaks from column to column, neighbours respond most and the rest of the row less. The two shares of a
+//! row together describe this.
 //!
 //! # Source
 //! Row-column addressing: charge that leaks between the lines of a capacitive matrix, and stray capacitance

@@ -4,7 +4,7 @@
 //! sigma -> sigma (1 + growth_share depth / thickness)          depth at most the thickness
 //! ```
 //!
-//! What is spread wider is not lost: the peak falls as the width grows.
+//! The volume is conserved: the peak falls as the width grows.
 //!
 //! No derivative in closed form. Cost: one image.
 //!

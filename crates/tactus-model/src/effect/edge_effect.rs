@@ -1,12 +1,12 @@
-//! `edge-effect`: the covering answers differently near its edge, or near the seam between two sensors.
+//! `edge-effect`: the covering's response differs near its edge, or near the seam between two sensors.
 //!
 //! ```text
 //! u_e -> u_e (1 + edge_share exp(-edge distance / reach) + seam_share exp(-seam distance / reach))
 //! ```
 //!
-//! Distances are those of the tool's axis: from the nearest side of the active area (0 on it and outside), and from
-//! the line in the middle of x, where the paper's two sensors meet. A factor by the element's own place would be part
-//! of its sensitivity.
+//! Distances are those of the tool's axis from the nearest side of the active area (0 on it and outside), and from the
+//! line in the middle of x where the paper's two sensors meet. A factor that depended on the element's own position would
+//! be part of its sensitivity.
 //!
 //! Derivatives in closed form. Cost: none.
 //!

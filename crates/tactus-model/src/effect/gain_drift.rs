@@ -5,8 +5,8 @@
 //! g straight through 0 and gain_01_share .. gain_06_share, duration / 6 apart, and constant after the duration
 //! ```
 //!
-//! The start is at 0, since the gain there is the base model's. Of a random walk least squares leave 10 % of the
-//! variance. `T_0` is the first temperature that is known; without one temperature does nothing.
+//! The curve starts at 0 because the gain at the start is the base model's. A least-squares fit leaves 10 % of the
+//! variance of a random walk. `T_0` is the first known temperature; if no temperature is known, it has no effect.
 //!
 //! Derivatives in closed form. Cost: none.
 //!

@@ -4,7 +4,8 @@
 //! G -> (1 - tail_share) G_sigma + tail_share G_(width_ratio sigma)
 //! ```
 //!
-//! Both of unit volume. The tail takes from the peak: sensitivity, stated for a Gaussian, is to be calibrated anew.
+//! Both have unit volume. The tail lowers the peak, so sensitivity, which is stated for one Gaussian, must be calibrated
+//! again.
 //!
 //! # Source
 //! The layered elastic solution falls off more slowly than the Gaussian of its core (the paper's Fig. 3); a mixture

@@ -5,9 +5,9 @@
 //! u     -> u + set_share mean(m_k - u)                         tau = recovery {1 / spread_ratio, 1, spread_ratio}
 //! ```
 //!
-//! The dent is a share of the deepest, each element's own, and recovers exponentially with a ratio of 1; with others it
-//! follows power laws and series, as `relaxation` does. It adds to what presses less than it did; a press that goes as
-//! deep as the one before feels nothing of it, since `m_k` is then `u`.
+//! Each element has its own dent, a share of its greatest signal. It recovers exponentially with a ratio of 1; with other
+//! ratios it follows power laws and series, as `relaxation` does. It adds to signals smaller than the earlier one. It does
+//! not change a press as deep as the one before, since `m_k` is then `u`.
 //!
 //! Derivatives in closed form, with memory. Cost: three exponentials a moment.
 //!

@@ -4,11 +4,11 @@
 //! width = ratio x declared width
 //! ```
 //!
-//! Widths are a cylinder's, sphere's or cone's diameter (a cone keeps its angle), a box's two sides, and for a mesh
-//! its x and y. Sensitivity keeps its meaning: it is stated for the reference tool as it is declared.
+//! The width is the diameter of a cylinder, sphere or cone (a cone keeps its angle), both sides of a box, and x and y of a
+//! mesh. Sensitivity keeps its meaning: it is stated for the reference tool as declared.
 //!
 //! # Source
-//! A tool's tolerance: nothing in the paper, which gives 1 mm without one.
+//! Manufacturing tolerance of the tool. The paper gives 1 mm without a tolerance.
 
 use std::sync::Arc;
 

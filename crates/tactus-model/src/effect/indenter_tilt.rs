@@ -5,10 +5,10 @@
 //! lowest  = the greatest tan(tilt_x) u + tan(tilt_y) v of the face
 //! ```
 //!
-//! `u, v` along the tool's own sides (the robot's axes) from the foot of its axis. `touched_share` says which height of
-//! the tool the depth is told of: 0 the foot of the axis (one edge goes deeper, the other less deep, and while all of the
-//! face touches the volume is the same), 1 the lowest point, with which a touch finds the surface. Acts on tools with a
-//! flat face and on meshes; the head of a sphere or a cone stays as it is.
+//! `u, v` are measured along the tool's own sides (the robot's axes) from the foot of its axis. `touched_share` selects the
+//! point to which the depth refers: 0 is the foot of the axis (one edge is deeper and the other less deep; while the whole
+//! face touches, the volume is the same), 1 is the lowest point, which a touch finds. The effect acts on tools with a
+//! flat face and on meshes; it does not change the head of a sphere or a cone.
 //!
 //! No derivative in closed form. Cost: one image, in four to five times its time.
 //!

@@ -1,4 +1,4 @@
-//! `misregistration`: the sensor does not lie where the robot's calibration says.
+//! `misregistration`: the sensor's true position differs from the registration.
 //!
 //! ```text
 //! p_sensor = (1 + scale_error) Rot(-(rotation + rotation_deg)) S (p_robot - origin - offset)
@@ -8,11 +8,11 @@
 //!     | 0           1          |
 //! ```
 //!
-//! Shift and turn are those of the registration itself. Scale and squareness are the stage's, about the shifted origin: its steps are
-//! longer than it believes, and its y axis leans towards x.
+//! Offset and rotation belong to the registration itself. Scale and squareness belong to the stage and act about the
+//! shifted origin: its steps are longer than stated, and its y axis leans towards x.
 //!
 //! # Source
-//! The paper's Sec. 2.1: two touches near opposite corners set the registration, and so carry their errors.
+//! The paper's Sec. 2.1: two touches near opposite corners define the registration, which inherits their errors.
 
 use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
 

@@ -1,11 +1,11 @@
-//! `miswired`: an element is dead, or answers for another.
+//! `miswired`: an element is dead, or reports another element's signal.
 //!
 //! ```text
 //! u_element -> own_share u_element + other_share u_answers_for
 //! ```
 //!
-//! Dead: both shares 0. The paper's faulty elements: `own_share` 0, `other_share` 1. Several are several effects, one
-//! for each element; every one takes what reached the elements themselves, so that their order does not matter. The
+//! A dead element has both shares 0. The paper's faulty elements have `own_share` 0 and `other_share` 1. Each faulty
+//! element needs its own effect. Every such effect reads the signals before the stage, so their order does not matter. The
 //! element keeps its own gain and baseline.
 //!
 //! # Source

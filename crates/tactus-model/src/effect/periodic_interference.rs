@@ -4,8 +4,9 @@
 //! counts -> counts + sine sin(a) + cosine cos(a)          a = 2 pi frequency t + column phase_per_column
 //! ```
 //!
-//! the same on all elements, or running over the columns in the order in which they are read. Sine and cosine stand
-//! for amplitude and phase: they act linearly. A tone above half the frame rate shows as its alias below it.
+//! The phase is the same for all elements, or advances over the columns in the order in which they are read. Sine and
+//! cosine replace amplitude and phase because the model is linear in them. A tone above half the frame rate appears as its
+//! alias below it.
 //!
 //! Derivatives in closed form. Cost: a sine and a cosine for each column.
 //!

@@ -5,9 +5,9 @@
 //! v(t) = greatest of the speed of loading and v before, fallen by exp(-dt / recovery)
 //! ```
 //!
-//! The speed of loading is that at which depth grows while the tool is in the covering. Without loading what it did
-//! dies away with the recovery time: a short one acts on the way down only, a long one for as long as the tool
-//! stands in the covering. Out of it, it is forgotten.
+//! The speed of loading is the rate at which depth increases while the tool is in the covering. After loading the effect
+//! decays with the recovery time: with a short one it acts during loading only, with a long one for as long as the tool
+//! is in the covering. It is reset when the tool leaves the covering.
 //!
 //! Derivatives in closed form. Cost: none.
 //!

@@ -5,14 +5,15 @@
 //!                                                       tau = time_constant {1 / spread_ratio, 1, spread_ratio}
 //! ```
 //!
-//! and, while the tool touches, not below 0, since a covering does not pull. Once it has left, `after_release` of the
-//! change still shows: nothing of it where the covering is no longer felt, so that it shows in the next press only; all of
-//! it in a linear solid. Without contact it recovers `recovery_ratio` times as fast as it relaxes: where that is large,
-//! each press begins anew. A step to `u` and a hold give, with a ratio of 1, `u (1 - relaxed_share (1 - exp(-t / time_constant)))`: the
-//! response at once is the base model's. A negative share creeps upwards.
+//! While the tool touches, the result is at least 0, since a covering does not pull. After the tool has left, the share
+//! `after_release` of the change remains visible: 0 if the covering loses contact with the sensor, so that the change shows
+//! in the next press only, and 1 in a linear solid. Without contact it recovers `recovery_ratio` times as fast as it
+//! relaxes; with a large ratio each press starts fresh. With a spread ratio of 1, a step to `u` and a hold give
+//! `u (1 - relaxed_share (1 - exp(-t / time_constant)))`: the immediate response is the base model's. A negative share
+//! makes the response creep upwards.
 //!
-//! Three times spread on a scale of ratios follow what relaxes in no single one. Share of the fall that is explained
-//! under a depth held from 0.03 to 60 s, the gain free, frames at 30 Hz (without spread, and with):
+//! Three time constants spread by a ratio also fit materials without a single time constant. Share of the decrease that is
+//! explained while a depth is held from 0.03 to 60 s, with free gain and frames at 30 Hz (ratio 1, and ratio free):
 //!
 //! | law | ratio 1 | free |
 //! |---|---|---|

@@ -4,11 +4,11 @@
 //! counts(t) -> counts(t - (last_row - row) row_time - (last_column - column) column_time)
 //! ```
 //!
-//! Elements one by one, row by row, take an `element_time` each if `column_time` is that and `row_time` a row's columns
-//! of it; rows at once have no `column_time`, and columns at once no `row_time`. A frame bears the time of its last
-//! element; the first was sampled longest ago. Between moments counts are taken
-//! to run straight, and what was before the first to be as the first. All elements together are late by half a scan,
-//! which is `time-lag`; what tells them apart is that the first are later than the last.
+//! If elements are sampled one by one, row by row, `column_time` is the time per element and `row_time` that of a whole
+//! row. If whole rows are sampled at once `column_time` is 0, and if whole columns are, `row_time` is 0. A frame has the
+//! time of its last element, so the first element is the oldest. Counts are interpolated linearly between moments, and are
+//! constant before the first. The mean delay over all elements is half a scan and resembles `time-lag`; the difference is
+//! that here the first elements are older than the last.
 //!
 //! Derivatives in closed form. Cost: a short history, as long as a scan.
 //!
@@ -102,7 +102,7 @@ impl ScanSkew {
         let (before, after) = (older.counts[element], newer.counts[element]);
         let between_s = older.age_s - newer.age_s;
         let per_s = if between_s > 0.0 { (after - before) / between_s } else { 0.0 };
-        // What is asked for as it is now is given to the bit.
+        // Age 0 returns the present counts to the bit.
         let count = if age_s > newer.age_s { after - per_s * (age_s - newer.age_s) } else { after };
         (count, per_s)
     }

@@ -1,11 +1,11 @@
-//! `softening`: what was pressed before answers more weakly, up to where it was pressed.
+//! `softening`: the response is weaker up to the greatest earlier signal (Mullins effect).
 //!
 //! ```text
 //! u -> u (1 - softened_share erf((1 - u^2 / m^2) / width_share))          m = greatest u so far
 //! ```
 //!
-//! each element by its own past. A first loading is the base model's, and so is going on beyond what was reached;
-//! below it unloading and every later press follow the same weaker curve. It does not recover.
+//! Each element has its own history. First loading follows the base model, and so does loading beyond the earlier maximum.
+//! Below it, unloading and every later press follow the same weaker curve. It does not recover.
 //!
 //! Derivatives in closed form. Cost: an error function for each element.
 //!

@@ -1,10 +1,10 @@
-//! `surface-offset`: the covering's surface is not at the height where the one touch put it.
+//! `surface-offset`: the height of the covering's surface differs from the one that a touch found.
 //!
 //! ```text
 //! depth = surface + offset - z
 //! ```
 //!
-//! A threshold of contact is the same with a negative offset.
+//! A contact threshold acts like a negative offset.
 //!
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.

@@ -4,8 +4,9 @@
 //! depth = surface + slope_x (x - x_c - touched_x) + slope_y (y - y_c - touched_y) - z
 //! ```
 //!
-//! `x, y` in the sensor frame, `x_c, y_c` the middle of the active area, and `touched` from there the place at which the
-//! surface's height was found, where a tilt changes nothing. Only that place's distance along the slope matters.
+//! `x, y` are in the sensor frame, `x_c, y_c` is the middle of the active area, and `touched` is the position, relative to
+//! the middle, at which a touch found the surface's height; a tilt changes nothing there. Only its distance along the
+//! slope matters.
 //!
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.

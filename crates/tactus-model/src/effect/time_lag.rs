@@ -1,13 +1,13 @@
-//! `time-lag`: frames are late or early against the stage's positions.
+//! `time-lag`: frames are late or early relative to the stage's positions.
 //!
 //! ```text
 //! tip(t) -> tip(t - lag)          late: lag > 0
 //! ```
 //!
-//! The path is asked for another instant; only one that knows its future can be early. Where places come one by
-//! one, a [`Trail`](crate::Trail) of them is the path.
+//! The effect looks up the path at another instant. Early frames need a path whose future is known. If positions become
+//! known one by one, the path is a [`Trail`](crate::Trail).
 //!
-//! No derivative: that is the tip's velocity, which only the path knows. Cost: none.
+//! No derivative: it needs the tip's velocity, which only the path knows. Cost: none.
 //!
 //! # Source
 //! Transport delay, the factor `exp(-s lag)` of a linear system: K. J. Astrom and R. M. Murray, *Feedback Systems*
