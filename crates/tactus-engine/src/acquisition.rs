@@ -1,4 +1,4 @@
-//! The one task that acquires: safety first, then the recording, then the run, then who watches.
+//! The acquisition task. Each frame goes to the safety supervisor, then to the recording, the run and the viewers.
 
 use std::sync::Arc;
 
@@ -19,11 +19,11 @@ use crate::supervisor::{Supervisor, Violation};
 /// Supervisor ticks between two publications of the run's state.
 const TICKS_PER_STATE: u64 = 15;
 
-/// What frames and reports meet on their way, and what the run reads and sets.
+/// State that each frame and stage report passes through, and that the run reads and sets.
 pub(crate) struct Live {
     pub(crate) supervisor: Supervisor,
     pub(crate) tally: Tally,
-    /// The covering in place; a script may have it changed, and it stays.
+    /// The covering in place. A script can have it changed; the change lasts beyond the run.
     pub(crate) covering: Covering,
     window: Option<Window>,
     recording: Option<Recording>,
@@ -86,7 +86,7 @@ impl Live {
         }
     }
 
-    /// Averages the frames that arrive within `[from, until)`; a former average is given up.
+    /// Averages the frames that arrive within `[from, until)`. Replaces an average that is still in progress.
     pub(crate) fn average(&mut self, from: MonoTime, until: MonoTime) -> oneshot::Receiver<Average> {
         let (window, average) = Window::open(from, until);
         self.window = Some(window);
@@ -107,7 +107,7 @@ impl Live {
 }
 
 impl Shared {
-    /// Everything from here on goes into `sink`, until [`Shared::close_recording`].
+    /// Records everything from now on into `sink`, until [`Shared::close_recording`].
     pub(crate) fn open_recording(&self, sink: Box<dyn Record>, run_id: String) {
         let now = self.clock.now();
         let report = *self.stage.state().borrow();
@@ -131,7 +131,7 @@ impl Shared {
         recording.failure.map_or(closed, Err)
     }
 
-    /// Tells an event of the run in progress.
+    /// Records and publishes an event of the run in progress.
     pub(crate) fn emit(&self, event: pb::run_event::Event) {
         let now = self.clock.now();
         let mut live = self.live();
@@ -150,7 +150,7 @@ impl Shared {
         self.end_with(ending);
     }
 
-    /// Tells what the supervisor did.
+    /// Records and publishes what the supervisor did.
     pub(crate) fn emit_safety(&self, verdict: pb::SafetyVerdict, rule: &str, detail: &str) {
         let now = self.clock.now();
         let mut live = self.live();
@@ -272,7 +272,7 @@ impl Shared {
         self.trip(violation);
     }
 
-    /// Ends the run for a broken rule and stops motion, before anything else is done.
+    /// Stops motion and ends the run because a rule was broken, before anything else is done.
     fn stop_for(&self, violation: Option<&Violation>) {
         if let Some(violation) = violation {
             self.end(Ending::Safety(violation.clone()));
@@ -280,7 +280,7 @@ impl Shared {
         }
     }
 
-    /// Tells of a broken rule, for which motion has been stopped.
+    /// Records and publishes a broken rule, after motion was stopped.
     fn trip(&self, violation: Option<Violation>) {
         let Some(violation) = violation else { return };
         error!(%violation, "safety stop");
@@ -296,8 +296,8 @@ impl Shared {
 }
 
 impl Live {
-    /// Follows the offset between the device's clock and the host's: arrival is never before sampling,
-    /// so the least difference is the best estimate, and the spread its uncertainty.
+    /// Estimates the offset between the device's clock and the host's. A frame never arrives before it is sampled, so
+    /// the least difference is the best estimate and the spread is its uncertainty.
     fn watch_clock(&mut self, frame: &Frame) {
         let tick_ns = self.sensor_info.as_ref().map_or(0, |info| info.tick_ns);
         let Some(tick) = frame.device_tick.filter(|_| tick_ns > 0) else { return };

@@ -1,4 +1,4 @@
-//! The mean over the frames of a stretch of time.
+//! The mean over the frames of a time interval.
 
 use tactus_schema::{Frame, MonoTime};
 use tokio::sync::oneshot;
@@ -12,7 +12,7 @@ pub(crate) struct Average {
     pub(crate) rms_counts: Vec<f64>,
     /// Number of frames averaged.
     pub(crate) frames: u32,
-    /// Frames that should have been among them and were lost.
+    /// Frames of the interval that were lost.
     pub(crate) lost: u64,
     /// Arrival of the first and the last of them.
     pub(crate) span: [MonoTime; 2],
@@ -25,7 +25,7 @@ struct Moments {
     squares: f64,
 }
 
-/// An average in the making, fed by the acquisition task.
+/// An average in progress. The acquisition task adds the frames.
 #[derive(Debug)]
 pub(crate) struct Window {
     from: MonoTime,
@@ -44,7 +44,7 @@ impl Window {
         (Self { from, until, moments: Vec::new(), frames: 0, lost: 0, span: [from; 2], done }, average)
     }
 
-    /// Takes a frame in; gives itself back while it wants more.
+    /// Adds a frame. Returns itself while it needs more frames.
     pub(crate) fn take(mut self, frame: &Frame) -> Option<Self> {
         let at = frame.received.mono;
         if at < self.from {
@@ -63,7 +63,7 @@ impl Window {
             lost: self.lost,
             span: self.span,
         };
-        // Whoever waited may have been interrupted: then nobody wants the average any more.
+        // The receiver is gone if the waiting run was interrupted; the average is then not needed.
         drop(self.done.send(average));
         None
     }

@@ -1,4 +1,4 @@
-//! The engine: the devices for the life of the service, and at most one run at a time.
+//! The engine owns the devices for the life of the service and executes at most one run at a time.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,7 +14,7 @@ use crate::acquisition::{Live, acquire};
 use crate::outlet::{Publish, Record};
 use crate::run::{Broken, Ending, Run, RunOrder, RunOutcome};
 
-/// Puts another covering in place, in mm; given by a simulated rig that can do it itself.
+/// Puts a covering of a thickness in mm in place. Only a simulated rig has such a function.
 pub type ChangeCovering = Arc<dyn Fn(f64) + Send + Sync>;
 
 /// A rig's devices, started.
@@ -25,7 +25,7 @@ pub struct Devices {
     pub stage: Arc<dyn Stage>,
     /// Every report of the stage.
     pub stage_reports: mpsc::Receiver<pb::StageState>,
-    /// How the covering is changed; `None` if a person does it.
+    /// Changes the covering; `None` if a person changes it.
     pub change_covering: Option<ChangeCovering>,
 }
 
@@ -35,7 +35,7 @@ impl fmt::Debug for Devices {
     }
 }
 
-/// The run engine of one rig. Clones are handles to the same engine; it ends with the last.
+/// The run engine of one rig. Clones are handles to the same engine, which ends when the last is dropped.
 #[derive(Clone)]
 pub struct Engine {
     shared: Arc<Shared>,
@@ -51,29 +51,29 @@ impl fmt::Debug for Engine {
 /// Who stops a run, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StopOrder {
-    /// Such as `cli`, `signal`, or a bus client's name.
+    /// Who stops: `cli`, `signal`, or a bus client's name.
     pub by: String,
-    /// For the run's events.
+    /// The reason, for the run's events; may be empty.
     pub reason: String,
-    /// The data so far are not to be used: the run ends as aborted, not as stopped.
+    /// True if the data so far must not be used: the run then ends as aborted instead of stopped.
     pub abort: bool,
 }
 
-/// A sign of life: how acquisition goes.
+/// Health of the acquisition, for the heartbeat.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pulse {
     /// Frames received since the start.
     pub frames: u64,
     /// Frames known to be lost since the start.
     pub frames_lost: u64,
-    /// The sensor answers.
+    /// True while the sensor answers.
     pub sensor_connected: bool,
-    /// When the last frame came.
+    /// Arrival time of the last frame.
     pub last_frame: MonoTime,
-    /// When the supervisor last looked at the clock.
+    /// Time of the supervisor's last check of the clock.
     pub supervised: MonoTime,
-    /// Least and greatest of (arrival of a frame - its device time) seen lately, in seconds: the
-    /// device clock's offset and how far it can be trusted; `None` without a device clock.
+    /// Least and greatest of (arrival of a frame - its device time) over the recent frames, in seconds. They estimate
+    /// the device clock's offset and its uncertainty; `None` without a device clock.
     pub clock_offset_s: Option<[f64; 2]>,
 }
 
@@ -89,14 +89,14 @@ pub struct Busy {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}")]
 pub struct Stopped {
-    /// By whom, and why.
+    /// Who stopped it and why.
     pub reason: String,
 }
 
-/// Why nothing moves before an [`Engine::reset`].
+/// Why nothing may move before an [`Engine::reset`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
-    /// The engine is new: nobody has said yet that the stage may move.
+    /// The engine is new, and nobody has allowed motion yet.
     #[error("nothing has been reset since the service started")]
     Started,
     /// A reset is under way, or the last one failed.
@@ -105,7 +105,7 @@ pub enum Fault {
     /// The stage's controller is in alarm.
     #[error("the stage is in alarm")]
     Alarm,
-    /// The stage does not know where it is, as after a reset of its controller.
+    /// The stage does not know its position, as after a reset of its controller.
     #[error("the stage does not know where it is")]
     Unhomed,
 }
@@ -119,7 +119,7 @@ pub enum ResetError {
     /// Somebody stopped it.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// The stage.
+    /// The stage reported an error.
     #[error(transparent)]
     Stage(#[from] StageError),
     /// A device did not answer, or somebody stopped the wait for it.
@@ -131,14 +131,14 @@ pub enum ResetError {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum EngineError {
-    /// The rig is a description of data, not of a service.
+    /// The rig file describes recorded data and has no service part.
     #[error(
         "rig {rig:?} has no envelope, motion, policy, sensor and stage: it describes data, not a service"
     )]
     NoService { rig: String },
 }
 
-/// What the run, the acquisition task and the handles share.
+/// State that the run, the acquisition task and the handles share.
 pub(crate) struct Shared {
     pub(crate) rig: Rig,
     pub(crate) service: Service,
@@ -149,12 +149,12 @@ pub(crate) struct Shared {
     pub(crate) control: watch::Sender<Control>,
     pub(crate) state: watch::Sender<pb::RunState>,
     pub(crate) pulse: watch::Sender<Pulse>,
-    /// What only a reset ends.
+    /// A fault that only a reset clears.
     latched: watch::Sender<Option<Fault>>,
     live: Mutex<Live>,
 }
 
-/// What is asked of the run in progress.
+/// Requests to the run in progress.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Control {
     /// Somebody holds the [`Claim`].
@@ -220,8 +220,8 @@ impl Engine {
         self.shared.clock
     }
 
-    /// Takes the right to run. Whoever means to run takes it first and prepares then: a stop from here on,
-    /// be it before anything has moved, ends the run.
+    /// Takes the exclusive right to run. A caller takes it before it prepares the run, so that a stop during the
+    /// preparation ends the run too.
     ///
     /// # Errors
     /// [`Busy`] if somebody else holds it.
@@ -236,7 +236,7 @@ impl Engine {
         if taken { Ok(Claim(Arc::clone(&self.shared))) } else { Err(Busy { run_id: self.run_id() }) }
     }
 
-    /// Executes an experiment, and returns when it is over and the tip retracted, however it ended.
+    /// Executes an experiment. Returns after the tip is retracted, however the run ended.
     ///
     /// # Errors
     /// [`Busy`] if another run is in progress.
@@ -244,11 +244,11 @@ impl Engine {
         Ok(self.claim()?.run(order, record).await)
     }
 
-    /// Stops motion at once and ends the run in progress or in preparation, if there is one. Never waits.
+    /// Stops motion at once and ends the run in progress or in preparation, if there is one. Does not wait.
     ///
     /// Returns true if there was one.
     pub fn stop(&self, order: StopOrder) -> bool {
-        // First the reason, then the stop: whoever moves checks the one after it has joined the other's order.
+        // Set the reason before the stop: a move checks the reason after it has joined the stop order.
         let claimed = self.shared.control.borrow().claimed;
         if claimed {
             self.shared.end(Ending::Stop(order));
@@ -260,7 +260,7 @@ impl Engine {
     /// Returns once nobody holds the right to run.
     pub async fn released(&self) {
         let mut control = self.shared.control.subscribe();
-        // The sender lives as long as this engine: waiting cannot fail.
+        // Waiting cannot fail because the sender lives as long as this engine.
         let _released = control.wait_for(|control| !control.claimed).await;
     }
 
@@ -268,12 +268,12 @@ impl Engine {
         self.shared.state.borrow().run_id.clone()
     }
 
-    /// Clears the stage's alarm, if there is one, homes it, raises the tip, and checks that frames flow: the
-    /// explicit act that a service wants after its start, and a stage after an alarm, a reset of its
-    /// controller or an unfinished homing. A [`Engine::stop`] ends it.
+    /// Clears the stage's alarm, if there is one, homes the stage, raises the tip, and checks that frames arrive. It is
+    /// required after the service starts, and after an alarm, a reset of the controller or an unfinished homing.
+    /// [`Engine::stop`] interrupts it.
     ///
     /// # Errors
-    /// [`ResetError`] if a run is in progress, or what stands in the way.
+    /// [`ResetError`] if a run is in progress or the reset failed.
     pub async fn reset(&self) -> Result<(), ResetError> {
         let not_ready = |why: Broken| ResetError::NotReady(why.to_string());
         let claim = self.claim()?;
@@ -284,7 +284,7 @@ impl Engine {
         if status == pb::StageStatus::Alarm {
             shared.stage.clear_alarm().await?;
         }
-        // The order is made before the check: a stop between the two still counts as later than the order.
+        // Make the order before the check, so that a stop between the two counts as later than the order.
         let homing = shared.stage.home();
         claim.check()?;
         homing.await?;
@@ -302,15 +302,15 @@ impl Engine {
         Ok(())
     }
 
-    /// What wants a [`Engine::reset`] before anything may move; a service starts no run until it is gone.
+    /// The fault that requires an [`Engine::reset`]; `None` if motion is allowed. No run starts while there is one.
     pub fn fault(&self) -> Option<Fault> {
         self.shared.fault()
     }
 
-    /// Holds the run in progress before its next step. A press ends at the safe height, so that a held run
-    /// presses nothing.
+    /// Pauses the run in progress before its next step. Every press ends at the safe height, so a paused run does not
+    /// press.
     ///
-    /// Returns false if there is no run that could be held.
+    /// Returns false if there is no run to pause.
     pub fn pause(&self) -> bool {
         let claimed = self.shared.control.borrow().claimed;
         self.shared.control.send_if_modified(|control| {
@@ -321,28 +321,28 @@ impl Engine {
         claimed
     }
 
-    /// Lets a held run go on. Returns false if none was held.
+    /// Resumes a paused run. Returns false if no run was paused.
     pub fn resume(&self) -> bool {
         self.shared.control.send_if_modified(|control| std::mem::take(&mut control.paused))
     }
 
-    /// Where the run stands; changes at each event and every half second.
+    /// State of the run, updated at each event and every half second.
     pub fn state(&self) -> watch::Receiver<pb::RunState> {
         self.shared.state.subscribe()
     }
 
-    /// Where the run stands, and what wants a reset, as of now.
+    /// Present state of the run, with the fault that requires a reset.
     pub fn run_state(&self) -> pb::RunState {
         let state = self.shared.state.borrow().clone();
         pb::RunState { fault: self.shared.fault_text(), ..state }
     }
 
-    /// How acquisition goes; changes with each frame.
+    /// Health of the acquisition, updated with each frame.
     pub fn pulse(&self) -> watch::Receiver<Pulse> {
         self.shared.pulse.subscribe()
     }
 
-    /// The latest report of the stage. A copy: whoever looks holds up no report.
+    /// A copy of the stage's latest report.
     pub fn stage_state(&self) -> pb::StageState {
         *self.shared.stage.state().borrow()
     }
@@ -354,7 +354,7 @@ impl Engine {
 }
 
 impl Shared {
-    /// From here on the stage may move, or not.
+    /// Sets or clears the fault that forbids motion.
     pub(crate) fn latch(&self, fault: Option<Fault>) {
         self.latched.send_replace(fault);
     }
@@ -373,13 +373,14 @@ impl Shared {
         latched.or((status == pb::StageStatus::Unhomed).then_some(Fault::Unhomed))
     }
 
-    /// What the acquisition task and the run share. Held only for moments, never across an await.
+    /// State that the acquisition task and the run share. The lock is never held across an await.
     pub(crate) fn live(&self) -> MutexGuard<'_, Live> {
-        // A panic elsewhere must not keep the supervisor from its work.
+        // A panic elsewhere must not stop the supervisor.
         self.live.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks the run to end. The first reason wins, but a silence, which may be forgiven, gives way to any other.
+    /// Asks the run to end. The first reason counts, except that any other reason replaces a silence of the sensor,
+    /// after which the run might have continued.
     pub(crate) fn end(&self, ending: Ending) {
         self.control.send_modify(|control| {
             control.paused = false;
@@ -389,13 +390,13 @@ impl Shared {
         });
     }
 
-    /// How long one frame takes.
+    /// Sample period of the sensor.
     pub(crate) fn sample_period(&self) -> Duration {
         Duration::from_secs_f64(1.0 / self.rig.array.rate_hz())
     }
 }
 
-/// The right to run; given back when dropped.
+/// The exclusive right to run. Dropping it gives it back.
 #[must_use = "the right is given back when this is dropped"]
 pub struct Claim(Arc<Shared>);
 
@@ -411,7 +412,7 @@ impl Claim {
         Run::new(&self.0, order).execute(record).await
     }
 
-    /// Tells whether the run was stopped already.
+    /// Checks whether the run was stopped already.
     ///
     /// # Errors
     /// [`Stopped`], with the reason.

@@ -20,7 +20,7 @@ pub struct Bounds {
     registration: tactus_model::Registration,
 }
 
-/// A step that would leave the envelope; the text says by how much, and which limit it is.
+/// A step that would leave the envelope. The message names the limit and the value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum Outside {
@@ -44,7 +44,7 @@ pub enum Outside {
     /// Longer than any step may last.
     #[error("{duration_s} s is too long for one step: the limit is {DURATION_MAX_S} s")]
     Duration { duration_s: f64 },
-    /// No covering is so thick.
+    /// The covering is thicker than [`THICKNESS_MAX_MM`].
     #[error("no covering is {thickness_mm} mm thick: the limit is {THICKNESS_MAX_MM} mm")]
     Covering { thickness_mm: f64 },
     /// Faster than the rig allows.
@@ -119,9 +119,9 @@ impl Bounds {
 
     fn check_depth(&self, depth_mm: f64) -> Result<(), Outside> {
         let limit_mm = self.depth_max_mm();
-        // A share of a thickness is rarely a round decimal: allow for the rounding of the product.
+        // Share times thickness is rounded: allow for that.
         if depth_mm <= limit_mm * (1.0 + 1e-12) {
-            // A negative depth is a height: as bounded as any other.
+            // A negative depth is a height and has the same bounds as every height.
             return check_axis("z", -depth_mm, [f64::NEG_INFINITY, self.envelope.z_max_mm]);
         }
         Err(Outside::Depth {
@@ -144,7 +144,7 @@ fn check_duration(duration_s: f64) -> Result<(), Outside> {
 }
 
 fn check_axis(axis: &'static str, value_mm: f64, [least_mm, greatest_mm]: [f64; 2]) -> Result<(), Outside> {
-    // Not a number is inside no bounds.
+    // NaN is outside all bounds.
     if value_mm >= least_mm && value_mm <= greatest_mm {
         Ok(())
     } else {

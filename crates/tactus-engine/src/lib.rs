@@ -1,9 +1,9 @@
 //! The run engine and the safety supervisor.
 //!
-//! An [`Engine`] owns a rig's devices for the life of the service. One task acquires: each frame
-//! goes first to the safety supervisor, then to the recording, then to the run's averages, then to
-//! whoever watches. A run executes one experiment script: every step is checked against the rig's
-//! envelope before anything moves, and whatever ends a run, the tip is retracted first.
+//! An [`Engine`] owns a rig's devices for the life of the service. The acquisition task passes each frame to the
+//! safety supervisor, then to the recording, then to the run's averages, then to the viewers. A run executes one
+//! experiment script: every step is checked against the rig's envelope before anything moves, and the tip is retracted
+//! before the run ends, whatever ended it.
 
 mod acquisition;
 mod average;

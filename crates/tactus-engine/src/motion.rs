@@ -1,4 +1,4 @@
-//! How a run moves the tip: up before sideways, down last and in small confirmed steps.
+//! Motion of the tip: first up, then sideways, last down in small confirmed steps.
 
 use std::time::Duration;
 
@@ -9,17 +9,17 @@ use tokio::time::timeout;
 use crate::engine::Shared;
 use crate::run::Broken;
 
-/// Greatest downward travel near the covering that is commanded before the last is confirmed: a host
-/// that dies at any instant leaves the tip at most this far from its last confirmed depth.
+/// Longest downward step near the covering. The next step is commanded only after the last is confirmed, so that a host
+/// that dies leaves the tip at most this far below its last confirmed height.
 const UNCONFIRMED_MAX_MM: f64 = 0.1;
 
-/// Below this two heights are the same: a third of the stage's vertical step.
+/// Heights that differ by less count as equal: a third of the stage's vertical step.
 const SAME_HEIGHT_MM: f64 = 0.0003;
 
-/// How long a stopped stage may take to stand.
+/// Longest time that a stopped stage may take to stand still.
 const STANDSTILL: Duration = Duration::from_secs(5);
 
-/// How often a stage may refuse to retract.
+/// Greatest number of refused retract commands before the run gives up.
 const REFUSALS_MAX: u32 = 5;
 
 impl Shared {
@@ -77,8 +77,8 @@ impl Shared {
         Ok(())
     }
 
-    /// Straight up to the safe height, whatever happened before. A stop halts the tip, but does not leave it
-    /// pressed in: once the stage stands it goes on up.
+    /// Moves straight up to the safe height, also after a stop: the stop halts the tip, and once the stage stands still
+    /// the tip is raised, so that it does not stay pressed in.
     ///
     /// Returns the height reached, or why the tip could not be retracted.
     pub(crate) async fn retract(&self) -> Result<f64, StageError> {
@@ -105,9 +105,9 @@ impl Shared {
         }
     }
 
-    /// One straight move. A stop ends it, and then the reason of the stop is the error.
+    /// Makes one straight move. If a stop ends it, the error is the reason of the stop.
     async fn go(&self, position_mm: [f64; 3], speed_mm_per_s: f64) -> Result<[f64; 3], Broken> {
-        // The order is made before the check: a stop between the two still counts as later than the order.
+        // Make the order before the check, so that a stop between the two counts as later than the order.
         let order = self.stage.move_to(Target { position_mm, speed_mm_per_s });
         self.check_ended()?;
         let moved = order.await;
@@ -119,7 +119,7 @@ impl Shared {
         self.stage.state().borrow().status() == StageStatus::Idle
     }
 
-    /// Waits until a stopped stage stands. If it does not, the next command says so.
+    /// Waits until a stopped stage stands still. If it does not, the next command fails.
     async fn stand_still(&self) {
         let mut state = self.stage.state();
         let standing = state.wait_for(|report| {
@@ -131,8 +131,9 @@ impl Shared {
     }
 }
 
-/// The first of the fewest equal steps of a way down: none is a stub, in which the tip would hardly get going.
+/// Length of one step when a descent is divided into the fewest equal steps. Equal steps avoid a last step so short that
+/// the stage hardly accelerates.
 fn confirmed_step_mm(way_mm: f64) -> f64 {
-    // What is a whole number of steps but for rounding is not one more.
+    // Rounding must not add a step to a whole number of steps.
     way_mm / (way_mm / UNCONFIRMED_MAX_MM - 1e-6).ceil().max(1.0)
 }

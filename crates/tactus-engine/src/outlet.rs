@@ -1,15 +1,15 @@
-//! Where everything that happens goes: the recording, which must not lose anything, and the viewers.
+//! Receivers of frames, reports and events: the recording, which must not lose any, and the viewers.
 
 use std::error::Error;
 
 use tactus_schema::{Frame, TimeStamp, pb};
 
-/// A recording in the making. A failure fails the run.
+/// A recording in progress. An error fails the run.
 pub trait Record: Send {
     /// What the sensor says of itself.
     ///
     /// # Errors
-    /// If it could not be taken in; the recording is then incomplete.
+    /// If it could not be stored; the recording is then incomplete.
     fn sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordFailure>;
     /// One frame.
     ///
@@ -26,7 +26,7 @@ pub trait Record: Send {
     /// # Errors
     /// As [`Record::sensor_info`].
     fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure>;
-    /// One act of the safety supervisor.
+    /// One action of the safety supervisor.
     ///
     /// # Errors
     /// As [`Record::sensor_info`].
@@ -34,7 +34,7 @@ pub trait Record: Send {
     /// Closes the recording; returns once everything is on disk.
     ///
     /// # Errors
-    /// If what was taken in before could not be stored.
+    /// If earlier data could not be stored.
     fn finish(self: Box<Self>) -> Result<(), RecordFailure>;
 }
 
@@ -43,7 +43,7 @@ pub trait Record: Send {
 #[error("the recording failed: {0}")]
 pub struct RecordFailure(#[from] pub Box<dyn Error + Send + Sync>);
 
-/// Those who watch. Must return at once: what they cannot take, they drop and count themselves.
+/// Publishes to the viewers. Must return at once: an implementation drops and counts what it cannot send.
 pub trait Publish: Send + Sync {
     /// What the sensor says of itself.
     fn sensor_info(&self, info: &pb::SensorInfo);
@@ -53,13 +53,13 @@ pub trait Publish: Send + Sync {
     fn stage(&self, state: &pb::StageState);
     /// One event of the run.
     fn event(&self, event: &pb::RunEvent);
-    /// Where the run stands.
+    /// State of the run.
     fn state(&self, state: &pb::RunState);
-    /// One act of the safety supervisor.
+    /// One action of the safety supervisor.
     fn safety(&self, event: &pb::SafetyEvent);
 }
 
-/// Nobody watches.
+/// Publishes to nobody.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unpublished;
 

@@ -20,7 +20,7 @@ use crate::script::{self, Request};
 use crate::supervisor::Violation;
 use pb::run_event::Event;
 
-/// How long readings are averaged for the run's reference zero.
+/// Averaging time of the run's reference zero.
 const REFERENCE: Duration = Duration::from_millis(300);
 
 /// An experiment to be run.
@@ -38,25 +38,25 @@ pub struct RunOrder {
     pub who: String,
     /// Bounds of the script's steps, time and memory.
     pub limits: Limits,
-    /// What the dry run promised, if there was one.
+    /// Prediction of the dry run, if there was one.
     pub planned: Option<Planned>,
     /// Names and versions of the software and the devices.
     pub versions: BTreeMap<String, String>,
     /// Where the recording goes, for the run's state.
     pub recording: String,
-    /// The order stands for a [`crate::Engine::reset`] too, as on an engine that was made for this run alone: a
-    /// stage that does not know where it is, is homed. It clears no alarm.
+    /// True if the run also replaces an [`crate::Engine::reset`], as on an engine that was made for this run alone: it
+    /// homes a stage that does not know its position. It does not clear an alarm.
     pub resets: bool,
 }
 
-/// What a dry run on the simulated twin promises.
+/// Prediction of a dry run on the simulated twin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Planned {
     /// Number of presses.
     pub presses: u32,
     /// Number of dwells.
     pub dwells: u32,
-    /// Duration from the first step to the retracted tip.
+    /// Time from the first step until the tip is retracted.
     pub duration_s: f64,
 }
 
@@ -67,9 +67,9 @@ pub struct RunOutcome {
     pub run_id: String,
     /// The experiment's name.
     pub experiment: String,
-    /// How it ended.
+    /// Exit status.
     pub exit_status: pb::ExitStatus,
-    /// Why it ended so, for a person.
+    /// The reason, for a person.
     pub message: String,
     /// Frames received and recorded.
     pub frames: u64,
@@ -79,7 +79,7 @@ pub struct RunOutcome {
     pub presses: u32,
     /// Completed dwells of completed presses.
     pub dwells: u32,
-    /// From the first step to the retracted tip.
+    /// Time from the first step until the tip was retracted.
     pub duration_s: f64,
     /// Least and greatest x, y and z that were commanded, robot frame.
     pub travel_mm: [[f64; 2]; 3],
@@ -116,7 +116,7 @@ pub(crate) enum Broken {
 }
 
 impl Ending {
-    /// True for a silence of the sensor, after which a run may go on once the sensor is back.
+    /// True for a silence of the sensor: the run may continue once frames arrive again.
     pub(crate) fn is_silence(&self) -> bool {
         matches!(self, Self::Safety(Violation::Silence { .. }))
     }
@@ -181,7 +181,7 @@ impl<'a> Run<'a> {
         self.shared.emit(Event::Started(self.describe_start()));
         let mut result = self.admit().await;
         if matches!(result, Err(Broken::Refused(_))) {
-            // Nothing moves, not even up.
+            // The tip is not moved, not even up.
             let z_mm = self.shared.position_mm()[2];
             return self.conclude(&result, Ok(z_mm));
         }
@@ -204,7 +204,7 @@ impl<'a> Run<'a> {
         self.conclude(&result, retracted)
     }
 
-    /// The stage answers, and nothing wants a reset.
+    /// Checks that the stage answers and that no reset is required.
     async fn admit(&self) -> Result<(), Broken> {
         self.shared.wait_for_stage().await?;
         match self.shared.fault().filter(|_| !self.order.resets) {
@@ -213,7 +213,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The sensor answers, the stage knows where it is, the tip is up, the zero is taken.
+    /// Waits for the sensor, homes the stage if necessary, raises the tip and takes the reference zero.
     async fn prepare(&mut self) -> Result<(), Broken> {
         self.set_phase(Phase::Idle, -1);
         let now = self.shared.clock.now().mono;
@@ -237,7 +237,7 @@ impl<'a> Run<'a> {
     async fn home(&self) -> Result<(), Broken> {
         if self.shared.stage.state().borrow().status() == pb::StageStatus::Unhomed {
             info!("homing the stage");
-            // As in a reset: first the order, then the check.
+            // As in a reset: make the order before the check.
             let homing = self.shared.stage.home();
             self.shared.check_ended()?;
             let homed = homing.await;
@@ -264,11 +264,11 @@ impl<'a> Run<'a> {
                         broken.get_or_insert(reason);
                         refusal
                     });
-                    // The script waits for the answer; if its thread died, `next` says so.
+                    // The script waits for the answer. If its thread died, `next` returns `None`.
                     let _told = answer.send(reply);
                 }
                 Request::Ended(Ok(_)) => return broken.map_or(Ok(()), Err),
-                // The script's error repeats what broke it, with the line.
+                // The script's error repeats the cause, with the line.
                 Request::Ended(Err(error)) => {
                     self.shared.check_ended()?;
                     return Err(match broken {
@@ -286,7 +286,7 @@ impl<'a> Run<'a> {
         Err(Broken::Refused(message))
     }
 
-    /// Retracts, and says so.
+    /// Retracts the tip and records the outcome.
     async fn clean_up(&mut self) -> Result<f64, StageError> {
         self.set_phase(Phase::Retract, self.phase.map_or(-1, |(_, press)| press));
         let retracted = self.shared.retract().await;
@@ -306,7 +306,7 @@ impl<'a> Run<'a> {
         retracted
     }
 
-    /// Closes the recording and tells how it ended.
+    /// Closes the recording and returns the outcome.
     fn conclude(self, result: &Result<(), Broken>, retracted: Result<f64, StageError>) -> RunOutcome {
         let tally = self.shared.live().tally;
         let (mut exit_status, mut message) = verdict(result, tally.frames_lost);
@@ -409,7 +409,7 @@ impl<'a> Run<'a> {
 }
 
 impl Shared {
-    /// Waits until frames flow, as long as the rig's policy says.
+    /// Waits until frames arrive, as long as the rig's policy allows.
     pub(crate) async fn wait_for_sensor(&self) -> Result<(), Broken> {
         let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
         let since = self.clock.now().mono;
@@ -421,8 +421,7 @@ impl Shared {
         }
     }
 
-    /// Waits until the stage answers, as long as the rig's policy says; what then stands in the way, the first
-    /// move says.
+    /// Waits until the stage answers, as long as the rig's policy allows. Other problems show at the first move.
     pub(crate) async fn wait_for_stage(&self) -> Result<(), Broken> {
         let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
         let mut state = self.stage.state();
@@ -440,12 +439,12 @@ impl Shared {
         self.control.borrow().ending.clone().map_or(Ok(()), |ending| Err(Broken::Ended(ending)))
     }
 
-    /// What `future` gives, unless the run is asked to end first.
+    /// The result of `future`, unless the run is asked to end first.
     pub(crate) async fn unless_ended<T>(&self, future: impl Future<Output = T>) -> Result<T, Broken> {
         let mut control = self.control.subscribe();
         tokio::select! {
             biased;
-            // The sender lives in `self`, so that waiting cannot fail: then the future decides.
+            // Waiting cannot fail because the sender lives in `self`; otherwise the future decides.
             Ok(control) = control.wait_for(|control| control.ending.is_some()) => {
                 let ending = control.ending.clone();
                 drop(control);

@@ -9,7 +9,7 @@ use tokio::sync::{mpsc, watch};
 use crate::engine::Control;
 use crate::run::RunOrder;
 
-/// What the script's thread tells the run.
+/// Message from the script's thread to the run.
 #[derive(Debug)]
 pub(crate) enum Request {
     /// A step; the script waits for the answer.
@@ -18,7 +18,7 @@ pub(crate) enum Request {
     Ended(Result<Outcome, ScriptError>),
 }
 
-/// The run's end of the channel. One request is under way at most: the script waits for each answer.
+/// The run's end of the channel. There is at most one pending request, because the script waits for each answer.
 pub(crate) enum Requests {
     /// Real time: the runtime does other work while the script thinks.
     Waiting(mpsc::Receiver<Request>),
@@ -45,13 +45,13 @@ pub(crate) fn start(
     thread::Builder::new().name("script".into()).stack_size(STACK_BYTES).spawn(move || {
         let mut host = RunHost { send, control };
         let outcome = tactus_plan::execute(&script, &arguments, &rig, seed, &limits, &mut host);
-        // A run that has gone needs no answer.
+        // If the run is gone, nobody needs the result.
         let _told = (host.send)(Request::Ended(outcome));
     })?;
     Ok(requests)
 }
 
-/// Room for the evaluator's deepest allowed recursion.
+/// Stack size for the evaluator's deepest allowed recursion.
 const STACK_BYTES: usize = 16 << 20;
 
 impl Requests {

@@ -1,12 +1,12 @@
-//! The safety supervisor: sees every frame and every report first, and may only stop.
+//! The safety supervisor. It sees every frame and every stage report first, and can only stop motion.
 
 use tactus_schema::rig::Service;
 use tactus_schema::{Frame, MonoTime, Rig, pb};
 
-/// Sample periods without a frame that the tip may stay near the covering.
+/// Sample periods without a frame after which a tip near the covering is stopped.
 const SILENT_PERIODS_MAX: f64 = 3.0;
 
-/// Watches frames, positions and the clock. Sans-IO: who feeds it acts on what it answers.
+/// Checks frames, positions and the clock. It does no I/O: the caller acts on the violations that it returns.
 #[derive(Debug)]
 pub struct Supervisor {
     limits: Limits,
@@ -19,7 +19,7 @@ pub struct Supervisor {
     tripped: bool,
 }
 
-/// What elements read without load; `None` for one that was not read then, which has no zero.
+/// Readings without load, in counts; `None` for an element that was not read then.
 type Zero = Vec<Option<f64>>;
 
 #[derive(Debug, Clone, Copy)]
@@ -66,7 +66,7 @@ pub enum Violation {
         "no frame for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
     )]
     Silence { silent_s: f64, limit_s: f64, z_mm: f64 },
-    /// An element that was read at the run's first zero is not read any more: what presses it is not seen.
+    /// An element that was read for the run's first zero is no longer read, so a load on it would not be seen.
     #[error(
         "element {element} was not read for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
     )]
@@ -114,7 +114,7 @@ impl Supervisor {
         }
     }
 
-    /// A run begins: the zeros of the last one are no longer true.
+    /// Begins a run: discards the zeros of the last one.
     pub fn begin(&mut self, depth_max_mm: f64) {
         self.set_depth_max_mm(depth_max_mm);
         self.reference = None;
@@ -126,9 +126,9 @@ impl Supervisor {
         self.limits.depth_max_mm = depth_max_mm;
     }
 
-    /// The run's reference zero. Loads are limited against it and against the current tare, so that
-    /// repeated taring cannot ratchet the limit up. An element that has not been read for as long as a sensor may
-    /// be silent is known not to be: it has no zero and no limit, and its silence stops nothing.
+    /// Sets the run's reference zero. Loads are limited relative to it and to the current tare, so that repeated taring
+    /// cannot raise the limit step by step. An element that has been silent for longer than the limit is known not to
+    /// be read: it has no zero and no limit, and its silence does not stop motion.
     pub fn set_reference(&mut self, counts: Vec<f64>) {
         let zero = self.zero(counts);
         self.tare = Some(zero.clone());
@@ -152,7 +152,7 @@ impl Supervisor {
         counts.into_iter().enumerate().map(zero).collect()
     }
 
-    /// Watches again after a violation was dealt with.
+    /// Resumes checking after a violation was handled.
     pub fn rearm(&mut self, now: MonoTime) {
         self.tripped = false;
         self.last_frame = self.last_frame.max(now);
@@ -161,7 +161,7 @@ impl Supervisor {
         }
     }
 
-    /// Looks at a frame.
+    /// Checks a frame.
     pub fn on_frame(&mut self, frame: &Frame) -> Option<Violation> {
         self.last_frame = frame.received.mono;
         self.look_at_elements(frame);
@@ -171,7 +171,8 @@ impl Supervisor {
         self.trip(violation)
     }
 
-    /// What was not read stands in a frame with an earlier value, which says nothing of the present load.
+    /// Ignores elements that were not read: their value in the frame is an earlier one and does not show the present
+    /// load.
     fn look_at_elements(&mut self, frame: &Frame) {
         let at = frame.received.mono;
         self.elements.resize(frame.counts.len(), Element { last_read: None, is_read: false });
@@ -189,7 +190,7 @@ impl Supervisor {
         }
     }
 
-    /// Looks at a report of the stage. A stage that does not know where it is leaves the last known height.
+    /// Checks a report of the stage. If the stage does not know its position, the last known height is kept.
     pub fn on_report(&mut self, report: &pb::StageState) -> Option<Violation> {
         match report.status() {
             pb::StageStatus::Unspecified
@@ -209,7 +210,7 @@ impl Supervisor {
         self.trip(violation)
     }
 
-    /// Looks at the clock.
+    /// Checks the time since the last frame.
     pub fn on_time(&mut self, now: MonoTime) -> Option<Violation> {
         if self.z_mm >= self.limits.near_mm {
             return None;
@@ -239,7 +240,7 @@ impl Supervisor {
         })
     }
 
-    /// A violation is told once: what follows it is its own clean-up.
+    /// Reports a violation only once: later ones occur while the first is handled.
     fn trip(&mut self, violation: Option<Violation>) -> Option<Violation> {
         let fresh = violation.filter(|_| !self.tripped);
         self.tripped |= fresh.is_some();
@@ -255,7 +256,7 @@ impl Limits {
         zero: &[Option<f64>],
         against: &'static str,
     ) -> Option<Violation> {
-        // Only what was read, now and then: a rise of anything else is no number.
+        // Only elements that were read both now and for the zero: the rise of any other is NaN.
         let rises = || {
             let pairs = frame.counts.iter().zip(elements).zip(zero).zip(&self.signs).enumerate();
             pairs.filter_map(|(element, (((count, state), zero), sign))| {

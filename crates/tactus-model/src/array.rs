@@ -15,7 +15,7 @@ pub struct Array {
     step_counts: f64,
 }
 
-/// Why a description is not an array.
+/// Why a description does not make an array.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ArrayError {
@@ -40,7 +40,7 @@ pub enum ArrayError {
 }
 
 impl Array {
-    /// Checks a description and makes an array of it.
+    /// An array from its description; all lengths in mm.
     ///
     /// # Errors
     /// [`ArrayError`] names the field that is wrong.
@@ -107,7 +107,7 @@ impl Array {
 
     /// The resolution of the human fingertip (paper, Fig. 10): 14 rows of 20 at 70 per cm2.
     ///
-    /// Touch receptors have no edges; elements take as much of their pitch as those of the `DigiTacts`.
+    /// Touch receptors have no edges. The elements here fill the same share of their pitch as those of the `DigiTacts`.
     pub fn fingertip() -> Self {
         Self::even("fingertip", [14, 20], 70.0)
     }
@@ -211,7 +211,7 @@ impl Array {
         [along(&self.col_centres_mm, self.element_mm[0]), along(&self.row_centres_mm, self.element_mm[1])]
     }
 
-    /// From where to where each column reaches along x, and each row along y.
+    /// Least and greatest x of each column, and y of each row.
     pub(crate) fn sides_mm(&self) -> [Vec<[f64; 2]>; 2] {
         let sides = |centres: &[f64], size: f64| {
             centres.iter().map(|centre| [centre - size / 2.0, centre + size / 2.0]).collect()

@@ -13,12 +13,12 @@ pub struct Blur {
 }
 
 impl Blur {
-    /// Share of what presses at `at_mm` that arrives within `side_mm = [least, greatest]`; in `[0, 1]`.
+    /// Share of a load at `at_mm` that arrives within `side_mm = [least, greatest]`; in `[0, 1]`.
     ///
     /// `Phi((greatest - at) / sigma) - Phi((least - at) / sigma)`
     ///
-    /// Written as what arrives without blur (all or nothing) plus the tails that the blur adds or takes
-    /// away: these keep their relative accuracy far from the element.
+    /// Computed as the value without blur (0 or 1) plus the tails that the blur adds or removes, which keep their relative
+    /// accuracy far from the element.
     pub fn of_point(self, at_mm: f64, [least, greatest]: [f64; 2]) -> f64 {
         let inside = least < at_mm && at_mm <= greatest;
         let tail = |edge_mm: f64| {

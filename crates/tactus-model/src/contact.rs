@@ -1,4 +1,4 @@
-//! A tool standing in the covering, cut into slices that the blur integrates in closed form.
+//! A tool in the covering, cut into slices over which the blur is integrated in closed form.
 
 mod mesh;
 mod rectangle;
@@ -12,30 +12,30 @@ use crate::quadrature::smooth;
 pub struct Contact {
     /// The tool.
     pub indenter: Indenter,
-    /// Its axis, sensor frame.
+    /// Position of the tool's axis, sensor frame.
     pub position_mm: [f64; 2],
-    /// Angle from the sensor's x axis to the tool's, counter-clockwise; matters to a box or mesh only. One
-    /// along the robot's axes stands at minus the registration's rotation.
+    /// Angle from the sensor's x axis to the tool's, counter-clockwise; matters for a box or mesh only. For a tool aligned
+    /// with the robot's axes it is minus the registration's rotation.
     pub rotation_deg: f64,
-    /// How far its lowest point stands below the undeformed surface; at or above it (<= 0) nothing presses.
+    /// Depth of the tool's lowest point below the undeformed surface. There is no contact at 0 or less.
     pub depth_mm: f64,
 }
 
 /// A strip of the penetration map, parallel to y.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slice {
-    /// Where it stands.
+    /// Position along x.
     pub(crate) x_mm: f64,
-    /// From where to where it reaches.
+    /// Least and greatest y.
     pub(crate) y_mm: [f64; 2],
     /// Its width times its depth.
     pub(crate) weight_mm2: f64,
 }
 
-/// A line in a plane of one x: from and to, each by its y and how far it stands below the surface.
+/// A line in a plane of constant x: its two ends, each as y and depth below the surface.
 type Line = [[f64; 2]; 2];
 
-/// What is to be cut into slices.
+/// The function that is cut into slices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cut {
     /// The penetration map `I`.
@@ -45,8 +45,8 @@ enum Cut {
 }
 
 impl Contact {
-    /// Cuts the penetration map into slices, finely enough for a blur of `sigma_mm` that sums over them
-    /// agree with the integrals to about 1e-11 of the volume (a mesh: see its module).
+    /// Cuts the penetration map into slices so fine that under a blur of `sigma_mm` sums over them agree with the
+    /// integrals to about 1e-11 of the volume (a mesh: see its module).
     pub(crate) fn slices(&self, sigma_mm: f64) -> Vec<Slice> {
         self.cut(Cut::Penetration, sigma_mm)
     }
@@ -57,17 +57,17 @@ impl Contact {
         self.cut(Cut::Footprint, sigma_mm)
     }
 
-    /// As [`Contact::slices`], of a tool that leans: whose face stands deeper by `lean` per mm along its own x and
-    /// y, its lowest point at the contact's depth. Round heads roll and stay as they are.
+    /// As [`Contact::slices`], for a tool that leans: its face is deeper by `lean` per mm along its own x and y, and its
+    /// lowest point is at the contact's depth. A lean does not change round heads.
     ///
-    /// Accuracy: the same while all of a face touches; else about 1e-4 of the volume (a mesh: the same always).
+    /// Accuracy: the same while the whole face touches, otherwise about 1e-4 of the volume (a mesh: always the same).
     pub(crate) fn leaning(&self, lean: [f64; 2], sigma_mm: f64) -> Vec<Slice> {
         let Self { indenter, position_mm: [x, y], rotation_deg, depth_mm } = self;
         if lean.iter().all(|by| *by == 0.0) || *depth_mm <= 0.0 {
             return self.slices(sigma_mm);
         }
         let lowered_mm = indenter.lowered_mm(lean);
-        // Where the surface cuts through the face, what is below it ends in a corner.
+        // Where the surface cuts through the face, the penetration map has a kink.
         let fine_mm = if *depth_mm < 2.0 * lowered_mm { sigma_mm / 16.0 } else { sigma_mm };
         let strips: Vec<Slice> = match indenter {
             Indenter::Cylinder { diameter_mm } => {
@@ -121,7 +121,7 @@ impl Contact {
     }
 }
 
-/// What of a line stands below the surface.
+/// The part of a line below the surface.
 fn below_surface([from, to]: Line) -> Option<Line> {
     let at_surface = || {
         let share = from[1] / (from[1] - to[1]);
@@ -135,7 +135,8 @@ fn below_surface([from, to]: Line) -> Option<Line> {
     }
 }
 
-/// Adds slices of a line: what all of it shares, and upon it a stack of thin layers, each shorter than the one below.
+/// Adds slices of a line: one for the depth that the whole line has, and a stack of thin layers that become shorter with
+/// depth.
 fn stack(x_mm: f64, width_mm: f64, line: Line, sigma_mm: f64, slices: &mut Vec<Slice>) {
     let [[from, below_from], [to, below_to]] = line;
     let mut press = |y_mm, depth_mm| slices.push(Slice { x_mm, y_mm, weight_mm2: width_mm * depth_mm });

@@ -1,6 +1,6 @@
-//! The elastic covering and how it spreads what presses on it.
+//! The elastic covering and its point spread.
 
-/// The layer on the sensor.
+/// The elastic layer on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Covering {
     /// Thickness in mm, positive.
@@ -24,7 +24,7 @@ impl Covering {
 pub struct Psf {
     /// Spread without any covering: the sensor's own.
     pub sigma_intercept_mm: f64,
-    /// Spread gained with each mm of covering.
+    /// Increase of the spread per mm of covering.
     pub sigma_per_mm: f64,
 }
 

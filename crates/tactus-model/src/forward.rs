@@ -5,7 +5,7 @@ use crate::contact::Slice;
 use crate::effect::Load;
 use crate::{Array, Contact, Covering, Indenter, Psf};
 
-/// How an element answers what reaches it.
+/// Response of the elements to their signal `u_e`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Response {
     /// Counts per mm of equivalent indentation at small depths, one per element, row-major; either sign.
@@ -24,7 +24,7 @@ pub struct Response {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ModelError {
-    /// A list has not one value per element.
+    /// A list does not have one value per element.
     #[error("{field} has {values} values for {elements} elements")]
     Length { field: &'static str, values: usize, elements: usize },
     /// A parameter is out of its range.
@@ -32,7 +32,7 @@ pub enum ModelError {
     Range { field: &'static str, range: &'static str, value: f64 },
 }
 
-/// Beyond this spread an element's share is lost in rounding.
+/// With a wider spread an element's share is lost in rounding.
 const SIGMA_MAX_ELEMENTS: f64 = 10_000.0;
 
 /// The static base model of an array (science of the paper's Sec. 2 and Eq. 4).
@@ -49,7 +49,7 @@ const SIGMA_MAX_ELEMENTS: f64 = 10_000.0;
 /// element's size or the spread. (For a tool such as a sphere, whose signal is not proportional to depth,
 /// this holds at a depth of 1 mm.)
 ///
-/// The tool goes no deeper than the covering: where it stands deeper, `I` is the thickness `t`.
+/// The tool cannot go deeper than the covering: there `I` is the thickness `t`.
 ///
 /// Accuracy: integrals agree with direct quadrature to 1e-9 and better; see the tests.
 #[derive(Debug, Clone)]
@@ -61,7 +61,7 @@ pub struct ForwardModel {
 }
 
 impl ForwardModel {
-    /// Checks the parameters and makes a model of them.
+    /// A model from its parameters.
     ///
     /// # Errors
     /// [`ModelError`] names the parameter that is out of range or has the wrong length.
@@ -86,12 +86,12 @@ impl ForwardModel {
         &self.array
     }
 
-    /// Spread against covering thickness.
+    /// Spread as a function of covering thickness.
     pub fn psf(&self) -> Psf {
         self.psf
     }
 
-    /// How the elements answer.
+    /// Response of the elements.
     pub fn response(&self) -> &Response {
         &self.response
     }
@@ -122,8 +122,8 @@ impl ForwardModel {
         );
     }
 
-    /// As [`ForwardModel::indentation`], of a press with its own lean and spread, both of its `sigma_mm` positive;
-    /// its weight is the caller's to apply. In units of the reference press as it is, under its own spread.
+    /// As [`ForwardModel::indentation`], for a load with its own lean and spread; both of its `sigma_mm` are positive. The
+    /// caller applies its weight. The unit is the base model's reference press.
     ///
     /// # Panics
     /// If `indentation_mm` has not one place per element.
@@ -134,7 +134,7 @@ impl ForwardModel {
         let finest_mm = sigma_mm[0].min(sigma_mm[1]);
         let blurs = sigma_mm.map(|sigma_mm| Blur { sigma_mm });
         self.press(&contact.leaning(*lean, finest_mm), blurs, 1.0, indentation_mm);
-        // The tool goes no deeper than the covering's foot: min(I, t) = max(0, I) - max(0, I - t).
+        // The tool cannot go deeper than the covering: min(I, t) = max(0, I) - max(0, I - t).
         if contact.depth_mm > covering.thickness_mm {
             let beyond = Contact { depth_mm: contact.depth_mm - covering.thickness_mm, ..contact.clone() };
             self.press(&beyond.leaning(*lean, finest_mm), blurs, -1.0, indentation_mm);
@@ -172,15 +172,15 @@ impl ForwardModel {
         }
     }
 
-    /// `d_ref`: what one mm of the reference indenter at an element's own centre gives, in mm^3 per mm.
+    /// `d_ref`: signal per mm of the reference indenter at an element's own centre, in mm^3 per mm.
     pub fn reference_mm2(&self) -> f64 {
         self.reference_mm2
     }
 }
 
 impl Response {
-    /// Elements that all answer alike and linearly, their sensitivity stated for the paper's press: a cylinder of
-    /// 1 mm under a covering of 1.016 mm (0.04 inch).
+    /// Elements with the same linear response. The sensitivity is stated for the paper's press: a cylinder of 1 mm under a
+    /// covering of 1.016 mm (0.04 inch).
     pub fn uniform(elements: usize, sensitivity_counts_per_mm: f64, baseline_counts: f64) -> Self {
         Self {
             sensitivity_counts_per_mm: vec![sensitivity_counts_per_mm; elements],

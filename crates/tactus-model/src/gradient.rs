@@ -14,7 +14,7 @@ pub struct Gradient {
     pub by_position_mm: [Vec<f64>; 2],
     /// By the tool's rotation about its axis, in counts per degree.
     pub by_rotation_deg: Vec<f64>,
-    /// By the tool's depth, in counts per mm; from above where it jumps.
+    /// By the tool's depth, in counts per mm; towards greater depth where it jumps.
     pub by_depth_mm: Vec<f64>,
     /// By [`Psf::sigma_intercept_mm`](crate::Psf), in counts per mm.
     pub by_sigma_intercept_mm: Vec<f64>,
@@ -38,8 +38,8 @@ struct Signal {
 impl ForwardModel {
     /// Counts of every element under a contact and their derivatives.
     ///
-    /// The spread acts twice: on what arrives, and on the reference press that sensitivity is stated for; both
-    /// are in the derivatives. For the derivative by depth of a tool with a flat face, the tool touches.
+    /// The spread acts twice: on the signal, and on the reference press for which sensitivity is stated. The derivatives
+    /// include both. The derivative by depth of a tool with a flat face is the one in contact.
     ///
     /// Accuracy: as the image's; against central differences, see the tests.
     pub fn gradient(&self, contact: &Contact, covering: Covering) -> Gradient {

@@ -1,4 +1,4 @@
-//! Images that were computed before.
+//! A cache of computed images.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -6,28 +6,27 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::effect::{BaseModel, Load};
 use crate::{Contact, Indenter};
 
-/// A memory of what presses give, shared by [`Pipeline`](crate::Pipeline)s of one array and one reference press that
-/// follow the same path with other effects: most effects leave the contact and its spread as they are.
+/// A cache of images, shared by [`Pipeline`](crate::Pipeline)s with the same array and reference press that follow the
+/// same path with different effects. Most effects do not change the contact and its spread, so these images recur.
 ///
-/// The image of an upright tool with a flat face is in proportion to its depth: it is remembered once for all depths,
-/// and agrees with what would be computed to rounding. Others are what would be computed, to the bit. Meshes are not
-/// remembered.
+/// The image of an upright tool with a flat face is proportional to its depth: one image serves all depths and agrees
+/// with the computed one to rounding. Other images are equal to the computed ones to the bit. Meshes are not cached.
 #[derive(Debug)]
 pub struct Images {
     held: Mutex<HashMap<Key, Arc<[f64]>>>,
     most: usize,
 }
 
-/// All on which an image depends, bit by bit.
+/// Everything that an image depends on, bit by bit.
 type Key = [u64; 14];
 
 impl Images {
-    /// A memory of at most so many images; when it is full it begins anew.
+    /// A cache of at most so many images. It is cleared when full.
     pub fn new(most: usize) -> Self {
         Self { held: Mutex::new(HashMap::new()), most }
     }
 
-    /// The image of a press, remembered or computed by `compute`.
+    /// The image of a load, from the cache or by `compute`.
     pub(crate) fn recall(
         &self,
         base: BaseModel<'_>,
@@ -70,7 +69,7 @@ impl Images {
     }
 }
 
-/// True if the penetration is the same all over the tool's face: its image is in proportion to it, up to the covering's
+/// True if the penetration is uniform over the tool's face. The image is then proportional to it, up to the covering's
 /// thickness.
 fn is_even(press: &Load) -> bool {
     let is_flat = matches!(press.contact.indenter, Indenter::Cylinder { .. } | Indenter::Box { .. });

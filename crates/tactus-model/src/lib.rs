@@ -1,4 +1,4 @@
-//! Forward model of a tactile array under an elastic covering: what every element reads of a tool.
+//! Forward model of a tactile array under an elastic covering: from a tool's contact to the reading of every element.
 //!
 //! # Geometry
 //!
@@ -13,11 +13,11 @@
 //!
 //! # One image
 //!
-//! An [`Indenter`] (cylinder, sphere, cone, box, or any [`Mesh`]) that stands a depth `z` below the undeformed surface
-//! ([`Contact`]) makes the penetration map
+//! An [`Indenter`] (cylinder, sphere, cone, box, or any [`Mesh`]) at a depth `z` below the undeformed surface ([`Contact`])
+//! makes the penetration map
 //!
 //! ```text
-//! I(x, y) = how far the tool's underside stands below the surface, in [0, t] mm            (Sec. 5, Fig. 7)
+//! I(x, y) = depth of the tool's underside below the surface, in [0, t] mm                  (Sec. 5, Fig. 7)
 //! ```
 //!
 //! The covering spreads it by a Gaussian point spread function of unit volume, whose width grows with thickness
@@ -29,15 +29,15 @@
 //! counts_e = baseline_e + sensitivity_e (u_e + k_e u_e^2)
 //! ```
 //!
-//! `d_ref` is what the reference tool gives, 1 mm deep at the element's own centre under the reference covering: so
-//! sensitivity is what a calibration measures, counts per mm of that press. [`Readout`] then makes of counts what a
-//! converter gives: noise, saturation, quantisation, in this order.
+//! `d_ref` is the signal of the reference tool 1 mm deep at the element's own centre under the reference covering. So
+//! sensitivity is what a calibration measures: counts per mm of that press. [`Readout`] then applies noise, saturation and
+//! quantisation, in this order.
 //!
 //! A Gaussian blur and the integral over a rectangle separate into x and y. A tool is cut into slices of one x; the
 //! share of a line that arrives between two edges has a closed form in the error function, and along x the integrand
-//! is smooth, so that Gauss-Legendre quadrature between its corners converges at once ([`Blur`]).
+//! is smooth, so that Gauss-Legendre quadrature between its corners converges fast ([`Blur`]).
 //!
-//! | what | held against | agrees to |
+//! | what | compared with | agrees to |
 //! |---|---|---|
 //! | cylinder, sphere, cone | direct quadrature over the tool's face, without the error function | 1e-9 of each element |
 //! | box, mesh | closed form; direct quadrature in the tool's own frame | 1e-9 |
@@ -45,8 +45,8 @@
 //! | derivatives ([`Gradient`]) | central differences | 1e-6 of the largest |
 //! | [`PressTable`] | the exact image | 5e-5 of the peak (4e-6 measured for the paper's H) |
 //!
-//! Also held by tests: all that presses arrives (mass), mirror symmetry, linearity in depth of flat tools, and the
-//! limits of no spread and endless spread.
+//! Tests also check conservation of volume, mirror symmetry, linearity in depth of flat tools, and the limits of zero and
+//! infinite spread.
 //!
 //! ```
 //! use tactus_model::{Array, Contact, Covering, ForwardModel, Indenter, Psf, Response};
@@ -61,10 +61,10 @@
 //! let mut counts = [0.0; 48];
 //! model.image(&press, covering, &mut counts);
 //! assert!((counts[17] - 600.0).abs() < 1e-9);
-//! // Its neighbour along x feels 0.77 of it: the spread of Eq. 4 is 1.36 element widths.
+//! // Its neighbour along x reads 0.77 of it: the spread of Eq. 4 is 1.36 element widths.
 //! assert!(((counts[16] - 100.0) / 500.0 - 0.77).abs() < 0.005);
 //!
-//! // How the image changes with what is not known exactly.
+//! // Derivatives of the image, for fits and error propagation.
 //! let gradient = model.gradient(&press, covering);
 //! assert!((gradient.by_depth_mm[17] - 1000.0).abs() < 1e-6);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -72,14 +72,14 @@
 //!
 //! # In time
 //!
-//! A [`Simulator`] is a sensor as a value: the model, where it lies, what covers it, its tool, its noise, and the
-//! [`effect`]s that the base model lacks. Its [`Pipeline`] follows a [`Path`], such as a [`Trajectory`] of the stage,
-//! moment by moment: motion, contact, covering, element, readout. Clones are as many sensors.
+//! A [`Simulator`] describes a sensor: the model, its registration, covering, tool and noise, and the [`effect`]s that the
+//! base model lacks. Its [`Pipeline`] follows a [`Path`], such as a [`Trajectory`] of the stage, moment by moment: motion,
+//! contact, covering, element, readout. Every clone is an independent sensor.
 //!
 //! # Speed
 //!
-//! A [`PressTable`] is a tool's image made ready: sampled instead of computed, some 1.7 million images a second on a core
-//! for any mesh on 48 elements, where the exact image of a cylinder takes 7 us and of the H 500 us.
+//! A [`PressTable`] interpolates a tool's image from a table made once: about 1.7 million images a second on one core, for
+//! any mesh on 48 elements. The exact image takes 7 us for a cylinder and 500 us for the H.
 //!
 //! This crate has no I/O, no async, no clock and no global random numbers.
 //!

@@ -2,8 +2,8 @@
 
 /// Triangles in the tool's frame: z up, the tool's axis at x = y = 0, in mm.
 ///
-/// Only what can be seen from below presses, so that a surface need not be closed: through a hole the
-/// next surface above is seen. The order of a triangle's corners does not matter.
+/// Only surfaces that are visible from below make contact, so the mesh need not be closed: through a hole the next surface
+/// above is visible. The order of a triangle's corners does not matter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     vertices_mm: Vec<[f64; 3]>,
@@ -11,7 +11,7 @@ pub struct Mesh {
     bounds_mm: [[f64; 2]; 3],
 }
 
-/// Why triangles are not a tool.
+/// Why triangles do not make a tool.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum MeshError {
@@ -21,10 +21,10 @@ pub enum MeshError {
     /// A coordinate is not a finite number.
     #[error("vertex {vertex} is not finite")]
     NotFinite { vertex: usize },
-    /// A triangle names a vertex that is not there.
+    /// A triangle refers to a vertex that does not exist.
     #[error("triangle {triangle} names vertex {vertex} of {vertices}")]
     NoVertex { triangle: usize, vertex: u32, vertices: usize },
-    /// Larger than any tool: most likely in other units.
+    /// The mesh is larger than any tool: its units are probably not mm.
     #[error("the mesh spans {span_mm} mm, more than {} mm: are its units millimetres?", Mesh::SPAN_MAX_MM)]
     Huge { span_mm: f64 },
 }

@@ -1,6 +1,6 @@
-//! What the stage is doing: the words of the measurement table.
+//! Phases of a press, with their names in the measurement table.
 
-/// What the stage is doing when a frame is taken.
+/// Phase of a press in which a frame is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Phase {
     /// Outside a press.

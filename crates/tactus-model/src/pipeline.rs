@@ -1,4 +1,4 @@
-//! The pipeline in time: from where the tip is to what every element reads.
+//! The pipeline in time: from the position of the tip to the reading of every element.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ pub struct Moment {
     pub temperature_c: Option<f64>,
 }
 
-/// A [`Simulator`] at work, moment by moment.
+/// A running [`Simulator`]: computes the readings moment by moment.
 ///
 /// ```text
 /// motion    path at t, effects        -> tip, registration, surface
@@ -30,11 +30,11 @@ pub struct Moment {
 /// readout   effects; then read()      -> what the converter gives
 /// ```
 ///
-/// What has no memory is computed again only when the contact changes: a tip that rests costs next to nothing.
-/// With no effects counts are those of [`ForwardModel::image`], to the bit.
+/// Stages without memory are computed again only when the contact changes, so a resting tip costs little. Without effects
+/// the counts are those of [`ForwardModel::image`], to the bit.
 ///
-/// Moments need not be evenly spaced, nor need each of them be a frame. Time does not go back: a moment before the
-/// last one is taken to be at the same instant.
+/// Moments need not be evenly spaced, and not every moment need be a frame. Time does not go back: a moment before the
+/// last one counts as the same instant.
 #[derive(Debug)]
 pub struct Pipeline {
     model: ForwardModel,
@@ -63,10 +63,10 @@ struct Stages {
     readout: Vec<Box<dyn OnReadout>>,
 }
 
-/// What was last pressed, and what of it reached the elements.
+/// The last contact and its signal at the elements.
 #[derive(Debug)]
 struct Pressed {
-    /// Where: position, rotation and depth; `None` if it is to be computed anew.
+    /// Position, rotation and depth; `None` if the image must be computed again.
     at: Option<([f64; 2], f64, f64)>,
     contact: Contact,
     loads: Vec<Load>,
@@ -74,7 +74,7 @@ struct Pressed {
     of_one_mm: Vec<f64>,
 }
 
-/// What spares the pipeline the computing of images.
+/// Sources of images that need not be computed.
 #[derive(Debug, Clone, Copy)]
 struct Ready<'a> {
     table: Option<&'a PressTable>,
@@ -82,17 +82,17 @@ struct Ready<'a> {
 }
 
 impl Moment {
-    /// An instant, the temperature being unknown.
+    /// An instant with unknown temperature.
     pub fn at(t_s: f64) -> Self {
         Self { t_s, temperature_c: None }
     }
 }
 
 impl Pipeline {
-    /// A sensor with no past.
+    /// A sensor without history.
     ///
     /// # Errors
-    /// [`EffectError::Element`] if an effect names an element that the array has not.
+    /// [`EffectError::Element`] if an effect names an element that the array does not have.
     pub fn new(simulator: &Simulator) -> Result<Self, EffectError> {
         let Simulator { model, registration, surface_mm, covering, indenter, effects, .. } =
             simulator.clone();
@@ -129,8 +129,8 @@ impl Pipeline {
 
     /// Counts of every element at a moment, row-major, before noise and converter.
     ///
-    /// `path`: the tip in the robot frame, z up; a place where it rests, a [`Trajectory`](crate::Trajectory), a
-    /// [`Trail`](crate::Trail) of what is known so far, or a function of time.
+    /// `path`: the tip in the robot frame, z up; a fixed position, a [`Trajectory`](crate::Trajectory), a
+    /// [`Trail`](crate::Trail) of the positions so far, or a function of time.
     pub fn step(&mut self, moment: Moment, path: &impl Path) -> &[f64] {
         let Moment { t_s, temperature_c } = moment;
         let dt_s = self.last_s.map_or(0.0, |last_s| (t_s - last_s).max(0.0));
@@ -175,20 +175,19 @@ impl Pipeline {
         &self.counts
     }
 
-    /// What is read of `counts` when `noise_counts` of noise come upon them. The noise is a sample that the caller
-    /// draws.
+    /// The reading for `counts` plus `noise_counts`, a noise sample that the caller draws.
     pub fn read(&self, counts: f64, noise_counts: f64) -> f64 {
         let noisy = counts + noise_counts;
         self.readout
             .read(self.stages.readout.iter().fold(noisy, |counts, effect| effect.convert(counts)), 0.0)
     }
 
-    /// The tool as it last stood in the covering, after the effects of motion and contact.
+    /// The last contact, after the effects of motion and contact.
     pub fn contact(&self) -> &Contact {
         &self.pressed.contact
     }
 
-    /// Forgets the past: what every effect remembers, and the time.
+    /// Clears the history of every effect, and the time.
     pub fn reset(&mut self) {
         let Stages { motion, contact: _, covering, element: _, readout } = &mut self.stages;
         for effect in motion {
@@ -203,9 +202,9 @@ impl Pipeline {
         self.last_s = None;
     }
 
-    /// Makes presses up to `depth_max_mm` deep fast by a [`PressTable`] of the tool, at the cost of its accuracy and of the
-    /// time that it takes to make. It serves wherever no effect changes the tool or the spread, until another
-    /// covering is put in place.
+    /// Computes contacts up to `depth_max_mm` deep by a [`PressTable`] of the tool from now on. Images are faster and have
+    /// the table's accuracy; making it takes time. It is used wherever no effect changes the tool or the spread, until
+    /// another covering is put in place.
     ///
     /// # Errors
     /// As [`PressTable::new`].
@@ -215,8 +214,7 @@ impl Pipeline {
         Ok(())
     }
 
-    /// Looks images up, and leaves them, in a memory that is shared with other pipelines of the same array and the same
-    /// reference press.
+    /// Uses a cache of images that is shared with other pipelines of the same array and the same reference press.
     pub fn share(&mut self, images: Arc<Images>) {
         self.images = Some(images);
     }
@@ -233,7 +231,7 @@ impl Pipeline {
         self.surface_mm = surface_mm;
     }
 
-    /// Makes the covering answer `stiffness` times as strongly as the model says; 1 at first.
+    /// Multiplies the covering's response by `stiffness`; 1 at first.
     pub fn set_stiffness(&mut self, stiffness: f64) {
         self.stiffness = stiffness;
     }
@@ -288,7 +286,7 @@ impl Pressed {
             effect.spread(base, &mut self.loads);
         }
         self.reached_mm.fill(0.0);
-        // A press table is of the tool and the spread as they are.
+        // A press table holds for the tool and the spread as declared.
         let table = table.filter(|_| stages.contact.is_empty());
         for load in self.loads.iter().filter(|load| load.contact.depth_mm > 0.0) {
             let tabulated = table.is_some_and(|table| load.tabulated(table, base, &mut self.of_one_mm));
@@ -307,7 +305,7 @@ impl Pressed {
 }
 
 impl Load {
-    /// As [`Load::indentation`] by a press table; false if it is not for this press.
+    /// As [`Load::indentation`], from a press table; false if the table does not hold for this load.
     fn tabulated(&self, table: &PressTable, base: BaseModel<'_>, indentation_mm: &mut [f64]) -> bool {
         let Contact { position_mm, rotation_deg, depth_mm, .. } = self.contact;
         let mut single_mm = vec![0.0_f32; indentation_mm.len()];
@@ -321,8 +319,7 @@ impl Load {
         true
     }
 
-    /// What reaches every element, in units of the base model's reference press; nothing of a spread that none can
-    /// be.
+    /// The signal of every element, in units of the base model's reference press; 0 for an impossible spread.
     fn indentation(&self, base: BaseModel<'_>, indentation_mm: &mut [f64]) {
         if self.sigma_mm.iter().all(|sigma_mm| *sigma_mm > 0.0) {
             base.model.indentation_of(self, base.covering, indentation_mm);

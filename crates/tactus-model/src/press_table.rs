@@ -1,4 +1,4 @@
-//! A tool's image made ready: the fast twin of the forward model for one tool under one covering.
+//! A table of presses, sampled once: the fast version of the forward model for one tool under one covering.
 
 mod field;
 mod layers;
@@ -6,7 +6,7 @@ mod layers;
 use crate::{Contact, Covering, ForwardModel, Indenter};
 use layers::Layers;
 
-/// What an element reads of a tool, as a function of its place under the tool, the tool's rotation and depth.
+/// A table of the signal of an element as a function of its position under the tool, the tool's rotation and depth.
 ///
 /// With the element's active square turned by the tool's rotation `theta` and centred at `p` in the tool's frame,
 ///
@@ -14,15 +14,14 @@ use layers::Layers;
 /// T(p, theta, depth) = integral over the square of (I_depth * G_sigma)
 /// ```
 ///
-/// is smooth in all its arguments: the blur has removed what a table would miss. So `T` is made once, exactly,
-/// and sampled: by cubic B-splines over `p` (nodes a sixth of the blur apart), by three nodes of a trigonometric
-/// polynomial over the quarter turn after which a square comes to lie on itself, and by cubic Hermite
-/// polynomials over depth, whose pieces end where the area touched jumps. Tools that are round need one
-/// rotation, and tools whose underside is flat one depth. An image then takes 16 to 192 multiplications an
-/// element, whatever the mesh.
+/// is smooth in all its arguments because the blur has removed fine detail. So `T` is computed once with the exact method
+/// and then interpolated: by cubic B-splines over `p` (nodes a sixth of the blur apart), by three nodes of a
+/// trigonometric polynomial over the quarter turn under which a square is symmetric, and by cubic Hermite polynomials
+/// over depth, whose pieces end where the contact area jumps. Round tools need one rotation, and tools with a flat
+/// underside one depth. An image takes 16 to 192 multiplications per element, for any mesh.
 ///
-/// Accuracy: within 5e-5 of the greatest rise against [`ForwardModel::image`] for elements up to a blur's `sigma`
-/// in size (see the tests and the benchmarks, which print it). Values are `f32`.
+/// Accuracy: within 5e-5 of the greatest rise of [`ForwardModel::image`], for elements no larger than the blur's `sigma`
+/// (the tests and benchmarks print it). Values are `f32`.
 ///
 /// ```
 /// use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Response, PressTable};
@@ -54,7 +53,7 @@ struct Element {
     quadratic: f32,
 }
 
-/// Why there is no press table, or no image of it.
+/// Why a press table cannot be made or sampled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum PressTableError {
@@ -66,12 +65,12 @@ pub enum PressTableError {
         "the greatest depth must lie above 0 and within the covering of {thickness_mm} mm, not at {depth_max_mm} mm"
     )]
     DepthMax { depth_max_mm: f64, thickness_mm: f64 },
-    /// The blur is too fine against the elements or the tool for a table of it.
+    /// The blur is too fine for a table, relative to the elements or the tool.
     #[error(
         "a blur of {sigma_mm} mm is too fine for a press table: it needs half an element ({element_mm} mm) and 1/200 of the tool ({tool_mm} mm)"
     )]
     Fine { sigma_mm: f64, element_mm: f64, tool_mm: f64 },
-    /// The list for the image has not one place per element.
+    /// The output does not have one value per element.
     #[error("an image of {elements} elements does not fit {places} places")]
     Length { elements: usize, places: usize },
 }
@@ -79,7 +78,7 @@ pub enum PressTableError {
 impl PressTable {
     /// Makes the press table of a tool under a covering for depths up to `depth_max_mm`, in mm.
     ///
-    /// Takes milliseconds for flat tools, seconds for finely tessellated ones.
+    /// Takes milliseconds for flat tools and seconds for finely tessellated ones.
     ///
     /// # Errors
     /// [`PressTableError::DepthMax`] unless `0 < depth_max_mm <= ` the covering's thickness; [`PressTableError::Fine`] if the

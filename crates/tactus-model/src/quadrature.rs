@@ -32,9 +32,9 @@ const FOUR: [(f64, f64); 2] = [
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
 
-/// Points and weights that integrate over `[from, to]` what a Gaussian of standard deviation `sigma_mm` has
-/// made smooth, to about 1e-11 (1e-9 if narrow): 2 points over 1/32 of a standard deviation, 4 over a quarter
-/// of it, 8 over two of them, or 16 over each four.
+/// Points and weights that integrate over `[from, to]` a function smoothed by a Gaussian of standard deviation
+/// `sigma_mm`, to about 1e-11 (1e-9 if narrow): 2 points for up to 1/32 of a standard deviation, 4 for up to a quarter, 8
+/// for up to two, otherwise 16 per four.
 pub(crate) fn smooth(from: f64, to: f64, sigma_mm: f64) -> impl Iterator<Item = (f64, f64)> {
     if to - from <= sigma_mm / 32.0 {
         panels(&TWO, from, to, 1)

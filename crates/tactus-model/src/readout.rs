@@ -15,10 +15,8 @@ impl Readout {
         Self { full_scale_counts: array.full_scale_counts(), step_counts: array.step_counts() }
     }
 
-    /// What is read of `counts` when `noise_counts` of noise come upon it: within 0 and full scale, in
-    /// whole steps, nearest first.
-    ///
-    /// The noise is a sample that the caller draws.
+    /// The reading for `counts` plus `noise_counts`, a noise sample that the caller draws: limited to 0 and full scale, and
+    /// rounded to the nearest step.
     pub fn read(&self, counts: f64, noise_counts: f64) -> f64 {
         let most_steps = (self.full_scale_counts / self.step_counts).floor();
         let steps = ((counts + noise_counts) / self.step_counts).clamp(0.0, most_steps);

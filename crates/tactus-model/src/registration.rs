@@ -1,4 +1,4 @@
-//! Where the sensor lies in the robot's frame.
+//! Position and rotation of the sensor in the robot frame.
 
 /// Rigid transform between the robot frame and the sensor frame, in the plane.
 ///

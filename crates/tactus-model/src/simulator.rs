@@ -3,9 +3,9 @@
 use crate::effect::{Effect, EffectError};
 use crate::{Covering, ForwardModel, Indenter, Moment, Pipeline, Registration, Trajectory};
 
-/// A sensor where it lies, what covers it, the tool, and what the base model lacks.
+/// A sensor with its registration, covering, tool and effects.
 ///
-/// A value: clones are as many sensors, and each run of one begins without a past.
+/// It is a plain value: every clone is another sensor, and every run begins without history.
 ///
 /// ```
 /// # use tactus_model::{Array, Covering, ForwardModel, Indenter, Psf, Registration, Response};
@@ -42,20 +42,20 @@ pub struct Simulator {
     pub covering: Covering,
     /// The tool on the stage.
     pub indenter: Indenter,
-    /// What the base model lacks; those of one stage act in this order.
+    /// Departures from the base model. Effects of one stage act in this order.
     pub effects: Vec<Effect>,
-    /// Standard deviation of an element's noise.
+    /// Standard deviation of an element's noise, in counts.
     pub noise_rms_counts: f64,
 }
 
 /// One reading of all elements, row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
-    /// When, in the trajectory's time.
+    /// Time on the trajectory's time axis.
     pub t_s: f64,
     /// Counts before noise and converter.
     pub clean_counts: Vec<f64>,
-    /// What the converter gives.
+    /// Counts after noise and converter.
     pub counts: Vec<f64>,
 }
 
@@ -72,8 +72,8 @@ struct ImageSequence<'a, D> {
 impl Simulator {
     /// Images at `rate_hz`, the first at the trajectory's start; `frames` of them, also beyond its end.
     ///
-    /// `draw` gives standard normal deviates, one for each element of each image: a generator of the caller's, or
-    /// `|| 0.0` for a sensor without noise.
+    /// `draw` returns standard normal deviates, one for each element of each image: the caller's generator, or `|| 0.0`
+    /// for a sensor without noise.
     ///
     /// # Errors
     /// As [`Pipeline::new`].
@@ -93,7 +93,7 @@ impl Simulator {
 
 impl<D: FnMut() -> f64> ImageSequence<'_, D> {
     fn image(&mut self, frame: u32) -> Image {
-        // From the run's beginning, so that nothing adds up.
+        // Computed from the start, so that rounding errors do not accumulate.
         let t_s = self.trajectory.start_s() + f64::from(frame) / self.rate_hz;
         let clean_counts = self.pipeline.step(Moment::at(t_s), self.trajectory).to_vec();
         let read = |clean: &f64| self.pipeline.read(*clean, self.noise_rms_counts * (self.draw)());

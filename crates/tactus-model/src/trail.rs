@@ -1,28 +1,29 @@
-//! The path of a tip whose places come one by one.
+//! The path of a tip whose positions become known one by one.
 
 use std::collections::VecDeque;
 
 use crate::Path;
 
-/// Where the tip was, for as long as an effect may ask: what a virtual device knows, whose future is not made yet.
+/// Recent positions of the tip, kept for as long as an effect can look back. A virtual device uses it because the future of
+/// its path is unknown.
 ///
-/// Straight between the places that it was given; before the first and after the last the tip rests there.
+/// The path is straight between the positions; the tip rests before the first and after the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trail {
     last: (f64, [f64; 3]),
     earlier: VecDeque<(f64, [f64; 3])>,
 }
 
-/// No effect asks for what was longer ago.
+/// No effect looks back further.
 const KEPT_S: f64 = 1.0;
 
 impl Trail {
-    /// A trail that begins: a time in s and a place in mm, robot frame.
+    /// A trail with one point: a time in s and a position in mm, robot frame.
     pub fn new(t_s: f64, position_mm: [f64; 3]) -> Self {
         Self { last: (t_s, position_mm), earlier: VecDeque::new() }
     }
 
-    /// Goes on to another place; one that is not later than the last takes its stead.
+    /// Adds a position. It replaces the last one if it is not later.
     pub fn push(&mut self, t_s: f64, position_mm: [f64; 3]) {
         if t_s > self.last.0 {
             self.earlier.push_back(self.last);

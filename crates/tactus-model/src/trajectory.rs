@@ -1,37 +1,37 @@
-//! The way of the stage's tip in time.
+//! The path of the tip in time.
 
-/// A path that is straight between points: a time in s and a place in mm (robot frame, z up) for each.
+/// A path that is straight between points. Each point has a time in s and a position in mm (robot frame, z up).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     times_s: Vec<f64>,
     positions_mm: Vec<[f64; 3]>,
 }
 
-/// Where the tip is at any instant: what the [`Pipeline`](crate::Pipeline) asks for.
+/// Position of the tip at any instant: the input of the [`Pipeline`](crate::Pipeline).
 ///
-/// A place alone is the path of a tip that rests there.
+/// A position alone is the path of a tip that rests there.
 pub trait Path {
-    /// Place at `t_s`, in mm, robot frame.
+    /// Position at `t_s`, in mm, robot frame.
     fn at(&self, t_s: f64) -> [f64; 3];
 }
 
-/// Why points are no trajectory.
+/// Why points do not make a trajectory.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum TrajectoryError {
-    /// No point.
+    /// There is no point.
     #[error("a trajectory needs at least one point")]
     Empty,
     /// A time or coordinate is not a finite number.
     #[error("point {index} is not finite: t = {t_s} s, position = {position_mm:?} mm")]
     NotFinite { index: usize, t_s: f64, position_mm: [f64; 3] },
-    /// A time does not exceed the one before it.
+    /// A time is not greater than the one before it.
     #[error("times must rise: point {index} is at {t_s} s, after one at {before_s} s")]
     Order { index: usize, t_s: f64, before_s: f64 },
 }
 
 impl Trajectory {
-    /// Checks points, each a time in s and a place in mm, and makes a trajectory of them.
+    /// A trajectory through points, each a time in s and a position in mm.
     ///
     /// # Errors
     /// [`TrajectoryError`] names the point that is wrong.
@@ -55,7 +55,7 @@ impl Trajectory {
         Ok(Self { times_s, positions_mm })
     }
 
-    /// Place at `t_s`, in mm; before the first point and after the last the tip rests there.
+    /// Position at `t_s`, in mm; the tip rests before the first point and after the last.
     pub fn at(&self, t_s: f64) -> [f64; 3] {
         let before = self.points_until(t_s).saturating_sub(1);
         let from = self.positions_mm[before];
@@ -68,7 +68,7 @@ impl Trajectory {
         }
     }
 
-    /// Velocity at `t_s`, in mm/s: at a point, that of the piece which begins there; 0 outside.
+    /// Velocity at `t_s`, in mm/s; at a point, that of the segment which begins there; 0 outside.
     pub fn velocity_mm_per_s(&self, t_s: f64) -> [f64; 3] {
         let after = self.points_until(t_s);
         if after == 0 || after == self.times_s.len() {

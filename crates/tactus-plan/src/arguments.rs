@@ -1,4 +1,4 @@
-//! The values that somebody chose for a script's parameters.
+//! Values that somebody chose for a script's parameters.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ pub struct Arguments(BTreeMap<String, Given>);
 #[derive(Debug, Clone, PartialEq)]
 enum Given {
     Json(Value),
-    /// As typed by a person; what it means depends on the parameter's type.
+    /// As typed by a person; the parameter's type decides how it is parsed.
     Text(String),
 }
 
@@ -33,7 +33,7 @@ impl Arguments {
     }
 
     /// Adds one value written as `name=value`: JSON after the sign, or a bare text where a text is wanted.
-    /// A later value for the same name takes the earlier one's place.
+    /// A later value replaces an earlier one of the same name.
     ///
     /// # Errors
     /// [`ScriptError::Malformed`] without a name or a sign.

@@ -1,7 +1,6 @@
-//! What the functions of a script share during one evaluation.
+//! State that the functions of a script share during one evaluation.
 //!
-//! An evaluation has a thread to itself, and the evaluator hands functions no context of ours, so the context
-//! is that thread's own.
+//! The evaluator passes no context to functions. Each evaluation has its own thread, so the context is thread-local.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -14,16 +13,16 @@ use crate::evaluate::{Evaluated, Job, Purpose};
 use crate::script_rng::ScriptRng;
 use crate::{Call, Exceeded, Location, Parameter, Refusal, Reply, ScriptError, Step, sandbox};
 
-/// What the script's thread says to the caller's.
+/// Message from the script's thread to the caller's.
 #[derive(Debug)]
 pub(crate) enum Message {
     /// A step; the script waits for the answer.
     Call(Call),
-    /// The script is over.
+    /// The script has ended.
     Ended(Box<Result<Evaluated, ScriptError>>),
 }
 
-/// Seen by both threads while the script computes.
+/// State that both threads see while the script computes.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     stop: AtomicU8,
@@ -53,7 +52,7 @@ impl Watch {
         }
     }
 
-    /// The line under way, from 1; 0 before the first.
+    /// The line in execution, counted from 1; 0 before the first.
     pub(crate) fn line(&self) -> u32 {
         self.line.load(Ordering::Relaxed)
     }
@@ -82,12 +81,12 @@ impl From<Halt> for starlark::Error {
     }
 }
 
-/// Which part of the script is under way.
+/// The section of the script in execution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ScriptSection {
-    /// The top level: parameters may be declared, nothing may be done.
+    /// The top level: may declare parameters, may not ask for steps.
     TopLevel,
-    /// `run`: the other way round.
+    /// The function `run`: may ask for steps, may not declare parameters.
     Run,
 }
 
@@ -133,7 +132,7 @@ impl EvaluationContext {
         }
     }
 
-    /// Makes this the context of the present thread.
+    /// Makes this the context of the current thread.
     pub(crate) fn begin(self) -> Rc<Self> {
         let context = Rc::new(self);
         SESSION.set(Some(Rc::clone(&context)));
@@ -149,7 +148,7 @@ impl EvaluationContext {
         self.job.watch.stopped().map_or(Ok(()), |stop| Err(self.halt(stop)))
     }
 
-    /// Why the script ends when the caller's thread says so.
+    /// The reason for the script's end when the caller's thread demands it.
     pub(crate) fn halt(&self, stop: Stop) -> Halt {
         match stop {
             Stop::Cancelled => Refusal::Stopped("the run was stopped".into()).into(),
@@ -157,7 +156,7 @@ impl EvaluationContext {
         }
     }
 
-    /// Declares a parameter; gives its value.
+    /// Declares a parameter and returns its value.
     pub(crate) fn declare(&self, parameter: Parameter) -> Result<Value, Halt> {
         if self.part.get() != ScriptSection::TopLevel {
             return Err(Halt::Failed("parameters are declared at the top level, not inside run".into()));

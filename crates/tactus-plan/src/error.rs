@@ -1,8 +1,8 @@
-//! What can be wrong with a script.
+//! Errors of a script.
 
 use crate::{Exceeded, Location, Refusal};
 
-/// Why a script is not one, or ended early. The text begins with the script's line where there is one.
+/// Why a script was refused or ended early. The text begins with the script's line where there is one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ScriptError {
     /// Not Starlark, or something that experiment scripts may not use.
@@ -20,30 +20,30 @@ pub enum ScriptError {
         at: Location,
         /// What is wrong.
         problem: String,
-        /// How the script got there, with the lines' text.
+        /// The calls that led to the line, with the text of each line.
         call_stack: String,
     },
-    /// A step was not done.
+    /// A step was not performed.
     #[error("{at}: {refusal}")]
     Refused {
         /// The line that asked for the step.
         at: Location,
         /// Why it was not done.
         refusal: Refusal,
-        /// How the script got there, with the lines' text.
+        /// The calls that led to the line, with the text of each line.
         call_stack: String,
     },
-    /// The script used up what it may use.
+    /// The script exceeded a limit.
     #[error("{at}: {exceeded}")]
     Limit {
-        /// The line that was under way.
+        /// The line in execution.
         at: Location,
-        /// The bound that it ran into.
+        /// The limit.
         exceeded: Exceeded,
-        /// How the script got there, with the lines' text; empty if it had to be left behind.
+        /// The calls that led to the line, with the text of each line; empty if the thread had to be left behind.
         call_stack: String,
     },
-    /// A parameter was given a value that it cannot have, or does not exist.
+    /// A parameter does not exist or cannot have the given value.
     #[error("{script}: {problem}")]
     Argument {
         /// The script's name, without the suffix.
@@ -54,7 +54,7 @@ pub enum ScriptError {
     /// The arguments cannot be read at all.
     #[error("{0}")]
     Malformed(String),
-    /// The evaluator itself broke.
+    /// The evaluator itself failed.
     #[error("{script}: the evaluator broke: {problem}")]
     Evaluator {
         /// The script's name, without the suffix.
@@ -76,7 +76,7 @@ impl ScriptError {
         }
     }
 
-    /// How the script got to that line, outermost call first; empty where there is nothing to tell.
+    /// The calls that led to that line, outermost first; empty for errors without a line in execution.
     pub fn call_stack(&self) -> &str {
         match self {
             Self::Evaluation { call_stack, .. }

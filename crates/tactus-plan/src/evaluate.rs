@@ -15,7 +15,7 @@ use crate::{
     Arguments, Exceeded, Limits, Location, Parameter, Refusal, Reply, RigView, Script, ScriptError, sandbox,
 };
 
-/// What an evaluation is for.
+/// Purpose of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// The parameters only.
@@ -27,7 +27,7 @@ pub(crate) enum Purpose {
     },
 }
 
-/// All that the script's thread needs.
+/// Input of the script's thread.
 #[derive(Debug)]
 pub(crate) struct Job {
     pub(crate) script: Script,
@@ -40,7 +40,7 @@ pub(crate) struct Job {
     pub(crate) replies: Receiver<Result<Reply, Refusal>>,
 }
 
-/// What an evaluation gives.
+/// Result of an evaluation.
 #[derive(Debug)]
 pub(crate) struct Evaluated {
     pub(crate) parameters: Vec<Parameter>,
@@ -51,11 +51,11 @@ pub(crate) struct Evaluated {
     pub(crate) heap_bytes: usize,
 }
 
-/// Evaluates a script and sends what came of it.
+/// Evaluates a script and sends the result.
 pub(crate) fn evaluate(job: Job) {
     let context = EvaluationContext::new(job).begin();
     let ended = Module::with_temp_heap(|module| evaluate_in(&module, &context));
-    // If nobody listens any more, nobody wants to know.
+    // If the receiver is gone, nobody needs the result.
     drop(context.job.calls.send(Message::Ended(Box::new(ended))));
 }
 
@@ -64,8 +64,8 @@ fn evaluate_in(module: &Module<'_>, context: &EvaluationContext) -> Result<Evalu
     let rig = rig_value(&context.job.rig, module.heap());
     module.set("rig", rig);
     let mut eval = Evaluator::new(module);
-    // Collection runs between top-level statements only, where scripts do nothing, and follows values
-    // however deep: without it memory is bounded just as well.
+    // Garbage collection would run between top-level statements only, where scripts do no work, and recurses into values
+    // of any depth. Memory is bounded without it.
     eval.disable_gc();
     let bounded = eval
         .set_max_callstack_size(limits.call_depth.max(1))
@@ -102,7 +102,7 @@ fn evaluate_in(module: &Module<'_>, context: &EvaluationContext) -> Result<Evalu
     }
 }
 
-/// Looks after the bounds before each statement.
+/// Checks the limits before each statement.
 struct BeforeStatement;
 
 impl<'e> BeforeStmtFuncDyn<'e> for BeforeStatement {
@@ -118,7 +118,7 @@ impl<'e> BeforeStmtFuncDyn<'e> for BeforeStatement {
     }
 }
 
-/// The evaluator's error in our terms.
+/// Converts the evaluator's error.
 fn script_error(error: &Error, eval: &Evaluator<'_, '_, '_>, context: &EvaluationContext) -> ScriptError {
     let script = context.job.script.name().to_owned();
     let line = error.span().map_or_else(|| context.job.watch.line().max(1), sandbox::line);
@@ -157,7 +157,7 @@ fn halt(error: &Error, eval: &Evaluator<'_, '_, '_>, context: &EvaluationContext
     Halt::Failed(error.without_diagnostic().to_string().trim().to_owned())
 }
 
-/// Texts that may quote a script's values end up in messages: they stay short.
+/// Shortens a text that may quote a script's values, for use in messages.
 fn shortened(mut text: String) -> String {
     const BYTES_MAX: usize = 8 << 10;
     if text.len() > BYTES_MAX {

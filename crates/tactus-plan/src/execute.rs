@@ -11,18 +11,18 @@ use crate::context::{Message, Stop, Watch};
 use crate::evaluate::{self, Evaluated, Job, Purpose};
 use crate::{Arguments, Exceeded, Host, Limits, Location, Refusal, RigView, Script, ScriptError};
 
-/// Stack of the script's thread: deep enough for the call depth and the nesting that are allowed, in a build
-/// without optimisation. Only what is used takes memory.
+/// Stack of the script's thread: enough for the allowed call depth and nesting in a build without optimisation. Only the
+/// used part takes memory.
 const STACK_BYTES: usize = 64 << 20;
-/// How often the host is asked whether to stop while the script computes.
+/// Interval at which the host is asked whether to stop while the script computes.
 const POLL: Duration = Duration::from_millis(20);
-/// How long a script that was told to end may take to come to its next check.
+/// Longest time that a script which must end may take until its next check.
 const GRACE: Duration = Duration::from_secs(1);
 
-/// What a script did that ended by itself.
+/// Outcome of a script that ended by itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Every parameter's value.
+    /// Values of all parameters.
     pub arguments: Arguments,
     /// What `run` returned, as JSON; null where JSON has no form for it.
     pub result: Value,
@@ -64,7 +64,7 @@ pub(crate) fn converse(
     purpose: Purpose,
     host: &mut dyn Host,
 ) -> Result<Evaluated, ScriptError> {
-    // Question and answer: never more than one message in either channel, and each side waits for the other.
+    // Each side waits for the other, so each channel holds at most one message.
     let (calls, messages) = sync_channel(1);
     let (answers, replies) = sync_channel(1);
     let watch = Arc::new(Watch::default());
@@ -110,13 +110,13 @@ pub(crate) fn converse(
 
 enum Next {
     Message(Message),
-    /// The script was told to end and did not.
+    /// The script had to end and did not.
     LeftBehind(Stop),
-    /// The script's thread is no more.
+    /// The script's thread died.
     Gone,
 }
 
-/// Waits for the script's next message, and tells it to end when it must.
+/// Waits for the script's next message. Demands its end when the run is cancelled or its time is over.
 fn next(messages: &Receiver<Message>, watch: &Watch, limits: &Limits, host: &dyn Host) -> Next {
     let since = Instant::now();
     let mut told = None;

@@ -1,4 +1,4 @@
-//! Between a script and whoever performs its steps.
+//! The interface between a script and the host that performs its steps.
 
 use std::fmt;
 
@@ -6,20 +6,20 @@ use crate::Step;
 
 /// Performs the steps of a script: the run engine on a rig, or a test.
 pub trait Host {
-    /// Performs one step and gives back what came of it. The script waits for as long as this takes.
+    /// Performs one step and returns the result. The script waits meanwhile.
     ///
     /// # Errors
     /// [`Refusal`] if the step was not done; it ends the script at the line of the call.
     fn perform(&mut self, call: &Call) -> Result<Reply, Refusal>;
 
-    /// True once the run is to end. Asked again and again while the script computes.
+    /// True once the run must end. Polled while the script computes.
     fn cancelled(&self) -> bool;
 }
 
-/// A step that a script asks for, and the line that asks.
+/// A step and the line of the script that asks for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Call {
-    /// What to do.
+    /// The step.
     pub step: Step,
     /// The innermost line of the script.
     pub at: Location,
@@ -40,10 +40,10 @@ impl fmt::Display for Location {
     }
 }
 
-/// What came of a step.
+/// The result of a step.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reply {
-    /// It is done and there is nothing to tell.
+    /// Done, without a result.
     Done,
     /// A press: one reading for each of its depths, in their order.
     Pressed(Vec<MeanReading>),
@@ -73,7 +73,7 @@ pub struct MeanReading {
     pub frames: u32,
 }
 
-/// Why a step was not done. The text is for a person and follows the script's line.
+/// Why a step was not performed. The text is for a person and is displayed after the script's line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// The step leaves the rig's envelope; nothing moved.
@@ -82,7 +82,7 @@ pub enum Refusal {
     /// The run was stopped.
     #[error("{0}")]
     Stopped(String),
-    /// The rig could not do it.
+    /// The rig could not perform it.
     #[error("{0}")]
     Failed(String),
 }

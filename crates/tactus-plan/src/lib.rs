@@ -1,6 +1,6 @@
 //! Experiment scripts in Starlark, evaluated into steps.
 //!
-//! A script is a text that declares parameters at its top level and does its work in `run(rig)`:
+//! A script declares parameters at its top level and does its work in `run(rig)`:
 //!
 //! ```
 //! use tactus_plan::Script;
@@ -20,17 +20,17 @@
 //! # Ok::<(), tactus_plan::ScriptError>(())
 //! ```
 //!
-//! [`Script::parse`] reads it, [`Script::parameters`] tells what can be set, [`Arguments`] are what somebody
-//! set, and [`execute()`] runs it: each step that it asks for goes to a [`Host`], and what comes back is what the
-//! script sees. [`reference()`] lists the functions that scripts can call, [`RigView`] what they see of the rig.
-//! This crate moves nothing and checks no envelope: that is the host's part.
+//! [`Script::parse`] reads it, [`Script::parameters`] lists its parameters, [`Arguments`] holds the values that somebody
+//! chose for them, and [`execute()`] runs it. Each step that the script asks for goes to a [`Host`], whose [`Reply`] the
+//! script receives. [`reference()`] lists the functions that scripts can call, and [`RigView`] shows what they see of the
+//! rig. This crate moves nothing and checks no envelope; the host does both.
 //!
 //! # What a script cannot do
 //!
-//! There is no `load`, no file, no network, no clock and no source of chance but the run's seed. `while` and
-//! recursion without an end do not exist in the language or run into [`Limits`]:
+//! Scripts have no `load`, no files, no network and no clock; their random numbers come from the run's seed alone. The
+//! language has no `while`, and endless recursion runs into [`Limits`]:
 //!
-//! | bound | looked at |
+//! | bound | checked |
 //! |---|---|
 //! | source of 256 KiB, nested 150 deep | before parsing |
 //! | loop turns and calls ([`Limits::ticks`]) | once in a thousand of them |
@@ -45,15 +45,18 @@
 //!
 //! # What is not bounded
 //!
-//! The evaluator is a library in the caller's process and is not made against somebody who knows its inside.
-//! A script runs on a thread of its own, and one that is stuck inside a single operation (comparing values that
-//! share their parts over and over) is left behind a second after its time is over: the caller goes on, that
-//! thread computes until the operation ends or the process does. Three things remain, all of them
-//! inside one operation: a comprehension that copies a long list can pass the memory bound by some hundred
-//! copies; an error whose message quotes a value that shares its parts over and over can take any memory; and one
-//! that quotes a value nested some hundred thousand deep can run out of stack, which ends the process. Against
-//! these only a process of its own with limits by the operating system would help; [`Call`] and [`Reply`] are
-//! plain data, so that the host can stand on the other side of a pipe.
+//! The evaluator is a library in the caller's process. It does not withstand an attacker who knows its internals.
+//! A script runs on its own thread. If it is stuck inside a single operation, such as a comparison of deeply shared
+//! values, it is left behind one second after its time is over: the caller continues, and that thread computes until
+//! the operation or the process ends. Three cases are not bounded, each inside one operation:
+//!
+//! - a comprehension that copies a long list can exceed the memory bound by some hundred copies;
+//! - an error message that quotes a deeply shared value can take any amount of memory;
+//! - an error message that quotes a value nested some hundred thousand deep can overflow the stack, which ends the
+//!   process.
+//!
+//! Only a separate process with limits by the operating system would prevent these. [`Call`] and [`Reply`] are plain
+//! data, so the host can be at the other end of a pipe.
 
 mod arguments;
 mod builtins;

@@ -1,21 +1,20 @@
-//! How much a script may use up.
+//! Resource limits of a script.
 
 use std::time::Duration;
 
-/// Bounds of one evaluation of a script. `Default` is ample for any experiment.
-///
-/// What each of them can and cannot hold is told in the crate's documentation.
+/// Bounds of one evaluation of a script. `Default` suffices for any experiment. The crate's documentation tells when each
+/// is checked and what is not bounded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Limits {
     /// Turns of loops and comprehensions, plus calls of functions and operators. Looked at once in a thousand.
     pub ticks: u64,
     /// Memory of the script's values.
     pub heap_bytes: usize,
-    /// Functions that may be under way at a time.
+    /// Greatest call depth.
     pub call_depth: usize,
     /// Steps asked of the host, `log` included.
     pub steps: u64,
-    /// Time that the script may compute between two steps. The steps themselves may take as long as they need.
+    /// Computing time between two steps. The duration of the steps themselves is not limited.
     pub think: Duration,
 }
 

@@ -1,4 +1,4 @@
-//! A value that a script lets others choose: declared by `param(...)`, checked here.
+//! Parameters of a script: declared by `param(...)`, checked here.
 
 use std::fmt;
 
@@ -8,13 +8,13 @@ use serde_json::Value;
 /// One declared parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Parameter {
-    /// Name by which it is set.
+    /// Name.
     pub name: String,
     /// Type of its values, taken from the default.
     pub kind: ParameterType,
-    /// Value unless set.
+    /// Value if no other is given.
     pub default: Value,
-    /// What it means.
+    /// Meaning, for a person.
     pub doc: String,
     /// Unit of the value or of each value of the list.
     pub unit: Option<String>,
@@ -92,7 +92,7 @@ impl Parameter {
         }
     }
 
-    /// The value that a text stands for: JSON, or for a text parameter the text itself.
+    /// Parses a value from text: JSON, or the text itself for a text parameter.
     pub(crate) fn accept_text(&self, text: &str) -> Result<Value, String> {
         match (self.kind, serde_json::from_str::<Value>(text)) {
             (ParameterType::String, Ok(value @ Value::String(_))) => self.accept(&value),

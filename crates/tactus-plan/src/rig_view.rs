@@ -31,7 +31,7 @@ pub struct RigView {
     pub covering_mm: f64,
     /// Greatest depth that the envelope allows under the covering in place; none without an envelope.
     pub depth_max_mm: Option<f64>,
-    /// The same as a share of the covering's thickness.
+    /// Greatest depth as a share of the covering's thickness; none without an envelope.
     pub depth_share_max: Option<f64>,
     /// Standard deviation of the spread under the covering in place, as the rig file states it.
     pub sigma_mm: f64,
@@ -43,7 +43,7 @@ pub struct RigView {
     pub rotation_deg: f64,
     /// Height at which the tip travels.
     pub safe_height_mm: Option<f64>,
-    /// Speed of loading, unless the script says otherwise.
+    /// Default speed of loading.
     pub load_speed_mm_per_s: Option<f64>,
     /// Greatest speed of loading.
     pub load_speed_max_mm_per_s: Option<f64>,
@@ -65,7 +65,7 @@ pub struct ElementView {
 }
 
 impl RigView {
-    /// What a script sees of this rig.
+    /// The view of a rig.
     pub fn of(rig: &Rig) -> Self {
         let array = &rig.array;
         let cols = array.cols();

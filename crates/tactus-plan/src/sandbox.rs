@@ -1,10 +1,10 @@
-//! What experiment scripts may use, and the bounds that the evaluator does not know itself.
+//! The sandbox: language restrictions and bounds that the evaluator does not have itself.
 //!
-//! The evaluator counts loop turns and calls and looks at memory and time every thousand of them. That is
-//! too late for a single operation that makes a huge value, so such operations are closed off here:
-//! the source is bounded in size ([`SOURCE_MAX_BYTES`]) and nesting before it is parsed, operators that
-//! can make a value much larger than their operands are replaced by functions that measure first
-//! (`operators`), and what cannot be replaced is refused with its line (`language`).
+//! The evaluator counts loop turns and calls and checks memory and time once in a thousand of them. That is too late
+//! for a single operation that makes a huge value. Therefore the size of the source ([`SOURCE_MAX_BYTES`]) and its
+//! nesting are bounded before it is parsed, operators that can make a value much larger than their operands are
+//! replaced by functions that measure first (`operators`), and operations that cannot be replaced are refused with
+//! their line (`language`).
 
 mod globals;
 mod language;
@@ -20,10 +20,10 @@ use crate::{Location, ScriptError};
 pub(crate) use globals::GLOBALS;
 pub(crate) use text::{Numbers, SEQUENCE_MAX, write_text};
 
-/// Longest source that is read.
+/// Longest source, in bytes.
 pub(crate) const SOURCE_MAX_BYTES: usize = 256 << 10;
 
-/// Parses and checks a script, and puts the measuring functions in the place of its operators.
+/// Parses and checks a script, and replaces its operators by functions that measure first.
 pub(crate) fn parse(name: &str, source: &str) -> Result<AstModule, ScriptError> {
     let syntax =
         |line, problem| ScriptError::Syntax { at: Location { script: name.to_owned(), line }, problem };

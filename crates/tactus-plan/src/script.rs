@@ -14,7 +14,7 @@ use crate::{
     Arguments, Call, Host, Limits, Location, Parameter, Refusal, Reply, RigView, ScriptError, sandbox,
 };
 
-/// An experiment script. Cloning is cheap enough to hand it to another thread.
+/// An experiment script.
 #[derive(Clone)]
 pub struct Script {
     name: String,
@@ -29,14 +29,14 @@ pub struct Script {
 const NAME_MAX_BYTES: usize = 64;
 
 impl Script {
-    /// Reads a script. `name` is what locations and files are called after; a suffix `.star` is dropped.
+    /// Parses a script. `name` appears in locations and file names; a suffix `.star` is dropped.
     ///
     /// # Errors
     /// [`ScriptError::Syntax`] with the line: not Starlark, nested too deeply, something that experiment
     /// scripts may not use, or no `def run(rig):`.
     pub fn parse(name: &str, source: &str) -> Result<Self, ScriptError> {
         let name = name.strip_suffix(".star").unwrap_or(name).to_owned();
-        // It becomes part of run ids, and so of paths.
+        // The name becomes part of run ids and so of paths.
         let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || name.len() > NAME_MAX_BYTES || !name.chars().all(is_plain) {
             return Err(ScriptError::Malformed(format!(
@@ -73,7 +73,7 @@ impl Script {
         &self.sha256
     }
 
-    /// What the script says of itself: its first statement, if that is a text. The first line sums it up.
+    /// The script's docstring: its first statement, if that is a text. The first line is the summary.
     pub fn doc(&self) -> &str {
         &self.doc
     }
@@ -103,7 +103,7 @@ impl Script {
         &self.ast
     }
 
-    /// Where `def run` stands.
+    /// The line of `def run`.
     pub(crate) fn run_line(&self) -> u32 {
         self.run_line
     }
@@ -118,7 +118,7 @@ impl fmt::Debug for Script {
     }
 }
 
-/// The host of an evaluation that performs nothing.
+/// The host of an evaluation without steps.
 struct NoHost;
 
 impl Host for NoHost {
@@ -145,7 +145,7 @@ fn docstring(statement: &AstStmt) -> Option<String> {
     Some(lines.join("\n"))
 }
 
-/// The statements of a block; one statement alone is its own block.
+/// The statements of a block; a single statement counts as a block.
 fn statements(block: &AstStmt) -> &[AstStmt] {
     if let Stmt::Statements(statements) = &block.node { statements } else { slice::from_ref(block) }
 }

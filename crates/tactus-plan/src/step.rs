@@ -1,12 +1,12 @@
-//! What a script may ask for.
+//! The steps that a script can ask for.
 
-/// One thing that a script asks for. Positions are in the sensor frame (the rig's registration maps
-/// them to the robot's), heights above the covering's nominal surface, depths below it.
+/// One step of a script. Positions are in the sensor frame (the rig's registration maps them to the robot frame),
+/// heights are above the covering's nominal surface, depths below it; all in mm.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
-    /// Travel to a place at a height, up first and down last.
+    /// Travel to a position and height: first up, then sideways, last down.
     Move {
-        /// Where.
+        /// Target.
         to: Position,
         /// Height above the surface; the rig's safe height if `None`.
         height_mm: Option<f64>,
@@ -15,24 +15,24 @@ pub enum Step {
     },
     /// One press.
     Press(Press),
-    /// Stay and average readings for a time, as a dwell of the press in hand or outside one.
+    /// Stay, let the reading settle, and average for a time.
     Dwell {
-        /// For how long.
+        /// Averaging time.
         duration_s: f64,
     },
-    /// Average the readings of a time, without the settling pause of a dwell.
+    /// Average readings at once, without the settling time of a dwell.
     Read {
-        /// For how long.
+        /// Averaging time.
         duration_s: f64,
     },
     /// Take the present reading as the zero of later reads. Not while pressing.
     Tare {
-        /// For how long readings are averaged.
+        /// Averaging time.
         duration_s: f64,
     },
     /// Let time pass.
     Wait {
-        /// For how long.
+        /// Waiting time.
         duration_s: f64,
     },
     /// Write a line into the run's events.
@@ -47,7 +47,7 @@ pub enum Step {
     },
 }
 
-/// A place in the plane, sensor frame.
+/// A position in the plane, sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
     /// Along a row of elements.
@@ -56,18 +56,18 @@ pub struct Position {
     pub y_mm: f64,
 }
 
-/// One contact at one place: approach, load through the depths with a dwell at each, unload, retract.
+/// One contact at one position: approach, load through the depths with a dwell at each, unload, retract.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Press {
-    /// Where.
+    /// Position of the contact.
     pub at: Position,
-    /// Depths below the surface in the order they are held; going up is allowed (a load-unload ladder).
+    /// Depths below the surface in the order in which they are held. They may decrease, as in a load-unload ladder.
     pub depths_mm: Vec<f64>,
-    /// How long readings are averaged at each depth.
+    /// Averaging time at each depth.
     pub dwell_s: f64,
     /// Speed of loading and unloading; the rig's load speed if `None`.
     pub speed_mm_per_s: Option<f64>,
-    /// Sideways distance from which the tip comes to the place at the approach height, so that the direction
-    /// of approach is known; straight from where it was if `None`.
+    /// Offset along x and y from which the tip approaches the position at the approach height, so that the direction of
+    /// approach is known. `None`: straight from its last position.
     pub approach_from_mm: Option<[f64; 2]>,
 }

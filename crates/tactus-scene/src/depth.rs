@@ -1,12 +1,12 @@
-//! What the camera sees: the depth map.
+//! The depth map that the camera sees.
 
 use crate::facet::{Facet, SAMPLES, Window};
 use crate::lattice::Lattice;
 
-/// The z-buffer of a pose: how far the tool's underside stands below the undeformed surface.
+/// The z-buffer of a pose: depth of the tool's underside below the undeformed surface.
 ///
-/// Only the cells that the tool can reach and from which anything arrives at an element; elsewhere it is 0.
-/// A cell holds the mean of 16 samples.
+/// It covers only the cells that the tool can reach and that contribute to an element; elsewhere the depth is 0. The value
+/// of a cell is the mean of 16 samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMap {
     /// Side of the square cells.
@@ -32,8 +32,8 @@ impl DepthMap {
     }
 }
 
-/// Draws facets: of every sample of a window's cells the depth of the deepest facet, or 0 where there is none,
-/// and of every cell their mean.
+/// Draws facets: sets every sample of a window's cells to the depth of the deepest facet, or 0 where there is none, and
+/// computes the mean of every cell.
 pub(crate) fn draw(
     window: Window,
     facets: &[Facet],
@@ -50,7 +50,7 @@ pub(crate) fn draw(
     means_mm.extend(samples_mm.iter().map(mean));
 }
 
-/// In four sums side by side.
+/// Mean in four parallel sums.
 fn mean(values: &[f32; SAMPLES]) -> f32 {
     let (rows, _) = values.as_chunks::<4>();
     let sums = rows.iter().fold([0.0; 4], |sums, row| std::array::from_fn(|k| sums[k] + row[k]));

@@ -13,10 +13,10 @@ mod obj;
 mod ply;
 mod stl;
 
-/// Most bytes of a file.
+/// Largest file, in bytes.
 pub const BYTES_MAX: usize = 256 << 20;
 
-/// Most triangles of a file, its faces being cut in triangles.
+/// Greatest number of triangles of a file, after faces are cut into triangles.
 pub const TRIANGLES_MAX: usize = 5_000_000;
 
 /// As many as triangles have that share none.
@@ -28,8 +28,8 @@ const LINE_MAX_BYTES: usize = 65_536;
 
 /// Format of a mesh file.
 ///
-/// None of them states units: coordinates are taken as mm, tool frame. Only vertices and faces are read; a
-/// face of more than three corners is cut into a fan from its first corner, which is right if it is convex.
+/// None of the formats states units: coordinates are taken as mm, tool frame. Only vertices and faces are read. A face with
+/// more than three corners is cut into a fan from its first corner, which is correct for convex faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// `.stl`, stereolithography. Binary if the length is that of the announced triangles, whatever the
@@ -42,7 +42,7 @@ pub enum Format {
     Ply,
 }
 
-/// Why a file gives no mesh.
+/// Why a file cannot be read as a mesh.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum FileError {
@@ -52,21 +52,21 @@ pub enum FileError {
     /// The extension names no format.
     #[error("cannot tell the format of {}: its name must end in .stl, .obj or .ply", path.display())]
     UnknownFormat { path: PathBuf },
-    /// More than a tool needs.
+    /// The file holds more than a tool needs.
     #[error("the file holds {count} {what}, more than {most}: make the mesh coarser")]
     TooLarge { what: &'static str, count: usize, most: usize },
-    /// The bytes are not of the format, or end too early.
+    /// The bytes do not follow the format, or end too early.
     #[error("the file is not a sound {format} file: {what}")]
     Broken { format: Format, what: String },
-    /// A sound file without faces, such as a point cloud.
+    /// The file is valid but has no faces, such as a point cloud.
     #[error("the {format} file has no faces")]
     NoFaces { format: Format },
-    /// The file was read, but what it holds is not a tool.
+    /// The file was read, but its triangles do not make a tool.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
 
-/// Reads a mesh from a file; the extension of its name tells the [`Format`].
+/// Reads a mesh from a file. The extension of its name decides the [`Format`].
 ///
 /// # Errors
 /// [`FileError`] says why the file cannot be read or is not a mesh.
@@ -80,7 +80,7 @@ pub fn load(path: &Path) -> Result<Mesh, FileError> {
     read(format, &bytes)
 }
 
-/// Reads a mesh from the bytes of a file. Its triangles stand in the order of the file.
+/// Reads a mesh from the bytes of a file. Its triangles keep the order of the file.
 ///
 /// # Errors
 /// [`FileError`] says why the bytes are not a mesh.
@@ -98,7 +98,7 @@ pub fn read(format: Format, bytes: &[u8]) -> Result<Mesh, FileError> {
 }
 
 impl Format {
-    /// The format that the extension of a file's name tells, in any case.
+    /// The format for the extension of a file's name, in upper or lower case.
     pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "stl" => Some(Self::Stl),

@@ -13,13 +13,13 @@ use crate::facet::{Facet, STEPS};
 use crate::lattice::{Axis, single};
 use crate::{Pose, RenderError, Renderer};
 
-/// Why the graphics processor gives no images.
+/// Why the GPU makes no images.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
-    /// As on the processor.
+    /// The same error as on the CPU.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// There is none, or it has no driver.
+    /// There is no GPU, or it has no driver.
     #[error(
         "no Vulkan device: install its driver (mesa-vulkan-drivers has one for most, and one in software), or use \
          the CPU path, which gives the same images"
@@ -36,7 +36,7 @@ pub enum GpuError {
         /// Why.
         source: wgpu::RequestDeviceError,
     },
-    /// One pose alone is more than the device takes.
+    /// A single pose exceeds the limits of the device.
     #[error(
         "a pose needs {wanted} {what}, and {adapter} takes {most}: make the cells larger or the mesh coarser"
     )]
@@ -76,20 +76,20 @@ type View = [u32; 6];
 /// A [`Facet`] as the shaders read it.
 type Words = [u32; 16];
 
-/// The fast twin of a [`Renderer`]: the same images, made by compute shaders through Vulkan.
+/// A [`Renderer`] by compute shaders through Vulkan, for many poses at once.
 ///
-/// The processor turns the tool and cuts it into facets, in double precision and then in integers; the device
-/// draws, blurs, integrates and answers, in single precision. As both draw the same integers, the images of the
-/// two differ by rounding only: by less than 1e-5 of the peak, measured 1.3e-6 (`tests/it/gpu.rs` prints it).
+/// The CPU turns the tool and cuts it into facets, in double precision and then in integers. The GPU draws, blurs,
+/// integrates and applies the response in single precision. Both draw the same integers, so their images differ by rounding
+/// only: by less than 1e-5 of the peak, measured 1.3e-6 (`tests/it/gpu.rs` prints it).
 ///
-/// Any number of poses may be asked for at once; thousands at a time keep a device busy.
+/// A call may have any number of poses; thousands at a time keep a device busy.
 #[derive(Debug)]
 pub struct GpuRenderer {
     renderer: Renderer,
     adapter: String,
     device: wgpu::Device,
     queue: wgpu::Queue,
-    /// What the device reported out of turn.
+    /// Errors that the device reported asynchronously.
     failure: Arc<Mutex<Option<String>>>,
     room: Room,
     stages: Stages,
@@ -280,7 +280,7 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// An error that the device reported out of turn.
+    /// An error that the device reported asynchronously.
     fn reported(&self) -> Result<(), GpuError> {
         match self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(reason) => Err(self.failed(&reason)),

@@ -12,13 +12,13 @@ use crate::facet::{self, Facet, Placed, SAMPLES, Window};
 use crate::lattice::whole;
 use crate::lattice::{Lattice, single};
 
-/// Cells to a `sigma` of the blur, unless a cell's size is asked for.
+/// Default number of cells per `sigma` of the blur.
 const CELLS_PER_SIGMA: f64 = 16.0;
 
-/// Least and most cells along a tool, unless a cell's size is asked for.
+/// Default least and greatest number of cells along a tool.
 const CELLS_PER_TOOL: [f64; 2] = [64.0, 250.0];
 
-/// Why there is no image.
+/// Why no image can be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum RenderError {
@@ -32,15 +32,15 @@ pub enum RenderError {
         /// Least side of a cell for this array and blur.
         least_mm: f64,
     },
-    /// A pose holds something that is not a finite number.
+    /// A value of a pose is not a finite number.
     #[error("{field} of pose {pose} is not finite")]
     Pose { pose: usize, field: &'static str },
-    /// Not one place for each element of each pose.
+    /// The output does not have one value for each element of each pose.
     #[error("{poses} poses of {elements} elements need {} places, not {places}", poses * elements)]
     Length { poses: usize, elements: usize, places: usize },
 }
 
-/// An orthographic camera that looks up at a tool through the covering (paper, Sec. 5), and the sensor behind.
+/// An orthographic camera that looks up at a tool through the covering (paper, Sec. 5), and the sensor behind it.
 ///
 /// ```text
 /// I        = z-buffer of the tool's depth below the surface, in [0, covering thickness]
@@ -48,8 +48,8 @@ pub enum RenderError {
 /// counts_e = baseline_e + sensitivity_e * (u_e + k_e u_e^2),   u_e = d_e / d_ref
 /// ```
 ///
-/// `A` is the length of a cell that arrives in a column (or row) of elements after the blur. The viewing volume
-/// is the covering. Any attitude of the tool will do, and any mesh: closed or not, of any order of corners.
+/// `A` is the length of a cell that arrives in a column (or row) of elements after the blur. The viewing volume is the
+/// covering. The tool can have any attitude. The mesh need not be closed, and the order of corners does not matter.
 ///
 /// # Accuracy
 ///
@@ -92,8 +92,8 @@ struct Buffers {
 }
 
 impl Renderer {
-    /// A camera with cells of `sigma / 16`, or less if the upright tool has less than 64 of them across, or more
-    /// if the tool, however it is turned, could have more than 250 within the raster.
+    /// A camera with cells of `sigma / 16`. The cells are smaller if the upright tool would have fewer than 64 of them
+    /// across, and larger if the tool in any attitude could have more than 250 within the raster.
     ///
     /// # Errors
     /// [`RenderError::Covering`] for a covering without thickness or spread.
@@ -107,7 +107,7 @@ impl Renderer {
         Self::with_cell_mm(model, covering, mesh, coarsest_mm.max(finest_mm))
     }
 
-    /// A camera with cells of a given size: finer ones take the square of the time.
+    /// A camera with cells of a given size. Time grows with the inverse square of the size.
     ///
     /// # Errors
     /// [`RenderError::Covering`] for a covering without thickness or spread, [`RenderError::Cell`] for cells
@@ -138,7 +138,7 @@ impl Renderer {
         self.lattice.cell_mm
     }
 
-    /// What the camera sees of a pose.
+    /// The depth map of a pose.
     ///
     /// # Errors
     /// [`RenderError::Pose`] if the pose is not finite.
@@ -152,8 +152,8 @@ impl Renderer {
     /// Counts of every element of a pose, before noise, saturation and quantisation; row-major, overwritten.
     ///
     /// # Errors
-    /// [`RenderError::Pose`] if the pose is not finite, [`RenderError::Length`] if `counts` has not one place
-    /// per element.
+    /// [`RenderError::Pose`] if the pose is not finite, [`RenderError::Length`] if `counts` does not have one value per
+    /// element.
     pub fn image(&self, pose: &Pose, counts: &mut [f32]) -> Result<(), RenderError> {
         let poses = std::slice::from_ref(pose);
         self.check(poses, counts)?;
@@ -261,7 +261,7 @@ fn check(poses: &[Pose]) -> Result<(), RenderError> {
     Ok(())
 }
 
-/// Sum of products, in sixteen sums side by side.
+/// Sum of products, in sixteen parallel sums.
 fn dot(one: &[f32], other: &[f32]) -> f32 {
     let (ones, one) = one.as_chunks::<16>();
     let (others, other) = other.as_chunks::<16>();

@@ -1,4 +1,4 @@
-//! The raster before the sensor, and how much of each cell arrives at each column and row of elements.
+//! The raster over the sensor, and the share of each cell that arrives at each column and row of elements.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use tactus_model::{Array, Blur};
 
 use crate::RenderError;
 
-/// Where the blur's tail is cut, in `sigma`: 1e-7 of it lies beyond.
+/// Distance in `sigma` at which the blur's tail is cut; 1e-7 of the volume lies beyond.
 const REACH_SIGMAS: f64 = 5.2;
 
 /// Most cells along an axis: their number fits 16 bits in a facet.
@@ -61,8 +61,8 @@ impl Axis {
             return Err(RenderError::Cell { cell_mm, least_mm: finest_mm });
         }
         let cells = whole(((most_mm - least_mm) / cell_mm).ceil());
-        // What is pressed in a cell counts as spread over it, which adds cell^2 / 6 to the blur's variance wherever
-        // the lattice lies across the tool: it is taken off beforehand.
+        // The depth of a cell counts as uniform over it. On average over positions of the lattice this adds cell^2 / 6 to
+        // the blur's variance, which is subtracted here.
         let variance_mm2 = sigma_mm * sigma_mm;
         let blur = Blur { sigma_mm: (variance_mm2 - cell_mm * cell_mm / 6.0).max(variance_mm2 / 2.0).sqrt() };
         let edge_mm = |cell: usize| least_mm + cell as f64 * cell_mm;

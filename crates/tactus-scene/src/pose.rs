@@ -1,14 +1,13 @@
-//! Where the tool stands before the camera.
+//! Position and attitude of the tool.
 
-/// A tool's place, attitude and depth.
+/// A tool's position, attitude and depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// The tool's origin along x and y, in mm, sensor frame.
     pub position_mm: [f64; 2],
-    /// How it is turned about its origin.
+    /// Rotation about the tool's origin.
     pub attitude: Attitude,
-    /// How far its lowest point, in this attitude, stands below the undeformed surface, in mm; at or above it
-    /// (<= 0) nothing presses.
+    /// Depth of its lowest point, in this attitude, below the undeformed surface, in mm. There is no contact at 0 or less.
     pub depth_mm: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Made tools, in the tool's frame: z up, pressing downwards from z = 0, and the middle of what they span at
-//! x = y = 0. All lengths in mm.
+//! Generated tools in the tool's frame: z up, the lowest point at z = 0, and the middle of their extent at x = y = 0. All
+//! lengths in mm.
 
 use tactus_model::Mesh;
 
@@ -49,7 +49,7 @@ impl Scene {
         }
     }
 
-    /// Its tool as what presses.
+    /// Its tool as a mesh.
     #[expect(
         clippy::missing_panics_doc,
         clippy::expect_used,

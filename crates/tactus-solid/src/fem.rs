@@ -56,7 +56,7 @@ use even::Even;
 
 pub use reaction::Reaction;
 
-/// Bricks along a side of the slab, and layers of them, at most.
+/// Greatest number of bricks along a side of the slab, and of layers.
 pub const BRICKS_MAX: u32 = 2_000;
 
 /// A slab of equal elastic bricks.
@@ -70,7 +70,7 @@ pub struct Bricks {
     mean_dilatation: bool,
 }
 
-/// Why numbers are not a slab of bricks, or a load does not fit on it.
+/// Why numbers do not make a slab of bricks, or a load does not fit on it.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum BricksError {
@@ -153,14 +153,14 @@ impl Bricks {
         f64::from(self.layers) * self.height_mm
     }
 
-    /// What arrives at the base of 1 N that presses on the node at the middle of the top.
+    /// Reaction at the base to 1 N on the node in the middle of the top.
     pub fn under_point(&self) -> Reaction {
         let nodes = self.half() + 1;
         self.under(&Even { nodes, values: vec![1.0; nodes * nodes] })
     }
 
-    /// What arrives at the base of 1 N that presses evenly on a disc about the middle of the top. The pressure acts
-    /// on the nodes by the bricks' shape functions; for a diameter of 0 this is [`under_point`](Self::under_point).
+    /// Reaction at the base to 1 N spread evenly over a disc about the middle of the top. The bricks' shape functions
+    /// distribute the pressure to the nodes; for a diameter of 0 this is [`under_point`](Self::under_point).
     ///
     /// # Errors
     /// [`BricksError::Disc`] if the disc hangs over the slab's sides.

@@ -32,9 +32,9 @@ use libm::{exp, expm1, j0, j1};
 
 use crate::{quadrature::integrate, search::peak};
 
-/// Beyond this `K` there is nothing: `T` falls like `K exp(-K)`.
+/// `T` falls like `K exp(-K)` and is negligible beyond this `K`.
 const WAVES_MAX: f64 = 36.0;
-/// Beyond this many thicknesses from the load there is nothing: the pressure falls like `exp(-0.74 r/h)` in an
+/// Distance from the load, in thicknesses, beyond which the pressure is negligible: it falls like `exp(-0.74 r/h)` in an
 /// incompressible layer, and faster in others.
 const REACH: f64 = 40.0;
 
@@ -46,16 +46,16 @@ pub struct Layer {
     base: BaseContact,
 }
 
-/// How the layer lies on its base.
+/// Contact of the layer with its base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BaseContact {
-    /// It sticks.
+    /// The layer sticks to the base.
     Bonded,
-    /// It slides; what arrives then does not depend on Poisson's ratio.
+    /// The layer slides on the base; the pressure then does not depend on Poisson's ratio.
     Frictionless,
 }
 
-/// Why numbers are not a layer.
+/// Why numbers do not make a layer.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LayerError {
     /// The thickness is not a positive, finite number.
@@ -86,7 +86,7 @@ impl Layer {
         self.thickness_mm
     }
 
-    /// `T(K)`: how much of a pressure wave of wave number `K / h`, `K >= 0`, arrives at the base. `T(0) = 1`.
+    /// `T(K)`: share of a pressure wave of wave number `K / h`, `K >= 0`, that arrives at the base. `T(0) = 1`.
     pub fn transfer(&self, waves: f64) -> f64 {
         let k = waves;
         // Numerator and denominator times exp(-2 K), so that no large K overflows.
@@ -105,17 +105,17 @@ impl Layer {
         }
     }
 
-    /// What arrives of 1 N that presses at a point.
+    /// Pressure at the base under 1 N at a point.
     pub fn under_point(&self) -> Imprint {
         self.under_disc(0.0)
     }
 
-    /// What arrives of 1 N that presses evenly on a disc of this diameter.
+    /// Pressure at the base under 1 N spread evenly over a disc of this diameter.
     pub fn under_disc(&self, diameter_mm: f64) -> Imprint {
         Imprint { layer: *self, radius: diameter_mm.abs() / 2.0 / self.thickness_mm }
     }
 
-    /// Standard deviation of the Gaussian that is most like the pressure under a point, in mm.
+    /// Standard deviation of the Gaussian that fits the pressure under a point best, in mm.
     ///
     /// It maximises the correlation over the plane with a Gaussian of unit L2 norm (the paper's Eq. 3), which is
     /// the least-squares fit of a Gaussian of free height. In the Fourier domain that is

@@ -1,6 +1,6 @@
-//! The highest place of a function.
+//! Maximum of a function.
 
-/// Where `f`, which rises to one peak and falls, is highest in `[low, high]`: to 1e-7 of `high`.
+/// Position of the maximum of `f`, which has one peak in `[low, high]`, to 1e-7 of `high`.
 pub(crate) fn peak([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     let close = 1e-7 * high;
     while high - low > close {

@@ -1,4 +1,4 @@
-//! What each step of a script does.
+//! Execution of each step of a script.
 
 use std::time::Duration;
 
@@ -14,14 +14,14 @@ use super::{Broken, Ending, Run};
 use crate::average::Average;
 use crate::supervisor::Violation;
 
-/// How often one press is begun again before the run fails.
+/// Repetitions of one press before the run fails.
 const REPEATS_MAX: u32 = 3;
 
-/// Sample periods that an average is waited for beyond its end.
+/// Sample periods to wait for an average beyond its end.
 const LATE_PERIODS_MAX: u32 = 5;
 
 impl Run<'_> {
-    /// Checks a step and does it.
+    /// Checks a step against the envelope and performs it.
     pub(super) async fn perform(&mut self, call: &Call) -> Result<Reply, Broken> {
         self.hold_while_paused().await?;
         self.bounds.check(&call.step)?;
@@ -59,7 +59,7 @@ impl Run<'_> {
         }
     }
 
-    /// A press ends at the safe height, so a run that is held between two steps presses nothing.
+    /// Waits while the run is paused. Every press ends at the safe height, so a paused run does not press.
     async fn hold_while_paused(&mut self) -> Result<(), Broken> {
         if !self.shared.control.borrow().paused {
             return self.shared.check_ended();
@@ -93,7 +93,7 @@ impl Run<'_> {
         Ok(Reply::Position { x_mm: to.x_mm, y_mm: to.y_mm, height_mm: self.shared.position_mm()[2] })
     }
 
-    /// Presses, and begins again if frames were lost and the rig's policy says so.
+    /// Presses. Repeats the press if frames were lost and the rig's policy says so.
     async fn press(&mut self, press: &Press) -> Result<Vec<MeanReading>, Broken> {
         let mut repeats = 0;
         loop {
@@ -159,7 +159,7 @@ impl Run<'_> {
         Ok(readings)
     }
 
-    /// One dwell: settle, then average.
+    /// One dwell: waits for the settling time, then averages.
     async fn hold(
         &self,
         press: &Press,
@@ -196,7 +196,7 @@ impl Run<'_> {
         lost && self.shared.service.policy.on_gap == OnGap::Repeat
     }
 
-    /// After frames were lost: up, wait for the sensor, watch again.
+    /// After frames were lost: raises the tip, waits for the sensor, and has the supervisor check again.
     async fn recover(&mut self) -> Result<(), Broken> {
         self.set_phase(Phase::Retract, -1);
         self.shared.retract().await?;
@@ -204,7 +204,7 @@ impl Run<'_> {
         self.await_the_sensors_return().await
     }
 
-    /// A silence is no reason to end once frames flow again; then the supervisor watches again.
+    /// Withdraws a silence as the reason to end once frames arrive again, and has the supervisor check again.
     async fn await_the_sensors_return(&self) -> Result<(), Broken> {
         self.shared.forgive_silence();
         self.shared.wait_for_sensor().await?;
@@ -263,7 +263,7 @@ impl Run<'_> {
         Ok(Reply::Done)
     }
 
-    /// An average outside a press, begun again if frames were lost in it and the rig's policy says so.
+    /// An average outside a press. Repeated if frames were lost and the rig's policy says so.
     pub(super) async fn whole_average(&mut self, duration: Duration) -> Result<Average, Broken> {
         let mut repeats = 0;
         loop {
@@ -311,7 +311,7 @@ impl Run<'_> {
 }
 
 impl crate::engine::Shared {
-    /// Takes a silence back as the reason to end: the run goes on once the sensor is back.
+    /// Withdraws a silence as the reason to end: the run continues once the sensor is back.
     fn forgive_silence(&self) {
         self.control.send_modify(|control| {
             control.ending.take_if(|ending| ending.is_silence());

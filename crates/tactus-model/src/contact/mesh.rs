@@ -1,10 +1,10 @@
-//! Meshes: what is seen of them from below, without a raster.
+//! Meshes: the penetration map without a raster.
 //!
-//! A plane of one x cuts the triangles that stand below the surface in lines; the deepest of them at every y is
-//! what presses. Between the x of two corners, or of places where edges cross as seen from below or pass through a
-//! triangle, these lines change smoothly, so that a quadrature whose panels end there is exact to about 1e-9. Of
-//! tools with many corners those closer than 1/64 of the blur share a panel, and crossings are not looked for:
-//! together about 1e-5 of the image's peak.
+//! A plane of constant x cuts the triangles below the surface in lines, and the deepest line at every y is in contact.
+//! The lines change smoothly with x, except at corners, at crossings of edges (seen from below) and where edges pass
+//! through a triangle. A quadrature whose panels end at these x is exact to about 1e-9. For tools with many corners,
+//! corners closer than 1/64 of the blur share a panel and crossings are ignored; the error is then about 1e-5 of the
+//! image's peak.
 
 use super::{Cut, Line, Slice, stack};
 use crate::Mesh;
@@ -13,7 +13,7 @@ use crate::quadrature::smooth;
 /// Corners of a triangle below the surface: x, y and how far below, sensor frame.
 type Facet = [[f64; 3]; 3];
 
-/// Slices of a mesh that stands at a depth and leans: of which, upright, the lowest point stood there.
+/// Slices of a mesh that leans. `depth_mm` is the depth of its lowest point when upright.
 pub(super) fn slices(
     cut: Cut,
     mesh: &Mesh,
@@ -30,7 +30,7 @@ pub(super) fn slices(
     for panel in panels(&facets, sigma_mm / 64.0) {
         let [from, to] = panel;
         let crossed: Vec<&Facet> = facets.iter().filter(|facet| overlaps(facet, panel)).collect();
-        // Where an edge runs nearly along y, a line's end goes far within a narrow panel.
+        // Where an edge is nearly parallel to y, a line's end moves far within a narrow panel.
         let goes_mm = crossed.iter().map(|facet| goes_mm(facet, to - from)).fold(to - from, f64::max);
         for (x_mm, width_mm) in smooth(from, to, sigma_mm * (to - from) / goes_mm) {
             let lines: Vec<Line> = crossed.iter().filter_map(|facet| line_at(facet, x_mm)).collect();
@@ -66,7 +66,7 @@ fn facets(mesh: &Mesh, [x, y]: [f64; 2], rotation_deg: f64, depth_mm: f64, lean:
     facets
 }
 
-/// What of a triangle stands below the surface: three or four corners, or none.
+/// The part of a triangle below the surface: three or four corners, or none.
 fn below_surface(facet: Facet) -> Vec<[f64; 3]> {
     let mut polygon = Vec::with_capacity(4);
     for (corner, next) in [(0, 1), (1, 2), (2, 0)].map(|(one, other)| (facet[one], facet[other])) {
@@ -82,7 +82,7 @@ fn below_surface(facet: Facet) -> Vec<[f64; 3]> {
     polygon
 }
 
-/// Tools of more facets have their corners so close that crossings of edges do not matter.
+/// Tools with more facets have corners so close together that crossings of edges do not matter.
 const FEW_FACETS: usize = 200;
 
 /// Ranges of x between the corners of facets and the crossings of their edges; with many facets, those that
@@ -144,15 +144,15 @@ fn pierced_x([from, to]: &[[f64; 3]; 2], [a, b, c]: &Facet) -> Option<f64> {
     weights(&point).iter().all(|weight| *weight > -1e-9).then_some(point[0])
 }
 
-/// How far along y a facet's edges go at most within a width of x.
+/// Greatest change of y along a facet's edges within a width of x.
 fn goes_mm([a, b, c]: &Facet, width_mm: f64) -> f64 {
     let edges = [[a, b], [b, c], [c, a]].map(|[from, to]| [(to[0] - from[0]).abs(), (to[1] - from[1]).abs()]);
-    // An edge along y is a panel's border.
+    // An edge parallel to y is a panel's border.
     let slanting = edges.into_iter().filter(|[along_x, _]| *along_x > 0.0);
     slanting.map(|[along_x, along_y]| along_y * (width_mm / along_x).min(1.0)).fold(0.0, f64::max)
 }
 
-/// Where the plane of one x cuts a facet, from its least y to its greatest.
+/// The line in which a plane of constant x cuts a facet, from least to greatest y.
 fn line_at(facet: &Facet, x_mm: f64) -> Option<Line> {
     let [a, b, c] = *facet;
     let crossed =
@@ -165,7 +165,7 @@ fn line_at(facet: &Facet, x_mm: f64) -> Option<Line> {
     Some(if one[0] <= other[0] { [one, other] } else { [other, one] })
 }
 
-/// The deepest of several lines at every y, as lines that do not overlap; those that go on straight are joined.
+/// The deepest of several lines at every y, as lines that do not overlap. Collinear neighbours are joined.
 fn deepest(lines: &[Line]) -> Vec<Line> {
     let mut ends: Vec<f64> = lines.iter().flatten().map(|[y, _]| *y).collect();
     ends.sort_by(f64::total_cmp);
@@ -196,7 +196,7 @@ fn deepest(lines: &[Line]) -> Vec<Line> {
     visible
 }
 
-/// How far below the surface a line stands at `y`.
+/// Depth of a line below the surface at `y`.
 fn at(line: &Line, y: f64) -> f64 {
     let [[from, below_from], [to, below_to]] = *line;
     if to > from { below_from + (below_to - below_from) * (y - from) / (to - from) } else { below_from }

@@ -11,7 +11,7 @@ pub(super) fn slices(
     depth_mm: f64,
     sigma_mm: f64,
 ) -> Vec<Slice> {
-    // As for round tools: what a computation may take comes before the last digits of an edge.
+    // As for round tools: bounded computing time is worth more than the last digits at an edge.
     let sigma_mm = sigma_mm.max(width_mm.max(height_mm) / 1000.0);
     let [half_u, half_v] = [width_mm / 2.0, height_mm / 2.0];
     let (sin, cos) = rotation_deg.to_radians().sin_cos();

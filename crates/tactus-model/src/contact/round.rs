@@ -23,15 +23,15 @@ impl Profile {
         Self::Cone { radius_mm: diameter_mm / 2.0, slope: (apex_deg.to_radians() / 2.0).tan() }
     }
 
-    /// Slices at a depth: a stack of thin discs, one for each height above the lowest point; along the shaft
-    /// they stay as large as it.
+    /// Slices at a depth: a stack of thin discs, one for each height above the lowest point. Along the shaft the discs
+    /// have its radius.
     pub(super) fn slices(self, cut: Cut, position_mm: [f64; 2], depth_mm: f64, sigma_mm: f64) -> Vec<Slice> {
         let head_mm = depth_mm.min(self.head_mm());
         if cut == Cut::Footprint {
             return disc(position_mm, self.rim_mm(head_mm), 1.0, sigma_mm).collect();
         }
-        // Under a blur much finer than the tool, what a computation may take comes before the last digits of
-        // the tool's edge.
+        // Under a blur much finer than the tool, bounded computing time is worth more than the last digits at the
+        // tool's edge.
         let sigma_mm = sigma_mm.max(self.radius_mm() / 50.0);
         let scale_mm = sigma_mm * head_mm / self.rim_mm(head_mm);
         smooth(0.0, head_mm, scale_mm)
@@ -67,8 +67,8 @@ impl Profile {
 
 /// Slices of a disc of even depth, at `x = radius sin(theta)` for evenly spaced `theta`.
 ///
-/// What a blur makes of them is a smooth function of `theta` that goes on periodically beyond the disc's
-/// edges, so that the midpoint rule converges faster than any power of the number of slices.
+/// Their blurred contribution is a smooth periodic function of `theta`, so the midpoint rule converges faster than any
+/// power of the number of slices.
 pub(super) fn disc(
     [x, y]: [f64; 2],
     radius_mm: f64,

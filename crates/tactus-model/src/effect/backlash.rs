@@ -23,7 +23,7 @@ use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipSta
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "backlash",
-    summary: "the tip's place depends on the direction from which it came",
+    summary: "the tip's position depends on the direction of approach",
     parameters: &[
         Parameter::real("play_x_mm", 0.0, [0.0, 1.0]),
         Parameter::real("play_y_mm", 0.0, [0.0, 1.0]),
@@ -39,11 +39,11 @@ struct Backlash {
     axes: [Axis; 3],
 }
 
-/// A nut on a screw.
+/// One axis: a nut with play on a screw.
 #[derive(Debug)]
 struct Axis {
     half_mm: f64,
-    /// Where it is, and by how much that changes with the play.
+    /// Position of the tip, and its derivative by the play.
     at: Option<(f64, f64)>,
 }
 

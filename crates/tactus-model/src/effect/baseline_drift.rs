@@ -1,4 +1,4 @@
-//! `baseline-drift`: the zero wanders in time, alike in all elements or in one.
+//! `baseline-drift`: the baseline changes in time, for all elements together or for one.
 //!
 //! ```text
 //! counts -> counts + c(t - start)          t since the start of the run
@@ -28,7 +28,7 @@ use super::{Definition, Make, Now, OnReadout, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "baseline-drift",
-    summary: "the zero wanders in time",
+    summary: "the baseline drifts in time",
     parameters: &[
         Parameter::element_or_all("element"),
         Parameter::given("start_s", 0.0, [0.0, 1e6]),

@@ -1,4 +1,4 @@
-//! A sensor on the test bench, and derivatives against differences.
+//! Test helpers: a sensor with known parameters, and a comparison of derivatives with finite differences.
 
 use super::{BaseModel, Effect, Make, Now, TipState};
 use crate::{
@@ -45,8 +45,8 @@ pub(crate) fn linear(effects: impl IntoIterator<Item = Effect>) -> Simulator {
     one
 }
 
-/// What element 21 feels, in mm, of a tip upon it that goes straight from depth to depth: times in s and depths in
-/// mm. Without effects that is the depth.
+/// The signal of element 21 in mm under a tip at its centre that moves linearly from depth to depth (times in s, depths in
+/// mm). Without effects it is the depth.
 pub(crate) fn felt_mm<const N: usize>(effect: &Effect, depths: [(f64, f64); N]) -> [f64; N] {
     let one = linear([effect.clone()]);
     let mut pipeline = Pipeline::new(&one).unwrap();
@@ -67,13 +67,13 @@ pub(crate) fn fine(effect: Effect) -> Simulator {
     one
 }
 
-/// The tip over an element's centre, in the robot frame, so deep.
+/// Position of the tip over an element's centre at a depth, robot frame.
 pub(crate) fn upon(simulator: &Simulator, element: usize, depth_mm: f64) -> [f64; 3] {
     let [x, y] = simulator.registration.to_robot(simulator.model.array().centre_mm(element).unwrap());
     [x, y, simulator.surface_mm - depth_mm]
 }
 
-/// Counts under a tip that rests at a place from the beginning.
+/// Counts under a tip that rests at a position from the start.
 pub(crate) fn still(simulator: &Simulator, tip_mm: [f64; 3]) -> Vec<f64> {
     Pipeline::new(simulator).unwrap().step(Moment::at(0.0), &tip_mm).to_vec()
 }

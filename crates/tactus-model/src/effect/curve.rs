@@ -1,14 +1,14 @@
-//! A value that wanders in time: straight from knot to knot.
+//! A value that changes in time: linear from knot to knot.
 
-/// A curve through evenly spaced knots that begins at 0, and stays where it is after the last.
+/// A piecewise linear curve through evenly spaced knots. It begins at 0 and is constant after the last knot.
 ///
 /// ```text
 /// c(t) = (1 - w) c_i + w c_(i+1)          x = K t / duration,  i = floor(x),  w = x - i,  c_0 = 0
 /// ```
 ///
-/// It follows any shape that is smooth over a knot's length, and much of one that is not: least squares leave of the
-/// variance of a random walk about its mean 10 % with 6 knots, 7.5 % with 8, 5.3 % with 12 and 3.9 % with 16 (400
-/// walks of 1200 steps; no 16 shapes at all leave less than 3.7 %, by the walk's Karhunen-Loève series).
+/// It follows any shape that is smooth over a knot's length. Of the variance of a random walk about its mean, a
+/// least-squares fit leaves 10 % with 6 knots, 7.5 % with 8, 5.3 % with 12 and 3.9 % with 16 (400 walks of 1200 steps).
+/// No 16 functions leave less than 3.7 %, by the walk's Karhunen-Loève series.
 #[derive(Debug)]
 pub(super) struct Curve<const K: usize> {
     duration_s: f64,

@@ -1,14 +1,14 @@
-//! What an effect is, apart from what it does: its name, its parameters, and values for them.
+//! Definitions of effects: name, parameters and their values.
 
 use super::{OnContact, OnCovering, OnElement, OnMotion, OnReadout, REGISTRY};
 use crate::Array;
 
-/// An effect's name, parameters and surroundings; its equation and source stand in its file.
+/// An effect's name, parameters and relations. Its equation and source are in its file.
 #[derive(Debug)]
 pub struct Definition {
     /// The name in reports and model files: a contract.
     pub name: &'static str,
-    /// What it is, in half a sentence.
+    /// Summary, as half a sentence.
     pub summary: &'static str,
     /// Its parameters, in the order in which their values are listed.
     pub parameters: &'static [Parameter],
@@ -16,7 +16,7 @@ pub struct Definition {
     pub near_twins: &'static [&'static str],
     /// Experiments, or parts of `diagnose`, that show it.
     pub shown_by: &'static [&'static str],
-    /// Makes what does it, at a stage, of one value for each parameter.
+    /// Creates the effect's object at its stage from one value for each parameter.
     pub make: Make,
 }
 
@@ -42,9 +42,9 @@ pub enum ParameterKind {
     Real,
     /// Index of an element; no fit varies it, and it has no meaning on another array.
     Element,
-    /// The same, or -1 for all elements, which it is where it is not given.
+    /// Index of an element, or -1 for all elements, the default.
     ElementOrAll,
-    /// A number that no fit varies; neutral where it is not given.
+    /// A number that no fit varies; neutral by default.
     Given,
 }
 
@@ -59,7 +59,7 @@ pub enum PipelineStage {
     Readout,
 }
 
-/// Makes an effect's object, at its stage, of one value for each of its parameters.
+/// Creates an effect's object at its stage from one value for each parameter.
 #[derive(Debug, Clone, Copy)]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Make {
@@ -77,7 +77,7 @@ pub struct Effect {
     values: Vec<f64>,
 }
 
-/// Why a name and parameters are no effect.
+/// Why a name and parameters do not make an effect.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum EffectError {
@@ -96,7 +96,7 @@ pub enum EffectError {
     /// A value is out of its range.
     #[error("{effect}: {parameter} must lie from {} to {}, not at {value}", range[0], range[1])]
     Range { effect: &'static str, parameter: &'static str, range: [f64; 2], value: f64 },
-    /// An index is none of an element of the array.
+    /// An index is not that of an element of the array.
     #[error("{effect}: {parameter} must be one of the elements 0 to {last}, not {value}")]
     Element { effect: &'static str, parameter: &'static str, last: usize, value: f64 },
 }
@@ -138,7 +138,7 @@ impl Parameter {
         Self { name, neutral, range, kind: ParameterKind::Real, is_optional: false }
     }
 
-    /// The same, which may be left out: what an effect had from its beginning may not.
+    /// The same parameter as optional. Parameters that an effect has had since its first version are not optional.
     #[must_use]
     pub const fn or_neutral(self) -> Self {
         Self { is_optional: true, ..self }

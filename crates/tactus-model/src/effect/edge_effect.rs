@@ -1,4 +1,4 @@
-//! `edge-effect`: the covering answers differently near its edge, or near the seam between two sensors.
+//! `edge-effect`: the covering's response differs near its edge, or near the seam between two sensors.
 //!
 //! ```text
 //! u_e -> u_e (1 + edge_share exp(-edge distance / reach) + seam_share exp(-seam distance / reach))

@@ -1,4 +1,4 @@
-//! `low-pass`: the readout is a first-order low-pass filter.
+//! `low-pass`: the readout follows with a first-order lag.
 //!
 //! ```text
 //! c' = (counts - c) / time_constant          settled at the first moment

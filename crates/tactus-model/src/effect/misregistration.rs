@@ -1,4 +1,4 @@
-//! `misregistration`: the sensor does not lie where the robot's calibration says.
+//! `misregistration`: the sensor's true position differs from the registration.
 //!
 //! ```text
 //! p_sensor = (1 + scale_error) Rot(-(rotation + rotation_deg)) S (p_robot - origin - offset)
@@ -20,7 +20,7 @@
 //! steps are longer than it reports, and its y axis leans towards x.
 //!
 //! # Source
-//! The paper's Sec. 2.1: two touches near opposite corners set the registration, and so carry their errors.
+//! The paper's Sec. 2.1: two touches near opposite corners define the registration, which inherits their errors.
 
 use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
 

@@ -1,4 +1,4 @@
-//! `miswired`: an element is dead, or answers for another.
+//! `miswired`: an element is dead, or reports another element's signal.
 //!
 //! ```text
 //! u_element -> own_share u_element + other_share u_answers_for

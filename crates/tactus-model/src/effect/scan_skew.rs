@@ -107,7 +107,7 @@ impl ScanSkew {
         let (before, after) = (older.counts[element], newer.counts[element]);
         let between_s = older.age_s - newer.age_s;
         let per_s = if between_s > 0.0 { (after - before) / between_s } else { 0.0 };
-        // What is asked for as it is now is given to the bit.
+        // Age 0 returns the present counts to the bit.
         let count = if age_s > newer.age_s { after - per_s * (age_s - newer.age_s) } else { after };
         (count, per_s)
     }

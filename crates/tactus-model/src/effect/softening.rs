@@ -1,4 +1,4 @@
-//! `softening`: what was pressed before answers more weakly, up to where it was pressed.
+//! `softening`: the response is weaker up to the greatest earlier signal (Mullins effect).
 //!
 //! ```text
 //! u -> u (1 - softened_share erf((1 - u^2 / m^2) / width_share))          m = greatest u so far

@@ -1,10 +1,10 @@
-//! What an effect of each stage is given, and what it may change.
+//! The traits of the stages: what an effect receives and what it may change.
 
 use std::fmt::Debug;
 
 use crate::{Contact, Covering, ForwardModel, Indenter, Registration};
 
-/// The base model, and the covering in place.
+/// The base model with the covering in place.
 #[derive(Debug, Clone, Copy)]
 pub struct BaseModel<'a> {
     /// The base model.
@@ -26,18 +26,18 @@ pub struct Now<'a> {
     pub base: BaseModel<'a>,
 }
 
-/// Where the tip is, and where the sensor is taken to lie; all in the robot frame.
+/// Position of the tip, registration of the sensor and height of the surface; all in the robot frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipState {
-    /// The tip.
+    /// Position of the tip.
     pub tip_mm: [f64; 3],
-    /// Where the sensor lies.
+    /// Registration of the sensor.
     pub registration: Registration,
     /// Height of the covering's surface under the tip.
     pub surface_mm: f64,
 }
 
-/// By how much a contact changes, per unit of a parameter.
+/// Derivative of a contact by a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shift {
     /// Of the tool's axis, sensor frame.
@@ -53,24 +53,24 @@ pub struct Shift {
 /// The spread conserves volume: a load with another width has the same volume.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Load {
-    /// By what it is multiplied.
+    /// Weight in the sum.
     pub weight: f64,
     /// The tool in the covering.
     pub contact: Contact,
-    /// How the tool's face leans, as [`OnContact::lean`] says.
+    /// Lean of the tool's face, as in [`OnContact::lean`].
     pub lean: [f64; 2],
     /// Standard deviations of its Gaussian along the sensor's x and y.
     pub sigma_mm: [f64; 2],
 }
 
-/// An effect between what the stage says and where the tool touches.
+/// An effect between the reported position of the stage and the contact.
 pub trait OnMotion: Debug + Send + Sync {
     /// The instant whose place on the path counts at `t_s`.
     fn instant_s(&self, t_s: f64) -> f64 {
         t_s
     }
 
-    /// Changes where the tip is, or where the sensor lies.
+    /// Changes the position of the tip, the registration or the surface.
     fn place(&mut self, _now: Now<'_>, _tip: &mut TipState) {}
 
     /// Derivative of the contact by the parameter of an index; `before` is what [`OnMotion::place`] was last given.
@@ -87,8 +87,8 @@ pub trait OnContact: Debug + Send + Sync {
     /// Changes the contact.
     fn touch(&self, _base: BaseModel<'_>, _contact: &mut Contact) {}
 
-    /// How the tool leans about the foot of its axis: by how much a flat face stands deeper per mm along the tool's
-    /// own x and y. A [`Contact`] is upright, so that this goes beside it; those of several effects add.
+    /// Lean of the tool about the foot of its axis: the increase of a flat face's depth per mm along the tool's own x and
+    /// y. A [`Contact`] is always upright, so the lean is separate. The leans of several effects add.
     fn lean(&self) -> [f64; 2] {
         [0.0; 2]
     }
@@ -100,7 +100,7 @@ pub trait OnCovering: Debug + Send + Sync {
     /// of weight 1 with the base model's spread, the same along x and y.
     fn spread(&self, _base: BaseModel<'_>, _loads: &mut Vec<Load>) {}
 
-    /// Changes what reaches the elements: equivalent indentations in mm, row-major.
+    /// Changes the signal that reaches the elements: equivalent indentations in mm, row-major.
     fn signal(&mut self, _now: Now<'_>, _contact: &Contact, _signal_mm: &mut [f64]) {}
 
     /// Derivative of what [`OnCovering::signal`] last gave by the parameter of an index, at the input `before`, in
@@ -123,7 +123,7 @@ pub trait OnCovering: Debug + Send + Sync {
 /// An effect in the elements; without memory.
 pub trait OnElement: Debug + Send + Sync {
     /// Changes the elements' signals before their response: equivalent indentations in mm, row-major.
-    /// `felt_mm` is what reached each element, before any effect of this stage.
+    /// `felt_mm` is the signal that reached each element, before any effect of this stage.
     fn signal(&self, _base: BaseModel<'_>, _felt_mm: &[f64], _signal_mm: &mut [f64]) {}
 
     /// Changes counts after the response.
@@ -145,10 +145,10 @@ pub trait OnElement: Debug + Send + Sync {
 
 /// An effect in the readout.
 pub trait OnReadout: Debug + Send + Sync {
-    /// Changes counts, row-major, before noise comes upon them.
+    /// Changes counts, row-major, before noise is added.
     fn counts(&mut self, _now: Now<'_>, _counts: &mut [f64]) {}
 
-    /// What comes before the converter: changes a noisy reading.
+    /// Changes a noisy reading before the converter.
     fn convert(&self, counts: f64) -> f64 {
         counts
     }
@@ -177,7 +177,7 @@ impl TipState {
         self.registration.to_sensor([x_mm, y_mm])
     }
 
-    /// A tool standing there.
+    /// The contact of a tool at this state.
     pub fn contact(&self, indenter: Indenter) -> Contact {
         let [_, _, z_mm] = self.tip_mm;
         Contact {

@@ -1,4 +1,4 @@
-//! `surface-offset`: the covering's surface is not at the height that the touch found.
+//! `surface-offset`: the height of the covering's surface differs from the one that a touch found.
 //!
 //! ```text
 //! depth = surface + offset - z

@@ -1,4 +1,4 @@
-//! `time-lag`: frames are late or early against the stage's positions.
+//! `time-lag`: frames are late or early relative to the stage's positions.
 //!
 //! ```text
 //! tip(t) -> tip(t - lag)          late: lag > 0

@@ -1,4 +1,4 @@
-//! Checks that every function makes of its arguments.
+//! Checks of function arguments.
 
 use starlark::values::float::UnpackFloat;
 use starlark::values::list::ListRef;

@@ -1,4 +1,4 @@
-//! Lists and texts: the bounded forms of standard functions, and random numbers.
+//! Bounded forms of standard functions on lists and texts, and random numbers.
 
 use std::num::NonZeroI32;
 

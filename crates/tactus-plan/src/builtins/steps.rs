@@ -1,4 +1,4 @@
-//! What a script has the rig do. The envelope is checked by the host; here only what makes no sense anywhere.
+//! Functions that ask for steps. They refuse values that are invalid on every rig; the host checks the envelope.
 
 use starlark::environment::GlobalsBuilder;
 use starlark::eval::Evaluator;

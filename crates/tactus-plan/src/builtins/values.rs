@@ -1,4 +1,4 @@
-//! Our types as a script's values and back.
+//! Conversion between Rust types and script values.
 
 use serde_json::{Map, Value as Json};
 use starlark::values::dict::DictRef;

@@ -1,4 +1,4 @@
-//! Everything that a script can call.
+//! The functions that a script can call.
 
 use std::sync::LazyLock;
 
@@ -11,8 +11,8 @@ use crate::builtins;
 pub(super) const OPERATORS: [(&str, &str); 4] =
     [("plus", "+"), ("times", "*"), ("percent", "%"), ("union", "|")];
 
-/// What is taken over from the language's standard functions. The others either reach around the bounds
-/// (`getattr` gives any method) or are replaced by bounded ones in [`builtins`].
+/// Standard functions that scripts may use. The others either bypass the bounds (`getattr` returns any method) or are
+/// replaced by bounded ones in [`builtins`].
 const STANDARD: [&str; 19] = [
     "False",
     "None",

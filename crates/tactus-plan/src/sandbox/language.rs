@@ -1,12 +1,11 @@
-//! What the grammar allows and experiment scripts may not use: operations that can make a value far larger
-//! than their operands and that no function can stand in for.
+//! Refuses operations that can make a value far larger than their operands and that no function can replace.
 
 use starlark::syntax::AstModule;
 use starlark::syntax::ast::{AssignOp, AstExpr, AstStmt, Expr, Stmt};
 
 use super::line;
 
-/// Methods that are refused, and what to write instead.
+/// Refused methods and their replacements.
 const REFUSED_METHODS: [(&str, &str); 4] = [
     ("extend", "write `a += b`"),
     ("format", "write `\"... %s ...\" % (a, b)`, or give `log` several values"),
@@ -14,7 +13,7 @@ const REFUSED_METHODS: [(&str, &str); 4] = [
     ("replace", "experiment scripts do not edit texts"),
 ];
 
-/// An error with its line at the first thing that is refused.
+/// An error at the line of the first refused operation.
 pub(super) fn check(ast: &AstModule) -> Result<(), (u32, String)> {
     let refused = find_in_statement(ast.statement());
     refused.map_or(Ok(()), |(span, problem)| Err((line(&ast.file_span(span)), problem)))

@@ -1,5 +1,5 @@
-//! How deeply a source is nested, told from its tokens: parser and compiler call themselves once a level, and
-//! would run out of stack on a hostile source before they could refuse it.
+//! Nesting depth of a source, computed from its tokens. The parser and the compiler recurse once per level, so a hostile
+//! source would overflow the stack before they could refuse it.
 
 use starlark_syntax::codemap::CodeMap;
 use starlark_syntax::lexer::{Lexer, Token};

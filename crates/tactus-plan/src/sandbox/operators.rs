@@ -1,4 +1,4 @@
-//! The operators that can make large values, as functions that measure first.
+//! Functions that replace the operators which can make large values, and measure first.
 
 use std::collections::HashMap;
 
@@ -92,7 +92,7 @@ fn check_size(like: Value<'_>, size: u64) -> Result<(), Halt> {
     if size > limit { Err(Exceeded::Size { what, size, unit, limit }.into()) } else { Ok(()) }
 }
 
-/// Whole numbers grow without end when multiplied by themselves: what enters an operator fits 64 bits.
+/// Checks that a whole number fits 64 bits: repeated multiplication would let it grow without a bound.
 fn check_whole(value: Value<'_>) -> Result<(), Halt> {
     if value.get_type() == "int" && !matches!(i64::unpack_value(value), Ok(Some(_))) {
         return Err(Halt::Failed("a whole number beyond 64 bits: use floats".into()));

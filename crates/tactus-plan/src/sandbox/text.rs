@@ -1,4 +1,4 @@
-//! Values as text, within a bound: the evaluator's own `str` follows shared parts again and again.
+//! Converts values to text of bounded length. The evaluator's own `str` repeats shared parts without a bound.
 
 use starlark::values::dict::DictRef;
 use starlark::values::float::UnpackFloat;

@@ -1,4 +1,4 @@
-//! What arrives at the base.
+//! Reaction forces at the base.
 
 use libm::exp;
 
