@@ -85,12 +85,12 @@ fn a_cross_wired_element_keeps_its_own_sensitivity() {
 }
 
 #[test]
-fn a_response_turned_round_is_the_root_near_the_line() {
-    assert!((turned_round(0.5, 0.0).unwrap() - 0.5).abs() < 1e-15);
-    assert!((turned_round(0.7 + 0.2 * 0.49, 0.2).unwrap() - 0.7).abs() < 1e-12);
-    assert!((turned_round(0.7 - 0.2 * 0.49, -0.2).unwrap() - 0.7).abs() < 1e-12);
+fn a_response_inverted_is_the_root_near_the_line() {
+    assert!((inverted(0.5, 0.0).unwrap() - 0.5).abs() < 1e-15);
+    assert!((inverted(0.7 + 0.2 * 0.49, 0.2).unwrap() - 0.7).abs() < 1e-12);
+    assert!((inverted(0.7 - 0.2 * 0.49, -0.2).unwrap() - 0.7).abs() < 1e-12);
     // A response that falls again never reads so much.
-    assert_eq!(turned_round(3.0, -0.2), None);
+    assert_eq!(inverted(3.0, -0.2), None);
 }
 
 #[test]

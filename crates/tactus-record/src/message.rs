@@ -1,4 +1,4 @@
-//! The kinds of messages in a recording, listed once: channels, encoding, decoding and counting follow from the list.
+//! The kinds of messages in a recording, listed once. Channels, encoding, decoding and counting follow from the list.
 
 use std::borrow::Cow;
 
@@ -42,7 +42,7 @@ macro_rules! kinds {
             $(counted: |$counted:ident, $tally:ident| $count:expr,)?
         }
     )*) => {
-        /// A recorded message.
+        /// A recorded message as it is read back.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Message {
             $($(#[$doc])* $kind($held),)*

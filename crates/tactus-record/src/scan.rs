@@ -1,4 +1,4 @@
-//! Walks an MCAP file from its start to its end, or to where it is damaged.
+//! Reads an MCAP file from its start to its end, or to the first damage.
 
 use std::{
     io::{self, Read},
@@ -19,7 +19,7 @@ use crate::{header::Attachment, layout};
 /// No record and no unpacked chunk is larger; a length beyond it is damage.
 const RECORD_MAX_BYTES: usize = 64 * 1024 * 1024;
 
-/// At most this much is asked of the source at once, so that a wrong length costs no memory.
+/// At most this much is read at once, so that a wrong length costs no memory.
 const READ_BYTES: usize = 1024 * 1024;
 
 /// How much of a file could be read.
@@ -32,12 +32,12 @@ pub enum Completeness {
     Truncated {
         /// Everything before this byte was read.
         at_byte: u64,
-        /// What was found there.
+        /// What is wrong there.
         reason: String,
     },
 }
 
-/// What a file holds that matters here.
+/// The items of a file that a recording uses.
 pub(crate) enum ScanItem {
     Metadata(mcap::records::Metadata),
     Attachment(Attachment),

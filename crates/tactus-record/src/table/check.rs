@@ -1,4 +1,4 @@
-//! What the contract asks of values.
+//! Checks values against the contract.
 
 use std::{collections::BTreeSet, path::Path};
 

@@ -12,12 +12,12 @@ use parquet::{
 
 use super::TableError;
 
-/// Rows asked for at once: bounds what a wrong count of rows in a damaged file costs.
+/// Rows read at once, so that a wrong number of rows in a damaged file costs no memory.
 const BATCH_ROWS: usize = 8192;
 
-/// Values of a column, row by row.
+/// The values of a column, grouped by row.
 pub(super) struct Column<T> {
-    /// As many as there are values that are not null.
+    /// All values that are not null.
     values: Vec<T>,
     /// Where each row's values begin; one more than there are rows.
     starts: Vec<usize>,
@@ -25,7 +25,7 @@ pub(super) struct Column<T> {
     null_rows: Vec<usize>,
 }
 
-/// A file in which a column is read, and what errors say of it.
+/// Reads columns of one row group; knows the file for errors.
 pub(super) struct ColumnReader<'a> {
     pub(super) path: &'a Path,
     pub(super) group: &'a dyn RowGroupReader,
@@ -37,7 +37,7 @@ impl<T> Column<T> {
         self.starts.len() - 1
     }
 
-    /// The values of one row: one, or, of a list, any number; none of a null.
+    /// The values of one row: one, or any number of a list; none if it is null.
     pub(super) fn row(&self, row: usize) -> &[T] {
         &self.values[self.starts[row]..self.starts[row + 1]]
     }
