@@ -121,7 +121,7 @@ impl DiscretisingSensor {
 
     /// Distinct readings of a point that goes from one edge of the middle element, 0, to the other, 1 (Fig. 6a).
     pub fn locations(&self) -> usize {
-        // The last step stands on the far edge, where 1 / (0.02 f) is whole.
+        // The last step is at the far edge if 1 / (0.02 f) is whole.
         let last = (1.0 / self.step() * (1.0 + 1e-12)).floor();
         let mut readings: Vec<_> = self.glide([0.0], [1.0], last).map(|(_, reading)| reading).collect();
         readings.sort_unstable();

@@ -164,7 +164,7 @@ struct Scaled {
     cholesky: Cholesky<f64, nalgebra::Dyn>,
 }
 
-/// `None` if the matrix, of which the lower triangle counts, is singular.
+/// Uses the lower triangle only. `None` if the matrix is singular.
 fn scaled(mut gram: DMatrix<f64>) -> Option<Scaled> {
     let scale = gram.diagonal().map(|square| 1.0 / square.sqrt());
     if !scale.iter().all(|value| value.is_finite()) {

@@ -22,7 +22,7 @@ pub enum RecordError {
     /// The file is MCAP, but not a recording of a run, or it was cut off before it said which run it is.
     #[error("{}: no metadata record {:?}, so this is no recording of a run, or its first bytes are lost", path.display(), crate::header::METADATA_NAME)]
     NoRun { path: PathBuf },
-    /// Something that stands at the start of every recording is missing or wrong.
+    /// An attachment or metadata field of the recording's start is missing or wrong.
     #[error("{}: {what}: {problem}", path.display())]
     Header { path: PathBuf, what: String, problem: String },
     /// The rig in the recording is not a rig.
@@ -52,10 +52,10 @@ pub enum RowsError {
     /// A table could not be read or written, or a row breaks its contract.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// Rows that stand together are of one rig.
+    /// Files that are read together must be of one rig.
     #[error("{} was made with another rig than {}: take them apart", path.display(), first.display())]
     RigsDiffer { first: PathBuf, path: PathBuf },
-    /// A run may be taken once.
+    /// No run may be in two files.
     #[error("{} holds run {run:?}, which was taken already", path.display())]
     RunTwice { path: PathBuf, run: String },
     /// The stage never said where it was.

@@ -167,7 +167,7 @@ kinds! {
         timed: |frame| (frame.received, frame.seq),
         counted: |frame, tally| tally.frame(frame),
     }
-    /// What the sensor says of itself.
+    /// The sensor's description of itself.
     SensorInfo(pb::SensorInfo) {
         message: pb::SensorInfo,
         wire: pb::SensorInfo,
@@ -188,7 +188,7 @@ kinds! {
         timed: |event| (stamp(event.t_mono_ns, event.t_wall_ns), event.seq),
         counted: |event, tally| tally.event(event),
     }
-    /// An act of the safety supervisor.
+    /// A verdict of the safety supervisor.
     Safety(pb::SafetyEvent) {
         message: pb::SafetyEvent,
         wire: pb::SafetyEvent,

@@ -72,7 +72,7 @@ impl Recording {
         &self.tally
     }
 
-    /// Records a message at its own time: a frame, a report of the stage, an event of the run, an act of the safety
+    /// Records a message at its own time: a frame, a report of the stage, an event of the run, a verdict of the safety
     /// supervisor.
     ///
     /// # Errors

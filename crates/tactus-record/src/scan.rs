@@ -44,7 +44,7 @@ pub(crate) enum ScanItem {
     Message(RawMessage),
 }
 
-/// A message as it stands in the file.
+/// An encoded message with its channel and header.
 pub(crate) struct RawMessage {
     pub(crate) channel: Arc<mcap::Channel<'static>>,
     pub(crate) header: MessageHeader,
@@ -56,7 +56,7 @@ pub(crate) struct Scan<R> {
     source: R,
     mcap: LinearReader,
     channels: ChannelAccumulator<'static>,
-    /// Bytes given to the reader; it asks for no more than the record in hand needs.
+    /// Bytes given to the parser; it asks for no more than the current record needs.
     taken_bytes: u64,
     /// Bytes up to the end of the last good record.
     good_bytes: u64,
@@ -140,7 +140,7 @@ impl<R: Read> Scan<R> {
     }
 }
 
-/// Reads one record; `None` if it carries nothing that matters here. The error says what is wrong with it.
+/// Reads one record; `None` if recordings do not use its kind. The error says what is wrong with it.
 fn item(
     channels: &mut ChannelAccumulator<'static>,
     opcode: u8,

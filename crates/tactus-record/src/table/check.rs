@@ -6,7 +6,7 @@ use tactus_schema::{Rig, table::RowView};
 
 use super::TableError;
 
-/// Checks rows in the order in which they stand in the table.
+/// Checks rows in the table's order.
 pub(crate) struct Checker {
     elements: usize,
     indenters: BTreeSet<String>,

@@ -44,7 +44,7 @@ impl<T> Column<T> {
 }
 
 impl ColumnReader<'_> {
-    /// A column of texts, none of them null.
+    /// Reads a column of texts; null is an error.
     pub(super) fn texts(&self, leaf: usize, name: &'static str) -> Result<Vec<String>, TableError> {
         let column = self.column::<ByteArrayType>(leaf, name)?;
         self.no_nulls(&column, name)?;
@@ -55,28 +55,28 @@ impl ColumnReader<'_> {
         column.values.iter().enumerate().map(text).collect()
     }
 
-    /// A column of 32-bit integers, none of them null.
+    /// Reads a column of 32-bit integers; null is an error.
     pub(super) fn int32s(&self, leaf: usize, name: &'static str) -> Result<Vec<i32>, TableError> {
         let column = self.column::<Int32Type>(leaf, name)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
 
-    /// A column of 64-bit integers, none of them null.
+    /// Reads a column of 64-bit integers; null is an error.
     pub(super) fn int64s(&self, leaf: usize, name: &'static str) -> Result<Vec<i64>, TableError> {
         let column = self.column::<Int64Type>(leaf, name)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
 
-    /// A column of numbers, none of them null.
+    /// Reads a column of numbers; null is an error.
     pub(super) fn float64s(&self, leaf: usize, name: &'static str) -> Result<Vec<f64>, TableError> {
         let column = self.column::<DoubleType>(leaf, name)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
 
-    /// A column of numbers or nulls; a column of Parquet's null type, in whatever it is kept, holds nulls only.
+    /// Reads a column of numbers or nulls; a column of Parquet's null type, whatever its physical type, is all null.
     pub(super) fn optional_float64s(
         &self,
         leaf: usize,
@@ -90,7 +90,7 @@ impl ColumnReader<'_> {
         Ok((0..column.rows()).map(|row| column.row(row).first().copied()).collect())
     }
 
-    /// A column of lists of numbers, neither null nor with nulls in them.
+    /// Reads a column of lists of numbers; null lists and null elements are errors.
     pub(super) fn lists(&self, leaf: usize, name: &'static str) -> Result<Column<f32>, TableError> {
         let column = self.column::<FloatType>(leaf, name)?;
         self.no_nulls(&column, name)?;
@@ -124,8 +124,8 @@ impl ColumnReader<'_> {
     }
 }
 
-/// Values and levels as Parquet keeps them: a repetition level above 0 goes on in the row before, a definition level
-/// below the greatest stands for no value.
+/// Values and levels as Parquet stores them: a value with a repetition level above 0 belongs to the same row as the one
+/// before; a definition level below the greatest means that there is no value.
 struct Levels<T> {
     values: Vec<T>,
     definition: Vec<i16>,
@@ -137,7 +137,7 @@ struct Levels<T> {
 struct DefinitionLevels {
     /// The level of a value; 0 if there can be no nulls.
     defined: i16,
-    /// The level of a list without elements; its length says what is wrong with it.
+    /// The level of a list without elements; the check of its length reports it.
     empty_list: Option<i16>,
 }
 
