@@ -1,4 +1,4 @@
-//! Spatial acuity of a row of elements that round what they read (paper Sec. 4, Eq. 5-8, Fig. 6).
+//! Spatial acuity of a row of quantising elements (paper Sec. 4, Eq. 5-8, Fig. 6).
 //!
 //! Elements of width 1 stand side by side; a point that presses at `mu` with unit force is spread by a Gaussian
 //! (Eq. 7), and each of five elements integrates its share (Eq. 5) and rounds it to a multiple of the force
@@ -9,8 +9,8 @@
 //! reading_i = floor(S_i / f + 1/2)                                      in steps of f
 //! ```
 //!
-//! Eq. 6 as it is printed, `floor(S + f / 2)`, gives at most two readings, 0 and 1, whatever `f` is. The text around
-//! it says "rounding to the nearest multiple of f", which is what is done here. All lengths are in element widths.
+//! Eq. 6 as printed, `floor(S + f / 2)`, gives at most two readings, 0 and 1, whatever `f` is. The text around
+//! it says "rounding to the nearest multiple of f", so this module does that. All lengths are in element widths.
 //!
 //! - *Localisation* (Fig. 6a): [`DiscretisingSensor::locations`], how many distinct readings there are as a point
 //!   goes over one element in steps of `0.02 f`.
@@ -18,14 +18,14 @@
 //!   `0.02 f`, until they read otherwise than one point of twice the force.
 //! - *Aliasing*: [`NYQUIST_SIGMA`] and [`passed`].
 //!
-//! Both counts are bounds: without noise, and by whoever knows the sensor perfectly.
+//! Both results are bounds: they assume no noise and a perfectly known sensor.
 //!
-//! # Steps that need no look
+//! # Steps that are skipped
 //!
 //! A reading changes only where some `S_i` crosses a rounding boundary. While the points move by `h`, `S_i` moves
-//! forwards by at most `|S_i'| h + M h^2 / 2` and backwards by at most `M h^2 / 2 - |S_i'| h`, as `|S_i''| <= M`; the steps
-//! within which neither reaches a boundary cannot change any reading and are left out. So the answer is that of stepping
-//! through them all, to the last count, which the tests hold.
+//! forwards by at most `|S_i'| h + M h^2 / 2` and backwards by at most `M h^2 / 2 - |S_i'| h`, as `|S_i''| <= M`; steps
+//! within which neither reaches a boundary cannot change any reading and are skipped. The result equals that of stepping
+//! through all of them, to the last count; the tests check this.
 //!
 //! ```
 //! use tactus_calibrate::acuity::DiscretisingSensor;
@@ -51,10 +51,10 @@ pub const NYQUIST_SIGMA: f64 = 3.0 * FRAC_1_PI;
 /// The Nyquist frequency of elements of width 1, in cycles per element width.
 pub const NYQUIST_FREQUENCY: f64 = 0.5;
 
-/// The paper's places of the two points' middle within an element: 0, 0.1, ..., 0.9.
+/// The paper's positions of the two points' midpoint within an element: 0, 0.1, ..., 0.9.
 pub const OFFSETS: [f64; 10] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 
-/// As many places between those of the paper: 0.05, 0.15, ..., 0.95.
+/// Positions midway between those of the paper: 0.05, 0.15, ..., 0.95.
 pub const OFFSETS_BETWEEN: [f64; 10] = [0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95];
 
 /// A step of the moving points, in force resolutions (paper, Sec. 4).
@@ -70,24 +70,19 @@ pub fn passed(sigma: f64, cycles_per_element: f64) -> f64 {
     exp(-2.0 * turn * turn)
 }
 
-/// Why there is no such sensor.
+/// Why the parameters describe no sensor.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum AcuityError {
     /// The spread is out of range.
     #[error("a spread must be between 0.001 and 100 element widths, not {sigma}")]
-    Sigma {
-        /// The spread that was given.
-        sigma: f64,
-    },
+    Sigma { sigma: f64 },
     /// The force resolution is out of range.
     #[error("a force resolution must be between 0.00001 and 1 of a press's force, not {force_resolution}")]
-    ForceResolution {
-        /// The resolution that was given.
-        force_resolution: f64,
-    },
+    ForceResolution { force_resolution: f64 },
 }
 
-/// Five elements in a row under a spread, that round.
+/// Five quantising elements in a row under a Gaussian spread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiscretisingSensor {
     sigma: f64,
@@ -126,7 +121,7 @@ impl DiscretisingSensor {
 
     /// Distinct readings of a point that goes from one edge of the middle element, 0, to the other, 1 (Fig. 6a).
     pub fn locations(&self) -> usize {
-        // The last step stands on the far edge, where 1 / (0.02 f) is whole.
+        // The last step is at the far edge if 1 / (0.02 f) is whole.
         let last = (1.0 / self.step() * (1.0 + 1e-12)).floor();
         let mut readings: Vec<_> = self.glide([0.0], [1.0], last).map(|(_, reading)| reading).collect();
         readings.sort_unstable();
@@ -134,10 +129,10 @@ impl DiscretisingSensor {
         readings.len()
     }
 
-    /// Separation at which two points about the place `offset` first read otherwise than at the same place (Fig. 6b).
+    /// Separation at which two points with midpoint `offset` first read differently from two at the same place (Fig. 6b).
     ///
-    /// `None` if they never do, however far they move apart: where the spread is so wide and the resolution so
-    /// coarse that hardly anything is read to begin with.
+    /// `None` if they never do, however far they move apart: the spread is so wide and the resolution so coarse that
+    /// hardly anything is read even at separation 0.
     pub fn separation(&self, offset: f64) -> Option<f64> {
         // Then both are beyond the five elements by more than nine spreads, which leaves nothing of them.
         let far = (2.0 * ELEMENTS as f64 + 18.0 * self.sigma) / self.step();
@@ -147,7 +142,7 @@ impl DiscretisingSensor {
             .map(|(step, _)| step * self.step())
     }
 
-    /// Mean of [`DiscretisingSensor::separation`] over places; `None` without places, or if it is `None` at one.
+    /// Mean of [`DiscretisingSensor::separation`] over `offsets`; `None` without offsets, or if it is `None` at one.
     pub fn mean_separation(&self, offsets: &[f64]) -> Option<f64> {
         let separations = offsets.iter().map(|offset| self.separation(*offset));
         let sum: f64 = separations.sum::<Option<f64>>()?;
@@ -159,7 +154,7 @@ impl DiscretisingSensor {
     }
 
     /// Numbers and readings of the steps from 0 to `last` of points that move from `start` by `velocity` times the
-    /// way, without those that cannot read otherwise than the one before them.
+    /// distance, without the steps that cannot read differently from the one before them.
     fn glide<const N: usize>(
         &self,
         start: [f64; N],
@@ -238,8 +233,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Spreads of Fig. 6, in element widths. The paper gives no ranges; here the optimum of Fig. 6b falls on the places
-    /// of its text.
+    /// Spreads of Fig. 6, in element widths. The paper gives no ranges; with these, the optimum of Fig. 6b agrees with the
+    /// paper's text.
     pub const SIGMAS: [f64; 2] = [0.03, 10.0];
     /// Force steps `1 / f` of Fig. 6; the paper gives no range.
     pub const FORCE_STEPS: [f64; 2] = [4.0, 256.0];
@@ -264,11 +259,11 @@ impl Grid {
         }
     }
 
-    /// What holds of the sensor of every cell, row-major, one row a force resolution. The threads of rayon's pool in
-    /// force share the work; the result does not depend on their number.
+    /// The value of `of` for the sensor of every cell, row-major, one row per force resolution. The threads of the current
+    /// rayon pool share the work; the result does not depend on their number.
     ///
     /// # Errors
-    /// As [`DiscretisingSensor::new`], of the first cell that is none.
+    /// As [`DiscretisingSensor::new`], for the first cell that fails.
     pub fn map<T: Send>(&self, of: impl Fn(DiscretisingSensor) -> T + Sync) -> Result<Vec<T>, AcuityError> {
         let cells = self.force_resolutions.iter().flat_map(|f| self.sigmas.iter().map(|sigma| [*sigma, *f]));
         let sensors = cells.map(|[sigma, f]| DiscretisingSensor::new(sigma, f));

@@ -8,7 +8,7 @@ fn sensor(sigma: f64, force_steps: f64) -> DiscretisingSensor {
     DiscretisingSensor::new(sigma, 1.0 / force_steps).unwrap()
 }
 
-/// The paper's procedure as it is told: every step, and a set of what was read.
+/// The paper's procedure, literally: every step, and the set of all readings.
 fn count_all(sensor: DiscretisingSensor) -> usize {
     let step = 0.02 * sensor.force_resolution();
     let steps = (0..).map(|nth| f64::from(nth) * step).take_while(|at| *at <= 1.0 + 1e-12);
@@ -23,8 +23,8 @@ fn step_apart(sensor: DiscretisingSensor, offset: f64) -> Option<f64> {
     apart.find(|apart| sensor.reading([offset - 0.5 * apart, offset + 0.5 * apart]) != together)
 }
 
-/// Spreads and force steps that fall on no pattern, and such as make exact ties: half-whole steps under hardly any
-/// spread, odd steps at an edge.
+/// Irregular spreads and force steps, and others that make exact ties: half-integer steps under hardly any spread, odd
+/// steps at an edge.
 fn awkward() -> impl Iterator<Item = DiscretisingSensor> {
     let sigmas = [0.001, 0.02, 0.05, 0.11, 0.24, 0.313, 0.5, 0.955, 1.36, 3.0, 10.0];
     let force_steps = [1.0, 2.0, 3.0, 4.5, 5.0, 7.3, 16.0, 33.0, 100.5, 141.421_356, 256.0];
@@ -90,7 +90,7 @@ fn between_whole_numbers_of_steps_there_is_a_plateau_and_no_ridge() {
         assert!(counts.iter().all(|count| (count / plateau - 1.0).abs() < 0.02), "{force_steps}: {counts:?}");
         assert!((sensor(0.3, force_steps).locations() as f64) < 1.02 * plateau);
     }
-    // Whole: neighbours change together, so that there are half as many.
+    // Whole numbers of steps: neighbours change together, so there are half as many readings.
     for force_steps in [10.0, 57.0, 256.0, 700.0] {
         let count = sensor(0.1, force_steps).locations() as f64;
         assert!((count / force_steps - 1.0).abs() < 0.11, "{force_steps}: {count}");
@@ -127,7 +127,7 @@ fn the_optimum_for_two_points_hangs_on_where_they_are() {
 
 #[test]
 fn a_change_that_never_comes_is_none() {
-    // A tenth of the force on each: below half of the resolution, together and apart.
+    // Each element gets a tenth of the force: less than half the resolution, whether the points are together or apart.
     let coarse = sensor(10.0, 4.0);
     assert_eq!(coarse.separation(0.5), None);
     assert_eq!(coarse.mean_separation(&OFFSETS), None);
@@ -137,10 +137,10 @@ fn a_change_that_never_comes_is_none() {
 
 #[test]
 fn without_spread_an_element_says_nothing_of_the_place_inside_it() {
-    // At the near edge half each, inside all on one, at the far edge half each.
+    // At either edge two elements share the force; inside, one element gets all of it.
     assert_eq!(sensor(0.001, 4.0).reading([0.0]), [0, 2, 2, 0, 0]);
     assert_eq!(sensor(0.001, 4.0).reading([0.5]), [0, 0, 4, 0, 0]);
-    // From the middle, each has half an element to go until the other neighbours feel it.
+    // From the middle, each point moves half an element until it reaches the next neighbour.
     let apart = sensor(0.001, 4.0).separation(0.5).unwrap();
     assert!((apart - 1.0).abs() < 0.01, "{apart}");
 }

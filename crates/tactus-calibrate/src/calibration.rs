@@ -1,4 +1,4 @@
-//! The whole calibration: what the presses tell of the sensor, step upon step.
+//! The whole calibration, step by step.
 
 mod remarks;
 
@@ -17,24 +17,24 @@ use crate::{
     thickness::against_thickness,
 };
 
-/// What was found about a sensor.
+/// The characterisation of one sensor under its coverings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibration {
-    /// What it rests on.
+    /// The measurements used.
     pub data: DataSummary,
     /// Noise of the median element at rest, in counts.
     pub noise_rms_counts: Option<f64>,
     /// Each element's reading at rest.
     pub baseline_counts: Vec<Option<Estimate>>,
-    /// Faulty elements.
+    /// Faulty elements, and elements that could not be judged.
     pub health: Health,
-    /// Where the sensor lies.
+    /// Where the sensor lies in the robot's frame; `None` if it could not be fitted.
     pub registration: Option<RegistrationFit>,
-    /// How its elements answer.
+    /// The elements' responses; `None` if they could not be fitted.
     pub response: Option<ResponseFit>,
     /// The spread of each covering at each depth.
     pub spreads: Vec<SpreadFit>,
-    /// Spread against thickness.
+    /// Spread against thickness (Eq. 4); `None` without spreads.
     pub thickness: Option<ThicknessFit>,
     /// What could not be determined, and what it would take; a sentence each.
     pub missing: Vec<String>,
@@ -42,29 +42,29 @@ pub struct Calibration {
     pub warnings: Vec<String>,
 }
 
-/// What a calibration rests on.
+/// The measurements that a calibration used.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DataSummary {
     /// Ids of the runs.
     pub runs: Vec<String>,
-    /// Presses in them.
+    /// Number of presses in all runs.
     pub presses: usize,
-    /// Dwells in these.
+    /// Number of dwells in all presses.
     pub dwells: usize,
     /// Frames in all.
     pub frames: u64,
-    /// Frames left out because an element read what no noise explains.
+    /// Frames left out because an element's reading is an outlier.
     pub frames_left_out: u64,
     /// The coverings pressed, in mm.
     pub coverings_mm: Vec<f64>,
-    /// The covering for which sensitivities are stated, in mm.
+    /// Thickness of the covering for which sensitivities are stated, in mm.
     pub reference_covering_mm: f64,
 }
 
-/// Characterises a sensor from what was measured, starting from what is declared.
+/// Characterises a sensor from measured presses, starting from the declared description.
 ///
 /// The steps are the paper's: faulty elements, registration (Sec. 2.1), response (Sec. 2.2), spread (Sec. 3.1, Eq. 3),
-/// spread against thickness (Eq. 4). Each takes the results of those before it, errors included. A step for which the
+/// spread against thickness (Eq. 4). Each uses the results of the steps before it, errors included. A step for which the
 /// data do not suffice is left out; [`Calibration::missing`] says so, and later steps use what is declared.
 ///
 /// # Errors
@@ -81,7 +81,7 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
     let registration = match register(declared, readings, &sound) {
         Ok((mut registration, fitted)) => {
             place = fitted;
-            // Now that the place is known, faults show more clearly.
+            // With the fitted pose, faults show more clearly.
             health = examine(declared, readings, &place);
             let sounder = health.sound(readings.elements);
             if sounder != sound
@@ -117,7 +117,7 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
     match respond(declared, readings, &calibration.health, &place) {
         Err(problem) => {
             calibration.missing.push(format!(
-                "Response of the elements: {problem}. Without it images cannot be corrected, and no spread be fitted."
+                "Response of the elements: {problem}. Without it images cannot be corrected, and no spread can be fitted."
             ));
         }
         Ok((response, gains)) => {
@@ -135,8 +135,8 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
 impl Calibration {
     /// Spread against thickness for a model, and its standard errors where it was fitted.
     ///
-    /// With one covering only, the declared slope stays and the intercept is made to fit. `None` if the data say
-    /// nothing, or what they say is no spread: an intercept that is not positive, a slope below 0.
+    /// With one covering only, the declared slope stays and the intercept is fitted. `None` without a fit, or if the fit is
+    /// no valid spread: its intercept is not positive, or its slope is negative.
     pub fn psf(&self, declared: Psf) -> Option<(Psf, [Option<f64>; 2])> {
         let thickness = self.thickness.as_ref()?;
         let (psf, errors) = match (&thickness.linear, thickness.coverings.as_slice()) {
@@ -155,8 +155,8 @@ impl Calibration {
         (psf.sigma_intercept_mm > 0.0 && psf.sigma_per_mm >= 0.0).then_some((psf, errors))
     }
 
-    /// The elements' responses for a model: what was fitted, and for the others the median of it; the errors of
-    /// sensitivity, baseline and curvature beside them. `None` if none was fitted.
+    /// The elements' responses for a model, with the standard errors of sensitivity, baseline and curvature. Elements
+    /// without a fit get the median of the fitted ones. `None` if no element was fitted.
     pub fn responses(&self, declared: &Response) -> Option<(Response, [Vec<f64>; 3])> {
         let fitted = self.response.as_ref()?;
         let elements = self.baseline_counts.len();
@@ -170,7 +170,8 @@ impl Calibration {
             reference_indenter: declared.reference_indenter.clone(),
             reference_covering: Covering { thickness_mm: self.data.reference_covering_mm },
         };
-        // What was not fitted is known as well as elements are alike; a straight line, as well as a curvature is known.
+        // The error of an element without a fit is the scatter between elements. A linear form's curvature has the error of the
+        // shared one.
         let sensitivities: Vec<f64> =
             fitted.elements.iter().map(|one| one.sensitivity_counts_per_mm.value).collect();
         let bent = fitted.shared_quadratic_per_mm.map_or(0.0, |curvature| curvature.standard_error);
@@ -208,7 +209,8 @@ impl DataSummary {
     }
 }
 
-/// What is declared, with the reference press that was most made where the declared one was not.
+/// The declared description. If no press is a reference press as declared, the most frequent combination of tool and
+/// covering becomes the reference.
 fn referred(
     declared: &Declared,
     readings: &Readings,

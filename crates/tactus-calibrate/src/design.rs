@@ -1,4 +1,4 @@
-//! Which covering to order, given the pitch of the elements and their force resolution (paper Sec. 4).
+//! Which covering to order for a given pitch of the elements and force resolution (paper Sec. 4).
 //!
 //! Point location and two-point discrimination are best under a spread of about 0.3 element widths, but an array
 //! aliases unless the spread is at least [`NYQUIST_SIGMA`]; beyond that, every further spread costs acuity. So the
@@ -8,8 +8,8 @@
 //! t = (sigma_wanted * pitch - sigma_intercept) / sigma_per_mm                     t, pitch in mm
 //! ```
 //!
-//! Where the sensor's own spread (the intercept) is already beyond what is wanted, no covering gives less, and the
-//! thinnest one is the best there is: the paper's own case, 1.11 + 0.497 t against 0.955.
+//! If the sensor's own spread (the intercept) already exceeds the wanted one, no covering gives less, and the
+//! thinnest one is best. This is the paper's own case: 1.11 + 0.497 t against 0.955.
 //!
 //! The force resolution is `f = 1 / force_steps` of one press's whole signal, summed over the elements that it reaches.
 
@@ -20,65 +20,66 @@ use tactus_model::{Covering, Psf};
 
 use crate::acuity::{AcuityError, DiscretisingSensor, Grid, NYQUIST_FREQUENCY, NYQUIST_SIGMA, passed};
 
-/// What is asked of a covering.
+/// The requirements for a covering.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
     /// Distance between elements' centres, 0.05 to 100 mm.
     pub pitch_mm: f64,
-    /// Steps of the converter that one press's whole signal is worth, 2 to 65,536.
+    /// Converter steps in the whole signal of one press, 2 to 65,536.
     pub force_steps: u32,
-    /// Least spread in pitches, 0.05 to 10; [`NYQUIST_SIGMA`] forbids aliasing.
+    /// Least spread in pitches, 0.05 to 10; from [`NYQUIST_SIGMA`] on, there is no aliasing.
     pub min_sigma: f64,
     /// Spread against thickness, as measured.
     pub psf: Psf,
 }
 
-/// A covering's recommendation and what it costs.
+/// The recommended covering and its acuity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Design {
     /// Distance between elements' centres.
     pub pitch_mm: f64,
-    /// Steps of the converter that one press's whole signal is worth.
+    /// Converter steps in the whole signal of one press.
     pub force_steps: u32,
     /// Least spread that was wanted, in pitches.
     pub min_sigma: f64,
-    /// Spread in pitches without which frequencies beyond Nyquist's pass.
+    /// Least spread in pitches that prevents aliasing: [`NYQUIST_SIGMA`].
     pub nyquist_sigma: f64,
-    /// Spread in pitches under which a point is located best, and the least such; in hundredths over 0.05 to 1.
+    /// The spread under which a point is located best, the least if there are several; searched from 0.05 to 1 pitches in
+    /// steps of 0.01.
     pub best_for_locating: Acuity,
-    /// Spread in pitches under which two points are told apart best; in hundredths over 0.05 to 1.
+    /// The spread under which two points are told apart best; searched likewise.
     pub best_for_two_points: Acuity,
-    /// Thickness that gives the wanted spread by Eq. 4; negative if the sensor's own spread is already wider, `None`
+    /// Thickness that gives the least wanted spread by Eq. 4; negative if the sensor's own spread is already wider, `None`
     /// if the spread does not depend on thickness.
     pub wanted_thickness_mm: Option<f64>,
-    /// What to order.
+    /// The covering to order.
     pub recommended: Covered,
-    /// Why.
+    /// Why that covering is recommended.
     pub reason: Reason,
-    /// Coverings that are sold, and others in steps of 0.5 mm, by thickness.
+    /// The paper's coverings, the recommended one, and 0.5 to 6 mm in steps of 0.5 mm; by thickness.
     pub curve: Vec<Covered>,
 }
 
-/// How well places are told apart under a spread.
+/// How well positions are told apart under a spread.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Acuity {
     /// Spread, in pitches.
     pub sigma: f64,
-    /// Distinct readings of a point that goes over one element: an upper bound of the places that can be told.
+    /// Distinct readings of a point that moves across one element: an upper bound of the positions that can be told apart.
     pub locations: usize,
-    /// Separation at which two points first read otherwise than one of twice the force, mean over two hundred
-    /// places in an element; `None` if that never happens at one of them.
+    /// Separation at which two points first read differently from one of twice the force, mean over two hundred
+    /// positions in an element; `None` if that never happens at one of them.
     pub separation_mm: Option<f64>,
 }
 
-/// A covering and what it does.
+/// A covering and the acuity under it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Covered {
-    /// Thickness.
+    /// Thickness of the covering.
     pub thickness_mm: f64,
-    /// Whether it is one of the paper's four.
+    /// True if it is one of the paper's four.
     pub of_the_paper: bool,
-    /// How well places are told apart under it.
+    /// Spread and acuity under it.
     #[serde(flatten)]
     pub acuity: Acuity,
     /// Share of the amplitude that passes at the Nyquist frequency.
@@ -91,39 +92,28 @@ pub struct Covered {
 pub enum Reason {
     /// It gives the wanted spread.
     GivesWanted,
-    /// It gives the wanted spread, but is thicker than any that was measured: Eq. 4 is drawn out beyond its data.
+    /// It gives the wanted spread, but is thicker than any that was measured: Eq. 4 is extrapolated.
     BeyondMeasured,
     /// The sensor's own spread is wider than what is wanted, so the thinnest available covering comes nearest.
     SensorAlreadyWider,
-    /// What would do is thinner than the thinnest available covering, so that is taken.
+    /// The covering that would give the wanted spread is thinner than the thinnest available one, which is taken instead.
     ThinnerThanAvailable,
 }
 
 /// Why nothing can be recommended.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum DesignError {
     /// A number is out of range.
     #[error("{name} must be {range}, not {value}")]
-    OutOfRange {
-        /// Which.
-        name: &'static str,
-        /// What it may be, and what it is.
-        range: &'static str,
-        /// What was given.
-        value: f64,
-    },
+    OutOfRange { name: &'static str, range: &'static str, value: f64 },
     /// More spread is wanted than there is, and no covering adds any.
     #[error(
         "the model's spread is {sigma:.2} pitches under any covering (sigma_per_mm = 0), less than the {min_sigma:.2} wanted: \
          take a model with the spread of at least two coverings, or want less"
     )]
-    CoveringWithoutEffect {
-        /// The spread that there is, in pitches.
-        sigma: f64,
-        /// The spread that was wanted, in pitches.
-        min_sigma: f64,
-    },
-    /// The spread of a covering is none that the acuity can be computed of.
+    CoveringWithoutEffect { sigma: f64, min_sigma: f64 },
+    /// The acuity cannot be computed for the spread of a covering.
     #[error(transparent)]
     Acuity(#[from] AcuityError),
 }
@@ -186,7 +176,7 @@ impl Wanted {
         within("the spread's growth with thickness", self.psf.sigma_per_mm, 0.0..=f64::MAX, slope)
     }
 
-    /// The thinnest covering that gives the wanted spread, but none thinner than those that there are.
+    /// The thinnest covering that gives the wanted spread, but not thinner than the thinnest available one.
     fn choose(&self, wanted_thickness_mm: Option<f64>) -> Result<(f64, Reason), DesignError> {
         let [thinnest, .., thickest] = Covering::PAPER.map(|covering| covering.thickness_mm);
         let without = self.psf.sigma_intercept_mm / self.pitch_mm;
@@ -234,7 +224,7 @@ impl Wanted {
     }
 }
 
-/// Separation, endless if two points are never told apart.
+/// Separation; infinite if two points are never told apart.
 fn apart_mm(acuity: &Acuity) -> f64 {
     acuity.separation_mm.unwrap_or(f64::INFINITY)
 }

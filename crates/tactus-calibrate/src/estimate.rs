@@ -1,4 +1,4 @@
-//! An estimated number.
+//! A number with its standard error.
 
 use serde::Serialize;
 
@@ -8,14 +8,14 @@ const Z_95: f64 = 1.959_963_984_540_054;
 /// An estimated number with its standard error; both in the same unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
-    /// The number.
+    /// The estimate itself.
     pub value: f64,
-    /// Its standard error.
+    /// Standard deviation of the estimate's error.
     pub standard_error: f64,
 }
 
 impl Estimate {
-    /// A number whose variance is known.
+    /// An estimate of known variance; negative variances, which rounding can cause, count as 0.
     pub(crate) fn new(value: f64, variance: f64) -> Self {
         Self { value, standard_error: variance.max(0.0).sqrt() }
     }
@@ -26,12 +26,12 @@ impl Estimate {
         [self.value - reach, self.value + reach]
     }
 
-    /// True if the 95 % interval holds a number.
+    /// True if the 95 % interval contains `truth`.
     pub fn covers(&self, truth: f64) -> bool {
         (truth - self.value).abs() <= Z_95 * self.standard_error
     }
 
-    /// The same in another unit, one of which is `unit` of the former ones.
+    /// The same in another unit, which is `unit` times the present one.
     #[must_use]
     pub fn in_units_of(&self, unit: f64) -> Self {
         Self { value: self.value / unit, standard_error: self.standard_error / unit.abs() }

@@ -4,11 +4,11 @@
 //! |---|---|
 //! | stuck | one and the same reading in every frame, while others have noise |
 //! | noisy | a standard deviation at rest several times the median element's |
-//! | cross-wired | its readings follow, press by press, what another element must feel, and not what itself must |
-//! | dead | pressed as hard as others, it does not rise above its noise |
+//! | cross-wired | press by press, its readings follow the prediction for another element, not its own |
+//! | dead | pressed as hard as the others, it does not rise above its noise |
 //!
-//! What an element must feel is the base model's equivalent indentation. An element is judged only if it was pressed
-//! near enough: those that were not are listed, so that nobody takes silence for health.
+//! The prediction is the base model's equivalent indentation. An element is judged only if a press came near enough.
+//! The others are listed, so that an element without a fault is not mistaken for one that was tested.
 //!
 //! # Source
 //! Paper, Sec. 2.2: two elements "responded to a stimulus of one adjacent element, but not to the element itself".
@@ -23,25 +23,25 @@ use crate::{
     setting::{Declared, across, goes_across},
 };
 
-/// Noise of so many times the median is no chance.
+/// An element is noisy if its noise is more than this many times the median.
 const NOISY: f64 = 3.0;
-/// Frames at rest that it takes to know a noise.
+/// Frames at rest needed to estimate noise.
 const FRAMES_LEAST: u64 = 30;
-/// An element counts as pressed if it must have felt this share of what a press at its own centre gives.
+/// An element counts as pressed if its predicted indentation is this share of that from a press at its centre.
 const PRESSED: f64 = 0.85;
-/// A dead element rises less than this share of the stronger ones, and than these many standard deviations.
+/// A dead element rises less than this share of the stronger elements, and less than this many standard deviations.
 const DEAD: [f64; 2] = [0.02, 8.0];
-/// Likeness is the cosine between readings and what must have been felt; a stranger's must exceed the own by this.
+/// Likeness is the cosine between readings and prediction; another element's must exceed the element's own by this.
 const STRANGER: f64 = 0.02;
-/// Places around an element that it takes to tell whose signal it gives.
+/// Distinct places needed to tell which element's signal an element gives.
 pub(crate) const WIRING_PLACES_LEAST: usize = 4;
 
 /// What is wrong with an element.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FaultyElement {
-    /// The element.
+    /// Its row-major index.
     pub element: usize,
-    /// What kind of fault it is.
+    /// The fault.
     pub kind: FaultKind,
     /// The numbers that show it, in a sentence.
     pub evidence: String,
@@ -51,16 +51,16 @@ pub struct FaultyElement {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum FaultKind {
-    /// It answers to nothing.
+    /// It responds to no press.
     Dead,
     /// It always reads the same.
     Stuck {
-        /// That reading.
+        /// The constant reading.
         counts: f64,
     },
     /// It gives another element's signal.
     CrossWired {
-        /// The other one.
+        /// Index of the other element.
         answers_for: usize,
     },
     /// Its noise is far above the others'.
@@ -70,12 +70,12 @@ pub enum FaultKind {
     },
 }
 
-/// The verdicts.
+/// The result of judging every element.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Health {
-    /// What was found, in order of the elements.
+    /// Faulty elements, by index.
     pub faults: Vec<FaultyElement>,
-    /// Elements that no press came near enough to: nothing is known of their response.
+    /// Elements that no press came near enough to: nothing is known about their response.
     pub not_judged: Vec<usize>,
 }
 
@@ -91,7 +91,7 @@ impl Health {
         })
     }
 
-    /// For each element, true if it was judged and nothing speaks against it.
+    /// For each element, true if it was judged and has no fault.
     pub(crate) fn sound(&self, elements: usize) -> Vec<bool> {
         let faulty = |element: usize| self.faults.iter().any(|fault| fault.element == element);
         (0..elements).map(|element| !faulty(element) && !self.not_judged.contains(&element)).collect()
@@ -132,25 +132,26 @@ pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &SensorPo
 }
 
 fn stuck(readings: &Readings, element: usize, typical_noise: f64) -> Option<f32> {
-    // Its noise is that of rounding; where that is all that others have, a steady reading is no fault.
+    // Its noise is the rounding's. If the others have no more noise, a constant reading is no fault.
     let rounding = readings.noise_rms_counts[element].unwrap_or(0.0);
     readings.constant_counts[element]
         .filter(|_| typical_noise > 2.0 * rounding && readings.frames >= FRAMES_LEAST)
 }
 
-/// Every press at its deepest, as the elements must have felt it and as they read it.
+/// The deepest dwell of every press: predicted indentations and measured rises.
 struct Trials {
-    /// By press and element.
+    /// Predicted indentation by press and element.
     felt: Vec<Vec<f64>>,
+    /// Measured rise by press and element, in counts.
     rises: Vec<Vec<f64>>,
     /// Standard deviation of a rise in units of one frame's noise.
     spread: Vec<f64>,
     places_mm: Vec<[f64; 2]>,
-    /// Greatest that each element felt of a press, over what it would have felt of it at its centre.
+    /// Greatest predicted indentation of each element, as a share of that from the same press at its centre.
     reach: Vec<f64>,
-    /// Rise of the stronger among the elements that were pressed; dead ones are not among them, be they many.
+    /// 90th percentile of the rises of pressed elements, which dead ones hardly influence.
     strong_rise: f64,
-    /// Greatest rise of any in units of its standard deviation.
+    /// Greatest rise of any element in units of its standard deviation.
     clearest: f64,
     /// True if the presses go across the sensor: in one patch all elements rise and fall alike.
     across: bool,
@@ -214,7 +215,7 @@ impl Trials {
 
     fn verdict(&self, element: usize, noise: f64) -> Verdict {
         let [share, deviations] = DEAD;
-        // Presses that raise nothing are too light to judge by, or everything is dead.
+        // If no element rises, the presses are too light to judge by, or every element is dead.
         if self.reach[element] < PRESSED || self.clearest < deviations {
             return Verdict::Unknown;
         }
@@ -234,13 +235,13 @@ impl Trials {
             .map(|other| (other, self.likeness(element, other)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         match best {
-            // The stranger's likeness must be that of a signal, not of noise.
+            // The other element's likeness must come from a signal, not from noise.
             Some((other, likeness))
                 if other != element && likeness > own + STRANGER && 1.0 - likeness < (1.0 - own) / 4.0 =>
             {
                 let evidence = format!(
-                    "over {} presses its readings are like what element {other} must feel (cosine {likeness:.4}), not like what \
-                     itself must ({own:.4})",
+                    "over {} presses its readings follow the prediction for element {other} (cosine {likeness:.4}), not its own \
+                     ({own:.4})",
                     self.rises.len()
                 );
                 Verdict::Faulty(FaultKind::CrossWired { answers_for: other }, evidence)
@@ -256,7 +257,7 @@ impl Trials {
         rises.max_by(|a, b| a[0].total_cmp(&b[0])).unwrap_or([0.0, 1.0])
     }
 
-    /// Cosine between what an element read and what another must have felt, whatever the sign of its sensitivity.
+    /// Cosine between the readings of one element and the prediction for another, whatever the sign of the sensitivity.
     fn likeness(&self, element: usize, other: usize) -> f64 {
         let (mut both, mut read, mut felt) = (0.0, 0.0, 0.0);
         for (rises, felts) in self.rises.iter().zip(&self.felt) {

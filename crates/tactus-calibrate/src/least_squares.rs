@@ -6,20 +6,20 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Damping beyond which no step helps any more.
+/// Damping at which the search ends.
 const DAMPING_MAX: f64 = 1e10;
 const ROUNDS_MAX: usize = 100;
-/// A step that promises to lessen the cost by less than this share of it is the last.
+/// The search ends when a step would reduce the cost by less than this share.
 const PROMISE_LEAST: f64 = 1e-10;
 
-/// The normal equations of one round, gathered reading by reading.
+/// The normal equations of one round, accumulated observation by observation.
 #[derive(Debug, Clone)]
 pub(crate) struct Normal {
     gram: DMatrix<f64>,
     right: DVector<f64>,
     /// Sum of the squared residuals, weighted.
     pub(crate) cost: f64,
-    /// Number of readings.
+    /// Number of observations.
     pub(crate) readings: usize,
 }
 
@@ -29,7 +29,7 @@ impl Normal {
         Self { gram, right, cost: 0.0, readings: 0 }
     }
 
-    /// Adds a reading: its residual (measured less predicted), the prediction's derivatives by the parameters that it
+    /// Adds an observation: its residual (measured less predicted), the prediction's derivatives by the parameters that it
     /// depends on, and its weight, one over its variance.
     pub(crate) fn add(&mut self, residual: f64, slopes: &[(usize, f64)], weight: f64) {
         self.cost += weight * residual * residual;
@@ -43,7 +43,7 @@ impl Normal {
         }
     }
 
-    /// Adds an element's readings in one press, which all stand on one reading at rest, whose error they share.
+    /// Adds an element's observations in one press, which share one reading at rest and its error.
     ///
     /// With `n_j` frames in a reading and `m` at rest, of one noise, the covariance is that of `diag(1/n) + 1/m`; its
     /// inverse is `diag(n) - n n^T / (m + sum n)` (Sherman and Morrison).
@@ -93,7 +93,7 @@ impl Normal {
     }
 }
 
-/// The mean over some frames, held against a prediction.
+/// The mean over some frames, compared with a prediction.
 #[derive(Debug, Clone)]
 pub(crate) struct Observation {
     /// Measured less predicted.
@@ -114,7 +114,7 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// The factor by which variances grow because the model does not hold to the noise; at least 1.
+    /// The factor by which variances grow if residuals exceed the noise; at least 1.
     pub(crate) fn inflation(&self) -> f64 {
         self.misfit.max(1.0)
     }
@@ -131,7 +131,7 @@ pub(crate) fn minimise(
 ) -> Option<Fit> {
     let mut at = DVector::from_vec(start);
     let mut normal = evaluate(at.as_slice())?;
-    // Damping as by Nielsen: less after a step that kept its promise, more and more after steps that did not help.
+    // Nielsen's schedule: less damping after a step that reduced the cost as predicted, ever more after steps that failed.
     let (mut damping, mut growth) = (1e-6, 2.0);
     for _ in 0..ROUNDS_MAX {
         let step = normal.step(free, damping);
@@ -164,7 +164,7 @@ struct Scaled {
     cholesky: Cholesky<f64, nalgebra::Dyn>,
 }
 
-/// `None` if the matrix, of which the lower triangle counts, is singular.
+/// Uses the lower triangle only. `None` if the matrix is singular.
 fn scaled(mut gram: DMatrix<f64>) -> Option<Scaled> {
     let scale = gram.diagonal().map(|square| 1.0 / square.sqrt());
     if !scale.iter().all(|value| value.is_finite()) {
@@ -176,7 +176,7 @@ fn scaled(mut gram: DMatrix<f64>) -> Option<Scaled> {
         }
     }
     let cholesky = Cholesky::new(gram)?;
-    // A pivot of the size of rounding errors: the parameters cannot be told apart.
+    // A pivot of the size of rounding errors: the observations do not determine the parameters.
     let least = cholesky.l_dirty().diagonal().min();
     (least > 1e-7).then_some(Scaled { scale, cholesky })
 }

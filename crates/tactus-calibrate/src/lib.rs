@@ -1,11 +1,11 @@
 //! Characterisation of a tactile array from measured presses, and the resolution that its covering allows.
 //!
-//! [`ReadingsBuilder`] makes presses and dwells of frames; [`calibrate`] takes them through the steps of the paper's Sections 2
+//! [`ReadingsBuilder`] makes presses and dwells from frames; [`calibrate`] takes them through the steps of the paper's Sections 2
 //! and 3: faulty elements, registration, element response, point spread, spread against thickness. Every number comes
-//! with its standard error, which holds the errors of the steps before.
+//! with its standard error, which includes the errors of the earlier steps.
 //!
-//! [`acuity`] is how finely a row of elements that round can locate and tell apart (paper, Sec. 4); [`design`] makes of
-//! it which covering to order.
+//! [`acuity`] computes how finely a row of quantising elements can locate points and tell them apart (paper, Sec. 4).
+//! [`design`] derives from it which covering to order.
 //!
 //! This crate has no I/O, no async, no clock and no global random numbers.
 

@@ -1,11 +1,11 @@
 //! Order statistics.
 
-/// The middle value, the upper of two; `None` of nothing.
+/// The middle value, the upper of two; `None` without values.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// The value below which this share of the values lies; `None` of nothing.
+/// The value below which this share of the values lies; `None` without values.
 pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]

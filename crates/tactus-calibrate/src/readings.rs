@@ -1,4 +1,4 @@
-//! What was measured: frames gathered into presses, each with its dwells and the reading at rest before it.
+//! What was measured: frames grouped into presses, each with its dwells and the reading at rest before it.
 
 mod segment;
 
@@ -9,12 +9,12 @@ use tactus_schema::table::RowView;
 
 use segment::{Segment, SegmentKind};
 
-/// Above this height nothing touches the covering, however wrong the believed surface may be.
+/// Above this height nothing touches the covering, even if the declared surface is wrong.
 const CLEAR_MM: f64 = 0.3;
-/// A press that holds so many depths shows by these how an element answers.
+/// A press that holds at least this many depths shows the response without frames in motion.
 const STEPS_LEAST: usize = 3;
 
-/// Frames gathered into what calibration works on.
+/// Frames grouped into presses and dwells: the input of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Readings {
     /// Number of elements.
@@ -23,18 +23,18 @@ pub struct Readings {
     pub runs: Vec<String>,
     /// The presses, run by run, in order.
     pub presses: Vec<MeasuredPress>,
-    /// Of each element, its standard deviation at rest, at least that of rounding to the converter's step; none of an
+    /// Standard deviation of each element at rest, at least that of rounding to the converter's step; `None` for an
     /// element that was never at rest.
     pub noise_rms_counts: Vec<Option<f64>>,
-    /// Of each element, its mean at rest, and the standard error of that from its scatter between rests.
+    /// Mean of each element at rest, and its standard error from the scatter between rests.
     pub rest_counts: Vec<Option<[f64; 2]>>,
-    /// Of each element, its reading if that was the same in every frame.
+    /// Reading of each element that read the same in every frame.
     pub constant_counts: Vec<Option<f32>>,
     /// Frames in all.
     pub frames: u64,
     /// Frames at rest.
     pub frames_at_rest: u64,
-    /// Frames left out because an element read what no noise explains.
+    /// Frames left out because an element's reading is an outlier.
     pub frames_left_out: u64,
 }
 
@@ -45,7 +45,7 @@ pub struct MeasuredPress {
     pub run: usize,
     /// Its index in the run.
     pub index: i32,
-    /// Where it was; robot frame.
+    /// Position in the plane; robot frame.
     pub place_mm: [f64; 2],
     /// Thickness of the covering in place.
     pub covering_mm: f64,
@@ -53,7 +53,7 @@ pub struct MeasuredPress {
     pub indenter: Arc<str>,
     /// The reading at rest before it, if there was one.
     pub rest: Option<Rest>,
-    /// Its dwells, in order of time: where depths were held, the mean of each; else every frame of its loading too.
+    /// Its dwells, in order of time: the mean of each held depth and, if few depths were held, every frame of the loading too.
     pub dwells: Vec<Dwell>,
 }
 
@@ -85,7 +85,7 @@ pub struct ReadingsBuilder {
     elements: usize,
     step_counts: f64,
     readings: Readings,
-    /// The frames of the stretch of time that is not over yet.
+    /// The frames of the stretch of time in progress.
     segment: Segment,
     rest: Option<Rest>,
     loading: Vec<Dwell>,
@@ -105,14 +105,14 @@ struct RestSums {
 impl MeasuredPress {
     /// Rise of an element at a dwell above its rest, and the variance of that in units of one frame's.
     ///
-    /// `None` if nothing was at rest before the press, or the element is none.
+    /// `None` if there is no rest before the press, or the array has no such element.
     pub fn rise(&self, dwell: &Dwell, element: usize) -> Option<[f64; 2]> {
         let rest = self.rest.as_ref()?;
         let rise = dwell.counts.get(element)? - rest.counts.get(element)?;
         Some([rise, 1.0 / dwell.frames as f64 + 1.0 / rest.frames as f64])
     }
 
-    /// The dwell that went deepest.
+    /// The deepest dwell.
     pub fn deepest(&self) -> Option<&Dwell> {
         self.dwells.iter().min_by(|a, b| a.height_mm.total_cmp(&b.height_mm))
     }
@@ -124,7 +124,7 @@ impl MeasuredPress {
 }
 
 impl ReadingsBuilder {
-    /// Nothing gathered yet, of an array.
+    /// Starts without rows; every row must have one count for each element of `array`.
     pub fn new(array: &Array) -> Self {
         let elements = array.elements();
         Self {
@@ -187,13 +187,13 @@ impl ReadingsBuilder {
         }
     }
 
-    /// Everything that was gathered.
+    /// Ends the last press and computes noise, rests and constant readings.
     pub fn finish(mut self) -> Readings {
         self.close();
         self.end_press();
         let Self { mut readings, noise, range_counts, step_counts, .. } = self;
         readings.presses.retain(|press| !press.dwells.is_empty());
-        // Frames in motion are for presses that are all there is: at one place, with hardly a depth held.
+        // Frames in motion count only if all presses are at one place and hold hardly any depth.
         let stepped = readings.presses.iter().any(|press| press.held() >= STEPS_LEAST);
         if stepped || distinct_places(readings.presses.iter().map(|press| press.place_mm)).len() > 1 {
             for press in &mut readings.presses {
@@ -214,7 +214,7 @@ impl ReadingsBuilder {
         readings
     }
 
-    /// Ends the stretch of time in hand and makes of it what it is.
+    /// Ends the stretch of time in progress and stores it as a rest, a dwell or frames of loading.
     fn close(&mut self) {
         let segment = std::mem::take(&mut self.segment);
         match segment.kind {
@@ -262,7 +262,7 @@ impl ReadingsBuilder {
         });
     }
 
-    /// Gives the press in hand its frames in motion; whether they stay is decided when all is known.
+    /// Gives the press in progress its frames in motion; [`ReadingsBuilder::finish`] decides whether they stay.
     fn end_press(&mut self) {
         let loading = std::mem::take(&mut self.loading);
         if let Some(press) = self.readings.presses.last_mut() {
@@ -287,7 +287,7 @@ impl RestSums {
     }
 }
 
-/// Places at least 50 um apart that were pressed, in order.
+/// Places that are at least 50 um apart, in order.
 pub fn distinct_places(places_mm: impl IntoIterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
     let mut places: Vec<[f64; 2]> = Vec::new();
     for [x, y] in places_mm {

@@ -45,7 +45,7 @@ fn a_press_has_its_dwells_and_the_rest_before_it() {
     assert_eq!(press.rest, Some(Rest { counts: vec![100.0, 50.0], frames: 10 }));
     let dwells: Vec<(f64, f64, usize)> =
         press.dwells.iter().map(|dwell| (dwell.height_mm, dwell.counts[0], dwell.frames)).collect();
-    // The first and the last frame of a hold are not sure to stand still.
+    // The tip may move during the first and the last frame of a hold.
     assert_eq!(dwells, [(-0.2, 300.0, 6), (-0.4, 500.0, 6), (-0.6, 700.0, 6)]);
     assert_eq!(press.rise(&press.dwells[1], 0), Some([400.0, 1.0 / 6.0 + 1.0 / 10.0]));
 }

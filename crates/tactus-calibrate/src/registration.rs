@@ -9,12 +9,12 @@
 //!
 //! with `u_e` the equivalent indentation of the base model. All of it is fitted at once by weighted least squares:
 //! origin, rotation, surface, the spread of the covering in place, one curvature `k` for all, and a sensitivity for
-//! each element; so neither unequal elements nor a wrong spread move the result. The scale is no part of the fit: it
-//! is fitted once more beside all others, as a check. It should be 1.
+//! each element; so neither unequal elements nor a wrong spread move the result. The scale is fixed at 1 in this
+//! fit. A second fit, which frees it, is a check: the scale should be 1.
 //!
 //! # Source
-//! Paper, Sec. 2.1: two points near opposite corners, where a light press excites an element's neighbours alike, give
-//! orientation and place; the surface is measured at one point.
+//! Paper, Sec. 2.1: two points near opposite corners, at which a light press excites an element's neighbours equally, give
+//! orientation and position; the surface is measured at one point.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -28,13 +28,13 @@ use crate::{
     setting::{Declared, Setting, across, goes_across},
 };
 
-/// Places that must be pressed for a place of the sensor to follow.
+/// Distinct places needed to fit the sensor's pose.
 const PLACES_LEAST: usize = 4;
-/// Beyond so many times the noise, presses in one patch say nothing sure of the sensor's place.
+/// If residuals exceed this many times the noise, presses in one patch do not determine the sensor's pose.
 const PATCH_MISFIT: f64 = 3.0;
-/// An element takes part if it rose so many standard deviations of its noise.
+/// An element takes part if it rose by more than this many standard deviations of its noise.
 const RISE_LEAST: f64 = 20.0;
-/// A press is left out if its misfit is so many times the median press's.
+/// A press is left out if its misfit exceeds this many times the median press's.
 const OUTLYING: f64 = 6.0;
 
 /// Parameters before the elements' sensitivities.
@@ -58,15 +58,15 @@ pub struct RegistrationFit {
     pub surface_mm: Option<Estimate>,
     /// Distances in the robot's frame over those declared for the sensor.
     pub scale: Option<Estimate>,
-    /// Spread under the covering in place, as these presses show it.
+    /// Spread under the covering in place, fitted to the same presses.
     pub sigma_mm: Estimate,
-    /// The covering in place.
+    /// Thickness of the covering in place.
     pub covering_mm: f64,
-    /// Ids of the runs that it rests on.
+    /// Ids of the runs used.
     pub runs: Vec<String>,
-    /// Presses that it rests on.
+    /// Number of presses used.
     pub presses: usize,
-    /// Presses left out because the others contradict them: index of the run, index of the press.
+    /// Outlying presses that were left out: id of the run, index of the press.
     pub left_out: Vec<(String, i32)>,
     /// Root mean square of the residuals in units of the noise: 1 if the model holds.
     pub residual_in_noise: f64,
@@ -82,19 +82,19 @@ impl RegistrationFit {
     }
 }
 
-/// What later steps take from a registration.
+/// The sensor's pose in the robot's frame with its errors, as later steps use it.
 #[derive(Debug, Clone)]
 pub(crate) struct SensorPose {
     pub(crate) setting: Setting,
     pub(crate) sigma_mm: f64,
-    /// Presses that contradict the others: index of the run, index in it.
+    /// Outlying presses: index of the run, index in it.
     pub(crate) contradicting: Vec<(usize, i32)>,
     /// Covariance of origin x, origin y, rotation in degrees, surface, sigma.
     pub(crate) covariance: DMatrix<f64>,
 }
 
 impl SensorPose {
-    /// As declared, and taken for exact.
+    /// As declared, without errors.
     pub(crate) fn declared(declared: &Declared, covering_mm: f64) -> Self {
         let covariance = DMatrix::zeros(Self::UNCERTAIN, Self::UNCERTAIN);
         Self {
@@ -105,15 +105,15 @@ impl SensorPose {
         }
     }
 
-    /// Number of its parameters that are not sure.
+    /// Number of its uncertain parameters.
     pub(crate) const UNCERTAIN: usize = 5;
 
-    /// True if nothing speaks against a press.
+    /// True if the press is no outlier.
     pub(crate) fn admits(&self, press: &MeasuredPress) -> bool {
         !self.contradicting.contains(&(press.run, press.index))
     }
 
-    /// With one of its unsure parameters moved.
+    /// The same with one of its uncertain parameters moved.
     pub(crate) fn moved(&self, parameter: usize, by: f64) -> Self {
         let mut moved = self.clone();
         match parameter {
@@ -126,7 +126,7 @@ impl SensorPose {
     }
 }
 
-/// Fits the registration; without one, says why not.
+/// Fits the registration; the error is a sentence that says what is missing.
 pub(crate) fn register(
     declared: &Declared,
     readings: &Readings,
@@ -151,7 +151,7 @@ pub(crate) fn register(
     let mut problem = Problem::new(declared, readings, sound, presses)?;
     let mut contradicting = Vec::new();
     let mut fit = problem.fit(None).ok_or(UNDETERMINED)?;
-    // One by one: what a gross outlier does to the fit may make others look like outliers.
+    // One by one: one gross outlier may make other presses look like outliers.
     while let Some(outlying) = problem.outlying(&fit) {
         if problem.presses.len() <= PLACES_LEAST || contradicting.len() * 10 >= count {
             break;
@@ -191,11 +191,11 @@ pub(crate) fn register(
 
 const UNDETERMINED: &str = "the presses do not determine the sensor's place";
 
-/// The readings and what may move to explain them.
+/// The readings and the parameters that are fitted to them.
 struct Problem<'a> {
     declared: &'a Declared,
     presses: Vec<&'a MeasuredPress>,
-    /// Elements that take part, and their noise.
+    /// Elements that take part, and their noise in counts.
     elements: Vec<(usize, f64)>,
     start: Vec<f64>,
     free: Vec<bool>,
@@ -224,7 +224,7 @@ impl<'a> Problem<'a> {
         let mut free = vec![true; start.len()];
         free[ROTATION] = goes_across(declared, presses.iter().copied());
         free[SCALE] = false;
-        // Two depths cannot tell a surface that stands elsewhere from a response that is curved.
+        // With two depths a shifted surface cannot be told from a curved response.
         free[SURFACE] = depths.len() >= 3;
         free[CURVATURE] = depths.len() >= 2;
         Ok(Self { declared, presses, elements, start, free })
@@ -236,7 +236,7 @@ impl<'a> Problem<'a> {
         minimise(start.clone(), &free, |parameters| self.normal(parameters))
     }
 
-    /// The check: the scale, fitted beside all others.
+    /// The check: the scale, fitted with all other parameters.
     fn scale(&self, fit: &Fit) -> Option<Estimate> {
         let fit = self.free[ROTATION].then(|| self.fit(Some(fit)))??;
         Some(Estimate::new(fit.parameters[SCALE], fit.covariance[(SCALE, SCALE)] * fit.inflation()))
@@ -250,7 +250,7 @@ impl<'a> Problem<'a> {
         Some(normal)
     }
 
-    /// The press that the model misses most, if it misses it by far more than others.
+    /// The press with the greatest misfit, if that is an outlier.
     fn outlying(&self, fit: &Fit) -> Option<usize> {
         let mut costs = vec![(0.0, 0_u32); self.presses.len()];
         self.each(&fit.parameters, |press, noise, readings| {
@@ -268,7 +268,7 @@ impl<'a> Problem<'a> {
         worst.filter(|(_, misfit)| **misfit > limit).map(|(press, _)| press)
     }
 
-    /// Gives the readings of every element in every press: index of the press, noise, readings.
+    /// Calls `take` for every element in every press with the press's index, the noise and the observations.
     fn each(&self, parameters: &[f64], mut take: impl FnMut(usize, f64, &[Observation])) -> Option<()> {
         let (model, setting) = (self.model(parameters)?, setting(parameters));
         for (index, press) in self.presses.iter().enumerate() {
@@ -358,7 +358,7 @@ fn setting(parameters: &[f64]) -> Setting {
     }
 }
 
-/// Sound elements that rose well above their noise, each with it.
+/// Sound elements that rose well above their noise, each with its noise.
 fn taking_part(readings: &Readings, sound: &[bool], presses: &[&MeasuredPress]) -> Vec<(usize, f64)> {
     let rises = |element: usize, noise: f64| {
         presses.iter().any(|press| {
@@ -375,7 +375,7 @@ fn taking_part(readings: &Readings, sound: &[bool], presses: &[&MeasuredPress]) 
         .collect()
 }
 
-/// How a place on the sensor moves with the setting: derivatives of its x and y.
+/// Derivatives of a position on the sensor, x and y, by the parameters of the setting.
 struct Slopes {
     origin: [[f64; 2]; 2],
     rotation_deg: [f64; 2],

@@ -5,7 +5,7 @@ fn registered(declared: &Declared, readings: &Readings) -> RegistrationFit {
     register(declared, readings, &vec![true; readings.elements]).unwrap().0
 }
 
-/// Standard errors between an estimate and the truth.
+/// Distance of an estimate from the truth, in standard errors.
 fn off(estimate: Estimate, truth: f64) -> f64 {
     ((estimate.value - truth) / estimate.standard_error).abs()
 }
@@ -38,7 +38,7 @@ fn a_stage_whose_steps_are_wrong_shows_in_the_scale() {
         sensor.press(place_mm, THIN_MM, &[0.2, 0.4, 0.6]);
     }
     let (declared, readings) = sensor.readings();
-    // It still meets the sensor where that is, so that no place comes out wrong.
+    // Near the sensor the stage's positions are right, so the fitted pose is not wrong.
     let scale = registered(&declared, &readings).scale.unwrap();
     assert!(scale.covers(1.0), "{scale:?}");
 

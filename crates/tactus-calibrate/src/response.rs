@@ -1,4 +1,4 @@
-//! How each element answers to presses on its own centre (paper, Sec. 2.2 and Fig. 2).
+//! How each element responds to presses at its own centre (paper, Sec. 2.2 and Fig. 2).
 //!
 //! The rise of element `e` over its rest, in a press near its centre, is fitted as
 //!
@@ -8,12 +8,12 @@
 //! own quadratic     s_e (u + k_e u^2)
 //! ```
 //!
-//! over the equivalent indentation `u` of the press: its depth below the fitted surface, times what the base model says
-//! of its distance from the centre (a factor near 1). All dwells of a press stand on one reading at rest; its error
-//! is common to them, which the weights know.
+//! over the equivalent indentation `u` of the press: its depth below the fitted surface, times the base model's factor for
+//! its distance from the centre (near 1). All dwells of a press share one reading at rest; the weights account for this
+//! common error.
 //!
-//! Which of the three the data want is decided on dwells that were held out: each fifth is predicted from the others, and
-//! a form with more parameters must beat the one before it by two standard errors over the elements.
+//! Held-out dwells decide between the three forms: each fifth is predicted from the others, and a form with more
+//! parameters must beat the previous best by two standard errors over the elements.
 
 mod fit;
 
@@ -32,17 +32,17 @@ use crate::{
 
 use fit::{CentrePress, FittedForm, HeldOutError, fit, heldout};
 
-/// A press counts as one at an element's centre if the element feels this share of what it would feel there.
+/// A press counts as one at an element's centre if its predicted indentation is this share of that at the centre.
 const NEAR: f64 = 0.9;
-/// So many elements tell by themselves how much a gain scatters between them.
+/// From this many elements on, the scatter of the gain is taken between elements, else between dwells.
 const ELEMENTS_LEAST: usize = 5;
-/// Presses with so many dwells are preferred to others.
+/// Presses with at least this many dwells are preferred to others.
 const DWELLS_LEAST: usize = 3;
 /// A response begins flat if its slope is fewer standard errors than this, or its curvature at the deepest press
 /// has more than this many times the share of the slope.
 const FLAT_ERRORS: f64 = 5.0;
 const FLAT_CURVATURE: f64 = 3.0;
-/// A step to find how results move with the sensor's place, in mm or degrees.
+/// Step of the numeric derivatives by the sensor's pose, in mm or degrees.
 const STEP: f64 = 1e-4;
 
 /// A form of the response.
@@ -61,7 +61,7 @@ impl ResponseForm {
     /// Every form, from few parameters to many.
     pub const ALL: [Self; 3] = [Self::Linear, Self::SharedQuadratic, Self::OwnQuadratic];
 
-    /// Its name in words.
+    /// Its name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -74,35 +74,36 @@ impl ResponseForm {
 /// The elements' responses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResponseFit {
-    /// The form that the data want.
+    /// The selected form.
     pub form: ResponseForm,
-    /// How each form fares.
+    /// The residuals of each form that could be fitted.
     pub trials: Vec<Trial>,
     /// The common curvature `k` of the shared quadratic, in 1/mm, if there is such a fit.
     pub shared_quadratic_per_mm: Option<Estimate>,
-    /// Root mean square of the residuals of the wanted form in units of the noise: 1 if the form holds.
+    /// Root mean square of the residuals of the selected form in units of the noise: 1 if the form holds.
     pub residual_in_noise: f64,
-    /// The elements, in order; faulty ones and those without a press at their centre are missing.
+    /// The elements' responses by index, without faulty elements and those without a press at their centre.
     pub elements: Vec<ElementResponse>,
-    /// The cross-wired elements, by presses at the centres of those whose signal they give; no fit rests on them.
+    /// Responses of the cross-wired elements, from presses at the centres of the elements whose signals they give. No other
+    /// fit uses them.
     pub cross_wired: Vec<ElementResponse>,
 }
 
-/// How one form fares.
+/// The residuals of one form.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Trial {
-    /// The form.
+    /// The form that was fitted.
     pub form: ResponseForm,
     /// Root mean square of the residuals, in counts.
     pub rms_counts: f64,
-    /// The same on dwells that took no part in the fit; `None` where there are too few dwells to hold any out.
+    /// The same on dwells that took no part in the fit; `None` if there are too few dwells to hold any out.
     pub heldout_rms_counts: Option<f64>,
 }
 
 /// One element's response.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ElementResponse {
-    /// The element.
+    /// Row-major index of the element.
     pub element: usize,
     /// Equivalent indentation in mm and rise in counts of each dwell.
     pub points: Vec<[f64; 2]>,
@@ -110,15 +111,15 @@ pub struct ElementResponse {
     pub linear_counts_per_mm: Estimate,
     /// `s_e` and `k_e` of the form with own curvatures, in counts per mm and 1/mm, if there is such a fit.
     pub quadratic: Option<[Estimate; 2]>,
-    /// `s_e` of the form that the data want; its error holds that of the sensor's place and surface too.
+    /// `s_e` of the selected form; its error includes those of the sensor's pose and surface.
     pub sensitivity_counts_per_mm: Estimate,
-    /// `k` of that form; 0 if it is linear.
+    /// `k` of the selected form; 0 if it is linear.
     pub quadratic_per_mm: Estimate,
 }
 
 impl ElementResponse {
-    /// True if the response begins so flat that its slope there is hardly told from 0, or is soon overtaken by its
-    /// curvature: then the two numbers say little apart from each other.
+    /// True if the slope at the surface cannot be told from 0, or the curvature soon dominates it: then the two numbers are
+    /// meaningful only together.
     pub fn begins_flat(&self) -> bool {
         let deepest_mm = self.points.iter().map(|[u_mm, _]| u_mm.abs()).fold(0.0, f64::max);
         let sensitivity = self.sensitivity_counts_per_mm;
@@ -126,30 +127,30 @@ impl ElementResponse {
             || (self.quadratic_per_mm.value * deepest_mm).abs() > FLAT_CURVATURE
     }
 
-    /// The indentation `u` that gives a rise in counts: the response turned round. `None` beyond its turning point.
+    /// The indentation `u` that gives a rise in counts: the inverse response. `None` beyond its turning point.
     pub fn indentation_mm(&self, rise_counts: f64) -> Option<f64> {
-        turned_round(rise_counts / self.sensitivity_counts_per_mm.value, self.quadratic_per_mm.value)
+        inverted(rise_counts / self.sensitivity_counts_per_mm.value, self.quadratic_per_mm.value)
     }
 }
 
 /// `u` of `linear = u + k u^2`; the root that goes to `linear` as `k` goes to 0.
-pub(crate) fn turned_round(linear_mm: f64, quadratic_per_mm: f64) -> Option<f64> {
+pub(crate) fn inverted(linear_mm: f64, quadratic_per_mm: f64) -> Option<f64> {
     let square = 1.0 + 4.0 * quadratic_per_mm * linear_mm;
     (square > 0.0).then(|| 2.0 * linear_mm / (1.0 + square.sqrt()))
 }
 
-/// What later steps take from the responses.
+/// The responses with their errors, as later steps use them.
 #[derive(Debug, Clone)]
 pub(crate) struct Gains {
     /// The elements, and `s` and `k` of each.
     pub(crate) elements: Vec<(usize, [f64; 2])>,
-    /// Covariance of all `s`, then all `k`, the sensor's place given.
+    /// Covariance of all `s`, then all `k`, for a known pose of the sensor.
     pub(crate) own: DMatrix<f64>,
-    /// Derivatives of the same by the unsure parameters of the sensor's place.
+    /// Their derivatives by the uncertain parameters of the sensor's pose.
     pub(crate) by_place: DMatrix<f64>,
 }
 
-/// Fits the responses; without, says why not.
+/// Fits the responses; the error is a sentence that says what is missing.
 pub(crate) fn respond(
     declared: &Declared,
     readings: &Readings,
@@ -158,7 +159,7 @@ pub(crate) fn respond(
 ) -> Result<(ResponseFit, Gains), String> {
     let sound = health.sound(readings.elements);
     let own = |element: usize| sound[element].then_some(element);
-    // Which presses count is decided once: a hair's move of the sensor is not to change it.
+    // The presses are selected once, so that the small steps of the derivatives cannot change the selection.
     let groups = |moved: &SensorPose| groups(declared, readings, own, [place, moved]);
     let here = groups(place);
     if here.is_empty() {
@@ -170,7 +171,7 @@ pub(crate) fn respond(
     let fits = ResponseForm::ALL.map(|form| fit(form, &here, |_, _| true));
     let linear = fits[0].as_ref().ok_or("the readings do not determine the responses")?;
     let [_, shared, own] = &fits;
-    // Where nothing can be held out, a curvature with its error says more than a straight line without.
+    // If nothing can be held out, a curvature with its error is more informative than a straight line without one.
     let unheld = if shared.is_some() { ResponseForm::SharedQuadratic } else { ResponseForm::Linear };
     let heldout = ResponseForm::ALL.map(|form| heldout(form, &here));
     let form = chosen(&heldout).unwrap_or(unheld);
@@ -180,7 +181,7 @@ pub(crate) fn respond(
         ResponseForm::OwnQuadratic => own.as_ref().unwrap_or(linear),
     };
     let elements = wanted.elements.clone();
-    // A wrong place moves the responses.
+    // Errors of the sensor's pose move the responses.
     let by_place = |fitted: &FittedForm| {
         let column = |parameter: usize| {
             let moved = fit(fitted.form, &groups(&place.moved(parameter, STEP)), |_, _| true);
@@ -270,8 +271,7 @@ fn cross_wired(
     responses.collect()
 }
 
-/// The form with the fewest parameters that no other beats on held-out dwells, by each form's errors on them; `None` if
-/// none can be held out.
+/// The form with the fewest parameters that no other beats on held-out dwells; `None` if no dwell can be held out.
 fn chosen(heldout: &[Option<Vec<HeldOutError>>; 3]) -> Option<ResponseForm> {
     let mut best = ResponseForm::Linear;
     let mut best_errors = heldout[0].as_ref()?;
@@ -284,7 +284,7 @@ fn chosen(heldout: &[Option<Vec<HeldOutError>>; 3]) -> Option<ResponseForm> {
             *by_element.entry(before.element).or_default() += gain;
             by_dwell.push(gain);
         }
-        // Errors of one element hang together; but few elements say nothing of their own scatter.
+        // Errors of one element are correlated; but a few elements do not show the scatter between elements.
         let gains =
             if by_element.len() >= ELEMENTS_LEAST { by_element.into_values().collect() } else { by_dwell };
         let count = gains.len() as f64;
@@ -297,8 +297,8 @@ fn chosen(heldout: &[Option<Vec<HeldOutError>>; 3]) -> Option<ResponseForm> {
     Some(best)
 }
 
-/// The presses at the centres of elements, of which `signal_of` says whose signal they give, if they take part: chosen
-/// with the sensor at one place, felt with it at another.
+/// The presses at the centres of elements. `signal_of` names the element whose signal an element gives, or `None` if it
+/// takes no part. The presses are selected with the first pose of the sensor; indentations are predicted with the second.
 fn groups(
     declared: &Declared,
     readings: &Readings,

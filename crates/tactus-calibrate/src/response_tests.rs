@@ -43,7 +43,7 @@ fn one_curvature_is_found_as_one() {
     for one in &fit.elements {
         let sensitivity = one.sensitivity_counts_per_mm;
         assert!((sensitivity.value - gains[one.element]).abs() < 4.5 * sensitivity.standard_error, "{one:?}");
-        // Turned round, the response gives the depth that was pressed.
+        // The inverse response gives the depth that was pressed.
         for [u_mm, rise] in &one.points {
             assert!((one.indentation_mm(*rise).unwrap() - u_mm).abs() < 0.004, "{one:?}");
         }
@@ -85,12 +85,12 @@ fn a_cross_wired_element_keeps_its_own_sensitivity() {
 }
 
 #[test]
-fn a_response_turned_round_is_the_root_near_the_line() {
-    assert!((turned_round(0.5, 0.0).unwrap() - 0.5).abs() < 1e-15);
-    assert!((turned_round(0.7 + 0.2 * 0.49, 0.2).unwrap() - 0.7).abs() < 1e-12);
-    assert!((turned_round(0.7 - 0.2 * 0.49, -0.2).unwrap() - 0.7).abs() < 1e-12);
-    // A response that falls again never reads so much.
-    assert_eq!(turned_round(3.0, -0.2), None);
+fn a_response_inverted_is_the_root_near_the_line() {
+    assert!((inverted(0.5, 0.0).unwrap() - 0.5).abs() < 1e-15);
+    assert!((inverted(0.7 + 0.2 * 0.49, 0.2).unwrap() - 0.7).abs() < 1e-12);
+    assert!((inverted(0.7 - 0.2 * 0.49, -0.2).unwrap() - 0.7).abs() < 1e-12);
+    // A response with a maximum never reads that much.
+    assert_eq!(inverted(3.0, -0.2), None);
 }
 
 #[test]

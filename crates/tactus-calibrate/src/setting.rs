@@ -1,4 +1,4 @@
-//! What is known before a calibration, and how a press stands on the sensor.
+//! What is declared before a calibration, and where a press lies on the sensor.
 
 use std::collections::BTreeMap;
 
@@ -8,13 +8,13 @@ use tactus_model::{
 
 use crate::readings::{Dwell, MeasuredPress, Readings};
 
-/// Presses go across the sensor if these many pitches lie between them: then they tell its rotation.
+/// Presses that span this many pitches determine the sensor's rotation.
 const SPAN_LEAST_PITCHES: f64 = 2.0;
 
-/// Thicknesses that differ by less are those of one covering.
+/// Coverings whose thicknesses differ by less are the same covering.
 const SAME_COVERING_MM: f64 = 5e-4;
 
-/// What the rig's description says: where a calibration starts, and what it keeps where the data say nothing.
+/// The rig's description: the starting values of a calibration, kept for whatever the data do not determine.
 #[derive(Debug, Clone)]
 pub struct Declared {
     /// Array, spread, response.
@@ -29,7 +29,7 @@ pub struct Declared {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Setting {
     pub(crate) registration: Registration,
-    /// Distances in the robot's frame over those in the sensor's.
+    /// Distances in the robot's frame divided by those in the sensor's frame.
     pub(crate) scale: f64,
     /// Height of the covering's surface, robot frame.
     pub(crate) surface_mm: f64,
@@ -40,7 +40,7 @@ impl Declared {
         self.model.array()
     }
 
-    /// Elements that all answer with 1 to the reference press of 1 mm, under one spread for all coverings.
+    /// A model whose elements all read 1 under a reference press of 1 mm, with one spread for all coverings.
     pub(crate) fn unit_model(&self, sigma_mm: f64) -> Result<ForwardModel, ModelError> {
         let declared = self.model.response();
         let response = Response {
@@ -55,7 +55,7 @@ impl Declared {
         )
     }
 
-    /// As declared: at z = 0 stands the surface.
+    /// As declared, with the surface at z = 0.
     pub(crate) fn setting(&self) -> Setting {
         Setting { registration: self.registration, scale: 1.0, surface_mm: 0.0 }
     }
@@ -65,12 +65,12 @@ impl Declared {
         self.model.psf().sigma_mm(Covering { thickness_mm: covering_mm })
     }
 
-    /// The tool of a press.
+    /// The tool of a press; `None` if the rig does not describe it.
     pub(crate) fn indenter(&self, press: &MeasuredPress) -> Option<&Indenter> {
         self.indenters.get(&*press.indenter)
     }
 
-    /// True if a press is of the kind for which sensitivity is stated, in tool and covering.
+    /// True if a press was made with the reference tool under the reference covering.
     pub(crate) fn is_reference(&self, press: &MeasuredPress) -> bool {
         let response = self.model.response();
         same_covering(press.covering_mm, response.reference_covering.thickness_mm)
@@ -79,12 +79,12 @@ impl Declared {
 }
 
 impl Setting {
-    /// A place on the sensor, of a place in the robot's frame.
+    /// Converts a position from the robot's frame to the sensor's.
     pub(crate) fn on_sensor(&self, place_mm: [f64; 2]) -> [f64; 2] {
         self.registration.to_sensor(place_mm).map(|along| along / self.scale)
     }
 
-    /// How a press stands on the sensor at a dwell.
+    /// The contact of a dwell in the sensor's frame.
     pub(crate) fn contact(&self, press: &MeasuredPress, dwell: &Dwell, indenter: &Indenter) -> Contact {
         Contact {
             indenter: indenter.clone(),
@@ -95,12 +95,11 @@ impl Setting {
     }
 }
 
-/// True if two thicknesses are one covering's.
 pub(crate) fn same_covering(one_mm: f64, other_mm: f64) -> bool {
     (one_mm - other_mm).abs() < SAME_COVERING_MM
 }
 
-/// The coverings pressed, by thickness.
+/// Thicknesses of the coverings under which `presses` were made, ascending.
 pub(crate) fn coverings_mm<'a>(presses: impl Iterator<Item = &'a MeasuredPress>) -> Vec<f64> {
     let mut coverings_mm: Vec<f64> = presses.map(|press| press.covering_mm).collect();
     coverings_mm.sort_by(f64::total_cmp);
@@ -108,9 +107,9 @@ pub(crate) fn coverings_mm<'a>(presses: impl Iterator<Item = &'a MeasuredPress>)
     coverings_mm
 }
 
-/// The reference presses of the runs that go across the sensor; where none does, all reference presses.
+/// The reference presses of the runs that go across the sensor; of all runs if none does.
 ///
-/// Sweeps over one element would outweigh them and tell less.
+/// Sweeps over one element have more presses, but tell less about the sensor's pose.
 pub(crate) fn across<'a>(declared: &Declared, readings: &'a Readings) -> Vec<&'a MeasuredPress> {
     let of_run = |run: usize| {
         readings
@@ -128,7 +127,7 @@ pub(crate) fn across<'a>(declared: &Declared, readings: &'a Readings) -> Vec<&'a
     }
 }
 
-/// True if presses lie so far apart that they tell a rotation.
+/// True if the presses lie far enough apart to determine a rotation.
 pub(crate) fn goes_across<'a>(declared: &Declared, presses: impl Iterator<Item = &'a MeasuredPress>) -> bool {
     let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     for press in presses {

@@ -6,11 +6,11 @@
 //!
 //! `D_i` is the image of press `i`, each element's rise turned into indentation by its own response; `E_i` is the image
 //! that the base model gives for the tool at that place under a Gaussian of that sigma. Both are scaled to unit L2 norm:
-//! with unit sum or unit peak the maximum runs away. Faulty elements take no part.
+//! with unit sum or unit peak there is no finite maximum. Faulty elements take no part.
 //!
 //! The maximum is found by Newton's method. Its standard error has two parts: the scatter of the presses' own slopes
-//! (the sandwich estimate, which asks for no model of the noise), and what the errors of the elements' responses and of
-//! the sensor's place do to it, which is common to many presses and coverings, by first derivatives.
+//! (the sandwich estimate, which needs no model of the noise), and the errors of the elements' responses and of the sensor's
+//! pose, propagated by first derivatives; the latter are common to many presses and coverings.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -22,45 +22,45 @@ use crate::{
     order::median,
     readings::{Dwell, MeasuredPress, Readings, distinct_places},
     registration::SensorPose,
-    response::{Gains, turned_round},
+    response::{Gains, inverted},
     setting::{Declared, coverings_mm, same_covering},
 };
 
-/// Depths that differ by less belong together.
+/// Dwells whose depths differ by less are fitted together.
 const DEPTH_STEP_MM: f64 = 0.02;
-/// It takes so many places to see a spread between elements.
+/// Distinct places needed to fit a spread.
 const PLACES_LEAST: usize = 9;
-/// A press is left out if its image is so many times less like the model's than the median press's.
+/// A press is left out if one minus its image's likeness exceeds this many times the median press's.
 const OUTLYING: f64 = 40.0;
-/// Sigma is looked for between these, in pitches.
+/// Range in which sigma is searched, in pitches.
 const SIGMA_PITCHES: [f64; 2] = [0.05, 50.0];
 const ROUNDS_MAX: usize = 30;
-/// A step by less than this share of sigma is the last. First to see which images are like none, then for good: far
-/// below any error, and of no effect on what else is computed there.
+/// The search ends with a step of less than this share of sigma: first when looking for outlying images, then in the final
+/// fit, where the remaining step is far below any error.
 const STEP_LEAST: [f64; 2] = [1e-3, 1e-6];
-/// A step in sigma, as a share of it.
+/// Step of the numeric derivatives by sigma, as a share of it.
 const STEP_SHARE: f64 = 1e-4;
-/// A step to find how the slopes move with a press's place.
+/// Step of the numeric derivatives by a press's position.
 const STEP_MM: f64 = 1e-4;
 
-/// The spread that presses to one depth under one covering show.
+/// The spread fitted to the presses to one depth under one covering.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpreadFit {
     /// Thickness of the covering.
     pub covering_mm: f64,
     /// Depth of the presses below the fitted surface.
     pub depth_mm: f64,
-    /// Run that the presses are of.
+    /// Id of the run that the presses belong to.
     pub run: String,
-    /// Presses that it rests on.
+    /// Number of presses used.
     pub presses: usize,
-    /// Presses left out because their images are like none of the model's.
+    /// Number of presses left out as outliers.
     pub left_out: usize,
-    /// sigma+.
+    /// `sigma+`, the fitted standard deviation of the Gaussian.
     pub sigma_mm: Estimate,
-    /// The part of its standard error that more presses would lessen.
+    /// The part of its standard error that more presses would reduce.
     pub scatter_mm: f64,
-    /// Mean cosine between measured and modelled images at sigma+: 1 if the spread is a Gaussian and nothing is amiss.
+    /// Mean cosine between measured and modelled images at sigma+: 1 if the spread is a Gaussian and the model holds.
     pub likeness: f64,
 }
 
@@ -71,7 +71,7 @@ pub(crate) struct Spreads {
     pub(crate) covariance: DMatrix<f64>,
 }
 
-/// Fits the spread of every covering at every depth; what cannot be fitted is said.
+/// Fits the spread of every covering at every depth; the texts name what could not be fitted.
 pub(crate) fn spreads(
     declared: &Declared,
     readings: &Readings,
@@ -106,7 +106,7 @@ struct SpreadData<'a> {
     presses: Vec<(&'a MeasuredPress, &'a Dwell)>,
 }
 
-/// Of each covering, the presses of the run with the most, by depth.
+/// For each covering, the presses of the run that has the most of them, grouped by depth.
 fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<SpreadData<'a>> {
     let known = |press: &&MeasuredPress| press.rest.is_some() && declared.indenter(press).is_some();
     let mut groups = Vec::new();
@@ -134,7 +134,7 @@ fn groups<'a>(declared: &Declared, readings: &'a Readings) -> Vec<SpreadData<'a>
     groups
 }
 
-/// One fit, and how it moves with what it rests on.
+/// One fit, and its derivatives by the responses and the pose that it uses.
 struct GroupFit {
     fit: SpreadFit,
     variance: f64,
@@ -158,7 +158,7 @@ fn covariance(found: &[GroupFit], gains: &Gains, place: &SensorPose) -> DMatrix<
     covariance
 }
 
-/// One image: where the tool stood, and what the elements read, as indentations of unit norm.
+/// One image: the contact, and the elements' readings as indentations of unit norm.
 struct PressImage {
     contact: Contact,
     place_mm: [f64; 2],
@@ -173,11 +173,11 @@ struct SigmaSearch<'a> {
     place: &'a SensorPose,
     covering: Covering,
     images: Vec<PressImage>,
-    /// Presses with an element beyond the turning point of its response.
+    /// Number of presses left out so far: an element beyond its response's turning point, or an outlier.
     left_out: usize,
 }
 
-/// What one image says at a sigma.
+/// One image's likeness to the model at a sigma, with derivatives.
 struct ImageSlope {
     likeness: f64,
     /// Derivative of the likeness by sigma.
@@ -201,7 +201,7 @@ impl<'a> SigmaSearch<'a> {
             let Some(indenter) = declared.indenter(press) else { continue };
             let measured = gains.elements.iter().map(|(element, [s, k])| {
                 let [rise, _] = press.rise(dwell, *element)?;
-                turned_round(rise / s, *k)
+                inverted(rise / s, *k)
             });
             let Some(mut measured) = measured.collect::<Option<Vec<f64>>>() else {
                 search.left_out += 1;
@@ -221,7 +221,7 @@ impl<'a> SigmaSearch<'a> {
     }
 
     fn run(mut self, readings: &Readings, group: &SpreadData<'_>) -> Result<GroupFit, String> {
-        // The median image's sigma is hardly moved by images that are like none.
+        // Outlying images hardly move the median image's sigma.
         let (start_mm, slopes) =
             self.maximise(median_step, self.declared.sigma_mm(self.covering.thickness_mm), STEP_LEAST[0])?;
         let unlike = median(slopes.iter().map(|slope| 1.0 - slope.likeness));
@@ -250,7 +250,7 @@ impl<'a> SigmaSearch<'a> {
         Ok(GroupFit { fit, variance, by_gains, by_place })
     }
 
-    /// Where steps end, from a start, and what every image says there.
+    /// Where the steps from a start converge, and every image's slope there.
     fn maximise(
         &self,
         step: fn(&[ImageSlope]) -> f64,
@@ -267,7 +267,7 @@ impl<'a> SigmaSearch<'a> {
             if step.abs() < step_least * sigma_mm {
                 return Ok((sigma_mm, slopes));
             }
-            // A step that is no number ends here too.
+            // NaN ends the search here too.
             if !(least..=most).contains(&sigma_mm) {
                 break;
             }
@@ -280,7 +280,7 @@ impl<'a> SigmaSearch<'a> {
     }
 
     fn slope(&self, sigma_mm: f64, image: &PressImage, contact: &Contact) -> ImageSlope {
-        // Two images a hair apart give the image between them and its slope, both to some 1e-8.
+        // Two images at slightly different sigmas give the image between them and its slope, both to some 1e-8.
         let step_mm = STEP_SHARE * sigma_mm;
         let [less, more] = [sigma_mm - step_mm, sigma_mm + step_mm].map(|sigma_mm| {
             let mut felt = vec![0.0; self.declared.array().elements()];
@@ -312,7 +312,7 @@ impl<'a> SigmaSearch<'a> {
         }
     }
 
-    /// How the sum of the slopes moves with the elements' responses.
+    /// Derivatives of the sum of the slopes by the elements' responses.
     fn by_gains(&self, slopes: &[ImageSlope]) -> DVector<f64> {
         let count = self.gains.elements.len();
         let mut by_gains = DVector::zeros(2 * count);
@@ -328,7 +328,7 @@ impl<'a> SigmaSearch<'a> {
         by_gains
     }
 
-    /// How the sum of the slopes moves with the sensor's place.
+    /// Derivatives of the sum of the slopes by the sensor's pose.
     fn by_place(&self, sigma_mm: f64, slopes: &[ImageSlope]) -> DVector<f64> {
         let mut by_place = DVector::zeros(SensorPose::UNCERTAIN);
         for (image, slope) in self.images.iter().zip(slopes) {

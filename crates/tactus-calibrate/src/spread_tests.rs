@@ -34,7 +34,7 @@ fn spreads_and_their_line_come_back_within_their_errors() {
 
 #[test]
 fn an_image_like_no_other_is_left_out() {
-    // In every run the fourth press is of something else.
+    // In every run the image of the fourth press is wrong.
     let found = whole(2, |counts, press| {
         if press == 3 {
             counts.reverse();
@@ -80,7 +80,7 @@ fn nothing_measured_is_said_and_no_number_given() {
 fn the_number_of_threads_changes_no_bit() {
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        // Debug output of a number names all of its bits.
+        // The debug output of a number determines all of its bits.
         pool.install(|| format!("{:?}", whole(5, |_, _| ())))
     };
     assert_eq!(on(1), on(3));

@@ -1,4 +1,4 @@
-//! A sensor made up for tests, and experiments on it that give the rows of a measurement table.
+//! A synthetic sensor for tests, and experiments on it that give rows of the measurement table.
 
 use std::collections::BTreeMap;
 
@@ -15,16 +15,16 @@ pub(crate) const TOOL: Indenter = Indenter::Cylinder { diameter_mm: 1.0 };
 /// Its thinnest covering.
 pub(crate) const THIN_MM: f64 = 1.016;
 
-/// Changes the counts of a frame of a press.
+/// Changes the counts of a frame, given the index of its press.
 type Spoil = Box<dyn Fn(&mut [f64], i32)>;
 
-/// A made-up sensor.
+/// A simulated sensor on a stage, with the readings so far.
 pub(crate) struct SyntheticSensor {
     pub(crate) model: ForwardModel,
     pub(crate) registration: Registration,
     pub(crate) surface_mm: f64,
     pub(crate) noise_counts: f64,
-    /// What is done to the counts of a frame, when, and by which press.
+    /// Changes the counts of a frame, given the index of its press.
     pub(crate) spoil: Spoil,
     rng: ChaCha8Rng,
     builder: ReadingsBuilder,
@@ -33,7 +33,7 @@ pub(crate) struct SyntheticSensor {
 }
 
 impl SyntheticSensor {
-    /// Gains that differ, one curvature, a place and a surface other than declared.
+    /// Unequal gains, one curvature, and a pose and a surface that differ from the declared ones.
     pub(crate) fn new(seed: u64) -> Self {
         let array = Array::digitacts();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -59,7 +59,7 @@ impl SyntheticSensor {
         }
     }
 
-    /// The rig's description, which knows nothing of all that.
+    /// The rig's description, without this truth.
     pub(crate) fn declared(&self) -> Declared {
         let array = self.model.array().clone();
         let response = Response::uniform(array.elements(), 900.0, 0.0);
@@ -71,7 +71,7 @@ impl SyntheticSensor {
         }
     }
 
-    /// Where an element's centre is declared to be, robot frame.
+    /// Declared position of an element's centre, robot frame.
     pub(crate) fn centre_mm(&self, element: usize) -> [f64; 2] {
         self.declared().registration.to_robot(self.model.array().centre_mm(element).unwrap())
     }
@@ -95,13 +95,13 @@ impl SyntheticSensor {
         }
     }
 
-    /// Ends the run; the next press is of another one.
+    /// Ends the run; the next press belongs to a new one.
     pub(crate) fn next_run(&mut self) {
         self.run.push('+');
         self.press = 0;
     }
 
-    /// A press: at rest, then through depths below the declared surface, ten frames each.
+    /// A press: at rest, then at depths below the declared surface, twelve frames each.
     pub(crate) fn press(&mut self, [x, y]: [f64; 2], covering_mm: f64, depths_mm: &[f64]) {
         let index = self.press;
         self.press += 1;
@@ -150,7 +150,7 @@ impl SyntheticSensor {
         });
     }
 
-    /// What was measured.
+    /// The declared description and the readings.
     pub(crate) fn readings(self) -> (Declared, Readings) {
         (self.declared(), self.builder.finish())
     }

@@ -5,51 +5,51 @@
 //! quadratic   sigma+ = a + b t + c t^2
 //! ```
 //!
-//! through the spreads of all coverings and depths, of equal weight, as in the paper. The standard errors come from the
-//! covariance of the spreads: `(X^T X)^-1 X^T C X (X^T X)^-1`. Where the points scatter about the line by more than
-//! their own errors can explain, errors are widened by as much, and the fit says so.
+//! through the spreads of all coverings and depths with equal weights, as in the paper. The standard errors come from the
+//! covariance of the spreads: `(X^T X)^-1 X^T C X (X^T X)^-1`. If the points scatter about the line by more than
+//! their own errors explain, the errors are widened accordingly, and the fit says so.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::{Estimate, setting::same_covering, spread::Spreads};
 
-/// A scatter that chance reaches in one case in a thousand is no chance.
+/// A scatter whose p-value is below this is not taken for chance.
 pub(crate) const IMPLAUSIBLE: f64 = 1e-3;
 
-/// Spread of each covering, and against thickness.
+/// Spread of each covering, and its dependence on thickness.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThicknessFit {
-    /// The mean over its depths of each covering's spread.
+    /// Each covering's spread, the mean over its depths.
     pub coverings: Vec<CoveringSpread>,
-    /// `a` in mm and `b`; none with a single covering.
+    /// `a` in mm and `b`; `None` with a single covering.
     pub linear: Option<Curve<2>>,
-    /// `a` in mm, `b`, and `c` in 1/mm; none with fewer than three coverings.
+    /// `a` in mm, `b`, and `c` in 1/mm; `None` with fewer than three coverings.
     pub quadratic: Option<Curve<3>>,
 }
 
 /// The spread of one covering.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CoveringSpread {
-    /// Its thickness.
+    /// Thickness of the covering.
     pub covering_mm: f64,
     /// Mean over its depths.
     pub sigma_mm: Estimate,
     /// Greatest difference between two of its depths.
     pub range_mm: f64,
-    /// Chance of such differences between depths if there are none: small means that spread depends on depth.
+    /// P-value of the differences between depths if the spread does not depend on depth; `None` with one depth.
     pub chance: Option<f64>,
 }
 
-/// A polynomial with `N` coefficients, that of `t^0` first.
+/// A polynomial in thickness with `N` coefficients, that of `t^0` first.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Curve<const N: usize> {
-    /// The coefficients.
+    /// In mm, then with one power of mm less each.
     #[serde(serialize_with = "as_list")]
     pub coefficients: [Estimate; N],
     /// Root mean square distance of the points from it, in mm.
     pub rms_mm: f64,
-    /// Chance of such a scatter if the polynomial holds.
+    /// P-value of the scatter if the polynomial holds; `None` without degrees of freedom.
     pub chance: Option<f64>,
 }
 
@@ -58,13 +58,13 @@ fn as_list<const N: usize, S: serde::Serializer>(values: &[Estimate; N], to: S) 
 }
 
 impl<const N: usize> Curve<N> {
-    /// Its value at a thickness.
+    /// Spread at a thickness, in mm.
     pub fn at(&self, covering_mm: f64) -> f64 {
         self.coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * covering_mm + coefficient.value)
     }
 }
 
-/// Fits spread against thickness; none without spreads.
+/// Fits spread against thickness; `None` without spreads.
 pub(crate) fn against_thickness(spreads: &Spreads) -> Option<ThicknessFit> {
     let mut rows: Vec<usize> = (0..spreads.fits.len()).collect();
     rows.sort_by(|one, other| spreads.fits[*one].covering_mm.total_cmp(&spreads.fits[*other].covering_mm));
@@ -131,7 +131,7 @@ fn among(spreads: &Spreads, rows: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows.len(), |row, column| spreads.covariance[(rows[row], rows[column])])
 }
 
-/// Chance that values of this covariance scatter so about the model of this design, or more: the upper tail of
+/// Probability that values with this covariance scatter as much or more about the model of this design: the upper tail of
 /// chi-squared at the least generalised sum of squares. `None` without degrees of freedom.
 fn chance(values: &DVector<f64>, design: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
     let freedom = design.nrows().checked_sub(design.ncols()).filter(|freedom| *freedom > 0)?;

@@ -1,5 +1,5 @@
-//! Writes a recording of a made-up run, its summary and its measurement table into a directory, for programs in
-//! other languages to be tried on: `cargo run -p tactus-record --example sample_recording -- DIR`
+//! Writes a synthetic run's recording, summary and measurement table into a directory, to test programs in other
+//! languages: `cargo run -p tactus-record --example sample_recording -- DIR`
 
 mod synthetic;
 

@@ -1,4 +1,4 @@
-//! Frames a second into a recording on this machine: `cargo run --release -p tactus-record --example throughput`
+//! Measures how many frames per second this machine records: `cargo run --release -p tactus-record --example throughput`
 
 #![allow(clippy::print_stdout, reason = "a program for people")]
 

@@ -1,4 +1,4 @@
-//! The channels of a recording, and when what they carry reaches the file.
+//! Writes messages to the channels of a recording, and decides when they reach the file.
 
 use std::{
     collections::BTreeMap,
@@ -11,11 +11,11 @@ use tactus_schema::{DESCRIPTOR_SET, TimeStamp, key::Keys};
 
 use crate::{MessageKind, header::Header, message::Recorded};
 
-/// A chunk is closed and handed to the system once it spans this much time. A reader can do nothing with half a
-/// chunk, so this is what a killed process loses.
+/// A chunk is closed and handed to the system once it spans this much time. A reader cannot use a partial chunk, so a
+/// killed process loses this much.
 const CHUNK_SPAN: Duration = Duration::from_millis(500);
 
-/// A chunk that fills up earlier is closed earlier.
+/// A chunk of this size is closed even if it spans less time.
 const CHUNK_BYTES: u64 = 256 * 1024;
 
 /// Name of a protobuf schema's and message's encoding in MCAP.
@@ -35,9 +35,9 @@ pub(crate) struct ChannelWriter<W: Write> {
 
 /// How recordings are written.
 ///
-/// Compression is worth its price: one core records 60,000 frames/s (2,000 sensors at 30 Hz) in an eighth of its
-/// time, at less than half the bytes; a higher level gains nothing on chunks this small. 48 elements, 30 Hz, chunks
-/// of half a second, message indexes included, one core of a small server, by `examples/throughput.rs`:
+/// Compression is cheap: one core records 60,000 frames/s (2,000 sensors at 30 Hz) in an eighth of its time, at less than
+/// half the bytes. A higher level gains hardly anything on chunks this small. Measured by `examples/throughput.rs` on one
+/// core of a small server, with 48 elements, 30 Hz, chunks of half a second and message indexes:
 ///
 /// | compression | frames/s | bytes/frame |
 /// |---|---|---|
@@ -48,10 +48,10 @@ pub(crate) fn options() -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Zstd))
         .compression_level(1)
-        // In this thread: a chunk is a few kilobytes, not worth waking others for.
+        // In this thread: a chunk has only a few kilobytes.
         .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES))
-        // A chunk is put together in memory and written at once, so that no half-written header is ever in the file.
+        // A chunk is assembled in memory and written at once, so that the file never contains a partial header.
         .disable_seeking(true)
         .library(concat!("tactus-record ", env!("CARGO_PKG_VERSION")))
 }
@@ -83,7 +83,7 @@ impl<W: Write> ChannelWriter<W> {
         Ok(Self { mcap, ids, encoded: Vec::new(), chunk_began: None, failed: false })
     }
 
-    /// Closes the chunk in hand and gives it to the system.
+    /// Closes the current chunk and gives it to the system.
     pub(crate) fn flush(&mut self) -> Result<(), McapError> {
         self.once_failed_always()?;
         self.chunk_began = None;
@@ -92,7 +92,7 @@ impl<W: Write> ChannelWriter<W> {
         flushed
     }
 
-    /// Writes the summary and gives back the sink, with everything in it.
+    /// Writes the summary and returns the sink, which then contains everything.
     pub(crate) fn finish(mut self) -> Result<W, McapError> {
         self.once_failed_always()?;
         self.mcap.finish()?;
@@ -100,7 +100,7 @@ impl<W: Write> ChannelWriter<W> {
         buffered.into_inner().map_err(|error| McapError::Io(error.into_error()))
     }
 
-    /// Writes a message to the channel of its kind, and closes the chunk in hand first if it spans enough time.
+    /// Writes a message to the channel of its kind, and first closes the current chunk if it spans [`CHUNK_SPAN`].
     pub(crate) fn write<M: Recorded>(
         &mut self,
         message: &M,
@@ -124,7 +124,7 @@ impl<W: Write> ChannelWriter<W> {
         written
     }
 
-    /// After an error the sink may hold any part of what it was given: nothing may follow that.
+    /// After an error the sink may hold any part of its last input, so nothing may follow.
     fn once_failed_always(&self) -> Result<(), McapError> {
         if self.failed { Err(McapError::AttemptedWriteAfterFailure) } else { Ok(()) }
     }
@@ -143,12 +143,12 @@ fn declare<W: Write>(
     Ok(ids)
 }
 
-/// MCAP has no times before 1970.
+/// MCAP has no times before 1970; they become 0.
 pub(crate) fn unsigned(ns: i64) -> u64 {
     u64::try_from(ns).unwrap_or(0)
 }
 
-/// MCAP's sequence numbers have 32 bits; the message holds all of them.
+/// MCAP's sequence numbers have 32 bits; the message itself holds all 64.
 pub(crate) fn wrapped(seq: u64) -> u32 {
     #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are what is wanted")]
     let low = seq as u32;

@@ -12,7 +12,7 @@ use crate::{Entry, Header, Message, Reader, Script};
 
 const RIG_TOML: &str = include_str!("../../../config/rigs/sim.toml");
 
-/// Takes bytes up to a limit, as a disk does, and shows what it has.
+/// Accepts bytes up to a limit, as a disk does, and shows them.
 #[derive(Clone)]
 struct Disk {
     bytes: Arc<Mutex<Vec<u8>>>,
@@ -84,7 +84,7 @@ fn a_killed_process_loses_at_most_one_chunk_span() {
     let spanned = u64::try_from(CHUNK_SPAN.as_millis() * 30 / 1000).unwrap() + 1;
     for seq in 0..100 {
         writer.write(&frame(seq), seq, at(seq)).unwrap();
-        // What the disk has is what a kill would leave.
+        // A kill would leave what is on the disk now.
         let lost = seq + 1 - durable_frames(&disk);
         assert!(lost <= spanned, "{lost} frames at risk after frame {seq}");
     }

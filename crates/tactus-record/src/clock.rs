@@ -1,15 +1,15 @@
-//! The device's clock against the host's.
+//! Estimates the device's clock relative to the host's.
 //!
 //! A frame is sampled at device time `tick * tick_ns` and reaches the host at `t_mono = sampling + delay`. The delay
-//! is never negative and varies; its least value is met again and again. So the line under all points
-//! `(tick * tick_ns, t_mono - tick * tick_ns)` is the host's time of sampling, late by the least delay, which no
-//! observer at the host can know. Without drift that line is level: `offset = min(t_mono - tick * tick_ns)`. A
+//! is never negative and varies; many frames come close to its least value. So the line under all points
+//! `(tick * tick_ns, t_mono - tick * tick_ns)` is the host's time of sampling, late by the least delay, which the host
+//! cannot observe. Without drift that line is level: `offset = min(t_mono - tick * tick_ns)`. A
 //! device clock that runs fast or slow tilts it: then it is the edge of the points' lower convex hull below their
 //! mean, which is the line with the least mean distance to them (Moon, Skelly and Towsley, 1999).
 //!
-//! A coarse counter tells whole ticks: the sampling was anywhere within its tick. Where the ticks are those of frames at an
-//! even rate, that rate says more: the line through the ticks against the frames' numbers is known far better than a
-//! tick. Else it is taken to be in the middle of the tick, right on average, but not after the frame arrived.
+//! A coarse counter gives whole ticks: the sampling was anywhere within its tick. If the frames come at an even rate, the line
+//! through the ticks against the frames' numbers is known far better than a tick, and is used. Otherwise the sampling is
+//! taken to be in the middle of the tick, which is right on average, but not after the frame arrived.
 
 use serde::Serialize;
 use tactus_schema::{DeviceTick, MonoTime};
@@ -17,19 +17,19 @@ use tactus_schema::{DeviceTick, MonoTime};
 /// A residual beyond this is a jump of the device's clock, not a delay.
 const JUMP_NS: f64 = 1e9;
 
-/// No quartz runs further off; what looks like more is a jump.
+/// No quartz drifts more; a larger slope is a jump.
 const DRIFT_MAX: f64 = 500e-6;
 
-/// Over a shorter time a drift cannot be told from the delays.
+/// Over a shorter time a drift cannot be distinguished from the delays.
 const DRIFT_SPAN_NS: f64 = 60e9;
 
-/// Ticks that are shorter need no help.
+/// With ticks this short, an even rate is not looked for.
 const FINE_TICK_NS: u64 = 10_000;
 
-/// From fewer frames no rate is told.
+/// Least number of frames to estimate an even rate from.
 const EVEN_FRAMES: usize = 30;
 
-/// Ticks of an even rate are off its line by no more than this, in ticks: half of one, and half as much again for doubt.
+/// Ticks of an even rate are off its line by no more than this: half a tick, and a quarter as a margin.
 const EVEN_TICKS: f64 = 0.75;
 
 /// The estimated clock of one connection of the sensor.
@@ -37,7 +37,7 @@ const EVEN_TICKS: f64 = 0.75;
 pub struct EpochClock {
     /// The connection.
     pub epoch: u32,
-    /// Frames it was estimated from.
+    /// Number of frames it was estimated from.
     pub frames: u64,
     /// Length of a device tick.
     pub tick_ns: u64,
@@ -144,7 +144,7 @@ fn even_ticks(frames: &[(DeviceTick, MonoTime)]) -> Option<f64> {
     let mut steps: Vec<f64> = frames.windows(2).map(between).collect();
     steps.sort_by(f64::total_cmp);
     let median = share_below(&steps, 0.5);
-    // Of frames of which none between them was lost.
+    // Only pairs without a lost frame between them.
     steps.retain(|step| (step - median).abs() < 1.5);
     let nearly = steps.iter().sum::<f64>() / steps.len() as f64;
     if nearly < 1.0 {

@@ -6,8 +6,8 @@ const PERIOD_NS: i64 = 33_333_333;
 const OFFSET_NS: i64 = 5_000_000_000;
 const LEAST_DELAY_NS: i64 = 2_000_000;
 
-/// Frames of a device with nanosecond ticks whose clock runs slow by `drift_ppm`; delays from 2 to 10 ms, each
-/// eleventh of them the least one.
+/// Frames of a device with nanosecond ticks whose clock runs slow by `drift_ppm`; delays from 2 to 10 ms; every
+/// eleventh is the least one.
 fn frames(count: i64, drift_ppm: f64) -> Vec<(DeviceTick, MonoTime)> {
     (0..count)
         .map(|n| {
@@ -69,7 +69,7 @@ fn ticks_are_scaled_and_their_length_is_part_of_the_uncertainty() {
     assert!(clock.uncertainty_ns >= 1_000_000);
 }
 
-/// By how much each time is late that the clock gives frames sampled then: ticks of a millisecond, delays from 2 to 10 ms.
+/// Lateness of the estimated sampling times: ticks of a millisecond, delays from 2 to 10 ms.
 fn late_ns(sampled_ns: &[i64]) -> Vec<i64> {
     let frames: Vec<(DeviceTick, MonoTime)> = (0..)
         .zip(sampled_ns)
@@ -86,7 +86,7 @@ fn late_ns(sampled_ns: &[i64]) -> Vec<i64> {
 
 #[test]
 fn of_an_even_rate_times_are_far_better_known_than_the_ticks_of_its_clock() {
-    // 30 and 29.7 Hz; of each hundred frames seven are lost.
+    // 30 and 29.7 Hz; seven of every hundred frames are lost.
     for period_ns in [33_333_333, 33_670_034] {
         let sampled_ns: Vec<i64> =
             (0..3000).filter(|n| n % 100 > 6).map(|n| 17_400_000 + n * period_ns).collect();

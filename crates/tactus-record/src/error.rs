@@ -8,109 +8,57 @@ use crate::table::TableError;
 
 /// Why a recording could not be written or read.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum RecordError {
     /// The file system refused.
     #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// What was tried, such as `create`.
-        action: &'static str,
-        /// On which file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
+    Io { action: &'static str, path: PathBuf, source: io::Error },
     /// A message could not be stored: what was taken in before may be incomplete.
     #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// The recording.
-        path: PathBuf,
-        /// What the MCAP writer said.
-        source: mcap::McapError,
-    },
+    Write { path: PathBuf, source: mcap::McapError },
     /// The file does not begin as an MCAP file does.
     #[error("{} is not an MCAP file", path.display())]
-    NotMcap {
-        /// The file.
-        path: PathBuf,
-    },
+    NotMcap { path: PathBuf },
     /// The file is MCAP, but not a recording of a run, or it was cut off before it said which run it is.
     #[error("{}: no metadata record {:?}, so this is no recording of a run, or its first bytes are lost", path.display(), crate::header::METADATA_NAME)]
-    NoRun {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Something that stands at the start of every recording is missing or wrong.
+    NoRun { path: PathBuf },
+    /// An attachment or metadata field of the recording's start is missing or wrong.
     #[error("{}: {what}: {problem}", path.display())]
-    Header {
-        /// The file.
-        path: PathBuf,
-        /// Name of the attachment or metadata field.
-        what: String,
-        /// What is wrong with it.
-        problem: String,
-    },
+    Header { path: PathBuf, what: String, problem: String },
     /// The rig in the recording is not a rig.
     #[error("{}: rig.json: {source}", path.display())]
-    Rig {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: RigError,
-    },
+    Rig { path: PathBuf, source: RigError },
     /// Recovery was asked for a recording that lacks nothing.
     #[error("{} is whole and its run is closed: there is nothing to recover", path.display())]
-    NothingToRecover {
-        /// The file.
-        path: PathBuf,
-    },
+    NothingToRecover { path: PathBuf },
     /// What recovery wrote does not read back as what was meant; the output was removed.
     #[error("{}: the recovered file does not read back: {problem}", path.display())]
-    Unverified {
-        /// The output.
-        path: PathBuf,
-        /// What differs.
-        problem: String,
-    },
+    Unverified { path: PathBuf, problem: String },
 }
 
 /// Why recordings and measurement tables gave no rows, or no table could be made of them.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum RowsError {
     /// No file was named.
     #[error("no recording or measurement table was named")]
     Nothing,
     /// The file is of another kind.
     #[error("{} is neither a recording (MCAP) nor a measurement table (Parquet): only these hold measured rows", path.display())]
-    Neither {
-        /// The file.
-        path: PathBuf,
-    },
+    Neither { path: PathBuf },
     /// A recording could not be read.
     #[error(transparent)]
     Record(#[from] RecordError),
     /// A table could not be read or written, or a row breaks its contract.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// Rows that stand together are of one rig.
+    /// Files that are read together must be of one rig.
     #[error("{} was made with another rig than {}: take them apart", path.display(), first.display())]
-    RigsDiffer {
-        /// The first file.
-        first: PathBuf,
-        /// The one that differs.
-        path: PathBuf,
-    },
-    /// A run may be taken once.
+    RigsDiffer { first: PathBuf, path: PathBuf },
+    /// No run may be in two files.
     #[error("{} holds run {run:?}, which was taken already", path.display())]
-    RunTwice {
-        /// The file.
-        path: PathBuf,
-        /// The run.
-        run: String,
-    },
+    RunTwice { path: PathBuf, run: String },
     /// The stage never said where it was.
     #[error("{}: no position of the stage was recorded", path.display())]
-    NoStage {
-        /// The recording.
-        path: PathBuf,
-    },
+    NoStage { path: PathBuf },
 }

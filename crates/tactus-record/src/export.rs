@@ -1,4 +1,4 @@
-//! Makes a measurement table of recordings.
+//! Makes a measurement table from recordings.
 
 use std::path::{Path, PathBuf};
 
@@ -12,37 +12,37 @@ const CLOCK_METADATA_KEY: &str = "tactus.clock";
 /// Name of that JSON's form.
 const CLOCK_SCHEMA: &str = "tactus.clock/1";
 
-/// What an export made.
+/// The result of an export.
 #[derive(Debug, Clone, Serialize)]
 pub struct ExportSummary {
-    /// The table.
+    /// Path of the table.
     pub path: PathBuf,
-    /// Rows in it: one a frame.
+    /// Number of rows: one per frame.
     pub rows: u64,
-    /// Runs in it.
+    /// Number of runs.
     pub runs: u64,
-    /// The device clocks it rests on.
+    /// The device clocks from which sampling times were computed.
     pub clocks: Vec<RunClocks>,
-    /// What a reader of the table should know, a sentence each.
+    /// Warnings for readers of the table, a sentence each.
     pub warnings: Vec<String>,
 }
 
-/// The device clock of each connection of a run, as it stands in the table's metadata.
+/// The device clock of each connection of a run, as in the table's metadata.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunClocks {
     /// Run id.
     pub run: String,
     /// Connections whose clock could be estimated.
     pub epochs: Vec<EpochClock>,
-    /// Connections whose frames are dated by their arrival.
+    /// Connections without a clock: their frames' sampling times are the times of arrival.
     pub by_arrival: Vec<u32>,
 }
 
-/// Writes the frames of the recordings as one measurement table, a row each, run after run.
+/// Writes the frames of the recordings as one measurement table, one row per frame, run after run.
 ///
-/// A row's time is its sampling time by the device's clock ([`EpochClock`]), its place and phase are the stage's at
-/// that time. Damaged recordings give what can be read of them, with a warning. The table is checked as it is
-/// written, and stands at `out` only when it is whole.
+/// A row's time is the sampling time by the device's clock ([`EpochClock`]); position and phase are the stage's at that
+/// time. Of damaged recordings the readable part is exported, with a warning. The table is checked while it is written,
+/// and appears at `out` only when it is complete.
 ///
 /// # Errors
 /// If a recording cannot be read, has another rig or the same run as one before, or holds no stage position; if a

@@ -1,10 +1,10 @@
-//! What stands at the start of a recording.
+//! The start of a recording: the run's metadata and attached files.
 
 use std::collections::BTreeMap;
 
 use tactus_schema::{Rig, WallTime};
 
-/// Name of the metadata record that tells a run's recording from any other MCAP file.
+/// Name of the metadata record that distinguishes a run's recording from any other MCAP file.
 pub(crate) const METADATA_NAME: &str = "tactus.run";
 
 /// Attachment: the rig as JSON, [`tactus_schema::rig::SCHEMA`].
@@ -18,24 +18,24 @@ pub(crate) const VERSIONS_JSON: &str = "versions.json";
 /// Attachment: the parameters as the script saw them, as a JSON object.
 pub(crate) const PARAMETERS_JSON: &str = "parameters.json";
 
-/// Everything known when a run begins.
+/// The inputs of a run, known when it begins.
 #[derive(Debug, Clone, Copy)]
 pub struct Header<'a> {
     /// Id of the run.
     pub run_id: &'a str,
     /// Name of the experiment.
     pub experiment: &'a str,
-    /// Who asked for it.
+    /// Who started the run.
     pub who: &'a str,
     /// The rig it runs on; its name goes into the topics.
     pub rig: &'a Rig,
-    /// The rig file as it was read; none if what it says of simulated devices is not so.
+    /// The rig file as it was read; `None` if its statements about simulated devices do not hold for this run.
     pub rig_toml: Option<&'a str>,
     /// The description of the sensor's frames as it was read, if the rig file names one.
     pub link_toml: Option<&'a str>,
     /// The experiment's script.
     pub script: Script<'a>,
-    /// Name to version of everything that had a part in it.
+    /// Versions, by name, of everything that takes part.
     pub versions: &'a BTreeMap<String, String>,
     /// The parameters as the script sees them, as a JSON object.
     pub parameters_json: &'a str,
@@ -50,7 +50,7 @@ pub struct Header<'a> {
 pub struct Script<'a> {
     /// File name, such as `element-centres.star`; becomes the attachment's name.
     pub name: &'a str,
-    /// The text.
+    /// The script's text.
     pub source: &'a str,
 }
 
@@ -61,7 +61,7 @@ pub struct RunMetadata {
     pub run_id: String,
     /// Name of the experiment.
     pub experiment: String,
-    /// Who asked for it.
+    /// Who started the run.
     pub who: String,
     /// Name of the rig.
     pub rig: String,
@@ -73,7 +73,7 @@ pub struct RunMetadata {
     pub started: WallTime,
 }
 
-/// A file within the recording.
+/// A file attached to the recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Attachment {
     /// File name.

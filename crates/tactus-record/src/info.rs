@@ -1,4 +1,4 @@
-//! What a recording holds, in short.
+//! The summary of a recording.
 
 use std::{collections::BTreeMap, fmt, path::Path};
 
@@ -11,10 +11,10 @@ use crate::{
     reader::{io_error, read_run},
 };
 
-/// A recording in short; as text for people, as JSON for programs.
+/// The summary of a recording: as text for people, as JSON for programs.
 #[derive(Debug, Clone, Serialize)]
 pub struct Info {
-    /// The file.
+    /// Path of the recording.
     pub path: String,
     /// Id of the run.
     pub run_id: String,
@@ -22,7 +22,7 @@ pub struct Info {
     pub experiment: String,
     /// Name of the rig.
     pub rig: String,
-    /// Who asked for it.
+    /// Who started the run.
     pub who: String,
     /// True if no physical sensor was read.
     pub simulated: bool,
@@ -32,40 +32,40 @@ pub struct Info {
     pub duration_s: f64,
     /// How the run ended, such as `done`; absent if the recording was never closed.
     pub exit_status: Option<&'static str>,
-    /// What the run said when it ended.
+    /// The run's message when it ended; empty if it never ended.
     pub message: String,
-    /// Frames recorded.
+    /// Number of frames recorded.
     pub frames: u64,
-    /// Frames that the sensor took and that never arrived.
+    /// Number of frames that the sensor took and that never arrived.
     pub frames_lost: u64,
-    /// Places at which frames are missing.
+    /// Number of gaps in the sequence of frames.
     pub gaps: u64,
-    /// Presses of which at least one dwell is done.
+    /// Number of presses with at least one completed dwell.
     pub presses: u32,
-    /// Dwells done.
+    /// Number of completed dwells.
     pub dwells: u32,
     /// Number of messages by topic.
     pub topics: BTreeMap<String, u64>,
-    /// The files within it.
+    /// The files attached to it.
     pub attachments: Vec<AttachmentInfo>,
-    /// Name to version of everything that had a part in the run.
+    /// Versions, by name, of everything that took part in the run.
     pub versions: BTreeMap<String, String>,
     /// How much of the file could be read.
     pub completeness: Completeness,
 }
 
-/// A file within a recording.
+/// A file attached to a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AttachmentInfo {
     /// File name.
     pub name: String,
     /// Media type.
     pub media_type: String,
-    /// Size.
+    /// Its size.
     pub bytes: u64,
 }
 
-/// Reads a whole recording and counts what is in it.
+/// Reads a whole recording and counts its contents.
 ///
 /// # Errors
 /// If the file cannot be read, is no MCAP file, or does not say which run it is. Damage is no error: it is reported

@@ -1,7 +1,7 @@
 //! Lengths inside MCAP records, checked before anything relies on them.
 //!
-//! The parser of the `mcap` crate reserves what a length asks for and subtracts from it; a damaged or hostile file
-//! must not reach it.
+//! The parser of the `mcap` crate trusts these lengths: it reserves memory by them and subtracts from them. So records with
+//! wrong lengths must not reach it.
 
 use mcap::records::op;
 
@@ -24,7 +24,7 @@ pub(crate) fn fits(opcode: u8, body: &[u8]) -> bool {
     read.is_some()
 }
 
-/// What is left of a body; each method takes from its front, or gives `None` if too little is left.
+/// The rest of a body. Each method removes a field from its front, or gives `None` if too little is left.
 struct Fields<'a> {
     rest: &'a [u8],
 }

@@ -1,16 +1,17 @@
 //! MCAP recordings, their recovery, and the Parquet measurement table.
 //!
-//! One run is one MCAP file that stock tools open: protobuf channels for frames, stage reports, run events,
-//! safety events and the sensor's description, named after the bus keys; and, at its start, the rig, the script,
-//! the versions and the parameters as attachments, so that a recording cut off at any byte still says what it is.
+//! One run is one MCAP file that stock tools open. Protobuf channels, named after the bus keys, hold frames, stage reports,
+//! run events, safety events and the sensor's description. The rig, the script, the versions and the parameters are
+//! attachments at the start of the file, so a recording that is cut off later still says what it is.
 //!
-//! - [`Recording`] writes one, and loses at most half a second of it when the process is killed.
-//! - [`Reader`] streams one, whole or damaged; [`info()`] summarises it; [`recover()`] makes a whole one of a damaged one.
-//! - [`Timeline`] knows where the stage was and what it did at each frame's sampling time.
-//! - [`export()`] makes the measurement table of any number of recordings; [`table`] reads and checks such a table,
-//!   whoever wrote it; [`rows::visit`] gives the rows of either kind of file.
+//! - [`Recording`] writes a recording, and loses at most half a second of it when the process is killed.
+//! - [`Reader`] streams a recording, complete or damaged; [`info()`] summarises it; [`recover()`] makes a complete one from a
+//!   damaged one.
+//! - [`Timeline`] gives the stage's position and phase at each frame's sampling time.
+//! - [`export()`] makes a measurement table from any number of recordings; [`table`] reads and checks such tables from any
+//!   program; [`rows::visit`] gives the rows of either kind of file.
 //!
-//! Everything here is blocking: callers give it a thread of its own.
+//! Everything here blocks: callers run it on a thread of its own.
 
 pub mod rows;
 pub mod table;

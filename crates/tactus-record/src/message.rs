@@ -1,4 +1,4 @@
-//! The kinds of messages in a recording, listed once: channels, encoding, decoding and counting follow from the list.
+//! The kinds of messages in a recording, listed once. Channels, encoding, decoding and counting follow from the list.
 
 use std::borrow::Cow;
 
@@ -42,7 +42,7 @@ macro_rules! kinds {
             $(counted: |$counted:ident, $tally:ident| $count:expr,)?
         }
     )*) => {
-        /// A recorded message.
+        /// A recorded message as it is read back.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Message {
             $($(#[$doc])* $kind($held),)*
@@ -167,7 +167,7 @@ kinds! {
         timed: |frame| (frame.received, frame.seq),
         counted: |frame, tally| tally.frame(frame),
     }
-    /// What the sensor says of itself.
+    /// The sensor's description of itself.
     SensorInfo(pb::SensorInfo) {
         message: pb::SensorInfo,
         wire: pb::SensorInfo,
@@ -188,7 +188,7 @@ kinds! {
         timed: |event| (stamp(event.t_mono_ns, event.t_wall_ns), event.seq),
         counted: |event, tally| tally.event(event),
     }
-    /// An act of the safety supervisor.
+    /// A verdict of the safety supervisor.
     Safety(pb::SafetyEvent) {
         message: pb::SafetyEvent,
         wire: pb::SafetyEvent,

@@ -16,29 +16,29 @@ use crate::{
     scan::{RawMessage, Scan, ScanItem},
 };
 
-/// One thing in a recording.
+/// One entry of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
-    /// Which run it is; first of all.
+    /// The run's metadata, the first entry.
     Run(RunMetadata),
-    /// A file that was put into it; before all messages.
+    /// An attached file; before all messages.
     Attachment(Attachment),
     /// A message, in the order in which it was recorded.
     Message {
         /// The channel's topic.
         topic: Arc<str>,
-        /// The host's wall clock.
+        /// When it was recorded, by the host's wall clock.
         at: WallTime,
-        /// What it says.
+        /// The decoded message.
         message: Message,
     },
 }
 
-/// Gives a recording's entries in order, up to its end or to where it is damaged. It never holds more than one
-/// chunk in memory.
+/// Gives a recording's entries in order, up to its end or to the first damage. It never holds more than one chunk in
+/// memory.
 ///
-/// As an iterator it gives an error only if the file system does; damage ends it, and then
-/// [`Reader::completeness`] says where and why.
+/// The iterator gives an error only if the file system does. Damage ends it; [`Reader::completeness`] then says where
+/// and why.
 pub struct Reader<R = BufReader<File>> {
     scan: Scan<R>,
     topics: BTreeMap<u16, Arc<str>>,
@@ -56,7 +56,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Reader, RecordError> {
     Ok(Reader::new(BufReader::with_capacity(64 * 1024, open(path)?)))
 }
 
-/// Opens a recording and reads up to the record that says which run it is.
+/// Opens a recording and reads up to the run's metadata.
 pub(crate) fn read_run(path: &Path) -> Result<(RunMetadata, Reader), RecordError> {
     let mut reader = read(path)?;
     for entry in reader.by_ref() {
@@ -69,7 +69,7 @@ pub(crate) fn read_run(path: &Path) -> Result<(RunMetadata, Reader), RecordError
     Err(RecordError::NoRun { path: path.to_owned() })
 }
 
-/// As many bytes as MCAP's magic has, or all if there are fewer: they tell kinds of files apart.
+/// The first bytes, as many as MCAP's magic has or fewer in a shorter file; they distinguish kinds of files.
 pub(crate) fn first_bytes(path: &Path) -> Result<Vec<u8>, RecordError> {
     let mut start = Vec::new();
     let mut bytes = open(path)?.take(mcap::MAGIC.len() as u64);
@@ -86,7 +86,7 @@ pub(crate) fn io_error(path: &Path, source: io::Error) -> RecordError {
 }
 
 impl<R: Read> Reader<R> {
-    /// Reads a recording from any source of its bytes.
+    /// Reads a recording from any source of bytes.
     pub fn new(source: R) -> Self {
         Self { scan: Scan::new(source), topics: BTreeMap::new() }
     }

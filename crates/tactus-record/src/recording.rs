@@ -1,4 +1,4 @@
-//! A recording in the making.
+//! Writes a recording.
 
 use std::{
     fmt,
@@ -12,9 +12,9 @@ use crate::{RecordError, Tally, Timed, channel::ChannelWriter, header::Header};
 
 /// One run being written to an MCAP file.
 ///
-/// Each call returns once the message is in the chunk in hand; a chunk reaches the system when it spans half a
-/// second of message time, so a killed process loses at most that. After an error nothing more is taken in: the
-/// caller fails the run. Dropped unfinished, the file is whole, but its run stays open.
+/// Each call returns once the message is in the current chunk. A chunk reaches the system when it spans half a second of
+/// message time, so a killed process loses at most that. After an error every call fails, and the caller fails the run. If
+/// the recording is dropped unfinished, the file is complete, but its run stays open.
 pub struct Recording {
     path: PathBuf,
     writer: ChannelWriter<File>,
@@ -22,22 +22,22 @@ pub struct Recording {
     sensor_infos: u64,
 }
 
-/// What a recording came to.
+/// The totals of a finished recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
-    /// The file.
+    /// Where it was written.
     pub path: PathBuf,
     /// Size of the file.
     pub bytes: u64,
-    /// Frames recorded: all that were received.
+    /// Number of frames recorded: all that were received.
     pub frames: u64,
-    /// Frames that the sensor took and that never arrived.
+    /// Number of frames that the sensor took and that never arrived.
     pub frames_lost: u64,
-    /// Places at which frames are missing.
+    /// Number of gaps in the sequence of frames.
     pub gaps: u64,
-    /// Presses of which at least one dwell is done.
+    /// Number of presses with at least one completed dwell.
     pub presses: u32,
-    /// Dwells done.
+    /// Number of completed dwells.
     pub dwells: u32,
     /// From the first message to the last.
     pub duration_s: f64,
@@ -62,28 +62,28 @@ impl Recording {
         }
     }
 
-    /// The file.
+    /// Where it is written.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What was recorded so far.
+    /// Totals of the messages recorded so far.
     pub fn tally(&self) -> &Tally {
         &self.tally
     }
 
-    /// Records a message at its own time: a frame, a report of the stage, an event of the run, an act of the safety
+    /// Records a message at its own time: a frame, a report of the stage, an event of the run, a verdict of the safety
     /// supervisor.
     ///
     /// # Errors
-    /// If the chunk before it could not be written; so with all that follow.
+    /// If an earlier chunk could not be written; all later calls fail, too.
     pub fn write<M: Timed>(&mut self, message: &M) -> Result<(), RecordError> {
         message.count(&mut self.tally);
         let written = self.writer.write(message, message.seq(), message.at());
         self.checked(written)
     }
 
-    /// Records what the sensor says of itself.
+    /// Records the sensor's description of itself, which has no time of its own.
     ///
     /// # Errors
     /// As [`Recording::write`].
@@ -95,7 +95,7 @@ impl Recording {
         self.checked(written)
     }
 
-    /// Gives everything taken in so far to the system. For quiet times: while messages come, they do it.
+    /// Gives all messages so far to the system. Only needed when no messages come; otherwise they do it.
     ///
     /// # Errors
     /// As [`Recording::write`].
@@ -104,10 +104,10 @@ impl Recording {
         self.checked(flushed)
     }
 
-    /// Closes the file; returns once it is on the disk.
+    /// Closes the file; returns once it is on disk.
     ///
     /// # Errors
-    /// If what was taken in before could not be stored.
+    /// If earlier messages could not be stored.
     pub fn finish(self) -> Result<Summary, RecordError> {
         let Self { path, writer, tally, .. } = self;
         let file = match writer.finish() {

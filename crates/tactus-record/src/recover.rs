@@ -1,4 +1,4 @@
-//! Makes a whole recording of a damaged one.
+//! Makes a complete recording from a damaged one.
 
 use std::{
     collections::BTreeMap,
@@ -24,23 +24,23 @@ use crate::{
     scan::{RawMessage, Scan, ScanItem},
 };
 
-/// What recovery found and made.
+/// The result of a recovery.
 #[derive(Debug, Clone)]
 pub struct Recovery {
     /// How much of the damaged file could be read.
     pub damage: Completeness,
-    /// Messages taken over.
+    /// Number of messages copied.
     pub messages: u64,
     /// True if the run was open and is now closed as crashed.
     pub closed: bool,
-    /// The recording that was made, read back from the disk.
+    /// The new recording, read back from disk.
     pub info: Info,
 }
 
-/// Writes all that can be read of the recording at `path` to `out`, and closes its run as crashed if it was open.
+/// Copies the readable part of the recording at `path` to `out`, and closes its run as crashed if it was open.
 ///
-/// Metadata, attachments and messages are taken over byte for byte, with their times. What was written is read back
-/// and compared before this returns; `out` must not exist, and does not after an error.
+/// Metadata, attachments and messages are copied byte for byte, with their times. The output is read back and compared
+/// before this returns. `out` must not exist beforehand, and does not exist after an error.
 ///
 /// # Errors
 /// If `path` cannot be read or is no recording, if nothing is wrong with it, or if `out` cannot be written or does
@@ -55,7 +55,7 @@ pub fn recover(path: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<Recovery
     let file = file.map_err(|source| RecordError::Io { action: "create", path: out.to_owned(), source })?;
     let made = rewrite(path, out, file).and_then(|copy| verify(out, before, copy));
     if made.is_err() {
-        // The error at hand says more than one that follows from it.
+        // An error of the removal would hide the one that matters.
         drop(fs::remove_file(out));
     }
     made
@@ -117,7 +117,7 @@ fn verify(out: &Path, before: Info, copied: CopyCounts) -> Result<Recovery, Reco
     })
 }
 
-/// The recording being made.
+/// The recording being written.
 struct RecordingCopy<W: Write> {
     mcap: mcap::Writer<mcap::write::NoSeek<std::io::BufWriter<W>>>,
     messages: u64,
@@ -162,7 +162,7 @@ impl<W: Write> RecordingCopy<W> {
         })
     }
 
-    /// Says that the run crashed, unless it said itself how it ended; true if that was needed.
+    /// Adds the event that the run crashed, unless the run has ended; true if it was added.
     fn close_run(&mut self) -> Result<bool, McapError> {
         let Some(run) = self.run.as_ref().filter(|_| self.tally.finished().is_none()) else {
             return Ok(false);

@@ -1,4 +1,4 @@
-//! Measured rows, of recordings and measurement tables alike.
+//! Measured rows from recordings and measurement tables.
 
 use std::{
     collections::BTreeSet,
@@ -21,11 +21,11 @@ const PARQUET_MAGIC: &[u8] = b"PAR1";
 /// Where rows came from.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// The rig that was measured, as the first file describes it; covering and tool stand in the rows.
+    /// The measured rig as the first file describes it; each row has its own covering and tool.
     pub rig: Rig,
     /// The runs, in the order of their rows.
     pub runs: Vec<RunSource>,
-    /// What a reader of the rows should know, a sentence each.
+    /// Warnings for readers of the rows, a sentence each.
     pub warnings: Vec<String>,
 }
 
@@ -40,17 +40,16 @@ pub struct RunSource {
     pub simulated: bool,
 }
 
-/// Gives every row of recordings and measurement tables to `take`, each with the rig as its file describes it, file
-/// after file, in the order given.
+/// Calls `take` for every row of recordings and measurement tables, with the rig as the row's file describes it; file after
+/// file, in the order given.
 ///
-/// A file is taken for what its first bytes say, whatever its name. The rows of a recording, whole or damaged, are
-/// those that [`export`](crate::export()) writes; the rows of a table are those that stand in it. Each is checked
-/// before it is given; no more than a few dozen bytes a frame of one recording, or one row group of one table, is in
-/// memory.
+/// The first bytes of a file decide its kind, not its name. The rows of a recording, complete or damaged, are those that
+/// [`export`](crate::export()) writes. Each row is checked before `take` sees it. Memory holds no more than a few dozen
+/// bytes per frame of one recording, or one row group of one table.
 ///
 /// # Errors
 /// If a file is neither, cannot be read, was made with another rig or holds a run of a file before; if a recording
-/// holds no stage position; or if a row breaks the table's contract. Rows before it have then been given.
+/// holds no stage position; or if a row breaks the table's contract. `take` has then seen the rows before it.
 pub fn visit<P: AsRef<Path>>(
     paths: &[P],
     mut take: impl FnMut(&Rig, RowView<'_>),
@@ -73,7 +72,7 @@ pub fn visit<P: AsRef<Path>>(
     sources.into_source()
 }
 
-/// The presses in recordings and measurement tables, as calibration takes them.
+/// The presses in recordings and measurement tables, for a calibration.
 ///
 /// # Errors
 /// As [`visit`].
@@ -86,7 +85,7 @@ pub fn readings<P: AsRef<Path>>(paths: &[P]) -> Result<(Source, Readings), RowsE
     Ok((source, readings))
 }
 
-/// Files that go together.
+/// The files read so far: of one rig, with each run once.
 #[derive(Debug, Default)]
 pub(crate) struct RowSources {
     /// The first file, and its rig.
@@ -96,7 +95,7 @@ pub(crate) struct RowSources {
 }
 
 impl RowSources {
-    /// Gives the rows of a recording.
+    /// Calls `take` for the rows of a recording.
     pub(crate) fn recording(
         &mut self,
         timeline: &Timeline,
@@ -132,7 +131,7 @@ impl RowSources {
         Ok(())
     }
 
-    /// Gives the rows of a table.
+    /// Calls `take` for the rows of a table.
     fn table(
         &mut self,
         table: TableReader,
@@ -176,7 +175,7 @@ impl RowSources {
     }
 }
 
-/// What must be the same in all runs; covering and tool stand in the rows.
+/// The part of a rig that must be the same in all runs: all but covering and tool, which the rows state.
 fn permanent(rig: &Rig) -> Rig {
     Rig { covering: rig.sensitivity_reference.covering, indenter: String::new(), ..rig.clone() }
 }
@@ -188,8 +187,9 @@ struct RowMaker<'a> {
     /// Frames whose sampling time was not after the one before.
     moved: u64,
     by_arrival: u64,
-    /// Elements that were not read in some frames, and these frames.
+    /// Elements that were not read in some frames.
     bad_elements: BTreeSet<u32>,
+    /// Number of these frames.
     partly_read: u64,
 }
 

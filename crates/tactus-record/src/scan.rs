@@ -1,4 +1,4 @@
-//! Walks an MCAP file from its start to its end, or to where it is damaged.
+//! Reads an MCAP file from its start to its end, or to the first damage.
 
 use std::{
     io::{self, Read},
@@ -19,7 +19,7 @@ use crate::{header::Attachment, layout};
 /// No record and no unpacked chunk is larger; a length beyond it is damage.
 const RECORD_MAX_BYTES: usize = 64 * 1024 * 1024;
 
-/// At most this much is asked of the source at once, so that a wrong length costs no memory.
+/// At most this much is read at once, so that a wrong length costs no memory.
 const READ_BYTES: usize = 1024 * 1024;
 
 /// How much of a file could be read.
@@ -32,19 +32,19 @@ pub enum Completeness {
     Truncated {
         /// Everything before this byte was read.
         at_byte: u64,
-        /// What was found there.
+        /// What is wrong there.
         reason: String,
     },
 }
 
-/// What a file holds that matters here.
+/// The items of a file that a recording uses.
 pub(crate) enum ScanItem {
     Metadata(mcap::records::Metadata),
     Attachment(Attachment),
     Message(RawMessage),
 }
 
-/// A message as it stands in the file.
+/// An encoded message with its channel and header.
 pub(crate) struct RawMessage {
     pub(crate) channel: Arc<mcap::Channel<'static>>,
     pub(crate) header: MessageHeader,
@@ -56,7 +56,7 @@ pub(crate) struct Scan<R> {
     source: R,
     mcap: LinearReader,
     channels: ChannelAccumulator<'static>,
-    /// Bytes given to the reader; it asks for no more than the record in hand needs.
+    /// Bytes given to the parser; it asks for no more than the current record needs.
     taken_bytes: u64,
     /// Bytes up to the end of the last good record.
     good_bytes: u64,
@@ -140,7 +140,7 @@ impl<R: Read> Scan<R> {
     }
 }
 
-/// Reads one record; `None` if it carries nothing that matters here. The error says what is wrong with it.
+/// Reads one record; `None` if recordings do not use its kind. The error says what is wrong with it.
 fn item(
     channels: &mut ChannelAccumulator<'static>,
     opcode: u8,

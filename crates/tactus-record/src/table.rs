@@ -1,8 +1,8 @@
-//! The measurement table as a file: written, read and checked, whoever wrote it.
+//! Measurement tables as files: written, read and checked, whichever program wrote them.
 //!
-//! The contract stands in [`tactus_schema::table`]. Types are exact: a column of another type is refused with its
+//! [`tactus_schema::table`] defines the contract. Types are exact: a column of another type is refused with its
 //! name. Physical layout is free: nullable or not, plain or dictionary, any of the ways in which Parquet writes
-//! lists, snappy, zstd or no compression, columns in any order, further columns beside them (which are not read).
+//! lists, snappy, zstd or no compression, columns in any order, and additional columns (which are ignored).
 
 mod check;
 mod column;
@@ -42,28 +42,28 @@ pub struct Table {
     counts: Vec<f32>,
 }
 
-/// What a table says of all its rows.
+/// The metadata of a table.
 #[derive(Debug, Clone)]
 pub struct TableHead {
-    /// The rig that was measured.
+    /// The measured rig.
     pub rig: Rig,
-    /// The file's metadata, the rig's text among it.
+    /// The file's key-value metadata, including the rig's text.
     pub metadata: BTreeMap<String, String>,
 }
 
-/// The rows of one run.
+/// The rows of one run in a [`Table`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunRows {
     /// Run id.
     pub run: Arc<str>,
-    /// Its rows, contiguous and in order of time.
+    /// Indices of its rows, in order of time.
     pub rows: Range<usize>,
 }
 
-/// What a valid table holds.
+/// The size of a valid table.
 #[derive(Debug, Clone)]
 pub struct Validated {
-    /// What it says of all its rows.
+    /// The table's metadata.
     pub head: TableHead,
     /// Number of rows.
     pub rows: u64,
@@ -71,7 +71,7 @@ pub struct Validated {
     pub runs: u64,
 }
 
-/// Reads a table into memory, checked.
+/// Reads a table into memory and checks it.
 ///
 /// # Errors
 /// [`TableError`] names the column, and the row where there is one.
@@ -102,7 +102,7 @@ pub fn validate(path: impl AsRef<Path>) -> Result<Validated, TableError> {
 }
 
 impl Table {
-    /// What it says of all its rows.
+    /// The table's metadata.
     pub fn head(&self) -> &TableHead {
         &self.head
     }
@@ -117,7 +117,7 @@ impl Table {
         self.t_ns.is_empty()
     }
 
-    /// The runs, in the order in which they stand in the table.
+    /// The runs, in the table's order.
     pub fn runs(&self) -> &[RunRows] {
         &self.runs
     }
@@ -140,18 +140,18 @@ impl Table {
         })
     }
 
-    /// Sampling times, one a row.
+    /// Sampling times, one per row.
     pub fn t_ns(&self) -> &[i64] {
         &self.t_ns
     }
 
-    /// Raw counts of all rows, one after the other; as many a row as the array has elements.
+    /// Raw counts of all rows, row after row; each row has one per element.
     pub fn counts(&self) -> &[f32] {
         &self.counts
     }
 }
 
-/// A table in the making.
+/// Collects the rows of a [`Table`].
 #[derive(Default)]
 struct TableBuilder {
     runs: Vec<RunRows>,

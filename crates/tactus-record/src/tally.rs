@@ -1,4 +1,4 @@
-//! What a run came to: frames received and lost, presses, dwells, how it ended.
+//! Totals of a run: frames received and lost, presses, dwells, exit status.
 
 use std::{collections::BTreeSet, time::Duration};
 
@@ -9,7 +9,7 @@ use tactus_schema::{
 
 use crate::Message;
 
-/// Counts over the messages of one run, taken in the order in which they were recorded.
+/// Totals over the messages of one run, counted in the order in which they were recorded.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     frames: u64,
@@ -23,14 +23,14 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Takes in any message as it was read back.
+    /// Counts any message as it was read back.
     pub fn take(&mut self, message: &Message) {
         message.count(self);
     }
 
-    /// Takes in a frame; returns how many are missing between it and the one before.
+    /// Counts a frame; returns how many are missing between it and the one before.
     ///
-    /// What was lost before the first frame was lost before the recording began, and is not counted.
+    /// Frames lost before the first one were lost before the recording began, and are not counted.
     pub fn frame(&mut self, frame: &Frame) -> u64 {
         self.time(frame.received.mono);
         self.frames += 1;
@@ -44,7 +44,7 @@ impl Tally {
         lost
     }
 
-    /// Takes in an event of the run.
+    /// Counts an event of the run.
     pub fn event(&mut self, event: &pb::RunEvent) {
         self.time(MonoTime::from_ns(event.t_mono_ns));
         match &event.event {
@@ -58,34 +58,34 @@ impl Tally {
         }
     }
 
-    /// Takes in the time of any other message.
+    /// Extends the duration to the time of a message.
     pub fn time(&mut self, at: MonoTime) {
         let (first, last) = self.span.unwrap_or((at, at));
         self.span = Some((first.min(at), last.max(at)));
     }
 
-    /// Frames received.
+    /// Number of frames received.
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// Frames that the sensor took and that never arrived.
+    /// Number of frames that the sensor took and that never arrived.
     pub fn frames_lost(&self) -> u64 {
         self.frames_lost
     }
 
-    /// Places at which frames are missing.
+    /// Number of gaps in the sequence of frames.
     pub fn gaps(&self) -> u64 {
         self.gaps
     }
 
-    /// Presses of which at least one dwell is done.
+    /// Number of presses with at least one completed dwell.
     pub fn presses(&self) -> u32 {
         let presses: BTreeSet<i32> = self.dwells.iter().map(|(press, _)| *press).collect();
         u32::try_from(presses.len()).unwrap_or(u32::MAX)
     }
 
-    /// Dwells done.
+    /// Number of completed dwells.
     pub fn dwells(&self) -> u32 {
         u32::try_from(self.dwells.len()).unwrap_or(u32::MAX).saturating_add(self.dwells_outside)
     }

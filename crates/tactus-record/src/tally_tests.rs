@@ -35,7 +35,7 @@ fn received_and_lost_add_up_to_what_the_sensor_took() {
     let lost: Vec<u64> = [(10, 3), (11, 0), (14, 2), (15, 0), (21, 0), (22, 0)]
         .map(|(seq, lost_before)| tally.frame(&frame(seq, lost_before)))
         .into();
-    // What was lost before the first frame is not this recording's; 16 to 20 are missing though nobody said so.
+    // Losses before the first frame do not count; 16 to 20 are missing although no frame reports them.
     assert_eq!(lost, [0, 0, 2, 0, 5, 0]);
     assert_eq!((tally.frames(), tally.frames_lost(), tally.gaps()), (6, 7, 2));
     assert_eq!(tally.frames() + tally.frames_lost(), 22 - 10 + 1);

@@ -1,4 +1,4 @@
-//! Where the stage was, and what it did, at any time of a run.
+//! Position and phase of the stage at any time of a run.
 
 mod builder;
 mod stage_path;
@@ -20,9 +20,9 @@ use crate::{
     reader::{io_error, read_run},
 };
 
-/// All of a recording but the counts of its frames, put into order of time.
+/// A recording without the counts of its frames, in order of time.
 ///
-/// It holds a few dozen bytes a frame, so that a second pass over the recording can treat the frames one by one.
+/// It holds a few dozen bytes per frame. A second pass over the recording can then treat the frames one by one.
 #[derive(Debug, Clone)]
 pub struct Timeline {
     path: PathBuf,
@@ -39,14 +39,14 @@ pub struct Timeline {
     completeness: Completeness,
 }
 
-/// A place of the stage at a time.
+/// A reported position of the stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageReport {
-    /// When it was there.
+    /// When it was reported.
     pub at: MonoTime,
-    /// Where; robot frame.
+    /// The tip in the robot's frame.
     pub position_mm: [f64; 3],
-    /// True if it said that it does not move.
+    /// True if the stage reported that it does not move.
     pub stands: bool,
 }
 
@@ -55,12 +55,12 @@ pub struct StageReport {
 pub enum Sampling {
     /// By the device's clock.
     Device(MonoTime),
-    /// Taken to be when it arrived, because the device's clock says nothing.
+    /// The time of arrival, because there is no usable device clock.
     Arrival(MonoTime),
 }
 
 impl Sampling {
-    /// The time, whatever it rests on.
+    /// The time of either kind.
     pub fn time(self) -> MonoTime {
         match self {
             Self::Device(at) | Self::Arrival(at) => at,
@@ -69,7 +69,7 @@ impl Sampling {
 }
 
 impl Timeline {
-    /// Reads a recording, whole or damaged.
+    /// Reads a recording, complete or damaged.
     ///
     /// # Errors
     /// If it cannot be read, does not say which run it is, or holds no valid rig.
@@ -84,12 +84,12 @@ impl Timeline {
         builder.into_timeline(path, run, completeness)
     }
 
-    /// The recording.
+    /// Path of the recording.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Which run it is.
+    /// The run's metadata.
     pub fn run(&self) -> &RunMetadata {
         &self.run
     }
@@ -99,12 +99,12 @@ impl Timeline {
         &self.rig
     }
 
-    /// The rig as it stands in the recording.
+    /// The same as the JSON text in the recording.
     pub fn rig_json(&self) -> &str {
         &self.rig_json
     }
 
-    /// A file within the recording.
+    /// Contents of an attached file.
     pub fn attachment(&self, name: &str) -> Option<&[u8]> {
         self.attachments.get(name).map(Vec::as_slice)
     }
@@ -114,7 +114,7 @@ impl Timeline {
         &self.events
     }
 
-    /// Counts over the whole recording.
+    /// Totals over the whole recording.
     pub fn tally(&self) -> &Tally {
         &self.tally
     }
@@ -124,7 +124,7 @@ impl Timeline {
         &self.completeness
     }
 
-    /// The device's clock against the host's, by connection.
+    /// Estimated device clocks, by connection.
     pub fn clocks(&self) -> &BTreeMap<u32, Result<EpochClock, NoClock>> {
         &self.clocks
     }
@@ -142,20 +142,20 @@ impl Timeline {
         }
     }
 
-    /// Where the stage was, in the robot's frame: between two reports as its speeds before and after say, before the
-    /// first and after the last where they say. `None` if it never said.
+    /// Position of the tip in the robot's frame. Between two reports it follows from the speeds before and after them; before
+    /// the first and after the last it is theirs. `None` without reports.
     pub fn position_mm(&self, at: MonoTime) -> Option<[f64; 3]> {
         stage_path::position_mm(&self.stage, at)
     }
 
-    /// What the stage did, and the index of the press, -1 outside one; idle before the run began.
+    /// Phase of the stage, and index of the press, -1 outside one; idle before the run began.
     pub fn phase(&self, at: MonoTime) -> (Phase, i32) {
         let next = self.phases.partition_point(|(from, _, _)| *from <= at);
         let now = next.checked_sub(1).and_then(|index| self.phases.get(index));
         now.map_or((Phase::Idle, -1), |(_, phase, press)| (*phase, *press))
     }
 
-    /// Thickness of the covering in place.
+    /// Thickness of the covering in place at a time.
     pub fn covering_mm(&self, at: MonoTime) -> f64 {
         let next = self.coverings.partition_point(|(from, _)| *from <= at);
         let now = next.checked_sub(1).or(Some(0)).and_then(|index| self.coverings.get(index));
@@ -170,7 +170,7 @@ impl Timeline {
             .unwrap_or(&self.rig.indenter)
     }
 
-    /// The run's first event.
+    /// The event that the run started, if it was recorded.
     pub fn started(&self) -> Option<&pb::RunStarted> {
         self.events.iter().find_map(|event| match &event.event {
             Some(Event::Started(started)) => Some(started),

@@ -1,6 +1,6 @@
-//! What the rig file and the model file say in the same words: arrays, indenters, values of elements.
+//! The parts that the rig file and the model file share: arrays, indenters, values of elements.
 //!
-//! A raw type is read as it is written; its `check` takes the path of its field in the file, for errors.
+//! A raw type mirrors the file; its `check` takes the path of its field in the file, for errors.
 
 mod array;
 mod indenter;
@@ -12,7 +12,7 @@ pub(crate) use indenter::RawIndenter;
 pub(crate) use number::{finite, not_negative, positive, range};
 pub(crate) use one_or_each::OneOrEach;
 
-/// A field that is wrong; each file's error has it as its `Field`.
+/// A wrong field; becomes the variant `Field` of each file's error.
 #[derive(Debug)]
 pub(crate) struct WrongField {
     /// Path of the field.
@@ -25,7 +25,7 @@ pub(crate) fn wrong(field: impl Into<String>, problem: impl Into<String>) -> Wro
     WrongField { field: field.into(), problem: problem.into() }
 }
 
-/// A file of another schema, or of another version, is not guessed at.
+/// Refuses a file of another schema or version.
 pub(crate) fn check_schema(read: &str, stated: &str) -> Result<(), WrongField> {
     if stated == read {
         Ok(())

@@ -1,30 +1,30 @@
-//! One reading of all elements, as it travels through the service.
+//! One reading of all elements, as the service passes it on.
 
 use std::sync::Arc;
 
 use crate::{DeviceTick, MonoTime, TimeStamp, WallTime, pb};
 
-/// One reading of all elements; cheap to clone, so that it can fan out.
+/// One reading of all elements; cheap to clone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Counts every frame the sensor took, lost ones included; see [`pb::Frame::seq`].
+    /// Counts every frame that the sensor took, including lost ones; see [`pb::Frame::seq`].
     pub seq: u64,
     /// Rises by one with every (re)connection.
     pub epoch: u32,
-    /// The device's clock at the sampling, where it has one.
+    /// The device's clock at the sampling; `None` if it has no clock.
     pub device_tick: Option<DeviceTick>,
     /// When the last byte of the frame reached the host.
     pub received: TimeStamp,
-    /// Raw counts, row-major, one per element; always finite. One that was not read stands with its last reading
-    /// of this epoch, or with 0.
+    /// Raw counts, row-major, one per element; always finite. An element that was not read has its last reading of this
+    /// epoch, or 0.
     pub counts: Arc<[f32]>,
-    /// What is known of this frame.
+    /// Gaps, saturation, unread elements.
     pub flags: FrameFlags,
-    /// Frames known to be lost just before this one.
+    /// Number of frames known to be lost just before this one.
     pub lost_before: u32,
     /// True if no physical sensor was read.
     pub simulated: bool,
-    /// Elements that were not read, in order; [`FrameFlags::BAD_ELEMENTS`] says whether there are any.
+    /// Indices of elements that were not read, ascending; [`FrameFlags::BAD_ELEMENTS`] is set if there are any.
     pub bad_elements: Arc<[u32]>,
 }
 
@@ -37,7 +37,7 @@ impl FrameFlags {
     pub const GAP_BEFORE: Self = Self(pb::FrameFlag::GapBefore as u32);
     /// The first frame after a (re)connection.
     pub const NEW_EPOCH: Self = Self(pb::FrameFlag::NewEpoch as u32);
-    /// At least one element stands at the end of its range.
+    /// At least one element is at the end of its range.
     pub const SATURATED: Self = Self(pb::FrameFlag::Saturated as u32);
     /// At least one element was not read.
     pub const BAD_ELEMENTS: Self = Self(pb::FrameFlag::BadElements as u32);
@@ -47,7 +47,7 @@ impl FrameFlags {
         self.0 & other.0 == other.0
     }
 
-    /// Both sets of bits.
+    /// The union of both sets of bits.
     #[must_use]
     pub fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)

@@ -15,7 +15,7 @@ pub enum Topic {
     SensorInfo,
     /// [`crate::pb::StageState`], at each report of the stage.
     StageState,
-    /// [`crate::pb::RunEvent`], as they happen.
+    /// [`crate::pb::RunEvent`], when it happens.
     RunEvent,
     /// [`crate::pb::RunState`], at each change.
     RunState,
@@ -25,26 +25,26 @@ pub enum Topic {
     SafetyState,
 }
 
-/// A question that the service answers; asked with [`crate::pb::RunRequest`] or
-/// [`crate::pb::CommandRequest`], answered with [`crate::pb::CommandReply`].
+/// A command that the service answers. The request is [`crate::pb::RunRequest`] for [`Command::Run`], otherwise
+/// [`crate::pb::CommandRequest`]; the answer is [`crate::pb::CommandReply`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Command {
-    /// What the service is doing.
+    /// Report the state of the service.
     Status,
     /// Start an experiment.
     Run,
-    /// Hold after the step in hand.
+    /// Hold after the current step.
     Pause,
-    /// Go on after a pause.
+    /// Continue after a pause.
     Resume,
-    /// Stop motion now, retract, end the run. Never queued behind anything.
+    /// Stop motion now, retract, end the run. Never waits for other commands.
     Stop,
     /// Clear the stage's alarm and home it. Refused during a run.
     Reset,
 }
 
 impl Topic {
-    /// Every topic.
+    /// In the order of the enumeration.
     pub const ALL: [Self; 7] = [
         Self::SensorFrame,
         Self::SensorInfo,
@@ -70,7 +70,7 @@ impl Topic {
 }
 
 impl Command {
-    /// Every command.
+    /// In the order of the enumeration.
     pub const ALL: [Self; 6] = [Self::Status, Self::Run, Self::Pause, Self::Resume, Self::Stop, Self::Reset];
 
     /// The key below `tactus/<rig>/`.
@@ -87,7 +87,7 @@ impl Command {
 }
 
 impl Keys {
-    /// The keys of the rig of that name; see [`crate::Rig`] for what a name may be.
+    /// The keys of the rig of that name; [`crate::Rig::name`] says what a name may be.
     pub fn new(rig: impl Into<String>) -> Self {
         Self { rig: rig.into() }
     }

@@ -1,7 +1,6 @@
 //! The contracts of Tactus: messages, bus keys, frames and times, the rig file, the model file, the measurement table.
 //!
-//! A change here is a new version, never a silent edit. No I/O: everything is parsed from and
-//! written to text or bytes that the caller reads and stores.
+//! Every change is a new version. There is no I/O: the caller reads and stores the texts and bytes.
 
 pub mod key;
 pub mod model;

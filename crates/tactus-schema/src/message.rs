@@ -11,7 +11,7 @@ pub mod pb {
     include!("../proto/tactus.v1.rs");
 }
 
-/// A message that has a place on the bus or in a recording.
+/// A message on the bus or in a recording.
 pub trait Message: prost::Message + Default + 'static {
     /// Full protobuf name, such as `tactus.v1.Frame`; the bus's encoding string and the schema name
     /// of the recording's channel.

@@ -1,7 +1,7 @@
-//! The model file: what is known of an array, and what its base model lacks; TOML, `tactus.model/1`.
+//! The model file: an array's base model and the effects that add to it; TOML, `tactus.model/1`.
 //!
-//! Simulators, virtual devices and the discovery of effects all read the same file; discovery writes it. Unknown
-//! keys are refused, as are effects and parameters that the library has not.
+//! Simulators, virtual devices and the discovery of effects read it; discovery writes it. Unknown keys, effects and
+//! parameters are refused.
 
 mod file;
 
@@ -17,12 +17,12 @@ use crate::description::WrongField;
 
 pub use file::SCHEMA;
 
-/// A checked model.
+/// A checked model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// The base model.
+    /// The model without effects.
     pub base: BaseModel,
-    /// What the base model lacks, in the order in which effects of one stage act.
+    /// What the base model lacks; effects of one stage act in this order.
     pub effects: Vec<KnownEffect>,
 }
 
@@ -35,7 +35,7 @@ pub struct BaseModel {
     pub psf: Psf,
     /// Standard errors of the spread's intercept and slope.
     pub psf_se: [Option<f64>; 2],
-    /// How the elements answer.
+    /// Sensitivities, baselines and quadratic terms, one per element.
     pub response: Response,
     /// Standard errors of the sensitivities, one per element.
     pub sensitivity_counts_per_mm_se: Option<Vec<f64>>,
@@ -43,50 +43,50 @@ pub struct BaseModel {
     pub baseline_counts_se: Option<Vec<f64>>,
     /// Standard errors of the quadratic terms, one per element.
     pub quadratic_per_mm_se: Option<Vec<f64>>,
-    /// Standard deviation of an element's noise.
+    /// Standard deviation of an element's noise, in counts.
     pub noise_rms_counts: f64,
 }
 
-/// An effect, and how it is known.
+/// An effect with its standard errors and evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownEffect {
-    /// The effect.
+    /// The effect and its parameters.
     pub effect: Effect,
-    /// Standard errors of its parameters, by name; of those that were estimated.
+    /// Standard errors of its estimated parameters, by name.
     pub standard_errors: BTreeMap<String, f64>,
-    /// What put it there.
+    /// The data that showed it; `None` if it was only stated.
     pub evidence: Option<Evidence>,
 }
 
-/// The data that an effect explains, and how well.
+/// The data that show an effect, and how much it improves the predictions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// Id of the data.
     pub data: String,
     /// Root mean square of the residuals on held-out presses without the effect.
     pub heldout_rms_before_counts: f64,
-    /// The same with it.
+    /// The same with the effect.
     pub heldout_rms_after_counts: f64,
 }
 
 /// Why a file is not a model.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelFileError {
-    /// Not TOML of the right form; the text names line and key.
+    /// The TOML is malformed; the text names line and key.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
     /// The array's description is contradictory.
     #[error("base.array: {0}")]
     Array(#[from] ArrayError),
-    /// The base parameters make no forward model.
+    /// There is no forward model with the base parameters.
     #[error("base: {0}")]
     Base(#[from] ModelError),
-    /// An entry is no effect.
+    /// An entry is no known effect, or its parameters are wrong.
     #[error("effect[{index}]: {source}")]
     Effect {
-        /// Index of the entry.
+        /// Index of the entry, from 0.
         index: usize,
-        /// What is wrong with it.
+        /// The problem.
         source: EffectError,
     },
     /// One field is wrong.
@@ -106,10 +106,10 @@ impl From<WrongField> for ModelFileError {
 }
 
 impl Model {
-    /// What a rig's description says: its response is linear, it has no effects, and its noise is not stated, so 0.
-    /// Nothing of what a simulated rig hides is in it.
+    /// The model that a rig's description states: a linear response, no effects, and noise 0 because it is not stated. It
+    /// ignores the hidden truth of a simulated rig.
     ///
-    /// `None` if the rig's reference indenter is not among its tools, which no checked rig has.
+    /// `None` if the rig's reference indenter is not among its tools, which a checked rig rules out.
     pub fn of_rig(rig: &Rig) -> Option<Self> {
         let reference = &rig.sensitivity_reference;
         let response = Response {
@@ -124,9 +124,9 @@ impl Model {
 
     /// The characterisation carried to another array.
     ///
-    /// The spread in mm, the response to the reference press, the noise and the effects stay. What was each
-    /// element's own becomes the median over the elements for all, and standard errors of such values go, as do
-    /// effects that name elements. So the paper's Fig. 10 shows one covering on arrays of other resolutions.
+    /// The spread in mm, the response to the reference press, the noise and the effects stay. Values of single elements are
+    /// replaced by their median; their standard errors are dropped, and so are effects that name elements. The paper's
+    /// Fig. 10 shows one covering on arrays of other resolutions in this way.
     #[must_use]
     pub fn on(&self, array: Array) -> Self {
         let for_all = |values: &[f64]| vec![median(values); array.elements()];
@@ -152,14 +152,13 @@ impl Model {
     /// The base model, ready to use.
     ///
     /// # Errors
-    /// [`ModelError`] if a parameter was changed to what no model can have, or an array is given for which
-    /// there is no reference press.
+    /// [`ModelError`] if a parameter is invalid, or the array has no reference press.
     pub fn forward(&self) -> Result<ForwardModel, ModelError> {
         let BaseModel { array, psf, response, .. } = &self.base;
         ForwardModel::new(array.clone(), *psf, response.clone())
     }
 
-    /// A sensor of this model: where it lies, the height of its surface, what covers it, and the tool.
+    /// A sensor of this model at a pose, with the height of its surface, a covering and a tool.
     ///
     /// # Errors
     /// As [`Model::forward`].
@@ -183,7 +182,7 @@ impl Model {
 }
 
 impl BaseModel {
-    /// Parameters that were not estimated, of a sensor without noise.
+    /// Parameters without standard errors, of a sensor without noise.
     pub fn of(array: Array, psf: Psf, response: Response) -> Self {
         Self {
             array,
@@ -198,7 +197,7 @@ impl BaseModel {
     }
 }
 
-/// The middle value, or the mean of the two in the middle; 0 of nothing.
+/// The middle value, or the mean of the two in the middle; 0 without values.
 fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

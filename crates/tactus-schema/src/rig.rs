@@ -24,9 +24,9 @@ pub use transport::{HidLink, IdentityError, MAX_REPORT_BYTES, SerialPort, Transp
 /// A checked rig description.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rig {
-    /// Name, one chunk of a bus key: letters, digits, `-`, `_`.
+    /// Name, one part of a bus key: letters, digits, `-`, `_`.
     pub name: String,
-    /// True if no physical device stands behind it.
+    /// True if it has no physical devices.
     pub simulated: bool,
     /// The elements.
     pub array: Array,
@@ -36,7 +36,7 @@ pub struct Rig {
     pub psf: Psf,
     /// Counts per mm of indentation of the reference indenter at the element's own centre, one per element.
     pub sensitivity_counts_per_mm: Vec<f64>,
-    /// What the sensitivity was stated for.
+    /// The press that the sensitivities refer to.
     pub sensitivity_reference: SensitivityReference,
     /// Reading at rest, one per element.
     pub baseline_counts: Vec<f64>,
@@ -46,27 +46,27 @@ pub struct Rig {
     pub indenter: String,
     /// The covering in place.
     pub covering: Covering,
-    /// What may be done to it; `None` in descriptions that came with data.
+    /// Links, limits and motion; `None` in descriptions stored with data.
     pub service: Option<Service>,
-    /// What the virtual devices hide from the service; simulated rigs only.
+    /// The hidden truth of the virtual devices; simulated rigs only.
     pub simulation: Option<Simulation>,
 }
 
-/// The press for which sensitivity is stated.
+/// The press that sensitivities refer to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensitivityReference {
     /// Id of an indenter of the rig.
     pub indenter: String,
-    /// The covering then in place.
+    /// The covering in place during that press.
     pub covering: Covering,
 }
 
-/// What the lab service needs beyond the description.
+/// The sections that only the lab service needs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Service {
     /// Bounds that no script, client or fault may cross.
     pub envelope: Envelope,
-    /// How the stage moves within them.
+    /// How the stage moves within the bounds.
     pub motion: Motion,
     /// What to do when something is lost.
     pub policy: Policy,
@@ -83,7 +83,7 @@ pub struct Envelope {
     pub x_mm: [f64; 2],
     /// Least and greatest y.
     pub y_mm: [f64; 2],
-    /// Greatest z; the least is given by the depth limit.
+    /// Greatest z; the depth limit gives the least.
     pub z_max_mm: f64,
     /// Greatest depth as a share of the covering's thickness, in (0, 1).
     pub depth_share_max: f64,
@@ -102,7 +102,7 @@ pub struct Envelope {
 pub struct Motion {
     /// Height at which the tip travels and to which it retracts.
     pub safe_height_mm: f64,
-    /// Height down to which it travels fast before a press.
+    /// Height down to which the tip travels fast before a press.
     pub approach_height_mm: f64,
     /// Speed of travel and retraction.
     pub travel_speed_mm_per_s: f64,
@@ -110,7 +110,7 @@ pub struct Motion {
     pub load_speed_mm_per_s: f64,
     /// Rest between the end of a motion and the readings of a dwell.
     pub settle_s: f64,
-    /// A move is done when the controller is idle and the position within this of the target.
+    /// A move is done when the controller is idle and the position is within this distance of the target.
     pub tolerance_mm: f64,
 }
 
@@ -119,14 +119,14 @@ pub struct Motion {
 pub struct Policy {
     /// When frames are lost during a run.
     pub on_gap: OnGap,
-    /// How long a lost device is waited for before the run fails, in milliseconds.
+    /// How long the service waits for a lost device before the run fails, in milliseconds.
     pub reconnect_ms: u32,
 }
 
 /// What a run does when frames are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnGap {
-    /// Retract, wait for the sensor, begin the press again; the run ends as degraded.
+    /// Retract, wait for the sensor, repeat the press; the run ends as degraded.
     Repeat,
     /// Retract and fail.
     Fail,
@@ -135,13 +135,13 @@ pub enum OnGap {
 /// The sensor's link.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SensorLink {
-    /// How it speaks.
+    /// The protocol.
     pub protocol: SensorProtocol,
-    /// Over what.
+    /// The transport.
     pub transport: Transport,
 }
 
-/// Protocols of sensors. The meaning of a frame's counts depends on the protocol.
+/// Protocols of sensors. The unit of a frame's counts depends on the protocol.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SensorProtocol {
     /// `weiss-dsa`: the `DSACON32m` and relatives, push mode; 12-bit counts.
@@ -181,7 +181,7 @@ pub const ANYSKIN_SHAPE: [usize; 2] = [5, 3];
 /// The truth of a simulated rig, which the service does not see.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
-    /// Seed of everything random in it.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Standard deviation of an element's noise.
     pub noise_rms_counts: f64,
@@ -191,9 +191,9 @@ pub struct Simulation {
     pub quadratic_per_mm: f64,
     /// True registration minus the declared one.
     pub registration_error: RegistrationError,
-    /// True height of the covering's surface where the service believes 0.
+    /// True height of the covering's surface, which the service takes to be 0.
     pub surface_mm: f64,
-    /// What is wrong with elements, by index: in the file, the lists `miswired`, `dead`, `stuck` and `noisy`.
+    /// Faults of elements, by index: in the file, the lists `miswired`, `dead`, `stuck` and `noisy`.
     pub faults: BTreeMap<usize, ElementFault>,
     /// The stage's true kinematics.
     pub stage: SimulatedStage,
@@ -208,22 +208,22 @@ pub struct RegistrationError {
     pub rotation_deg: f64,
 }
 
-/// What is wrong with a simulated element.
+/// A fault of a simulated element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ElementFault {
-    /// It gives the signal of another, by its own gain (the paper's two faulty elements).
+    /// It gives another element's signal with its own gain, as the paper's two faulty elements do.
     Miswired {
-        /// Index of the other.
+        /// Index of the other element.
         answers_for: usize,
     },
-    /// It answers to nothing: its baseline, and its noise.
+    /// It responds to no press and reads baseline and noise.
     Dead,
     /// It always reads the same, without noise.
     Stuck {
-        /// What it reads; within full scale.
+        /// The constant reading; within full scale.
         counts: u16,
     },
-    /// It has a noise of its own.
+    /// It has more noise than the others.
     Noisy {
         /// Standard deviation of its noise.
         noise_rms_counts: f64,
@@ -239,7 +239,7 @@ pub struct SimulatedStage {
     pub vertical_step_mm: f64,
     /// Acceleration along a move.
     pub acceleration_mm_per_s2: f64,
-    /// Greatest speed it can do.
+    /// Greatest speed along a move.
     pub speed_max_mm_per_s: f64,
     /// Travel of x, y and z: least and greatest, robot frame.
     pub travel_mm: [[f64; 2]; 3],
@@ -248,10 +248,10 @@ pub struct SimulatedStage {
 /// Why a file is not a rig.
 #[derive(Debug, thiserror::Error)]
 pub enum RigError {
-    /// Not TOML of the right form; the text names line and key.
+    /// The TOML is malformed; the text names line and key.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
-    /// Not JSON of the right form.
+    /// The JSON is malformed.
     #[error("{0}")]
     Json(#[from] serde_json::Error),
     /// The array's description is contradictory.

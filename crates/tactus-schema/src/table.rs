@@ -1,4 +1,4 @@
-//! The measurement table: the columns that analysis reads, as Parquet.
+//! The measurement table: the Parquet columns that analysis reads.
 //!
 //! | column | type | meaning |
 //! |---|---|---|

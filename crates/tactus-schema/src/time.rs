@@ -1,4 +1,4 @@
-//! Three clocks that are never mixed: the device's, the host's monotonic one, and the wall's.
+//! Times of three clocks, each a type of its own: the device's clock, the host's monotonic clock and its wall clock.
 
 use std::time::Duration;
 
@@ -44,7 +44,7 @@ impl MonoTime {
         Duration::from_nanos(u64::try_from(self.0.saturating_sub(earlier.0)).unwrap_or(0))
     }
 
-    /// This instant and `duration` more.
+    /// The instant `duration` later; saturates at the end of the range.
     #[must_use]
     pub fn after(self, duration: Duration) -> Self {
         Self(self.0.saturating_add(i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX)))
@@ -62,7 +62,7 @@ impl WallTime {
         self.0
     }
 
-    /// This instant and `duration` more.
+    /// The instant `duration` later; saturates at the end of the range.
     #[must_use]
     pub fn after(self, duration: Duration) -> Self {
         Self(self.0.saturating_add(i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX)))

@@ -1,4 +1,4 @@
-//! What a reader must know of a calibration: what is missing, and what speaks against its numbers.
+//! Remarks on a calibration: what is missing, and what limits the trust in its numbers.
 
 use super::Calibration;
 use crate::{
@@ -9,10 +9,10 @@ use crate::{
     thickness::IMPLAUSIBLE,
 };
 
-/// Residuals of so many times the noise say that the model is not the sensor's.
+/// Residuals beyond this many times the noise show that the model does not hold.
 const MISFIT: f64 = 1.5;
 
-/// What is to be said of a calibration, in its order.
+/// Remarks in the order of the calibration's steps.
 #[derive(Default)]
 struct Remarks {
     missing: Vec<String>,
@@ -20,7 +20,7 @@ struct Remarks {
 }
 
 impl Calibration {
-    /// Adds what its results, and what it rests on, give to say.
+    /// Adds the remarks on its results and on its data.
     pub(super) fn remark(&mut self, declared: &Declared, readings: &Readings) {
         let mut remarks = Remarks::default();
         remarks.data(declared, readings);
@@ -54,7 +54,7 @@ impl Remarks {
         }
         if readings.frames_left_out > 0 {
             self.warnings.push(format!(
-                "{} of {} frames are left out: an element read what no noise explains.",
+                "{} of {} frames are left out: an element's reading is an outlier.",
                 readings.frames_left_out, readings.frames
             ));
         }

@@ -1,21 +1,21 @@
-//! A stretch of frames of one kind, and its mean without outlying frames.
+//! A stretch of consecutive frames of one kind, and its mean without outlying frames.
 
 use tactus_schema::table::{Phase, RowView};
 
 use super::{CLEAR_MM, Dwell};
 use crate::order::median;
 
-/// A frame is left out if an element is so many robust standard deviations away from its median.
+/// A frame is left out if an element is more than this many robust standard deviations away from its median.
 const OUTLYING: f64 = 10.0;
-/// Median absolute deviation to standard deviation, of a normal distribution.
+/// Ratio of the standard deviation to the median absolute deviation of a normal distribution.
 const MAD_TO_SD: f64 = 1.4826;
-/// A tip within this of where it mostly was has arrived.
+/// A tip stands still within this distance of its median height.
 const STILL_MM: f64 = 0.002;
 
-/// What a stretch of frames is good for.
+/// What a stretch of frames is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum SegmentKind {
-    /// Nothing: on the way, or going up.
+    /// Nothing: the tip moves in the air, or goes up.
     #[default]
     Between,
     /// Nothing touches.
@@ -62,10 +62,10 @@ impl Segment {
         self.counts.extend_from_slice(counts);
     }
 
-    /// Keeps the frames in which the tip stood still and gives its height; none if there are none.
+    /// Keeps the frames in which the tip stood still and gives its height; `None` without frames.
     ///
-    /// The first and the last of them go too: positions between two reports are not exact, and the tip may still
-    /// have moved, or moved on.
+    /// The first and the last of them are dropped too: positions between two reports are not exact, so the tip may have
+    /// moved during these frames.
     pub(super) fn settle(&mut self) -> Option<f64> {
         let elements = self.elements()?;
         let height_mm = median(self.heights_mm.iter().copied())?;
@@ -84,14 +84,14 @@ impl Segment {
         Some(height_mm)
     }
 
-    /// The mean of each element over the frames in which none reads what noise cannot explain.
+    /// The mean of each element over the frames without outliers; `None` if there are none.
     pub(super) fn mean(&self, step_counts: f64) -> Option<SegmentMean> {
         let elements = self.elements()?;
         let frames = self.heights_mm.len();
         let column =
             |element: usize| (0..frames).map(move |frame| f64::from(self.counts[frame * elements + element]));
         let mut sound = vec![true; frames];
-        // Fewer tell no outlier from the rest.
+        // With fewer frames an outlier cannot be told from noise.
         if frames >= 5 {
             for element in 0..elements {
                 let centre = median(column(element))?;
@@ -103,7 +103,7 @@ impl Segment {
             }
         }
         let kept = sound.iter().filter(|sound| **sound).count();
-        // If nothing is left, nothing stood still: a mean would be none.
+        // Without frames there is no mean.
         if kept == 0 {
             return None;
         }
@@ -118,7 +118,7 @@ impl Segment {
         Some(SegmentMean { counts, squares, frames: kept, left_out: frames - kept })
     }
 
-    /// Every frame by itself.
+    /// Every frame as a dwell of its own that was not held.
     pub(super) fn frames(&self) -> impl Iterator<Item = Dwell> {
         let elements = self.elements().unwrap_or(1);
         self.heights_mm.iter().zip(self.counts.chunks_exact(elements)).map(|(height_mm, counts)| Dwell {

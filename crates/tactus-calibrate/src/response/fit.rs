@@ -13,10 +13,10 @@ use crate::{
     setting::Declared,
 };
 
-/// Dwells are held out in so many turns.
+/// Number of folds in which dwells are held out.
 const FOLDS: usize = 5;
 
-/// An element's readings in a press at its centre.
+/// An element's readings in one press at its centre.
 #[derive(Debug, Clone)]
 pub(super) struct CentrePress {
     pub(super) element: usize,
@@ -25,7 +25,7 @@ pub(super) struct CentrePress {
     rest_frames: usize,
 }
 
-/// One dwell.
+/// One dwell of such a press: predicted indentation and measured rise.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CentreDwell {
     pub(super) u_mm: f64,
@@ -33,7 +33,7 @@ pub(super) struct CentreDwell {
     frames: usize,
 }
 
-/// The error of a prediction.
+/// The error of the prediction for a held-out dwell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct HeldOutError {
     pub(super) element: usize,
@@ -42,7 +42,7 @@ pub(super) struct HeldOutError {
     pub(super) in_noise: f64,
 }
 
-/// A fitted form.
+/// A form with its fitted parameters.
 #[derive(Debug, Clone)]
 pub(super) struct FittedForm {
     pub(super) form: ResponseForm,
@@ -52,7 +52,7 @@ pub(super) struct FittedForm {
 }
 
 impl CentrePress {
-    /// An element's readings in a press, which give some element's signal, with the sensor at a place.
+    /// The readings of `element` in a press, with the indentation predicted at the element `signal`, whose signal it gives.
     pub(super) fn of(
         declared: &Declared,
         model: &ForwardModel,
@@ -129,7 +129,7 @@ impl FittedForm {
         Estimate::new(self.fit.parameters[at], self.fit.covariance[(at, at)] * self.fit.inflation())
     }
 
-    /// Where among the parameters the curvature of the element at an index stands.
+    /// Index among the parameters of the curvature of the element at `index`.
     fn curvature_at(&self, index: usize) -> Option<usize> {
         let count = self.elements.len();
         match self.form {
@@ -139,14 +139,14 @@ impl FittedForm {
         }
     }
 
-    /// Where among the parameters a row of all `s`, then all `k`, stands.
+    /// Index among the parameters of a row of the expanded vector: all `s`, then all `k`.
     fn place(&self, row: usize) -> Option<usize> {
         let count = self.elements.len();
         if row < count { Some(row) } else { self.curvature_at(row - count) }
     }
 }
 
-/// Fits a form to the dwells that are kept; their group and their index in it decide.
+/// Fits a form to the dwells that `keep` selects by their press and their index in it.
 pub(super) fn fit(
     form: ResponseForm,
     groups: &[CentrePress],
@@ -191,7 +191,7 @@ pub(super) fn fit(
     Some(fitted)
 }
 
-/// Counts per mm of an element, as a line through zero has it: where every form starts.
+/// Counts per mm of an element by a line through zero: the starting value of every form.
 fn slope(groups: &[CentrePress], element: usize) -> f64 {
     let points = groups.iter().filter(|group| group.element == element).flat_map(|group| &group.points);
     let [above, below] = points.fold([0.0, 0.0], |[above, below], point| {
@@ -202,7 +202,7 @@ fn slope(groups: &[CentrePress], element: usize) -> f64 {
 
 /// Errors of predictions of dwells that took no part in the fit; `None` if the presses have too few dwells.
 pub(super) fn heldout(form: ResponseForm, groups: &[CentrePress]) -> Option<Vec<HeldOutError>> {
-    // A press with fewer dwells, cut off perhaps, takes part in the fits but holds none out.
+    // Presses with fewer dwells, such as aborted ones, take part in the fits, but none of their dwells is held out.
     let whole = |group: &&CentrePress| group.points.len() >= DWELLS_LEAST;
     let folds = FOLDS.min(groups.iter().filter(whole).map(|group| group.points.len()).min()?);
     let mut errors = Vec::new();

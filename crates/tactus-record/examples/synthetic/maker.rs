@@ -1,4 +1,4 @@
-//! Lets the made-up run happen.
+//! Generates the messages of a synthetic run.
 
 use std::sync::Arc;
 
@@ -161,7 +161,7 @@ impl Maker {
     }
 
     fn stage(&self) -> Vec<Fed> {
-        // Every 100 ms, and at each knot, as a controller that is asked while moving.
+        // Every 100 ms, and at each knot, like a controller that is polled while it moves.
         let mut times: Vec<f64> = (0..(self.now_s * 10.0) as u32).map(|n| f64::from(n) * 0.1).collect();
         times.extend(self.knots.iter().map(|knot| knot.0));
         times.sort_by(f64::total_cmp);

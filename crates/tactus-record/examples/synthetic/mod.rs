@@ -1,4 +1,4 @@
-//! A made-up run with known truth: for tests, benchmarks and examples, where no rig is at hand.
+//! A synthetic run with known truth, for tests, benchmarks and examples without a rig.
 //!
 //! The stage moves on straight lines between knots; each element reads a Gaussian of its distance to the tip, times
 //! the depth; frames are sampled by a device clock that may drift and arrive after a varying delay.
@@ -33,7 +33,7 @@ pub const TICK_NS: u64 = 1_000_000;
 /// 2026-03-25 10:00:00 UTC.
 pub const STARTED_NS: i64 = 1_774_432_800_000_000_000;
 
-/// What the run does.
+/// The parameters of a run.
 #[derive(Debug, Clone)]
 pub struct Plan {
     pub run_id: String,
@@ -58,7 +58,7 @@ pub struct Press {
     pub depths_mm: Vec<f64>,
 }
 
-/// What a recording is fed with, in order of time.
+/// The messages for a recording, in order of time.
 #[derive(Debug, Clone)]
 pub enum Fed {
     Info(pb::SensorInfo, TimeStamp),
@@ -67,7 +67,7 @@ pub enum Fed {
     Event(pb::RunEvent),
 }
 
-/// A run that was made up, and its truth.
+/// A synthetic run, and its truth.
 #[derive(Debug, Clone)]
 pub struct Run {
     pub plan: Plan,

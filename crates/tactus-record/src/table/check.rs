@@ -1,4 +1,4 @@
-//! What the contract asks of values.
+//! Checks values against the contract.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -6,7 +6,7 @@ use tactus_schema::{Rig, table::RowView};
 
 use super::TableError;
 
-/// Checks rows in the order in which they stand in the table.
+/// Checks rows in the table's order.
 pub(crate) struct Checker {
     elements: usize,
     indenters: BTreeSet<String>,

@@ -12,12 +12,12 @@ use parquet::{
 
 use super::TableError;
 
-/// Rows asked for at once: bounds what a wrong count of rows in a damaged file costs.
+/// Rows read at once, so that a wrong number of rows in a damaged file costs no memory.
 const BATCH_ROWS: usize = 8192;
 
-/// Values of a column, row by row.
+/// The values of a column, grouped by row.
 pub(super) struct Column<T> {
-    /// As many as there are values that are not null.
+    /// All values that are not null.
     values: Vec<T>,
     /// Where each row's values begin; one more than there are rows.
     starts: Vec<usize>,
@@ -25,7 +25,7 @@ pub(super) struct Column<T> {
     null_rows: Vec<usize>,
 }
 
-/// A file in which a column is read, and what errors say of it.
+/// Reads columns of one row group; knows the file for errors.
 pub(super) struct ColumnReader<'a> {
     pub(super) path: &'a Path,
     pub(super) group: &'a dyn RowGroupReader,
@@ -37,14 +37,14 @@ impl<T> Column<T> {
         self.starts.len() - 1
     }
 
-    /// The values of one row: one, or, of a list, any number; none of a null.
+    /// The values of one row: one, or any number of a list; none if it is null.
     pub(super) fn row(&self, row: usize) -> &[T] {
         &self.values[self.starts[row]..self.starts[row + 1]]
     }
 }
 
 impl ColumnReader<'_> {
-    /// A column of texts, none of them null.
+    /// Reads a column of texts; null is an error.
     pub(super) fn texts(&self, leaf: usize, name: &'static str) -> Result<Vec<String>, TableError> {
         let column = self.column::<ByteArrayType>(leaf, name)?;
         self.no_nulls(&column, name)?;
@@ -55,28 +55,28 @@ impl ColumnReader<'_> {
         column.values.iter().enumerate().map(text).collect()
     }
 
-    /// A column of 32-bit integers, none of them null.
+    /// Reads a column of 32-bit integers; null is an error.
     pub(super) fn int32s(&self, leaf: usize, name: &'static str) -> Result<Vec<i32>, TableError> {
         let column = self.column::<Int32Type>(leaf, name)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
 
-    /// A column of 64-bit integers, none of them null.
+    /// Reads a column of 64-bit integers; null is an error.
     pub(super) fn int64s(&self, leaf: usize, name: &'static str) -> Result<Vec<i64>, TableError> {
         let column = self.column::<Int64Type>(leaf, name)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
 
-    /// A column of numbers, none of them null.
+    /// Reads a column of numbers; null is an error.
     pub(super) fn float64s(&self, leaf: usize, name: &'static str) -> Result<Vec<f64>, TableError> {
         let column = self.column::<DoubleType>(leaf, name)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
 
-    /// A column of numbers or nulls; a column of Parquet's null type, in whatever it is kept, holds nulls only.
+    /// Reads a column of numbers or nulls; a column of Parquet's null type, whatever its physical type, is all null.
     pub(super) fn optional_float64s(
         &self,
         leaf: usize,
@@ -90,7 +90,7 @@ impl ColumnReader<'_> {
         Ok((0..column.rows()).map(|row| column.row(row).first().copied()).collect())
     }
 
-    /// A column of lists of numbers, neither null nor with nulls in them.
+    /// Reads a column of lists of numbers; null lists and null elements are errors.
     pub(super) fn lists(&self, leaf: usize, name: &'static str) -> Result<Column<f32>, TableError> {
         let column = self.column::<FloatType>(leaf, name)?;
         self.no_nulls(&column, name)?;
@@ -124,8 +124,8 @@ impl ColumnReader<'_> {
     }
 }
 
-/// Values and levels as Parquet keeps them: a repetition level above 0 goes on in the row before, a definition level
-/// below the greatest stands for no value.
+/// Values and levels as Parquet stores them: a value with a repetition level above 0 belongs to the same row as the one
+/// before; a definition level below the greatest means that there is no value.
 struct Levels<T> {
     values: Vec<T>,
     definition: Vec<i16>,
@@ -137,7 +137,7 @@ struct Levels<T> {
 struct DefinitionLevels {
     /// The level of a value; 0 if there can be no nulls.
     defined: i16,
-    /// The level of a list without elements; its length says what is wrong with it.
+    /// The level of a list without elements; the check of its length reports it.
     empty_list: Option<i16>,
 }
 

@@ -1,4 +1,4 @@
-//! Where a file keeps the contract's columns, and whether they have the contract's types.
+//! Finds the contract's columns in a file, and checks their types.
 
 use parquet::{
     basic::{ConvertedType, LogicalType, Type as PhysicalType},

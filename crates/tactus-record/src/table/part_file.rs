@@ -1,4 +1,4 @@
-//! A Parquet file in the making.
+//! Writes a Parquet file beside its path until it is complete.
 
 use std::{
     fs::{self, File},
@@ -24,7 +24,7 @@ use super::TableError;
 /// Rows of a row group: half an hour of one sensor, some 10 MB in memory.
 pub(super) const GROUP_ROWS: usize = 65_536;
 
-/// A Parquet file that stands beside its place, with the ending `.part`, until it is whole.
+/// A Parquet file that has the suffix `.part` until it is complete.
 pub(super) struct PartFile {
     path: PathBuf,
     beside: PathBuf,
@@ -51,7 +51,7 @@ impl PartFile {
         }
     }
 
-    /// Where it will stand.
+    /// The path of the complete file.
     pub(super) fn path(&self) -> &PathBuf {
         &self.path
     }
@@ -73,7 +73,7 @@ impl PartFile {
         written.map_err(|source| TableError::Parquet { path: self.beside.clone(), source })
     }
 
-    /// Closes the file and puts it in its place.
+    /// Closes the file and moves it to its path.
     pub(super) fn finish(self) -> Result<(), TableError> {
         let Self { path, beside, file } = self;
         let file = match file.into_inner() {
@@ -86,12 +86,12 @@ impl PartFile {
 
     /// Removes what was written so far.
     pub(super) fn abandon(self) {
-        // The error at hand says more than one that follows from it.
+        // An error of the removal would hide the one that matters.
         drop(fs::remove_file(&self.beside));
     }
 }
 
-/// The columns with which every table of frames begins, of a row group in hand: from the run to the position.
+/// The first columns of every table of frames, from the run to the position, in the current row group.
 #[derive(Default)]
 pub(super) struct FrameColumns {
     run: Vec<ByteArray>,
@@ -129,7 +129,7 @@ impl FrameColumns {
     }
 }
 
-/// Where the lists of a frame's elements begin: 0 at the first of each.
+/// Repetition levels of a list of this many elements: 0 at its first element, then 1.
 pub(super) fn repetition(elements: usize) -> impl Iterator<Item = i16> {
     (0..elements).map(|index| i16::from(index > 0))
 }
@@ -155,8 +155,8 @@ pub(super) fn column<T: DataType>(
     column.close()
 }
 
-/// Names and indices repeat: dictionaries. Times and positions do not. Counts are whole numbers of a narrow range on
-/// most sensors; where they are not, the writer gives the dictionary up by itself.
+/// Names and indices repeat, so they have dictionaries; times and positions do not. Counts of most sensors are whole
+/// numbers in a narrow range; otherwise the writer drops their dictionary by itself.
 fn properties() -> Result<WriterProperties, ParquetError> {
     let mut properties = WriterProperties::builder()
         .set_created_by(concat!("tactus-record ", env!("CARGO_PKG_VERSION")).into())

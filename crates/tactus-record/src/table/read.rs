@@ -26,7 +26,7 @@ use super::{
     layout::{CONTRACT, find},
 };
 
-/// A table whose head was read and whose rows are still to be.
+/// A table whose metadata was read, and whose rows were not read yet.
 pub(crate) struct TableReader {
     path: PathBuf,
     file: SerializedFileReader<File>,
@@ -52,17 +52,17 @@ impl TableReader {
         Ok(Self { path: path.to_owned(), file, head, leaves })
     }
 
-    /// The file.
+    /// Path of the table.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What it says of all its rows.
+    /// The table's metadata.
     pub(crate) fn head(&self) -> &TableHead {
         &self.head
     }
 
-    /// Gives every row to `take`, in order, once it has passed; one row group at a time is in memory.
+    /// Checks every row and calls `take` for it, in order; one row group at a time is in memory.
     pub(crate) fn visit<E: From<TableError>>(
         self,
         mut take: impl FnMut(RowView<'_>) -> Result<(), E>,
@@ -167,7 +167,7 @@ impl RowGroup {
         })
     }
 
-    /// Checks and gives every row; the number of rows.
+    /// Checks every row and calls `take` for it; returns the number of rows.
     fn visit<E: From<TableError>>(
         &self,
         source: &ColumnReader<'_>,

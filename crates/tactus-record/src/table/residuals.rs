@@ -1,4 +1,4 @@
-//! Writes what two models leave of each frame.
+//! Writes the residuals of each frame under two models.
 
 use std::{fs::File, path::PathBuf};
 
@@ -34,11 +34,11 @@ const SCHEMA: &str = "
         required group residual_after (LIST) { repeated group list { required float element; } }
     }";
 
-/// A table of residuals being written: measured minus predicted, in counts, frame by frame, of a model before and
-/// after something was added to it, and whether the frame was held out of the fit of both. The columns beside them are those
-/// of the measurement table.
+/// A table of residuals being written: measured minus predicted, in counts, frame by frame, for a model before and
+/// after effects were added to it, and whether the frame was held out of both fits. The other columns are those of the
+/// measurement table.
 ///
-/// Until [`ResidualWriter::finish`] the rows stand in a file beside `path` with the ending `.part`.
+/// Until [`ResidualWriter::finish`] the rows are in a file beside `path` with the suffix `.part`.
 pub struct ResidualWriter {
     part: PartFile,
     group: RowGroup,
@@ -56,7 +56,7 @@ impl ResidualWriter {
         Ok(Self { part, group: RowGroup::default() })
     }
 
-    /// Adds a frame and what either model predicts of it, one value an element.
+    /// Adds a frame and the predictions of both models, one value per element.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -71,7 +71,7 @@ impl ResidualWriter {
         if self.group.frames.rows() >= GROUP_ROWS { self.close_group() } else { Ok(()) }
     }
 
-    /// Closes the table and puts it in its place.
+    /// Closes the table and moves it to its path.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -95,12 +95,12 @@ impl std::fmt::Debug for ResidualWriter {
     }
 }
 
-/// The columns of the row group in hand.
+/// The columns of the current row group.
 #[derive(Default)]
 struct RowGroup {
     frames: FrameColumns,
     held_out: Vec<bool>,
-    /// Of either model.
+    /// Before and after, frame by frame, element by element.
     residuals: [Vec<f32>; 2],
     /// 0 where a frame's list begins.
     repeated: Vec<i16>,

@@ -34,9 +34,9 @@ const SCHEMA: &str = "
         required group counts (LIST) { repeated group list { required float element; } }
     }";
 
-/// A measurement table being written. Rows that break the contract are refused, so what it makes is valid.
+/// A measurement table being written. Rows that break the contract are refused, so the table is valid.
 ///
-/// Until [`TableWriter::finish`] the rows stand in a file beside `path` with the ending `.part`.
+/// Until [`TableWriter::finish`] the rows are in a file beside `path` with the suffix `.part`.
 pub struct TableWriter {
     part: PartFile,
     checker: Checker,
@@ -45,7 +45,7 @@ pub struct TableWriter {
 }
 
 impl TableWriter {
-    /// Begins a table of measurements of one rig, given as it shall stand in the file.
+    /// Begins a table of measurements of one rig; `rig_json` goes into the file as it is.
     ///
     /// # Errors
     /// If `rig_json` is not a rig or the file cannot be created.
@@ -69,7 +69,7 @@ impl TableWriter {
         self.put(row)
     }
 
-    /// Adds a row that has passed already.
+    /// Adds a row that was checked already.
     pub(crate) fn put(&mut self, row: RowView<'_>) -> Result<(), TableError> {
         self.group.push(&row);
         self.rows += 1;
@@ -81,7 +81,7 @@ impl TableWriter {
         self.part.metadata(key, value);
     }
 
-    /// Closes the table and puts it in its place; the number of rows.
+    /// Closes the table and moves it to its path; returns the number of rows.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -114,7 +114,7 @@ impl std::fmt::Debug for TableWriter {
     }
 }
 
-/// The columns of the row group in hand.
+/// The columns of the current row group.
 #[derive(Default)]
 struct RowGroup {
     frames: FrameColumns,

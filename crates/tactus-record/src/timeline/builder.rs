@@ -1,4 +1,4 @@
-//! Gathers a timeline from a recording's entries.
+//! Builds a timeline from a recording's entries.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -16,9 +16,9 @@ use crate::{
 #[derive(Default)]
 pub(super) struct TimelineBuilder {
     attachments: BTreeMap<String, Vec<u8>>,
-    /// Frames by connection; `None` in place of a tick ends the hope for that connection's clock.
+    /// Ticks and arrivals by connection; `None` once a frame of the connection had no tick.
     ticks: BTreeMap<u32, Option<Vec<(DeviceTick, MonoTime)>>>,
-    /// Tick length as it was last stated, by connection.
+    /// Tick length by connection, as first known when one of its frames arrived.
     tick_ns: BTreeMap<u32, u64>,
     stated_tick_ns: u64,
     stage: Vec<StageReport>,
@@ -64,7 +64,7 @@ impl TimelineBuilder {
     }
 
     fn stage(&mut self, state: &pb::StageState) {
-        // What a stage that is not there reports is no position.
+        // A disconnected stage reports no valid position.
         let position_mm = [state.x_mm, state.y_mm, state.z_mm];
         if state.status() != pb::StageStatus::Disconnected && position_mm.iter().all(|mm| mm.is_finite()) {
             let stands = state.status() == pb::StageStatus::Idle;
@@ -101,7 +101,7 @@ impl TimelineBuilder {
         };
         let rig =
             Rig::from_json(&rig_json).map_err(|source| RecordError::Rig { path: path.to_owned(), source })?;
-        // Times are the messages' own; a stable sort keeps the order of those that share one.
+        // Sorted by the messages' own times; a stable sort keeps the order of equal times.
         self.stage.sort_by_key(|report| report.at);
         self.stage.dedup_by(|later, kept| {
             let same = later.at == kept.at;

@@ -1,22 +1,22 @@
 //! Where a stage was between two of its reports.
 //!
-//! A stage goes at an even speed but for the moments in which it starts, stops or turns. Those fall between reports too:
-//! there the straight line from one report to the next cuts the corner, by up to a quarter of the interval at the change
-//! of speed (11 um at 1 mm/s and 22 reports a second). So the lines before and after are drawn on to where they meet:
+//! A stage moves at constant speed except when it starts, stops or turns. If it does so between two reports, the straight
+//! line between them cuts the corner, by up to a quarter of the interval times the change of speed (11 um at 1 mm/s and 22
+//! reports a second). So the lines before and after are extrapolated to where they meet:
 //!
 //! ```text
 //! x(t) = x_1 + v_01 (t - t_1)  until they meet,  x_2 + v_23 (t - t_2)  from then      v_ij from report i to report j
 //! ```
 //!
-//! each axis for itself. A report that says that the stage stands gives a speed of 0. The speed from such a report to the next
-//! is less than that of the way, since the stage went off in between: it counts only on the way to the next stop, where
-//! there is no better. Where the lines do not meet between the two reports it is the straight line.
+//! for each axis separately. A report that the stage stands gives a speed of 0. The speed from such a report to the next is
+//! less than that of the motion, because the stage started in between; it is used only on the way to the next stop, where
+//! there is no better one. If the lines do not meet between the two reports, the straight line is used.
 
 use tactus_schema::MonoTime;
 
 use super::StageReport;
 
-/// Where the stage was, by its reports in order of time: before the first and after the last where they say.
+/// Position at a time, by the stage's reports in order of time; before the first and after the last it is theirs.
 pub(super) fn position_mm(reports: &[StageReport], at: MonoTime) -> Option<[f64; 3]> {
     let next = reports.partition_point(|report| report.at <= at);
     let before = next.checked_sub(1).and_then(|index| reports.get(index));
@@ -48,7 +48,7 @@ pub(super) fn position_mm(reports: &[StageReport], at: MonoTime) -> Option<[f64;
     Some([along(0), along(1), along(2)])
 }
 
-/// Speed at a report along an axis, in mm/s, on the way between it and another: by the report on its other side.
+/// Speed along an axis, in mm/s, at a report of a pair: estimated from the report on the side away from `other`.
 fn speed(
     report: &StageReport,
     beside: Option<&StageReport>,

@@ -54,7 +54,7 @@ fn stepping_mm(s: f64) -> [f64; 3] {
 
 #[test]
 fn a_stage_that_stops_for_a_moment_was_there_before_it_said_so() {
-    // Asked each 50 ms on the way, and once in each stop.
+    // A report every 50 ms in motion, and one in each stop.
     let stop = |k: i32| 0.105 * f64::from(k) - 0.003;
     let mut times_s: Vec<(f64, bool)> = (1..=4).map(|k| (stop(k), true)).collect();
     times_s.extend((0..4).flat_map(|k| [0.002, 0.052].map(|s| (0.105 * f64::from(k) + s, false))));

@@ -25,7 +25,7 @@ fn read_all(bytes: &[u8]) -> (Vec<Entry>, Completeness) {
     (entries, reader.completeness().unwrap().clone())
 }
 
-/// What a kill leaves: the file as it stands while the recording is open.
+/// The file while the recording is open, as a kill would leave it.
 fn killed_after(path: &Path, messages: usize) -> Vec<u8> {
     let run = Plan { exit_status: None, ..Plan::short(2) }.make();
     let live = path.with_extension("live");
@@ -51,7 +51,7 @@ fn last_time_ns(entries: &[Entry]) -> i64 {
 #[test]
 fn a_recording_cut_anywhere_loses_at_most_half_a_second() {
     let (bytes, whole) = recorded(Plan::short(1));
-    // Each chunk spans half a second, so a cut within the data costs what stands in the chunk that was cut.
+    // Each chunk spans half a second, so a cut within the data loses the chunk that was cut.
     let mut before = 0;
     for cut in (8..bytes.len()).step_by(401) {
         let (entries, completeness) = read_all(&bytes[..cut]);

@@ -21,7 +21,7 @@ fn recorded(dir: &Path, plan: Plan) -> (Run, PathBuf) {
     (run, path)
 }
 
-/// Records with every message changed on its way.
+/// Records the run with every message changed.
 fn recorded_as(run: &Run, path: &Path, mut change: impl FnMut(&mut Fed) -> bool) {
     let mut recording = run.with_header(|header| Recording::create(path, header)).unwrap();
     for fed in &run.fed {
@@ -67,7 +67,7 @@ fn positions_and_phases_are_the_stages_at_the_sampling_time() {
     for row in table.rows() {
         let truth_mm = run.position_mm(row.t_ns as f64 * 1e-9);
         for axis in 0..3 {
-            // The made-up stage reports at every bend of its way, so the straight lines between are exact.
+            // The synthetic stage reports at every bend of its path, so straight lines between the reports are exact.
             assert!((row.position_mm[axis] - truth_mm[axis]).abs() < 1e-6, "{row:?} {truth_mm:?}");
         }
         match row.phase {

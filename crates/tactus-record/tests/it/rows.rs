@@ -1,4 +1,4 @@
-//! Rows of recordings and tables alike.
+//! Rows from recordings and tables.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

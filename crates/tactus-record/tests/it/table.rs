@@ -14,7 +14,7 @@ use tactus_schema::{
     table::{Phase, RowView},
 };
 
-/// A folder that may stand beside the repository, with measured data that is not in it.
+/// A folder with measured data beside the repository; it may be absent.
 const MEASURED: &str = "../../../shared/data/eflesh-normal-20250401_014340.parquet";
 
 fn folder() -> PathBuf {

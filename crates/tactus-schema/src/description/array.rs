@@ -1,4 +1,4 @@
-//! The elements, as both files write them.
+//! The array in the rig file and the model file.
 
 use serde::{Deserialize, Serialize};
 use tactus_model::{Array, ArrayError};

@@ -1,4 +1,4 @@
-//! A tool, as both files write it; a mesh stands in the file itself, so that data describe themselves.
+//! A tool in the rig file and the model file. The file contains a mesh itself, so that data are self-contained.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use tactus_model::{Indenter, Mesh};
 
 use super::{WrongField, positive, wrong};
 
-/// A tool: its shape, and the size that goes with it. Not a tagged enum, for the reason told at [`OneOrEach`].
+/// A tool: its shape, and the size that goes with it. Not a tagged enum, for the reason given at [`OneOrEach`].
 ///
 /// [`OneOrEach`]: super::OneOrEach
 #[derive(Debug, Serialize, Deserialize)]

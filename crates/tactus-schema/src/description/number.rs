@@ -1,8 +1,8 @@
-//! Numbers that can be right; a file may hold `nan`, `inf` and slips of the pen.
+//! Checks of numbers; a file may contain `nan`, `inf` and typing errors.
 
 use super::{WrongField, wrong};
 
-/// Nothing in a lab is larger, in any unit used here; sums and products of a few such numbers stay finite.
+/// Larger than any quantity in a lab in the units used here; sums and products of a few such numbers stay finite.
 const LARGEST: f64 = 1e12;
 
 pub(crate) fn finite(field: impl Into<String>, value: f64) -> Result<f64, WrongField> {

@@ -10,8 +10,8 @@ use super::{WrongField, finite, wrong};
 
 /// One number for all elements, or one each, row-major.
 ///
-/// Read by hand: an untagged enum cannot read numbers where some crate of the program has switched on
-/// `serde_json`'s `arbitrary_precision`, which gives a number as a map of its own.
+/// Deserialised by hand: an untagged enum cannot read numbers if any crate of the program enables `serde_json`'s feature
+/// `arbitrary_precision`, which represents a number as a map.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub(crate) enum OneOrEach {

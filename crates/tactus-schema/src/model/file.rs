@@ -1,4 +1,4 @@
-//! The model file as it is written: raw serde types, checked into [`Model`].
+//! The form of the model file: raw serde types, checked into [`Model`].
 
 use std::collections::BTreeMap;
 
@@ -90,15 +90,15 @@ impl Model {
         let effects = raw.effects.into_iter().enumerate();
         let effects = effects.map(|(index, raw)| raw.check(index, &base.array)).collect::<Result<_, _>>()?;
         let model = Self { base, effects };
-        // Parameters that make no forward model are none of a sensor.
+        // A sensor's parameters always make a forward model.
         model.forward()?;
         Ok(model)
     }
 
-    /// The model file; reading it gives the same model, to the bit.
+    /// The text of the model file; reading it gives the same model, to the bit.
     ///
     /// # Errors
-    /// If a model was made that no file can hold.
+    /// If the model holds values that no file can.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(&RawModel {
             schema: SCHEMA.into(),

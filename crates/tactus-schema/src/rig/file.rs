@@ -1,4 +1,4 @@
-//! The rig file as it is written: raw serde types, checked into [`Rig`].
+//! The form of the rig file: raw serde types, checked into [`Rig`].
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use crate::description::{
 /// The schema's name in the file.
 pub const SCHEMA: &str = "tactus.rig/1";
 
-/// Links, limits and what a simulation hides are read, but never go with data.
+/// Links, limits and the simulation's hidden truth are read, but never stored with data.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawRig {
@@ -77,7 +77,7 @@ impl Rig {
         toml::from_str::<RawRig>(text)?.check()
     }
 
-    /// Reads the JSON that goes with data; the parts a service needs may be absent.
+    /// Reads the JSON that is stored with data; the parts that only a service needs may be absent.
     ///
     /// # Errors
     /// As [`Rig::from_toml`].
@@ -85,7 +85,7 @@ impl Rig {
         serde_json::from_str::<RawRig>(text)?.check()
     }
 
-    /// The description that goes with data: everything but links, limits and what a simulation hides.
+    /// The description that is stored with data: everything except links, limits and the simulation's hidden truth.
     pub fn to_json(&self) -> String {
         serde_json::json!(RawRig::of(self)).to_string()
     }
@@ -123,7 +123,7 @@ impl RawRig {
 
     fn check(self) -> Result<Rig, RigError> {
         check_schema(SCHEMA, &self.schema)?;
-        // A rig that is served has its name in the bus keys; a description that came with data may be named freely.
+        // The name of a rig in service is part of the bus keys; descriptions stored with data may have any name.
         let name_fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if self.name.is_empty() || (self.sensor.is_some() && !self.name.chars().all(name_fits)) {
             let problem = "letters, digits, '-' and '_' only: it becomes part of the bus keys";
@@ -181,7 +181,7 @@ impl RawRig {
         if rig.simulated && rig.service.is_some() && rig.simulation.is_none() {
             return Err(wrong("simulation", "missing; a simulated rig needs it").into());
         }
-        // A description that makes no forward model is none of a sensor.
+        // A sensor's description always makes a forward model.
         if let Some(Err(error)) = Model::of_rig(&rig).map(|model| model.forward()) {
             return Err(wrong("sensitivity_reference", error.to_string()).into());
         }

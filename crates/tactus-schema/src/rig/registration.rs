@@ -1,4 +1,4 @@
-//! Where a sensor lies, or by how much it lies elsewhere than declared.
+//! A sensor's pose, or its difference from the declared one.
 
 use serde::{Deserialize, Serialize};
 use tactus_model::Registration;

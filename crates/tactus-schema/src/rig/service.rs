@@ -1,4 +1,4 @@
-//! What the lab service needs of a rig, as the rig file writes it: limits, motion, policy, links.
+//! The rig file's sections for the lab service: limits, motion, policy, links.
 
 use serde::Deserialize;
 use tactus_model::Array;
@@ -76,7 +76,7 @@ enum RawWeissChecksum {
     Sum8,
 }
 
-/// All of the parts, or none.
+/// Checks the sections; they are present together or not at all.
 pub(super) fn check(
     array: &Array,
     envelope: Option<RawEnvelope>,
@@ -137,7 +137,7 @@ impl RawEnvelope {
     }
 }
 
-/// A move that ends further away than this has not arrived.
+/// Greatest allowed `motion.tolerance_mm`.
 const TOLERANCE_MAX_MM: f64 = 0.05;
 
 impl RawMotion {
@@ -151,7 +151,7 @@ impl RawMotion {
             settle_s: not_negative(field("settle_s"), self.settle_s)?,
             tolerance_mm: positive(field("tolerance_mm"), self.tolerance_mm)?,
         };
-        // It is also the supervisor's slack at the depth limit.
+        // The supervisor allows this much beyond the depth limit.
         if motion.tolerance_mm > TOLERANCE_MAX_MM {
             return Err(wrong(field("tolerance_mm"), format!("at most {TOLERANCE_MAX_MM}")));
         }
@@ -200,7 +200,7 @@ impl RawPolicy {
     }
 }
 
-/// Addresses on an I2C bus end here.
+/// The greatest address on an I2C bus.
 const I2C_ADDRESSES: u16 = 128;
 
 impl RawSensorLink {
@@ -239,7 +239,7 @@ impl RawSensorLink {
 }
 
 impl RawSensorProtocol {
-    /// As it stands in the file.
+    /// Its value in the rig file.
     fn name(self) -> &'static str {
         match self {
             Self::WeissDsa => "weiss-dsa",
@@ -250,7 +250,7 @@ impl RawSensorProtocol {
     }
 }
 
-/// One element for each address, each address once.
+/// Checks that there is one address for each element, and each address once.
 fn check_addresses(addresses: Option<Vec<u16>>, array: &Array) -> Result<Vec<u8>, WrongField> {
     let field = "sensor.addresses";
     let Some(addresses) = addresses else {

@@ -1,4 +1,4 @@
-//! What the virtual devices of a simulated rig hide, as the rig file writes it.
+//! The rig file's section for the hidden truth of a simulated rig.
 
 use std::collections::BTreeMap;
 
@@ -77,7 +77,7 @@ impl RawSimulation {
         })
     }
 
-    /// The four lists as one: an element has one fault at most.
+    /// Merges the four lists; an element has at most one fault.
     fn faults(&self, array: &Array) -> Result<BTreeMap<usize, ElementFault>, WrongField> {
         let mut faults = BTreeMap::new();
         let mut add = |list: &str, element, fault| {

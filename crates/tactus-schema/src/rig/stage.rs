@@ -1,4 +1,4 @@
-//! The stage's link: how it speaks, over what, and how its axes lie in the robot's frame.
+//! The stage's link: protocol, transport, and its axes in the robot's frame.
 
 use serde::Deserialize;
 
@@ -9,13 +9,13 @@ use crate::description::{WrongField, finite, positive, wrong};
 /// The stage's link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageLink {
-    /// How it speaks.
+    /// The protocol, with the axes.
     pub protocol: StageProtocol,
-    /// Over what.
+    /// The transport.
     pub transport: Transport,
 }
 
-/// Protocols of stages, with what each has to know of the axes.
+/// Protocols of stages, each with its description of the axes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StageProtocol {
     /// `grbl`: Grbl 1.1 and grblHAL.
@@ -27,66 +27,66 @@ pub enum StageProtocol {
 /// The axes of a Grbl controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GrblAxes {
-    /// x, y and z of the robot's frame; no axis of the controller twice.
+    /// x, y and z of the robot's frame, each on an axis of its own.
     pub axes: [GrblAxis; 3],
-    /// The controller must have its soft limits on.
+    /// True if the controller must have its soft limits on.
     pub soft_limits: bool,
 }
 
-/// An axis of the robot's frame, as a Grbl controller has it.
+/// An axis of the robot's frame on a Grbl controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GrblAxis {
-    /// The controller's axis.
+    /// The controller's axis that moves it.
     pub machine_axis: MachineAxis,
     /// False if the controller counts the other way.
     pub is_forward: bool,
     /// The controller's coordinate that is 0 in the robot's frame.
     pub origin_mm: f64,
-    /// What the controller must have as its steps per mm, if the rig file says so.
+    /// Steps per mm that the controller must be set to; `None` if the rig file does not say.
     pub steps_per_mm: Option<f64>,
 }
 
-/// An axis of a controller that has three.
+/// One of a controller's three axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MachineAxis {
-    /// The first.
+    /// The controller's X.
     X,
-    /// The second.
+    /// The controller's Y.
     Y,
-    /// The third.
+    /// The controller's Z.
     Z,
 }
 
 /// The axes of Zaber devices on one port.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZaberAxes {
-    /// x, y and z of the robot's frame; x and y may be missing, and stand at 0 then. No axis of a device twice.
+    /// x, y and z of the robot's frame, each on an axis of its own; x and y may be missing, and are then 0.
     pub axes: [Option<ZaberAxis>; 3],
-    /// Acceleration along the path; `None` leaves the axes' own.
+    /// Acceleration along the path; `None` keeps the axes' settings.
     pub accel_mm_per_s2: Option<f64>,
-    /// Speed of each axis while it is homed; `None` leaves that of the last move.
+    /// Speed of each axis during homing; `None` keeps that of the last move.
     pub homing_speed_mm_per_s: Option<f64>,
-    /// Both sides send checksums: the devices' setting `comm.checksum` is switched on.
+    /// True if both sides send checksums: the devices' setting `comm.checksum` is switched on.
     pub checksums: bool,
-    /// A stage that says that it has its reference counts as homed when it is connected.
+    /// True if a stage that reports a valid reference counts as homed when it is connected.
     pub trusts_reference: bool,
 }
 
-/// An axis of the robot's frame, as a Zaber device has it.
+/// An axis of the robot's frame on a Zaber device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZaberAxis {
     /// Address of the device, 1 to 99.
     pub device: u8,
     /// Number of the axis in the device, 1 to 9.
     pub axis: u8,
-    /// Length of a microstep.
+    /// Length of a microstep, in um.
     pub um_per_microstep: f64,
     /// False if the device counts the other way.
     pub is_forward: bool,
     /// The device's position that is 0 in the robot's frame.
     pub origin_microsteps: i32,
-    /// What the device must have as its `resolution`, microsteps a full step, if the rig file says so.
+    /// `resolution` that the device must be set to, in microsteps per full step; `None` if the rig file does not say.
     pub resolution: Option<u32>,
 }
 
@@ -153,7 +153,7 @@ impl StageProtocol {
 }
 
 impl Default for GrblAxes {
-    /// A controller whose axes lie as the robot's, with soft limits.
+    /// A controller whose axes coincide with the robot's, with soft limits.
     fn default() -> Self {
         let axes = [MachineAxis::X, MachineAxis::Y, MachineAxis::Z].map(|machine_axis| GrblAxis {
             machine_axis,
@@ -265,7 +265,7 @@ impl RawZaberAxis {
     }
 }
 
-/// The first two axes that are the same.
+/// The first pair of equal axes.
 fn twins<T: PartialEq>(axis: impl Fn(usize) -> Option<T>) -> Option<[&'static str; 2]> {
     let pairs = [[0, 1], [0, 2], [1, 2]];
     let same = pairs.into_iter().find(|[a, b]| axis(*a).is_some() && axis(*a) == axis(*b));

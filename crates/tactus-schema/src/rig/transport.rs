@@ -1,4 +1,4 @@
-//! Over what a device is reached, as the rig file writes it.
+//! Transports to devices in the rig file.
 //!
 //! ```toml
 //! transport = { kind = "serial", path = "/dev/serial/by-id/...", baud = 115200 }
@@ -18,21 +18,21 @@ use serde::Deserialize;
 
 use crate::description::{WrongField, wrong};
 
-/// What carries a device's bytes.
+/// The transport of a device's bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Transport {
     /// The rig's own virtual device, in the service's process.
     Embedded,
     /// A serial port or pseudo-terminal.
     Serial {
-        /// Which.
+        /// How the port is found.
         port: SerialPort,
         /// Bits per second.
         baud: u32,
     },
     /// A USB interface without a driver of the system's own; each transfer is a packet.
     Usb(UsbLink),
-    /// A human interface device, which any device may call itself; each report is a packet.
+    /// A device of USB's class HID (human interface device); each report is a packet.
     Hid(HidLink),
     /// A serial server.
     Tcp {
@@ -44,27 +44,27 @@ pub enum Transport {
 /// Which serial port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SerialPort {
-    /// The one at a path; stable names such as those under by-id are best.
+    /// The port at a path, best a stable one such as those in `/dev/serial/by-id`.
     Path(String),
-    /// That of a USB device, wherever the system has put it.
+    /// The port of a USB device, under whatever path.
     Usb(UsbIdentity),
 }
 
-/// What stays with a USB device wherever it is plugged in.
+/// Identifies a USB device at any socket.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct UsbIdentity {
-    /// Number of the vendor.
+    /// The vendor's USB id.
     pub vid: u16,
-    /// The vendor's number of the product.
+    /// The vendor's id of the product.
     pub pid: u16,
-    /// Serial number of the one device; any if `None`.
+    /// Serial number of the device; `None` matches any.
     pub serial: Option<String>,
 }
 
-/// The endpoints of a USB interface, bulk or interrupt as the device says.
+/// The endpoints of a USB interface; the device's descriptor says whether they are bulk or interrupt endpoints.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbLink {
-    /// Which device.
+    /// The device.
     pub identity: UsbIdentity,
     /// Number of the interface.
     pub interface: u8,
@@ -77,15 +77,15 @@ pub struct UsbLink {
 /// A human interface device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HidLink {
-    /// Which device.
+    /// The device.
     pub identity: UsbIdentity,
     /// Number of its interface, for a device that has several.
     pub interface: Option<u8>,
-    /// Length of the longest report, with its id if it has one; a longer one is refused instead of cut.
+    /// Length of the longest report in bytes, including its id if it has one; a longer one is refused, not cut off.
     pub report_bytes: Option<usize>,
 }
 
-/// The longest report that the system's HID driver has.
+/// Length of the longest report that the system's HID driver passes on, in bytes.
 pub const MAX_REPORT_BYTES: usize = 16_384;
 
 impl Transport {
@@ -175,7 +175,7 @@ impl fmt::Display for UsbIdentity {
     }
 }
 
-/// A text that is no identity.
+/// A text is not a USB identity.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{text:?} is not VID:PID or VID:PID/SERIAL, such as 1209:0020/A1 with the numbers in hexadecimal")]
 pub struct IdentityError {
@@ -187,7 +187,7 @@ impl FromStr for UsbIdentity {
 
     fn from_str(text: &str) -> Result<Self, IdentityError> {
         let number = |digits: &str| match digits.len() {
-            // `from_str_radix` takes a sign too.
+            // `from_str_radix` would accept a sign.
             1..=4 if !digits.starts_with('+') => u16::from_str_radix(digits, 16).ok(),
             _ => None,
         };
@@ -207,7 +207,7 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// Numbers are read as wide as TOML has them, so that a refusal names the field.
+/// Numbers have TOML's width here, so that a refusal can name the field.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub(super) enum RawTransport {
