@@ -1,8 +1,7 @@
-//! `declared`: any format of frames of one length, told by a description instead of by code.
+//! `declared`: any format with frames of one length, given by a description instead of code.
 //!
-//! The wire format of the `DigiTacts` kit is not public, and laboratories build arrays of their own. So a
-//! description says how a frame looks; it is written in TOML (`tactus.link/1`, examples in `config/links`)
-//! and checked once:
+//! The format of the `DigiTacts` kit is not public, and laboratories build their own arrays. A description in TOML
+//! (`tactus.link/1`, examples in `config/links`) defines the frames. It is checked once:
 //!
 //! ```toml
 //! schema = "tactus.link/1"
@@ -10,10 +9,10 @@
 //! framing = "stream"            # or "packet": each read of the device is one frame
 //!
 //! [frame]
-//! bytes = 104                   # the whole frame
+//! bytes = 104                   # length of the whole frame
 //! sync = [0xAA, 0x55]           # what it begins with
 //! trailer = []                  # what it ends with
-//! length = { offset = 2, width = 1, adds = 4 }   # bytes of the frame are what this says, and 4
+//! length = { offset = 2, width = 1, adds = 4 }   # the frame has this field's value and 4 more bytes
 //!
 //! [samples]
 //! offset = 6
@@ -46,20 +45,19 @@
 //! endian = "big"
 //! ```
 //!
-//! besides `[hid] report_id` and `[usb] interface, endpoint`, which say where frames come from. Negative
-//! offsets are from the frame's end.
+//! `[hid] report_id` and `[usb] interface, endpoint` can say where the frames come from. Negative offsets count from the
+//! frame's end.
 //!
-//! [`RawFormat`] is the description as written, for serde only: whoever reads a file knows its path and shows
-//! where in the file an error lies, and a description can come in other ways than as TOML.
+//! [`RawFormat`] is the description as written, for serde. Reading the file is left to the caller, who knows its path.
 //! [`RawFormat::check`] makes a [`Format`], or names the field that contradicts the others. [`Decoder`] is
 //! the host's side, [`Encoder`] a virtual device's. [`Session`] reads one connection to a device.
 //!
-//! To match a description to a device, record what it sends: [`propose`] says what bytes of an unknown format
-//! may be, [`check_capture`] holds them against a description, and says how to correct it.
+//! To find the description of a device, record what it sends. [`propose`] analyses bytes of an unknown format.
+//! [`check_capture`] compares them with a description, and says how to correct it.
 //!
 //! # Source
-//! The parameters of CRCs are those of the public catalogue of CRC algorithms (width, poly, init, refin and
-//! refout as one, xorout, check).
+//! The parameters of CRCs are those of the public catalogue of CRC algorithms (width, poly, init, refin = refout,
+//! xorout, check).
 
 mod capture;
 mod check;

@@ -1,21 +1,21 @@
 //! `grbl`: controllers that run Grbl 1.1 or grblHAL.
 //!
 //! # Source
-//! Grbl's published interface description and its lists of errors and alarms; and what the real
-//! firmware's host build was seen to do, which [`Session`] honours:
-//! - Boot may emit `error:7` before the banner.
-//! - A status report is asked for by `?` and comes 5-60 ms later; a second `?` may be dropped.
+//! Grbl's published interface description, and its lists of errors and alarms. [`Session`] also takes into account what
+//! the host build of the real firmware was observed to do:
+//! - At boot it may send `error:7` before the banner.
+//! - `?` requests a status report, which arrives 5-60 ms later. A second `?` before it may be dropped.
 //! - Positions have three decimals.
-//! - `!` leads to `Hold:1`, then `Hold:0`; `~` is ignored until then.
-//! - 0x18 in motion may or may not raise `ALARM:3`, so that a banner in motion leaves the position suspect.
-//! - After `ALARM:1` and `ALARM:2` everything is `error:9` until 0x18 and `$X`, and `?` may go unanswered.
-//! - `$$` lists the settings, `$I` tells the version; both are answered while nothing moves, in an alarm too. Writing a
+//! - `!` leads to `Hold:1`, then `Hold:0`. Until then `~` is ignored.
+//! - 0x18 in motion may or may not raise `ALARM:3`. A banner in motion therefore makes the position suspect.
+//! - After `ALARM:1` and `ALARM:2` the answer to everything is `error:9` until 0x18 and `$X`, and `?` may stay unanswered.
+//! - `$$` lists the settings and `$I` the version. Both are answered while nothing moves, also in an alarm. Writing a
 //!   setting takes 100-220 ms; this host writes none.
-//! - `$H` with homing switched off is `error:5`. During `$H` one `<Home|...>` is sent, then nothing until
-//!   `ok`, or `ALARM:9` after some 24 s.
+//! - With homing switched off, `$H` gives `error:5`. During `$H` one `<Home|...>` is sent, then nothing until `ok`, or
+//!   `ALARM:9` after about 24 s.
 //! - There is no heartbeat.
 //!
-//! [`Response`] reads what the controller says, [`Session`] is the host's side of the conversation.
+//! [`Response`] parses lines of the controller. [`Session`] is the host's side.
 
 mod active_move;
 mod config;
@@ -32,11 +32,11 @@ pub use response::Response;
 pub use session::{Session, SessionError};
 pub use status::{MachineState, Position, StatusError, StatusReport};
 
-/// Real-time byte: asks for a status report.
+/// Real-time byte: requests a status report.
 pub const STATUS_QUERY: u8 = b'?';
-/// Real-time byte: decelerates to a stand and holds.
+/// Real-time byte: decelerates to a standstill and holds.
 pub const FEED_HOLD: u8 = b'!';
-/// Real-time byte: goes on after a hold.
+/// Real-time byte: resumes after a hold.
 pub const CYCLE_START: u8 = b'~';
 /// Real-time byte: resets the controller; it answers with its banner.
 pub const SOFT_RESET: u8 = 0x18;

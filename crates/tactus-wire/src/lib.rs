@@ -1,7 +1,8 @@
-//! Sans-IO codecs and protocol state machines of sensors and stages, one module a device family.
+//! Codecs and protocol state machines of sensors and stages, without I/O; one module for each device family.
 //!
-//! Bytes and times come in, actions go out: no sockets, no clock, no tokio. A time is a
+//! A session takes bytes and times and returns actions. It has no sockets, no clock and no tokio. A time is a
 //! [`Duration`](core::time::Duration) since an instant of the caller's choice, the same for all calls.
+//! [`sensor`] and [`stage`] contain what the protocols share.
 #![warn(clippy::indexing_slicing)]
 
 pub mod anyskin;

@@ -1,10 +1,10 @@
-//! Lines out of a stream of bytes, for the protocols that speak in them.
+//! Splits a stream of bytes into lines, for text protocols.
 
-/// Longest line that is believed; controllers' own are under 100 bytes.
+/// Longest line that is accepted. Lines of controllers are under 100 bytes.
 const MAX_LINE_BYTES: usize = 256;
 
-/// Cuts a stream into lines, whatever way it arrives. A line ends at CR or LF; empty ones are passed over,
-/// overlong ones and those that are not ASCII are dropped and counted.
+/// Splits a stream into lines. The result does not depend on how the bytes arrive. A line ends at CR or LF. Empty lines
+/// are skipped; lines that are too long or not ASCII are dropped and counted.
 #[derive(Debug, Clone, Default)]
 pub struct Lines {
     line: Vec<u8>,
@@ -13,7 +13,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Takes what arrived and hands each whole line to `each`.
+    /// Takes bytes, and passes each complete line to `each`.
     pub fn push(&mut self, bytes: &[u8], mut each: impl FnMut(&str)) {
         for byte in bytes {
             match byte {
@@ -24,7 +24,7 @@ impl Lines {
         }
     }
 
-    /// How many lines were dropped.
+    /// Lines that were dropped, since the start.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

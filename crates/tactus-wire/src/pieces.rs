@@ -1,4 +1,4 @@
-//! Streams that arrive in pieces, for the tests of decoders.
+//! Cuts streams into pieces, for the tests of decoders.
 
 /// A stream cut into pieces of these lengths, over and over; a length of 0 counts as 1.
 pub(crate) fn cut<'a>(mut rest: &'a [u8], lengths: &'a [usize]) -> impl Iterator<Item = &'a [u8]> {

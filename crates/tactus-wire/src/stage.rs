@@ -1,9 +1,12 @@
-//! What conversations with stages have in common, whatever the protocol: what they are asked, what they want done
-//! and tell, and when a move is done.
+//! What all stage sessions share: the trait, its actions, axes, and the check that a move has arrived.
 //!
-//! Each protocol's [`Session`] keeps to the same promises: one command at a time, a stop that goes before
-//! everything, a move that is done only when the controller stands within tolerance of the target, and a position
-//! that counts as known only from homing on until something casts doubt on it.
+//! Every [`Session`] guarantees the same: there is one command at a time; a stop precedes everything else; a move is done
+//! only when the controller stands within tolerance of the target; and the position counts as known only from homing
+//! until an event makes it doubtful.
+//!
+//! To add a stage protocol: add a module to this crate with a type that implements [`Session`]; an arm to
+//! `tactus_device::DrivenStage::start`; the protocol's name and keys to `tactus_schema::rig::StageProtocol`; and a virtual
+//! stage to `mock-devices`.
 
 mod action;
 mod arrival;

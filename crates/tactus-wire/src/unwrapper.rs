@@ -1,6 +1,6 @@
-//! Numbers of a device that wrap: frame counters and clocks.
+//! Unwraps counters and clocks of devices that start again at 0.
 
-/// Unwraps a number that begins again at 0 after `modulus` steps.
+/// Unwraps a number that starts again at 0 after `modulus` steps.
 #[derive(Debug, Clone)]
 pub(crate) struct Unwrapper {
     modulus: u128,
@@ -13,20 +13,20 @@ struct Previous {
     total: u64,
 }
 
-/// Where a number stands to the one before.
+/// How a number compares with the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Advance {
-    /// There is none before, or it is more than half the way round ahead, which is taken for a step back:
-    /// counting begins anew here.
+    /// It is the first number, or more than half the modulus ahead, which is taken as a step back: counting starts
+    /// again here.
     Anew { total: u64 },
-    /// The same again.
+    /// Unchanged.
     Same { total: u64 },
     /// Ahead by 1 or more.
     Ahead { by: u64, total: u64 },
 }
 
 impl Advance {
-    /// The number unwrapped.
+    /// The unwrapped number.
     pub(crate) fn total(self) -> u64 {
         match self {
             Self::Anew { total } | Self::Same { total } | Self::Ahead { total, .. } => total,
@@ -35,12 +35,12 @@ impl Advance {
 }
 
 impl Unwrapper {
-    /// For numbers below `modulus`, which is 2 to 2^64.
+    /// An unwrapper for numbers below `modulus`, which is 2 to 2^64.
     pub(crate) fn new(modulus: u128) -> Self {
         Self { modulus: modulus.clamp(2, 1 << 64), last: None }
     }
 
-    /// Takes the next number; one beyond the modulus is taken by its remainder.
+    /// Takes the next number, modulo the modulus.
     pub(crate) fn advance(&mut self, raw: u64) -> Advance {
         let raw = narrow(u128::from(raw) % self.modulus);
         let step = match self.last {

@@ -160,7 +160,7 @@ where
         let refusal = if !self.progress.connected {
             self.not_connected()
         } else if self.progress.active.is_some() {
-            let reason = "another command is in hand".to_owned();
+            let reason = "another command is under way".to_owned();
             StageError::Refused { command: format!("{command:?}"), reason }
         } else if stops_before != self.stop.count() {
             StageError::Stopped { position_mm: self.position_mm() }

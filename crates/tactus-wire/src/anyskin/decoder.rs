@@ -1,35 +1,34 @@
-//! Frames out of a stream of bytes that marks only their ends, and not only these.
+//! Finds frames in a stream whose only marks are the frames' ends, which can also occur within frames.
 
 use super::{DecodedFrame, FRAME_BYTES};
 
-/// So many frames in a row must end where they should before the first is believed.
+/// Number of frames in a row that must have the right end before the first is accepted.
 pub const CONFIRMING_FRAMES: usize = 3;
 
-/// Finds frames in a stream that may be cut anywhere and hold garbage.
+/// Finds frames in a stream that may contain garbage.
 ///
-/// Feed it with [`push`](Self::push), then call [`next_frame`](Self::next_frame) until it gives
-/// `None`; what comes out does not depend on how the stream was cut. It holds at most [`CONFIRMING_FRAMES`]
-/// frames and what was pushed since.
+/// Call [`push`](Self::push) with each read, then [`next_frame`](Self::next_frame) until it returns `None`. The result does
+/// not depend on how the bytes arrive. At most [`CONFIRMING_FRAMES`] frames and the last read are kept.
 ///
-/// A frame that follows another is given when its last byte arrives. At the beginning, and where a frame does
-/// not end as it should, the decoder looks for the first place from where [`CONFIRMING_FRAMES`] frames do:
-/// those before the last of them are late, but none is lost.
+/// A frame that follows another is returned when its last byte arrives. At the beginning, and after a frame with a wrong
+/// end, the decoder searches for the first place at which [`CONFIRMING_FRAMES`] frames begin. All but the last of these are
+/// returned late, but none is lost.
 #[derive(Debug, Clone, Default)]
 pub struct Decoder {
     bytes: Vec<u8>,
-    /// Bytes before this are done with.
+    /// Bytes before this index have been used.
     start: usize,
-    /// A frame begins at `start`.
+    /// True if a frame begins at `start`.
     in_step: bool,
     stats: DecoderStats,
 }
 
-/// What a [`Decoder`] met beside good frames, since it was made.
+/// What a [`Decoder`] has received besides good frames, since it was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DecoderStats {
-    /// Bytes that were part of no frame.
+    /// Bytes that belonged to no frame.
     pub skipped_bytes: u64,
-    /// How often it fell out of step: at least one frame was lost or damaged each time.
+    /// How often synchronisation was lost; each time at least one frame was lost or damaged.
     pub lost_steps: u64,
 }
 
@@ -39,7 +38,7 @@ impl Decoder {
         Self::default()
     }
 
-    /// Takes what arrived.
+    /// Takes the bytes of a read.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.drain(..self.start);
         self.start = 0;
@@ -66,12 +65,12 @@ impl Decoder {
         Some(frame)
     }
 
-    /// What it met beside good frames.
+    /// What it has received besides good frames.
     pub fn stats(&self) -> DecoderStats {
         self.stats
     }
 
-    /// Whether plausible frames follow each other from `at`; `None` if not enough has arrived to know.
+    /// Whether plausible frames follow each other from `at`; `None` if not enough bytes have arrived.
     fn goes_on_from(&self, at: usize) -> Option<bool> {
         for count in 0..CONFIRMING_FRAMES {
             let frame = DecodedFrame::parse(self.whole_at(at + count * FRAME_BYTES)?);
@@ -82,7 +81,7 @@ impl Decoder {
         Some(true)
     }
 
-    /// The bytes of a frame that begins at `at`, if they have all arrived.
+    /// The bytes of a frame that begins at `at`, if all have arrived.
     fn whole_at(&self, at: usize) -> Option<&[u8; FRAME_BYTES]> {
         self.bytes.get(at..)?.first_chunk()
     }

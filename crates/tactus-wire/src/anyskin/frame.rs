@@ -1,39 +1,37 @@
-//! The frame: one reading of all magnetometers.
+//! A frame: one reading of all magnetometers.
 
-/// Magnetometers of a board.
+/// Number of magnetometers on a board.
 pub const MAGNETOMETERS: usize = 5;
 
-/// Bytes of a frame.
+/// Length of a frame.
 pub const FRAME_BYTES: usize = MAGNETOMETERS * MAGNETOMETER_BYTES + END.len();
 
 const MAGNETOMETER_BYTES: usize = 16;
 
-/// What every frame ends with.
+/// Ends every frame.
 const END: [u8; 2] = *b"\r\n";
 
-/// Numbers between these magnitudes, and zero, are what a magnetometer may say in whatever unit. Bytes read
-/// at a wrong place mostly give others.
+/// Plausible magnitudes of a nonzero number, in any unit. Bytes read at a wrong offset usually give others.
 const PLAUSIBLE: core::ops::Range<f32> = 1e-9..1e9;
 
 /// One reading of all magnetometers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DecodedFrame {
-    /// In the order of the wire.
+    /// In the order on the wire.
     pub magnetometers: [Magnetometer; MAGNETOMETERS],
 }
 
 /// One reading of one magnetometer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Magnetometer {
-    /// In degrees Celsius, as the firmware converts it.
+    /// In degrees Celsius, as converted by the firmware.
     pub temperature_c: f32,
-    /// The field along the chip's x, y and z, in microtesla as the firmware converts it. May be any number,
-    /// NaN too.
+    /// Field along the chip's x, y and z in microtesla, as converted by the firmware. May be NaN or infinite.
     pub field_ut: [f32; 3],
 }
 
 impl DecodedFrame {
-    /// Reads a frame, if that is its end.
+    /// Decodes a frame; `None` if its end is wrong.
     pub fn parse(bytes: &[u8; FRAME_BYTES]) -> Option<Self> {
         let (magnetometers, end) = bytes.as_chunks::<MAGNETOMETER_BYTES>();
         if end != END {
@@ -56,7 +54,7 @@ impl DecodedFrame {
         bytes
     }
 
-    /// True if no number is of a magnitude that no magnetometer would say.
+    /// True if every number is zero, NaN or of a plausible magnitude.
     pub(super) fn is_plausible(&self) -> bool {
         let mut numbers = self.magnetometers.iter().flat_map(Magnetometer::numbers);
         numbers.all(|number| number == 0.0 || number.is_nan() || PLAUSIBLE.contains(&number.abs()))

@@ -1,4 +1,4 @@
-//! A recording held against a description.
+//! Compares a recording with a description.
 
 mod hint;
 mod search;
@@ -12,60 +12,60 @@ use super::inspect::Verdict;
 use super::sniff::find;
 use super::{Decoder, DecoderStats, Format, Framing};
 
-/// Strides that are told.
+/// Strides that are reported.
 const STRIDES_TOLD: usize = 5;
-/// A sync is compared with so many behind it.
+/// Each sync is compared with this many syncs behind it.
 const SYNCS_BEHIND: usize = 8;
 
-/// What [`check_capture`] saw.
+/// Result of [`check_capture`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaptureReport {
     /// Length of the capture in bytes.
     pub bytes: usize,
-    /// What the decoder made of it.
+    /// Statistics of the decoder.
     pub stats: DecoderStats,
-    /// Where the first frame begins.
+    /// Offset of the first frame.
     pub first_frame_at: Option<usize>,
-    /// The first byte that is part of no frame.
+    /// Offset of the first byte that belongs to no frame.
     pub first_skipped_at: Option<usize>,
-    /// How often the sync bytes are there, within frames too.
+    /// Number of occurrences of the sync bytes, including those within frames.
     pub syncs: usize,
-    /// Distances from one sync to another up to eight further, the most frequent first; five at most.
+    /// Distances from each sync to the next eight, most frequent first; at most five.
     pub strides: Vec<Stride>,
-    /// The first frame whose length field says something else.
+    /// The first frame with a wrong length field.
     pub first_bad_length: Option<Mismatch>,
-    /// The first frame that does not end with the trailer.
+    /// Offset of the first frame with a wrong trailer.
     pub first_bad_trailer_at: Option<usize>,
-    /// The first frame whose checksum does not hold.
+    /// The first frame with a wrong checksum.
     pub first_bad_checksum: Option<Mismatch>,
-    /// How the description may be corrected, the most telling first.
+    /// Possible corrections of the description, most likely first.
     pub hints: Vec<Hint>,
 }
 
 /// A distance between sync bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stride {
-    /// In bytes.
+    /// The distance in bytes.
     pub bytes: usize,
-    /// How often.
+    /// Number of occurrences.
     pub count: usize,
 }
 
-/// A number that should be another.
+/// A number that differs from the expected one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mismatch {
-    /// Where the frame begins.
+    /// Offset of the frame.
     pub at: usize,
-    /// What it should be.
+    /// The expected number.
     pub expected: u64,
-    /// What is there.
+    /// The number in the frame.
     pub found: u64,
 }
 
-/// Holds a capture against a description: what decodes, where it fails first, and how the description may be
-/// corrected.
+/// Compares a capture with a description: which frames decode, where decoding fails first, and how to correct the
+/// description.
 ///
-/// A capture of packets is their bytes one behind the other.
+/// A capture of packets is their bytes in sequence.
 pub fn check_capture(format: &Arc<Format>, capture: &[u8]) -> CaptureReport {
     let (frames_at, stats) = decode(format, capture);
     let heads: Vec<usize> =
@@ -114,11 +114,11 @@ impl CaptureReport {
     }
 }
 
-/// Where frames begin.
+/// Offsets of the frames, and the decoder's statistics.
 fn decode(format: &Arc<Format>, capture: &[u8]) -> (Vec<usize>, DecoderStats) {
     let mut decoder = Decoder::new(Arc::clone(format));
     let mut frames_at = Vec::new();
-    // In pieces, so that it holds little; packets one by one.
+    // In pieces, to limit what the decoder keeps; packets one by one.
     let piece = if format.framing == Framing::Packet { format.bytes } else { 1 << 16 };
     for piece in capture.chunks(piece) {
         decoder.push(piece);
@@ -140,7 +140,7 @@ fn first_skipped(frames_at: &[usize], frame_bytes: usize, end: usize) -> Option<
     (next < end).then_some(next)
 }
 
-/// Distances between sync bytes, the most frequent first, of equally frequent ones the shortest.
+/// Distances between sync bytes, most frequent first; of equally frequent ones the shortest first.
 fn strides(heads: &[usize]) -> Vec<Stride> {
     let mut counts = BTreeMap::new();
     for (index, at) in heads.iter().enumerate() {

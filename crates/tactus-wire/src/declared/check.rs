@@ -1,4 +1,4 @@
-//! A description is taken, or its contradiction named.
+//! Checks a description, and names its first contradiction.
 
 use super::checksum::{Algorithm, CRC32, Crc, CrcParameters, CrcWidth};
 use super::format::{Checksum, Length, Sequence, Timestamp};
@@ -9,14 +9,14 @@ use super::raw::{
 };
 use super::{Field, Format, FormatError, MAX_FRAME_BYTES, Samples};
 
-/// Longest sync and trailer.
+/// Greatest length of sync and trailer.
 const MAX_MARK_BYTES: usize = 16;
 
 impl RawFormat {
     /// Checks the description.
     ///
     /// # Errors
-    /// The first contradiction, by the name of its field.
+    /// The first contradiction, with the name of its field.
     pub fn check(self) -> Result<Format, FormatError> {
         if self.schema != SCHEMA {
             return Err(wrong("schema", format!("{:?} is not known here; write {SCHEMA:?}", self.schema)));
@@ -76,7 +76,7 @@ impl RawFormat {
     }
 }
 
-/// What every frame begins with.
+/// The bytes at the beginning of every frame.
 fn head(framing: Framing, hid: Option<RawHid>, sync: &[u8]) -> Result<Vec<u8>, FormatError> {
     if hid.is_some() && framing == Framing::Stream {
         return Err(wrong("framing", "HID reports are packets; write framing = \"packet\""));
@@ -166,7 +166,7 @@ impl RawSamples {
     }
 }
 
-/// For each element its place on the wire, from the element at each place.
+/// Each element's position on the wire, from the element at each position.
 fn places(order: &[usize], elements: usize) -> Result<Vec<usize>, FormatError> {
     let field = "samples.order";
     if order.len() != elements {
@@ -294,7 +294,7 @@ impl RawChecksum {
     }
 }
 
-/// The algorithm, if it has the check value that the description gives.
+/// The algorithm, if it has the check value of the description.
 fn checked(algorithm: Option<Algorithm>, check: Option<u32>) -> Result<Option<Algorithm>, FormatError> {
     let Some(check) = check else { return Ok(algorithm) };
     let found = algorithm.as_ref().map(|algorithm| algorithm.of(b"123456789"));

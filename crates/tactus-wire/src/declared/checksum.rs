@@ -1,12 +1,12 @@
-//! Checksums by their parameters.
+//! Checksums, by their parameters.
 
 use std::fmt;
 use std::sync::Arc;
 
-/// How a checksum is computed.
+/// Algorithm of a checksum.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Algorithm {
-    /// The low byte of the sum.
+    /// The low byte of the sum of all bytes.
     Sum8,
     /// All bytes combined by exclusive or.
     Xor8,
@@ -53,18 +53,18 @@ impl fmt::Display for Algorithm {
     }
 }
 
-/// Parameters of a cyclic redundancy check, as the catalogues give them.
+/// Parameters of a cyclic redundancy check, as in the public catalogues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CrcParameters {
-    /// Of the result.
+    /// Width of the result.
     pub width: CrcWidth,
-    /// Without its highest bit, not reflected.
+    /// Polynomial without its highest bit, not reflected.
     pub polynomial: u32,
-    /// What it begins with, not reflected.
+    /// Initial value, not reflected.
     pub init: u32,
-    /// Takes and gives the lowest bit first.
+    /// Process input and output with the lowest bit first.
     pub reflect: bool,
-    /// What the result is combined with.
+    /// The result is combined with this by exclusive or.
     pub xorout: u32,
 }
 
@@ -94,7 +94,7 @@ impl CrcWidth {
     }
 }
 
-/// The usual CRC of 32 bits, of Ethernet and zip.
+/// The CRC-32 of Ethernet and zip.
 pub const CRC32: CrcParameters = CrcParameters {
     width: CrcWidth::Bits32,
     polynomial: 0x04C1_1DB7,
@@ -103,11 +103,11 @@ pub const CRC32: CrcParameters = CrcParameters {
     xorout: 0xFFFF_FFFF,
 };
 
-/// A cyclic redundancy check with its tables, which clones share.
+/// A cyclic redundancy check with its tables. Clones share the tables.
 #[derive(Clone)]
 pub struct Crc {
     parameters: CrcParameters,
-    /// For eight bytes at a time: entry `[k][b]` is byte `b` followed by `k` zero bytes.
+    /// Tables for eight bytes at a time: entry `[k][b]` is byte `b` followed by `k` zero bytes.
     tables: Arc<[[u32; 256]; 8]>,
 }
 
@@ -124,7 +124,7 @@ impl Crc {
 
     /// The checksum of `bytes`.
     pub fn of(&self, bytes: &[u8]) -> u32 {
-        // Not reflected, a narrow result stands at the top of the word, so that both widths are one.
+        // A result that is not reflected is kept at the top of the word, so that both widths use the same code.
         let CrcParameters { width, init, reflect, xorout, .. } = self.parameters;
         let top = init << width.above();
         let result = if reflect {
@@ -138,8 +138,7 @@ impl Crc {
 
     fn lowest_first(&self, mut crc: u32, bytes: &[u8]) -> u32 {
         let (eights, rest) = bytes.as_chunks::<8>();
-        // The update is linear over exclusive or, so that the bytes of a block can be looked up
-        // independently.
+        // The update is linear over exclusive or, so the bytes of a block can be looked up independently.
         for &[b0, b1, b2, b3, b4, b5, b6, b7] in eights {
             let [c0, c1, c2, c3] = crc.to_le_bytes();
             crc = self.block([b0 ^ c0, b1 ^ c1, b2 ^ c2, b3 ^ c3, b4, b5, b6, b7]);

@@ -1,4 +1,4 @@
-//! Frames out of a stream of bytes, whatever else is in it.
+//! Finds frames in a stream of bytes that may contain garbage.
 
 use std::sync::Arc;
 
@@ -6,23 +6,22 @@ use super::inspect::Verdict;
 use super::{Format, Framing};
 use crate::unwrapper::{Advance, Unwrapper};
 
-/// Finds frames in a stream that may be cut anywhere and hold garbage, or in packets.
+/// Finds frames in packets, or in a stream that may contain garbage.
 ///
-/// Feed it with [`push`](Self::push), then call [`next_frame`](Self::next_frame) until it gives
-/// `None`; what comes out of a stream does not depend on how it was cut. It holds at most one unfinished
-/// frame and what was pushed since, and makes nothing new for a frame.
+/// Call [`push`](Self::push) with each read, then [`next_frame`](Self::next_frame) until it returns `None`. The result for a
+/// stream does not depend on how the bytes arrive. At most one incomplete frame and the last read are kept. No memory is
+/// allocated for a frame.
 ///
-/// With a checksum, the first whole frame after garbage is found when its last byte arrives. Without one, a
-/// frame in which sync bytes begin anew may be none, but the end of one and the beginning of the next: it is
-/// believed only if sync bytes follow it, so that it is given when these arrive. A longer sync makes that
-/// rare.
+/// With a checksum, the first complete frame after garbage is found when its last byte arrives. Without one, a frame that
+/// contains sync bytes may really be the end of one frame and the beginning of the next. It is therefore accepted only if
+/// sync bytes follow it, and returned when these arrive. A longer sync makes this rare.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     format: Arc<Format>,
     bytes: Vec<u8>,
-    /// Bytes before this are done with.
+    /// Bytes before this index have been used.
     start: usize,
-    /// Bytes that are no longer held.
+    /// Number of bytes that are no longer kept.
     gone: u64,
     sequence: Option<Unwrapper>,
     clock: Option<Unwrapper>,
@@ -32,20 +31,20 @@ pub struct Decoder {
     stats: DecoderStats,
 }
 
-/// What a [`Decoder`] met, since it was made.
+/// What a [`Decoder`] has received, since it was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DecoderStats {
-    /// Good frames, stale ones too.
+    /// Good frames, including stale ones.
     pub frames: u64,
-    /// Bytes that were part of no frame.
+    /// Bytes that belonged to no frame.
     pub skipped_bytes: u64,
-    /// Sync bytes, or packets, with another length.
+    /// Packets, or length fields behind sync bytes, with a wrong length.
     pub bad_lengths: u64,
-    /// Frames with another trailer, or that were not followed by sync bytes where those had to decide.
+    /// Frames with a wrong trailer, or without the sync bytes that had to follow to accept them.
     pub bad_ends: u64,
-    /// Frames whose checksum did not hold.
+    /// Frames with a wrong checksum.
     pub bad_checksums: u64,
-    /// Frames that are missing from the sequence.
+    /// Frames that are missing by the device's count.
     pub lost_frames: u64,
     /// Frames that the description calls stale.
     pub stale_frames: u64,
@@ -54,21 +53,21 @@ pub struct DecoderStats {
 /// One reading of all elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecodedFrame<'a> {
-    /// Where it begins: bytes that were pushed before it.
+    /// Offset of its first byte from the first byte that was pushed.
     pub at: u64,
-    /// The count of frames, unwrapped, if there is one.
+    /// The device's frame count, unwrapped, if there is one.
     pub sequence: Option<u64>,
-    /// Frames that are missing from the sequence just before this one.
+    /// Frames that are missing just before this one, by the device's count.
     pub lost_before: u64,
     /// The device's clock, unwrapped, if there is one.
     pub tick: Option<u64>,
-    /// The ticks of earlier frames are from another clock: this is the first frame, or the clock went back.
+    /// True if ticks of earlier frames cannot be compared: this is the first frame, or the clock went back.
     pub new_clock: bool,
-    /// The clock stood still and the description says that this means nothing new.
+    /// True if the clock did not advance, and the description says that such a frame holds nothing new.
     pub stale: bool,
-    /// One for each element, row-major.
+    /// Counts of all elements, row-major.
     pub counts: &'a [f32],
-    /// The elements whose counts mark them as bad, in order.
+    /// Indices of the elements that are marked as bad, ascending.
     pub bad: &'a [usize],
 }
 
@@ -90,12 +89,12 @@ impl Decoder {
         }
     }
 
-    /// What is decoded.
+    /// The format that is decoded.
     pub fn format(&self) -> &Arc<Format> {
         &self.format
     }
 
-    /// Takes what arrived; with [`Framing::Packet`] exactly one packet, or nothing.
+    /// Takes the bytes of a read; with [`Framing::Packet`] exactly one packet, or nothing.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.drain(..self.start);
         self.gone += self.start as u64;
@@ -129,7 +128,7 @@ impl Decoder {
         }
     }
 
-    /// What it met.
+    /// What it has received.
     pub fn stats(&self) -> DecoderStats {
         self.stats
     }
@@ -141,7 +140,7 @@ impl Decoder {
         }
     }
 
-    /// Whether the frame at the beginning of `rest` is one; `None` if what decides has not arrived.
+    /// Whether the frame at the beginning of `rest` is accepted; `None` if that needs more bytes.
     fn is_believed(&self, rest: &[u8]) -> Option<bool> {
         let format = &*self.format;
         if format.framing == Framing::Packet || format.checksum.is_some() {
@@ -162,11 +161,11 @@ impl Decoder {
             }
             at += 1;
         }
-        // Whatever stands behind the frame, it is no rival's.
+        // No other frame can begin within this one, whatever follows it.
         rival.map(|_| true).or(follows.filter(|follows| *follows))
     }
 
-    /// The frame at `start`, which is then done with.
+    /// Decodes and takes the frame at `start`.
     fn accept(&mut self) -> Option<DecodedFrame<'_>> {
         let format = &*self.format;
         let frame = self.bytes.get(self.start..)?.get(..format.bytes)?;

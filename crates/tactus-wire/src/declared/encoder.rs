@@ -1,12 +1,10 @@
-//! Frames as a virtual device sends them.
+//! Encodes frames, for virtual devices.
 
 use std::sync::Arc;
 
 use super::Format;
 
-/// Writes frames of a format, counted from 0.
-///
-/// Bytes that the description says nothing of are zero.
+/// Encodes frames of a format, with a count from 0. Bytes that are not described are zero.
 #[derive(Debug, Clone)]
 pub struct Encoder {
     format: Arc<Format>,
@@ -18,14 +16,14 @@ pub struct Encoder {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the reading has {found} elements, the description says {expected} (samples.elements)")]
 pub struct ElementsError {
-    /// As the description says.
+    /// Number in the description.
     pub expected: usize,
-    /// As given.
+    /// Number in the reading.
     pub found: usize,
 }
 
 impl Encoder {
-    /// An encoder whose first frame has the number 0.
+    /// An encoder whose first frame has count 0.
     pub fn new(format: Arc<Format>) -> Self {
         let mut frame = vec![0; format.bytes];
         for (to, from) in frame.iter_mut().zip(&format.head) {
@@ -40,11 +38,11 @@ impl Encoder {
         Self { format, frame, sequence: 0 }
     }
 
-    /// The next frame: the device's clock in its ticks, and the counts of all elements, row-major. Counts are
-    /// rounded and held to what a sample can be.
+    /// Encodes the next frame, from the device's clock in ticks and the counts of all elements, row-major. Counts are
+    /// rounded and limited to the range of a sample.
     ///
     /// # Errors
-    /// Another number of elements than the description says.
+    /// If the number of elements differs from the description.
     pub fn encode(&mut self, tick: u64, counts: &[f32]) -> Result<&[u8], ElementsError> {
         let format = &*self.format;
         if counts.len() != format.samples.elements {
@@ -66,12 +64,12 @@ impl Encoder {
         Ok(&self.frame)
     }
 
-    /// Begins at the number 0 again, as a device that is switched on.
+    /// Starts again at count 0, like a device that is switched on.
     pub fn restart(&mut self) {
         self.sequence = 0;
     }
 
-    /// Passes over a number, as if its frame had been lost.
+    /// Skips a count, as if its frame had been lost.
     pub fn lose_frame(&mut self) {
         self.sequence = self.sequence.wrapping_add(1);
     }

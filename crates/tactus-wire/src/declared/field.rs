@@ -1,20 +1,20 @@
-//! A whole number within a frame.
+//! A number within a frame.
 
 use super::Endian;
 
-/// A whole number within a frame, without sign.
+/// An unsigned whole number within a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Field {
-    /// Its first byte, from the beginning of the frame.
+    /// Offset of its first byte from the beginning of the frame.
     pub offset: usize,
-    /// Bytes of it, 1 to 8.
+    /// Its length in bytes, 1 to 8.
     pub width: usize,
-    /// Which byte is first.
+    /// Its byte order.
     pub endian: Endian,
 }
 
 impl Field {
-    /// Its value in a frame; `None` if it has not all arrived.
+    /// Its value in a frame; `None` if the frame ends before it.
     pub fn read(&self, frame: &[u8]) -> Option<u64> {
         let bytes = frame.get(self.offset..self.offset.checked_add(self.width)?)?;
         let join = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
@@ -41,7 +41,7 @@ impl Field {
         }
     }
 
-    /// How many values it can have: 2^8 to 2^64.
+    /// Number of its possible values: 2^8 to 2^64.
     pub(super) fn values(&self) -> u128 {
         1 << (8 * self.width.min(8))
     }

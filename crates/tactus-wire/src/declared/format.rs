@@ -4,7 +4,7 @@ use super::checksum::Algorithm;
 use super::raw::{Framing, RawHid, RawUsb};
 use super::{Field, Samples};
 
-/// Longest frame.
+/// Greatest length of a frame.
 pub const MAX_FRAME_BYTES: usize = 65_536;
 
 /// A format that can be decoded: a [`RawFormat`](super::RawFormat) without contradictions.
@@ -13,7 +13,7 @@ pub struct Format {
     pub(super) name: String,
     pub(super) framing: Framing,
     pub(super) bytes: usize,
-    /// What every frame begins with: the report id, then the sync bytes.
+    /// The bytes at the beginning of every frame: the report id, then the sync bytes.
     pub(super) head: Vec<u8>,
     pub(super) trailer: Vec<u8>,
     pub(super) length: Option<Length>,
@@ -25,15 +25,15 @@ pub struct Format {
     pub(super) usb: Option<RawUsb>,
 }
 
-/// A field that tells the length.
+/// A field with the frame's length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Length {
     pub(super) field: Field,
-    /// What it says in every frame.
+    /// Its value in every frame.
     pub(super) value: u64,
 }
 
-/// A count of frames.
+/// The device's count of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sequence {
     pub(super) field: Field,
@@ -49,7 +49,7 @@ pub(super) struct Timestamp {
     pub(super) unchanged_is_stale: bool,
 }
 
-/// What closes a frame.
+/// The checksum of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Checksum {
     pub(super) algorithm: Algorithm,
@@ -58,7 +58,7 @@ pub(super) struct Checksum {
     pub(super) field: Field,
 }
 
-/// A description contradicts itself.
+/// A contradiction in a description.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {problem}")]
 pub struct FormatError {
@@ -69,12 +69,12 @@ pub struct FormatError {
 }
 
 impl Format {
-    /// What is described.
+    /// Name of the device that is described.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// How the bytes arrive.
+    /// Whether bytes arrive as a stream or in packets.
     pub fn framing(&self) -> Framing {
         self.framing
     }
@@ -84,7 +84,7 @@ impl Format {
         self.bytes
     }
 
-    /// The elements' values.
+    /// How a frame holds the elements' values.
     pub fn samples(&self) -> &Samples {
         &self.samples
     }
@@ -94,22 +94,22 @@ impl Format {
         self.timestamp.map(|timestamp| timestamp.tick_ns)
     }
 
-    /// Length of the device clock's tick in ns, and after how many ticks it is 0 again, if it has a clock.
+    /// Length of the device clock's tick in ns, and number of ticks after which it starts again at 0, if it has a clock.
     pub fn clock(&self) -> Option<(f64, u128)> {
         self.timestamp.map(|timestamp| (timestamp.tick_ns, timestamp.wrap))
     }
 
-    /// After how many frames the count of frames is 0 again, if there is one; saturates.
+    /// Number of frames after which the frame count starts again at 0, if there is one; saturates.
     pub fn sequence_wrap(&self) -> Option<u64> {
         self.sequence.map(|sequence| u64::try_from(sequence.wrap).unwrap_or(u64::MAX))
     }
 
-    /// The HID report id, if it is a HID; 0 if its reports have none.
+    /// The HID report id, if the device is a HID; 0 if its reports have none.
     pub fn hid_report_id(&self) -> Option<u8> {
         self.hid.map(|hid| hid.report_id)
     }
 
-    /// Number of the USB interface and address of its endpoint, if it is read from one.
+    /// USB interface number and endpoint address, if the description has them.
     pub fn usb_interface_and_endpoint(&self) -> Option<(u8, u8)> {
         self.usb.map(|usb| (usb.interface, usb.endpoint))
     }

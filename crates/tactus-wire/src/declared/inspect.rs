@@ -1,26 +1,26 @@
-//! Whether bytes are a frame of a format.
+//! Decides whether bytes are a frame.
 
 use super::Format;
 
-/// What stands at a place of a stream.
+/// What begins at a place in a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
-    /// Something else than a frame's beginning.
+    /// No frame begins here.
     NoHead,
-    /// What may become a frame; it has not all arrived.
+    /// A possible frame that has not arrived completely.
     Unfinished,
-    /// The length field says something else.
+    /// The length field is wrong.
     BadLength { found: u64, expected: u64 },
-    /// It does not end as it should.
+    /// The trailer is wrong.
     BadTrailer,
-    /// The checksum does not hold.
+    /// The checksum is wrong.
     BadChecksum { found: u64, expected: u64 },
-    /// A frame.
+    /// A complete frame.
     Good,
 }
 
 impl Format {
-    /// What stands at the beginning of `bytes`.
+    /// What begins at the beginning of `bytes`.
     pub(super) fn inspect(&self, bytes: &[u8]) -> Verdict {
         if !begins_like(bytes, &self.head) {
             return Verdict::NoHead;
@@ -48,7 +48,7 @@ impl Format {
         Verdict::Good
     }
 
-    /// Whether `bytes` begin as a frame does; `None` if they end before that is known.
+    /// Whether `bytes` begin like a frame; `None` if they are too short to decide.
     pub(super) fn stands_at(&self, bytes: &[u8]) -> Option<bool> {
         if !begins_like(bytes, &self.head) {
             return Some(false);
@@ -56,7 +56,7 @@ impl Format {
         (bytes.len() >= self.head.len()).then_some(true)
     }
 
-    /// Offset of the first place where a frame's beginning stands, or stands as far as the bytes reach.
+    /// Offset of the first beginning of a frame, complete or cut off by the end of the bytes.
     pub(super) fn find_head(&self, bytes: &[u8]) -> Option<usize> {
         let first = *self.head.first()?;
         let mut at = 0;
@@ -75,7 +75,7 @@ fn begins_like(bytes: &[u8], head: &[u8]) -> bool {
     bytes.iter().zip(head).all(|(byte, expected)| byte == expected)
 }
 
-/// Offset of the first such byte; looks at blocks, which the compiler compares in one go.
+/// Offset of the first such byte. It compares blocks, which the compiler vectorises.
 fn find_byte(wanted: u8, bytes: &[u8]) -> Option<usize> {
     let (blocks, _) = bytes.as_chunks::<32>();
     let has_none = |block: &&[u8; 32]| block.iter().fold(0, |any, byte| any | u8::from(*byte == wanted)) == 0;

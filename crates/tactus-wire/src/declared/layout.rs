@@ -1,20 +1,20 @@
-//! Which bytes of a frame belong to what.
+//! Records which bytes of a frame are used by which field.
 
 use super::{Endian, Field, FormatError};
 
-/// Which bytes of a frame are taken, and by what.
+/// The bytes of a frame that are used, with the name of the field.
 pub(super) struct Layout {
     pub(super) bytes: usize,
     taken: Vec<(String, usize, usize)>,
 }
 
 impl Layout {
-    /// A frame of which nothing is taken.
+    /// A frame without any used bytes.
     pub(super) fn new(bytes: usize) -> Self {
         Self { bytes, taken: Vec::new() }
     }
 
-    /// A number, which takes its bytes.
+    /// A number field; marks its bytes as used.
     pub(super) fn field(
         &mut self,
         name: &str,
@@ -31,7 +31,7 @@ impl Layout {
         Ok(Field { offset, width, endian })
     }
 
-    /// An offset of a byte from the beginning.
+    /// Converts an offset of a byte to one from the beginning.
     pub(super) fn offset(&self, field: &str, offset: i64) -> Result<usize, FormatError> {
         self.end(field, offset).and_then(|at| {
             if at < self.bytes {
@@ -41,7 +41,7 @@ impl Layout {
         })
     }
 
-    /// An offset from the beginning, which may be the frame's end.
+    /// Converts an offset, which may be the frame's end, to one from the beginning.
     pub(super) fn end(&self, field: &str, offset: i64) -> Result<usize, FormatError> {
         let from_end =
             usize::try_from(offset.unsigned_abs()).ok().and_then(|back| self.bytes.checked_sub(back));
@@ -51,7 +51,7 @@ impl Layout {
         })
     }
 
-    /// Notes that `field` takes these bytes.
+    /// Marks bytes as used by `field`.
     pub(super) fn take(&mut self, field: &str, from: usize, bytes: usize) -> Result<(), FormatError> {
         let to = from.saturating_add(bytes);
         if to > self.bytes {
@@ -79,7 +79,7 @@ impl Layout {
     }
 }
 
-/// What is wrong with a field, and what to do.
+/// An error of a field, with what to do.
 pub(super) fn wrong(field: &str, problem: impl Into<String>) -> FormatError {
     FormatError { field: field.to_owned(), problem: problem.into() }
 }

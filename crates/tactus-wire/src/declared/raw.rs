@@ -1,91 +1,90 @@
-//! The description as it is written.
+//! The description as written in a file.
 
 use serde::{Deserialize, Serialize};
 
-/// The schema's name in the file.
+/// Name of the schema, as written in the file.
 pub const SCHEMA: &str = "tactus.link/1";
 
-/// A description as it is written; [`check`](RawFormat::check) makes a [`Format`](super::Format) of it.
+/// A description as written. [`check`](RawFormat::check) makes a [`Format`](super::Format) of it.
 ///
-/// Offsets are in bytes from the beginning of the frame, that is from the first sync byte; negative ones are
-/// from its end.
+/// Offsets are in bytes from the beginning of the frame, which is its first sync byte. Negative offsets are from its end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawFormat {
-    /// [`SCHEMA`].
+    /// Must be [`SCHEMA`].
     pub schema: String,
-    /// What is described.
+    /// Name of the device.
     pub name: String,
-    /// How the bytes arrive.
+    /// Whether bytes arrive as a stream or in packets.
     #[serde(default)]
     pub framing: Framing,
-    /// How a frame is told from what is around it.
+    /// Length and marks of a frame.
     pub frame: RawFrame,
     /// The elements' values.
     pub samples: RawSamples,
-    /// A count of frames.
+    /// The device's count of frames.
     pub sequence: Option<RawSequence>,
     /// The device's clock.
     pub timestamp: Option<RawTimestamp>,
-    /// What closes a frame; nothing if absent.
+    /// The checksum; `None` if frames have none.
     pub checksum: Option<RawChecksum>,
-    /// For devices that are a HID.
+    /// For human interface devices.
     pub hid: Option<RawHid>,
-    /// For devices that are read from a USB endpoint.
+    /// For devices on a USB endpoint.
     pub usb: Option<RawUsb>,
 }
 
-/// How the bytes arrive.
+/// Whether bytes arrive as a stream or in packets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Framing {
-    /// In pieces of any length, as from a serial port; sync bytes tell where a frame begins.
+    /// In pieces of any length, as from a serial port. Sync bytes mark the beginning of a frame.
     #[default]
     Stream,
-    /// Each piece is one frame: a HID report, a transfer, a datagram.
+    /// Each read is one frame: a HID report, a transfer or a datagram.
     Packet,
 }
 
-/// How a frame is told from what is around it.
+/// Length and marks of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawFrame {
     /// Length of the whole frame, from the first sync byte to the last byte of checksum and trailer.
     pub bytes: usize,
-    /// What every frame begins with; behind the report id, if there is one.
+    /// The bytes at the beginning of every frame; behind the report id, if there is one.
     #[serde(default)]
     pub sync: Vec<u8>,
-    /// What every frame ends with.
+    /// The bytes at the end of every frame.
     #[serde(default)]
     pub trailer: Vec<u8>,
-    /// A field that tells the length.
+    /// A field with the frame's length.
     pub length: Option<RawLength>,
 }
 
-/// A field that tells the length.
+/// A field with the frame's length.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawLength {
-    /// Where.
+    /// Offset of its first byte.
     pub offset: i64,
-    /// Bytes of it, 1 to 8.
+    /// Its length in bytes, 1 to 8.
     pub width: usize,
-    /// Which byte is first.
+    /// Its byte order.
     #[serde(default)]
     pub endian: Endian,
-    /// Bytes of the frame that the field does not count: the frame has its value and these.
+    /// Bytes of the frame that the field does not count. The frame's length is the field's value plus this.
     #[serde(default)]
     pub adds: i64,
 }
 
-/// Which byte is first.
+/// Byte order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Endian {
-    /// The lowest.
+    /// Low byte first.
     #[default]
     Little,
-    /// The highest.
+    /// High byte first.
     Big,
 }
 
@@ -93,21 +92,21 @@ pub enum Endian {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawSamples {
-    /// Where the first begins.
+    /// Offset of the first sample.
     pub offset: i64,
-    /// How many.
+    /// Number of elements.
     pub elements: usize,
     /// Rows of the array.
     pub rows: Option<usize>,
     /// Columns of the array.
     pub cols: Option<usize>,
-    /// What each is.
+    /// Type of each sample.
     #[serde(rename = "type")]
     pub kind: SampleType,
-    /// Which byte of each is first.
+    /// Byte order of each sample.
     #[serde(default)]
     pub endian: Endian,
-    /// In which order they come.
+    /// Order of the elements on the wire.
     #[serde(default)]
     pub order: RawOrder,
     /// Values that mark an element as bad.
@@ -115,41 +114,40 @@ pub struct RawSamples {
     pub bad: Vec<f64>,
 }
 
-/// What one sample is.
+/// Type of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SampleType {
     /// One byte.
     U8,
-    /// Twelve bits; two samples in three bytes, a last odd one in two. `little`: the first sample is the
-    /// first byte and the low half of the second. `big`: it is the first byte and the high half of the
-    /// second, the byte above the half.
+    /// Twelve bits: two samples in three bytes; a last odd sample in two. With `little`, the first sample is the first byte
+    /// and, above it, the low half of the second. With `big`, it is the first byte and, below it, the high half of the
+    /// second.
     U12,
     /// Two bytes.
     U16,
     /// Two bytes, signed.
     I16,
-    /// Four bytes; kept to 24 significant bits.
+    /// Four bytes; decoded with 24 significant bits.
     U32,
-    /// Four bytes, floating-point; a number that is not finite marks a bad element.
+    /// Four bytes, floating-point. A value that is not finite marks a bad element.
     F32,
 }
 
-/// In which order samples come.
+/// Order of the elements on the wire.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
     expecting = "order is \"row-major\", \"column-major\" or a list with an element for each sample"
 )]
 pub enum RawOrder {
-    /// One of the usual ones.
+    /// A named order.
     Named(OrderName),
-    /// The element that each sample belongs to, in the order of the wire; elements are counted from 0,
-    /// row-major.
+    /// The element of each sample, in the order on the wire. Elements are counted from 0, row-major.
     Elements(Vec<usize>),
 }
 
-/// The usual orders.
+/// A named order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OrderName {
@@ -165,18 +163,18 @@ impl Default for RawOrder {
     }
 }
 
-/// A count of frames.
+/// The device's count of frames.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawSequence {
-    /// Where.
+    /// Offset of its first byte.
     pub offset: i64,
-    /// Bytes of it, 1 to 8.
+    /// Its length in bytes, 1 to 8.
     pub width: usize,
-    /// Which byte is first.
+    /// Its byte order.
     #[serde(default)]
     pub endian: Endian,
-    /// After how many frames it is 0 again; as its width has it, if absent.
+    /// Number of frames after which it starts again at 0; by default the range of its width.
     pub wrap: Option<u64>,
 }
 
@@ -184,82 +182,81 @@ pub struct RawSequence {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawTimestamp {
-    /// Where.
+    /// Offset of its first byte.
     pub offset: i64,
-    /// Bytes of it, 1 to 8.
+    /// Its length in bytes, 1 to 8.
     pub width: usize,
-    /// Which byte is first.
+    /// Its byte order.
     #[serde(default)]
     pub endian: Endian,
-    /// Length of a tick.
+    /// Length of a tick in ns; need not be whole.
     pub tick_ns: f64,
-    /// After how many ticks it is 0 again; as its width has it, if absent.
+    /// Number of ticks after which it starts again at 0; by default the range of its width.
     pub wrap: Option<u64>,
-    /// A frame with the timestamp of the one before holds nothing new.
+    /// True if a frame with the timestamp of the previous one holds nothing new.
     #[serde(default)]
     pub unchanged_is_stale: bool,
 }
 
-/// What closes a frame.
+/// The checksum of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawChecksum {
-    /// Which.
+    /// Its algorithm.
     pub kind: ChecksumKind,
-    /// The first byte that it covers; 0 if absent.
+    /// Offset of the first byte that it covers; default 0.
     #[serde(default)]
     pub from: i64,
-    /// The first byte behind those that it covers; where it stands itself, if absent.
+    /// Offset behind the last byte that it covers; default its own offset.
     pub to: Option<i64>,
-    /// Where it stands; at the end, in front of the trailer, if absent.
+    /// Its own offset; default at the end, in front of the trailer.
     pub offset: Option<i64>,
-    /// Which byte of it is first.
+    /// Its byte order.
     #[serde(default)]
     pub endian: Endian,
-    /// Of a CRC, without its highest bit, not reflected; for crc32 0x04C11DB7 if absent.
+    /// Polynomial of a CRC without its highest bit, not reflected; default 0x04C11DB7 for crc32, required for crc16.
     pub polynomial: Option<u32>,
-    /// What a CRC begins with, not reflected; for crc32 0xFFFFFFFF if absent.
+    /// Initial value of a CRC, not reflected; default 0xFFFFFFFF for crc32, required for crc16.
     pub init: Option<u32>,
-    /// A CRC takes and gives the lowest bit first; for crc32 true if absent.
+    /// Process input and output of a CRC with the lowest bit first; default true for crc32, required for crc16.
     pub reflect: Option<bool>,
-    /// What the result of a CRC is combined with; for crc32 0xFFFFFFFF if absent.
+    /// The result of a CRC is combined with this by exclusive or; default 0xFFFFFFFF for crc32, required for crc16.
     pub xorout: Option<u32>,
-    /// Of the nine characters `123456789`, as catalogues of checksums list it: a guard against a wrong
-    /// parameter.
+    /// The checksum of the nine characters `123456789`, as in catalogues: a guard against wrong parameters.
     pub check: Option<u32>,
 }
 
-/// Which checksum.
+/// Algorithm of a checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChecksumKind {
-    /// None.
+    /// Frames have no checksum.
     None,
-    /// The low byte of the sum.
+    /// The low byte of the sum of all bytes.
     Sum8,
     /// All bytes combined by exclusive or.
     Xor8,
-    /// A CRC of 16 bits, by its parameters.
+    /// A CRC of 16 bits, with the given parameters.
     Crc16,
-    /// A CRC of 32 bits, the usual one unless parameters are given.
+    /// A CRC of 32 bits; that of Ethernet and zip unless parameters are given.
     Crc32,
 }
 
-/// For devices that are a HID.
+/// For human interface devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawHid {
-    /// First byte of each report, which counts as the frame's byte 0; 0 for a device whose reports have none.
+    /// First byte of each report, which is the frame's byte 0; 0 for a device whose reports have none.
     pub report_id: u8,
 }
 
-/// For devices that are read from a USB endpoint.
+/// For devices on a USB endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawUsb {
-    /// Number of the interface.
+    /// Number of the USB interface.
     pub interface: u8,
-    /// Address of the endpoint that frames come from; 0x80 or more.
+    /// Address of the endpoint that sends frames; 0x80 or more.
     pub endpoint: u8,
 }
 

@@ -9,13 +9,13 @@ pub struct Samples {
     pub(super) elements: usize,
     pub(super) kind: SampleType,
     pub(super) endian: Endian,
-    /// For each element its place on the wire, unless they are in order.
+    /// Each element's position on the wire; `None` if they are in order.
     pub(super) places: Option<Vec<usize>>,
     pub(super) bad: Vec<f32>,
 }
 
 impl SampleType {
-    /// Length of so many samples in bytes.
+    /// Length of this many samples in bytes.
     pub(super) fn bytes(self, samples: usize) -> usize {
         match self {
             Self::U8 => samples,
@@ -25,7 +25,7 @@ impl SampleType {
         }
     }
 
-    /// The least and the greatest whole number that a sample can be; none for f32.
+    /// The least and greatest value of a sample; `None` for f32.
     pub fn range(self) -> Option<(f64, f64)> {
         match self {
             Self::U8 => Some((0.0, 255.0)),
@@ -39,12 +39,12 @@ impl SampleType {
 }
 
 impl Samples {
-    /// How many elements.
+    /// Number of elements.
     pub fn elements(&self) -> usize {
         self.elements
     }
 
-    /// What each sample is.
+    /// Type of each sample.
     pub fn kind(&self) -> SampleType {
         self.kind
     }
@@ -53,7 +53,7 @@ impl Samples {
         self.kind.bytes(self.elements)
     }
 
-    /// Reads all elements of a frame into `counts`, row-major; `wire` is room to work in.
+    /// Reads all elements of a frame into `counts`, row-major; `wire` is scratch memory.
     pub(super) fn decode(&self, frame: &[u8], wire: &mut Vec<f32>, counts: &mut Vec<f32>) {
         let bytes = frame.get(self.offset..self.offset + self.bytes()).unwrap_or_default();
         counts.clear();
@@ -65,7 +65,7 @@ impl Samples {
         counts.extend(places.iter().map(|place| wire.get(*place).copied().unwrap_or(f32::NAN)));
     }
 
-    /// Finds the elements whose counts mark them as bad.
+    /// Lists the elements that their counts mark as bad.
     pub(super) fn find_bad(&self, counts: &[f32], bad: &mut Vec<usize>) {
         bad.clear();
         if self.bad.is_empty() && self.kind != SampleType::F32 {
@@ -77,7 +77,7 @@ impl Samples {
         );
     }
 
-    /// Writes all elements, row-major, into a frame: rounded, and held to what a sample can be.
+    /// Writes all elements, row-major, into a frame; rounded, and limited to the range of a sample.
     pub(super) fn encode(&self, counts: &[f32], frame: &mut [u8]) {
         let Some(bytes) = frame.get_mut(self.offset..self.offset + self.bytes()) else { return };
         let mut wire = counts.to_vec();

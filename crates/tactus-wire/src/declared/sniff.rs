@@ -1,54 +1,51 @@
-//! What bytes of an unknown format say of it.
+//! Analyses bytes of an unknown format.
 
 use std::cmp::Reverse;
 
-/// Longest frame that is looked for.
+/// Longest frame that is searched for.
 pub const MAX_STRIDE_BYTES: usize = 4096;
 
-/// So much of a capture is looked at.
+/// Length of the part of a capture that is analysed.
 const MAX_LOOKED_AT_BYTES: usize = 1 << 16;
 
-/// Strides that are looked at more closely.
+/// Number of strides that are analysed further.
 const CANDIDATES: usize = 64;
 
-/// Share of frames that must have the same byte for it to be called constant, and that must step by one for a
-/// counter.
+/// Share of frames that must have the same byte for a constant, or a byte increased by one for a counter.
 const NEARLY_ALL: f64 = 0.97;
 
-/// A stride this much like the best is preferred to it if it is shorter.
+/// A shorter stride is preferred to the best one if its likeness is at least this share of the best.
 const AS_GOOD: f64 = 0.8;
 
-/// Runs of constant bytes that are looked for in the whole capture, the most telling first: sync bytes are among those.
+/// Number of runs of constant bytes that are tried as sync bytes, most distinctive first.
 const RUNS_LOOKED_FOR: usize = 16;
 
 /// Longest sync that is proposed.
 const MAX_SYNC_BYTES: usize = 8;
 
-/// What a format may be.
+/// A possible format of the frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
     /// Length of a frame in bytes.
     pub stride: usize,
-    /// Share of the bytes that are the same one stride later, beyond what chance explains; up to 1.
+    /// Share of bytes that are equal one stride later, in excess of chance; up to 1.
     pub likeness: f64,
-    /// Bytes that are there once in every stride, at the same place; likely what frames begin with, or a part
-    /// of it.
+    /// Bytes that occur once in every stride at the same place: probably the sync bytes, or a part of them.
     pub sync: Vec<u8>,
-    /// Where they stand first.
+    /// Offset of the first occurrence of `sync`.
     pub first_at: usize,
-    /// Bytes that are the same in every frame, as offsets from the sync.
+    /// Offsets from the sync of bytes that are the same in every frame.
     pub constant: Vec<usize>,
-    /// Bytes that count by one from frame to frame, as offsets from the sync: likely the low byte of a
-    /// sequence.
+    /// Offsets from the sync of bytes that increase by one from frame to frame: probably the low byte of a frame count.
     pub counters: Vec<usize>,
 }
 
-/// Looks for frames of one length in bytes of which nothing is known.
+/// Searches for frames of one length in bytes of an unknown format.
 ///
-/// The bytes are compared with themselves one stride later, for all strides up to [`MAX_STRIDE_BYTES`] and a
-/// third of the capture; a stride is proposed if bytes that do not change mark each frame once. Best first;
-/// none if nothing repeats. The first 64 KiB are looked at. A second of recording is enough as a rule, and
-/// one in which nothing touches the array is best. Lost bytes, and frames of several lengths, spoil it.
+/// The bytes are compared with themselves one stride later, for all strides up to [`MAX_STRIDE_BYTES`] and a third of the
+/// capture. A stride is proposed if constant bytes occur once in each frame. The best proposal comes first; there is none if
+/// nothing repeats. The first 64 KiB are analysed. One second of recording is usually enough, best without any contact with
+/// the array. Lost bytes or frames of different lengths prevent a result.
 pub fn propose(capture: &[u8]) -> Vec<Proposal> {
     let bytes = capture.get(..MAX_LOOKED_AT_BYTES).unwrap_or(capture);
     let chance = chance(bytes);
@@ -66,10 +63,10 @@ pub fn propose(capture: &[u8]) -> Vec<Proposal> {
     proposals
 }
 
-/// Share of bytes that are the same one stride later, beyond chance.
+/// Share of bytes that are equal one stride later, in excess of chance.
 fn likeness(bytes: &[u8], stride: usize, chance: f64) -> f64 {
     let later = bytes.get(stride..).unwrap_or_default();
-    // In blocks, which the compiler compares in one go; none overflows a byte.
+    // In blocks, which the compiler vectorises, and in which the count cannot overflow a byte.
     let same_in = |(now, later): (&[u8], &[u8])| -> usize {
         now.iter().zip(later).fold(0_u8, |same, (now, later)| same + u8::from(now == later)).into()
     };
@@ -78,13 +75,13 @@ fn likeness(bytes: &[u8], stride: usize, chance: f64) -> f64 {
     if chance < 1.0 { (same - chance) / (1.0 - chance) } else { 0.0 }
 }
 
-/// Share of bytes that would be the same in any other order too.
+/// Share of bytes that would be equal by chance.
 fn chance(bytes: &[u8]) -> f64 {
     let length = bytes.len().max(1) as f64;
     histogram(bytes).iter().map(|count| (*count as f64 / length).powi(2)).sum()
 }
 
-/// How often each byte is there.
+/// Number of occurrences of each byte.
 fn histogram<'a>(bytes: impl IntoIterator<Item = &'a u8>) -> [usize; 256] {
     let mut counts = [0; 256];
     for byte in bytes {
@@ -95,12 +92,12 @@ fn histogram<'a>(bytes: impl IntoIterator<Item = &'a u8>) -> [usize; 256] {
     counts
 }
 
-/// The proposal for a stride, if bytes mark each frame once.
+/// The proposal for a stride, if constant bytes occur once in each frame.
 fn proposal(bytes: &[u8], stride: usize, likeness: f64) -> Option<Proposal> {
     let columns: Vec<ByteColumn> = (0..stride).map(|phase| ByteColumn::of(bytes, stride, phase)).collect();
     let mut runs: Vec<ConstantRun> =
         runs(&columns).into_iter().map(|run| ConstantRun::of(&columns, run)).collect();
-    runs.sort_by_key(|run| Reverse((run.telling, run.after_varied)));
+    runs.sort_by_key(|run| Reverse((run.distinctive, run.after_varied)));
     let mark = runs.iter().take(RUNS_LOOKED_FOR).find_map(|run| run.mark(bytes, stride))?;
     let first_at = find(bytes, &mark.sync).next()?;
     let from_sync = |matches: fn(&ByteColumn) -> bool| -> Vec<usize> {
@@ -117,13 +114,13 @@ fn proposal(bytes: &[u8], stride: usize, likeness: f64) -> Option<Proposal> {
     })
 }
 
-/// The bytes at one place of all frames.
+/// The bytes at one offset of all frames.
 struct ByteColumn {
-    /// Theirs, if they are all the same.
+    /// Their value, if nearly all are the same.
     value: Option<u8>,
-    /// They step by one.
+    /// True if they increase by one from frame to frame.
     counts: bool,
-    /// How many different ones.
+    /// Number of different values.
     kinds: usize,
 }
 
@@ -142,7 +139,7 @@ impl ByteColumn {
     }
 }
 
-/// Where runs of constant columns begin, and how long they are; a run may go on at the beginning.
+/// Beginning and length of each run of constant columns. A run may continue from the last column to the first.
 fn runs(columns: &[ByteColumn]) -> Vec<(usize, usize)> {
     let stride = columns.len();
     let constant = |phase: usize| columns.get(phase % stride).is_some_and(|column| column.value.is_some());
@@ -152,17 +149,17 @@ fn runs(columns: &[ByteColumn]) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// Columns side by side in which nothing changes.
+/// Adjacent constant columns.
 struct ConstantRun {
     phase: usize,
     values: Vec<u8>,
-    /// Bytes that are neither 0x00 nor 0xFF, which are rare outside of marks.
-    telling: usize,
-    /// Different bytes in front of it: a checksum in front of a sync varies most.
+    /// Number of bytes other than 0x00 and 0xFF; constant ones are rare outside of sync bytes.
+    distinctive: usize,
+    /// Number of different bytes just before it: a checksum in front of a sync varies most.
     after_varied: usize,
 }
 
-/// Constant bytes that are there once in every stride.
+/// Constant bytes that occur once in every stride.
 struct SyncCandidate {
     phase: usize,
     sync: Vec<u8>,
@@ -172,12 +169,12 @@ impl ConstantRun {
     fn of(columns: &[ByteColumn], (phase, length): (usize, usize)) -> Self {
         let values: Vec<u8> =
             columns.iter().cycle().skip(phase).take(length).filter_map(|column| column.value).collect();
-        let telling = values.iter().filter(|byte| !matches!(byte, 0x00 | 0xFF)).count();
+        let distinctive = values.iter().filter(|byte| !matches!(byte, 0x00 | 0xFF)).count();
         let before = columns.get((phase + columns.len() - 1) % columns.len());
-        Self { phase, values, telling, after_varied: before.map_or(0, |column| column.kinds) }
+        Self { phase, values, distinctive, after_varied: before.map_or(0, |column| column.kinds) }
     }
 
-    /// Its shortest beginning of two bytes or more, or else its first byte, that is there once in every stride.
+    /// The shortest beginning of it with at least two bytes, or else its first byte, that occurs once in every stride.
     fn mark(&self, bytes: &[u8], stride: usize) -> Option<SyncCandidate> {
         let expected = bytes.len() as f64 / stride as f64;
         let is_mark = |sync: &&[u8]| {
@@ -190,7 +187,7 @@ impl ConstantRun {
     }
 }
 
-/// Where a pattern stands.
+/// Offsets of a pattern.
 pub(super) fn find<'a>(bytes: &'a [u8], pattern: &'a [u8]) -> impl Iterator<Item = usize> + 'a {
     let windows = bytes.windows(pattern.len().max(1)).enumerate();
     windows.filter(move |(_, window)| *window == pattern).map(|(at, _)| at)

@@ -1,4 +1,4 @@
-//! One straight move: the line that orders it, and what a report means for it.
+//! A straight move under way: its G-code line, and how reports are judged.
 
 use core::time::Duration;
 
@@ -10,12 +10,12 @@ use crate::stage::{ArrivalCheck, Judgement, distance_mm};
 pub(super) struct ActiveMove {
     arrival: ArrivalCheck,
     line: String,
-    /// When the controller took the line.
+    /// When the controller accepted the line.
     accepted: Option<Duration>,
 }
 
 impl ActiveMove {
-    /// A move that sets out now. The target is rounded to the three decimals that are sent.
+    /// A move that starts now. The target is rounded to the three decimals that are sent.
     pub(super) fn new(
         now: Duration,
         config: &Config,
@@ -40,7 +40,7 @@ impl ActiveMove {
         &self.arrival
     }
 
-    /// True if the line has not been taken yet.
+    /// True if the line has not been accepted yet.
     pub(super) fn awaits_ok(&self) -> bool {
         self.accepted.is_none()
     }
@@ -49,8 +49,8 @@ impl ActiveMove {
         self.accepted = Some(now);
     }
 
-    /// Judges a report received now: whether the controller stands, where, and since when it was asked. One that was
-    /// asked for before the `ok` proves nothing.
+    /// Judges a report received now that was requested at `asked`. A report that was requested before the `ok` does not
+    /// show that the move has ended.
     pub(super) fn judge(
         &mut self,
         now: Duration,

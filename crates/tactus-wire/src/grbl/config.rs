@@ -1,48 +1,48 @@
-//! What is asked of a controller, and how its axes lie in the stage's frame.
+//! Requirements on a controller, and the orientation of its axes in the stage's frame.
 
 use crate::stage::{AxisName, Direction};
 
-/// What is asked of the controller.
+/// Requirements on the controller, and the orientation of its axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// A move is done when the controller stands within this of the target, more than 0.
+    /// A move is done when the controller stands within this distance of the target; more than 0.
     pub tolerance_mm: f64,
-    /// Which axes of the controller serve x, y and z.
+    /// The controller's axes for the stage's x, y and z.
     pub axes: [Axis; 3],
-    /// The controller must have its soft limits on (`$20`), so that it refuses what is beyond its travel.
+    /// Require soft limits (`$20`), so that the controller refuses targets beyond its travel.
     pub needs_soft_limits: bool,
 }
 
-/// One axis of the stage, as the controller has it.
+/// The controller's axis for one axis of the stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
-    /// The controller's axis.
+    /// Its name in the controller.
     pub machine: AxisName,
-    /// Which way it counts.
+    /// Direction in which it counts.
     pub direction: Direction,
-    /// The controller's coordinate that is 0 mm.
+    /// Coordinate of the controller at the stage's 0 mm.
     pub origin_mm: f64,
-    /// What the controller must have as its steps per mm (`$100` to `$102`), more than 0; `None` takes any.
+    /// Required steps per mm (`$100` to `$102`), more than 0; `None` accepts any.
     pub steps_per_mm: Option<f64>,
 }
 
-/// Why a configuration makes no stage.
+/// Why a configuration is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ConfigError {
     /// A number of the stage is not more than 0.
     #[error("{field} is {value}, but must be more than 0")]
     NotPositive { field: &'static str, value: f64 },
-    /// An origin is no place.
+    /// An origin is not finite.
     #[error("{name}: origin_mm is {value}, but must be a number")]
     Origin { name: AxisName, value: f64 },
-    /// An axis of the controller would serve two of the stage.
+    /// Two axes of the stage use the same axis of the controller.
     #[error("{first} and {second} are the same axis of the controller")]
     Same { first: AxisName, second: AxisName },
 }
 
 impl Config {
-    /// A controller whose axes lie as the stage's: the same names, directions and origin.
+    /// A controller with the stage's axes: the same names, directions and origin.
     pub fn aligned(tolerance_mm: f64) -> Self {
         let axes = AxisName::ALL.map(|machine| Axis {
             machine,
@@ -56,7 +56,7 @@ impl Config {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// If a number is out of range, or one axis of the controller serves two of the stage.
+    /// If a number is out of range, or two axes of the stage use the same axis of the controller.
     pub fn check(&self) -> Result<(), ConfigError> {
         let positive = |field, value: f64| {
             if value.is_finite() && value > 0.0 {
@@ -79,13 +79,13 @@ impl Config {
         Ok(())
     }
 
-    /// Where a place of the controller is in the stage's frame.
+    /// Converts the controller's coordinates to the stage's frame.
     pub fn to_stage(&self, machine_mm: [f64; 3]) -> [f64; 3] {
         // No negative zero.
         self.axes.map(|axis| axis.direction.sign() * (axis.machine.of(machine_mm) - axis.origin_mm) + 0.0)
     }
 
-    /// Where a place of the stage is in the controller's coordinates.
+    /// Converts a position in the stage's frame to the controller's coordinates.
     pub fn to_machine(&self, stage_mm: [f64; 3]) -> [f64; 3] {
         let mut machine_mm = [0.0; 3];
         for (name, axis) in self.named_axes() {

@@ -1,4 +1,4 @@
-//! Errors and alarms in words.
+//! Meanings of error and alarm numbers.
 
 /// What `error:n` means.
 pub fn error_meaning(code: u8) -> &'static str {

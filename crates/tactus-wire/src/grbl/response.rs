@@ -1,12 +1,12 @@
-//! One line from the controller.
+//! A line from the controller.
 
 use super::StatusReport;
 use super::status::triple;
 
-/// What one line says.
+/// A line from the controller.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Response {
-    /// `ok`: the line was taken; its motion may yet be to come.
+    /// `ok`: the line was accepted. Its motion may still follow.
     Ok,
     /// `error:n`: the line was refused; see [`error_meaning`](super::error_meaning).
     Error(u8),
@@ -14,32 +14,32 @@ pub enum Response {
     Alarm(u8),
     /// `Grbl 1.1h ['$' for help]`: the controller has started or was reset.
     Banner(String),
-    /// `<...>`.
+    /// `<...>`: a status report.
     Status(StatusReport),
-    /// `[MSG:...]`.
+    /// `[MSG:...]`: a message for people.
     Message(String),
     /// `[PRB:x,y,z:1]`: where a probing ended, and whether it touched.
     Probe {
-        /// Machine frame.
+        /// In the machine frame.
         position_mm: [f64; 3],
         /// The probe touched.
         touched: bool,
     },
-    /// `$n=value`.
+    /// `$n=value`: a setting.
     Setting {
-        /// Number of the setting.
+        /// Its number, as in `$100`.
         number: u16,
-        /// Its value as written.
+        /// Its value, as written.
         value: String,
     },
-    /// `[...]` of another kind: offsets, parser state, version.
+    /// `[...]` of any other kind: offsets, parser state, version.
     Feedback(String),
-    /// Anything else: an echo, noise, a broken line.
+    /// Anything else: an echo, noise or a broken line.
     Unknown(String),
 }
 
 impl Response {
-    /// Reads a line, without its end.
+    /// Parses a line, without its end.
     pub fn parse(line: &str) -> Self {
         Self::known(line).unwrap_or_else(|| Self::Unknown(line.to_owned()))
     }
@@ -64,7 +64,7 @@ impl Response {
             let (number, value) = setting.split_once('=')?;
             return Some(Self::Setting { number: number.parse().ok()?, value: value.to_owned() });
         }
-        // Noise of the link may stand before it, and to miss a reset is worse than to see one too many.
+        // Noise may precede the banner. Missing a reset is worse than seeing one that did not happen.
         let banner = line.get(line.find("Grbl")?..)?;
         Some(Self::Banner(banner.to_owned()))
     }

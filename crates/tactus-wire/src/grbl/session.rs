@@ -1,7 +1,7 @@
-//! The host's side of the conversation.
+//! The host's side of a connection to a Grbl controller.
 
 mod error;
-mod hear;
+mod handle;
 mod phase;
 mod step;
 
@@ -18,26 +18,25 @@ use crate::stage::{self, Alarm, Cause, Failure, Session as _, distance_mm};
 
 pub use error::SessionError;
 
-/// What a session wants done, or tells.
 type Action = stage::Action<SessionError>;
 
-/// How long a banner is waited for that comes by itself when the port is opened.
+/// How long to wait for a banner that the controller sends when the port is opened.
 const LISTEN: Duration = Duration::from_millis(500);
 
-/// How long homing may take; the controller itself gives up after some 24 s.
+/// Longest time for homing. The controller itself gives up after about 24 s.
 const HOMING_TIMEOUT: Duration = Duration::from_mins(1);
 
-/// Lowest speed that the three decimals of a feed in mm/min can tell.
+/// Lowest speed that can be sent: a feed in mm/min has three decimals.
 const SPEED_MIN_MM_PER_S: f64 = 0.001 / 60.0;
 
-/// Half of the reporting step: places nearer than this are the same.
+/// Half of the reporting resolution. Positions closer than this are equal.
 const SAME_PLACE_MM: f64 = 0.0005;
 
-/// A conversation with a controller over one connection; see [`stage::Session`]. The controller's coordinates are its
-/// work frame, which is the machine's unless an offset is set in it.
+/// The host's side of one connection to a controller; see [`stage::Session`]. The controller's coordinates are those of its
+/// work frame, which is the machine frame unless an offset is set.
 ///
-/// The position counts as known only from a successful homing on, until an alarm, a reset that was not
-/// ours, or a stop that had to reset the controller in motion.
+/// The position counts as known from a successful homing until an alarm, a reset by others, or a stop that had to reset
+/// the controller in motion.
 #[derive(Debug)]
 pub struct Session {
     config: Config,
@@ -45,9 +44,9 @@ pub struct Session {
     poll: StatusPoll,
     phase: Phase,
     homed: bool,
-    /// In alarm, with its number; 0 if it was not told.
+    /// Number of the present alarm; 0 if it was not reported.
     alarm: Option<u8>,
-    /// The banner, and what `$I` tells.
+    /// The banner, and the version from `$I`.
     identity: String,
     settings: Settings,
     /// As last reported since the last reset.
@@ -62,7 +61,7 @@ impl Session {
     /// A session that has not started.
     ///
     /// # Errors
-    /// If the configuration makes no stage; see [`Config::check`].
+    /// If the configuration is invalid; see [`Config::check`].
     pub fn new(config: Config) -> Result<Self, ConfigError> {
         config.check()?;
         Ok(Self {
@@ -87,7 +86,7 @@ impl Session {
     }
 
     fn check_ready(&self, command: &str) -> Result<(), Failure> {
-        if self.is_ready() { Ok(()) } else { Err(Failure::refused(command, "another command is in hand")) }
+        if self.is_ready() { Ok(()) } else { Err(Failure::refused(command, "another command is under way")) }
     }
 
     fn check_alarm(&self) -> Result<(), Failure> {
@@ -148,7 +147,7 @@ impl stage::Session for Session {
             return self.finish(now);
         }
         self.homed = false;
-        // While homing `?` is not answered.
+        // `?` is not answered during homing.
         self.poll.reset();
         self.phase = Phase::Homing { deadline: now + HOMING_TIMEOUT, accepted: None };
         self.send_line("$H");
@@ -179,7 +178,7 @@ impl stage::Session for Session {
         self.finish(now)
     }
 
-    /// Resets and unlocks the controller.
+    /// Resets and unlocks the controller with `$X`.
     fn clear_alarm(&mut self, now: Duration) -> Vec<Action> {
         if self.is_over() {
             return Vec::new();
@@ -194,13 +193,12 @@ impl stage::Session for Session {
         self.finish(now)
     }
 
-    /// The stage decelerates and keeps its
-    /// position; what the controller still holds is then flushed by a reset, made at a stand. Homing can only
-    /// be ended by a reset.
+    /// The stage decelerates and keeps its position. At standstill a reset then discards the commands that the controller
+    /// still holds. Homing can only be ended by a reset.
     fn stop(&mut self, now: Duration) -> Vec<Action> {
         let stopped = Some(Failure::Stopped { position_mm: self.position_mm });
         match self.phase.clone() {
-            // It stands, and would not answer.
+            // It stands still, and would not answer.
             Phase::Ready if self.alarm.is_some() => self.send(FEED_HOLD),
             Phase::Ready | Phase::Looking { purpose: Purpose::Recover, .. } => self.hold(now, None),
             Phase::Moving(_) | Phase::Unlocking { .. } | Phase::Looking { purpose: Purpose::Clear, .. } => {
@@ -213,7 +211,7 @@ impl stage::Session for Session {
                 self.reset(now, Purpose::Greet, 1);
             }
             Phase::Resetting { purpose, resets: 0, .. } => self.reset(now, purpose, 1),
-            // Reset already: nothing moves.
+            // It has been reset already, so nothing moves.
             Phase::Resetting { .. } | Phase::Over => {}
         }
         self.finish(now)
@@ -221,7 +219,7 @@ impl stage::Session for Session {
 
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
         let mut lines = core::mem::take(&mut self.lines);
-        lines.push(bytes, |line| self.hear(now, Response::parse(line)));
+        lines.push(bytes, |line| self.handle(now, Response::parse(line)));
         self.lines = lines;
         self.finish(now)
     }
@@ -230,7 +228,7 @@ impl stage::Session for Session {
         if self.phase.deadline().is_some_and(|deadline| now >= deadline) {
             self.overdue(now);
         }
-        // In an alarm the controller may keep silent until it is reset.
+        // In an alarm the controller may stay silent until it is reset.
         let excused = self.alarm.is_some() && self.is_ready();
         if self.poll_interval().is_some() && self.poll.is_silent(now) && !excused {
             self.fail(SessionError::Silent { query: "for its status" });
@@ -241,10 +239,10 @@ impl stage::Session for Session {
 
 fn check_numbers(command: &str, target_mm: [f64; 3], speed_mm_per_s: f64) -> Result<(), Failure> {
     if !target_mm.iter().all(|mm| mm.is_finite()) {
-        return Err(Failure::refused(command, "the target is not a place"));
+        return Err(Failure::refused(command, "the target is not finite"));
     }
     if !(speed_mm_per_s.is_finite() && speed_mm_per_s >= SPEED_MIN_MM_PER_S) {
-        return Err(Failure::refused(command, "the speed is not one that can be sent"));
+        return Err(Failure::refused(command, "the speed is too low or not a number"));
     }
     Ok(())
 }

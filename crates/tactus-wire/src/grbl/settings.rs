@@ -1,4 +1,4 @@
-//! The controller's own settings: what `$$` lists, and whether a rig can rely on it.
+//! The controller's settings (`$$`), and the check that they match the rig.
 
 use std::collections::BTreeMap;
 
@@ -8,14 +8,14 @@ use crate::stage::Setting;
 const SOFT_LIMITS: u16 = 20;
 const HOMING: u16 = 22;
 
-/// `$100` is x, `$101` y, `$102` z.
+/// `$100` for x; y and z follow.
 const STEPS_PER_MM: u16 = 100;
 
-/// Steps per mm are printed with three decimals, and kept with seven digits.
+/// Steps per mm are printed with three decimals and stored with seven digits.
 const STEPS_TOLERANCE: f64 = 0.0005;
 const STEPS_TOLERANCE_SHARE: f64 = 1e-6;
 
-/// Values by number, as written.
+/// Values as written, by number of the setting.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Settings(BTreeMap<u16, String>);
 
@@ -28,9 +28,9 @@ impl Settings {
         self.0.clear();
     }
 
-    /// Holds the settings against what is asked of the controller. Nothing is changed.
+    /// Checks the settings against the requirements. Changes nothing.
     pub(super) fn check(&self, config: &Config) -> Result<(), SessionError> {
-        // Further bits are grblHAL's and say how to home.
+        // Higher bits are options of grblHAL's homing.
         self.need(HOMING, "1, homing on", is_odd)?;
         if config.needs_soft_limits {
             self.need(SOFT_LIMITS, "1, soft limits on", |value| value != 0.0)?;
@@ -45,7 +45,7 @@ impl Settings {
         Ok(())
     }
 
-    /// What is worth to be told of them.
+    /// The settings that are relevant to a stage.
     pub(super) fn list(&self) -> Vec<Setting> {
         let known = |(number, value): (&u16, &String)| {
             let (name, value) = (format!("${number}"), value.clone());
@@ -69,7 +69,7 @@ fn is_odd(value: f64) -> bool {
     value as i64 & 1 == 1
 }
 
-/// What a setting is; `None` if it is of no matter to a stage.
+/// Meaning of a setting; `None` if it is not relevant to a stage.
 fn meaning(number: u16) -> Option<String> {
     let of_axis = |what: &str| {
         let names = ["x", "y", "z"];

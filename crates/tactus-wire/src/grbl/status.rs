@@ -2,50 +2,49 @@
 
 use std::fmt;
 
-/// What the controller reports when asked by `?`. Fields that it leaves out are `None`; those not named
-/// here are passed over.
+/// The controller's answer to `?`. Fields that it omits are `None`; other fields are ignored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StatusReport {
-    /// What it is doing.
+    /// See [`MachineState`].
     pub state: MachineState,
-    /// Where it stands, in one of two frames.
+    /// Its position, in one of two frames.
     pub position: Position,
-    /// Work frame's origin in the machine frame; sent now and then, and first after a reset.
+    /// Origin of the work frame in the machine frame. Sent from time to time, and first after a reset.
     pub work_offset_mm: Option<[f64; 3]>,
-    /// Free blocks of the planner and free bytes of the line buffer.
+    /// Free blocks of the planner, and free bytes of the line buffer.
     pub buffer: Option<[u32; 2]>,
-    /// Feed now, in mm/min.
+    /// Present feed rate.
     pub feed_mm_per_min: Option<f64>,
 }
 
-/// What the controller is doing.
+/// State of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MachineState {
-    /// Nothing.
+    /// Standing still, ready for lines.
     Idle,
-    /// Moving as a line told it to.
+    /// Executing a line.
     Run,
     /// Decelerating into a hold.
     Holding,
-    /// Standing in a hold (`Hold:0`).
+    /// Standing still in a hold (`Hold:0`).
     Hold,
-    /// Moving as a jog told it to.
+    /// Executing a jog.
     Jog,
-    /// Locked; the code is only told by some firmware.
+    /// Locked by an alarm. Only some firmware reports its number here.
     Alarm,
-    /// Safety door.
+    /// The safety door is open.
     Door,
-    /// Checks lines without moving.
+    /// Checking lines without moving.
     Check,
-    /// Looking for the limit switches.
+    /// Searching for the limit switches.
     Home,
     /// Asleep until reset.
     Sleep,
-    /// Waiting for a change of tool.
+    /// Waiting for a tool change.
     Tool,
 }
 
-/// Where the controller stands.
+/// Position of the controller in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Position {
     /// `MPos`: machine frame.
@@ -57,10 +56,10 @@ pub enum Position {
 /// Why a line is not a status report.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StatusError {
-    /// It does not stand in `<` `>`.
+    /// It is not enclosed in `<` `>`.
     #[error("a status report stands in angle brackets")]
     Brackets,
-    /// A state that Grbl does not have.
+    /// An unknown state.
     #[error("there is no state {0:?}")]
     State(String),
     /// A field is malformed.
@@ -72,10 +71,10 @@ pub enum StatusError {
 }
 
 impl StatusReport {
-    /// Reads a line.
+    /// Parses a line.
     ///
     /// # Errors
-    /// Anything but a whole report with a position.
+    /// If it is not a complete report with a position.
     pub fn parse(line: &str) -> Result<Self, StatusError> {
         let inner =
             line.strip_prefix('<').and_then(|line| line.strip_suffix('>')).ok_or(StatusError::Brackets)?;
@@ -104,7 +103,7 @@ impl StatusReport {
 }
 
 impl fmt::Display for StatusReport {
-    /// As Grbl prints it, with three decimals.
+    /// The report as Grbl prints it, with three decimals.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, [x, y, z]) = match self.position {
             Position::Machine(mm) => ("MPos", mm),
@@ -162,7 +161,7 @@ impl fmt::Display for MachineState {
     }
 }
 
-/// The first three of at least three numbers: further axes are not the stage's.
+/// The first three of at least three numbers. Further axes are ignored.
 pub(super) fn triple(text: &str) -> Option<[f64; 3]> {
     let mut numbers = text.split(',').map(number);
     Some([numbers.next()??, numbers.next()??, numbers.next()??])

@@ -4,41 +4,41 @@ use std::ops::Range;
 
 use super::{HEADER, Reply, Request, USB_HEADER, reply, request};
 
-/// Finds packets in a stream that may be cut anywhere and hold garbage.
+/// Finds packets in a stream that may contain garbage.
 ///
-/// Feed it with [`push`](Self::push); then the host calls [`next_reply`](Self::next_reply), the device
-/// [`next_request`](Self::next_request), until it gives `None`. What comes out does not depend on how the
-/// stream was cut. It holds at most one unfinished packet and what was pushed since.
+/// Call [`push`](Self::push) with each read. Then call [`next_reply`](Self::next_reply) on the host, or
+/// [`next_request`](Self::next_request) on the device, until it returns `None`. The result does not depend on how the bytes
+/// arrive. At most one incomplete packet and the last read are kept.
 ///
-/// There is no checksum. A packet is believed if header, address, length and footer agree; of packets that
-/// overlap, the one that ends first, and of those the one that begins last. So the first whole packet after
-/// garbage is found when its last byte arrives, unless the garbage ends with a whole header whose length
-/// happens to lead to four footer bytes within that packet.
+/// There is no checksum. A packet is accepted if header, address, length and footer fit; of overlapping packets the one
+/// that ends first, and of those the one that begins last. So the first complete packet after garbage is found when its
+/// last byte arrives, unless the garbage ends with a complete header whose length happens to lead to four footer bytes
+/// within that packet.
 #[derive(Debug, Clone, Default)]
 pub struct Decoder {
     bytes: Vec<u8>,
-    /// Bytes before this are done with.
+    /// Bytes before this index have been used.
     start: usize,
-    /// A read request ended at `start`: a zero there still belongs to it.
+    /// A read request ended at `start`, so a zero there still belongs to it.
     zero_belongs: bool,
     stats: DecoderStats,
 }
 
-/// What a [`Decoder`] met beside good packets, since it was made.
+/// What a [`Decoder`] has received besides good packets, since it was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DecoderStats {
-    /// Bytes that were part of no packet.
+    /// Bytes that belonged to no packet.
     pub skipped_bytes: u64,
 }
 
-/// What stands at a header.
+/// What begins at a header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Extent {
     /// No packet.
     Impossible,
-    /// It has not all arrived.
+    /// A possible packet that has not arrived completely.
     Unfinished,
-    /// It has arrived.
+    /// A complete packet.
     Whole { length: usize },
 }
 
@@ -48,7 +48,7 @@ impl Decoder {
         Self::default()
     }
 
-    /// Takes what arrived.
+    /// Takes the bytes of a read.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.drain(..self.start);
         self.start = 0;
@@ -74,7 +74,7 @@ impl Decoder {
         Request::parse(self.bytes.get(packet)?)
     }
 
-    /// What it met beside good packets.
+    /// What it has received besides good packets.
     pub fn stats(&self) -> DecoderStats {
         self.stats
     }
@@ -98,8 +98,8 @@ impl Decoder {
         }
     }
 
-    /// Of the packets that begin at `from` or later and end by `limit`, the one that ends first; of those the
-    /// last.
+    /// Of the packets that begin at `from` or later and end by `limit`, the one that ends first; of several, the one that
+    /// begins last.
     fn first_to_end_within(
         &self,
         from: usize,
@@ -121,7 +121,7 @@ impl Decoder {
         first
     }
 
-    /// Skips to the next header, or to the end but for what may become one.
+    /// Skips to the next header; without one, to the end except for what may become one.
     fn skip_to_header(&mut self) {
         let rest = self.bytes.get(self.start..).unwrap_or_default();
         let skipped = find_header(rest).unwrap_or_else(|| {
@@ -138,7 +138,7 @@ impl Decoder {
     }
 }
 
-/// Length of a read request but for the zero behind it; no other request is that short.
+/// Length of a read request without the zero behind it. No other request is that short.
 const READ_BYTES: usize = 15;
 
 /// Offset of the first four header bytes in a row, of either board.

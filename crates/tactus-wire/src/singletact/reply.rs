@@ -1,12 +1,12 @@
-//! What the interface board answers.
+//! Replies of the interface board.
 
 use super::decoder::Extent;
 use super::{FOOTER, HEADER, READING_BYTES, USB_HEADER};
 
-/// Bytes before the data.
+/// Length of the header, before the data.
 const HEAD_BYTES: usize = 12;
 
-/// More data than a read can ask for is no reply.
+/// Most data in a reply: what a read can request.
 const MAX_DATA_BYTES: usize = 32;
 
 /// The answer to a request.
@@ -14,15 +14,15 @@ const MAX_DATA_BYTES: usize = 32;
 pub struct Reply<'a> {
     /// Which board sent it.
     pub via: Via,
-    /// Of the element on the I2C bus.
+    /// Address of the element on the I2C bus.
     pub address: u8,
-    /// True if the board says that the element did not answer: the data mean nothing.
+    /// True if the element did not answer the board. The data then have no meaning.
     pub timed_out: bool,
-    /// Of the request.
+    /// Id of the request.
     pub id: u8,
-    /// The board's clock in units of 0.1 ms; wraps after 119 h.
+    /// The board's clock in units of 0.1 ms. It starts again at 0 after 119 h.
     pub timestamp_ticks: u32,
-    /// What was read; empty in the answer to a write.
+    /// The requested bytes; empty in the answer to a write.
     pub data: &'a [u8],
 }
 
@@ -35,16 +35,16 @@ pub enum Via {
     Usb,
 }
 
-/// What an element has at [`READING_LOCATION`](super::READING_LOCATION).
+/// The data at [`READING_LOCATION`](super::READING_LOCATION).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ElementReading {
-    /// Counts the element's own readings; wraps.
+    /// Number of the element's reading; starts again at 0 after 65 535.
     pub counter: u16,
     /// The value in counts; see [`BASELINE_COUNTS`](super::BASELINE_COUNTS).
     pub counts: u16,
 }
 
-/// A reply is not the reading that was asked for.
+/// Why a reply is not the requested reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ReplyError {
@@ -53,7 +53,7 @@ pub enum ReplyError {
         "the element at address {address} did not answer on the I2C bus; check its address and its cable"
     )]
     TimedOut { address: u8 },
-    /// Another number of bytes.
+    /// It has another number of bytes.
     #[error("a reading has 6 bytes, not {bytes}")]
     Length { bytes: usize },
 }
@@ -77,10 +77,10 @@ impl<'a> Reply<'a> {
         packet
     }
 
-    /// Reads the data as a reading.
+    /// Decodes the data as a reading.
     ///
     /// # Errors
-    /// The element did not answer, or the reply holds something else.
+    /// If the element did not answer, or the reply has other data.
     pub fn reading(&self) -> Result<ElementReading, ReplyError> {
         if self.timed_out {
             return Err(ReplyError::TimedOut { address: self.address });
@@ -92,7 +92,7 @@ impl<'a> Reply<'a> {
         Ok(ElementReading { counter, counts: u16::from_be_bytes([high, low]) })
     }
 
-    /// Reads a whole reply.
+    /// Parses a complete reply.
     pub(super) fn parse(packet: &'a [u8]) -> Option<Self> {
         let (head, rest) = packet.split_first_chunk::<HEAD_BYTES>()?;
         let data = rest.get(..rest.len().checked_sub(FOOTER.len())?)?;
@@ -109,7 +109,7 @@ impl<'a> Reply<'a> {
 }
 
 impl ElementReading {
-    /// The reading as the data of a reply; the two bytes that no one reads are zero.
+    /// The data of a reply with this reading. The two ignored bytes are zero.
     pub fn encode(self) -> [u8; READING_BYTES as usize] {
         let ([counter_high, counter_low], [high, low]) =
             (self.counter.to_be_bytes(), self.counts.to_be_bytes());
@@ -126,7 +126,7 @@ impl Via {
     }
 }
 
-/// What stands at the beginning of `bytes`.
+/// What begins at the beginning of `bytes`.
 pub(super) fn extent(bytes: &[u8]) -> Extent {
     let Some(&[a, b, c, d, address, _, _, _, _, _, _, n]) = bytes.first_chunk::<HEAD_BYTES>() else {
         return Extent::Unfinished;

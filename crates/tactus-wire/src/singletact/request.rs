@@ -1,13 +1,13 @@
-//! What the host asks.
+//! Requests of the host.
 
 use super::decoder::Extent;
 use super::{DEFAULT_ADDRESS, FOOTER, HEADER, READING_BYTES, READING_LOCATION};
 
-/// Bytes before the data.
+/// Length of the header, before the data.
 const HEAD_BYTES: usize = 10;
-/// Bytes after the data: 0xFF and the footer.
+/// Length after the data: 0xFF and the footer.
 const TAIL_BYTES: usize = 5;
-/// How long the board is to wait for the element, in ms.
+/// How long the board waits for the element, in ms.
 const BUS_TIMEOUT_MS: u8 = 100;
 
 const READ: u8 = 1;
@@ -16,67 +16,67 @@ const CALIBRATE: u8 = 4;
 
 /// Longest read.
 const MAX_READ_BYTES: u8 = 32;
-/// Longest write: what a transfer on the bus holds.
+/// Longest write, limited by a transfer on the bus.
 pub(super) const MAX_WRITE_BYTES: usize = 28;
-/// Locations end here.
+/// End of the register.
 const LOCATIONS: u8 = 191;
-/// Locations that can be written end here.
+/// End of the writable part of the register.
 const WRITABLE: usize = 128;
 
-/// A request, as the host writes and the device reads it.
+/// A request of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request<'a> {
-    /// Of the element on the I2C bus, below 128; see [`DEFAULT_ADDRESS`].
+    /// Address of the element on the I2C bus, below 128; see [`DEFAULT_ADDRESS`].
     pub address: u8,
-    /// Comes back with the reply.
+    /// The reply repeats it.
     pub id: u8,
-    /// What to do.
+    /// What the element is to do.
     pub operation: Operation<'a>,
 }
 
-/// What an element is to do.
+/// An operation of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Operation<'a> {
-    /// Answer with a part of the register.
+    /// Read a part of the register.
     Read {
-        /// Where it begins, 0 to 190.
+        /// First location, 0 to 190.
         location: u8,
-        /// How many bytes, up to 32.
+        /// Number of bytes, up to 32.
         bytes: u8,
     },
-    /// Write a part of the register; kept in flash, which takes some 50 ms.
+    /// Write a part of the register. It is kept in flash, which takes about 50 ms.
     Write {
-        /// Where it begins; it ends at 128 or before.
+        /// First location. The data must end by location 128.
         location: u8,
         /// Up to 28 bytes.
         data: &'a [u8],
     },
-    /// Write a part of the table of calibration; kept in flash.
+    /// Write a part of the calibration table. It is kept in flash.
     Calibrate {
-        /// Which part of the table.
+        /// First location in the table.
         location: u8,
         /// Up to 28 bytes.
         data: &'a [u8],
     },
 }
 
-/// Why a request cannot be asked.
+/// Why a request is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum RequestError {
-    /// No such address on an I2C bus.
+    /// The I2C bus has no such address.
     #[error("address {address} is not below 128")]
     Address { address: u8 },
-    /// More bytes than a transfer holds, or none at all where some must be.
+    /// More bytes than fit in a transfer, or an empty write.
     #[error("{bytes} bytes do not fit: reads take up to 32, writes 1 to 28")]
     Length { bytes: usize },
-    /// The register ends before, or may only be read there.
+    /// The register ends before the data, or is read-only there.
     #[error("location {location} and {bytes} bytes: reads end at 191, writes at 128")]
     Location { location: u8, bytes: usize },
 }
 
 impl Request<'static> {
-    /// Asks the element at `address` for its reading.
+    /// The request for the reading of the element at `address`.
     pub fn reading(address: u8, id: u8) -> Self {
         let operation = Operation::Read { location: READING_LOCATION, bytes: READING_BYTES };
         Self { address, id, operation }
@@ -93,7 +93,7 @@ impl<'a> Request<'a> {
     /// The request as bytes.
     ///
     /// # Errors
-    /// An address, a location or a number of bytes that the board or the element does not take.
+    /// If an address, location or number of bytes is outside the range of the board or the element.
     pub fn encode(&self) -> Result<Vec<u8>, RequestError> {
         let Self { address, id, operation } = *self;
         if address >= 0x80 {
@@ -129,7 +129,7 @@ impl<'a> Request<'a> {
         Ok(packet)
     }
 
-    /// Reads a whole request, without the zero behind a read.
+    /// Parses a complete request, without the zero behind a read.
     pub(super) fn parse(packet: &'a [u8]) -> Option<Self> {
         let (head, rest) = packet.split_first_chunk::<HEAD_BYTES>()?;
         let data = rest.get(..rest.len().checked_sub(TAIL_BYTES)?)?;
@@ -144,13 +144,13 @@ impl<'a> Request<'a> {
     }
 }
 
-/// What stands at the beginning of `bytes`.
+/// What begins at the beginning of `bytes`.
 pub(super) fn extent(bytes: &[u8]) -> Extent {
     let Some(&[a, b, c, d, address, _, _, code, _, n]) = bytes.first_chunk::<HEAD_BYTES>() else {
         return Extent::Unfinished;
     };
     let data_bytes = if code == READ { 0 } else { usize::from(n) };
-    // A write of nothing is answered by no board.
+    // No board answers an empty write.
     let known = code == READ || (matches!(code, WRITE | CALIBRATE) && n > 0);
     if [a, b, c, d] != [HEADER; 4] || address >= 0x80 || !known || data_bytes > MAX_WRITE_BYTES {
         return Extent::Impossible;

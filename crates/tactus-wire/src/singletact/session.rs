@@ -1,4 +1,4 @@
-//! The host's side: polls one element after the other, a reading of all elements a round.
+//! The host's side: polls the elements one after another. Each round gives one reading of all elements.
 
 use core::time::Duration;
 
@@ -9,13 +9,13 @@ use crate::unwrapper::{Advance, Unwrapper};
 /// Length of a tick of the board's clock.
 pub const TICK: Duration = Duration::from_micros(100);
 
-/// A request that is not answered by then is given up: the board itself waits up to 100 ms for the element.
+/// An unanswered request is given up after this. The board itself waits up to 100 ms for the element.
 pub const ANSWER_TIMEOUT: Duration = Duration::from_millis(250);
 
-/// An element that leaves so many polls in a row without an answer is lost.
+/// An element is lost after this many polls in a row without an answer.
 pub const SILENT_POLLS: u32 = 3;
 
-/// An element that answers, but with no fresh reading for this long, is lost.
+/// An element is lost when it answers, but has sent no fresh reading for this long.
 pub const STALE_AFTER: Duration = Duration::from_secs(1);
 
 /// Polls the elements over one connection, a round in every interval.
@@ -48,7 +48,7 @@ pub struct Config {
     /// I2C addresses in the order of the elements, each below 128 and unique. Every element also answers at 4, so 4 can
     /// be used only for a single element.
     pub addresses: Vec<u8>,
-    /// From the beginning of one round to that of the next; zero for as fast as they answer.
+    /// Time between the beginnings of two rounds; zero to poll as fast as the elements answer.
     pub interval: Duration,
 }
 
@@ -56,13 +56,13 @@ pub struct Config {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ConfigError {
-    /// The list is empty.
+    /// The list of addresses is empty.
     #[error("there is no address to poll: name at least one, 4 if the element was given none of its own")]
     NoAddress,
-    /// No such address on an I2C bus.
+    /// The I2C bus has no such address.
     #[error("address {address} is not below 128")]
     Address { address: u8 },
-    /// Twice the same.
+    /// An address is listed twice.
     #[error("address {address} is there twice: give each element its own")]
     Twice { address: u8 },
 }
@@ -97,7 +97,7 @@ struct Element {
     counter: Unwrapper,
     /// When its counter last advanced.
     fresh: Option<Duration>,
-    /// Polls in a row without an answer, or with one that is no reading.
+    /// Polls in a row without a valid answer.
     failed: u32,
     lost: bool,
 }
@@ -113,7 +113,7 @@ impl Session {
     /// A session that has not started.
     ///
     /// # Errors
-    /// No address, one that is no address, or one twice.
+    /// If there is no address, an invalid one, or the same one twice.
     pub fn new(config: Config) -> Result<Self, ConfigError> {
         let Config { addresses, interval } = config;
         if addresses.is_empty() {
@@ -292,7 +292,7 @@ impl sensor::Session for Session {
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
         let mut actions = Vec::new();
         self.decoder.push(bytes);
-        // The decoder is set aside while its replies, which borrow from it, are handled.
+        // The decoder is moved out of `self`, because its replies borrow from it.
         let mut decoder = core::mem::take(&mut self.decoder);
         while let Some(reply) = decoder.next_reply() {
             self.handle(now, &reply, &mut actions);

@@ -1,98 +1,98 @@
-//! What a session wants done, and tells.
+//! What a stage session asks its driver to do, and what it reports.
 
 use core::time::Duration;
 
 use super::AxisName;
 
-/// What the session wants done, or tells; `E` is why it may be over.
+/// What a session asks for or reports. `E` is the error that ends the session.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action<E> {
     /// Write these bytes.
     Send(Vec<u8>),
-    /// The controller answered and is the one that was described; commands are taken from here on.
+    /// The controller answered and matches the configuration. From here on, commands are accepted.
     Connected(Controller),
-    /// Where it stands and what it does; at each report, and when its status changes without one.
+    /// Position and status; at each report of the controller, and at each other change of status.
     Report(Report),
-    /// The position is not to be trusted any more, by no doing of this session.
+    /// The position has become doubtful by an event outside this session.
     Suspect {
-        /// What happened.
+        /// What happened, for the log.
         why: String,
     },
-    /// The command in hand has ended; the position is where the stage stands.
+    /// The command under way has ended. The position is that of the stage, in mm.
     Done(Result<[f64; 3], Failure>),
     /// The session is over.
     Failed(E),
 }
 
-/// What answered.
+/// The controller that answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Controller {
-    /// Its name and version, in its own words.
+    /// Its name and version, as it reports them.
     pub identity: String,
-    /// Its settings that matter to a stage.
+    /// Its settings that are relevant to a stage.
     pub settings: Vec<Setting>,
 }
 
-/// A setting of the controller, as it tells it.
+/// A setting of the controller.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Setting {
     /// Its name in the protocol.
     pub name: String,
-    /// Its value.
+    /// Its value, as the controller writes it.
     pub value: String,
-    /// What it is.
+    /// What it means, in words.
     pub meaning: String,
 }
 
-/// Where the stage stands and what it does.
+/// Position and status of the stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Report {
-    /// As last reported. Where axes are asked one after another, that takes some 15 ms.
+    /// As last reported. A controller that is queried axis by axis takes about 15 ms for all.
     pub position_mm: [f64; 3],
-    /// What it does.
+    /// See [`Status`].
     pub status: Status,
-    /// What is wrong, in an alarm that was told.
+    /// The alarm, if the controller reported which one.
     pub alarm: Option<Alarm>,
 }
 
-/// What the stage does.
+/// Status of the stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// It stands, at a place that is not to be trusted until it is homed.
+    /// It stands still; its position is not known until it is homed.
     Unhomed,
-    /// It stands.
+    /// It stands still.
     Idle,
     /// It moves.
     Moving,
-    /// It holds, or comes to a stand.
+    /// It decelerates, or holds after a stop.
     Hold,
-    /// It looks for its reference position.
+    /// It searches for its reference position.
     Homing,
-    /// It takes no commands until the alarm is cleared.
+    /// It accepts no commands until the alarm is cleared.
     Alarm,
 }
 
-/// A fault of the controller that must be seen to and cleared.
+/// A fault of the controller, to be remedied and cleared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Alarm {
-    /// The controller's number, 0 if it was not told; two characters, the first in the high byte, where the protocol
-    /// has letters: `FS` is 0x4653.
+    /// The controller's number; 0 if it did not report one. Where the protocol has two letters, the first is the high
+    /// byte: `FS` is 0x4653.
     pub code: u16,
-    /// Of which axis, where the protocol tells that.
+    /// The axis, if the protocol reports it.
     pub axis: Option<AxisName>,
-    /// What it means and what to do.
+    /// What it means and what to do, in words.
     pub meaning: &'static str,
 }
 
-/// Why a command did not do what was asked.
+/// Why a command failed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Failure {
     /// [`Session::stop`](super::Session::stop) ended it.
     Stopped {
-        /// Where the stage stands.
+        /// Position of the stage.
         position_mm: [f64; 3],
     },
-    /// The controller refused it, did not confirm it, or it cannot be done.
+    /// The controller refused the command or did not confirm it, or it is impossible.
     Refused {
         /// The command.
         command: String,
@@ -103,47 +103,46 @@ pub enum Failure {
     Alarm(Alarm),
     /// The position is not known.
     Unhomed,
-    /// Someone else moved an axis meanwhile, by its knob or by a command of another host; the stage was
-    /// stopped.
+    /// Someone else moved an axis meanwhile, by its knob or from another host. The stage was stopped.
     Interrupted {
-        /// Which axis.
+        /// The axis that was moved.
         axis: AxisName,
-        /// What it said, in words.
+        /// What the controller reported, in words.
         meaning: &'static str,
-        /// Where the stage stands.
+        /// Position of the stage.
         position_mm: [f64; 3],
     },
-    /// The stage stands elsewhere.
+    /// The stage stands still, but not at the target.
     NotThere {
-        /// Where it was sent.
+        /// Target of the move.
         target_mm: [f64; 3],
-        /// Where it says it is.
+        /// Position that the controller reports.
         position_mm: [f64; 3],
     },
-    /// The move took longer than it can; the stage was stopped.
+    /// The move took too long. The stage was stopped.
     Overdue {
-        /// Where it was sent.
+        /// Target of the move.
         target_mm: [f64; 3],
-        /// Where it says it is.
+        /// Position that the controller reports.
         position_mm: [f64; 3],
-        /// How long was waited.
+        /// Time since the move was sent.
         waited: Duration,
     },
 }
 
-/// What kind of thing ended a session.
+/// What kind of error ended a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
-    /// Nothing answers, or nothing does any more.
+    /// The controller does not answer, or has stopped answering.
     Silent,
-    /// What answers does not know what is asked.
+    /// The device answers, but does not understand the queries.
     Protocol,
-    /// It is not the stage that was described.
+    /// The stage differs from the configuration.
     Mismatch,
 }
 
 impl Alarm {
-    /// Its short name, `1` or `z FS` for instance.
+    /// Its short name, such as `1` or `z FS`.
     pub fn name(&self) -> String {
         let code = match self.code.to_be_bytes() {
             [0, number] => number.to_string(),
@@ -158,7 +157,7 @@ impl Failure {
         Self::Refused { command: command.to_owned(), reason: reason.into() }
     }
 
-    /// The same, now that the stage stands at `position_mm`.
+    /// The same failure, with the position at which the stage came to rest.
     pub(crate) fn at(self, position_mm: [f64; 3]) -> Self {
         match self {
             Self::Stopped { .. } => Self::Stopped { position_mm },

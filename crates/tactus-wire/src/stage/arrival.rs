@@ -1,39 +1,39 @@
-//! Whether a move has arrived: how long it may take, and what a report proves.
+//! Decides whether a move has arrived, and whether it takes too long.
 
 use core::time::Duration;
 
 use super::distance_mm;
 
-/// What a move may take beyond twice the time that it should.
+/// Time that a move may take beyond twice its expected duration.
 const ALLOWANCE: Duration = Duration::from_secs(2);
 
-/// For how long the controller must say that it stands elsewhere, before that is believed: it may not have set out
-/// yet.
+/// How long the controller must report that it stands away from the target before the move counts as failed: it may not
+/// have started yet.
 const ELSEWHERE_MIN: Duration = Duration::from_millis(200);
 
-/// A place that is to be reached.
+/// The target of a move, and when it should be reached.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ArrivalCheck {
     target_mm: [f64; 3],
     sent: Duration,
     overdue: Duration,
-    /// Since when the controller says that it stands elsewhere.
+    /// Since when the controller reports that it stands away from the target.
     elsewhere: Option<Duration>,
 }
 
-/// What a report means for a move.
+/// What a report shows about a move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Judgement {
-    /// Go on waiting.
+    /// Not decided yet.
     Underway,
     /// Arrived.
     Done,
-    /// Standing, but not there.
+    /// Standing still away from the target.
     NotThere,
 }
 
 impl ArrivalCheck {
-    /// At a place for which the stage sets out now, and which it should reach within `expected_s`.
+    /// A move that starts now and should take `expected_s`.
     pub(crate) fn new(now: Duration, target_mm: [f64; 3], expected_s: f64) -> Self {
         let expected = Duration::try_from_secs_f64(2.0 * expected_s).unwrap_or(Duration::MAX);
         let overdue = now.saturating_add(expected).saturating_add(ALLOWANCE);
@@ -44,7 +44,7 @@ impl ArrivalCheck {
         self.target_mm
     }
 
-    /// When it is not reached by then, something is wrong.
+    /// A move that has not arrived by then has failed.
     pub(crate) fn overdue(&self) -> Duration {
         self.overdue
     }
@@ -53,8 +53,8 @@ impl ArrivalCheck {
         now.saturating_sub(self.sent)
     }
 
-    /// Judges a report: whether the controller stands, and where. Only one that was asked for after the controller
-    /// took the move may say that it stands.
+    /// Judges a report. `stands` may be true only for a report that was requested after the controller accepted the
+    /// move.
     pub(crate) fn judge(
         &mut self,
         now: Duration,

@@ -1,24 +1,24 @@
-//! Axes and places.
+//! Axes of the stage.
 
 use core::fmt;
 
-/// Which axis of the stage.
+/// An axis of the stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AxisName {
-    /// The first.
+    /// In the plane of the covering.
     X,
-    /// The second.
+    /// In the plane of the covering.
     Y,
-    /// The third, along which the tip presses.
+    /// Up; the tip presses along it.
     Z,
 }
 
-/// Which way an axis counts, seen in the stage's frame.
+/// Direction in which a controller's axis counts, in the stage's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
-    /// More of the controller's units are more mm.
+    /// Its coordinate increases with the stage's.
     Positive,
-    /// More of the controller's units are fewer mm.
+    /// Its coordinate decreases as the stage's increases.
     Negative,
 }
 
@@ -26,7 +26,7 @@ impl AxisName {
     /// All three, in order.
     pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
 
-    /// Its part of a place, or of anything that each axis has.
+    /// Its component of a position, or of any three values by axis.
     pub fn of<T>(self, [x, y, z]: [T; 3]) -> T {
         match self {
             Self::X => x,
@@ -35,7 +35,7 @@ impl AxisName {
         }
     }
 
-    /// Puts its part into a place.
+    /// Sets its component of a position.
     pub fn set(self, [x, y, z]: &mut [f64; 3], mm: f64) {
         match self {
             Self::X => *x = mm,
@@ -52,7 +52,7 @@ impl fmt::Display for AxisName {
 }
 
 impl Direction {
-    /// 1 or -1.
+    /// 1.0 or -1.0.
     pub fn sign(self) -> f64 {
         match self {
             Self::Positive => 1.0,
@@ -61,7 +61,7 @@ impl Direction {
     }
 }
 
-/// Distance between two places.
+/// Distance between two positions.
 pub(crate) fn distance_mm(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }

@@ -1,20 +1,20 @@
-//! The two forms of the checksum.
+//! The two forms of a packet's checksum.
 
 use super::crc;
 use super::packet::{HEADER_BYTES, SYNC};
 
-/// How packets with a payload are closed, which depends on the controller's firmware.
+/// Checksum of packets with a payload; it depends on the controller's firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Checksum {
-    /// [`crc()`], two bytes, low byte first.
+    /// [`crc()`]: two bytes, low byte first.
     #[default]
     Crc,
-    /// Older firmware: the sum of the same bytes, its low eight bits. One damaged packet in 256 passes.
+    /// Older firmware: the low eight bits of the sum of the same bytes. One damaged packet in 256 is not detected.
     Sum8,
 }
 
 impl Checksum {
-    /// A packet that an encoder of [this module](super) made, closed in this form.
+    /// A packet from an encoder of [this module](super), with the checksum in this form.
     pub fn close(self, mut packet: Vec<u8>) -> Vec<u8> {
         if self == Self::Sum8 && packet.len() > HEADER_BYTES {
             packet.truncate(packet.len().saturating_sub(Self::Crc.bytes()));
@@ -24,7 +24,7 @@ impl Checksum {
         packet
     }
 
-    /// Its length.
+    /// Its length in bytes.
     pub(super) fn bytes(self) -> usize {
         match self {
             Self::Crc => 2,
@@ -40,7 +40,7 @@ impl Checksum {
         }
     }
 
-    /// The checksum that stands at the beginning of `bytes`, if it has all arrived.
+    /// The checksum at the beginning of `bytes`, if all of it has arrived.
     pub(super) fn read(self, bytes: &[u8]) -> Option<u16> {
         match self {
             Self::Crc => bytes.first_chunk().map(|bytes| u16::from_le_bytes(*bytes)),

@@ -1,41 +1,40 @@
-//! What the host asks, and the plain acknowledgement.
+//! Commands of the host, and the device's acknowledgement.
 
 use super::{ErrorCode, Packet, encode_packet, id};
 
-/// Flag of the acquire command: push frames.
+/// Flag of the acquire command: send frames continuously.
 const RUN: u8 = 0x80;
-/// Flag of the acquire command: run-length encode them.
+/// Flag of the acquire command: run-length encode frames.
 const RUN_LENGTH: u8 = 0x01;
 
-/// Configures the acquisition: whether to push frames, how they are encoded, how many a second.
-/// Answered by [`acknowledge`] with [`id::ACQUIRE`].
+/// Command that configures the acquisition: whether to send frames, their encoding, and their rate in Hz. Answered by [`acknowledge`] with [`id::ACQUIRE`].
 pub fn acquire(run: bool, run_length: bool, fps: u16) -> Vec<u8> {
     let flags = if run { RUN } else { 0 } | if run_length { RUN_LENGTH } else { 0 };
     let [fps_low, fps_high] = fps.to_le_bytes();
     encode_packet(id::ACQUIRE, &[flags, fps_low, fps_high])
 }
 
-/// Asks for [`ControllerInfo`](super::ControllerInfo).
+/// Query for [`ControllerInfo`](super::ControllerInfo).
 pub fn query_controller() -> Vec<u8> {
     encode_packet(id::CONTROLLER, &[])
 }
 
-/// Asks for [`SensorInfo`](super::SensorInfo).
+/// Query for [`SensorInfo`](super::SensorInfo).
 pub fn query_sensor() -> Vec<u8> {
     encode_packet(id::SENSOR, &[])
 }
 
-/// Asks for the [`MatrixInfo`](super::MatrixInfo) of one matrix, counted from 0.
+/// Query for the [`MatrixInfo`](super::MatrixInfo) of one matrix, counted from 0.
 pub fn query_matrix(matrix: u8) -> Vec<u8> {
     encode_packet(id::MATRIX, &[matrix])
 }
 
-/// The device's answer to a command that has no other: its error code.
+/// The device's acknowledgement of a command: an error code.
 pub fn acknowledge(id: u8, code: ErrorCode) -> Vec<u8> {
     encode_packet(id, &code.0.to_le_bytes())
 }
 
-/// A command as the device reads it.
+/// A command of the host, as the device decodes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostCommand {
     /// [`query_controller`].
@@ -44,25 +43,25 @@ pub enum HostCommand {
     QuerySensor,
     /// [`query_matrix`].
     QueryMatrix {
-        /// Which, counted from 0.
+        /// Number of the matrix, counted from 0.
         matrix: u8,
     },
     /// [`acquire`].
     Acquire {
-        /// Push frames.
+        /// Send frames continuously.
         run: bool,
-        /// Run-length encode them.
+        /// Run-length encode the frames.
         run_length: bool,
         /// Frames per second.
         fps: u16,
     },
 }
 
-/// Why a packet is not a command that is known here.
+/// Why a packet is not a known command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum CommandError {
-    /// No such command.
+    /// No command has this id.
     #[error("there is no command {id:#04x}")]
     Unknown { id: u8 },
     /// Its payload has another length.
@@ -71,10 +70,10 @@ pub enum CommandError {
 }
 
 impl HostCommand {
-    /// Reads a command.
+    /// Parses a command.
     ///
     /// # Errors
-    /// A command that is not known, or a payload of another length.
+    /// If the command is unknown, or its payload has a wrong length.
     pub fn parse(packet: &Packet<'_>) -> Result<Self, CommandError> {
         match (packet.id, packet.payload) {
             (id::CONTROLLER, []) => Ok(Self::QueryController),

@@ -3,21 +3,21 @@
 /// Tables for eight bytes at a time: entry `[k][b]` is byte `b` followed by `k` zero bytes.
 static TABLES: [[u16; 256]; 8] = tables();
 
-/// The checksum of `bytes`, started at 0xFFFF.
+/// The checksum of `bytes`, with the initial value 0xFFFF.
 ///
 /// For each byte `crc = (crc >> 8) ^ T[(crc ^ byte) & 0xFF]`, where `T` is the table of the
-/// polynomial 0x1021 for most-significant-bit-first use. Table and shift do not match, so that it is
-/// no standard preset: `"123456789"` gives 0x6EB4.
+/// polynomial 0x1021 for most-significant-bit-first use. Table and shift do not match, so it is not a standard CRC:
+/// `"123456789"` gives 0x6EB4.
 pub fn crc(bytes: &[u8]) -> u16 {
     update(0xFFFF, bytes)
 }
 
-/// Goes on from `crc` over `bytes`.
+/// Continues the checksum `crc` over `bytes`.
 #[expect(clippy::indexing_slicing, reason = "a byte is an index into a table of 256")]
 pub(super) fn update(mut crc: u16, bytes: &[u8]) -> u16 {
     let at = |table: usize, byte: u8| TABLES[table][usize::from(byte)];
     let (eights, rest) = bytes.as_chunks::<8>();
-    // The update is linear over xor, so that the bytes of a block can be looked up independently.
+    // The update is linear over xor, so the bytes of a block can be looked up independently.
     for &[b0, b1, b2, b3, b4, b5, b6, b7] in eights {
         let [low, high] = crc.to_le_bytes();
         crc = at(7, b0 ^ low)

@@ -1,66 +1,65 @@
-//! Packets out of a stream of bytes, whatever else is in it.
+//! Finds packets in a stream of bytes that may contain garbage.
 
 use std::ops::Range;
 
 use super::packet::{HEADER_BYTES, SYNC};
 use super::{BOOT_MESSAGE, Checksum, Packet};
 
-/// Longest payload that [`Decoder::new`] believes in.
+/// Longest payload that [`Decoder::new`] accepts.
 const DEFAULT_MAX_PAYLOAD_BYTES: usize = 4096;
 
-/// Finds packets in a stream that may be cut anywhere and hold garbage.
+/// Finds packets in a stream that may contain garbage.
 ///
-/// Feed it with [`push`](Self::push), then call [`next_packet`](Self::next_packet) until it gives
-/// `None`; what comes out does not depend on how the stream was cut. It holds at most one unfinished
-/// packet and what was pushed since.
+/// Call [`push`](Self::push) with each read, then [`next_packet`](Self::next_packet) until it returns `None`. The result
+/// does not depend on how the bytes arrive. At most one incomplete packet and the last read are kept.
 ///
-/// Sync bytes may occur within a payload or in garbage. Of packets that overlap, the one that ends
-/// first and whose checksum holds is believed. So a broken length never hides the frames behind it,
-/// and the first whole packet after garbage is found when its last byte arrives.
+/// Sync bytes may occur within a payload or in garbage. Of overlapping candidates, the packet that ends first and has a
+/// correct checksum is accepted. So a damaged length never hides the frames behind it, and the first complete packet after
+/// garbage is found when its last byte arrives.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     bytes: Vec<u8>,
-    /// Bytes before this are done with.
+    /// Bytes before this index have been used.
     start: usize,
     max_payload_bytes: usize,
     checksum: Checksum,
-    /// How much of [`BOOT_MESSAGE`] the skipped bytes end with.
+    /// Length of the beginning of [`BOOT_MESSAGE`] with which the skipped bytes end.
     boot_matched: usize,
     stats: DecoderStats,
 }
 
-/// What a [`Decoder`] met beside good packets, since it was made.
+/// What a [`Decoder`] has received besides good packets, since it was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DecoderStats {
-    /// Bytes that were part of no packet.
+    /// Bytes that belonged to no packet.
     pub skipped_bytes: u64,
-    /// Packets whose checksum did not hold.
+    /// Packets with a wrong checksum.
     pub bad_checksums: u64,
     /// Boot messages among the skipped bytes.
     pub boot_messages: u64,
 }
 
-/// A packet's checksum does not hold.
+/// A packet's checksum is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("packet {id:#04x} of {bytes} bytes has the checksum {found:#06x}, not {expected:#06x}")]
 pub struct ChecksumError {
-    /// The packet's id, if it can be believed.
+    /// The packet's id, unless that is damaged.
     pub id: u8,
-    /// Length of its payload, if it can be believed.
+    /// Length of its payload, unless that is damaged.
     pub bytes: usize,
-    /// Computed.
+    /// Checksum computed from the packet.
     pub expected: u16,
-    /// Received.
+    /// Checksum in the packet.
     pub found: u16,
 }
 
-/// What stands at sync bytes.
+/// What begins at sync bytes.
 enum Candidate {
     /// No packet: the id or the length is impossible.
     Impossible,
-    /// It has not all arrived.
+    /// A possible packet that has not arrived completely.
     Unfinished,
-    /// It has arrived.
+    /// A complete packet.
     Whole { end: usize, verdict: Result<(), ChecksumError> },
 }
 
@@ -76,7 +75,7 @@ impl Decoder {
         Self::with_max_payload(DEFAULT_MAX_PAYLOAD_BYTES)
     }
 
-    /// A decoder for payloads of up to `bytes`; longer ones are taken for garbage.
+    /// A decoder for payloads of up to `bytes`; longer ones count as garbage.
     pub fn with_max_payload(bytes: usize) -> Self {
         Self {
             bytes: Vec::new(),
@@ -88,20 +87,20 @@ impl Decoder {
         }
     }
 
-    /// The same decoder, for packets that are closed in another form.
+    /// The same decoder with another form of checksum.
     #[must_use]
     pub fn with_checksum(self, checksum: Checksum) -> Self {
         Self { checksum, ..self }
     }
 
-    /// Takes what arrived.
+    /// Takes the bytes of a read.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.drain(..self.start);
         self.start = 0;
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// The next packet, a packet whose checksum does not hold, or `None` until more is pushed.
+    /// The next packet, the error of a wrong checksum, or `None` until more is pushed.
     pub fn next_packet(&mut self) -> Option<Result<Packet<'_>, ChecksumError>> {
         loop {
             self.skip_to_sync();
@@ -129,12 +128,12 @@ impl Decoder {
         }
     }
 
-    /// What it met beside good packets.
+    /// What it has received besides good packets.
     pub fn stats(&self) -> DecoderStats {
         self.stats
     }
 
-    /// Skips to the next sync bytes, or to the end but for what may become sync bytes.
+    /// Skips to the next sync bytes; without any, to the end except for what may become sync bytes.
     fn skip_to_sync(&mut self) {
         let rest = self.bytes.get(self.start..).unwrap_or_default();
         let skipped = find_sync(rest).unwrap_or_else(|| {
@@ -147,7 +146,7 @@ impl Decoder {
     fn inspect(&self, at: usize) -> Candidate {
         let Some(rest) = self.bytes.get(at + SYNC.len()..) else { return Candidate::Unfinished };
         let Some(&[id, length_low, length_high]) = rest.first_chunk() else {
-            // A run of sync bytes ends where the header begins: no id is one.
+            // The header begins behind the last sync byte, because no id equals one.
             return if rest.first() == Some(&SYNC[0]) {
                 Candidate::Impossible
             } else {
@@ -173,7 +172,7 @@ impl Decoder {
         Candidate::Whole { end: at + HEADER_BYTES + length + self.checksum.bytes(), verdict }
     }
 
-    /// Of the checksummed packets that lie within `from..limit` and end before `limit`, the one that ends first.
+    /// Of the packets with a correct checksum that begin at `from` or later and end before `limit`, the one that ends first.
     fn first_to_end_within(&self, mut from: usize, mut limit: usize) -> Option<Range<usize>> {
         let mut first = None;
         while let Some(offset) = find_sync(self.bytes.get(from..limit.min(self.bytes.len()))?) {
@@ -190,7 +189,7 @@ impl Decoder {
         first
     }
 
-    /// The packet from `start` to `end`, which is then done with.
+    /// Takes the packet from `start` to `end`.
     fn accept(&mut self, end: usize) -> Option<Packet<'_>> {
         let packet = self.bytes.get(self.start..end)?;
         let id = *packet.get(SYNC.len())?;
@@ -204,7 +203,7 @@ impl Decoder {
     fn skip(&mut self, count: usize) {
         let skipped = self.bytes.get(self.start..self.start + count).unwrap_or_default();
         for byte in skipped {
-            // ESC stands only at the message's beginning, so that a mismatch can fall back no further.
+            // ESC occurs only at the beginning of the message, so a mismatch falls back to the beginning.
             let expected = BOOT_MESSAGE.get(self.boot_matched);
             self.boot_matched = match expected {
                 Some(expected) if expected == byte => self.boot_matched + 1,
@@ -233,7 +232,7 @@ fn find_sync(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// Offset of the first sync byte; looks at blocks, which the compiler compares in one go.
+/// Offset of the first sync byte. It compares blocks, which the compiler vectorises.
 fn find_sync_byte(bytes: &[u8]) -> Option<usize> {
     let (blocks, _) = bytes.as_chunks::<32>();
     let has_none =

@@ -1,44 +1,44 @@
-//! The full frame: one reading of all elements.
+//! The frame packet: one reading of all elements.
 
 use super::{Packet, encode_packet, id};
 
 /// Bit of the flags byte: counts are run-length encoded.
 const RUN_LENGTH: u8 = 0x01;
 
-/// Greatest count that a run-length word can hold.
+/// Greatest count in a run-length word.
 const MAX_RUN_COUNTS: u16 = 0x0FFF;
 
 /// One reading of all elements.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DecodedFrame {
-    /// The controller's clock in ms; wraps after 49.7 days.
+    /// The controller's clock in ms. It starts again at 0 after 49.7 days.
     pub timestamp_ms: u32,
-    /// True if the counts came run-length encoded.
+    /// True if the counts were run-length encoded.
     pub run_length: bool,
-    /// Raw counts in the order of the wire: row-major.
+    /// Raw counts, row-major, as on the wire.
     pub counts: Vec<u16>,
 }
 
-/// Why a packet is not the frame that was expected.
+/// Why a packet is not the expected frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum FrameError {
-    /// The packet is something else.
+    /// The packet has another id.
     #[error("packet {id:#04x} is not a frame")]
     NotAFrame { id: u8 },
-    /// The payload ends before the counts begin, or within one.
+    /// The payload ends before the counts, or within one.
     #[error("a frame of {bytes} bytes has no whole number of counts")]
     Length { bytes: usize },
-    /// Another array than expected.
+    /// The array has another number of elements than expected.
     #[error("the frame has {found} elements, the rig's array has {expected}")]
     Elements { expected: usize, found: usize },
 }
 
 impl DecodedFrame {
-    /// Reads a frame of exactly `elements` counts.
+    /// Decodes a frame of exactly `elements` counts.
     ///
     /// # Errors
-    /// Any other packet, a broken payload, or another number of elements.
+    /// If it is another packet, is damaged, or has another number of elements.
     pub fn parse(packet: &Packet<'_>, elements: usize) -> Result<Self, FrameError> {
         if packet.id != id::FRAME {
             return Err(FrameError::NotAFrame { id: packet.id });
@@ -65,9 +65,9 @@ impl DecodedFrame {
     }
 }
 
-/// A frame as a whole packet.
+/// Encodes a frame as a packet.
 ///
-/// Run-length words hold twelve bits: counts above 4095 read 4095 in that form.
+/// Run-length words have twelve bits, so counts above 4095 become 4095.
 ///
 /// # Panics
 /// If the counts do not fit into one packet: more than 32 765 of them.

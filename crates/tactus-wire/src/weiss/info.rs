@@ -1,4 +1,4 @@
-//! What the controller says of itself, its sensor and its matrices.
+//! The controller's information about itself, its sensor and its matrices.
 
 use super::{Packet, encode_packet, id};
 
@@ -6,7 +6,7 @@ use super::{Packet, encode_packet, id};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct ErrorCode(pub u16);
 
-/// The error numbers in order, in words.
+/// Meanings of the error numbers, in order.
 const MEANINGS: [&str; 28] = [
     "success",
     "not available",
@@ -41,65 +41,65 @@ const MEANINGS: [&str; 28] = [
 impl ErrorCode {
     /// No error.
     pub const SUCCESS: Self = Self(0);
-    /// The command is not known.
+    /// The command is unknown.
     pub const UNKNOWN_COMMAND: Self = Self(13);
-    /// The command's payload has another form.
+    /// The command's payload has a wrong form.
     pub const FORMAT: Self = Self(14);
     /// There is no such matrix.
     pub const INDEX_OUT_OF_BOUNDS: Self = Self(24);
 
-    /// The number in words.
+    /// Its meaning in words.
     pub fn meaning(self) -> &'static str {
         MEANINGS.get(usize::from(self.0)).copied().unwrap_or("unknown error")
     }
 }
 
-/// Reply to query 1.
+/// Reply to [`query_controller`](super::query_controller).
 ///
-/// The published description gives 19 bytes (after these fields: sensor controller type, active
-/// interface, CAN bit rate u32, CAN id u16), but the firmware sends 18, and which one is missing is
-/// not told: what follows the flags is kept unread.
+/// The published description has 19 bytes: after these fields, the sensor controller's type, the active interface, the CAN
+/// bit rate (u32) and the CAN id (u16). The firmware sends 18, and it is unknown which byte is missing. So the bytes after
+/// the flags are not decoded.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ControllerInfo {
     /// 0 if the query succeeded.
     pub error: ErrorCode,
     /// Serial number of the controller.
     pub serial_number: u32,
-    /// Version of its hardware, two binary-coded digits.
+    /// Version of its hardware: two binary-coded decimal digits.
     pub hardware_version: u8,
     /// Version of its software.
     pub software_version: u16,
-    /// Not described.
+    /// Not described by the source.
     pub status_flags: u8,
-    /// Not described.
+    /// Not described by the source.
     pub feature_flags: u8,
-    /// Sensor controller type, interface and CAN settings, unread.
+    /// Sensor controller type, interface and CAN settings, not decoded.
     pub rest: [u8; 7],
 }
 
-/// Reply to query 2.
+/// Reply to [`query_sensor`](super::query_sensor).
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SensorInfo {
     /// 0 if the query succeeded.
     pub error: ErrorCode,
-    /// Number of matrices whose counts make up a frame.
+    /// Number of matrices in a frame.
     pub matrices: u16,
-    /// Who generated the description.
+    /// Author of the description, by number.
     pub generated_by: u16,
     /// Revision of the sensor's hardware.
     pub hardware_revision: u8,
     /// Serial number of the sensor.
     pub serial_number: u32,
-    /// Not described.
+    /// Not described by the source.
     pub feature_flags: u8,
 }
 
-/// Reply to query 0x0B.
+/// Reply to [`query_matrix`](super::query_matrix).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MatrixInfo {
     /// 0 if the query succeeded.
     pub error: ErrorCode,
-    /// Width and height of one element.
+    /// Width and height of an element.
     pub element_mm: [f32; 2],
     /// Columns.
     pub cells_x: u16,
@@ -111,33 +111,33 @@ pub struct MatrixInfo {
     pub hardware_revision: u8,
     /// Centre of the matrix in the sensor's frame.
     pub centre_mm: [f32; 3],
-    /// Orientation of the matrix in the sensor's frame; its unit is not described.
+    /// Orientation of the matrix in the sensor's frame; its unit is unknown.
     pub theta: [f32; 3],
-    /// Reading at full scale; its unit is not described.
+    /// Reading at full scale; its unit is unknown.
     pub full_scale: f32,
-    /// Not described.
+    /// Not described by the source.
     pub feature_flags: u8,
 }
 
-/// Why a packet is not the reply that was expected.
+/// Why a packet is not the expected reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("reply {id:#04x} has {found} bytes of payload, not {expected}")]
 pub struct InfoError {
     /// The packet's id.
     pub id: u8,
-    /// Length that the reply has.
+    /// Length of the expected reply's payload.
     pub expected: usize,
-    /// Length found; 0 too if the packet is another reply.
+    /// Length of the packet's payload; 0 if it is another reply.
     pub found: usize,
 }
 
 impl ControllerInfo {
     const BYTES: usize = 18;
 
-    /// Reads the reply.
+    /// Decodes the reply.
     ///
     /// # Errors
-    /// Another packet, or one of another length.
+    /// If it is another packet, or has another length.
     pub fn parse(packet: &Packet<'_>) -> Result<Self, InfoError> {
         let mut fields = Fields::of::<{ Self::BYTES }>(packet, id::CONTROLLER)?;
         Ok(Self {
@@ -151,7 +151,7 @@ impl ControllerInfo {
         })
     }
 
-    /// The reply as a whole packet.
+    /// Encodes the reply as a packet.
     pub fn encode(&self) -> Vec<u8> {
         let mut payload = Vec::with_capacity(Self::BYTES);
         payload.extend(self.error.0.to_le_bytes());
@@ -168,10 +168,10 @@ impl ControllerInfo {
 impl SensorInfo {
     const BYTES: usize = 12;
 
-    /// Reads the reply.
+    /// Decodes the reply.
     ///
     /// # Errors
-    /// Another packet, or one of another length.
+    /// If it is another packet, or has another length.
     pub fn parse(packet: &Packet<'_>) -> Result<Self, InfoError> {
         let mut fields = Fields::of::<{ Self::BYTES }>(packet, id::SENSOR)?;
         Ok(Self {
@@ -184,7 +184,7 @@ impl SensorInfo {
         })
     }
 
-    /// The reply as a whole packet.
+    /// Encodes the reply as a packet.
     pub fn encode(&self) -> Vec<u8> {
         let mut payload = Vec::with_capacity(Self::BYTES);
         payload.extend(self.error.0.to_le_bytes());
@@ -200,10 +200,10 @@ impl SensorInfo {
 impl MatrixInfo {
     const BYTES: usize = 52;
 
-    /// Reads the reply.
+    /// Decodes the reply.
     ///
     /// # Errors
-    /// Another packet, or one of another length.
+    /// If it is another packet, or has another length.
     pub fn parse(packet: &Packet<'_>) -> Result<Self, InfoError> {
         let mut fields = Fields::of::<{ Self::BYTES }>(packet, id::MATRIX)?;
         Ok(Self {
@@ -223,7 +223,7 @@ impl MatrixInfo {
         })
     }
 
-    /// The reply as a whole packet.
+    /// Encodes the reply as a packet.
     pub fn encode(&self) -> Vec<u8> {
         let mut payload = Vec::with_capacity(Self::BYTES);
         payload.extend(self.error.0.to_le_bytes());
@@ -241,7 +241,7 @@ impl MatrixInfo {
     }
 }
 
-/// Reads fields from the front of a payload whose length has been checked.
+/// Takes fields from the front of a payload whose length has been checked.
 struct Fields<'a> {
     rest: &'a [u8],
 }
@@ -255,7 +255,7 @@ impl<'a> Fields<'a> {
         Ok(Self { rest: packet.payload })
     }
 
-    /// The next `N` bytes; zeros past the end, which the check of the length rules out.
+    /// The next `N` bytes. Zeros past the end, which the check of the length excludes.
     fn take<const N: usize>(&mut self) -> [u8; N] {
         let Some((field, rest)) = self.rest.split_first_chunk::<N>() else { return [0; N] };
         self.rest = rest;

@@ -1,14 +1,14 @@
-//! The envelope of everything on the wire.
+//! Packets, the envelope of all messages.
 
 use super::crc;
 
-/// What every packet begins with.
+/// Sync bytes at the beginning of every packet.
 pub(super) const SYNC: [u8; 3] = [0xAA; 3];
 
 /// Bytes before the payload: sync, id, length.
 pub(super) const HEADER_BYTES: usize = 6;
 
-/// Longest payload that a length field can tell.
+/// Longest payload, by the size of the length field.
 pub const MAX_PAYLOAD_BYTES: usize = u16::MAX as usize;
 
 /// Packet ids; a reply carries the id of its command.
@@ -25,18 +25,18 @@ pub mod id {
     pub const MATRIX: u8 = 0x0B;
 }
 
-/// One packet whose checksum holds.
+/// A packet with a correct checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packet<'a> {
-    /// What it is; see [`id`].
+    /// Its kind; see [`id`].
     pub id: u8,
-    /// What it carries.
+    /// Its content.
     pub payload: &'a [u8],
 }
 
-/// A packet as bytes; an empty payload has no checksum.
+/// Encodes a packet. An empty payload has no checksum.
 ///
-/// No packet has the id 0xAA: a reader would take it for a part of the sync bytes.
+/// No packet may have the id 0xAA: a decoder would take it for a sync byte.
 ///
 /// # Panics
 /// If the payload is longer than [`MAX_PAYLOAD_BYTES`].

@@ -1,4 +1,4 @@
-//! The host's side of the conversation.
+//! The host's side of a connection to a controller.
 
 use core::time::Duration;
 
@@ -12,10 +12,10 @@ use crate::sensor::{self, Action, Cause, Loss, LossEvidence, Reading};
 /// Length of a tick of the controller's clock.
 pub const TICK: Duration = Duration::from_millis(1);
 
-/// A query that is not answered is asked again after this; an acquisition without fresh frames too.
+/// An unanswered query is sent again after this. An acquisition without fresh frames is switched on again.
 pub const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// How often a query is asked before the link is given up: well over the 8 s that the controller takes to boot.
+/// Attempts at a query before the link is given up. At 1 s each, that is well over the 8 s in which the controller boots.
 const ASKED_MAX: u32 = 15;
 
 /// Reads one connection to a controller: switches the acquisition off, queries the controller, its sensor and matrix,
@@ -31,18 +31,18 @@ pub struct Session {
     stale_frames: u64,
 }
 
-/// What is asked of the controller.
+/// Requirements on the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Config {
     /// Rows of the array. A frame with another number of elements than rows times columns ends the session.
     pub rows: usize,
     /// Columns of the array.
     pub cols: usize,
-    /// Frames per second.
+    /// Frame rate in Hz.
     pub fps: u16,
-    /// Have frames run-length encoded.
+    /// Request run-length encoded frames.
     pub run_length: bool,
-    /// How the controller's firmware closes packets, both ways.
+    /// Form of the checksum that the controller's firmware uses, in both directions.
     pub checksum: Checksum,
 }
 
@@ -55,20 +55,20 @@ struct Device {
     matrix: MatrixInfo,
 }
 
-/// Why a session is over.
+/// Why a session has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum SessionError {
-    /// A query was asked again and again without an answer.
+    /// A query was repeated without an answer.
     #[error("the controller did not answer {asked} times to {query}")]
     Silent { query: &'static str, asked: u32 },
-    /// The controller refused.
+    /// The controller refused a command.
     #[error("the controller refused {query}: error {}, {}", code.0, code.meaning())]
     Refused { query: &'static str, code: ErrorCode },
-    /// The controller answers in another form.
+    /// An answer has a wrong form.
     #[error("{0}")]
     Answer(#[from] InfoError),
-    /// The controller sends other frames.
+    /// A frame has a wrong form or number of elements.
     #[error("{0}")]
     DecodedFrame(#[from] FrameError),
 }
@@ -80,7 +80,7 @@ enum State {
     Over,
 }
 
-/// The questions in their order.
+/// The queries and commands, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Query {
     SwitchOff,
@@ -94,7 +94,7 @@ enum Query {
 impl Session {
     /// A session that has not started.
     pub fn new(config: Config) -> Self {
-        // Room for the longest reply and for other arrays, so that those can be named in the error.
+        // Room for the longest reply, and for frames of other arrays, so that the error can name their size.
         let max_payload_bytes = (5 + 4 * config.elements()).max(1024);
         Self {
             config,
@@ -152,7 +152,7 @@ impl Session {
                 return query.check(code.unwrap_or_default());
             }
             (Query::SwitchOn, id::FRAME) => return self.handle_frame(now, packet, actions),
-            // Frames of an earlier acquisition, and late answers to questions asked twice.
+            // Frames of an earlier acquisition, and late answers to repeated queries.
             _ => return Ok(()),
         };
         actions.push(self.ask(now, next, 1));
@@ -189,7 +189,7 @@ impl Session {
         Ok(())
     }
 
-    /// Begins anew: the controller forgot what it was told, and takes commands again soon.
+    /// Starts again after a restart: the controller has lost its configuration.
     fn restart(&mut self, now: Duration, actions: &mut Vec<Action>) {
         match self.state {
             State::Over => return,
@@ -221,10 +221,10 @@ impl sensor::Session for Session {
         let mut actions = Vec::new();
         let boots_before = self.decoder.stats().boot_messages;
         self.decoder.push(bytes);
-        // The decoder is set aside while its packets, which borrow from it, are handled.
+        // The decoder is moved out of `self`, because its packets borrow from it.
         let mut decoder = core::mem::take(&mut self.decoder);
         while let Some(packet) = decoder.next_packet() {
-            // A packet with a wrong checksum is counted there; a lost reply is asked for again.
+            // The decoder counts wrong checksums. A lost reply is requested again.
             let Ok(packet) = packet else { continue };
             if let Err(error) = self.handle(now, &packet, &mut actions) {
                 self.state = State::Over;
@@ -286,7 +286,7 @@ impl Device {
         )
     }
 
-    /// That the matrix reports another shape than the rig file.
+    /// A warning if the matrix reports another shape than the rig file.
     fn mismatch(&self, Config { rows, cols, .. }: Config) -> Option<String> {
         let (own_rows, own_cols) = (usize::from(self.matrix.cells_y), usize::from(self.matrix.cells_x));
         ((own_rows, own_cols) != (rows, cols)).then(|| {

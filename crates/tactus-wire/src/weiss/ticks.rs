@@ -1,19 +1,19 @@
-//! The controller's clock: unwrapped, and watched for jumps.
+//! Unwraps the controller's clock, and detects jumps.
 
 use core::time::Duration;
 
-/// A tick this far back or less is a frame that came late; farther back the clock was set back.
+/// A frame whose tick is up to this much earlier came late. If it is earlier than that, the clock was set back.
 const LATE_MS: u32 = 1000;
 
-/// How much more the controller's clock may advance than the host's between two frames: what a frame may be
-/// delayed on the way. More, and the clock was set forward.
+/// The longest delay of a frame on its way. If the controller's clock advances between two frames by more than this beyond
+/// the host's, it was set forward.
 const DELAY_MS: u128 = 1000;
 
-/// Turns the wrapping 32-bit ticks of successive frames into 64-bit ones.
+/// Converts the wrapping 32-bit ticks of successive frames to 64 bits.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TickUnwrapper {
     last: Option<PreviousTick>,
-    /// A frame that seemed late. If the next goes on from it, the clock was set back.
+    /// Tick of a frame that seemed late. If the next frame continues from it, the clock was set back.
     late: Option<u32>,
 }
 
@@ -24,19 +24,19 @@ struct PreviousTick {
     received: Duration,
 }
 
-/// What a frame's tick says of it.
+/// How a frame's tick compares with the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TickOrder {
-    /// Later than the frame before, on the same clock.
+    /// Later than the previous frame, on the same clock.
     Next { tick_ms: u64 },
-    /// The first on a new clock: the first at all, or the controller's clock has jumped.
+    /// The first frame, or the first after a jump of the controller's clock.
     NewClock { tick_ms: u64 },
-    /// The frame before again, or one from before that: nothing new.
+    /// A repeated or late frame.
     Stale,
 }
 
 impl TickUnwrapper {
-    /// Places a frame that was received at `now`.
+    /// Compares a frame that was received at `now` with the previous one.
     pub(super) fn place(&mut self, now: Duration, raw_ms: u32) -> TickOrder {
         let Some(last) = self.last else { return self.new_clock(now, raw_ms) };
         let (ahead_ms, behind_ms) = (raw_ms.wrapping_sub(last.raw_ms), last.raw_ms.wrapping_sub(raw_ms));

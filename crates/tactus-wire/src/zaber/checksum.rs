@@ -1,13 +1,12 @@
 //! The checksum that may end a message.
 
-/// The byte that brings the sum of all bytes between a message's first character and the `:` to zero, modulo
-/// 256.
+/// The byte that makes the sum of all bytes between a message's first character and the `:` zero, modulo 256.
 pub(super) fn checksum(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte)).wrapping_neg()
 }
 
-/// Takes the checksum off the body of a message. `None` if it is malformed or wrong; otherwise the rest, and
-/// whether there was one.
+/// Removes the checksum from the body of a message. `None` if it is malformed or wrong; otherwise the rest, and whether
+/// there was one.
 pub(super) fn verify(body: &str) -> Option<(&str, bool)> {
     let Some((content, digits)) = body.rsplit_once(':') else { return Some((body, false)) };
     let is_hex = digits.len() == 2 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());

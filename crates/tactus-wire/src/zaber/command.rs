@@ -1,24 +1,24 @@
-//! What a host says.
+//! Commands of the host.
 
 use super::checksum::{checksum, verify};
 use super::packet::Fields;
 use crate::lines::Lines;
 
-/// A command.
+/// A command of the host to one device or all.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HostCommand {
-    /// Address of the device, 1 to 99; 0 means all of them.
+    /// Address of the device, 1 to 99; 0 for all devices.
     pub device: u8,
-    /// Number of the axis, 1 to 9; 0 means the device and all its axes.
+    /// Number of the axis, 1 to 9; 0 for the device and all its axes.
     pub axis: u8,
-    /// The answer carries the same id, 0 to 99.
+    /// Message id, 0 to 99. The answer repeats it.
     pub id: Option<u8>,
-    /// What is to be done, `get pos` for instance. An empty command asks for the status alone.
+    /// The command's words, such as `get pos`. An empty command requests only the status.
     pub text: String,
 }
 
 impl HostCommand {
-    /// The bytes that a host sends.
+    /// The line, with its end.
     pub fn encode(&self, with_checksum: bool) -> Vec<u8> {
         let Self { device, axis, id, text } = self;
         let id = id.map(|id| format!(" {id:02}")).unwrap_or_default();
@@ -29,9 +29,8 @@ impl HostCommand {
         format!("/{content}{sum}\n").into_bytes()
     }
 
-    /// Reads a line, without its end: `/`, then address, axis and id, each of which may be missing from the
-    /// right, then the command. `None` if it is no command or its checksum is wrong: a device keeps silent
-    /// then. A command in parts is not understood.
+    /// Parses a line, without its end: `/`, address, axis, id and words. The id, then the axis, then the address may be
+    /// omitted. `None` if it is no command, comes in parts or has a wrong checksum; a device then stays silent.
     pub fn parse(line: &str) -> Option<Self> {
         let (content, _) = verify(line.strip_prefix('/')?)?;
         if content.ends_with('\\') {
@@ -47,8 +46,8 @@ impl HostCommand {
     }
 }
 
-/// The device's ear, for virtual devices: cuts a stream into commands, whatever way it arrives. What is no
-/// command is dropped and counted.
+/// Decodes commands on the device's side, for virtual devices. The result does not depend on how the bytes arrive. Other
+/// lines are dropped and counted.
 #[derive(Debug, Clone, Default)]
 pub struct HostCommandDecoder {
     lines: Lines,
@@ -56,7 +55,7 @@ pub struct HostCommandDecoder {
 }
 
 impl HostCommandDecoder {
-    /// Takes what arrived and hands each command to `each`.
+    /// Takes bytes, and passes each command to `each`.
     pub fn push(&mut self, bytes: &[u8], mut each: impl FnMut(HostCommand)) {
         let broken = &mut self.broken;
         self.lines.push(bytes, |line| match HostCommand::parse(line) {
@@ -65,7 +64,7 @@ impl HostCommandDecoder {
         });
     }
 
-    /// How many lines were dropped.
+    /// Lines that were dropped, since the start.
     pub fn dropped(&self) -> u64 {
         self.lines.dropped() + self.broken
     }

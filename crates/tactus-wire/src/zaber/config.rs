@@ -1,52 +1,49 @@
-//! How a stage is made up of axes.
+//! The configuration of a stage: its axes and limits.
 
 use super::speed_setting;
 use crate::stage::{AxisName, Direction};
 
-/// Largest position that is sent, either way: what fits in the controller's 32 bits.
+/// Largest magnitude of a position that fits in the controller's 32 bits.
 const POSITION_MAX_MICROSTEPS: f64 = 2_147_483_647.0;
 
 /// A stage: up to three axes of one or more devices on one port.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Config {
-    /// x, y and z. An axis that is missing stands at 0 mm for ever.
+    /// x, y and z. A missing axis always stands at 0 mm.
     pub axes: [Option<Axis>; 3],
-    /// A move is done when the stage stands within this of the target, more than 0.
+    /// A move is done when the stage stands within this distance of the target; more than 0.
     pub tolerance_mm: f64,
-    /// Acceleration along the path, more than 0, of which each axis is set to its part; `None` leaves the
-    /// axes' own.
+    /// Acceleration along the path, more than 0. Each axis is set to its component. `None` keeps the axes' settings.
     pub accel_mm_per_s2: Option<f64>,
-    /// `maxspeed` of each axis while it is homed, more than 0, as the last move may have left a much lower
-    /// one; `None` leaves that. The axes limit their speed near the sensor by themselves.
+    /// Speed of each axis for homing (`maxspeed`), more than 0. `None` keeps the speed of the last move, which may be much
+    /// lower. The axes limit their speed near the home sensor by themselves.
     pub homing_speed_mm_per_s: Option<f64>,
-    /// Commands carry checksums, and the devices are set to answer with them (`comm.checksum`); a message
-    /// without one is then dropped.
+    /// Send checksums, and set the devices to send them (`comm.checksum`). Messages without one are then dropped.
     pub checksums: bool,
-    /// True: a stage that says when it is connected that it has its reference position counts as homed.
-    /// False: it must be homed after each connection; an axis that stalled, and whose warning was cleared by
-    /// someone else, says that it has it too.
+    /// If true, a stage that reports a reference position when it is connected counts as homed. If false, it must be homed
+    /// after each connection. (An axis that stalled reports a reference, too, once someone else has cleared its warning.)
     pub trusts_reference: bool,
 }
 
-/// One axis.
+/// An axis of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
-    /// Address of its device, 1 to 99.
+    /// Address of the device, 1 to 99.
     pub device: u8,
-    /// Its number in the device, 1 to 9.
+    /// Number of the axis in the device, 1 to 9.
     pub number: u8,
     /// Length of a microstep, more than 0.
     pub um_per_microstep: f64,
-    /// Which way it counts.
+    /// Direction in which it counts.
     pub direction: Direction,
-    /// The position that is 0 mm.
+    /// Controller's position at the stage's 0 mm.
     pub origin_microsteps: i32,
-    /// What its `resolution` must be, microsteps a full step, as a microstep's length depends on it; more than 0.
-    /// `None` takes any.
+    /// Required `resolution` in microsteps per full step, more than 0: the length of a microstep depends on it. `None`
+    /// accepts any.
     pub resolution: Option<u32>,
 }
 
-/// Why a configuration makes no stage.
+/// Why a configuration is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ConfigError {
@@ -59,7 +56,7 @@ pub enum ConfigError {
     /// A number of the stage is not more than 0.
     #[error("{field} is {value}, but must be more than 0")]
     NotPositive { field: &'static str, value: f64 },
-    /// Two axes are the same one.
+    /// Two axes of the stage use the same axis of a device.
     #[error("{first} and {second} are the same axis of the same device")]
     Same { first: AxisName, second: AxisName },
 }
@@ -97,21 +94,21 @@ impl Config {
         if seen.is_empty() { Err(ConfigError::NoAxis) } else { Ok(()) }
     }
 
-    /// The axes that are there.
+    /// The axes that are present, by name.
     pub(super) fn named_axes(&self) -> impl Iterator<Item = (AxisName, Axis)> {
         AxisName::ALL.into_iter().zip(self.axes).filter_map(|(name, axis)| Some((name, axis?)))
     }
 }
 
 impl Axis {
-    /// Where a position of the controller is in the stage's frame.
+    /// Converts the controller's position to the stage's frame.
     #[expect(clippy::cast_precision_loss, reason = "exact up to 2^53 microsteps, which are kilometres")]
     pub fn position_mm(&self, microsteps: i64) -> f64 {
         let from_origin = microsteps.saturating_sub(i64::from(self.origin_microsteps));
         self.direction.sign() * from_origin as f64 * self.um_per_microstep / 1000.0 + 0.0
     }
 
-    /// The nearest position of the controller; `None` if it is none that can be sent.
+    /// The nearest position of the controller; `None` if it exceeds 32 bits.
     #[expect(clippy::cast_possible_truncation, reason = "checked to be within 32 bits")]
     pub fn microsteps(&self, position_mm: f64) -> Option<i64> {
         let from_origin = self.direction.sign() * position_mm * 1000.0 / self.um_per_microstep;
@@ -119,7 +116,7 @@ impl Axis {
         (microsteps.abs() <= POSITION_MAX_MICROSTEPS).then_some(microsteps as i64)
     }
 
-    /// The `maxspeed` of the controller for a speed; `None` if it is not more than 0 or too fast to be told.
+    /// The setting `maxspeed` for a speed; `None` if the speed is not more than 0 or exceeds 32 bits.
     pub fn speed_setting(&self, speed_mm_per_s: f64) -> Option<i64> {
         speed_setting(speed_mm_per_s * 1000.0 / self.um_per_microstep)
     }

@@ -1,16 +1,16 @@
-//! Messages out of a stream of bytes.
+//! Decodes messages from a stream of bytes.
 
 use super::{Message, Packet};
 use crate::lines::Lines;
 
-/// Messages that may wait for their next part at once.
+/// Incomplete messages that are kept at the same time.
 const PARTIAL_MAX: usize = 4;
 
-/// Longest message that is put together; the longest answers are lists of a few hundred bytes.
+/// Longest message that is assembled. The longest answers are lists of a few hundred bytes.
 const MESSAGE_MAX_BYTES: usize = 4096;
 
-/// The host's ear: cuts a stream into packets, whatever way it arrives, and puts messages together that come
-/// in parts. What is broken, overlong or lacks its beginning is dropped and counted.
+/// Decodes messages on the host's side, and assembles those that come in parts. The result does not depend on how the
+/// bytes arrive. Messages that are broken, too long or lack their beginning are dropped and counted.
 #[derive(Debug, Clone, Default)]
 pub struct Decoder {
     lines: Lines,
@@ -20,18 +20,18 @@ pub struct Decoder {
 #[derive(Debug, Clone, Default)]
 struct Assembly {
     needs_checksums: bool,
-    /// Messages of which a part is to come, oldest first, and how many have come after the first.
+    /// Incomplete messages, oldest first, with the number of parts after the first.
     partial: Vec<(Message, u32)>,
     dropped: u64,
 }
 
 impl Decoder {
-    /// From here on a packet without a checksum counts as broken.
+    /// From now on, packets without a checksum count as broken.
     pub fn require_checksums(&mut self) {
         self.assembly.needs_checksums = true;
     }
 
-    /// Takes what arrived and hands each whole message to `each`.
+    /// Takes bytes, and passes each complete message to `each`.
     pub fn push(&mut self, bytes: &[u8], mut each: impl FnMut(Message)) {
         let assembly = &mut self.assembly;
         self.lines.push(bytes, |line| {
@@ -41,7 +41,7 @@ impl Decoder {
         });
     }
 
-    /// How many lines and messages were dropped.
+    /// Lines and messages that were dropped, since the start.
     pub fn dropped(&self) -> u64 {
         self.lines.dropped() + self.assembly.dropped
     }
@@ -60,7 +60,7 @@ impl Assembly {
         {
             return self.join(&message, part.trim_start(), more);
         }
-        // A message that begins ends one that never came to its end.
+        // A new message replaces an incomplete one with the same header.
         let before = self.partial.len();
         self.partial.retain(|(partial, _)| partial.header() != message.header());
         self.dropped += u64::from(before != self.partial.len());

@@ -1,4 +1,4 @@
-//! Warning flags in words.
+//! Warning flags and their meanings.
 
 use core::fmt;
 
@@ -6,44 +6,43 @@ use core::fmt;
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Flag([u8; 2]);
 
-/// What a warning flag asks for.
+/// What a warning flag requires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Severity {
-    /// Nothing.
+    /// No flag.
     None,
-    /// To be known, no more.
+    /// Information only.
     Notice,
-    /// A person is to look at it; the stage may go on.
+    /// A person should look at it. The stage may continue.
     Caution,
-    /// The position is not to be trusted until the axis is homed.
+    /// The position is not reliable until the axis is homed.
     Suspect,
-    /// The stage must stop; the flag must be seen to and cleared.
+    /// The stage must stop, and the flag must be remedied and cleared.
     Fault,
 }
 
 impl Flag {
-    /// `--`: no warning stands.
+    /// `--`: no warning.
     pub const NONE: Self = Self(*b"--");
     /// `FS`: the axis stalled and stopped.
     pub const STALLED: Self = Self(*b"FS");
-    /// `WR`: the axis has no reference position; so after power-up.
+    /// `WR`: the axis has no reference position, as after power-up.
     pub const NO_REFERENCE: Self = Self(*b"WR");
     /// `WH`: the axis has a position, but has not been homed.
     pub const NOT_HOMED: Self = Self(*b"WH");
     /// `NC`: the axis is moved by hand with its knob.
     pub const MANUAL_CONTROL: Self = Self(*b"NC");
-    /// `NI`: another command took the place of one that was under way.
+    /// `NI`: another command interrupted one that was under way.
     pub const INTERRUPTED: Self = Self(*b"NI");
 
-    /// Reads the two characters, `--` or capitals and digits.
+    /// Parses the two characters: `--`, or capitals and digits.
     pub fn parse(text: &str) -> Option<Self> {
         let pair = <[u8; 2]>::try_from(text.as_bytes()).ok()?;
         let known = |byte: u8| byte.is_ascii_uppercase() || byte.is_ascii_digit();
         (pair == *b"--" || pair.into_iter().all(known)).then_some(Self(pair))
     }
 
-    /// The two characters as one number, the first in the high byte: `FS` is 0x4653. For protocols that tell
-    /// alarms by number.
+    /// The two characters as one number, the first in the high byte: `FS` is 0x4653.
     pub fn code(self) -> u16 {
         u16::from_be_bytes(self.0)
     }
@@ -53,25 +52,25 @@ impl Flag {
         Self::parse(str::from_utf8(&code.to_be_bytes()).ok()?)
     }
 
-    /// What it asks for. An unknown fault is a fault, an unknown warning a caution, all else a notice.
+    /// What it requires. An unknown fault is a fault, an unknown warning a caution, and any other flag a notice.
     pub fn severity(self) -> Severity {
         match &self.0 {
             b"--" => Severity::None,
             b"WR" | b"WH" | b"WM" => Severity::Suspect,
-            // The two warnings: steps may be lost, or something was pressed on that should not be.
+            // These two warnings mean that steps may be lost, or that something was in the way.
             b"WL" | b"WS" | [b'F', _] => Severity::Fault,
             [b'W', _] => Severity::Caution,
             _ => Severity::Notice,
         }
     }
 
-    /// True if [`NO_REFERENCE`](Self::NO_REFERENCE) or [`NOT_HOMED`](Self::NOT_HOMED) may stand behind it: a
-    /// message shows the gravest flag alone.
+    /// True if it may hide [`NO_REFERENCE`](Self::NO_REFERENCE) or [`NOT_HOMED`](Self::NOT_HOMED), because a message shows
+    /// only the gravest flag.
     pub fn hides_reference(self) -> bool {
         matches!(self.severity(), Severity::Fault | Severity::Caution) || self.0 == *b"WM"
     }
 
-    /// True if the driver of the motor is off, and `driver enable` is what brings it back.
+    /// True if the motor's driver is off, until `driver enable`.
     pub fn driver_is_off(self) -> bool {
         matches!(&self.0, b"FO" | b"FD" | b"FH" | b"FV" | b"FC" | b"FM")
     }

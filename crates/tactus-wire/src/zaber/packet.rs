@@ -1,70 +1,70 @@
-//! One line from a device.
+//! Lines from a device.
 
 use super::Flag;
 use super::checksum::{checksum, verify};
 
-/// Longest line that a device is asked to send, its end included; the protocol's default.
+/// Longest line of a device, with its end; the protocol's default.
 const PACKET_MAX_BYTES: usize = 80;
 
-/// Who sent a message, and in answer to what.
+/// Sender of a message, and the command that it answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
     /// Address of the device, 1 to 99.
     pub device: u8,
-    /// Number of the axis, 1 to 9; 0 means the device as a whole.
+    /// Number of the axis, 1 to 9; 0 for the device as a whole.
     pub axis: u8,
-    /// The command's message id, 0 to 99, if it had one.
+    /// The command's message id, 0 to 99; `None` if it had none.
     pub id: Option<u8>,
 }
 
-/// What a device says.
+/// A message from a device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Message {
-    /// `@`: the one answer that each command gets.
+    /// `@`: the answer to a command.
     Reply {
-        /// From whom.
+        /// Sender.
         header: Header,
-        /// `OK`; `RJ` otherwise, and then [`data`](Message::data) names the [`Rejection`](super::Rejection).
+        /// True for `OK`. For `RJ`, [`data`](Message::data) names the [`Rejection`](super::Rejection).
         accepted: bool,
-        /// `BUSY`: it moves; `IDLE` otherwise.
+        /// True for `BUSY` (moving), false for `IDLE`.
         busy: bool,
-        /// The gravest of the warnings that stand.
+        /// The gravest present warning.
         flag: Flag,
-        /// What was asked for; `0` if there is nothing to tell.
+        /// The requested data; `0` if there are none.
         data: String,
     },
-    /// `#`: more lines of an answer, for people or lists.
+    /// `#`: a further line of an answer, for people or lists.
     Info {
-        /// From whom.
+        /// Sender.
         header: Header,
-        /// The text.
+        /// Text of the line.
         data: String,
     },
-    /// `!`: sent without being asked, where `comm.alert` is on: a motion has ended.
+    /// `!`: sent unrequested when a motion has ended, if `comm.alert` is on.
     Alert {
-        /// From whom; without an id.
+        /// Sender; without an id.
         header: Header,
-        /// It moves.
+        /// True while it moves.
         busy: bool,
-        /// The gravest of the warnings that stand.
+        /// The gravest present warning.
         flag: Flag,
-        /// Mostly empty.
+        /// Usually empty.
         data: String,
     },
 }
 
-/// One line, which is a message or a part of one.
+/// A line: a message, or a part of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Packet {
-    /// The message, or the part.
+    /// The message or part.
     pub message: Message,
-    /// It carried a checksum, which was right.
+    /// True if it had a checksum, which was correct.
     pub checked: bool,
-    /// It ended with `\`: a part follows, as an info that begins with `cont`.
+    /// True if it ended with `\`: the next part follows as an info line that begins with `cont`.
     pub more: bool,
 }
 
-/// Why a line is no packet.
+/// Why a line is not a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum PacketError {
@@ -80,10 +80,10 @@ pub enum PacketError {
 }
 
 impl Packet {
-    /// Reads a line, without its end.
+    /// Parses a line, without its end.
     ///
     /// # Errors
-    /// If it is not one that a device would send.
+    /// If a device would not send such a line.
     pub fn parse(line: &str) -> Result<Self, PacketError> {
         let mut characters = line.chars();
         let kind = characters.next().filter(|kind| "@#!".contains(*kind)).ok_or(PacketError::Kind)?;
@@ -119,22 +119,22 @@ impl Packet {
 }
 
 impl Message {
-    /// From whom it is.
+    /// Sender, and the command that it answers.
     pub fn header(&self) -> Header {
         match self {
             Self::Reply { header, .. } | Self::Info { header, .. } | Self::Alert { header, .. } => *header,
         }
     }
 
-    /// What it says beyond its fields.
+    /// Its data.
     pub fn data(&self) -> &str {
         match self {
             Self::Reply { data, .. } | Self::Info { data, .. } | Self::Alert { data, .. } => data,
         }
     }
 
-    /// The bytes that a device sends: one packet, or several if it is longer than 80 bytes. A packet is cut
-    /// between words; a word that is longer than a packet is sent whole.
+    /// The bytes that a device sends: one packet, or several if it is longer than 80 bytes. It is split between words; a
+    /// word that is longer than a packet is sent whole.
     pub fn encode(&self, with_checksum: bool) -> Vec<u8> {
         let Header { device, axis, id } = self.header();
         let id = id.map(|id| format!(" {id:02}")).unwrap_or_default();
@@ -151,7 +151,7 @@ impl Message {
         let mut parts = 0;
         let mut packet = head.clone();
         for word in self.data().split_ascii_whitespace() {
-            // A blank before it; after it `\`, a checksum and the line's end.
+            // 1 for the space before the word; 6 for `\`, a checksum and the line's end.
             let fits = packet.len() + 1 + word.len() + 6 <= PACKET_MAX_BYTES;
             if !fits && packet.len() > head.len() {
                 packet.push('\\');
@@ -167,7 +167,7 @@ impl Message {
         bytes
     }
 
-    /// Where what follows is to be put.
+    /// Its data, to append the next part.
     pub(super) fn data_mut(&mut self) -> &mut String {
         match self {
             Self::Reply { data, .. } | Self::Info { data, .. } | Self::Alert { data, .. } => data,
@@ -188,7 +188,7 @@ fn end_packet(bytes: &mut Vec<u8>, packet: &str, with_checksum: bool) {
 pub(super) struct Fields<'a>(pub(super) &'a str);
 
 impl<'a> Fields<'a> {
-    /// The next word if it is a number of no more than `max`.
+    /// Takes the next word if it is a number up to `max`.
     pub(super) fn number(&mut self, max: u8) -> Option<u8> {
         let (word, rest) = self.split();
         let is_number = !word.is_empty() && word.len() <= 2 && word.bytes().all(|byte| byte.is_ascii_digit());
@@ -197,13 +197,13 @@ impl<'a> Fields<'a> {
         Some(number)
     }
 
-    /// The next word if it is a message id: two digits.
+    /// Takes the next word if it is a message id: two digits.
     pub(super) fn id(&mut self) -> Option<u8> {
         let (word, _) = self.split();
         if word.len() == 2 { self.number(99) } else { None }
     }
 
-    /// What is left.
+    /// The remaining words.
     pub(super) fn rest(&self) -> String {
         self.0.trim().to_owned()
     }

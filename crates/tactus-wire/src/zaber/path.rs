@@ -1,4 +1,4 @@
-//! One straight path: what each axis is set to, so that all arrive together.
+//! Splits a straight path into moves of the axes that end at the same time.
 
 use super::Axis;
 
@@ -11,7 +11,7 @@ const ACCEL_SCALE: f64 = 1.6384 / 10_000.0;
 /// Largest value of either setting.
 const SETTING_MAX: f64 = 2_147_483_647.0;
 
-/// The `maxspeed` for a speed: rounded, 1 at least. `None` if it is not more than 0 or too fast to be told.
+/// The setting `maxspeed` for a speed, rounded, at least 1. `None` if the speed is not more than 0 or exceeds 32 bits.
 ///
 /// # Source
 /// The manual's entry of `maxspeed`: speed in microsteps/s times 1.6384.
@@ -19,8 +19,8 @@ pub fn speed_setting(microsteps_per_s: f64) -> Option<i64> {
     setting(microsteps_per_s * SPEED_SCALE)
 }
 
-/// The `accel` for an acceleration: rounded, 1 at least, since 0 means no limit. `None` if it is
-/// not more than 0 or too high to be told.
+/// The setting `accel` for an acceleration, rounded, at least 1 because 0 means no limit. `None` if the acceleration is not
+/// more than 0 or exceeds 32 bits.
 ///
 /// # Source
 /// The manual's entry of `accel`: acceleration in microsteps/s² times 1.6384 / 10000.
@@ -28,17 +28,17 @@ pub fn accel_setting(microsteps_per_s2: f64) -> Option<i64> {
     setting(microsteps_per_s2 * ACCEL_SCALE)
 }
 
-/// The speed, microsteps per second, that a `maxspeed` means.
+/// The speed in microsteps/s of a setting `maxspeed`.
 pub fn speed_told(setting: i64) -> f64 {
     setting as f64 / SPEED_SCALE
 }
 
-/// The acceleration, microsteps per second squared, that an `accel` means.
+/// The acceleration in microsteps/s^2 of a setting `accel`.
 pub fn accel_told(setting: i64) -> f64 {
     setting as f64 / ACCEL_SCALE
 }
 
-/// What one axis is to do.
+/// The part of a move that one axis makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct AxisMove {
     pub(super) target_microsteps: i64,
@@ -46,8 +46,8 @@ pub(super) struct AxisMove {
     pub(super) accel: Option<i64>,
 }
 
-/// The move of an axis that goes `way_mm` of a path of `path_mm`, either sign. `None` if the speed or the
-/// acceleration cannot be told to the controller.
+/// The move of an axis that travels `way_mm` (of either sign) on a path of `path_mm`. `None` if speed or acceleration is
+/// outside the controller's range.
 pub(super) fn axis_move(
     axis: &Axis,
     target_microsteps: i64,
@@ -59,7 +59,7 @@ pub(super) fn axis_move(
     let share = (way_mm / path_mm).abs().min(1.0);
     let microsteps = |mm: f64| mm * 1000.0 / axis.um_per_microstep;
     let speed = microsteps(speed_mm_per_s * share);
-    // The axis that goes farthest must not be faster than asked; its share is 0.57 at least.
+    // Rounding up to 1 must not make the axis that travels farthest faster than requested. Its share is at least 0.57.
     if share > 0.5 && speed * SPEED_SCALE < 1.0 {
         return None;
     }

@@ -1,44 +1,30 @@
-//! Rejections in words.
+//! Rejections and their meanings.
 
-/// Why a command was rejected: the word that stands in the data of an `RJ` reply.
+/// Why a command was rejected: the word in the data of an `RJ` reply.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(missing_docs, reason = "see `Rejection::word` and `Rejection::meaning`")]
 pub enum Rejection {
-    /// `AGAIN`.
     Again,
-    /// `BADAXIS`.
     BadAxis,
-    /// `BADCOMMAND`.
     BadCommand,
-    /// `BADDATA`.
     BadData,
-    /// `BADMESSAGEID`.
     BadMessageId,
-    /// `DEVICEONLY`.
     DeviceOnly,
-    /// `DRIVERDISABLED`.
     DriverDisabled,
-    /// `FULL`.
     Full,
-    /// `INACTIVE`.
     Inactive,
-    /// `LOCKSTEP`.
     Lockstep,
-    /// `NOACCESS`.
     NoAccess,
-    /// `NOTSUPPORTED`.
     NotSupported,
-    /// `PARKED`.
     Parked,
-    /// `REMOTE`.
     Remote,
-    /// `STATUSBUSY`.
     StatusBusy,
     /// Any other word.
     Other(String),
 }
 
 impl Rejection {
-    /// Reads the word.
+    /// Parses the word.
     pub fn parse(data: &str) -> Self {
         match data {
             "AGAIN" => Self::Again,
@@ -60,7 +46,7 @@ impl Rejection {
         }
     }
 
-    /// The word.
+    /// The word on the wire.
     pub fn word(&self) -> &str {
         match self {
             Self::Again => "AGAIN",

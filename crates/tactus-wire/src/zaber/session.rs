@@ -1,9 +1,9 @@
-//! The host's side of the conversation.
+//! The host's side of a connection to Zaber devices.
 
 mod axis_state;
 mod conclude;
 mod error;
-mod hear;
+mod handle;
 mod phase;
 mod request;
 mod step;
@@ -21,36 +21,35 @@ use crate::stage::{self, Alarm, ArrivalCheck, AxisName, Cause, Failure, Session 
 
 pub use error::SessionError;
 
-/// What a session wants done, or tells.
 type Action = stage::Action<SessionError>;
 
-/// How long homing may take: the longest axes at Zaber's default approach speeds take about a minute.
+/// Longest time for homing. The longest axes take about a minute at Zaber's default approach speeds.
 const HOMING_TIMEOUT: Duration = Duration::from_mins(2);
 
-/// A conversation over one connection with all devices of a stage; see [`stage::Session`].
+/// The host's side of one connection to all devices of a stage; see [`stage::Session`].
 ///
-/// One request stands at a time, and its answer is known by its message id; only a stop overtakes it. So no
-/// axis ever has more than one move in flight. A request that only asks or sets is asked again when no
-/// answer comes; a move or a homing that is not answered is never sent again: the stage is stopped instead.
+/// One request is pending at a time, and its answer has the same message id. Only a stop overtakes it. So no axis ever has
+/// more than one pending move. An unanswered query or setting is sent again. An unanswered move or homing is never sent
+/// again: the stage is stopped instead.
 ///
-/// The position counts as known from a successful homing on, or from the start if
-/// [`Config::trusts_reference`] and the stage says that it has its reference, until a fault, a lost reference
-/// (which is how a restart shows), or a stop that had to be an emergency stop.
+/// The position counts as known from a successful homing; with [`Config::trusts_reference`] also from the start, if the
+/// stage reports a reference position. It becomes unknown by a fault, a lost reference (which shows a restart), or an
+/// emergency stop.
 #[derive(Debug)]
 pub struct Session {
     config: Config,
     decoder: Decoder,
     axes: Vec<AxisState>,
     phase: Phase,
-    /// What is still to be asked in the batch or round under way.
+    /// Requests of the present batch or round that have not been sent.
     queue: VecDeque<SlotRequest>,
     pending: Option<Pending>,
     last_id: u8,
-    /// When the last round of questions for the positions began.
+    /// When the last round of position queries began.
     round_began: Option<Duration>,
-    /// When that round was over; `None` while it is under way.
+    /// When that round ended; `None` while it is under way.
     round_ended: Option<Duration>,
-    /// The next round does not wait for its turn.
+    /// The next round does not wait for the interval.
     at_once: bool,
     homed: bool,
     alarm: Option<Alarm>,
@@ -63,7 +62,7 @@ impl Session {
     /// A session that has not started.
     ///
     /// # Errors
-    /// If the configuration makes no stage; see [`Config::check`].
+    /// If the configuration is invalid; see [`Config::check`].
     pub fn new(config: Config) -> Result<Self, ConfigError> {
         config.check()?;
         let axes = config.named_axes().map(|(name, axis)| AxisState::new(name, axis)).collect();
@@ -86,7 +85,7 @@ impl Session {
         })
     }
 
-    /// What the axes are set to, in mm.
+    /// The axes' travel, in mm.
     fn settings(&self) -> Vec<Setting> {
         let told = |state: &AxisState| Setting {
             name: "limit.min, limit.max".to_owned(),
@@ -96,7 +95,7 @@ impl Session {
         self.axes.iter().map(told).collect()
     }
 
-    /// What each axis is to do; `None` if the stage is there.
+    /// Queues the moves of the axes; `None` if the stage already stands at the target.
     fn plan(
         &mut self,
         now: Duration,
@@ -129,7 +128,7 @@ impl Session {
             let way_mm = state.name.of(reached_mm) - state.name.of(from_mm);
             let Some(axis_move) = axis_move(&state.axis, target, way_mm, path_mm, speed_mm_per_s, accel)
             else {
-                let reason = format!("the controller of {} cannot be told such a speed", state.name);
+                let reason = format!("the speed is outside the range of the controller of {}", state.name);
                 return Err(Failure::Refused { command: command.to_owned(), reason });
             };
             settings.push(SlotRequest { slot, request: Request::Speed(axis_move.speed) });
@@ -150,7 +149,7 @@ impl Session {
     }
 
     fn check_ready(&self, command: &str) -> Result<(), Failure> {
-        if self.is_ready() { Ok(()) } else { Err(Failure::refused(command, "another command is in hand")) }
+        if self.is_ready() { Ok(()) } else { Err(Failure::refused(command, "another command is under way")) }
     }
 
     fn check_stands(&self, command: &str) -> Result<(), Failure> {
@@ -170,7 +169,7 @@ impl Session {
 
     fn check_numbers(&self, command: &str, target_mm: [f64; 3], speed_mm_per_s: f64) -> Result<(), Failure> {
         if !target_mm.iter().all(|mm| mm.is_finite()) {
-            return Err(Failure::refused(command, "the target is not a place"));
+            return Err(Failure::refused(command, "the target is not finite"));
         }
         let missing = AxisName::ALL
             .into_iter()
@@ -180,7 +179,7 @@ impl Session {
             return Err(Failure::refused(command, "the target needs an axis that the stage lacks"));
         }
         if !(speed_mm_per_s.is_finite() && speed_mm_per_s > 0.0) {
-            return Err(Failure::refused(command, "the speed is not one that can be sent"));
+            return Err(Failure::refused(command, "the speed is too low or not a number"));
         }
         Ok(())
     }
@@ -210,8 +209,8 @@ impl stage::Session for Session {
         self.ignored + self.decoder.dropped()
     }
 
-    /// Asks each device and axis what it is and where it stands. Nothing is
-    /// moved; a stage that is found moving is stopped.
+    /// Queries the identity, limits and position of each device and axis. Moves nothing, but stops a stage that is already
+    /// moving.
     fn start(&mut self, now: Duration) -> Vec<Action> {
         self.phase = Phase::Greeting;
         let mut devices = Vec::new();
@@ -235,7 +234,7 @@ impl stage::Session for Session {
         self.finish(now)
     }
 
-    /// Z first, so that the tip is clear, then the others together.
+    /// Homes z first, so that the tip is clear, then the others together.
     fn home(&mut self, now: Duration) -> Vec<Action> {
         if self.is_over() {
             return Vec::new();
@@ -254,10 +253,10 @@ impl stage::Session for Session {
         self.finish(now)
     }
 
-    /// Each axis is set to its part of the speed, so that all arrive together.
+    /// Sets each axis to its component of the speed, so that all arrive at the same time.
     ///
-    /// The axes start one after another, a request and its answer apart: on a line at 115200 baud that is
-    /// about 5 ms, by which the path departs from a straight line.
+    /// The axes start one after another, about 5 ms apart at 115200 baud (a request and its answer). The path deviates
+    /// from a straight line accordingly.
     fn move_to(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) -> Vec<Action> {
         if self.is_over() {
             return Vec::new();
@@ -281,7 +280,7 @@ impl stage::Session for Session {
         self.finish(now)
     }
 
-    /// Clears what has to be seen to, on every axis, and switches drivers on that were off.
+    /// Clears the warnings of every axis, and enables drivers that are off.
     fn clear_alarm(&mut self, now: Duration) -> Vec<Action> {
         if self.is_over() {
             return Vec::new();
@@ -306,9 +305,9 @@ impl stage::Session for Session {
         self.finish(now)
     }
 
-    /// Stops all devices of the port. The axes decelerate and
-    /// keep their position; the stop ends when every device has confirmed it and every axis says that it
-    /// stands. What goes on moving for 3 s is stopped by `estop`, after which the position is suspect.
+    /// Stops all devices on the port. The axes decelerate and keep their position. The stop ends when every device has
+    /// confirmed it and every axis reports standstill. If an axis still moves after 3 s, `estop` follows, and the
+    /// position is then suspect.
     fn stop(&mut self, now: Duration) -> Vec<Action> {
         let stopped = Failure::Stopped { position_mm: self.position_mm() };
         match &self.phase {
@@ -327,8 +326,8 @@ impl stage::Session for Session {
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {
         let mut decoder = core::mem::take(&mut self.decoder);
         decoder.push(bytes, |message| {
-            self.hear(now, &message);
-            // The next request goes out with the answer to the last, whatever else has arrived.
+            self.handle(now, &message);
+            // The answer to a request lets the next one go out, whatever else has arrived.
             self.proceed(now);
         });
         if self.needs_checksums() {

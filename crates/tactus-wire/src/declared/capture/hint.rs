@@ -1,80 +1,80 @@
-//! What a report advises, in words.
+//! Advice on correcting a description.
 
 use std::fmt;
 
 use super::Stride;
 use crate::declared::{Algorithm, Endian, Proposal};
 
-/// How a description may be corrected.
+/// A possible correction of a description.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Hint {
-    /// The sync bytes are nowhere.
+    /// The sync bytes do not occur.
     SyncAbsent {
-        /// As described.
+        /// As in the description.
         sync: Vec<u8>,
-        /// How often they are there in the opposite order.
+        /// Number of occurrences in the opposite order.
         reversed: usize,
         /// What repeats in the capture instead.
         proposal: Option<Proposal>,
     },
-    /// The sync bytes are there at another distance than the description says, or at none.
+    /// The sync bytes occur at another distance than described, or at no regular distance.
     FrameBytes {
-        /// As described.
+        /// As in the description.
         described: usize,
-        /// The distance that most have.
+        /// The most frequent distance.
         found: Option<Stride>,
-        /// How often the sync bytes are there.
+        /// Number of occurrences of the sync bytes.
         syncs: usize,
     },
-    /// The length field says the same in all frames, but something else.
+    /// The length field has the same wrong value in all frames.
     LengthAdds {
-        /// What it says.
+        /// Value of the field.
         value: u64,
-        /// What to write.
+        /// Value to write into the description.
         adds: i64,
     },
-    /// The length field would be right in the other byte order.
+    /// The length field is right in the other byte order.
     LengthEndian {
-        /// What to write.
+        /// Value to write into the description.
         endian: Endian,
     },
-    /// The length field is not the same in all frames, which are of one length.
+    /// The length field varies, although all frames have the same length.
     LengthVaries {
         /// Two of its values.
         values: [u64; 2],
     },
-    /// Another checksum holds on nearly all frames.
+    /// Another checksum is correct for nearly all frames.
     ChecksumIs {
         /// How it is computed.
         algorithm: Algorithm,
-        /// The first byte that it covers.
+        /// Offset of the first byte that it covers.
         from: usize,
-        /// The first byte behind those that it covers, and where it stands.
+        /// Its own offset, which is also the end of the bytes that it covers.
         offset: usize,
-        /// Which byte of it is first.
+        /// Its byte order.
         endian: Endian,
-        /// What of it the description says otherwise; empty if it says that there is none.
+        /// Keys in which the description differs; empty if the description has no checksum.
         differs: Vec<&'static str>,
     },
-    /// The checksum does not hold, and none that was tried does.
+    /// The checksum is wrong, and no other was found that is correct.
     ChecksumUnknown,
-    /// The sequence does not count by one; some bytes do.
+    /// The sequence does not count by one.
     SequenceAt {
-        /// Their offsets.
+        /// Offsets of the bytes that do.
         counters: Vec<usize>,
     },
-    /// The timestamp goes back or jumps, and does not in the other byte order.
+    /// The timestamp goes back or jumps, but not in the other byte order.
     TimestampEndian {
-        /// What to write.
+        /// Value to write into the description.
         endian: Endian,
     },
     /// The timestamp never changes.
     TimestampStands,
-    /// Samples change less from frame to frame in the other byte order.
+    /// Samples change less between frames in the other byte order.
     SampleEndian {
-        /// What to write.
+        /// Value to write into the description.
         endian: Endian,
-        /// How many times less.
+        /// Factor by which they change less.
         smoother: f64,
     },
 }
@@ -167,7 +167,7 @@ fn name(endian: Endian) -> &'static str {
     }
 }
 
-/// Bytes as they are written in documents of formats.
+/// Displays bytes in hexadecimal, separated by spaces.
 struct Hex<'a>(&'a [u8]);
 
 impl fmt::Display for Hex<'_> {

@@ -1,4 +1,4 @@
-//! Looks for what in a description does not fit a recording.
+//! Searches for corrections that make a description fit a recording.
 
 use super::{Hint, Stride};
 use crate::declared::checksum::{Algorithm, CRC32, Crc, CrcParameters, CrcWidth};
@@ -6,18 +6,18 @@ use crate::declared::format::Checksum;
 use crate::declared::sniff::find;
 use crate::declared::{Endian, Field, Format, Framing, SampleType, Samples, propose};
 
-/// Frames that checksums are tried on.
+/// Number of frames on which checksums are tried.
 const FRAMES_TRIED: usize = 16;
-/// Frames that must differ for a checksum that holds on all to be no chance.
+/// Number of different frames on which a checksum must be correct, so that it is not so by chance.
 const FRAMES_NEEDED: usize = 3;
-/// Where the bytes that a checksum covers may begin.
+/// Number of offsets that are tried as the beginning of the covered bytes.
 const FROM_TRIED: usize = 16;
-/// Share of frames that something must hold for.
+/// Share of frames for which a correction must hold.
 const NEARLY_ALL: f64 = 0.9;
-/// Samples in the other byte order must be so much smoother in time to be mentioned.
+/// Factor by which samples must be smoother in time in the other byte order to be reported.
 const SMOOTHER: f64 = 4.0;
 
-/// How the description may be corrected, by what stands from one sync to the next.
+/// Possible corrections of the description, from the bytes between syncs.
 pub(super) fn hints(
     format: &Format,
     capture: &[u8],
@@ -45,7 +45,7 @@ pub(super) fn hints(
     hints
 }
 
-/// Finds the stride that the capture has, and says so if it is not as described.
+/// The stride of the capture; adds a hint if it differs from the description.
 fn hint_stride(
     format: &Format,
     capture: &[u8],
@@ -74,7 +74,7 @@ fn hint_stride(
     found.map(|stride| stride.bytes)
 }
 
-/// What stands from one sync to the next, where that is a stride further.
+/// The bytes from each sync to the next one, where that is a stride away.
 fn slices<'a>(capture: &'a [u8], heads: &[usize], stride: usize) -> Vec<&'a [u8]> {
     let mut slices = Vec::new();
     let mut next = 0;
@@ -98,7 +98,7 @@ fn hint_length(format: &Format, slices: &[&[u8]], hints: &mut Vec<Hint>) {
     let turned = turned(length.field);
     let Some(value) = values(length.field).next() else { return };
     let stride = slices.first().map_or(0, |slice| slice.len());
-    // The length that the field says by the description's rule, for the stride that is there.
+    // The field's value by the description's rule, for the stride of the capture.
     let wanted = length.value.checked_add(stride as u64).and_then(|sum| sum.checked_sub(format.bytes as u64));
     if wanted.is_some_and(|wanted| agree(length.field, wanted)) {
         return;
@@ -114,12 +114,12 @@ fn hint_length(format: &Format, slices: &[&[u8]], hints: &mut Vec<Hint>) {
     }
 }
 
-/// Says which checksum holds, if not the described one. Where the one that holds stands.
+/// The field of the correct checksum; adds a hint if it differs from the description.
 fn hint_checksum(format: &Format, slices: &[&[u8]], hints: &mut Vec<Hint>) -> Option<Field> {
     let mut tried: Vec<&[u8]> = slices.to_vec();
     tried.sort_unstable();
     tried.dedup();
-    // Spread over the capture's frames.
+    // Spread over the frames of the capture.
     let step = tried.len().div_ceil(FRAMES_TRIED).max(1);
     let tried: Vec<&[u8]> = tried.into_iter().step_by(step).collect();
     if tried.len() < FRAMES_NEEDED {
@@ -160,7 +160,7 @@ fn holds(checksum: &Checksum, slices: &[&[u8]]) -> bool {
     }))
 }
 
-/// Checksums to try on frames of this length, the nearest to the description first.
+/// Checksums to try on frames of this length, those closest to the description first.
 fn variants(format: &Format, bytes: usize) -> impl Iterator<Item = Checksum> {
     let described = format.checksum.as_ref();
     let crc16 = |polynomial, init, reflect, xorout| {
@@ -196,7 +196,7 @@ fn variants(format: &Format, bytes: usize) -> impl Iterator<Item = Checksum> {
             endians.iter().flat_map(move |endian| {
                 let algorithm = algorithm.clone();
                 let field = Field { offset, width, endian: *endian };
-                // Less than half of a frame is covered by no checksum worth the name.
+                // A real checksum covers at least about half of the frame.
                 (0..FROM_TRIED.min(offset / 2 + 1)).map(move |from| Checksum {
                     algorithm: algorithm.clone(),
                     from,
@@ -234,8 +234,7 @@ fn hint_sequence(format: &Format, slices: &[&[u8]], closed_at: Option<Field>, hi
 fn hint_timestamp(format: &Format, slices: &[&[u8]], hints: &mut Vec<Hint>) {
     let Some(timestamp) = format.timestamp else { return };
     let values = |field: Field| slices.iter().filter_map(move |slice| field.read(slice)).collect::<Vec<_>>();
-    // Ahead by less than a thousandth of the way round: a clock that is read in order, and not one whose high
-    // bytes are low.
+    // A clock that is read in the right byte order advances by less than a thousandth of its range.
     let in_order = |values: &[u64]| {
         nearly_all(values.iter().zip(values.iter().skip(1)).map(|(a, b)| {
             let ahead = (u128::from(*b) + timestamp.wrap - u128::from(*a) % timestamp.wrap) % timestamp.wrap;
@@ -274,7 +273,7 @@ fn hint_samples(format: &Format, slices: &[&[u8]], hints: &mut Vec<Hint>) {
     }
 }
 
-/// The same field in the other byte order.
+/// The field in the other byte order.
 fn turned(field: Field) -> Field {
     Field { endian: opposite(field.endian), ..field }
 }

@@ -6,16 +6,16 @@ use crate::stage::Cause;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum SessionError {
-    /// No banner came.
+    /// No banner came after several resets.
     #[error("no banner came after {resets} resets: is this a Grbl controller, and is the bit rate right?")]
     NoBanner { resets: u32 },
     /// The controller stopped answering.
     #[error("the controller did not answer {query}")]
     Silent { query: &'static str },
-    /// The controller refused a query without which nothing can be done.
+    /// The controller refused a necessary query.
     #[error("the controller refused {query}: error {code}, {meaning}")]
     Refused { query: &'static str, code: u8, meaning: &'static str },
-    /// A setting of the controller is not what the rig relies on.
+    /// A setting of the controller differs from the rig's requirement.
     #[error(
         "the controller has ${number} = {found}, but the rig needs {needed}: correct the rig file, or the \
          controller's setting by its own tools; nothing was changed"

@@ -1,37 +1,37 @@
-//! What a session is about.
+//! The phases of a session.
 
 use core::time::Duration;
 
 use super::Failure;
 use crate::grbl::active_move::ActiveMove;
 
-/// How long a held stage may go on decelerating before it is reset in motion.
+/// Longest deceleration after a hold, before the controller is reset in motion.
 const HOLD_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// What a session is about.
+/// What the session is doing.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Phase {
-    /// A banner is waited for, at first perhaps without a reset.
+    /// Waiting for a banner. The first one may come without a reset.
     Resetting { purpose: Purpose, resets: u32, deadline: Duration },
-    /// The first report asked for since then is waited for.
+    /// Waiting for a report that was requested after `since`.
     Looking { purpose: Purpose, since: Duration },
-    /// The controller is asked what it is, for the `tries`th time.
+    /// Querying version or settings, for the `tries`th time.
     Asking { query: Query, tries: u32, deadline: Duration },
-    /// Nothing is in hand.
+    /// No command is under way.
     Ready,
-    /// A move is in hand.
+    /// A move is under way.
     Moving(ActiveMove),
-    /// Homing is in hand; `accepted` is when the controller said that it is done.
+    /// Homing; `accepted` is when the controller reported its end.
     Homing { deadline: Duration, accepted: Option<Duration> },
-    /// `$X` is on its way.
+    /// `$X` was sent.
     Unlocking { deadline: Duration },
-    /// A feed hold was sent; the command in hand will end with `failure`.
+    /// A feed hold was sent. The command under way will end with `failure`.
     Holding { failure: Option<Failure>, since: Duration },
-    /// It has not started, or has failed.
+    /// The session has not started, or has failed.
     Over,
 }
 
-/// What the controller is asked before it is taken for the rig's.
+/// A query about the controller before it is accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Query {
     /// `$I`: its version.
@@ -40,21 +40,21 @@ pub(super) enum Query {
     Settings,
 }
 
-/// What a reset is for.
+/// Purpose of a reset.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Purpose {
-    /// To see whether there is a controller.
+    /// To find out whether a controller answers.
     Greet,
-    /// None: it was not ours.
+    /// None: something else reset the controller.
     Recover,
     /// To clear an alarm.
     Clear,
-    /// To flush what the controller still holds, while it stands at `held_mm`; `None` if it may have been moving.
+    /// To discard the commands that the controller holds. It stood still at `held_mm`; `None` if it may have been moving.
     Stop { failure: Option<Failure>, held_mm: Option<[f64; 3]> },
 }
 
 impl Phase {
-    /// When it has taken too long.
+    /// When the phase has taken too long.
     pub(super) fn deadline(&self) -> Option<Duration> {
         match self {
             Self::Resetting { deadline, .. }

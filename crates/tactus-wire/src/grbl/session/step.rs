@@ -1,4 +1,4 @@
-//! The steps that a session takes by itself.
+//! Steps that a session takes: reports, holds, resets and queries.
 
 use core::time::Duration;
 
@@ -7,26 +7,26 @@ use super::{Action, Failure, Session, SessionError, alarm};
 use crate::grbl::{FEED_HOLD, MachineState, SOFT_RESET, STATUS_QUERY};
 use crate::stage::{Report, Status};
 
-/// Between status reports while standing.
+/// Interval of status reports at standstill.
 const POLL_IDLE: Duration = Duration::from_millis(100);
 
-/// Between status reports while moving, or waiting to know.
+/// Interval of status reports in motion, or while waiting for one.
 const POLL_MOVING: Duration = Duration::from_millis(50);
 
-/// How long the banner may take after a reset; some boards pass through a boot loader.
+/// Longest time from a reset to the banner. Some boards run a boot loader first.
 const BANNER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How long the answer to `$I` or `$$` may take.
+/// Longest time to the answer to `$I` or `$$`.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How often they are asked.
+/// Attempts at `$I` and `$$`.
 const TRIES_MAX: u32 = 3;
 
-/// How often a reset is tried.
+/// Attempts at a reset.
 const RESETS_MAX: u32 = 4;
 
 impl Session {
-    /// Tells where the stage is and what it does.
+    /// Reports position and status.
     pub(super) fn report(&mut self) {
         let report = Report {
             position_mm: self.position_mm,
@@ -36,12 +36,12 @@ impl Session {
         self.actions.push(Action::Report(report));
     }
 
-    /// Ends the command in hand.
+    /// Ends the command under way.
     pub(super) fn done(&mut self, result: Result<[f64; 3], Failure>) {
         self.actions.push(Action::Done(result));
     }
 
-    /// Ends the session; what moves is told to stop.
+    /// Ends the session, stopping any motion.
     pub(super) fn fail(&mut self, error: SessionError) {
         match self.phase {
             Phase::Homing { .. } => self.send(SOFT_RESET),
@@ -56,7 +56,7 @@ impl Session {
         self.actions.push(Action::Failed(error));
     }
 
-    /// Decelerates to a stand, whereupon the command in hand ends with `failure`.
+    /// Decelerates to a standstill. The command under way then ends with `failure`.
     pub(super) fn hold(&mut self, now: Duration, failure: Option<Failure>) {
         self.send(FEED_HOLD);
         self.phase = Phase::Holding { failure, since: now };
@@ -69,13 +69,13 @@ impl Session {
         self.phase = Phase::Resetting { purpose, resets, deadline: now + BANNER_TIMEOUT };
     }
 
-    /// Looks where the stage is after a reset.
+    /// Requests the position after a reset.
     pub(super) fn look(&mut self, now: Duration, purpose: Purpose) {
         self.phase = Phase::Looking { purpose, since: now };
         self.poll.at_once();
     }
 
-    /// Asks the controller what it is, for the `tries`th time.
+    /// Queries the controller, for the `tries`th time.
     pub(super) fn ask(&mut self, now: Duration, query: Query, tries: u32) {
         if query == Query::Settings {
             self.settings.forget();
@@ -84,7 +84,7 @@ impl Session {
         self.phase = Phase::Asking { query, tries, deadline: now + ANSWER_TIMEOUT };
     }
 
-    /// Does what follows when a phase has taken too long.
+    /// Handles a phase that has taken too long.
     pub(super) fn overdue(&mut self, now: Duration) {
         match self.phase.clone() {
             Phase::Resetting { resets, .. } if resets >= RESETS_MAX => {
@@ -107,7 +107,7 @@ impl Session {
         }
     }
 
-    /// Asks for a report if it is time, and hands out what is to be done.
+    /// Requests a report if it is due, and returns the actions.
     pub(super) fn finish(&mut self, now: Duration) -> Vec<Action> {
         if self.poll_interval().is_some_and(|interval| now >= self.poll.next(interval)) {
             self.poll.sent(now);
@@ -119,12 +119,12 @@ impl Session {
         core::mem::take(&mut self.actions)
     }
 
-    /// How often to ask for a report; `None` if it would not be answered.
+    /// Interval of requests for a report; `None` if they would not be answered.
     pub(super) fn poll_interval(&self) -> Option<Duration> {
         match self.phase {
             Phase::Resetting { .. } | Phase::Asking { .. } | Phase::Unlocking { .. } | Phase::Over => None,
             Phase::Homing { accepted, .. } => accepted.map(|_| POLL_MOVING),
-            // A query asked now would only delay the one that follows the `ok`.
+            // A query now would only delay the one that follows the `ok`.
             Phase::Moving(ref travel) if travel.awaits_ok() => Some(POLL_IDLE),
             Phase::Ready if !self.moves() => Some(POLL_IDLE),
             Phase::Ready | Phase::Moving(_) | Phase::Holding { .. } | Phase::Looking { .. } => {
@@ -133,7 +133,7 @@ impl Session {
         }
     }
 
-    /// True if the last report says that the stage moves.
+    /// True if the stage moves, by the last report.
     pub(super) fn moves(&self) -> bool {
         use MachineState::{Holding, Home, Jog, Run};
         self.state.is_some_and(|state| matches!(state, Run | Jog | Holding | Home))
@@ -159,7 +159,7 @@ impl Session {
             Some(Run | Jog) => Status::Moving,
             Some(Holding | Hold | Door | Tool) => Status::Hold,
             Some(Home) => Status::Homing,
-            // An alarm that was not told: locked since the start, which homing unlocks.
+            // An unreported alarm: locked since the start, until homing unlocks it.
             Some(Idle | Check | Sleep | Alarm) | None if !self.homed => Status::Unhomed,
             Some(Idle | Check | Sleep | Alarm) | None => Status::Idle,
         }

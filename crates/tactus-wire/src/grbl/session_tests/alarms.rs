@@ -104,7 +104,7 @@ fn homing_may_fail() {
         960 < <Home|MPos:1.000,1.000,5.000|FS:0,0>
         960 = Homing 1.000 1.000 5.000
         12000 * move 2 1 5 at 10
-        12000 = refused another command is in hand
+        12000 = refused another command is under way
         24950 < ALARM:9
         24950 = Alarm 9 1.000 1.000 5.000
         24950 = alarm 9

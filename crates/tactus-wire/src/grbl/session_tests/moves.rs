@@ -147,15 +147,15 @@ fn a_refused_move_is_told_in_words() {
 fn commands_that_cannot_be_done_are_refused_before_anything_is_sent() {
     homed(
         "950 * move nan 1 5 at 10
-        950 = refused the target is not a place
+        950 = refused the target is not finite
         951 * move 2 1 5 at 0
-        951 = refused the speed is not one that can be sent
+        951 = refused the speed is too low or not a number
         952 * move 2 1 5 at -1
-        952 = refused the speed is not one that can be sent
+        952 = refused the speed is too low or not a number
         953 * move 2 1 5 at 10
         953 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
         954 * home
-        954 = refused another command is in hand",
+        954 = refused another command is under way",
     );
 }
 

@@ -1,9 +1,9 @@
-//! What is known of one axis.
+//! State of an axis.
 
 use crate::stage::AxisName;
 use crate::zaber::{Axis, Flag, Severity};
 
-/// What is known of one axis.
+/// State of an axis, as last reported.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct AxisState {
     pub(super) name: AxisName,
@@ -11,25 +11,25 @@ pub(super) struct AxisState {
     /// Travel in microsteps.
     pub(super) limit_min: i64,
     pub(super) limit_max: i64,
-    /// As last reported, microsteps.
+    /// Position in microsteps.
     pub(super) position: i64,
     pub(super) busy: bool,
-    /// It has confirmed the move or homing in hand, and said nothing of anyone else's.
+    /// It has confirmed the present move or homing, and has reported no interruption by others.
     pub(super) is_ours: bool,
-    /// The gravest fault that stands.
+    /// The gravest present fault.
     pub(super) fault: Option<Flag>,
-    /// Whether it knows where it is, as it last let see.
+    /// Whether it has a reference position.
     pub(super) reference: Reference,
-    /// What it said last may hide something: the list of its warnings is to be asked for.
+    /// Its last flag may hide others, so the list of its warnings must be requested.
     pub(super) needs_list: bool,
 }
 
-/// Whether an axis knows where it is.
+/// Whether an axis has a reference position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reference {
-    /// It does.
+    /// It has one.
     Known,
-    /// It does not, or not well.
+    /// It has none, or a doubtful one.
     Lost,
 }
 
@@ -54,13 +54,13 @@ impl AxisState {
         (self.limit_min..=self.limit_max).contains(&microsteps)
     }
 
-    /// Its travel in words.
+    /// Its travel, in words.
     pub(super) fn travel(&self) -> String {
         let [a, b] = [self.limit_min, self.limit_max].map(|limit| self.axis.position_mm(limit));
         format!("its travel is {:.3} to {:.3} mm", a.min(b), a.max(b))
     }
 
-    /// Takes over the flag of a reply, or with `all` the list of flags; true if a fault is new.
+    /// Takes the flag of a reply, and with `all` the complete list. True if there is a new fault.
     pub(super) fn take_flags(&mut self, flag: Flag, all: Option<&[Flag]>) -> bool {
         let flags = || all.unwrap_or_default().iter().copied().chain([flag]);
         let is_complete = all.is_some() || !flag.hides_reference();

@@ -1,4 +1,4 @@
-//! What follows when a batch or a round of questions has been answered.
+//! Continues when all requests of a batch or a round have been answered.
 
 use core::time::Duration;
 
@@ -9,7 +9,7 @@ use super::{Action, Failure, Session};
 use crate::stage::{Controller, Judgement};
 
 impl Session {
-    /// Every request of a batch or a round has its answer.
+    /// Continues after the last answer of a batch or a round.
     pub(super) fn conclude(&mut self, now: Duration) {
         let was_round = self.round_began.is_some() && self.round_ended.is_none();
         self.round_ended = Some(now);
@@ -35,7 +35,7 @@ impl Session {
         let (identity, settings) = (self.identity.clone(), self.settings());
         self.actions.push(Action::Connected(Controller { identity, settings }));
         self.report();
-        // Whatever sent it off is gone: perhaps this host, before it was cut off.
+        // Its motion was started by someone who is gone, perhaps by this host before the link broke.
         if self.moves() {
             self.halt(now, None);
         }
@@ -43,7 +43,7 @@ impl Session {
 
     fn judge(&mut self, now: Duration) {
         self.report();
-        // The list of warnings, if it is needed, is asked for in the next round.
+        // The next round requests the list of warnings, if it is needed.
         let moves = self.axes.iter().any(|state| state.busy || state.needs_list);
         let position_mm = self.position_mm();
         let Phase::Moving(travel) = &mut self.phase else { return };
@@ -60,7 +60,7 @@ impl Session {
     fn conclude_homing(&mut self) {
         let Phase::Homing { group, then, .. } = &mut self.phase else { return };
         let of_group = |slot: &usize| self.axes.get(*slot);
-        // The list of warnings, if it is needed, is asked for in the next round.
+        // The next round requests the list of warnings, if it is needed.
         if group.iter().filter_map(of_group).any(|state| state.busy || state.needs_list) {
             return self.report();
         }
@@ -104,7 +104,7 @@ impl Session {
         self.axes.iter().all(|state| state.reference == Reference::Known)
     }
 
-    /// The stage stands, or is not waited for any longer.
+    /// Ends a stop: the stage stands still, or has been waited for long enough.
     pub(super) fn end_stop(&mut self) {
         let phase = core::mem::replace(&mut self.phase, Phase::Ready);
         self.report();
@@ -116,7 +116,7 @@ impl Session {
         }
     }
 
-    /// Sends the axes in some slots home.
+    /// Homes the axes in these slots.
     pub(super) fn home_group(&mut self, slots: Vec<usize>) {
         self.begin_batch();
         let homing_speed = self.config.homing_speed_mm_per_s;

@@ -15,13 +15,13 @@ pub enum SessionError {
     /// A device stopped answering.
     #[error("device {device} did not answer to {command:?}")]
     Silent { device: u8, command: String },
-    /// A device refused a request without which nothing can be done.
+    /// A device refused a necessary request.
     #[error("device {device} refused {command:?}: {rejection}")]
     Refused { device: u8, command: String, rejection: Rejection },
-    /// A device has fewer axes than are to be used.
+    /// A device has fewer axes than the rig uses.
     #[error("device {device} has {axis_count} axes, but the rig uses its axis {number} as {name}")]
     NoAxis { device: u8, number: u8, name: AxisName, axis_count: i64 },
-    /// A setting of an axis is not what the rig relies on.
+    /// A setting of an axis differs from the rig's requirement.
     #[error(
         "the controller has {setting} = {found} on {name}, but the rig needs {needed}: correct the rig file, or the \
          controller's setting by its own tools; nothing was changed"

@@ -1,33 +1,32 @@
-//! What a session is about.
+//! The phases of a session.
 
 use core::time::Duration;
 
 use super::Failure;
 use crate::stage::ArrivalCheck;
 
-/// A stop that a device has not confirmed by then is sent again.
+/// A stop that a device has not confirmed after this is sent again.
 const STOP_REPLY_TIMEOUT: Duration = Duration::from_millis(250);
 
-/// How long a stopped stage may go on decelerating before it is stopped harder, and then before it is given
-/// up.
+/// Longest deceleration after a stop before an emergency stop follows, and after that before the session stops waiting.
 const DECELERATION_MAX: Duration = Duration::from_secs(3);
 
-/// What a session is about.
+/// What the session is doing.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Phase {
-    /// The devices are asked what they are.
+    /// Querying the devices.
     Greeting,
-    /// Nothing is in hand.
+    /// No command is under way.
     Ready,
-    /// A move is in hand.
+    /// A move is under way.
     Moving(ActiveMove),
-    /// Homing is in hand: of the axes in the slots of `group`, and `then` of the others.
+    /// Homing the axes in the slots of `group`, then those of `then`.
     Homing { group: Vec<usize>, then: Option<Vec<usize>>, deadline: Duration },
-    /// An alarm is being cleared.
+    /// Clearing an alarm.
     Clearing,
     /// A stop was sent.
     Stopping(Stop),
-    /// It has not started, or has failed.
+    /// The session has not started, or has failed.
     Over,
 }
 
@@ -44,21 +43,21 @@ pub(super) struct ActiveMove {
 /// A stop under way.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stop {
-    /// How the command in hand will end.
+    /// The result of the command under way; `None` if there is none.
     pub(super) failure: Option<Failure>,
     pub(super) since: Duration,
-    /// When it was last sent, and with which id.
+    /// When it was last sent; `id` is that message's.
     pub(super) sent: Duration,
     pub(super) id: u8,
-    /// Devices that have not confirmed it, and since when the first is waited for.
+    /// Devices that have not confirmed it; `unheard_since` is when waiting for them began.
     pub(super) unheard: Vec<u8>,
     pub(super) unheard_since: Duration,
-    /// It is an emergency stop by now.
+    /// True once it is an emergency stop.
     pub(super) is_hard: bool,
 }
 
 impl Phase {
-    /// When something is to be done about it.
+    /// When the phase has taken too long.
     pub(super) fn deadline(&self) -> Option<Duration> {
         match self {
             Self::Moving(travel) => Some(travel.arrival.overdue()),
@@ -70,12 +69,12 @@ impl Phase {
 }
 
 impl Stop {
-    /// The command that is to be sent.
+    /// The command to send.
     pub(super) fn text(&self) -> &'static str {
         if self.is_hard { "estop" } else { "stop" }
     }
 
-    /// When the stage should stand.
+    /// When the stage should stand still.
     pub(super) fn too_long(&self) -> Duration {
         self.since + DECELERATION_MAX * if self.is_hard { 2 } else { 1 }
     }

@@ -1,19 +1,19 @@
-//! Questions to devices, one at a time.
+//! Requests to devices, one at a time.
 
 use core::time::Duration;
 
 use crate::zaber::Flag;
 
-/// An answer that has not come after this is asked for again; it comes after some 5 ms.
+/// An unanswered query or setting is sent again after this. An answer usually takes about 5 ms.
 const REPLY_TIMEOUT: Duration = Duration::from_millis(250);
 
-/// A move or a homing that is not answered by then may have been lost, or not.
+/// After this, it is unknown whether an unanswered move or homing has arrived.
 const MOTION_REPLY_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// A request that stays unanswered for this long means that the device is gone.
+/// A device that has left a request unanswered for this long is gone.
 const SILENCE_MAX: Duration = Duration::from_secs(2);
 
-/// What is asked or told.
+/// A query, setting or motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Request {
     Checksums,
@@ -39,7 +39,7 @@ pub(super) struct SlotRequest {
     pub(super) request: Request,
 }
 
-/// The request that stands.
+/// The pending request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Pending {
     pub(super) request: SlotRequest,
@@ -48,7 +48,7 @@ pub(super) struct Pending {
     pub(super) sent: Duration,
 }
 
-/// What an answer says.
+/// Data of an answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Answer {
     Done,
@@ -58,7 +58,7 @@ pub(super) enum Answer {
 }
 
 impl Request {
-    /// The words of the command.
+    /// The command's words.
     pub(super) fn text(self) -> String {
         match self {
             Self::Checksums => "set comm.checksum 1".to_owned(),
@@ -78,17 +78,17 @@ impl Request {
         }
     }
 
-    /// For the device, not for one of its axes.
+    /// True for a request to the device, not to one of its axes.
     pub(super) fn is_of_device(self) -> bool {
         matches!(self, Self::Checksums | Self::Version | Self::AxisCount)
     }
 
-    /// Sets an axis in motion, so that it is sent once and never again.
+    /// True if it moves an axis: it is then sent only once.
     pub(super) fn moves(self) -> bool {
         matches!(self, Self::Move(_) | Self::Home)
     }
 
-    /// Reads the data of an answer; `None` if it is no answer to this.
+    /// Parses the data of an answer; `None` if they do not fit this request.
     pub(super) fn read(self, data: &str) -> Option<Answer> {
         match self {
             Self::Version => (!data.is_empty() && data.len() <= 16).then(|| Answer::Text(data.to_owned())),
@@ -113,12 +113,12 @@ impl Request {
 }
 
 impl Pending {
-    /// When to do something about the lack of an answer.
+    /// When to act on a missing answer.
     pub(super) fn overdue(&self) -> Duration {
         self.sent + if self.request.request.moves() { MOTION_REPLY_TIMEOUT } else { REPLY_TIMEOUT }
     }
 
-    /// True if there is no more hope for an answer.
+    /// True if the device has been silent for too long.
     pub(super) fn is_silent(&self, now: Duration) -> bool {
         now.saturating_sub(self.since) >= SILENCE_MAX
     }

@@ -1,4 +1,4 @@
-//! The steps that a session takes by itself.
+//! Steps that a session takes: reports, stops and rounds of queries.
 
 use core::time::Duration;
 
@@ -8,29 +8,28 @@ use super::{Action, Failure, Session, SessionError};
 use crate::stage::{Alarm, Report, Session as _, Status};
 use crate::zaber::HostCommand;
 
-/// Between rounds of questions while the stage stands.
+/// Interval of position rounds at standstill.
 const POLL_IDLE: Duration = Duration::from_millis(100);
 
-/// Between rounds at least, while the stage moves: as fast as replies come, which take longer, but not in no
-/// time where they take none.
+/// Least interval of rounds in motion. Real replies take longer; the limit is for links whose replies take no time.
 const POLL_MOVING: Duration = Duration::from_millis(10);
 
-/// For how long a stop is sent again to a device that does not confirm it.
+/// How long a stop is repeated to a device that does not confirm it.
 const STOP_SILENCE_MAX: Duration = Duration::from_secs(2);
 
 impl Session {
-    /// Tells where the stage is and what it does.
+    /// Reports position and status.
     pub(super) fn report(&mut self) {
         let report = Report { position_mm: self.position_mm(), status: self.status(), alarm: self.alarm };
         self.actions.push(Action::Report(report));
     }
 
-    /// Ends the command in hand.
+    /// Ends the command under way.
     pub(super) fn done(&mut self, result: Result<[f64; 3], Failure>) {
         self.actions.push(Action::Done(result));
     }
 
-    /// Ends the session; whatever moves is told to stop.
+    /// Ends the session, stopping any motion.
     pub(super) fn fail(&mut self, error: SessionError) {
         if !matches!(self.phase, Phase::Greeting | Phase::Over) {
             self.send_stop("stop");
@@ -41,7 +40,7 @@ impl Session {
         self.actions.push(Action::Failed(error));
     }
 
-    /// Stops everything, whereupon the command in hand ends with `failure`.
+    /// Stops all axes. The command under way then ends with `failure`.
     pub(super) fn halt(&mut self, now: Duration, failure: Option<Failure>) {
         self.queue.clear();
         self.pending = None;
@@ -59,7 +58,7 @@ impl Session {
         });
     }
 
-    /// Sends the stop that is under way again. What was asked before it proves nothing any more.
+    /// Sends the present stop again. Answers to earlier requests are no longer used.
     pub(super) fn repeat_stop(&mut self, now: Duration, text: &str) {
         self.send_stop(text);
         let (id, devices) = (self.last_id, self.devices());
@@ -75,13 +74,13 @@ impl Session {
         self.at_once = true;
     }
 
-    /// Tells all devices of the port at once to stop.
+    /// Sends a stop to all devices on the port at once.
     pub(super) fn send_stop(&mut self, text: &str) {
         let id = self.next_id();
         self.send(&HostCommand { device: 0, axis: 0, id: Some(id), text: text.to_owned() });
     }
 
-    /// Does what follows when a phase has taken too long.
+    /// Handles a phase that has taken too long.
     pub(super) fn overdue(&mut self, now: Duration) {
         match self.phase.clone() {
             Phase::Moving(travel) => {
@@ -108,7 +107,7 @@ impl Session {
         }
         self.homed = false;
         if stop.is_hard {
-            // A stage that still says that it moves can neither be believed nor waited for.
+            // A stage that still reports motion cannot be believed, and would not stop.
             return self.end_stop();
         }
         if let Phase::Stopping(stop) = &mut self.phase {
@@ -117,7 +116,7 @@ impl Session {
         self.repeat_stop(now, "estop");
     }
 
-    /// No answer has come in time: the request is asked again, unless that would move something twice.
+    /// Handles a missing answer: sends the request again, unless that could cause a motion twice.
     pub(super) fn unanswered(&mut self, now: Duration) {
         let Some(pending) = self.pending else { return };
         let SlotRequest { slot, request } = pending.request;
@@ -137,13 +136,13 @@ impl Session {
         self.send_request(pending.request, pending.id);
     }
 
-    /// Hands out what is to be done.
+    /// Sends what is due, and returns the actions.
     pub(super) fn finish(&mut self, now: Duration) -> Vec<Action> {
         self.proceed(now);
         core::mem::take(&mut self.actions)
     }
 
-    /// Asks the next request, if none stands and it is time.
+    /// Sends the next request, if none is pending and it is due.
     pub(super) fn proceed(&mut self, now: Duration) {
         if self.pending.is_some() || matches!(self.phase, Phase::Over) {
             return;
@@ -158,7 +157,7 @@ impl Session {
         }
     }
 
-    /// When to ask for the positions again; `None` while something else is being asked, or nothing at all.
+    /// When to start the next round of position queries; `None` while other requests are sent, or none at all.
     pub(super) fn next_round(&self) -> Option<Duration> {
         if self.pending.is_some() || !self.queue.is_empty() {
             return None;
@@ -182,7 +181,7 @@ impl Session {
         }
     }
 
-    /// What is put in the queue next is no round; what was left of one is not asked any more.
+    /// Prepares the queue for requests that are not a round. Drops the rest of a round.
     pub(super) fn begin_batch(&mut self) {
         self.queue.clear();
         for state in &mut self.axes {
@@ -191,7 +190,7 @@ impl Session {
         self.round_ended = self.round_ended.or(self.round_began).or(Some(Duration::ZERO));
     }
 
-    /// The alarm is what the axes say now.
+    /// Sets the alarm from the axes' faults.
     pub(super) fn renew_alarm(&mut self) {
         let mut faults = self.axes.iter().filter_map(|state| Some((state.name, state.fault?)));
         self.alarm = faults.next_back().map(|(name, flag)| Alarm {
@@ -201,7 +200,7 @@ impl Session {
         });
     }
 
-    /// True if an axis says that it moves.
+    /// True if an axis reports motion.
     pub(super) fn moves(&self) -> bool {
         self.axes.iter().any(|state| state.busy)
     }
@@ -241,7 +240,7 @@ impl Session {
         self.actions.push(Action::Send(command.encode(self.config.checksums)));
     }
 
-    /// Ids go round; the stop's is not used again while it is under way.
+    /// Ids start again at 0 after 99. The id of a stop is not used again while it is under way.
     fn next_id(&mut self) -> u8 {
         let taken = if let Phase::Stopping(stop) = &self.phase { Some(stop.id) } else { None };
         self.last_id = (self.last_id + 1) % 100;

@@ -1,4 +1,4 @@
-//! What a session does about what the controller says.
+//! Handles the controller's responses.
 
 use core::time::Duration;
 
@@ -8,33 +8,33 @@ use crate::grbl::active_move::ActiveMove;
 use crate::grbl::{FEED_HOLD, MachineState, Position, Response, StatusReport, error_meaning};
 use crate::stage::{Controller, Judgement, distance_mm};
 
-/// How long `$X` may take.
+/// Longest time for `$X`.
 const UNLOCK_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// What boot may emit before its banner; it answers no line.
+/// The error that may precede the banner at boot. It answers no line.
 const ERROR_AT_BOOT: u8 = 7;
 
 impl Session {
-    /// Does what one line calls for.
-    pub(super) fn hear(&mut self, now: Duration, response: Response) {
+    /// Handles a line.
+    pub(super) fn handle(&mut self, now: Duration, response: Response) {
         if self.phase == Phase::Over {
             return;
         }
         match response {
-            Response::Ok => self.hear_ok(now),
-            Response::Error(code) => self.hear_error(now, code),
-            Response::Alarm(code) => self.hear_alarm(code),
-            Response::Banner(banner) => self.hear_banner(now, &banner),
-            Response::Status(report) => self.hear_report(now, &report),
+            Response::Ok => self.handle_ok(now),
+            Response::Error(code) => self.handle_error(now, code),
+            Response::Alarm(code) => self.handle_alarm(code),
+            Response::Banner(banner) => self.handle_banner(now, &banner),
+            Response::Status(report) => self.handle_report(now, &report),
             Response::Unknown(_) => self.unknown_lines += 1,
             Response::Setting { number, value } => self.settings.take(number, value),
-            Response::Feedback(text) => self.hear_feedback(&text),
+            Response::Feedback(text) => self.handle_feedback(&text),
             Response::Message(_) | Response::Probe { .. } => {}
         }
     }
 
-    /// Anything but an answer to the line in hand is passed over: noise on the line is answered too.
-    fn hear_ok(&mut self, now: Duration) {
+    /// Ignores an `ok` that does not answer the last line: the controller answers noise on the link, too.
+    fn handle_ok(&mut self, now: Duration) {
         if let Phase::Moving(travel) = &mut self.phase
             && travel.awaits_ok()
         {
@@ -46,12 +46,12 @@ impl Session {
         } else if let Phase::Unlocking { .. } = self.phase {
             self.look(now, Purpose::Clear);
         } else if let Phase::Asking { query, .. } = self.phase {
-            self.hear_answered(now, query);
+            self.handle_answered(now, query);
         }
     }
 
-    /// Of what `$I` tells only the version is of interest.
-    fn hear_feedback(&mut self, text: &str) {
+    /// Takes the version from the answer to `$I`.
+    fn handle_feedback(&mut self, text: &str) {
         if let Phase::Asking { query: Query::Build, .. } = self.phase
             && text.starts_with("VER:")
         {
@@ -61,7 +61,7 @@ impl Session {
     }
 
     /// What was asked before the controller is taken for the rig's has been answered.
-    fn hear_answered(&mut self, now: Duration, query: Query) {
+    fn handle_answered(&mut self, now: Duration, query: Query) {
         if query == Query::Build {
             return self.ask(now, Query::Settings, 1);
         }
@@ -74,14 +74,14 @@ impl Session {
         self.report();
     }
 
-    fn hear_error(&mut self, now: Duration, code: u8) {
+    fn handle_error(&mut self, now: Duration, code: u8) {
         if code == ERROR_AT_BOOT {
             return;
         }
         if let Phase::Asking { query, .. } = self.phase {
             return match query {
                 // It has no version to tell.
-                Query::Build => self.hear_answered(now, query),
+                Query::Build => self.handle_answered(now, query),
                 Query::Settings => self.fail(SessionError::Refused {
                     query: query.line(),
                     code,
@@ -106,8 +106,8 @@ impl Session {
         self.done(Err(Failure::Refused { command, reason }));
     }
 
-    /// An alarm, told by a line, or (0) only by a report.
-    fn hear_alarm(&mut self, code: u8) {
+    /// Handles an alarm from a line; the number is 0 if only a status report showed it.
+    fn handle_alarm(&mut self, code: u8) {
         self.alarm = Some(code);
         self.state = Some(MachineState::Alarm);
         self.homed = false;
@@ -130,7 +130,7 @@ impl Session {
         }
     }
 
-    fn hear_banner(&mut self, now: Duration, banner: &str) {
+    fn handle_banner(&mut self, now: Duration, banner: &str) {
         self.poll.reset();
         self.state = None;
         banner.clone_into(&mut self.identity);
@@ -141,7 +141,7 @@ impl Session {
                 return;
             }
             Phase::Resetting { purpose, .. } => return self.look(now, purpose),
-            // The one that comes by itself and the one that was asked for.
+            // The banner at opening, and the one after the reset.
             Phase::Looking { purpose: Purpose::Greet, .. } | Phase::Asking { .. } => {
                 return self.look(now, Purpose::Greet);
             }
@@ -162,15 +162,15 @@ impl Session {
         self.look(now, Purpose::Recover);
     }
 
-    fn hear_report(&mut self, now: Duration, report: &StatusReport) {
+    fn handle_report(&mut self, now: Duration, report: &StatusReport) {
         let asked = self.poll.answered();
         self.state = Some(report.state);
         let offset_moved = self.take_position(report);
         if report.state != MachineState::Alarm {
             self.alarm = None;
         } else if self.alarm.is_none() && (self.homed || matches!(self.phase, Phase::Moving(_))) {
-            // Its line was lost on the way.
-            return self.hear_alarm(0);
+            // The alarm's own line was lost.
+            return self.handle_alarm(0);
         }
         if offset_moved {
             self.homed = false;
@@ -196,7 +196,7 @@ impl Session {
         }
     }
 
-    /// Takes over the position; true if the work frame has been moved since an earlier report.
+    /// Takes the position. True if the work frame has moved since an earlier report.
     fn take_position(&mut self, report: &StatusReport) -> bool {
         let before = self.work_offset_mm;
         self.work_offset_mm = report.work_offset_mm.or(before);
@@ -235,7 +235,7 @@ impl Session {
                 self.report();
                 self.done(Ok(self.position_mm));
             }
-            Some(MachineState::Alarm) => self.hear_alarm(0),
+            Some(MachineState::Alarm) => self.handle_alarm(0),
             _ => self.report(),
         }
     }
@@ -272,7 +272,7 @@ impl Session {
             Purpose::Stop { failure, held_mm } => {
                 let kept =
                     held_mm.is_some_and(|held| distance_mm(held, position_mm) <= self.config.tolerance_mm);
-                // A stage that says after a reset that it moves can neither be believed nor waited for.
+                // A stage that reports motion after a reset cannot be believed, and would not stop.
                 self.homed &= kept && !self.moves();
                 self.phase = Phase::Ready;
                 self.report();

@@ -1,4 +1,4 @@
-//! What a session does about what devices say.
+//! Handles messages from devices.
 
 use core::time::Duration;
 
@@ -10,19 +10,19 @@ use crate::stage::Alarm;
 use crate::zaber::{Flag, Header, Message, Rejection, Severity};
 
 impl Session {
-    /// Does what one message calls for.
-    pub(super) fn hear(&mut self, now: Duration, message: &Message) {
+    /// Handles a message.
+    pub(super) fn handle(&mut self, now: Duration, message: &Message) {
         match message {
             _ if matches!(self.phase, Phase::Over) => {}
             Message::Reply { header, accepted, busy, flag, data } => {
-                self.hear_reply(now, *header, *accepted, *busy, *flag, data);
+                self.handle_reply(now, *header, *accepted, *busy, *flag, data);
             }
-            Message::Alert { header, flag, .. } => self.hear_alert(now, *header, *flag),
+            Message::Alert { header, flag, .. } => self.handle_alert(now, *header, *flag),
             Message::Info { .. } => {}
         }
     }
 
-    fn hear_reply(
+    fn handle_reply(
         &mut self,
         now: Duration,
         header: Header,
@@ -45,7 +45,7 @@ impl Session {
         };
         let request = pending.request;
         if !accepted {
-            return self.hear_rejection(now, request, &Rejection::parse(data));
+            return self.handle_rejection(now, request, &Rejection::parse(data));
         }
         let Some(answer) = request.request.read(data) else {
             self.ignored += 1;
@@ -56,7 +56,7 @@ impl Session {
             return;
         }
         let all = if let Answer::Flags(flags) = &answer { Some(&flags[..]) } else { None };
-        if self.hear_flags(now, request, flag, all) && self.queue.is_empty() {
+        if self.handle_flags(now, request, flag, all) && self.queue.is_empty() {
             self.conclude(now);
         }
     }
@@ -68,7 +68,7 @@ impl Session {
         header == Header { device: state.axis.device, axis, id: Some(pending.id) }
     }
 
-    /// Takes over what an answer says; false if it ends the session.
+    /// Takes the data of an answer. False if they end the session.
     fn take_answer(
         &mut self,
         SlotRequest { slot, request }: SlotRequest,
@@ -107,7 +107,7 @@ impl Session {
         true
     }
 
-    fn hear_rejection(&mut self, now: Duration, request: SlotRequest, rejection: &Rejection) {
+    fn handle_rejection(&mut self, now: Duration, request: SlotRequest, rejection: &Rejection) {
         let command = request.request.text();
         let moving = matches!(self.phase, Phase::Moving(_) | Phase::Homing { .. });
         match request.request {
@@ -117,11 +117,11 @@ impl Session {
                 let failure = Failure::Refused { command, reason: format!("{name}: {rejection}") };
                 self.halt(now, Some(failure));
             }
-            // What is still wrong afterwards shows in the warnings.
+            // The warnings show what is still wrong.
             Request::Clear | Request::Enable => {
                 self.pending = None;
             }
-            // Asked again when the time is over.
+            // It is sent again after the timeout.
             request if *rejection == Rejection::Again && !request.moves() => {}
             Request::Checksums
             | Request::Version
@@ -141,8 +141,8 @@ impl Session {
         }
     }
 
-    /// An alert has no id and may be as old as its way is long: it is believed for the worse only.
-    fn hear_alert(&mut self, now: Duration, header: Header, flag: Flag) {
+    /// An alert has no id and may be old, so it is believed only if it reports a problem.
+    fn handle_alert(&mut self, now: Duration, header: Header, flag: Flag) {
         let is_meant = |state: &AxisState| {
             state.axis.device == header.device && (header.axis == 0 || header.axis == state.axis.number)
         };
@@ -154,12 +154,12 @@ impl Session {
             && let Some(slot) = self.axes.iter().position(is_meant)
             && severity == Severity::Fault
         {
-            self.hear_flags(now, SlotRequest { slot, request: Request::Warnings }, flag, None);
+            self.handle_flags(now, SlotRequest { slot, request: Request::Warnings }, flag, None);
         }
     }
 
-    /// Takes over the flags of an axis; false if what was under way is off.
-    fn hear_flags(
+    /// Takes the flags of an axis. False if they end the command under way.
+    fn handle_flags(
         &mut self,
         now: Duration,
         SlotRequest { slot, request }: SlotRequest,
@@ -168,7 +168,7 @@ impl Session {
     ) -> bool {
         let Some(state) = self.axes.get_mut(slot) else { return true };
         let is_new_fault = state.take_flags(flag, all);
-        // Both flags stay until the next command, so that only a flag that is new tells of someone else.
+        // Both flags stay until the next command, so only a new one shows an interruption.
         let is_others = matches!(flag, Flag::MANUAL_CONTROL | Flag::INTERRUPTED);
         if request.moves() {
             state.is_ours = !is_others;
@@ -202,7 +202,7 @@ impl Session {
         true
     }
 
-    /// An axis is at fault: the others are stopped, and the command in hand ends when all stand.
+    /// Handles a fault of an axis: stops the others. The command under way ends when all stand still.
     fn fault(&mut self, now: Duration, alarm: Alarm) {
         match &mut self.phase {
             Phase::Stopping(stop) => {
