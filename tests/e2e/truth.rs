@@ -1,8 +1,8 @@
-//! Truth comes back: simulated rigs whose truth varies are measured by the paper's experiments and calibrated, all by
-//! the real binary, and what was found is held against what each rig hides.
+//! Calibration recovers the truth: the real binary measures simulated rigs with different truths by the paper's
+//! experiments and calibrates them; the results are compared with what each rig hides.
 //!
-//! `just truth` does it for 200 rigs with the paper's sweep, and prints the table; here it is a few rigs and a coarse
-//! sweep, which show that nothing is broken, not that the intervals are right.
+//! `just truth` does this for 200 rigs with the paper's sweep, and prints the table of coverage. Here a few rigs and a
+//! coarse sweep show that nothing is broken, not that the intervals are right.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 #![expect(clippy::print_stdout, reason = "the table is what `just truth` is for")]
 
@@ -24,7 +24,7 @@ use toml::Table;
 /// 0.975 quantile of the standard normal distribution.
 const Z_95: f64 = 1.96;
 
-/// How many rigs, and how many points each side of the sweep has.
+/// Number of rigs, and number of points on each side of the sweep.
 fn extent() -> (u64, u64) {
     let of = |name: &str, default| std::env::var(name).map_or(default, |text| text.parse().unwrap());
     (of("TACTUS_TRUTH_RIGS", 2), of("TACTUS_TRUTH_POINTS", 5))
@@ -54,7 +54,7 @@ fn calibration_gives_back_what_simulated_rigs_hide() {
     }
 }
 
-/// What one rig gave: by quantity, errors in units of their standard errors.
+/// Results of one rig: for each quantity, errors in units of their standard errors.
 struct Found {
     errors: Vec<(String, f64)>,
     missed: usize,
@@ -62,7 +62,7 @@ struct Found {
     planted: usize,
 }
 
-/// Makes a rig of a seed, runs the experiments, calibrates, compares.
+/// Makes the rig of a seed, runs the experiments, calibrates, compares.
 fn measured(seed: u64, points: u64) -> Found {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("rig.toml");
@@ -119,7 +119,7 @@ fn varied(seed: u64) -> String {
     put(&["simulation", "seed"], i64::try_from(seed + 1).unwrap().into());
     put(&["simulation", "noise_rms_counts"], within(1.0, 4.0).into());
     put(&["simulation", "gain_spread"], within(0.02, 0.12).into());
-    // A curve too slight to be seen is no curve, and one that is seen is no line.
+    // Either clearly curved or straight: nothing in between, which might or might not be detected.
     let curved = within(0.0, 1.0) > 0.2;
     put(&["simulation", "quadratic_per_mm"], if curved { within(0.05, 0.3) } else { 0.0 }.into());
     put(&["simulation", "surface_mm"], within(-0.05, 0.05).into());
@@ -132,7 +132,7 @@ fn varied(seed: u64) -> String {
     toml::to_string(&rig).unwrap()
 }
 
-/// None to three of each kind of fault, each on an element of its own.
+/// None to three of each kind of fault, each on another element.
 fn faults(rng: &mut impl Rng) -> [(&'static str, toml::Value); 4] {
     let mut left: Vec<i64> = (0..48).collect();
     let mut draw = |rng: &mut dyn Rng, most: u32| {

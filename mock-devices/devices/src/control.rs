@@ -1,4 +1,4 @@
-//! The handle to a virtual rig: what is true in it, and what goes wrong.
+//! The handle to a virtual rig: its true state, and its faults.
 
 use std::sync::Arc;
 

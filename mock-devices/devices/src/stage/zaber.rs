@@ -142,7 +142,7 @@ impl ZaberController {
         }
         match answers.first() {
             None => Err(Rejection::BadAxis),
-            // One value for each axis if the command reads something, else a single `0`.
+            // Equal answers are sent once, different ones side by side.
             Some(first) if answers.iter().all(|answer| answer == first) => Ok(first.clone()),
             Some(_) => Ok(answers.join(" ")),
         }
