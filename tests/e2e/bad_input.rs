@@ -1,4 +1,4 @@
-//! Bad input gets a clear error with the place, a nonzero exit, moves nothing and loses nothing.
+//! Bad input gives a clear error with the place and a nonzero exit code; it moves nothing and loses nothing.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::fs;
@@ -77,7 +77,7 @@ fn a_recording_cut_short_is_told_and_recovered() {
     .unwrap();
     let summary =
         tactus(folder.path(), &[&NOWHERE[..], &["--json", "run", "one.star", "--no-report"]].concat()).json();
-    // A third of the file is amidst the frames: the summary with its schemas takes some 120 kB, the frames of
+    // A third of the file ends within the frames: the summary with its schemas takes about 120 kB, the frames of
     // this run twice that.
     let whole = fs::read(summary["recording"].as_str().unwrap()).unwrap();
     fs::write(folder.path().join("cut.mcap"), &whole[..whole.len() / 3]).unwrap();

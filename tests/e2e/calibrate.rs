@@ -1,11 +1,11 @@
-//! Calibration and the study on the command line: what they write, and how they take data that lack something.
+//! Calibration and the study on the command line: their results, and incomplete data.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use tactus_e2e::{Said, repository, tactus};
+use tactus_e2e::{CommandOutput, repository, tactus};
 use tempfile::TempDir;
 
 fn run(folder: &Path, experiment: &str, parameters: &[&str]) -> PathBuf {
@@ -16,7 +16,7 @@ fn run(folder: &Path, experiment: &str, parameters: &[&str]) -> PathBuf {
     folder.join(said.json()["recording"].as_str().unwrap())
 }
 
-fn calibrate(folder: &Path, files: &[&Path]) -> Said {
+fn calibrate(folder: &Path, files: &[&Path]) -> CommandOutput {
     let mut args = vec!["--json", "calibrate", "--out", "found"];
     args.extend(files.iter().map(|path| path.to_str().unwrap()));
     tactus(folder, &args)
@@ -43,7 +43,7 @@ fn a_calibrated_model_goes_into_the_simulator() {
 
     let said = tactus(folder.path(), &["validate", "found/model.toml"]);
     assert_eq!(said.code, Some(0), "{said:?}");
-    // The faulty elements are in the model: 18 gives the signal of 19, with its own gain.
+    // The faulty elements are in the model: element 18 gives the signal of 19, with its own gain.
     let press = ["--scene", "cylinder", "--x-mm", "7.1", "--y-mm", "4.9", "--depth-mm", "0.5"];
     let image = |model: &[&str]| {
         let said = tactus(folder.path(), &[&["--json", "simulate"], &press[..], model].concat());
@@ -52,7 +52,7 @@ fn a_calibrated_model_goes_into_the_simulator() {
         [row[2].as_f64().unwrap(), row[3].as_f64().unwrap()]
     };
     let [crossed, own] = image(&["--model", "found/model.toml"]);
-    // Their gains differ by 16 %, and a neighbour of its own wits would feel 0.77.
+    // Their gains differ by 16 %; a neighbour without the fault would read 0.77.
     assert!(((crossed - 100.0) / (own - 100.0) - 0.84).abs() < 0.01, "{crossed} {own}");
     let [neighbour, own] = image(&[]);
     assert!(((neighbour - 100.0) / (own - 100.0) - 0.77).abs() < 0.01, "{neighbour} {own}");
@@ -87,7 +87,7 @@ fn one_covering_gives_what_it_can_and_says_what_it_cannot() {
     let missing = sentences(&found, "missing");
     assert!(missing.contains("one covering"), "{missing}");
     assert!(found["thickness"]["linear"].is_null());
-    // Eq. 4 under the thinnest covering.
+    // Eq. 4 at the thinnest covering.
     let sigma_mm = found["thickness"]["coverings"][0]["sigma_mm"]["value"].as_f64().unwrap();
     assert!((sigma_mm - 2.725).abs() < 0.02, "{sigma_mm}");
 }
@@ -119,7 +119,7 @@ fn what_is_no_measurement_is_refused() {
     assert!(!folder.path().join("found").exists());
 }
 
-/// Data that nobody simulated: a soft magnetic skin, pressed at one place (`../shared/data`).
+/// Data of a real device: a soft magnetic skin, pressed at one place (`../shared/data`).
 #[test]
 fn measured_data_of_another_sensor_give_no_number_without_a_warning() {
     let data = repository("../shared/data/eflesh-normal-20250401_014340.parquet");
@@ -137,10 +137,10 @@ fn measured_data_of_another_sensor_give_no_number_without_a_warning() {
     assert!(missing.contains("Registration") && missing.contains("Point spread"), "{missing}");
     let warnings = sentences(&found, "warnings");
     assert!(warnings.contains("nominal") && warnings.contains("times the noise"), "{warnings}");
-    // Some channels rise with the square of the depth: two of their numbers mean little by themselves.
+    // Some channels grow with the square of the depth: two of their parameters mean little by themselves.
     assert!(warnings.contains("begin flat"), "{warnings}");
     assert!(found["health"]["faults"].as_array().unwrap().is_empty(), "{found}");
-    // Sensitivities of both signs, as the data's own description has them.
+    // Sensitivities have both signs, as in the data's description.
     let elements = found["response"]["elements"].as_array().unwrap();
     let negative = elements.iter().filter(|one| one["linear_counts_per_mm"]["value"].as_f64().unwrap() < 0.0);
     assert_eq!((elements.len(), negative.count()), (15, 3));
@@ -160,13 +160,13 @@ fn a_study_makes_every_run_once_and_one_report() {
     let found = said.json();
     assert!(found["truths"].as_u64().unwrap() >= 12, "{found}");
     let runs = || fs::read_dir(folder.path().join("study/runs")).unwrap().count();
-    // Corners, centres, a sweep for each covering, the H at six angles and under each covering.
+    // Corners, centres, a sweep per covering, the H at six angles and under each covering.
     assert_eq!(runs(), 13);
     let page = fs::read_to_string(folder.path().join("study/report.html")).unwrap();
     for figure in ["2a", "2b", "3", "4", "5a", "5b", "6a", "6b", "8a", "8b", "9b", "10a", "10b"] {
         assert!(page.contains(&format!("Figure {figure}")), "{figure}");
     }
-    // As after an interruption: what is missing is made, what is there is not.
+    // As after an interruption: only missing runs are made.
     let state = folder.path().join("study/study.json");
     let mut steps: Value = serde_json::from_str(&fs::read_to_string(&state).unwrap()).unwrap();
     steps["taken"].as_array_mut().unwrap().truncate(4);

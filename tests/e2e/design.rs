@@ -1,4 +1,4 @@
-//! `tactus design`: which covering to order, with numbers that can be checked by hand, and refusals.
+//! `tactus design`: which covering to order, with numbers that can be checked by hand; refused requests.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::fs;
@@ -64,7 +64,7 @@ fn a_measured_model_gives_pitch_and_spread() {
     fs::write(folder.path().join("sharp.toml"), text).unwrap();
     let args = ["--force-steps", "256", "--model", "sharp.toml", "--out", "curve.html"];
     let told = design(folder.path(), &args);
-    // (2 x 0.955 - 1.0) / 0.497 mm, in hundredths upwards.
+    // (2 x 0.955 - 1.0) / 0.497 mm, rounded up to hundredths.
     assert_eq!(told["reason"], "gives_wanted");
     assert_near(&told["recommended"]["thickness_mm"], 1.84, 1e-9);
     assert_near(&told["recommended"]["nyquist_passed"], (-4.5_f64).exp(), 3e-4);

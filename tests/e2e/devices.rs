@@ -1,4 +1,4 @@
-//! `tactus devices`: whatever is plugged into the machine that tests, it can be listed.
+//! `tactus devices` lists whatever is plugged into the test machine.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::fs;

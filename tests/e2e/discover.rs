@@ -1,16 +1,16 @@
-//! Discovery on the command line: what it refuses, and that what it finds is so on a new run.
+//! Discovery on the command line: refused input, and predictions of its model for a new run.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use tactus_e2e::{Said, repository, tactus};
+use tactus_e2e::{CommandOutput, repository, tactus};
 use tactus_record::rows;
 use tempfile::TempDir;
 
-/// Discovers in an empty folder, where nothing may be left behind.
-fn refused(files: &[&str], more: &[&str]) -> Said {
+/// Runs a discovery that must be refused, in an empty folder that must stay empty.
+fn refused(files: &[&str], more: &[&str]) -> CommandOutput {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("noise.mcap"), [0xA5; 512]).unwrap();
     fs::write(folder.path().join("bad.toml"), "schema = \"tactus.model/1\"\n").unwrap();
@@ -102,15 +102,15 @@ fn experiments_on_another_rig_than_the_datas_are_refused_with_both_named() {
     assert_eq!(refused(&["nowhere.mcap"], &["--embedded"]).code, Some(2), "without --active");
 }
 
-/// As `refused`, after a first line.
-fn refused_aloud(files: &[&str], more: &[&str]) -> Said {
+/// As `refused`, after a first line of output.
+fn refused_aloud(files: &[&str], more: &[&str]) -> CommandOutput {
     let folder = TempDir::new().unwrap();
     let said = tactus(folder.path(), &[&["discover"], files, more].concat());
     assert!(!folder.path().join("discovery").exists(), "{said:?}");
     said
 }
 
-/// A rig that hides nothing but what a test has it hide, and a file that has it hide physics of a strength; 1 is a bad rig.
+/// A rig that hides nothing by itself, and a truth file with hidden physics of a strength; 1 is a bad rig.
 fn hide(folder: &Path, physics: &str, strength: f64) {
     let text = fs::read_to_string(repository("config/rigs/sim.toml")).unwrap();
     let mut rig: toml::Table = toml::from_str(&text).unwrap();
@@ -126,7 +126,7 @@ fn hide(folder: &Path, physics: &str, strength: f64) {
     fs::write(folder.join("hidden.toml"), hidden).unwrap();
 }
 
-/// A short diagnosis of the rig; its recording.
+/// Runs a short diagnosis of the rig. Returns its recording.
 fn diagnosed(folder: &Path, truth: &[&str], seed: &str) -> String {
     let run = ["--json", "run", "diagnose", "--embedded", "--no-report", "--rig-file", "rig.toml"];
     let said = tactus(folder, &[&run[..], &["-p", "scale=0.1", "--seed", seed], truth].concat());
@@ -140,7 +140,7 @@ fn counts(recording: &str) -> Vec<f32> {
     counts
 }
 
-/// Root mean square of the differences between two runs of one seed, whose noise is the same.
+/// Root mean square of the differences between two runs with the same seed, and so the same noise.
 fn gap_counts(one: &str, other: &str) -> f64 {
     let (one, other) = (counts(one), counts(other));
     assert_eq!(one.len(), other.len());
@@ -148,8 +148,8 @@ fn gap_counts(one: &str, other: &str) -> f64 {
     (squares / one.len() as f64).sqrt()
 }
 
-/// Hidden physics, a diagnosis, a discovery; then the same experiment with another seed on the rig that hides it, on
-/// the rig without it, and on one that hides the grown model.
+/// Diagnoses a rig with hidden physics and discovers a model. Then makes the experiment with another seed on that rig, on
+/// the rig without hidden physics, and on a rig with the discovered model.
 fn is_named_and_closed(physics: &str, effect: &str, times_smaller: f64) {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
@@ -202,7 +202,7 @@ fn nothing_is_missing_of_a_rig_that_hides_nothing() {
     assert_eq!(said.json()["verdict"], "nothing-missing", "{}", said.json()["gap"]);
 }
 
-/// What was named, and what the data could not tell from it.
+/// The named effects, and those that the data could not distinguish from them.
 fn explanations(run: &Value, when: &str) -> Vec<(String, Vec<String>)> {
     let of = |step: &Value| {
         let others =
@@ -231,7 +231,7 @@ fn lost_motion_and_hysteresis_are_undecided_by_the_papers_corners_and_decided_by
     assert_eq!(explanations(run, "after_equivalent"), [("backlash".into(), vec![])]);
     assert!(run["duration_s"].as_f64().unwrap() < 180.0, "{run}");
 
-    // The run is on file, and where it pressed is within the rig's envelope.
+    // The run is recorded, and all its presses are within the rig's envelope.
     let runs = fs::read_dir(folder.join("discovery/runs")).unwrap();
     let recordings: Vec<_> = runs.map(|run| run.unwrap().path().join("recording.mcap")).collect();
     let rig: toml::Table = toml::from_str(&fs::read_to_string(folder.join("rig.toml")).unwrap()).unwrap();

@@ -1,4 +1,4 @@
-//! The README's first command, and what it promises.
+//! The README's first command, and its promises.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::fs;
@@ -81,7 +81,7 @@ fn two_runs_with_one_seed_are_identical_and_another_seed_differs() {
     assert_ne!(first, other);
 }
 
-/// Every message without what must differ: the run's name and the wall clock.
+/// Every message without the run's name and the wall clock, which always differ.
 fn messages(recording: &Path) -> Vec<String> {
     tactus_record::read(recording)
         .unwrap()
@@ -106,7 +106,7 @@ fn without_wall_clock(mut message: Message) -> String {
     format!("{message:?}")
 }
 
-/// A rig that hides nothing but its stage, and a sensor for it in whose place neighbours add a tenth each.
+/// A rig that hides nothing but its stage, and a model file in which each neighbour adds a tenth of its signal.
 fn write_truth(folder: &Path) {
     let faults = "\nmiswired = [{ element = 18, answers_for = 19 }, { element = 22, answers_for = 23 }]";
     let error = "origin_mm = [0.06, -0.04], rotation_deg = 0.2";
@@ -132,7 +132,7 @@ fn devices_hide_a_model_that_the_recording_shows_and_does_not_tell() {
     };
     let (hidden, plain) = (record(&["--truth", "truth.toml"]), record(&[]));
 
-    // What stands in the recording reads as the model says, to the steps of converter and stage.
+    // The recorded counts are those of the model, up to the steps of converter and stage.
     let deepest = |recording: &Path| {
         let (_, readings) = rows::readings(&[recording]).unwrap();
         let press = readings
@@ -168,7 +168,7 @@ fn devices_hide_a_model_that_the_recording_shows_and_does_not_tell() {
         "the rig's own sensor"
     );
 
-    // The rig's description is in it, but neither the rig file, whose sensor this was not, nor the model.
+    // It contains the rig's description, but neither the rig file, whose sensor was not used, nor the model.
     let bytes = fs::read(&hidden).unwrap();
     let holds = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
     let attachments: Vec<_> = tactus_record::read(&hidden)

@@ -1,5 +1,5 @@
-//! `tactus link check`: a description of frames held against what a device sent, made here byte by byte.
-//! `tactus link sniff`: the same bytes, sent by a device on a pseudo-terminal.
+//! `tactus link check`: compares a description of frames with a device's bytes, which the test makes.
+//! `tactus link sniff`: the same bytes, sent by a device at a pseudo-terminal.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::fs::{self, File};
@@ -9,7 +9,7 @@ use std::path::Path;
 use rustix::process::Signal;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use serde_json::Value;
-use tactus_e2e::{Process, Said, repository, tactus};
+use tactus_e2e::{CommandOutput, Process, repository, tactus};
 use tempfile::TempDir;
 
 /// CRC-16/CCITT-FALSE, bit by bit: polynomial 0x1021, from 0xFFFF, not reflected.
@@ -22,13 +22,13 @@ fn crc(bytes: &[u8]) -> u16 {
     })
 }
 
-/// 0 to 3, and nothing that repeats.
+/// A sequence of 0 to 3 that does not repeat.
 fn noise(index: u8, element: u16) -> u16 {
     let mixed = (u32::from(index) << 16 | u32::from(element)).wrapping_mul(0x9E37_79B9);
     u16::try_from((mixed ^ mixed >> 15).wrapping_mul(0x85EB_CA77) >> 30).unwrap()
 }
 
-/// A frame as config/links/digitacts.toml tells it: sync, length, count, clock in ms, 48 samples, checksum.
+/// A frame in the format of config/links/digitacts.toml: sync, length, count, clock in ms, 48 samples, checksum.
 fn frame(index: u8) -> Vec<u8> {
     let mut bytes = vec![0xAA, 0x55, 101, index];
     bytes.extend((33 * u32::from(index)).to_le_bytes());
@@ -37,7 +37,7 @@ fn frame(index: u8) -> Vec<u8> {
     bytes
 }
 
-/// Forty frames, of which one has a wrong byte, with garbage before them.
+/// Garbage, then forty frames; one of them has a wrong byte.
 fn capture() -> Vec<u8> {
     let mut bytes = vec![1, 2, 3];
     bytes.extend((0..40).flat_map(frame));
@@ -45,7 +45,7 @@ fn capture() -> Vec<u8> {
     bytes
 }
 
-fn check(folder: &Path, description: &str, args: &[&str]) -> Said {
+fn check(folder: &Path, description: &str, args: &[&str]) -> CommandOutput {
     fs::write(folder.join("link.toml"), description).unwrap();
     fs::write(folder.join("bytes.bin"), capture()).unwrap();
     tactus(folder, &[&["link", "check", "link.toml"], args].concat())
@@ -108,7 +108,7 @@ fn a_contradiction_is_refused_by_the_name_of_its_field() {
 
 /// The near end of a pseudo-terminal, and the path of the far end.
 fn terminal() -> (File, String) {
-    // Else whoever is started here holds the near end too, and the device never goes.
+    // Otherwise child processes inherit the near end, and the device never disappears.
     let near = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
     grantpt(&near).unwrap();
     unlockpt(&near).unwrap();
@@ -120,7 +120,7 @@ fn terminal() -> (File, String) {
 fn what_a_device_sends_is_saved_and_its_frames_are_proposed() {
     let folder = TempDir::new().unwrap();
     let (mut device, path) = terminal();
-    // As much as a pseudo-terminal takes before somebody reads.
+    // As many bytes as a pseudo-terminal takes before anybody reads.
     let sent = &capture()[..3200];
     let arguments = ["link", "sniff", &path, "--json", "--bytes", "3200", "--save", "bytes.bin"];
     let mut sniff = Process::start("tactus", folder.path(), &arguments);
@@ -140,7 +140,7 @@ fn what_a_device_sends_is_saved_and_its_frames_are_proposed() {
     assert!(next.contains("frame.bytes = 106") && next.contains("--capture bytes.bin"), "{next}");
     assert_eq!(fs::read(folder.path().join("bytes.bin")).unwrap(), sent);
 
-    // And the next step, with the description as it is shipped.
+    // The next step, with the shipped description.
     fs::write(folder.path().join("link.toml"), shipped()).unwrap();
     let checked = tactus(folder.path(), &["link", "check", "link.toml", "--capture", "bytes.bin", "--json"]);
     assert_eq!(checked.json()["capture"]["frames"], 29);

@@ -37,7 +37,7 @@ fn recording(lab: &ServiceUnderTest) -> PathBuf {
     runs[0].join("recording.mcap")
 }
 
-/// Waits until the array feels the tip, as a viewer of the live frames sees it.
+/// Waits until the live frames show a press.
 fn wait_until_pressing(lab: &ServiceUnderTest) {
     let mut viewer = lab.start_tactus(&["watch", "--json"]);
     viewer.wait_until(|line| {
@@ -48,14 +48,14 @@ fn wait_until_pressing(lab: &ServiceUnderTest) {
     });
 }
 
-/// What the service is doing.
+/// The service's state.
 fn status(lab: &ServiceUnderTest) -> Value {
     let said = lab.tactus(&["--json", "status"]);
     assert_eq!(said.code, Some(0), "{said:?}");
     said.json()
 }
 
-/// Where the tip truly is, as the virtual stage knows.
+/// True position of the tip, from the virtual stage.
 fn truth(lab: &mut ServiceUnderTest) -> Value {
     lab.mock.type_line("truth");
     let line = lab.mock.wait_until(|line| line.starts_with('{'));
@@ -85,7 +85,7 @@ fn a_run_started_by_the_cli_is_done_and_recorded() {
     assert!(said.err.contains("has devices of its own: add --embedded"), "{said:?}");
 }
 
-/// The shipped rig whose sensor sends described frames; its description stays where it is.
+/// The shipped rig whose sensor sends described frames. Its description stays in its place.
 fn described(_: String) -> String {
     let rig = fs::read_to_string(repository("config/rigs/pty-declared.toml")).unwrap();
     let link = repository("config/links/digitacts.toml").display().to_string();
@@ -123,7 +123,7 @@ fn a_sensor_whose_frames_are_described_is_read_and_recorded_with_its_description
     });
     assert_eq!(kept, Some(fs::read(repository("config/links/digitacts.toml")).unwrap()));
 
-    // Frames that are lost are counted by the device's own count, and the press is repeated.
+    // Lost frames are counted by the device's own counter, and the press is repeated.
     fs::remove_dir_all(lab.folder.path().join("runs")).unwrap();
     let script = lab.script("long.star", LONG_DWELL);
     let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
@@ -176,7 +176,7 @@ fn a_sensor_that_goes_for_two_seconds_is_a_gap_of_sixty_frames_and_the_press_is_
         .filter_map(|event| if let Event::Gap(gap) = event { Some(gap) } else { None })
         .collect();
     assert_eq!(gaps.len(), 1, "{gaps:?}");
-    // Two seconds without a device, and the time in which the driver finds it again.
+    // Two seconds without the device, and the time for the driver to find it again.
     assert!((59..=110).contains(&gaps[0].frames_lost), "{gaps:?}");
     assert_eq!(gaps[0].next_seq - gaps[0].after_seq - 1, gaps[0].frames_lost);
     assert!(events.iter().any(|event| matches!(event, Event::PressRepeated(_))));
@@ -270,7 +270,7 @@ fn after_a_start_nothing_moves_before_an_explicit_reset() {
     let done = lab.tactus(&["--json", "run", &presses, "--no-report"]);
     assert_eq!(done.code, Some(0), "{done:?}");
 
-    // The stage knows where it is; the new service moves it none the less only when told so.
+    // The stage knows its position; even so the new service moves it only after a reset.
     lab.daemon.signal(Signal::KILL);
     lab.daemon = Process::start("tactusd", lab.folder.path(), &["--config", "tactusd.toml"]);
     lab.daemon.wait_for("ready");

@@ -1,4 +1,4 @@
-//! The simulator on the command line: images, frames along a path, live frames on the bus, and bad input to each.
+//! The simulator on the command line: images, frames along a path, live frames on the bus, and bad input.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::fs;
@@ -39,7 +39,7 @@ fn the_h_gives_an_image_and_a_picture() {
     assert!((told["sigma_mm"].as_f64().unwrap() / 2.0 - 1.36).abs() < 0.005, "Eq. 4 in pitches of 2.0 mm");
     let counts = image(&told["image"]);
     assert_eq!((counts.len(), counts[0].len()), (6, 8));
-    // The H has a half turn's symmetry, and so has the array.
+    // The H and the array are symmetric under a half turn.
     let turned: Vec<Vec<f64>> = counts.iter().rev().map(|row| row.iter().rev().copied().collect()).collect();
     assert_close(&counts, &turned, 1e-6);
     assert!(fs::read(folder.path().join("h.png")).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
@@ -76,7 +76,7 @@ fn copies_have_the_same_characterisation_and_each_its_own_noise() {
     let copies: Vec<_> = told["copies"].as_array().unwrap().iter().map(image).collect();
     assert_eq!(copies.len(), 3);
     for copy in &copies {
-        // Noise of 2 counts: nine standard deviations, and half a step.
+        // Noise of 2 counts: nine standard deviations, plus half a step.
         assert_close(copy, &clean, 18.5);
         assert!(copy.iter().flatten().all(|counts| counts.fract() == 0.0), "whole steps");
     }
@@ -106,7 +106,7 @@ fn a_models_characterisation_goes_to_another_array() {
 #[test]
 fn frames_follow_a_path() {
     let folder = TempDir::new().unwrap();
-    // Down upon the centre of element 17 within a second.
+    // Down onto the centre of element 17 within a second.
     fs::write(folder.path().join("path.csv"), "t_s,x_mm,y_mm,z_mm\n0,2.9,4.9,0.1\n1,2.9,4.9,-0.4\n").unwrap();
     let args = ["simulate", "--scene", "cylinder", "--trajectory", "path.csv", "--rate-hz", "10"];
     let said = tactus(folder.path(), &args);

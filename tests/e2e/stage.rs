@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use tactus_e2e::{Process, Said, ServiceUnderTest, free_endpoint, repository, tactus};
+use tactus_e2e::{CommandOutput, Process, ServiceUnderTest, free_endpoint, repository, tactus};
 use tempfile::TempDir;
 
 const ZABER: &str = "protocol = \"zaber-ascii\"
@@ -13,7 +13,7 @@ axes.y = { device = 1, axis = 2, um_per_microstep = 0.047625 }
 axes.z = { device = 2, axis = 1, um_per_microstep = 0.047625, direction = -1, origin_microsteps = 629_921 }
 ";
 
-/// A shipped rig whose stage speaks otherwise.
+/// A shipped rig with another protocol of its stage.
 fn rig_file(folder: &Path, shipped: &str, protocol: &str) {
     let rig = fs::read_to_string(repository(shipped)).unwrap();
     fs::write(folder.join("rig.toml"), rig.replace("protocol = \"grbl\"\n", protocol)).unwrap();
@@ -28,7 +28,7 @@ fn served(folder: &Path, protocol: &str) -> Process {
     mock
 }
 
-fn check(folder: &Path, args: &[&str]) -> Said {
+fn check(folder: &Path, args: &[&str]) -> CommandOutput {
     let endpoint = free_endpoint();
     tactus(folder, &[&["--endpoint", &endpoint, "stage", "check"], args].concat())
 }
@@ -117,7 +117,7 @@ fn a_stage_that_the_service_holds_is_left_alone() {
     let said = lab.tactus(&["stage", "check", "--rig", "rig.toml", "--home", "--yes"]);
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.err.contains("busy") && said.err.contains("systemctl stop tactusd"), "{said:?}");
-    // One that listens elsewhere is not found, but its lock on the port is.
+    // A service at another endpoint is not found, but its lock on the port is.
     let said = check(lab.folder.path(), &["--rig", "rig.toml", "--home", "--yes"]);
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.out.contains("another program holds the port"), "{said:?}");

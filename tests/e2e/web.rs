@@ -1,4 +1,4 @@
-//! The dashboard over HTTP, as a browser speaks it; `just browser` has a real one.
+//! The dashboard over HTTP, with a browser's requests; `just browser` tests it with a real one.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -10,7 +10,7 @@ use tactus_e2e::{Process, ServiceUnderTest, free_endpoint};
 
 const HOLD: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 600.0)\n";
 
-/// `tactus-web` and where it listens.
+/// A running `tactus-web`, and its address.
 struct Web {
     _process: Process,
     address: String,
@@ -35,7 +35,7 @@ impl Web {
         socket
     }
 
-    /// Status and all that is answered.
+    /// Status code, and the whole response.
     fn ask(&self, request: &str, headers: &str) -> (u16, String) {
         let mut answer = String::new();
         self.send(request, headers).read_to_string(&mut answer).unwrap();
@@ -43,7 +43,7 @@ impl Web {
         (status.unwrap_or_else(|| panic!("no status: {answer}")), answer)
     }
 
-    /// The first view that is as wanted.
+    /// Waits for the first view that fulfils a condition.
     fn until(&self, is_it: impl Fn(&Value) -> bool) -> Value {
         let lines = BufReader::new(self.send("GET /live", "")).lines();
         let views =

@@ -1,7 +1,7 @@
-//! Drives the real binaries: starts them, waits for what they say, ends them.
+//! Drives the real binaries: starts them, waits for their output, ends them.
 //!
-//! The binaries are those that `cargo test --workspace` has just built. Nothing here sleeps: every wait is
-//! for a line, an answer or an exit, with a deadline that only a hang can reach.
+//! The binaries are those that `cargo test --workspace` has just built. Nothing here sleeps: every wait is for a line, an
+//! answer or an exit, with a deadline that only a hang can reach.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
 
 use std::fs;
@@ -23,7 +23,7 @@ pub const DEADLINE: Duration = Duration::from_mins(2);
 /// Path of one of our binaries.
 ///
 /// # Panics
-/// If it is not there: `cargo test --workspace` builds it.
+/// If it is missing: `cargo test --workspace` builds it.
 pub fn binary(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own path");
     let folder = test.ancestors().nth(2).expect("tests stand in target/<profile>/deps");
@@ -37,9 +37,9 @@ pub fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
 }
 
-/// What a finished command said.
+/// Output of a finished command.
 #[derive(Debug)]
-pub struct Said {
+pub struct CommandOutput {
     /// Exit code; `None` after a signal.
     pub code: Option<i32>,
     /// Standard output.
@@ -48,17 +48,17 @@ pub struct Said {
     pub err: String,
 }
 
-impl Said {
+impl CommandOutput {
     /// The one JSON object on standard output.
     ///
     /// # Panics
-    /// If it is none.
+    /// If it is no JSON.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error} in {self:?}"))
     }
 }
 
-impl From<Output> for Said {
+impl From<Output> for CommandOutput {
     fn from(output: Output) -> Self {
         Self {
             code: output.status.code(),
@@ -72,7 +72,7 @@ impl From<Output> for Said {
 ///
 /// # Panics
 /// If it cannot be started.
-pub fn tactus(folder: &Path, args: &[&str]) -> Said {
+pub fn tactus(folder: &Path, args: &[&str]) -> CommandOutput {
     let output = Command::new(binary("tactus")).args(args).current_dir(folder).stdin(Stdio::null()).output();
     output.expect("tactus starts").into()
 }
@@ -88,7 +88,7 @@ pub struct Process {
 }
 
 impl Process {
-    /// Starts one of our binaries; what it writes to standard output and standard error are its lines.
+    /// Starts one of our binaries. Its lines are those of standard output and standard error.
     ///
     /// # Panics
     /// If it cannot be started.
@@ -121,7 +121,7 @@ impl Process {
     /// Waits for a line that contains `text`, and returns it.
     ///
     /// # Panics
-    /// If the process ends or hangs before it says so.
+    /// If the process ends or hangs before that line.
     pub fn wait_for(&mut self, text: &str) -> String {
         self.wait_until(|line| line.contains(text))
     }
@@ -129,13 +129,13 @@ impl Process {
     /// Waits for a line that `is_it`, and returns it.
     ///
     /// # Panics
-    /// If the process ends or hangs before it says so.
+    /// If the process ends or hangs before that line.
     pub fn wait_until(&mut self, is_it: impl Fn(&str) -> bool) -> String {
         let deadline = Instant::now() + DEADLINE;
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
             let Ok(line) = self.lines.recv_timeout(left) else {
-                panic!("{} never said what was waited for; it said:\n{}", self.name, self.seen.join("\n"));
+                panic!("{} never printed the awaited line; it printed:\n{}", self.name, self.seen.join("\n"));
             };
             self.seen.push(line.clone());
             if is_it(&line) {
@@ -147,7 +147,7 @@ impl Process {
     /// Types a line into its standard input.
     ///
     /// # Panics
-    /// If it does not read any more.
+    /// If it no longer reads.
     pub fn type_line(&mut self, line: &str) {
         writeln!(self.stdin, "{line}")
             .and_then(|()| self.stdin.flush())
@@ -157,13 +157,13 @@ impl Process {
     /// Sends a signal.
     ///
     /// # Panics
-    /// If it has gone already.
+    /// If it has already ended.
     pub fn signal(&self, signal: Signal) {
         let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw).expect("a process id");
         kill_process(pid, signal).expect("the process is there");
     }
 
-    /// Waits for its end and returns the exit code and everything it said.
+    /// Waits for its end and returns the exit code and everything that it printed.
     ///
     /// # Panics
     /// If it hangs.
@@ -175,7 +175,7 @@ impl Process {
                 Ok(line) => self.seen.push(line),
                 Err(mpsc::RecvTimeoutError::Disconnected) => break,
                 Err(mpsc::RecvTimeoutError::Timeout) => {
-                    panic!("{} does not end; it said:\n{}", self.name, self.seen.join("\n"))
+                    panic!("{} does not end; it printed:\n{}", self.name, self.seen.join("\n"))
                 }
             }
         }
@@ -186,21 +186,21 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may have ended already.
         if self.child.kill().is_ok() {
             drop(self.child.wait());
         }
     }
 }
 
-/// A virtual rig on pseudo-terminals and a service that owns it, in a folder of their own.
+/// A virtual rig at pseudo-terminals and a service that uses it, in a temporary folder.
 #[derive(Debug)]
 pub struct ServiceUnderTest {
     /// The virtual devices; faults are typed into them.
     pub mock: Process,
     /// The service.
     pub daemon: Process,
-    /// Where it listens.
+    /// Bus endpoint of the service.
     pub endpoint: String,
     /// The working directory of both.
     pub folder: TempDir,
@@ -241,7 +241,7 @@ impl ServiceUnderTest {
     }
 
     /// Runs `tactus` against the service, to its end.
-    pub fn tactus(&self, args: &[&str]) -> Said {
+    pub fn tactus(&self, args: &[&str]) -> CommandOutput {
         tactus(self.folder.path(), &[&["--endpoint", &self.endpoint], args].concat())
     }
 

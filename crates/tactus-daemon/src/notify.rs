@@ -1,4 +1,4 @@
-//! What systemd is told: ready, alive, stopping. Nothing happens where there is no systemd.
+//! Notifications for systemd: ready, alive, stopping. Without systemd nothing happens.
 
 use std::time::Duration;
 
@@ -17,12 +17,12 @@ pub(crate) fn stopping() {
     tell(&[NotifyState::Stopping]);
 }
 
-/// Feeds the watchdog for as long as acquisition and the safety supervisor really go on.
+/// Feeds the watchdog while acquisition and the safety supervisor make progress.
 pub(crate) async fn feed_watchdog(engine: Engine) {
     let Some(limit) = sd_notify::watchdog_enabled() else { return };
     let pulse = engine.pulse();
     let mut fed = Pulse::default();
-    // Half the limit, as sd_watchdog_enabled(3) advises; nothing can have gone on before the first half is over.
+    // Half the limit, as sd_watchdog_enabled(3) advises. The first check is after one period: before it there is no progress to see.
     let period = (limit / 2).max(Duration::from_millis(1));
     let mut tick = interval_at(Instant::now() + period, period);
     loop {
@@ -39,6 +39,6 @@ pub(crate) async fn feed_watchdog(engine: Engine) {
 
 fn tell(states: &[NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(states) {
-        warn!(%error, "systemd could not be told");
+        warn!(%error, "systemd could not be notified");
     }
 }

@@ -1,4 +1,4 @@
-//! The service: acquires from start to end, answers commands, runs experiments.
+//! The service: acquires frames from start to end, answers commands, runs experiments.
 //!
 //! | task | waits for |
 //! |---|---|
@@ -35,8 +35,8 @@ use crate::notify;
 use commands::CommandDesk;
 use publish::BusPublisher;
 
-/// How long a run may take to retract and close its recording at shutdown.
-const FAREWELL: Duration = Duration::from_secs(30);
+/// Time for a run to retract and close its recording at shutdown.
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// The lab service of Tactus.
 #[derive(Debug, Parser)]
@@ -45,10 +45,10 @@ struct Options {
     /// The configuration file.
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
-    /// Overrides the configuration's log format.
+    /// Log format; overrides the configuration.
     #[arg(long, value_enum)]
     log: Option<LogFormat>,
-    /// Where recordings go; overrides the configuration.
+    /// Folder of recordings; overrides the configuration.
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
 }
@@ -62,9 +62,9 @@ enum ServiceError {
     Engine(#[from] EngineError),
     #[error(transparent)]
     Bus(#[from] BusError),
-    #[error("the system gives no {what}: {source}")]
+    #[error("the system provides no {what}: {source}")]
     System { what: &'static str, source: std::io::Error },
-    #[error("the run did not close within {FAREWELL:?}: its recording may lack its end")]
+    #[error("the run did not close within {SHUTDOWN_TIMEOUT:?}: its recording may lack its end")]
     Hung,
 }
 
@@ -95,7 +95,7 @@ fn start(config: Config) -> Result<(), ServiceError> {
     let runtime =
         tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(system("runtime"))?;
     let served = runtime.block_on(serve(config));
-    // What still computes, such as a dry run, does not hold the process.
+    // A computation that still runs, such as a dry run, does not delay the end of the process.
     runtime.shutdown_background();
     served
 }
@@ -148,7 +148,7 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     };
     info!("{signalled}: closing down");
     notify::stopping();
-    let closed = farewell(&engine, signalled).await;
+    let closed = end_run(&engine, signalled).await;
     drop(alive);
     for task in tasks {
         task.abort();
@@ -166,11 +166,11 @@ async fn frames_flow(engine: &Engine) {
 }
 
 /// Ends the run in progress: stop, retract, close the recording.
-async fn farewell(engine: &Engine, signalled: &str) -> Result<(), ServiceError> {
+async fn end_run(engine: &Engine, signalled: &str) -> Result<(), ServiceError> {
     engine.stop(StopOrder {
         by: "signal".into(),
         reason: format!("{signalled}: the service closes down"),
         abort: false,
     });
-    timeout(FAREWELL, engine.released()).await.map_err(|_| ServiceError::Hung)
+    timeout(SHUTDOWN_TIMEOUT, engine.released()).await.map_err(|_| ServiceError::Hung)
 }

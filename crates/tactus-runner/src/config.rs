@@ -9,33 +9,33 @@ use tactus_schema::{Rig, RigError};
 
 use crate::order::Texts;
 
-/// The checked configuration, with the rig it names.
+/// The checked configuration, with the rig that it names.
 #[derive(Debug, Clone)]
 pub struct Config {
     /// The rig.
     pub rig: RigFiles,
-    /// Where experiment scripts are looked for, before the built-in ones.
+    /// Folder of experiment scripts, searched before the built-in ones.
     pub experiments: Option<PathBuf>,
-    /// Where recordings go.
+    /// Folder of recordings.
     pub recordings: PathBuf,
     /// Endpoints of the bus.
     pub bus: BusSection,
-    /// How to log.
+    /// Format and filter of the log.
     pub log: LogSection,
 }
 
-/// A rig, how its sensor is spoken to, and the texts of the files that say so.
+/// A rig, the format of its sensor, and the texts of their files.
 #[derive(Debug, Clone)]
 pub struct RigFiles {
-    /// The rig.
+    /// The checked rig.
     pub rig: Rig,
-    /// How its sensor is spoken to.
+    /// Protocol of its sensor.
     pub codec: SensorCodec,
-    /// For the recordings.
+    /// The files as they were read, for recordings.
     pub texts: RigTexts,
 }
 
-/// What was read of a rig, as it was read.
+/// The texts of a rig's files, as they were read.
 #[derive(Debug, Clone)]
 pub struct RigTexts {
     /// The rig file.
@@ -48,7 +48,7 @@ pub struct RigTexts {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BusSection {
-    /// Where to listen; nothing beyond loopback unless it is named here.
+    /// Endpoints on which to listen. Default: only loopback.
     #[serde(default = "loopback")]
     pub listen: Vec<String>,
     /// Routers to connect to.
@@ -63,7 +63,7 @@ pub struct LogSection {
     /// Text for people, JSON for machines.
     #[serde(default)]
     pub format: LogFormat,
-    /// What is logged, in the form of `RUST_LOG`, which has precedence.
+    /// Filter in the form of `RUST_LOG`, which has precedence.
     #[serde(default = "info")]
     pub filter: String,
 }
@@ -72,57 +72,35 @@ pub struct LogSection {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum LogFormat {
-    /// One readable line each; without times under journald, which has its own.
+    /// One readable line per entry; without times under journald, which has its own.
     #[default]
     Text,
-    /// One JSON object each.
+    /// One JSON object per entry.
     Json,
 }
 
 /// Why a configuration cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ConfigError {
     /// A file could not be read.
     #[error("{}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file is not of the right form; the text names line and key.
+    Read { path: PathBuf, source: std::io::Error },
+    /// The file has a wrong form; the message names line and key.
     #[error("{}: {source}", path.display())]
-    Form {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: toml::de::Error,
-    },
-    /// The rig file is not a rig.
+    Form { path: PathBuf, source: toml::de::Error },
+    /// The rig file cannot be used.
     #[error("{}: {source}", path.display())]
-    Rig {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: RigError,
-    },
-    /// The description of the sensor's frames that the rig file names.
+    Rig { path: PathBuf, source: RigError },
+    /// The description of the sensor's frames cannot be used.
     #[error(transparent)]
     Link(#[from] LinkFileError),
-    /// The folder of experiments is not there.
+    /// The folder of experiments does not exist.
     #[error("{}: experiments = {folder:?} is no folder", path.display())]
-    Experiments {
-        /// The configuration.
-        path: PathBuf,
-        /// What it names.
-        folder: PathBuf,
-    },
+    Experiments { path: PathBuf, folder: PathBuf },
     /// The rig describes data, not a service.
     #[error("{}: a service needs the tables envelope, motion, policy, sensor and stage", path.display())]
-    NoService {
-        /// The rig file.
-        path: PathBuf,
-    },
+    NoService { path: PathBuf },
 }
 
 #[derive(Debug, Deserialize)]
@@ -152,8 +130,9 @@ impl Default for LogSection {
 }
 
 impl Config {
-    /// Reads and checks the file, the rig file it names, and the files that this one names. Paths in it are relative to its own folder,
-    /// but recordings: those are relative to systemd's state directory, or else to the working directory.
+    /// Reads and checks the file, the rig file that it names, and the files that the rig file names. Paths are relative to
+    /// the configuration's folder, except `recordings`: that is relative to systemd's state directory if there is one, else
+    /// to the working directory.
     ///
     /// # Errors
     /// [`ConfigError`] names the file, and the line or field in it.
@@ -172,8 +151,7 @@ impl Config {
 }
 
 impl RigFiles {
-    /// A rig that a service can use, from the text of its file; a description of frames is looked for relative to
-    /// `path`.
+    /// A rig that a service can use, from the text of its file. The path of a description of frames is relative to `path`.
     ///
     /// # Errors
     /// As [`Config::load`].
@@ -190,12 +168,12 @@ impl RigFiles {
 }
 
 impl RigTexts {
-    /// All that was read.
+    /// All texts.
     pub fn all(&self) -> Texts<'_> {
         Texts { rig_toml: Some(&self.rig_toml), link_toml: self.link_toml.as_deref() }
     }
 
-    /// Without the rig file, what of it says of simulated devices being otherwise.
+    /// Without the rig file, for runs in which its `[simulation]` does not hold.
     pub fn without_rig(&self) -> Texts<'_> {
         Texts { rig_toml: None, ..self.all() }
     }

@@ -14,19 +14,19 @@ use tactus_schema::rig::{Service, Transport, UsbLink};
 use tactus_virtual::{RigControl, Truth, VirtualRig};
 use tokio::sync::mpsc;
 
-/// Started devices, and the truth behind the virtual ones among them.
+/// Started devices, and the handle to the virtual ones among them.
 #[derive(Debug)]
 pub struct OpenedRig {
-    /// For the engine.
+    /// Drivers for the engine.
     pub devices: Devices,
-    /// Of the embedded virtual devices, if there are any.
+    /// Handle to the embedded virtual devices, if there are any.
     pub control: Option<RigControl>,
 }
 
-/// Starts the drivers of a rig, and its virtual devices where the rig says `embedded`; `truth` is what those hide, and
-/// both ends of the sensor's link speak by `codec`.
+/// Starts the drivers of a rig, and virtual devices for transports that are `embedded`. `truth` makes the truth of those;
+/// `codec` is the sensor's protocol, at both ends of the link.
 ///
-/// Devices need not be there yet: drivers wait for them.
+/// Devices need not be connected yet: drivers wait for them.
 pub fn open(
     rig: &Rig,
     service: &Service,
@@ -51,7 +51,7 @@ pub fn open(
     OpenedRig { devices: Devices { sensor, stage, stage_reports, change_covering }, control }
 }
 
-/// Starts the driver of a rig's stage alone; `embedded` is the way to it where the rig says `embedded`.
+/// Starts the driver of a rig's stage alone; `embedded` connects to a virtual stage.
 pub(crate) fn open_stage(
     rig: &Rig,
     service: &Service,
@@ -70,7 +70,7 @@ fn connector(transport: &Transport, embedded: impl FnOnce() -> Option<Box<dyn Co
     }
 }
 
-/// The way to a physical device; `None` for one that is embedded.
+/// The connector of a physical device; `None` for an embedded one.
 pub fn physical(transport: &Transport) -> Option<Box<dyn Connect>> {
     Some(match transport {
         Transport::Serial { port, baud } => Box::new(SerialConnector::of(port.clone(), *baud)),

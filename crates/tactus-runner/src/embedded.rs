@@ -19,7 +19,7 @@ use crate::{devices, virtual_time};
 
 pub use tactus_virtual::{HIDDEN_SCHEMA, Truth, TruthError, TruthFile};
 
-/// The rig that needs no hardware, as it is shipped in `config/rigs/sim.toml`.
+/// The text of `config/rigs/sim.toml`: the simulated rig that needs no hardware.
 pub const SIMULATED_RIG: &str = include_str!("../../../config/rigs/sim.toml");
 
 /// [`SIMULATED_RIG`], read.
@@ -33,63 +33,61 @@ pub fn simulated_rig() -> Result<RigFiles, ConfigError> {
 /// How time passes in an embedded run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// Nobody waits.
+    /// Virtual time: as fast as it computes.
     Virtual,
-    /// As on a real rig.
+    /// Real time, as on a real rig.
     Real,
 }
 
-/// A run that was done, well or badly.
+/// A run that ended, successfully or not.
 #[derive(Debug, Clone)]
 pub struct Finished {
-    /// How it ended.
+    /// Exit status, message and totals.
     pub outcome: RunOutcome,
-    /// Its recording.
+    /// Path of its recording.
     pub recording: PathBuf,
 }
 
 /// Why there was no run.
 #[derive(Debug, thiserror::Error)]
 pub enum EmbeddedError {
-    /// The rig is not one.
+    /// The rig is invalid.
     #[error(transparent)]
     Rig(#[from] RigError),
-    /// The rig has no service part.
+    /// The engine refused the rig.
     #[error(transparent)]
     Engine(#[from] EngineError),
     /// Its devices are not in this process.
     #[error(
         "the devices of rig {rig:?} are not embedded (transport.kind): they are run by the service, `tactusd`"
     )]
-    NotEmbedded {
-        /// The rig's name.
-        rig: String,
-    },
-    /// The truth is not one of this rig.
+    #[expect(missing_docs, reason = "the message says what each field is")]
+    NotEmbedded { rig: String },
+    /// The truth does not fit this rig.
     #[error(transparent)]
     Truth(#[from] TruthError),
-    /// The script or its parameters.
+    /// The script or its parameters are wrong.
     #[error(transparent)]
     Script(#[from] ScriptError),
-    /// The dry run.
+    /// There was no dry run.
     #[error(transparent)]
     Twin(#[from] TwinError),
-    /// The dry run found a step that cannot be done; nothing was moved.
+    /// The dry run found a step that cannot be done. Nothing was moved.
     #[error("{}", .0.outcome.message)]
     NotPossible(Box<DryRun>),
     /// The recording could not be opened.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// The system gave no thread or runtime.
+    /// The system provided no thread or runtime.
     #[error("no run: {0}")]
     System(#[from] io::Error),
 }
 
-/// What a simulated rig hides from the service, the same in all its runs: what comparisons hold findings against.
-/// The virtual devices are made of this very [`Truth`].
+/// The truth that a simulated rig hides from the service, equal in all its runs, for comparison with results. The virtual
+/// devices are made from it.
 ///
 /// `None` for a rig that hides nothing: one with physical devices, or a description that came with data. A run with a
-/// [`TruthFile`] hides that instead, and its recording holds no rig file that says otherwise.
+/// [`TruthFile`] hides that file's truth instead, and its recording does not contain the rig file.
 pub fn truth(rig: &Rig) -> Option<Truth> {
     let simulation = rig.simulation.as_ref().filter(|_| rig.simulated)?;
     Some(Truth::of(rig, simulation, simulation.seed))
@@ -98,10 +96,10 @@ pub fn truth(rig: &Rig) -> Option<Truth> {
 /// Dry-runs the experiment on the rig's twin and then runs it on the rig, whose devices must be embedded.
 /// Blocks until it is over.
 ///
-/// With a `truth`, the devices hide that in the place of what the rig file says of the sensor. Neither the dry run nor
-/// the recording knows it: the recording then has the rig's description, but not its file.
+/// With `truth`, the devices use that file's sensor instead of the rig file's. It is hidden from the dry run and the
+/// recording: the recording then contains the rig's description, but not its file.
 ///
-/// `started` gets the engine and the recording's path as soon as the run is about to begin.
+/// `started` is called with the engine and the order just before the run begins.
 ///
 /// # Errors
 /// [`EmbeddedError`] if there was no run at all; how a run ended is in [`Finished`].
@@ -139,7 +137,7 @@ pub fn run(
         return Err(EmbeddedError::NotPossible(Box::new(plan)));
     }
     order.planned = Some(plan.promise());
-    // Who runs simulated devices of one's own has nobody else to ask.
+    // The devices exist for this run only: nobody has to look at them before a reset.
     order.resets = true;
     let texts = if truth.is_none() { texts.all() } else { texts.without_rig() };
     let (recording, path) = order::recording(&order, rig, texts, folder, clock.now().wall)?;

@@ -16,29 +16,20 @@ pub const BUILT_IN: [(&str, &str); 5] = [
 
 /// Why there is no such experiment.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum ExperimentError {
     /// No script of that name.
     #[error("no experiment {name:?}; there is: {known}; or give the path of a .star file")]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// The names that exist.
-        known: String,
-    },
+    Unknown { name: String, known: String },
     /// The file could not be read.
     #[error("{}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is not a script.
+    Read { path: PathBuf, source: std::io::Error },
+    /// The script has an error.
     #[error(transparent)]
     Script(#[from] ScriptError),
 }
 
-/// The script that a person at this machine means: a path that ends in `.star`, or a name.
+/// Finds a script for a person at this machine: by a path that ends in `.star`, or by name.
 ///
 /// # Errors
 /// [`ExperimentError`]; the script's own errors name the line.
@@ -51,7 +42,7 @@ pub fn find(name_or_path: &str, folder: Option<&Path>) -> Result<Script, Experim
     }
 }
 
-/// The script of that name, in `folder` or built in. Never reads anywhere else, whatever the name.
+/// Finds a script by name, in `folder` or built in. Never reads anywhere else, whatever the name.
 ///
 /// # Errors
 /// As [`find`].

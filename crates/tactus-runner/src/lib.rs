@@ -1,15 +1,16 @@
 //! From a rig file and an experiment to a run: what the service `tactusd` and the embedded rig of the CLI share.
 //!
-//! | module | what it composes |
+//! | module | purpose |
 //! |---|---|
 //! | [`config`] | the configuration and rig files |
-//! | [`experiments`] | names to scripts |
-//! | [`order`] | a request to a checked order, its run id and its recording |
+//! | [`experiments`] | finds scripts by name |
+//! | [`order`] | turns a request into a checked order with its run id and recording |
 //! | [`devices`] | transports, drivers and virtual devices of a rig |
-//! | [`recorder`] | the recording behind the engine |
+//! | [`recorder`] | writes the recording for the engine |
 //! | [`twin`] | the dry run on a simulated twin |
 //! | [`embedded`] | one run in this process, without a service |
-//! | [`stage_check`] | a look at a rig's stage alone: what it is, and whether it moves as it says |
+//! | [`stage_check`] | a check of a rig's stage alone: its identity, and whether it moves as it reports |
+//! | [`logging`] | logs for terminals, the journal and machines |
 
 pub mod config;
 pub mod devices;

@@ -15,8 +15,8 @@ use crate::config::LogFormat;
 
 /// Logs to standard error from here on. `RUST_LOG` has precedence over `filter`.
 ///
-/// Under journald, which stamps and stores each line itself, times and colours are left out, and a line's level is the entry's
-/// priority: `journalctl -p warning` shows what went wrong.
+/// Under journald, which adds times itself, lines have neither times nor colours, and a line's level is the entry's
+/// priority: `journalctl -p warning` shows warnings and errors.
 pub fn start(format: LogFormat, filter: &str) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(filter));
     let lines = tracing_subscriber::fmt()
@@ -33,13 +33,13 @@ pub fn start(format: LogFormat, filter: &str) {
     };
 }
 
-/// True if standard error is the stream that journald gave us. The variable alone does not tell: children inherit it.
+/// True if standard error is journald's stream. The variable alone is no proof: child processes inherit it.
 fn is_journal() -> bool {
     let Ok(stream) = std::env::var("JOURNAL_STREAM") else { return false };
     fs::metadata("/proc/self/fd/2").is_ok_and(|there| stream == format!("{}:{}", there.dev(), there.ino()))
 }
 
-/// Puts the priority before a line, in the form of sd-daemon(3), which journald takes off again.
+/// Puts the priority before a line, in the form of sd-daemon(3); journald removes it.
 struct Ranked<F>(F);
 
 impl<S, N, F> FormatEvent<S, N> for Ranked<F>
@@ -59,7 +59,7 @@ where
     }
 }
 
-/// The level as syslog(3) counts.
+/// The level as a number of syslog(3).
 fn priority(level: Level) -> u8 {
     match level {
         Level::ERROR => 3,

@@ -1,4 +1,4 @@
-//! From what somebody asked for to an order the engine can take.
+//! From a request to a checked order for the engine.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,29 +9,29 @@ use tactus_plan::{Arguments, Limits, RigView, Script, ScriptError};
 use tactus_record::{Header, RecordError, Recording};
 use tactus_schema::{Rig, WallTime};
 
-/// What somebody asks for.
+/// A request for a run.
 #[derive(Debug, Clone)]
 pub struct RunRequest {
-    /// The experiment.
+    /// The experiment script.
     pub script: Script,
     /// The parameters that differ from their defaults.
     pub arguments: Arguments,
-    /// The seed; a new one each time if `None`.
+    /// Seed of the script's random numbers; derived from the time if `None`.
     pub seed: Option<u64>,
-    /// Who asks.
+    /// The person or program that requests the run.
     pub who: String,
 }
 
-/// The rig's files for a recording.
+/// Texts of the rig's files for a recording.
 #[derive(Debug, Clone, Copy)]
 pub struct Texts<'a> {
-    /// The rig file; none if what it says of simulated devices is not so.
+    /// The rig file; `None` if its `[simulation]` does not hold for the run.
     pub rig_toml: Option<&'a str>,
     /// The description of the sensor's frames, if the rig file names one.
     pub link_toml: Option<&'a str>,
 }
 
-/// Makes the order, with a new run id. Everything about the parameters is checked here.
+/// Makes the order, with a new run id, and checks the parameters.
 ///
 /// # Errors
 /// [`ScriptError`] names the parameter or the script's line.
@@ -59,8 +59,8 @@ pub fn order(request: RunRequest, rig: &Rig, at: WallTime) -> Result<RunOrder, S
     })
 }
 
-/// Opens the recording of an order: `recording.mcap` in a folder of the run's own, made below `folder`. It
-/// keeps the rig's files as they were read, the rig file unless what it says of simulated devices is not so.
+/// Opens the recording of an order: `recording.mcap` in a new folder of the run, below `folder`. It contains the texts of
+/// the rig's files.
 ///
 /// # Errors
 /// [`RecordError`] names the path.

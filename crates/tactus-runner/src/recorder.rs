@@ -1,4 +1,4 @@
-//! The recording behind the engine: written in place in virtual time, on a thread of its own in real time.
+//! Writes the engine's recording: directly in virtual time, on a separate thread in real time.
 
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{self, JoinHandle};
@@ -7,14 +7,14 @@ use tactus_engine::{Record, RecordFailure};
 use tactus_record::{RecordError, Recording};
 use tactus_schema::{Frame, TimeStamp, pb};
 
-/// What may wait for the disk: a minute of frames, reports and events. If it is full the run fails, loudly.
+/// Capacity of the queue to the disk: about a minute of frames, reports and events. If it is full the run fails.
 const QUEUE: usize = 4096;
 
-/// Writes in place: in virtual time nothing waits for the disk.
+/// Writes directly: in virtual time nothing has to keep up with a clock.
 #[derive(Debug)]
 pub struct DirectRecorder(pub Recording);
 
-/// Hands everything to a thread, so that a slow disk never holds up acquisition.
+/// Queues everything for a thread, so that a slow disk never delays acquisition.
 #[derive(Debug)]
 pub struct ThreadRecorder {
     entries: SyncSender<Entry>,
@@ -80,7 +80,7 @@ impl ThreadRecorder {
         Ok(Self { entries, writer })
     }
 
-    fn hand(&self, entry: Entry) -> Result<(), RecordFailure> {
+    fn queue(&self, entry: Entry) -> Result<(), RecordFailure> {
         self.entries.try_send(entry).map_err(|refused| {
             RecordFailure(Box::new(match refused {
                 TrySendError::Full(_) => QueueError::Full,
@@ -92,23 +92,23 @@ impl ThreadRecorder {
 
 impl Record for ThreadRecorder {
     fn sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordFailure> {
-        self.hand(Entry::SensorInfo(info.clone(), at))
+        self.queue(Entry::SensorInfo(info.clone(), at))
     }
 
     fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure> {
-        self.hand(Entry::Frame(frame.clone()))
+        self.queue(Entry::Frame(frame.clone()))
     }
 
     fn stage(&mut self, state: &pb::StageState) -> Result<(), RecordFailure> {
-        self.hand(Entry::Stage(*state))
+        self.queue(Entry::Stage(*state))
     }
 
     fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure> {
-        self.hand(Entry::Event(event.clone()))
+        self.queue(Entry::Event(event.clone()))
     }
 
     fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure> {
-        self.hand(Entry::Safety(event.clone()))
+        self.queue(Entry::Safety(event.clone()))
     }
 
     fn finish(self: Box<Self>) -> Result<(), RecordFailure> {

@@ -1,7 +1,7 @@
-//! `stage check`: whether a rig's stage is the one that the rig file describes, and does what it says.
+//! `stage check`: whether a rig's stage is the one that the rig file describes, and moves as it reports.
 //!
-//! It opens the stage itself, without a service and without the sensor. What it believes is what the controller
-//! reports. A stage that stands below the safe height rises to it; there each axis goes [`STEP_MM`] and back.
+//! It opens the stage itself, without a service and without the sensor. It relies on the controller's reports. A stage
+//! below the safe height rises to it; there each axis moves by [`STEP_MM`] and back.
 
 use std::io;
 use std::sync::Arc;
@@ -18,13 +18,13 @@ use tokio::time::{Instant, timeout};
 
 use crate::{devices, virtual_time};
 
-/// How far each axis goes.
+/// Distance that each axis moves.
 pub const STEP_MM: f64 = 0.01;
 
-/// An axis that has gone less than this of its way has not gone it.
+/// An axis that reports less than this share of its distance has not moved.
 const WAY_SHARE_MIN: f64 = 0.5;
 
-/// How long the first word of the controller is waited for; a driver that finds none says so earlier.
+/// Timeout for the controller's first answer. A driver that finds no device reports that earlier.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Names of the axes.
@@ -33,32 +33,32 @@ const NAMES: [&str; 3] = ["x", "y", "z"];
 /// What a check found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageCheck {
-    /// What answered.
+    /// The controller that answered.
     pub controller: Option<Controller>,
-    /// Where it stands, as last reported, robot frame.
+    /// Last reported position, robot frame.
     pub position_mm: [f64; 3],
-    /// True if it knows where it is.
+    /// True if the stage knows its position.
     pub is_homed: bool,
-    /// The moves that were made.
+    /// The moves that were tried.
     pub moves: Vec<CheckedMove>,
-    /// Why the check did not come to its end, or what must be done first.
+    /// Why the check did not finish, or what must be done first.
     pub trouble: Option<String>,
 }
 
 /// A move of the check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedMove {
-    /// Which axis moves.
+    /// Name of the moving axis.
     pub axis: &'static str,
-    /// Where along it the stage was sent.
+    /// Target on this axis.
     pub asked_mm: f64,
-    /// Where along it the stage then reported to stand; `None` if it did not arrive.
+    /// Reported position on this axis at the end; `None` if it did not arrive.
     pub reported_mm: Option<f64>,
-    /// How far the reported place is from that which was asked for, all axes together.
+    /// Distance of the reported position from the target, over all axes.
     pub error_mm: Option<f64>,
-    /// How long it took.
+    /// Duration of the move.
     pub took: Duration,
-    /// What is wrong with it.
+    /// What is wrong with the move; `None` if nothing is.
     pub trouble: Option<String>,
 }
 
@@ -69,24 +69,22 @@ pub enum StageCheckError {
     #[error(
         "rig {rig:?} has no stage: a rig file for a service needs envelope, motion, policy, sensor and stage"
     )]
-    NoService {
-        /// The rig's name.
-        rig: String,
-    },
-    /// The system gave no runtime.
+    #[expect(missing_docs, reason = "the message says what each field is")]
+    NoService { rig: String },
+    /// The system provided no runtime.
     #[error("no check: {0}")]
     System(#[from] io::Error),
 }
 
 impl StageCheck {
-    /// True if the stage is there, knows where it is, and made every move.
+    /// True if the stage is connected, knows its position, and made every move.
     pub fn is_good(&self) -> bool {
         self.trouble.is_none() && self.moves.iter().all(|one| one.trouble.is_none())
     }
 }
 
 impl CheckedMove {
-    /// What a stage is to be believed about a move from a place to another of which one axis differs.
+    /// Judges a move along one axis by its reported end.
     fn judge(axis: usize, from_mm: [f64; 3], asked_mm: [f64; 3], took: Duration, end: Ended) -> Self {
         let mut checked = Self {
             axis: NAMES[axis],
@@ -102,7 +100,7 @@ impl CheckedMove {
                 let (way_mm, asked_way_mm) =
                     (reached_mm[axis] - from_mm[axis], asked_mm[axis] - from_mm[axis]);
                 if way_mm * asked_way_mm.signum() < WAY_SHARE_MIN * asked_way_mm.abs() {
-                    // The rig's tolerance may be wider than the way.
+                    // The rig's tolerance may be greater than the distance.
                     checked.trouble = Some(format!(
                         "it reports {:+.1} um of {:+.1} um: it has not moved, or not that way",
                         way_mm * 1000.0,
@@ -117,14 +115,14 @@ impl CheckedMove {
     }
 }
 
-/// How a move ended.
+/// End of a move: the reached position.
 type Ended = Result<[f64; 3], StageError>;
 
-/// Checks the stage of a rig; with `home` it is homed first. An embedded stage is a virtual one, in virtual time;
-/// `started` gets its control. Blocks until it is over; an interrupt (Ctrl-C) stops the stage and ends the check.
+/// Checks the stage of a rig; `home` homes it first. An embedded stage is virtual and runs in virtual time; `started` is
+/// called with its control. Blocks until the end. An interrupt (Ctrl-C) stops the stage and ends the check.
 ///
 /// # Errors
-/// [`StageCheckError`] if there was no check at all; what it found is in [`StageCheck`].
+/// [`StageCheckError`] if there was no check at all; its result is the [`StageCheck`].
 pub fn run(rig: &Rig, home: bool, started: impl FnOnce(&RigControl)) -> Result<StageCheck, StageCheckError> {
     let Some(service) = &rig.service else {
         return Err(StageCheckError::NoService { rig: rig.name.clone() });
@@ -162,7 +160,7 @@ async fn check_until_interrupted(
         tokio::select! {
             biased;
             Ok(()) = tokio::signal::ctrl_c() => {
-                // First the mark, then the stop: whoever moves looks at the mark after giving the order.
+                // First the flag, then the stop: the check reads the flag after each order to move.
                 interrupted.store(true, Ordering::SeqCst);
                 stage.stop();
             }
@@ -178,7 +176,7 @@ async fn check(
     home: bool,
     interrupted: &AtomicBool,
 ) -> StageCheck {
-    // The driver waits for whoever takes its reports. The task ends with the driver.
+    // The driver waits until its reports are taken. The task ends with the driver.
     tokio::spawn(async move { while reports.recv().await.is_some() {} });
     let mut checking = Checking { stage, service, interrupted, controller: None, moves: Vec::new() };
     let trouble = checking.go_through(home).await.err();
@@ -193,7 +191,7 @@ async fn check(
     }
 }
 
-/// A check under way.
+/// A check in progress.
 struct Checking<'a> {
     stage: &'a DrivenStage,
     service: &'a Service,
@@ -245,7 +243,7 @@ impl Checking<'_> {
         Ok(())
     }
 
-    /// Waits for the controller, or for the first reason why there is none.
+    /// Waits for the controller, or for the first error.
     async fn connect(&self) -> Result<Controller, String> {
         let mut connection = self.stage.connection();
         let settled = connection.wait_for(|now| !matches!(now, Connection::Seeking(None)));
@@ -260,7 +258,7 @@ impl Checking<'_> {
         }
     }
 
-    /// Straight up to the safe height, if it stands lower.
+    /// Moves straight up to the safe height, if the stage is lower.
     async fn rise(&mut self) -> Result<(), String> {
         let motion = &self.service.motion;
         let [x_mm, y_mm, z_mm] = self.position_mm();
@@ -283,7 +281,7 @@ impl Checking<'_> {
         self.checked(axis, from_mm).await
     }
 
-    /// A step that stays clear of the ends of the travel, and of what is below: z goes up where there is room.
+    /// A step away from the nearer end of the envelope; z goes up if there is room.
     fn step_mm(&self, axis: usize, at_mm: f64) -> f64 {
         let envelope = &self.service.envelope;
         let grows = match axis {
@@ -307,9 +305,9 @@ impl Checking<'_> {
         Ok(())
     }
 
-    /// One straight move; the outer error is an interrupt before it.
+    /// One straight move. The outer error is an interrupt before it.
     async fn go(&self, position_mm: [f64; 3], speed_mm_per_s: f64) -> Result<Ended, String> {
-        // The order is given before the look: a stop between the two still counts as later than the order.
+        // The order comes before the check of the flag, so that a stop in between comes after the order.
         let order = self.stage.move_to(Target { position_mm, speed_mm_per_s });
         self.check_interrupted()?;
         Ok(order.await)

@@ -17,17 +17,17 @@ use crate::virtual_time;
 /// No experiment lasts longer.
 const LONGEST: Duration = Duration::from_hours(72);
 
-/// What an experiment will do, as a dry run found it.
+/// What an experiment will do, as found by a dry run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DryRun {
-    /// How the dry run ended; anything but done means that the experiment would not be done either.
+    /// How the dry run ended. If it is not done, the experiment cannot be done either.
     pub outcome: RunOutcome,
 }
 
 /// Why there was no dry run.
 #[derive(Debug, thiserror::Error)]
 pub enum TwinError {
-    /// The system gave no thread or no runtime.
+    /// The system provided no thread or no runtime.
     #[error("no dry run: {0}")]
     System(#[from] std::io::Error),
     /// The rig describes data, not a service.
@@ -42,12 +42,12 @@ pub enum TwinError {
 }
 
 impl DryRun {
-    /// True if the twin did everything that was asked.
+    /// True if the twin did everything.
     pub fn is_possible(&self) -> bool {
         self.outcome.exit_status == pb::ExitStatus::Done
     }
 
-    /// The promise for the run's progress.
+    /// Totals for the run's progress display.
     pub fn promise(&self) -> Planned {
         Planned {
             presses: self.outcome.presses,
@@ -56,16 +56,16 @@ impl DryRun {
         }
     }
 
-    /// Greatest depth that was commanded, in mm; 0 if nothing was pressed.
+    /// Greatest commanded depth, mm; 0 without a press.
     pub fn deepest_mm(&self) -> f64 {
         (-self.outcome.travel_mm[2][0]).max(0.0)
     }
 }
 
-/// Runs an experiment on the rig's twin. Blocks for as long as that takes to compute.
+/// Runs an experiment on the rig's twin. Blocks until it is computed.
 ///
 /// # Errors
-/// [`TwinError`] if there was no dry run; a refused step is a [`DryRun`] that is not possible.
+/// [`TwinError`] if there was no dry run. A refused step is no error: the [`DryRun`] is then not possible.
 pub fn dry_run(rig: &Rig, mut order: RunOrder) -> Result<DryRun, TwinError> {
     let mut twin = twin_of(rig);
     order.resets = true;
@@ -73,11 +73,11 @@ pub fn dry_run(rig: &Rig, mut order: RunOrder) -> Result<DryRun, TwinError> {
         service.sensor.transport = Transport::Embedded;
         service.stage.transport = Transport::Embedded;
     }
-    // A runtime of its own, on a thread of its own: the caller may live in another runtime.
+    // A separate runtime on a separate thread: the caller may be in another runtime.
     thread::Builder::new()
         .name("twin".into())
         .spawn(move || {
-            // What happens on the twin is no event of the service.
+            // The twin's log entries are no events of the service.
             tracing::subscriber::with_default(NoSubscriber::new(), || {
                 let runtime = virtual_time::runtime()?;
                 let outcome = runtime.block_on(run(twin, order))?;
@@ -93,7 +93,7 @@ async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
     let Some(service) = twin.service.clone() else {
         return Err(tactus_engine::EngineError::NoService { rig: twin.name }.into());
     };
-    // What a step does is the same by every codec: the twin has one that needs no description.
+    // Steps do not depend on the sensor's protocol: the twin uses one that needs no description.
     let codec = SensorCodec::default();
     let opened = devices::open(&twin, &service, codec, || Truth::of_rig(&twin, order.seed), clock);
     let engine = Engine::start(twin, opened.devices, clock, std::sync::Arc::new(Unpublished))?;
@@ -104,7 +104,7 @@ async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
     }
 }
 
-/// A dry run leaves nothing behind.
+/// A dry run records nothing.
 struct Unrecorded;
 
 impl Record for Unrecorded {

@@ -1,4 +1,4 @@
-//! A virtual device on its cable: bytes in and out over memory or a pseudo-terminal, faults from its control.
+//! A virtual device on its cable: bytes through memory or a pseudo-terminal, and injected faults.
 
 use std::io;
 use std::time::Duration;
@@ -12,47 +12,46 @@ use tokio::time::{Instant, sleep_until, timeout};
 use crate::faults::CableFault;
 use crate::terminal::TerminalPort;
 
-/// How long a device's output waits for a host that does not read; then bytes are lost, as in an
-/// overrun serial port.
+/// How long a device's output waits for a host that does not read. Then bytes are lost, as in an overrun serial port.
 const OVERRUN: Duration = Duration::from_millis(20);
 
-/// A device as bytes and times; it neither waits nor reads a clock.
+/// A device as a state machine of bytes and times; it neither waits nor reads a clock.
 ///
-/// Times never go back. After every call, what is due of [`output`](Self::output) is to be sent, and
-/// [`wake`](Self::wake) called when [`next_wake`](Self::next_wake) has come.
+/// Times never go back. After every call the caller sends [`output`](Self::output), and calls [`wake`](Self::wake) when
+/// [`next_wake`](Self::next_wake) has come.
 pub trait Device: Send {
-    /// What can go wrong with it.
+    /// Its faults.
     type Fault: Send;
 
-    /// Bytes from the host.
+    /// Takes bytes from the host.
     fn receive(&mut self, bytes: &[u8], now: Instant);
 
-    /// Time has passed.
+    /// Does everything that is due by `now`.
     fn wake(&mut self, now: Instant);
 
-    /// When it wants to be woken.
+    /// When something is due next.
     fn next_wake(&self) -> Option<Instant>;
 
-    /// The bytes that leave it by now.
+    /// Takes the bytes that leave it by `now`.
     fn output(&mut self, now: Instant) -> Vec<u8>;
 
-    /// Something goes wrong with it.
+    /// Injects a fault.
     fn fault(&mut self, fault: Self::Fault, now: Instant);
 
-    /// The cable has been plugged in again.
+    /// The cable is plugged in again.
     fn plugged_in(&mut self, now: Instant);
 }
 
-/// Something goes wrong on either end of the cable.
+/// A fault of the cable, or of the device at its end.
 #[derive(Debug, Clone, Copy)]
 pub enum InjectedFault<F> {
-    /// The cable.
+    /// Of the cable.
     Cable(CableFault),
-    /// The device.
+    /// Of the device.
     Device(F),
 }
 
-/// Where hosts find the device.
+/// Where hosts connect to the device.
 #[derive(Debug)]
 pub enum Port {
     /// In this process.
@@ -70,7 +69,7 @@ impl Port {
         }
     }
 
-    /// False if bytes that leave the device would find nobody.
+    /// False if no host would receive the device's bytes.
     fn has_host(&self) -> bool {
         match self {
             Self::Memory(_) => true,
@@ -78,7 +77,7 @@ impl Port {
         }
     }
 
-    /// Bytes came.
+    /// A host has sent bytes.
     fn heard_host(&self) {
         match self {
             Self::Memory(_) => {}
@@ -86,7 +85,7 @@ impl Port {
         }
     }
 
-    /// The device is gone until the next [`accept`](Self::accept).
+    /// Disconnects the host. The device is absent until the next [`accept`](Self::accept).
     fn unplug(&mut self) {
         match self {
             Self::Memory(port) => port.unplug(),
@@ -94,7 +93,7 @@ impl Port {
         }
     }
 
-    /// Gone from its place; the next [`accept`](Self::accept) is in another.
+    /// Disconnects the host. The next [`accept`](Self::accept) is at another pseudo-terminal.
     fn move_away(&mut self) -> io::Result<()> {
         match self {
             Self::Memory(port) => {
@@ -106,14 +105,14 @@ impl Port {
     }
 }
 
-/// Runs a device for ever: its time goes on whether or not a host is connected.
+/// Runs a device forever, whether or not a host is connected.
 ///
 /// # Errors
 /// If the system gives no pseudo-terminal.
 pub async fn run<D: Device>(
     mut device: D,
     mut port: Port,
-    mut strikes: mpsc::Receiver<InjectedFault<D::Fault>>,
+    mut faults: mpsc::Receiver<InjectedFault<D::Fault>>,
 ) -> io::Result<()> {
     let mut link = Link::Waiting;
     let mut buffer = [0; 1024];
@@ -130,7 +129,7 @@ pub async fn run<D: Device>(
         let wake = device.next_wake();
         let event = tokio::select! {
             biased;
-            Some(strike) = strikes.recv() => CableEvent::Strike(strike),
+            Some(fault) = faults.recv() => CableEvent::Fault(fault),
             event = listen(&mut link, &mut port, &mut buffer) => event?,
             () = until(wake) => continue,
         };
@@ -146,12 +145,12 @@ pub async fn run<D: Device>(
                 link = Link::Waiting;
                 device.plugged_in(now);
             }
-            CableEvent::Strike(InjectedFault::Device(fault)) => device.fault(fault, now),
-            CableEvent::Strike(InjectedFault::Cable(CableFault::Disconnect(duration))) => {
+            CableEvent::Fault(InjectedFault::Device(fault)) => device.fault(fault, now),
+            CableEvent::Fault(InjectedFault::Cable(CableFault::Disconnect(duration))) => {
                 link = Link::Out(now + duration);
                 port.unplug();
             }
-            CableEvent::Strike(InjectedFault::Cable(CableFault::Renumber)) => {
+            CableEvent::Fault(InjectedFault::Cable(CableFault::Renumber)) => {
                 link = Link::Out(now);
                 port.move_away()?;
             }
@@ -172,10 +171,10 @@ enum CableEvent<F> {
     Bytes(usize),
     Closed,
     Replugged,
-    Strike(InjectedFault<F>),
+    Fault(InjectedFault<F>),
 }
 
-/// Waits for what comes over the cable. Cancel-safe.
+/// Waits for a host, its bytes, its end, or the time to plug in again. Cancel-safe.
 async fn listen<F>(link: &mut Link, port: &mut Port, buffer: &mut [u8]) -> io::Result<CableEvent<F>> {
     match link {
         Link::Waiting => Ok(CableEvent::Connected(port.accept().await?)),
@@ -190,7 +189,7 @@ async fn listen<F>(link: &mut Link, port: &mut Port, buffer: &mut [u8]) -> io::R
     }
 }
 
-/// False if the host has gone.
+/// Sends bytes; false if the host has gone.
 async fn send(stream: &mut dyn ByteStream, bytes: &[u8]) -> bool {
     let sent = timeout(OVERRUN, stream.write_all(bytes)).await;
     sent.unwrap_or_else(|_| {

@@ -1,4 +1,4 @@
-//! The handle to a virtual rig: what is true in it, and what goes wrong.
+//! The handle to a virtual rig: its true state, and its faults.
 
 use std::sync::Arc;
 
@@ -10,13 +10,13 @@ use crate::faults::{Fault, FaultError, FaultScript, RigFault, SensorFault, Stage
 use crate::truth::Truth;
 use crate::world::SharedWorld;
 
-/// Faults that may wait for a device; it takes them whenever it is awake, so that more than these mean
-/// that it has ended. An overflow is refused with [`FaultError::NotTaken`].
+/// Capacity of a device's queue of faults. A device takes them whenever it is awake, so a full queue means that it has ended.
+/// A fault for a full queue is refused with [`FaultError::NotTaken`].
 const FAULTS_WAITING: usize = 64;
 
-/// Looks at and changes the truth of a virtual rig. Clones are handles to the same rig.
+/// Reads and changes the true state of a virtual rig. Clones are handles to the same rig.
 ///
-/// All positions are the robot's frame; all values are those of the present instant.
+/// Positions are in the robot frame. Values are those of the present instant.
 #[derive(Debug, Clone)]
 pub struct RigControl {
     world: SharedWorld,
@@ -25,7 +25,7 @@ pub struct RigControl {
     stage: mpsc::Sender<InjectedFault<StageFault>>,
 }
 
-/// Where the devices' faults come out.
+/// The receiving ends of the injected faults.
 #[derive(Debug)]
 pub struct FaultReceivers {
     /// For the sensor and its cable.
@@ -41,19 +41,19 @@ impl RigControl {
         (Self { world, started, sensor, stage }, FaultReceivers { sensor: sensor_tap, stage: stage_tap })
     }
 
-    /// Makes something go wrong now.
+    /// Injects a fault now.
     ///
     /// # Errors
-    /// An element that the array does not have, or a device that takes no more faults.
+    /// [`FaultError::Element`] for an element that the array does not have; [`FaultError::NotTaken`].
     pub fn inject(&self, fault: Fault) -> Result<(), FaultError> {
         match fault {
             Fault::Sensor(fault) => {
                 self.check_element(fault)?;
-                strike(&self.sensor, InjectedFault::Device(fault))
+                send(&self.sensor, InjectedFault::Device(fault))
             }
-            Fault::SensorCable(fault) => strike(&self.sensor, InjectedFault::Cable(fault)),
-            Fault::Stage(fault) => strike(&self.stage, InjectedFault::Device(fault)),
-            Fault::StageCable(fault) => strike(&self.stage, InjectedFault::Cable(fault)),
+            Fault::SensorCable(fault) => send(&self.sensor, InjectedFault::Cable(fault)),
+            Fault::Stage(fault) => send(&self.stage, InjectedFault::Device(fault)),
+            Fault::StageCable(fault) => send(&self.stage, InjectedFault::Cable(fault)),
             Fault::Rig(RigFault::Covering { thickness_mm }) => {
                 self.set_covering_mm(thickness_mm);
                 Ok(())
@@ -69,7 +69,7 @@ impl RigControl {
         }
     }
 
-    /// Makes a script's faults happen, each at its time since the rig was switched on.
+    /// Injects a script's faults, each at its time since the rig was switched on.
     ///
     /// # Errors
     /// As [`inject`](Self::inject), at the first fault that is refused.
@@ -81,28 +81,27 @@ impl RigControl {
         Ok(())
     }
 
-    /// Puts another covering in place, its surface where the former one's was; a negative thickness is none.
+    /// Puts another covering in place; its surface stays at the same height. A negative thickness counts as 0.
     pub fn set_covering_mm(&self, thickness_mm: f64) {
         self.world.lock().set_covering_mm(thickness_mm);
     }
 
-    /// Thickness of the covering in place.
+    /// Thickness of the present covering.
     pub fn covering_mm(&self) -> f64 {
         self.world.lock().covering_mm()
     }
 
-    /// Where the tip truly is.
+    /// True position of the tip.
     pub fn tip_mm(&self) -> [f64; 3] {
         self.world.lock().tip_mm(Instant::now())
     }
 
-    /// How far the tip truly stands below the covering's true surface; negative above it.
+    /// True depth of the tip below the covering's true surface; negative above it.
     pub fn depth_mm(&self) -> f64 {
         self.world.lock().depth_mm(Instant::now())
     }
 
-    /// The greatest true depth since the rig was switched on, at any instant, seen or not; negative while
-    /// the tip has never touched.
+    /// The greatest true depth at any instant since the rig was switched on; negative if the tip has never touched.
     pub fn deepest_mm(&self) -> f64 {
         self.world.lock().deepest_mm(Instant::now())
     }
@@ -119,7 +118,7 @@ impl RigControl {
         world.is_moving()
     }
 
-    /// What every element reads at present but for noise and quantisation, in counts, row-major.
+    /// Present reading of every element without noise and quantisation, counts, row-major.
     pub fn image_counts(&self) -> Vec<f64> {
         self.world.lock().image(Instant::now())
     }
@@ -136,6 +135,6 @@ impl RigControl {
     }
 }
 
-fn strike<F>(tap: &mpsc::Sender<InjectedFault<F>>, strike: InjectedFault<F>) -> Result<(), FaultError> {
-    tap.try_send(strike).map_err(|_| FaultError::NotTaken)
+fn send<F>(faults: &mpsc::Sender<InjectedFault<F>>, fault: InjectedFault<F>) -> Result<(), FaultError> {
+    faults.try_send(fault).map_err(|_| FaultError::NotTaken)
 }

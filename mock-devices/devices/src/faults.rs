@@ -1,7 +1,7 @@
-//! Faults that the virtual devices can be told to have, as text and typed.
+//! Faults that can be injected into the virtual devices, as text and as types.
 //!
 //! One line is one fault: the device, the fault's name, its arguments. Durations carry their unit
-//! (`2s`, `500ms`), lengths are in mm. Faults that last go on until `sensor clear` or `stage clear`.
+//! (`2s`, `500ms`), lengths are in mm. Lasting faults end with `sensor clear` or `stage clear`.
 
 mod parse;
 mod script;
@@ -12,25 +12,25 @@ pub use parse::FaultError;
 pub use parse::duration;
 pub use script::{FaultScript, FaultScriptError, TimedFault};
 
-/// Something that goes wrong, or that is changed behind the service's back.
+/// A fault, or a change that the service is not told of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fault {
     /// In the sensor, or between it and the host.
     Sensor(SensorFault),
-    /// With the sensor's cable, which also powers it.
+    /// Of the sensor's cable, which also powers the sensor.
     SensorCable(CableFault),
     /// In the stage's controller, or between it and the host.
     Stage(StageFault),
-    /// With the stage's cable; the controller has a supply of its own, and motion goes on.
+    /// Of the stage's cable. The controller has its own supply, and motion continues.
     StageCable(CableFault),
-    /// In the world between them.
+    /// In the world that both devices share.
     Rig(RigFault),
 }
 
 /// Faults of a cable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CableFault {
-    /// `disconnect 2s`: unplugged, and plugged in again after a while.
+    /// `disconnect 2s`: unplugged, and plugged in again after this time.
     Disconnect(Duration),
     /// `renumber`: unplugged and plugged in again at once; a pseudo-terminal gets another number.
     Renumber,
@@ -39,35 +39,35 @@ pub enum CableFault {
 /// Faults of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorFault {
-    /// On the way from the controller to the host.
+    /// Between the controller and the host.
     Link(LinkFault),
     /// `clock-jump -500ms`: the device's clock jumps, in ms.
     ClockJump {
-        /// By how much; negative is back.
+        /// Negative is backwards.
         ms: i64,
     },
     /// `clock-wrap`: the device's clock comes to within a second of its overflow.
     ClockWrap,
-    /// `stuck 7`: the element goes on reading what it reads now.
+    /// `stuck 7`: the element keeps its present reading.
     Stuck(usize),
     /// `saturate 7`: the element reads full scale.
     Saturate(usize),
-    /// `clear`: ends the faults that last.
+    /// `clear`: ends lasting faults.
     Clear,
 }
 
-/// What happens to frames on their way.
+/// Faults of frames between the sensor's controller and the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkFault {
-    /// `stall 2s`: says nothing for a while; what it measures meanwhile is lost.
+    /// `stall 2s`: sends nothing for this time; the frames of this time are lost.
     Stall(Duration),
-    /// `drip 5s`: for a while bytes come one at a time, evenly spaced.
+    /// `drip 5s`: for this time bytes come one at a time, evenly spaced.
     Drip(Duration),
     /// `drop 5`: the next bytes are lost.
     Drop(usize),
     /// `drop-frames 5`: the next frames are lost.
     DropFrames(usize),
-    /// `flip-bits 3`: bits of the next frame arrive flipped.
+    /// `flip-bits 3`: this many random bits of the next frame are flipped.
     FlipBits(usize),
     /// `garbage 64`: random bytes before the next frame.
     Garbage(usize),
@@ -75,11 +75,11 @@ pub enum LinkFault {
     Duplicate,
     /// `reorder`: the next frame comes after the one that follows it.
     Reorder,
-    /// `wrong-checksum`: the next frame's checksum does not hold.
+    /// `wrong-checksum`: the next frame has a wrong checksum.
     WrongChecksum,
-    /// `truncate`: the next frame breaks off in its middle.
+    /// `truncate`: the next frame ends in its middle.
     Truncate,
-    /// `burst 10`: the next frames come all at once, when the last of them is taken.
+    /// `burst 10`: the next frames come all at once, when the last of them is sampled.
     Burst(usize),
     /// `wrong-count 47`: the next frame has this many elements.
     WrongCount(usize),
@@ -88,37 +88,37 @@ pub enum LinkFault {
 /// Faults of the stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StageFault {
-    /// In what the controller does.
+    /// In the controller's behaviour.
     Controller(ControllerFault),
-    /// `echo-garbage`: sends every line back, with garbage behind it.
+    /// `echo-garbage`: sends every line back, followed by garbage.
     EchoGarbage,
-    /// `stall 2s`: the controller neither listens nor speaks for a while; motion goes on.
+    /// `stall 2s`: the controller neither receives nor sends for this time; motion continues.
     Stall(Duration),
-    /// `clear`: ends the faults that last.
+    /// `clear`: ends lasting faults.
     Clear,
 }
 
-/// What a stage's controller does wrong.
+/// Faults of a stage's controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ControllerFault {
-    /// `alarm 1`: stops dead and raises an alarm. Zaber's faults have letters: there z stalls, whatever the number.
+    /// `alarm 1`: stops at once and raises an alarm of this number. Zaber has no such numbers: there z stalls.
     Alarm(u8),
     /// `lie 0.05`: reports a z this much too high, in mm.
     Lie {
         /// Added to the reported z.
         z_mm: f64,
     },
-    /// `never-idle`: reports that it moves, for ever.
+    /// `never-idle`: always reports that it moves.
     NeverIdle,
     /// `refuse` or `refuse 33`: answers the next move with an error and does not move.
     Refuse(u8),
-    /// `ignore-moves`: accepts moves and does none.
+    /// `ignore-moves`: accepts moves, but makes none.
     IgnoreMoves,
-    /// `reset`: restarts as after a power failure, and no longer knows where it is.
+    /// `reset`: restarts as after a power failure, and no longer knows its position.
     Reset,
     /// `lost-steps 0.05`: the next move falls short by this much, unnoticed, in mm.
     LostSteps {
-        /// Way lost at the beginning of the move.
+        /// Distance lost at the beginning of the move.
         lost_mm: f64,
     },
     /// `homing-fails`: the next homing finds no switch.
@@ -133,11 +133,11 @@ pub enum RigFault {
         /// Its thickness.
         thickness_mm: f64,
     },
-    /// `surface 0.1`: the true surface stands here, where the service believes 0, in mm.
+    /// `surface 0.1`: moves the true surface to this height, in mm; the service still believes 0.
     Surface {
-        /// Its height.
+        /// Height in the robot frame.
         z_mm: f64,
     },
-    /// `stiffness 3`: the covering answers this many times as strongly.
+    /// `stiffness 3`: multiplies the response of the covering.
     Stiffness(f64),
 }

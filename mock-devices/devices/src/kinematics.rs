@@ -46,7 +46,7 @@ impl Profile {
         Self::new(distance_mm, start_mm_per_s, start_mm_per_s, acceleration_mm_per_s2)
     }
 
-    /// Length of the way.
+    /// Total distance.
     pub(crate) fn distance_mm(&self) -> f64 {
         self.distance_mm
     }
@@ -56,7 +56,7 @@ impl Profile {
         self.cruise_until_s() + self.peak_mm_per_s / self.acceleration_mm_per_s2
     }
 
-    /// Way gone after `t_s`; all of it at and after the end.
+    /// Distance after `t_s`; the total at and after the end.
     pub(crate) fn distance_at(&self, t_s: f64) -> f64 {
         let (v0, v, a) = (self.start_mm_per_s, self.peak_mm_per_s, self.acceleration_mm_per_s2);
         let speeding_up_s = self.speeding_up_s();
@@ -84,7 +84,7 @@ impl Profile {
         }
     }
 
-    /// When `gone_mm` of the way are gone; the end for all of it and more.
+    /// When `gone_mm` of the distance are covered; the end for the total and more.
     pub(crate) fn time_at(&self, gone_mm: f64) -> f64 {
         let (v0, v, a) = (self.start_mm_per_s, self.peak_mm_per_s, self.acceleration_mm_per_s2);
         let left_mm = self.distance_mm - gone_mm;

@@ -1,4 +1,4 @@
-//! Where the stage's tip is and where its controller believes it is, as functions of time.
+//! True and believed position of the stage's tip as functions of time.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,13 +7,13 @@ use tokio::time::Instant;
 
 use crate::kinematics::Profile;
 
-/// A place: x, y, z in mm, robot frame.
+/// x, y, z in mm, robot frame.
 pub(crate) type Point = [f64; 3];
 
-/// A chain of straight moves, each from rest to rest, one after the other without a pause between.
+/// A queue of straight moves, each from rest to rest, without pauses between them.
 ///
-/// The controller's position follows from the moves alone. The true one differs from it by an offset:
-/// all of it before homing, and what has been lost in steps since.
+/// The believed position follows from the moves alone. The true position differs from it by an offset: an arbitrary one before
+/// homing, and the lost steps since.
 #[derive(Debug)]
 pub(crate) struct Motion {
     acceleration_mm_per_s2: f64,
@@ -37,7 +37,7 @@ struct Move {
     target: MoveTarget,
     profile: Profile,
     start: Instant,
-    /// The motor slips over this much at the beginning.
+    /// Distance over which the motor slips at the beginning.
     lost_mm: f64,
 }
 
@@ -54,17 +54,17 @@ impl Motion {
         }
     }
 
-    /// From the next move on.
+    /// Sets the acceleration from the next move on.
     pub(crate) fn set_acceleration(&mut self, acceleration_mm_per_s2: f64) {
         self.acceleration_mm_per_s2 = acceleration_mm_per_s2;
     }
 
-    /// Where the controller believes the tip to be at `at`, which is not before the last change.
+    /// Believed position at `at`, which is not before the last change.
     pub(crate) fn believed_mm(&self, at: Instant) -> Point {
         self.current(at).map_or(self.rest_mm, |current| current.position_mm(at))
     }
 
-    /// Where the tip is at `at`, which is not before the last change.
+    /// True position at `at`, which is not before the last change.
     pub(crate) fn true_mm(&self, at: Instant) -> Point {
         let mut true_mm = sum(self.believed_mm(at), self.offset_mm);
         for one in self.moves.iter().take_while(|one| one.start <= at) {
@@ -73,23 +73,23 @@ impl Motion {
         true_mm
     }
 
-    /// Where the tip is and will be at the end of each move, in order.
+    /// True position at the end of each move, in order.
     pub(crate) fn true_ends_mm(&self) -> impl Iterator<Item = (Instant, Point)> {
         self.moves.iter().map(|one| (one.end(), self.true_mm(one.end())))
     }
 
-    /// Speed along the way.
+    /// Speed along the path.
     pub(crate) fn speed_mm_per_s(&self, at: Instant) -> f64 {
         self.current(at).map_or(0.0, |current| current.profile.speed_at(current.elapsed_s(at)))
     }
 
-    /// Where the controller believes that the last move will end.
+    /// Believed position at the end of the last move, held ones included.
     pub(crate) fn destination_mm(&self) -> Point {
         let held = self.held.back().map(|target| target.to_mm);
         held.or(self.moves.back().map(Move::end_mm)).unwrap_or(self.rest_mm)
     }
 
-    /// Moves begun or waiting.
+    /// Number of moves, started or waiting.
     pub(crate) fn pending(&self) -> usize {
         self.moves.len() + self.held.len()
     }
@@ -99,23 +99,23 @@ impl Motion {
         !self.moves.is_empty()
     }
 
-    /// When the move in hand ends.
+    /// When the present move ends.
     pub(crate) fn next_end(&self) -> Option<Instant> {
         self.moves.front().map(Move::end)
     }
 
-    /// When the last of the moves in hand ends.
+    /// When the last move ends, without held ones.
     pub(crate) fn last_end(&self) -> Option<Instant> {
         self.moves.back().map(Move::end)
     }
 
-    /// When, in the moves in hand, the tip first leaves `travel_mm` (least and greatest of each axis).
+    /// When the tip first leaves `travel_mm` (least and greatest of each axis), without held moves.
     pub(crate) fn leaves(&self, travel_mm: [[f64; 2]; 3]) -> Option<Instant> {
         let mut offset_mm = self.offset_mm;
         self.moves.iter().find_map(|one| {
             let way_mm = one.profile.distance_mm();
             let true_from_mm = sum(one.from_mm, offset_mm);
-            // The slip holds the tip back at the start; beyond it the way is straight.
+            // The slip delays the tip at the start; after it the path is straight.
             let slip_mm = one.lost_mm.min(way_mm);
             offset_mm = difference(offset_mm, one.direction.map(|part| part * slip_mm));
             let leaves_mm = (0..3)
@@ -130,14 +130,14 @@ impl Motion {
         })
     }
 
-    /// Takes finished moves off the chain.
+    /// Removes finished moves.
     pub(crate) fn settle(&mut self, now: Instant) {
         while let Some(done) = self.moves.pop_front_if(|one| one.end() <= now) {
             self.retire(&done, now);
         }
     }
 
-    /// Appends a move. Held motion is not resumed by it: the move waits too.
+    /// Appends a move. It does not resume held motion: the move waits too.
     pub(crate) fn push(&mut self, to_mm: Point, speed_mm_per_s: f64, now: Instant) {
         let target = MoveTarget { to_mm, speed_mm_per_s };
         if self.held.is_empty() {
@@ -147,12 +147,12 @@ impl Motion {
         }
     }
 
-    /// Appends a move to a true place, as switches there will tell.
+    /// Appends a move to a true position, as homing switches define it.
     pub(crate) fn push_true(&mut self, true_mm: Point, speed_mm_per_s: f64, now: Instant) {
         self.push(difference(true_mm, self.offset_mm), speed_mm_per_s, now);
     }
 
-    /// Brakes at once; what was not done is held.
+    /// Brakes at once and holds the rest of the moves.
     pub(crate) fn hold(&mut self, now: Instant) {
         self.settle(now);
         let mut undone: VecDeque<MoveTarget> = self.moves.iter().map(|one| one.target).collect();
@@ -166,7 +166,7 @@ impl Motion {
         let braking = Profile::brake(speed_mm_per_s, self.acceleration_mm_per_s2);
         let left_mm = current.profile.distance_mm() - gone_mm;
         if braking.distance_mm() + 1e-9 >= left_mm {
-            // It is braking already, for its own end.
+            // It is already braking for its own end.
             undone.pop_front();
             self.moves.truncate(1);
         } else {
@@ -186,19 +186,19 @@ impl Motion {
         self.held.extend(undone);
     }
 
-    /// Goes on with what was held.
+    /// Continues the held moves.
     pub(crate) fn resume(&mut self, now: Instant) {
         for target in std::mem::take(&mut self.held) {
             self.start(target, now);
         }
     }
 
-    /// Forgets what was held.
+    /// Discards the held moves.
     pub(crate) fn forget_held(&mut self) {
         self.held.clear();
     }
 
-    /// Stops dead and forgets everything, as when the motors' current is cut.
+    /// Stops at once and discards all moves, as when the motors lose their current.
     pub(crate) fn freeze(&mut self, now: Instant) {
         self.settle(now);
         if let Some(current) = self.current(now).copied() {
@@ -208,14 +208,14 @@ impl Motion {
         self.held.clear();
     }
 
-    /// At rest: from now on the controller believes to be at `believed_mm`.
+    /// Sets the believed position of a motion at rest.
     pub(crate) fn believe(&mut self, believed_mm: Point) {
         let true_mm = sum(self.rest_mm, self.offset_mm);
         self.rest_mm = believed_mm;
         self.offset_mm = difference(true_mm, believed_mm);
     }
 
-    /// The next move loses `lost_mm` of its way.
+    /// Lets the next move lose `lost_mm` of its distance.
     pub(crate) fn lose_steps(&mut self, lost_mm: f64) {
         self.lose_next_mm = lost_mm;
     }
@@ -238,7 +238,7 @@ impl Motion {
         });
     }
 
-    /// Rest where `one` has come to, and keep what it lost.
+    /// Sets the rest position to that of `one`, and keeps its lost steps in the offset.
     fn retire(&mut self, one: &Move, now: Instant) {
         self.rest_mm = one.position_mm(now);
         self.offset_mm = difference(self.offset_mm, one.slipped_mm(now));
@@ -287,7 +287,7 @@ fn along(from_mm: Point, direction: Point, distance_mm: f64) -> Point {
     std::array::from_fn(|axis| from_mm[axis] + direction[axis] * distance_mm)
 }
 
-/// Rounded up to a whole nanosecond, so that a motion is over when its time is; at most some months.
+/// Rounded up to a whole nanosecond, so that a motion has ended at its end time; at most some months.
 fn seconds(duration_s: f64) -> Duration {
     let bounded_s = if duration_s > 0.0 { duration_s.min(1e7) } else { 0.0 };
     Duration::from_secs_f64(bounded_s) + Duration::from_nanos(1)

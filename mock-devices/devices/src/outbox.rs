@@ -1,20 +1,20 @@
-//! Bytes that a device will have sent, each at its time.
+//! Bytes that a device will send, each at its time.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// A queue of bytes with the instants at which they leave; none overtakes another.
+/// A queue of bytes with the instants at which they leave; their order never changes.
 ///
-/// It is emptied as its times come, whether or not anybody listens, so that what fills it bounds it.
+/// Due bytes leave whether or not a host listens, so the rate of its producers bounds its length.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
     chunks: VecDeque<(Instant, Vec<u8>)>,
 }
 
 impl Outbox {
-    /// Has bytes leave at `due`, or behind what leaves later than that.
+    /// Schedules bytes for `due`, or for the time of the last scheduled byte if that is later.
     pub(crate) fn push(&mut self, due: Instant, bytes: impl Into<Vec<u8>>) {
         let bytes = bytes.into();
         if !bytes.is_empty() {
@@ -23,7 +23,7 @@ impl Outbox {
         }
     }
 
-    /// Has bytes leave one at a time, evenly over `duration` from `from` on.
+    /// Schedules bytes one at a time, evenly over `duration` from `from` on.
     pub(crate) fn drip(&mut self, from: Instant, duration: Duration, bytes: &[u8]) {
         let pause = duration / u32::try_from(bytes.len().max(1)).unwrap_or(u32::MAX);
         let mut due = from;
@@ -38,7 +38,7 @@ impl Outbox {
         self.chunks.front().map(|(due, _)| *due)
     }
 
-    /// The bytes that leave by `now`.
+    /// Takes the bytes that leave by `now`.
     pub(crate) fn take_due(&mut self, now: Instant) -> Vec<u8> {
         let mut bytes = Vec::new();
         while let Some((_, chunk)) = self.chunks.pop_front_if(|(due, _)| *due <= now) {
@@ -47,7 +47,7 @@ impl Outbox {
         bytes
     }
 
-    /// Forgets what has not left.
+    /// Discards bytes that have not left.
     pub(crate) fn clear(&mut self) {
         self.chunks.clear();
     }

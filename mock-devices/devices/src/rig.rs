@@ -1,4 +1,4 @@
-//! A whole virtual rig: both devices, the world between them, and a handle to the truth.
+//! A whole virtual rig: both devices, their world, and its handle.
 
 use std::fmt;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use crate::world::{SharedWorld, World};
 
 /// Both devices of a simulated rig, in this process.
 ///
-/// They run from [`start`](Self::start) until the runtime ends, whether or not anybody is connected.
+/// They run from [`start`](Self::start) until the runtime ends, whether or not a host is connected.
 #[derive(Debug)]
 pub struct VirtualRig {
     sensor: Arc<MemoryConnector>,
@@ -29,11 +29,11 @@ pub struct VirtualRig {
 }
 
 impl VirtualRig {
-    /// Switches the rig on, within a tokio runtime. The seed takes the place of the rig's own: one seed,
-    /// one behaviour, to the byte.
+    /// Switches the rig on, within a tokio runtime. `seed` replaces the rig's own. Equal seeds give equal bytes in virtual
+    /// time.
     ///
-    /// A rig without a simulation behaves as its description says, without noise; see [`twin_of`](crate::twin_of).
-    /// The sensor speaks as the rig file says, but for `declared`, which takes another file: then by the default.
+    /// A rig without a simulation behaves as its description says, without noise; see [`twin_of`](crate::twin_of). The
+    /// sensor uses the rig file's protocol. `declared` needs another file, so it is replaced by the default protocol.
     ///
     /// # Panics
     /// Outside of a tokio runtime.
@@ -42,7 +42,7 @@ impl VirtualRig {
         Self::of(Truth::of_rig(rig, seed), rig.covering, &codec.unwrap_or_default())
     }
 
-    /// As [`start`](Self::start), of any truth; the covering is the one in place, and the sensor speaks by `codec`.
+    /// As [`start`](Self::start), with any truth, covering and protocol of the sensor.
     ///
     /// # Panics
     /// Outside of a tokio runtime, and of a truth that was not made by its own constructors.
@@ -50,42 +50,42 @@ impl VirtualRig {
         let (sensor, sensor_port) = memory::pair("sensor");
         let (stage, stage_port) = memory::pair("stage");
         let started = start_devices(truth, covering, codec, Instant::now());
-        // In memory a device never fails.
+        // A device in memory never fails.
         tokio::spawn(cable::run(started.sensor, Port::Memory(sensor_port), started.faults.sensor));
         tokio::spawn(cable::run(started.stage, Port::Memory(stage_port), started.faults.stage));
         Self { sensor: Arc::new(sensor), stage: Arc::new(stage), control: started.control }
     }
 
-    /// The way to the sensor, for its driver.
+    /// Connects a driver to the sensor.
     pub fn sensor_connector(&mut self) -> Box<dyn Connect> {
         Box::new(Outlet(Arc::clone(&self.sensor)))
     }
 
-    /// The way to the stage, for its driver.
+    /// Connects a driver to the stage.
     pub fn stage_connector(&mut self) -> Box<dyn Connect> {
         Box::new(Outlet(Arc::clone(&self.stage)))
     }
 
-    /// A handle to what is true, and to what goes wrong.
+    /// Handle to the true state and the faults.
     pub fn control(&self) -> RigControl {
         self.control.clone()
     }
 }
 
-/// Devices that are switched on and not yet connected to anything.
+/// Devices that are switched on, but not yet connected to anything.
 #[derive(Debug)]
 pub struct Started {
     /// Takes [`faults.sensor`](FaultReceivers::sensor).
     pub sensor: VirtualSensor,
     /// Takes [`faults.stage`](FaultReceivers::stage).
     pub stage: VirtualStage,
-    /// What [`control`](Self::control) injects.
+    /// Faults that [`control`](Self::control) injects.
     pub faults: FaultReceivers,
-    /// A handle to what is true, and to what goes wrong.
+    /// Handle to the true state and the faults.
     pub control: RigControl,
 }
 
-/// Switches both devices on, connected to nothing; `covering` is the one in place, and the sensor speaks by `codec`.
+/// Switches both devices on, connected to nothing. `codec` is the protocol of the sensor.
 ///
 /// # Panics
 /// Of a truth that was not made by its own constructors.

@@ -1,9 +1,9 @@
-//! The device's side of a sensor's protocol: a tactile array whose elements feel the virtual world.
+//! The device side of a sensor: a tactile array in the virtual world, and its electronics.
 //!
-//! A `weiss-dsa` controller answers the queries and the acquisition command and pushes frames on an exact grid of
-//! its rate; `declared` and `anyskin` devices push them from power-up on; `singletact` elements answer polls. Where
-//! the protocol has room for it, the device says that it is simulated: the controller's serial numbers spell `SIM`,
-//! its matrix's unique id `SIMULA`, the element's register `SIMULATED`. The other two have no room.
+//! A `weiss-dsa` controller answers queries and the acquisition command, and sends frames on an exact grid of its rate.
+//! `declared` and `anyskin` devices send frames from power-up on. `singletact` elements answer polls. If the protocol has
+//! a field for it, the device says that it is simulated: the controller's serial numbers spell `SIM`, its matrix's unique
+//! id `SIMULA`, the element's register `SIMULATED`. `declared` and `anyskin` have no such field.
 
 mod codec;
 mod link_faults;
@@ -22,37 +22,37 @@ use crate::world::SharedWorld;
 use codec::{DeviceCodec, HostRequest, Register};
 use link_faults::LinkFaults;
 
-/// From power-up to the boot message. The real controller needs about 8 s; a simulated rig would make
-/// everybody wait for nothing, and a shorter pause takes the driver through the same states.
+/// From power-up to the boot message. The real controller needs about 8 s; a shorter pause takes the driver through the
+/// same states.
 const BOOT: Duration = Duration::from_millis(100);
 
 /// The boot message comes this often, as from the real controller.
 const BOOT_MESSAGES: usize = 3;
 
-/// A clock that is about to wrap does so after this.
+/// The fault `clock-wrap` lets the clock wrap after this.
 const WRAPS_AFTER: Duration = Duration::from_secs(1);
 
-/// Samplings that are later than this are passed over: a machine too slow for the rate would otherwise never catch up.
+/// Samplings that are later than this are skipped: a machine too slow for the rate would otherwise never catch up.
 const BACKLOG: Duration = Duration::from_secs(1);
 
 /// A virtual tactile array and its electronics.
 #[derive(Debug)]
 pub struct VirtualSensor {
     world: SharedWorld,
-    /// The clock's zero.
+    /// Zero of the device's clock.
     powered_up: Instant,
     clock_offset_ticks: i128,
     is_booting: bool,
     codec: DeviceCodec,
     acquisition: Option<Acquisition>,
     counts: Vec<u16>,
-    /// Elements that do not read what the model says, with what they read instead.
+    /// Elements with the faults `stuck` and `saturate`, and their readings.
     overridden: BTreeMap<usize, u16>,
     link_faults: LinkFaults,
     outbox: Outbox,
 }
 
-/// Frames are being pushed.
+/// An acquisition in progress.
 #[derive(Debug, Clone, Copy)]
 struct Acquisition {
     run_length: bool,
@@ -62,7 +62,7 @@ struct Acquisition {
 }
 
 impl VirtualSensor {
-    /// A device that is switched on now and speaks by `codec`.
+    /// A device that is switched on now and uses the protocol of `codec`.
     pub(crate) fn new(world: SharedWorld, codec: &SensorCodec, now: Instant) -> Self {
         let seed = world.lock().truth().seed;
         let mut sensor = Self {
@@ -98,7 +98,7 @@ impl VirtualSensor {
     fn answer(&mut self, asked: HostRequest, now: Instant) -> Vec<u8> {
         match asked {
             HostRequest::Weiss(command) => {
-                let answer = self.obey(command, now);
+                let answer = self.execute(command, now);
                 self.codec.close(answer)
             }
             HostRequest::SingleTact { address, id, asked } => {
@@ -115,7 +115,7 @@ impl VirtualSensor {
         }
     }
 
-    fn obey(&mut self, command: Result<HostCommand, CommandError>, now: Instant) -> Vec<u8> {
+    fn execute(&mut self, command: Result<HostCommand, CommandError>, now: Instant) -> Vec<u8> {
         match command {
             Ok(HostCommand::QueryController) => codec::controller(),
             Ok(HostCommand::QuerySensor) => codec::sensor(),
@@ -141,7 +141,7 @@ impl VirtualSensor {
         (now.duration_since(self.powered_up).as_secs_f64() * rate_hz).floor() as u64 + 1
     }
 
-    /// When a sampling takes place: computed from the grid's beginning, so that nothing adds up.
+    /// Time of the next sampling, computed from the start of the grid, so that no rounding accumulates.
     fn instant(&self, acquisition: Acquisition) -> Instant {
         self.powered_up + Duration::from_secs_f64(acquisition.next as f64 / acquisition.rate_hz)
     }
@@ -167,13 +167,13 @@ impl VirtualSensor {
         }
     }
 
-    /// What the device's clock shows; 0 if it has none.
+    /// Reading of the device's clock, ticks; 0 if it has none.
     fn tick(&self, at: Instant) -> u64 {
         let running = at.duration_since(self.powered_up);
         self.codec.clock().map_or(0, |clock| clock.shows(running, self.clock_offset_ticks))
     }
 
-    /// What an element reads at present.
+    /// Present reading of an element, counts.
     fn reading(&mut self, element: usize, now: Instant) -> u16 {
         if self.counts.is_empty() {
             self.world.lock().sample(now, &mut self.counts);
@@ -265,11 +265,11 @@ impl Device for VirtualSensor {
     }
 }
 
-/// The rate that the controller keeps when asked for one: its own, but for slower ones.
+/// The rate at which the controller acquires when another is requested: the request if it is slower, else its own.
 fn rate(asked_hz: f64, own_hz: f64) -> f64 {
-    // A whole number of frames per second that stands for the own rate is taken as it.
+    // The request has whole frames per second: one that rounds the own rate means the own rate.
     let kept_hz = if asked_hz > own_hz - 1.0 || asked_hz == 0.0 { own_hz } else { asked_hz };
-    // What the link could carry, and what a person could wait for.
+    // Limits: the link's throughput, and a person's patience.
     kept_hz.clamp(0.001, 10_000.0)
 }
 

@@ -1,4 +1,4 @@
-//! What feels: from where the tip is to what the elements read.
+//! The simulated sensor: from the tip's path to the counts of the elements.
 
 use std::fmt::Debug;
 
@@ -6,24 +6,24 @@ use tactus_model::{Covering, Moment, Pipeline, Trail};
 
 use tactus_hidden::HiddenSensor;
 
-/// A sensor in time, as the world asks it.
+/// A simulated sensor in time: the effects pipeline, or a sensor with hidden physics.
 pub(crate) trait SensorModel: Debug + Send {
-    /// Counts of every element at a moment, row-major, before noise and converter.
+    /// Advances to a moment. Returns the counts of every element then, row-major, before noise and converter.
     fn step(&mut self, moment: Moment, trail: &Trail) -> &[f64];
 
-    /// Those of the last moment.
+    /// Counts at the last moment.
     fn counts(&self) -> &[f64];
 
-    /// What is read of counts when noise comes upon them.
+    /// The converter's output for clean counts plus noise.
     fn read(&self, counts: f64, noise_counts: f64) -> f64;
 
     /// Puts another covering in place.
     fn set_covering(&mut self, covering: Covering);
 
-    /// Moves the covering's surface, robot frame.
+    /// Moves the covering's surface to this height, robot frame.
     fn set_surface_mm(&mut self, surface_mm: f64);
 
-    /// Makes the covering answer `stiffness` times as strongly.
+    /// Multiplies every indentation by `stiffness`.
     fn set_stiffness(&mut self, stiffness: f64);
 }
 

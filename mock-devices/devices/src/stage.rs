@@ -1,6 +1,6 @@
-//! The device's side of a stage: a controller that moves the virtual world's tip, and the line to it.
+//! The device side of a stage: a controller that moves the virtual world's tip, and the serial line to it.
 //!
-//! Which protocol it speaks is the rig's: [`grbl`] or [`zaber`]. Kinematics and faults are the same.
+//! The rig file selects its protocol: [`grbl`] or [`zaber`]. Kinematics and faults are the same.
 
 mod grbl;
 mod zaber;
@@ -20,17 +20,17 @@ use crate::world::SharedWorld;
 use grbl::GrblController;
 use zaber::ZaberController;
 
-/// A session judges what it is told by its own tolerance; a controller has none.
+/// A placeholder: only the driver's side of a protocol uses the tolerance of the configuration.
 const NO_MATTER_MM: f64 = 1.0;
 
-/// Garbage behind each echoed line.
+/// Bytes of garbage after each echoed line.
 const GARBAGE_BYTES: usize = 8;
 
-/// A virtual stage controller and what is wrong with it.
+/// A virtual stage controller with its faults.
 #[derive(Debug)]
 pub struct VirtualStage {
     controller: Box<dyn Controller>,
-    /// It neither listens nor speaks until then; what arrives waits.
+    /// Until then it neither receives nor sends; received bytes wait.
     hung_until: Option<Instant>,
     unheard: Vec<u8>,
     echoes: bool,
@@ -38,7 +38,7 @@ pub struct VirtualStage {
     rng: ChaCha8Rng,
 }
 
-/// What a controller does with bytes and time. Times never go back.
+/// A controller as a state machine of bytes and times. Times never go back.
 trait Controller: std::fmt::Debug + Send {
     /// Takes bytes from the host.
     fn receive(&mut self, bytes: &[u8], now: Instant);
@@ -46,22 +46,22 @@ trait Controller: std::fmt::Debug + Send {
     /// Does what is due.
     fn wake(&mut self, now: Instant);
 
-    /// Lets motion go on to `now`, and what follows from it.
+    /// Advances the motion to `now`, with its consequences.
     fn only_move(&mut self, now: Instant);
 
     /// When something is due.
     fn next_wake(&self) -> Option<Instant>;
 
-    /// When the tip runs into a limit, whether or not the controller listens.
+    /// When the tip hits a limit, whether or not the controller receives.
     fn limit_at(&self) -> Option<Instant>;
 
-    /// The bytes that leave it by now.
+    /// Takes the bytes that leave it by `now`.
     fn output(&mut self, now: Instant) -> Vec<u8>;
 
-    /// Takes on a defect.
+    /// Injects a fault.
     fn fault(&mut self, fault: ControllerFault, now: Instant);
 
-    /// Loses its defects.
+    /// Ends all lasting faults.
     fn mend(&mut self);
 }
 
@@ -94,7 +94,7 @@ impl VirtualStage {
         self.hung_until.is_some_and(|until| now < until)
     }
 
-    /// A line comes back as it went out, with garbage behind it.
+    /// Sends a received line back, followed by garbage.
     fn echo(&mut self, bytes: &[u8]) {
         for byte in bytes.iter().filter(|byte| **byte != b'?' && byte.is_ascii()) {
             self.echo.push(*byte);

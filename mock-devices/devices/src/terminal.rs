@@ -19,7 +19,7 @@ use tokio::io::AsyncReadExt;
 use tokio::net::unix::pipe;
 use tokio::task::JoinSet;
 
-/// A place for one pseudo-terminal after the other, with a link that always points to the present one.
+/// A port with one pseudo-terminal at a time, and a link that always points to the current one.
 #[derive(Debug)]
 pub struct TerminalPort {
     link: Option<PathBuf>,
@@ -32,7 +32,7 @@ struct Terminal {
     controller: OwnedFd,
     path: PathBuf,
     has_host: Arc<AtomicBool>,
-    /// Holds the hosts' side open, so that the controller's side never reads an error.
+    /// Keeps the hosts' side open, so that the controller's side never reads an error.
     _caretaker: JoinSet<()>,
 }
 
@@ -47,29 +47,29 @@ impl TerminalPort {
         Ok(port)
     }
 
-    /// Path of the present pseudo-terminal.
+    /// Path of the current pseudo-terminal.
     pub fn path(&self) -> Option<&Path> {
         self.terminal.as_ref().map(|terminal| terminal.path.as_path())
     }
 
-    /// The device's side of the present pseudo-terminal, which is opened if there is none.
+    /// The device's side of the current pseudo-terminal. Opens one if there is none.
     pub fn open(&mut self) -> io::Result<Box<dyn ByteStream>> {
         let terminal = match &self.terminal {
             Some(terminal) => terminal,
             None => self.replace()?,
         };
-        // The system reads, writes and waits for a pseudo-terminal as for a pair of pipes.
+        // A pseudo-terminal is read, written and waited for like a pair of pipes.
         let input = pipe::Receiver::from_owned_fd_unchecked(terminal.controller.try_clone()?)?;
         let output = pipe::Sender::from_owned_fd_unchecked(terminal.controller.try_clone()?)?;
         Ok(Box::new(tokio::io::join(input, output)))
     }
 
-    /// True if a host has opened the present pseudo-terminal. Without one, bytes that leave the device are lost.
+    /// True if a host has opened the current pseudo-terminal. Without a host, bytes that leave the device are lost.
     pub fn has_host(&self) -> bool {
         self.terminal.as_ref().is_some_and(|terminal| terminal.has_host.load(Ordering::Relaxed))
     }
 
-    /// Bytes came from a host, so that there is one: its opening may not have been noticed yet.
+    /// Bytes came from a host, so there is one: its opening may not have been noticed yet.
     pub fn heard_host(&self) {
         if let Some(terminal) = &self.terminal {
             terminal.has_host.store(true, Ordering::Relaxed);
@@ -83,7 +83,7 @@ impl TerminalPort {
 
     /// Hangs up and opens another pseudo-terminal, which has another number.
     pub fn reopen_elsewhere(&mut self) -> io::Result<()> {
-        // The former one still holds its number while the new one gets its own.
+        // The old one still holds its number while the new one gets another.
         self.replace().map(drop)
     }
 
@@ -119,8 +119,8 @@ impl Terminal {
     }
 }
 
-/// Watches hosts come and go. Whenever the last has gone it makes their side as good as new: what was left
-/// unread is thrown away, and the host's lock, which outlives a host that is killed, is opened.
+/// Watches hosts open and close the terminal. After the last one it resets their side: unread bytes are discarded, and the
+/// host's exclusive lock is released, because it outlives a killed host.
 async fn take_care(host_side: OwnedFd, mut hosts: pipe::Receiver, has_host: Arc<AtomicBool>) {
     let mut present = 0_u32;
     let mut buffer = [0; 64 * EVENT_BYTES];
@@ -137,7 +137,7 @@ async fn take_care(host_side: OwnedFd, mut hosts: pipe::Receiver, has_host: Arc<
         if present == 0
             && let Err(error) = ioctl_tiocnxcl(&host_side).and(tcflush(&host_side, QueueSelector::IFlush))
         {
-            tracing::warn!(%error, "the pseudo-terminal keeps what its last host left");
+            tracing::warn!(%error, "the pseudo-terminal could not be reset after its last host");
         }
     }
 }
@@ -152,17 +152,17 @@ fn is_opening(event: &[u8; EVENT_BYTES]) -> bool {
 
 impl Drop for TerminalPort {
     fn drop(&mut self) {
-        // Another program may have pointed the link elsewhere meanwhile: then it is that one's.
+        // Another program may have replaced the link meanwhile: then it is not ours to remove.
         if let (Some(link), Some(terminal)) = (&self.link, &self.terminal)
             && fs::read_link(link).is_ok_and(|target| target == terminal.path)
             && let Err(error) = fs::remove_file(link)
         {
-            tracing::warn!(link = %link.display(), %error, "the link stays behind");
+            tracing::warn!(link = %link.display(), %error, "the link could not be removed");
         }
     }
 }
 
-/// Points a link elsewhere in one step, so that it never points nowhere.
+/// Changes a link atomically, so that it never dangles.
 fn point(link: &Path, target: &Path) -> io::Result<()> {
     if let Some(folder) = link.parent() {
         fs::create_dir_all(folder)?;

@@ -1,4 +1,4 @@
-//! A device on the test bench: driven by hand, in a time of its own.
+//! A device on the test bench: driven by hand, with its own time.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -39,7 +39,7 @@ impl<D: Device> DeviceBench<D> {
         self.device.fault(fault, self.now);
     }
 
-    /// Lets time pass; gives what the device sends, in chunks with the time at which each leaves.
+    /// Lets time pass. Returns the chunks that the device sends, each with its time.
     pub(crate) fn chunks(&mut self, duration: Duration) -> Vec<(Instant, Vec<u8>)> {
         let end = self.now + duration;
         let mut chunks = Vec::new();
@@ -59,7 +59,7 @@ impl<D: Device> DeviceBench<D> {
         chunks
     }
 
-    /// Lets time pass; gives all bytes that the device sends.
+    /// Lets time pass. Returns all bytes that the device sends.
     pub(crate) fn bytes(&mut self, ms: u64) -> Vec<u8> {
         self.chunks(Duration::from_millis(ms)).into_iter().flat_map(|(_, bytes)| bytes).collect()
     }

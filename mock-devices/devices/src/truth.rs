@@ -1,4 +1,4 @@
-//! What a simulated rig hides from the service: the truth that calibration is to find.
+//! What a simulated rig hides from the service: the truth that a calibration estimates.
 
 use std::collections::BTreeMap;
 
@@ -16,36 +16,36 @@ use tactus_schema::rig::{ElementFault, GrblAxes, SimulatedStage, Simulation, Sta
 use crate::sensor_model::SensorModel;
 use crate::twin::simulation_of;
 
-/// The true sensor, stage and tool behind a rig description; all of it follows from the description and a seed.
+/// The true sensor, stage and tool behind a rig description.
 #[derive(Debug, Clone)]
 pub struct Truth {
     /// The seed of everything random.
     pub seed: u64,
     /// The base model with each element's true sensitivity.
     pub model: ForwardModel,
-    /// What the base model lacks, but for the faults.
+    /// Effects beyond the base model, without the faults of elements.
     pub effects: Vec<Effect>,
-    /// Physics in other forms than the library's, in the place of effects.
+    /// Hidden physics. If there is any, `effects` are not used.
     pub physics: Vec<Dose>,
     /// The converter.
     pub readout: Readout,
-    /// What is wrong with elements, by index.
+    /// Faults of elements, by index.
     pub faults: BTreeMap<usize, ElementFault>,
-    /// Standard deviation of an element's noise, unless it is noisy.
+    /// Standard deviation of an element's noise, unless its fault is `Noisy`.
     pub noise_rms_counts: f64,
-    /// Where the sensor really lies in the robot's frame.
+    /// True registration of the sensor in the robot frame.
     pub registration: Registration,
-    /// Height of the covering's surface where the service believes 0, when the rig is switched on.
+    /// True height of the covering's surface when the rig is switched on; the service believes 0.
     pub surface_mm: f64,
     /// The tool on the stage.
     pub indenter: Indenter,
     /// The stage.
     pub stage: SimulatedStage,
-    /// How its controller speaks, and how its axes lie.
+    /// Protocol of its controller, and directions of its axes.
     pub stage_protocol: StageProtocol,
 }
 
-/// What draws random numbers: each has a stream of its own, so that one does not disturb the others.
+/// Uses of random numbers. Each has its own stream, so that one does not disturb the others.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum RandomStream {
     Gains,
@@ -117,8 +117,7 @@ impl Truth {
         }
     }
 
-    /// What feels, under a covering. Stuck and noisy elements are not in it: their faults come after the signal,
-    /// where they are read.
+    /// The sensor under a covering. It contains no stuck and noisy elements: these faults are applied to the readings.
     pub(crate) fn sensor_model(&self, covering: Covering) -> Result<Box<dyn SensorModel>, EffectError> {
         let sensor = self.sensor(covering)?;
         if self.physics.is_empty() {
@@ -129,7 +128,7 @@ impl Truth {
         Ok(Box::new(sensor))
     }
 
-    /// Elements that do not answer for themselves: which, for which other, and with what share of its signal.
+    /// Rewired elements: the element, the element whose signal it gives, and the share of it.
     fn wiring(&self) -> impl Iterator<Item = (usize, usize, f64)> {
         self.faults.iter().filter_map(|(element, fault)| match fault {
             ElementFault::Miswired { answers_for } => Some((*element, *answers_for, 1.0)),

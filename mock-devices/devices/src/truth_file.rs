@@ -1,4 +1,4 @@
-//! A sensor to hide in the place of a rig's own, from a file.
+//! A file with another truth for the virtual devices than the rig file's.
 
 use serde::Deserialize;
 use tactus_hidden::{Definition, Dose, STRENGTH_MAX};
@@ -8,10 +8,10 @@ use tactus_schema::model::{Model, ModelFileError};
 
 use crate::truth::Truth;
 
-/// What the virtual devices are to hide: a model (base parameters, noise and effects), or hidden physics on the rig's
-/// own simulation.
+/// What the virtual devices hide instead of the rig's own sensor: a model (base parameters, noise and effects), or hidden
+/// physics on top of the rig's simulation.
 ///
-/// Stage, tool, registration error, surface and the faults of elements stay the rig's.
+/// Stage, tool, registration error, surface and faults of elements remain those of the rig.
 #[derive(Debug, Clone)]
 pub struct TruthFile(Content);
 
@@ -44,6 +44,7 @@ struct DoseEntry {
 
 /// Why a file cannot be the truth of a rig's virtual devices.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum TruthError {
     /// It is no model file.
     #[error(transparent)]
@@ -51,56 +52,37 @@ pub enum TruthError {
     /// It is no file of hidden physics; the text names line and key.
     #[error("{0}")]
     Hidden(#[from] toml::de::Error),
-    /// An entry is no hidden physics.
+    /// An entry is no hidden physics; the problem says what would be right.
     #[error("physics[{index}].{field}: {problem}")]
-    Physics {
-        /// Index of the entry.
-        index: usize,
-        /// Its field.
-        field: &'static str,
-        /// What is wrong with it, and what would be right.
-        problem: String,
-    },
+    Physics { index: usize, field: &'static str, problem: String },
     /// Its base parameters make no forward model.
     #[error("base: {0}")]
     Base(#[from] ModelError),
-    /// It is of another array.
+    /// It describes another array.
     #[error("base.array: {truth} is not the array of rig {rig:?}, {of_rig}")]
-    Array {
-        /// The file's array.
-        truth: String,
-        /// The rig's name.
-        rig: String,
-        /// The rig's array.
-        of_rig: String,
-    },
-    /// An effect names an element that the array has not.
+    Array { truth: String, rig: String, of_rig: String },
+    /// An effect names an element that the array does not have.
     #[error(transparent)]
     Effect(#[from] EffectError),
-    /// An effect would do nothing, or something else, on devices that run.
+    /// Running devices cannot show the effect: they do not know the tip's future, or the temperature.
     #[error(
         "{effect}: {parameter} = {value} cannot act on running devices, which {lack}; remove the effect, or make it {instead}"
     )]
     CannotAct {
-        /// The effect.
         effect: &'static str,
-        /// The parameter.
         parameter: &'static str,
-        /// Its value.
         value: f64,
-        /// What the devices do not know.
         lack: &'static str,
-        /// Values that can act, or that ask for nothing.
         instead: &'static str,
     },
 }
 
 impl TruthFile {
-    /// Reads a model file, or a file of hidden physics (its `schema` tells).
+    /// Reads a model file, or a file of hidden physics if its `schema` is [`HIDDEN_SCHEMA`].
     ///
     /// # Errors
-    /// [`TruthError::Model`], [`TruthError::Hidden`] and [`TruthError::Physics`] name the line and key, or the field,
-    /// that is wrong; [`TruthError::CannotAct`] an effect that no running device can have.
+    /// [`TruthError::Model`], [`TruthError::Hidden`] and [`TruthError::Physics`] name the line and key, or the field.
+    /// [`TruthError::CannotAct`] names an effect that no running device can have.
     pub fn from_toml(text: &str) -> Result<Self, TruthError> {
         let is_hidden =
             |table: toml::Table| table.get("schema").and_then(toml::Value::as_str) == Some(HIDDEN_SCHEMA);
@@ -114,10 +96,10 @@ impl TruthFile {
         Ok(Self(Content::Model(Box::new(model))))
     }
 
-    /// What the rig's devices then hide; the seed is that of everything random.
+    /// The truth of the rig's devices with this file; `seed` is that of everything random.
     ///
     /// # Errors
-    /// [`TruthError`] if it is of another array than the rig's.
+    /// [`TruthError`] if it describes another array than the rig's, or does not fit it.
     pub fn behind(&self, rig: &Rig, seed: u64) -> Result<Truth, TruthError> {
         let model = match &self.0 {
             Content::Model(model) => model,
@@ -155,7 +137,7 @@ fn one() -> f64 {
     1.0
 }
 
-/// Checks that running devices know what an effect acts on: the tip's past, and no temperature.
+/// Checks that running devices can show an effect. They know the tip's past, but neither its future nor a temperature.
 fn can_act(effect: &Effect) -> Result<(), TruthError> {
     for (parameter, value) in effect.parameters() {
         let (lack, instead) = match (effect.name(), parameter) {
@@ -168,7 +150,7 @@ fn can_act(effect: &Effect) -> Result<(), TruthError> {
     Ok(())
 }
 
-/// An array by its name and by what else two of one name can differ in.
+/// Describes an array by its name and every property in which two of one name can differ.
 fn describe(array: &Array) -> String {
     let [[left, right], [bottom, top]] = array.extent_mm();
     format!(

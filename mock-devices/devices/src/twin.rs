@@ -8,10 +8,10 @@ use tactus_schema::rig::{RegistrationError, SimulatedStage, Simulation};
 /// The virtual stage's travel reaches this far beyond the rig's envelope.
 const MARGIN_MM: f64 = 10.0;
 
-/// A simulated rig that behaves as this one's description says: no noise, no spread of gains, no errors.
+/// A simulated rig that behaves exactly as this one's description says: no noise, no scatter of gains, no errors.
 ///
-/// A dry run on it finds what an experiment will do, and gives nothing away of what a simulated rig hides.
-/// The kinematics are those of the rig's simulation, or the paper's stage.
+/// A dry run on it finds what an experiment will do, and reveals nothing that a simulated rig hides. The kinematics are those
+/// of the rig's simulation, or of the paper's stage.
 #[must_use]
 pub fn twin_of(rig: &Rig) -> Rig {
     Rig { simulated: true, simulation: Some(ideal(rig)), ..rig.clone() }
@@ -35,7 +35,7 @@ fn ideal(rig: &Rig) -> Simulation {
     }
 }
 
-/// The paper's stage (platen-forcer, 3 um and 1 um), with the room that the rig's envelope needs.
+/// The paper's stage (platen-forcer, 3 um and 1 um), with travel for the rig's envelope.
 fn stage_for(rig: &Rig) -> SimulatedStage {
     let wider = |[least, greatest]: [f64; 2]| [least - MARGIN_MM, greatest + MARGIN_MM];
     let deepest_mm = -rig.covering.thickness_mm;

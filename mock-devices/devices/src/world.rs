@@ -12,24 +12,24 @@ use crate::motion::{Motion, Point};
 use crate::sensor_model::SensorModel;
 use crate::truth::{RandomStream, Truth};
 
-/// The world, shared by the devices and their controls. Held for one look or one change at a time.
+/// The world, shared by the devices and their controls. The lock is held for one read or one change at a time.
 #[derive(Debug, Clone)]
 pub(crate) struct SharedWorld(Arc<Mutex<World>>);
 
-/// The truth, and what changes in it.
+/// The truth, and the state that changes.
 #[derive(Debug)]
 pub(crate) struct World {
     truth: Arc<Truth>,
-    /// The stage's tip and what its controller believes, where one controller moves all axes.
+    /// Motion of the tip, if one controller moves all axes.
     pub(crate) motion: Motion,
-    /// The same of x, y and z, where each axis moves by itself; the other two parts of its places are 0.
+    /// Motions of x, y and z, if each axis moves by itself; the other two coordinates of each are 0.
     by_axis: Option<[Motion; 3]>,
     covering: Covering,
     surface_mm: f64,
     deepest_mm: f64,
     noise: ChaCha8Rng,
     sensor_model: Box<dyn SensorModel>,
-    /// The zero of time of what feels, when it was first looked at, and where the tip was since.
+    /// Zero of the sensor model's time (its first sampling), and the tip's path since.
     trail: Option<(Instant, Trail)>,
 }
 
@@ -39,14 +39,14 @@ impl SharedWorld {
     }
 
     pub(crate) fn lock(&self) -> MutexGuard<'_, World> {
-        // A panic elsewhere left a whole world behind: every change is one assignment.
+        // After a panic elsewhere the world is still consistent: every change is one assignment.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl World {
-    /// A rig that was just switched on: the tip stands near the top of its travel, and the controller
-    /// believes that this is 0.
+    /// A rig that was just switched on: the tip is near the top of its travel, and the controller believes that it is
+    /// at 0.
     ///
     /// # Panics
     /// If the truth was not made by its own constructors, which check that effects name elements of the array.
@@ -54,11 +54,11 @@ impl World {
     pub(crate) fn new(truth: Arc<Truth>, covering: Covering) -> Self {
         let [x_mm, y_mm, z_mm] = truth.stage.travel_mm;
         let tip_mm = [middle(x_mm), middle(y_mm), z_mm[1] - 0.1 * (z_mm[1] - z_mm[0])];
-        let sensor_model = truth.sensor_model(covering).expect("a checked truth feels");
+        let sensor_model = truth.sensor_model(covering).expect("a checked truth makes a sensor");
         let acceleration_mm_per_s2 = truth.stage.acceleration_mm_per_s2;
         let by_axis = match &truth.stage_protocol {
             StageProtocol::Grbl(_) => None,
-            // An axis that is missing stands at 0 for ever.
+            // A missing axis stays at 0.
             StageProtocol::Zaber(zaber) => Some(std::array::from_fn(|axis| {
                 let at_mm = if zaber.axes[axis].is_some() { tip_mm[axis] } else { 0.0 };
                 Motion::at_rest([0.0; 3], on_axis(axis, at_mm), acceleration_mm_per_s2)
@@ -77,18 +77,18 @@ impl World {
         }
     }
 
-    /// What the rig hides.
+    /// The truth that the rig hides.
     pub(crate) fn truth(&self) -> &Arc<Truth> {
         &self.truth
     }
 
-    /// One reading of all elements at `at`, into `counts`: noise, saturation, quantisation upon the image there.
+    /// Writes one reading of all elements at `at` into `counts`, with noise, saturation and quantisation.
     pub(crate) fn sample(&mut self, at: Instant, counts: &mut Vec<u16>) {
         self.look(at);
         let Self { truth, noise, sensor_model, .. } = self;
         counts.clear();
         counts.extend(sensor_model.counts().iter().enumerate().map(|(element, clean)| {
-            // Drawn for a stuck element too, so that its fault changes no other's noise.
+            // Drawn for a stuck element too, so that its fault does not change the noise of others.
             let deviate: f64 = StandardNormal.sample(noise);
             let noise_rms_counts = match truth.faults.get(&element) {
                 Some(ElementFault::Stuck { counts }) => return *counts,
@@ -118,17 +118,17 @@ impl World {
         self.sensor_model.counts().iter().enumerate().map(read).collect()
     }
 
-    /// Where the tip truly is, in the stage's steps.
+    /// True position of the tip, rounded to the stage's steps.
     pub(crate) fn tip_mm(&self, at: Instant) -> Point {
         self.in_steps(self.of_motion(|motion| motion.true_mm(at)))
     }
 
-    /// Where the controller believes the tip to be, in the stage's steps.
+    /// Position of the tip that the controller believes, rounded to the stage's steps.
     pub(crate) fn believed_mm(&self, at: Instant) -> Point {
         self.in_steps(self.of_motion(|motion| motion.believed_mm(at)))
     }
 
-    /// How far the tip stands below the covering's true surface; negative above it.
+    /// Depth of the tip below the covering's true surface; negative above it.
     pub(crate) fn depth_mm(&self, at: Instant) -> f64 {
         self.surface_mm - self.tip_mm(at)[2]
     }
@@ -139,10 +139,9 @@ impl World {
         self.deepest_mm
     }
 
-    /// Brings the record of depths up to `now` and takes finished moves off the chain. To be called before
-    /// any change of the motion.
+    /// Updates the greatest depth up to `now` and removes finished moves. Call it before every change of the motion.
     pub(crate) fn settle(&mut self, now: Instant) {
-        // Along a straight line depth is greatest at an end: of a finished move, or where the tip is.
+        // On a straight line the greatest depth is at an end: that of a finished move, or the present position.
         let vertical = self.by_axis.as_ref().map_or(&self.motion, |[_, _, z]| z);
         let ends = vertical.true_ends_mm().filter(|(end, _)| *end <= now).map(|(_, tip_mm)| tip_mm);
         let lowest_mm = ends.chain([vertical.true_mm(now)]).map(|[_, _, z]| z).fold(f64::INFINITY, f64::min);
@@ -156,7 +155,7 @@ impl World {
         self.motions().any(|motion| motion.is_moving())
     }
 
-    /// The motion of one axis, where each moves by itself; else that of all.
+    /// The motion of one axis if each moves by itself, else that of all.
     pub(crate) fn motion_of(&mut self, axis: usize) -> &mut Motion {
         match &mut self.by_axis {
             Some(motions) => &mut motions[axis],
@@ -164,7 +163,7 @@ impl World {
         }
     }
 
-    /// What moves.
+    /// All motions.
     fn motions(&mut self) -> impl Iterator<Item = &mut Motion> {
         let (all, each) = match &mut self.by_axis {
             Some(motions) => (None, Some(motions)),
@@ -173,7 +172,7 @@ impl World {
         all.into_iter().chain(each.into_iter().flatten())
     }
 
-    /// A place that each motion tells its part of.
+    /// Combines a position from the coordinate of each motion.
     fn of_motion(&self, place: impl Fn(&Motion) -> Point) -> Point {
         match &self.by_axis {
             Some(motions) => std::array::from_fn(|axis| place(&motions[axis])[axis]),
@@ -186,13 +185,13 @@ impl World {
         self.covering.thickness_mm
     }
 
-    /// Puts another covering in place, its surface where the former one's was.
+    /// Puts another covering in place; its surface stays at the same height.
     pub(crate) fn set_covering_mm(&mut self, thickness_mm: f64) {
         self.covering = Covering { thickness_mm: thickness_mm.max(0.0) };
         self.sensor_model.set_covering(self.covering);
     }
 
-    /// Moves the true surface, where the service believes 0.
+    /// Moves the true surface; the service still believes 0.
     pub(crate) fn set_surface_mm(&mut self, surface_mm: f64, now: Instant) {
         self.settle(now);
         self.surface_mm = surface_mm;
@@ -200,7 +199,7 @@ impl World {
         self.settle(now);
     }
 
-    /// Makes the covering answer `stiffness` times as strongly as the model says.
+    /// Multiplies the response of the covering by `stiffness`.
     pub(crate) fn set_stiffness(&mut self, stiffness: f64) {
         self.sensor_model.set_stiffness(stiffness);
     }
@@ -219,7 +218,7 @@ impl World {
     }
 }
 
-/// A place on one axis.
+/// A position on one axis; the other two coordinates are 0.
 pub(crate) fn on_axis(axis: usize, mm: f64) -> Point {
     let mut place = [0.0; 3];
     place[axis] = mm;

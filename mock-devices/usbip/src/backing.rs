@@ -1,4 +1,4 @@
-//! The devices behind a USB device's functions: the virtual sensor and stage, which know nothing of USB.
+//! The devices behind USB functions: the virtual sensor and stage, which know nothing of USB.
 
 use std::fmt;
 
@@ -65,7 +65,7 @@ impl BackingDevice {
         }
     }
 
-    /// Bytes from the host.
+    /// Takes bytes from the host.
     pub(crate) fn receive(&mut self, bytes: &[u8], now: Instant) {
         match &mut self.0 {
             Backing::Sensor(backing) => backing.device.receive(bytes, now),
@@ -73,7 +73,7 @@ impl BackingDevice {
         }
     }
 
-    /// Time has passed; gives what leaves the device by now.
+    /// Does everything that is due. Returns the bytes that leave the device by `now`.
     pub(crate) fn wake(&mut self, now: Instant) -> Vec<u8> {
         fn wake<F: Send>(device: &mut dyn Device<Fault = F>, now: Instant) -> Vec<u8> {
             device.wake(now);
@@ -85,7 +85,7 @@ impl BackingDevice {
         }
     }
 
-    /// When it wants to be woken.
+    /// When something is due next.
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         match &self.0 {
             Backing::Sensor(backing) => backing.device.next_wake(),
@@ -93,7 +93,7 @@ impl BackingDevice {
         }
     }
 
-    /// The cable has been plugged in again.
+    /// The cable is plugged in again.
     pub(crate) fn plugged_in(&mut self, now: Instant) {
         match &mut self.0 {
             Backing::Sensor(backing) => backing.device.plugged_in(now),

@@ -1,21 +1,21 @@
-//! What can be done by hand to a virtual USB device: `sensor unplug`, as a line.
+//! Commands for a virtual USB device, as lines such as `sensor unplug`.
 
 use std::time::Duration;
 
 use tactus_virtual::faults::duration;
 
-/// Something that is done to a device or its plug.
+/// A command for a USB device or its plug.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlugCommand {
-    /// `unplug`: the cable comes out.
+    /// `unplug`: unplugs the cable.
     Unplug,
-    /// `plug`: it goes in again, where it was.
+    /// `plug`: plugs it in again at the same port.
     Plug,
-    /// `plug elsewhere`: it goes in again, in another port.
+    /// `plug elsewhere`: plugs it in again at another port.
     PlugElsewhere,
-    /// `halt`: the endpoint that sends stalls, until the host clears that.
+    /// `halt`: the sending endpoint stalls until the host clears the halt.
     Halt,
-    /// `slow 50ms`: answers one transfer in this time; `slow 0s` ends it.
+    /// `slow 50ms`: answers at most one transfer per this time; `slow 0s` ends it.
     Slow(Duration),
 }
 
@@ -23,13 +23,13 @@ pub enum PlugCommand {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum PlugCommandError {
-    /// An argument that the command does not take.
+    /// The command does not take the argument.
     #[error("{command} takes {wanted}, not {found:?}")]
     Argument { command: &'static str, wanted: &'static str, found: String },
-    /// There is nothing at the host.
+    /// The device is not at the host.
     #[error("it is not plugged in")]
     NotPlugged,
-    /// It is there already.
+    /// The device is at the host already.
     #[error("it is plugged in already")]
     Plugged,
     /// The system refused.
@@ -38,7 +38,7 @@ pub enum PlugCommandError {
 }
 
 impl PlugCommand {
-    /// The device and what is to be done to it; `None` if the line is no such command, but perhaps a fault.
+    /// Parses a line into the device's name and the command; `None` if it is no such command. It may be a fault.
     pub fn parse(line: &str) -> Option<(&str, Result<Self, PlugCommandError>)> {
         let words: Vec<_> = line.split_whitespace().collect();
         let (device, command, arguments) = match words[..] {

@@ -1,4 +1,4 @@
-//! Descriptors: what a device says of itself when it is plugged in.
+//! Descriptors: a device's description of itself for the host.
 //!
 //! # Source
 //! USB 2.0, section 9.6: tables 9-8 (device), 9-10 (configuration), 9-12 (interface), 9-13 (endpoint), 9-15 and
@@ -14,7 +14,7 @@ pub(crate) mod kind {
     pub(crate) const INTERFACE_ASSOCIATION: u8 = 11;
 }
 
-/// The bit of an endpoint's address that says: to the host.
+/// The direction bit of an endpoint's address: to the host.
 pub(crate) const IN: u8 = 0x80;
 
 /// U.S. English, the only language of the strings.
@@ -23,7 +23,7 @@ const LANGUAGE: u16 = 0x0409;
 /// USB 2.0, in binary-coded decimals.
 const USB_RELEASE: u16 = 0x0200;
 
-/// Length of the control endpoint's packets: at high speed there is no other.
+/// Length of the control endpoint's packets: the only one at high speed.
 const CONTROL_PACKET_BYTES: u8 = 64;
 
 /// How fast a device is; the numbers are the kernel's (`enum usb_device_speed`).
@@ -50,7 +50,7 @@ impl Speed {
 pub(crate) struct Class(pub(crate) u8, pub(crate) u8, pub(crate) u8);
 
 impl Class {
-    /// Each interface says for itself.
+    /// Each interface has its own class.
     pub(crate) const BY_INTERFACE: Self = Self(0, 0, 0);
     /// Interfaces are associated.
     pub(crate) const BY_ASSOCIATION: Self = Self(0xEF, 2, 1);
@@ -64,7 +64,7 @@ pub(crate) struct DeviceDescriptor {
     pub(crate) class: Class,
     pub(crate) vendor: u16,
     pub(crate) product: u16,
-    /// Of the device, in binary-coded decimals.
+    /// Release of the device, in binary-coded decimals.
     pub(crate) release: u16,
 }
 
@@ -84,20 +84,20 @@ impl DeviceDescriptor {
     }
 }
 
-/// How an endpoint carries its data.
+/// Transfer type of an endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TransferType {
     Bulk,
-    /// Asked at least every `interval`: in ms at full speed, in 2^(n-1) eighths of it at high speed.
+    /// Polled at least every `interval`: in ms at full speed, in units of 2^(n-1) / 8 ms at high speed.
     Interrupt {
         interval: u8,
     },
 }
 
-/// An endpoint but for the control endpoint.
+/// An endpoint other than the control endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Endpoint {
-    /// Its number, with [`IN`] where it sends.
+    /// Its number, with [`IN`] if it sends.
     pub(crate) address: u8,
     pub(crate) carrier: TransferType,
     pub(crate) packet_bytes: u16,
@@ -114,12 +114,12 @@ impl Endpoint {
     }
 }
 
-/// An interface with its only setting.
+/// An interface with a single setting.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Interface {
     pub(crate) number: u8,
     pub(crate) class: Class,
-    /// Descriptors of the class, whole, between those of the interface and its endpoints.
+    /// Complete descriptors of the class, between those of the interface and of its endpoints.
     pub(crate) class_descriptors: Vec<u8>,
     pub(crate) endpoints: Vec<Endpoint>,
 }
@@ -134,7 +134,7 @@ impl Interface {
     }
 }
 
-/// Interfaces that one driver serves: one, or two and more, which are associated.
+/// The interfaces of one function: one, or several that are associated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct FunctionDescriptors {
     pub(crate) interfaces: Vec<Interface>,
@@ -175,7 +175,7 @@ pub(crate) fn languages() -> Vec<u8> {
     vec![4, kind::STRING, low, high]
 }
 
-/// A string; what does not fit into its descriptor is left out.
+/// A string, cut to the length of a descriptor.
 pub(crate) fn string(text: &str) -> Vec<u8> {
     /// The length is one byte, and each unit has two.
     const UNITS_MAX: usize = 126;

@@ -1,4 +1,4 @@
-//! Functions: what a USB device is to the host's drivers.
+//! Functions: the roles of a USB device for the host's drivers.
 
 pub(crate) mod acm;
 pub(crate) mod bulk;
@@ -15,55 +15,55 @@ use hid::Hid;
 use crate::descriptor::{FunctionDescriptors, Speed};
 use crate::setup::{Refused, Setup};
 
-/// The first numbers that are a function's own within its device.
+/// A function's first interface and endpoint numbers within its device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FirstNumbers {
-    /// Of its interfaces.
+    /// Its first interface.
     pub(crate) interface: u8,
-    /// Of its endpoints: on this one it sends its data.
+    /// Its first endpoint, on which it sends its data.
     pub(crate) endpoint: u8,
 }
 
-/// What a function makes of a request of its class, or of its vendor.
+/// A function's answer to a request of its class or vendor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum ControlReply {
-    /// An answer; empty where the host only tells something.
+    /// Data for the host; empty if the host only sends something.
     Data(Vec<u8>),
     /// Bytes for the device behind.
     Heard(Vec<u8>),
 }
 
 impl ControlReply {
-    /// The host told something, which is done.
+    /// The request is done and has no data.
     pub(crate) const DONE: Self = Self::Data(Vec::new());
 }
 
-/// One function of a USB device. What its data endpoint hears goes to the device behind as it is.
+/// One function of a USB device. Bytes that its data endpoint receives go unchanged to the device behind it.
 pub(crate) trait Function: Send {
-    /// Its interfaces and endpoints. Every call gives the same, but for the place.
+    /// Its interfaces and endpoints. Every call returns the same, except for the numbers.
     fn group(&self, place: FirstNumbers) -> FunctionDescriptors;
 
-    /// A request of its class or vendor, or for a descriptor of its class; `data` are the host's.
+    /// Answers a request of its class or vendor, or for a descriptor of its class; `data` is from the host.
     ///
     /// # Errors
-    /// What it does not know.
+    /// [`Refused`] for an unknown request.
     fn control(&mut self, setup: Setup, data: &[u8]) -> Result<ControlReply, Refused>;
 
-    /// Makes packets for the host of what the device behind sends.
+    /// Makes packets for the host from bytes of the device behind it.
     fn packets(&mut self, bytes: &[u8]) -> Vec<Vec<u8>>;
 
-    /// False while no host has opened it: what the device sends is then lost, as real ones have it.
+    /// False while no host has opened it: then bytes of the device are lost, as with real devices.
     fn is_open(&self) -> bool {
         true
     }
 
-    /// What it sends when a host has asked and for so long there was nothing.
+    /// The packet that it sends if a host has waited this long without data.
     fn idle_packet(&self) -> Option<(Duration, Vec<u8>)> {
         None
     }
 }
 
-/// What kind of function a device has, with all that making it needs.
+/// The kind of a function, with its parameters.
 #[derive(Debug, Clone)]
 pub enum FunctionKind {
     /// A serial port by USB's own class, CDC-ACM.

@@ -10,7 +10,7 @@ use crate::setup::{Recipient, Refused, RequestKind, Setup, standard};
 /// Self-powered: no; wakes the host: no; halted: no.
 const STATUS: [u8; 2] = [0, 0];
 
-/// A device of one or more functions. What the host asks of single endpoints is the [`Peer`](crate::peer::Peer)'s.
+/// A device of one or more functions. Requests for single endpoints are answered by the [`Peer`](crate::peer::Peer)'s.
 pub(crate) struct Gadget {
     speed: Speed,
     device: DeviceDescriptor,

@@ -1,13 +1,13 @@
-//! What a virtual device calls itself.
+//! Numbers and strings of a virtual device.
 
 use crate::function::ftdi::Ftdi;
 
-/// pid.codes, whose products 1 to 16 are for tests and stand in no shop.
+/// pid.codes. Its products 1 to 16 are reserved for tests.
 const VENDOR: u16 = 0x1209;
 
 const MANUFACTURER: &str = "Tactus SIM";
 
-/// The numbers and strings of a device. Serial numbers say that it is simulated.
+/// The numbers and strings of a device. The serial number says that it is simulated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Identity {
     /// `idVendor`.
@@ -21,7 +21,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// A device of our own: its product number for tests, its name, its serial number.
+    /// A test device of pid.codes.
     pub fn own(product: u16, name: &str, serial: &str) -> Self {
         Self::new([VENDOR, product, 0x0100], name, serial)
     }

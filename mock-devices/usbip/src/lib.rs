@@ -1,17 +1,15 @@
-//! The device's side of USB: virtual devices that a real kernel enumerates, without any hardware.
+//! The device side of USB: virtual devices that a real kernel enumerates, without hardware.
 //!
-//! A `Gadget` is a USB device: its descriptors, and one or more `Function`s
-//! (CDC-ACM, FTDI, HID, vendor bulk), behind each of which sits a [`Device`](tactus_virtual::cable::Device) that knows
-//! nothing of USB. A `Peer` answers a host controller's messages for it (USB/IP);
-//! neither reads a clock nor does I/O, so that both are tested without a kernel. A [`Plug`] puts the
-//! peer at the other end of a socket pair, whose first end the kernel's `vhci_hcd` takes for a network's
-//! ([`Vhci`]), and pumps.
+//! A `Gadget` is a USB device: its descriptors, and one or more `Function`s (CDC-ACM, FTDI, HID, vendor bulk). Behind each
+//! function is a [`Device`](tactus_virtual::cable::Device), which knows nothing of USB. A `Peer` answers a host
+//! controller's USB/IP messages for the gadget. Neither reads a clock nor does I/O, so both are tested without a kernel. A
+//! [`Plug`] connects the peer to one end of a socket pair; the kernel's `vhci_hcd` ([`Vhci`]) has the other end.
 //!
-//! What real devices do and simpler emulations do not: a transfer for which there is nothing waits (NAK) until
-//! there is, or until the host takes it back; an endpoint can halt (STALL) until the host clears it; the cable
-//! comes out and goes in again, in the same place or in another.
+//! Like real devices, and unlike simpler emulations: a transfer without data waits (NAK) until there are some, or until the
+//! host cancels it; an endpoint can halt (STALL) until the host clears the halt; the cable can be unplugged and plugged in
+//! again, at the same port or at another.
 //!
-//! Each device runs at one speed only, and so has no descriptors for another.
+//! Each device runs at one speed only, so it has no descriptors for another.
 //!
 //! # Source
 //! The Universal Serial Bus Specification 2.0 (chapters 5, 8 and 9), the class documents named in the functions'

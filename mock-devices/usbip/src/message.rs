@@ -1,7 +1,7 @@
-//! USB/IP: the messages in which a kernel's virtual host controller asks for transfers, and their answers.
+//! USB/IP: requests of a kernel's virtual host controller for transfers, and the answers.
 //!
-//! Every message begins with 48 bytes, all numbers big-endian but for the setup data, which is as on the cable.
-//! Data follow a submitted transfer to the device, and the answer to one from it. Isochronous transfers have more;
+//! Every message begins with 48 bytes. Numbers are big-endian, except in the setup data, which is as on the cable. Data
+//! follows a submitted transfer to the device, and the answer to a transfer from it. Isochronous transfers have more;
 //! no device here has such an endpoint.
 //!
 //! # Source
@@ -10,10 +10,10 @@
 
 use crate::setup::{SETUP_BYTES, Setup};
 
-/// Length of what every message begins with.
+/// Length of the header of every message.
 const HEADER_BYTES: usize = 48;
 
-/// The longest transfer taken: more than any driver of these devices asks for.
+/// The longest accepted transfer, longer than any driver of these devices requests.
 const TRANSFER_BYTES_MAX: usize = 1 << 20;
 
 const CMD_SUBMIT: u32 = 1;
@@ -21,15 +21,15 @@ const CMD_UNLINK: u32 = 2;
 const RET_SUBMIT: u32 = 3;
 const RET_UNLINK: u32 = 4;
 
-/// For transfers that are not isochronous, in the field that numbers such packets.
+/// Number of isochronous packets in a transfer that is not isochronous.
 const NO_PACKETS: u32 = u32::MAX;
 
-/// What the host controller asks.
+/// A request of the host controller.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum UsbipRequest {
-    /// A transfer.
+    /// Submits a transfer.
     Submit(Transfer),
-    /// To take a transfer back.
+    /// Cancels a transfer.
     Unlink {
         /// Number of this request.
         seq: u32,
@@ -41,33 +41,33 @@ pub(crate) enum UsbipRequest {
 /// A transfer to or from an endpoint.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Transfer {
-    /// Its number, which its answer repeats.
+    /// Its number, which the answer repeats.
     pub(crate) seq: u32,
     /// Number of the endpoint, without its direction.
     pub(crate) endpoint: u8,
     pub(crate) flow: Direction,
-    /// For the control endpoint.
+    /// Only for the control endpoint.
     pub(crate) setup: Setup,
 }
 
-/// Where a transfer's data go.
+/// Direction of a transfer's data.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Direction {
-    /// To the host, which has room for so many bytes.
+    /// To the host, which accepts this many bytes.
     In(usize),
     /// To the device.
     Out(Vec<u8>),
 }
 
-/// How a transfer ended; the kernel's error numbers, negative.
+/// How a transfer ended, as the kernel's negative error numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TransferStatus {
     Done,
     /// The endpoint has halted, or refuses the request (`EPIPE`).
     Stalled,
-    /// The device sent more than there was room for (`EOVERFLOW`).
+    /// The device sent more than the host accepts (`EOVERFLOW`).
     Overflow,
-    /// Taken back before anything came (`ECONNRESET`).
+    /// Cancelled before it ended (`ECONNRESET`).
     Unlinked,
 }
 
@@ -82,16 +82,16 @@ impl TransferStatus {
     }
 }
 
-/// The kernel sent what is no request; the connection is of no more use.
+/// The kernel sent no valid request. The connection cannot be used any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum MessageError {
-    /// Of no known kind.
+    /// The kind of message is unknown.
     #[error("the host controller sent a message of kind {0}, which USB/IP requests are not")]
     Kind(u32),
-    /// Beyond what is taken.
+    /// The transfer is too long.
     #[error("the host controller asks for a transfer of {0} bytes; {TRANSFER_BYTES_MAX} are the most")]
     Length(u32),
-    /// Numbers that USB does not have.
+    /// The endpoint or direction does not exist in USB.
     #[error(
         "the host controller asks for endpoint {endpoint} in direction {direction}, which USB does not have"
     )]
@@ -103,22 +103,22 @@ pub(crate) enum MessageError {
     },
 }
 
-/// Cuts the kernel's bytes into requests.
+/// Splits the kernel's bytes into requests.
 #[derive(Debug, Default)]
 pub(crate) struct Decoder {
     bytes: Vec<u8>,
 }
 
 impl Decoder {
-    /// Bytes from the kernel.
+    /// Takes bytes from the kernel.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// The next request that has come whole.
+    /// The next complete request.
     ///
     /// # Errors
-    /// What is no request; every further call then says the same.
+    /// If the bytes are no request. Every further call returns the same error.
     pub(crate) fn next_request(&mut self) -> Result<Option<UsbipRequest>, MessageError> {
         let Some((header, behind)) = self.bytes.split_first_chunk::<HEADER_BYTES>() else { return Ok(None) };
         let header = Header(header);
@@ -191,12 +191,12 @@ impl Answers {
         self.bytes.extend_from_slice(data);
     }
 
-    /// A transfer to the device ended; it took so many bytes.
+    /// A transfer to the device ended; it took this many bytes.
     pub(crate) fn taken(&mut self, seq: u32, status: TransferStatus, bytes: usize) {
         self.answer(RET_SUBMIT, seq, status, bytes);
     }
 
-    /// An unlinking ended.
+    /// A request to cancel ended.
     pub(crate) fn unlinked(&mut self, seq: u32, status: TransferStatus) {
         self.answer(RET_UNLINK, seq, status, 0);
     }
@@ -207,7 +207,7 @@ impl Answers {
     }
 
     fn answer(&mut self, kind: u32, seq: u32, status: TransferStatus, bytes: usize) {
-        // Transfers are bounded far below what the field holds.
+        // Transfers are much shorter than the field allows.
         let length = u32::try_from(bytes).unwrap_or(u32::MAX);
         let mut header = [0; HEADER_BYTES];
         let packets = if kind == RET_SUBMIT { NO_PACKETS } else { 0 };

@@ -11,20 +11,20 @@ use crate::message::{Answers, Decoder, Direction, MessageError, Transfer, Transf
 use crate::pipe::Pipe;
 use crate::setup::{ENDPOINT_HALT, Recipient, Refused, RequestKind, Setup, standard};
 
-/// A device that is plugged in; it neither waits nor reads a clock.
+/// A plugged-in device as a state machine; it neither waits nor reads a clock.
 ///
-/// Times never go back. After every call, [`take_answers`](Self::take_answers) is to be sent to the kernel and
-/// [`take_heard`](Self::take_heard) to the devices behind, and [`wake`](Self::wake) called when
+/// Times never go back. After every call the caller sends [`take_answers`](Self::take_answers) to the kernel and
+/// [`take_heard`](Self::take_heard) to the devices behind, and calls [`wake`](Self::wake) when
 /// [`next_wake`](Self::next_wake) has come.
 pub(crate) struct Peer {
     gadget: Gadget,
     decoder: Decoder,
     answers: Answers,
-    /// Endpoints that send, by their address.
+    /// Endpoints that send, by address.
     pipes: BTreeMap<u8, Pipe>,
-    /// Endpoints that hear: their address, their function, whether they have halted.
+    /// Endpoints that receive: address, function, whether halted.
     ears: BTreeMap<u8, Ear>,
-    /// Functions that send something when nothing is to be sent: since when they have been starved.
+    /// Functions with an idle packet: since when a host has waited for data.
     starved_since: BTreeMap<usize, Instant>,
     heard: Vec<(usize, Vec<u8>)>,
 }
@@ -36,7 +36,7 @@ struct Ear {
 }
 
 impl Peer {
-    /// Plugged in just now.
+    /// A device that was just plugged in.
     pub(crate) fn new(gadget: Gadget) -> Self {
         let (mut pipes, mut ears) = (BTreeMap::new(), BTreeMap::new());
         for (function, endpoint) in gadget.endpoints() {
@@ -57,10 +57,10 @@ impl Peer {
         }
     }
 
-    /// Bytes from the kernel.
+    /// Takes bytes from the kernel.
     ///
     /// # Errors
-    /// What is no request; the connection is of no more use.
+    /// If they are no request. The connection cannot be used any more.
     pub(crate) fn receive(&mut self, bytes: &[u8], now: Instant) -> Result<(), MessageError> {
         self.decoder.push(bytes);
         while let Some(request) = self.decoder.next_request()? {
@@ -73,7 +73,7 @@ impl Peer {
         Ok(())
     }
 
-    /// Bytes from the device behind a function. With no host there they are lost.
+    /// Takes bytes of the device behind a function. Without a host they are lost.
     pub(crate) fn send(&mut self, function: usize, bytes: &[u8], now: Instant) {
         let Some(pipe) = self.gadget.data_address(function).and_then(|address| self.pipes.get_mut(&address))
         else {
@@ -88,7 +88,7 @@ impl Peer {
         self.wake(now);
     }
 
-    /// Time has passed.
+    /// Does everything that is due.
     pub(crate) fn wake(&mut self, now: Instant) {
         self.fill_silence(now);
         for pipe in self.pipes.values_mut() {
@@ -97,7 +97,7 @@ impl Peer {
         self.note_silence(now);
     }
 
-    /// When it wants to be woken.
+    /// When something is due next.
     pub(crate) fn next_wake(&mut self) -> Option<Instant> {
         let silences: Vec<_> =
             self.starved_since.iter().map(|(function, since)| (*function, *since)).collect();
@@ -108,7 +108,7 @@ impl Peer {
         self.pipes.values().filter_map(Pipe::next_wake).chain(idle).min()
     }
 
-    /// Halts the endpoint on which a function sends: its transfers stall until the host clears that.
+    /// Halts a function's sending endpoint: its transfers stall until the host clears the halt.
     pub(crate) fn halt(&mut self, function: usize, now: Instant) {
         if let Some(pipe) = self.data_pipe(function) {
             pipe.halt();
@@ -116,7 +116,7 @@ impl Peer {
         self.wake(now);
     }
 
-    /// Has a function answer at most one transfer in this time.
+    /// Limits a function to one answered transfer per this time.
     pub(crate) fn slow_down(&mut self, function: usize, slowness: Duration, now: Instant) {
         if let Some(pipe) = self.data_pipe(function) {
             pipe.slow_down(slowness);
@@ -124,17 +124,17 @@ impl Peer {
         self.wake(now);
     }
 
-    /// How many packets of all functions no host fetched in time.
+    /// Number of packets of all functions that no host fetched in time.
     pub(crate) fn lost(&self) -> u64 {
         self.pipes.values().map(Pipe::lost).sum()
     }
 
-    /// For the kernel.
+    /// Takes the bytes for the kernel.
     pub(crate) fn take_answers(&mut self) -> Vec<u8> {
         self.answers.take()
     }
 
-    /// For the devices behind: the number of the function, what its host sent.
+    /// Takes the bytes for the devices behind, with the index of the function.
     pub(crate) fn take_heard(&mut self) -> Vec<(usize, Vec<u8>)> {
         std::mem::take(&mut self.heard)
     }
@@ -173,7 +173,7 @@ impl Peer {
 
     fn unlink(&mut self, seq: u32, victim: u32) {
         let waited = self.pipes.values_mut().any(|pipe| pipe.unlink(victim));
-        // What does not wait has been answered already.
+        // A transfer that does not wait has been answered already.
         self.answers.unlinked(seq, if waited { TransferStatus::Unlinked } else { TransferStatus::Done });
     }
 
@@ -203,7 +203,7 @@ impl Peer {
         }
     }
 
-    /// What concerns one endpoint: whether it has halted (USB 2.0, sections 9.4.1, 9.4.5 and 9.4.9).
+    /// Requests about the halt of one endpoint (USB 2.0, sections 9.4.1, 9.4.5 and 9.4.9).
     fn endpoint_request(&mut self, setup: Setup) -> Result<Vec<u8>, Refused> {
         let address = setup.index_low();
         let is_halt = setup.value == ENDPOINT_HALT;
@@ -231,7 +231,7 @@ impl Peer {
         Ok(if setup.is_in() { vec![is_halted.into(), 0] } else { Vec::new() })
     }
 
-    /// Where a host has just closed, nothing is kept for the next.
+    /// Discards data for a host that has just closed, so that the next gets none of it.
     fn hang_up_where_closed(&mut self) {
         let numbers: Vec<_> = self.functions().collect();
         for number in numbers {
@@ -243,7 +243,7 @@ impl Peer {
         }
     }
 
-    /// Functions that say something after so much silence say it.
+    /// Sends the idle packets that are due.
     fn fill_silence(&mut self, now: Instant) {
         let silences: Vec<_> =
             self.starved_since.iter().map(|(function, since)| (*function, *since)).collect();

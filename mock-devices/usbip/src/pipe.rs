@@ -1,4 +1,4 @@
-//! An endpoint that sends: what the device has for the host, and the transfers that wait for it.
+//! A sending endpoint: packets for the host, and transfers that wait for them.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,17 +7,17 @@ use tokio::time::Instant;
 
 use crate::message::{Answers, TransferStatus};
 
-/// Packets that nobody fetches go after this long, as out of a small firmware's memory: a host that comes later
-/// reads nothing old.
+/// Packets that no host fetches are dropped after this time, as by firmware with little memory: a later host reads no
+/// old data.
 const KEPT: Duration = Duration::from_secs(1);
 
-/// The most that waits for a host; beyond it, the oldest goes.
+/// Greatest number of waiting bytes; beyond it the oldest packets are dropped.
 const WAITING_BYTES_MAX: usize = 256 * 1024;
 
 /// Packets on their way to the host.
 ///
 /// A transfer takes packet after packet until a short one, or until its room is full (USB 2.0, section 5.8.3).
-/// Where neither has come it waits, and its packets stay here: taken back, it takes nothing along.
+/// Until then it waits, and its packets stay here: a cancelled transfer loses no data.
 #[derive(Debug)]
 pub(crate) struct Pipe {
     packet_bytes: usize,
@@ -25,9 +25,9 @@ pub(crate) struct Pipe {
     waiting_bytes: usize,
     transfers: VecDeque<Waiting>,
     is_halted: bool,
-    /// From one answer to the next at least.
+    /// Least time between answers.
     slowness: Duration,
-    /// No answer before.
+    /// No answer before this time.
     busy_until: Option<Instant>,
     lost: u64,
 }
@@ -39,7 +39,7 @@ struct Waiting {
 }
 
 impl Pipe {
-    /// An endpoint whose packets have at most so many bytes.
+    /// An endpoint whose packets have at most this many bytes.
     pub(crate) fn new(packet_bytes: u16) -> Self {
         Self {
             packet_bytes: packet_bytes.into(),
@@ -53,7 +53,7 @@ impl Pipe {
         }
     }
 
-    /// A packet for the host.
+    /// Adds a packet for the host.
     pub(crate) fn push(&mut self, packet: Vec<u8>, now: Instant) {
         self.waiting_bytes += packet.len();
         self.packets.push_back((now, packet));
@@ -62,19 +62,19 @@ impl Pipe {
         }
     }
 
-    /// The host asks for data.
+    /// Adds a transfer of the host.
     pub(crate) fn ask(&mut self, seq: u32, room: usize) {
         self.transfers.push_back(Waiting { seq, room });
     }
 
-    /// The host takes a transfer back; false if it does not wait here.
+    /// Cancels a transfer; false if it does not wait here.
     pub(crate) fn unlink(&mut self, seq: u32) -> bool {
         let before = self.transfers.len();
         self.transfers.retain(|transfer| transfer.seq != seq);
         self.transfers.len() < before
     }
 
-    /// From now on every transfer fails, until [`clear_halt`](Self::clear_halt).
+    /// Lets every transfer fail until [`clear_halt`](Self::clear_halt).
     pub(crate) fn halt(&mut self) {
         self.is_halted = true;
     }
@@ -89,13 +89,13 @@ impl Pipe {
         self.is_halted
     }
 
-    /// Answers at most one transfer in this time; zero is as fast as the host asks.
+    /// Answers at most one transfer per this time; zero means no limit.
     pub(crate) fn slow_down(&mut self, slowness: Duration) {
         self.slowness = slowness;
         self.busy_until = None;
     }
 
-    /// Forgets what has not been fetched.
+    /// Discards packets that were not fetched.
     pub(crate) fn clear(&mut self) {
         self.packets.clear();
         self.waiting_bytes = 0;
@@ -106,17 +106,17 @@ impl Pipe {
         !self.is_halted && self.transfers.front().is_some_and(|transfer| self.extent(transfer.room).is_none())
     }
 
-    /// How many packets nobody has fetched in time.
+    /// Number of packets that no host fetched in time.
     pub(crate) fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// When a transfer may be answered that cannot be now.
+    /// When a transfer that must wait now can be answered.
     pub(crate) fn next_wake(&self) -> Option<Instant> {
         self.busy_until.filter(|_| !self.transfers.is_empty() && !self.packets.is_empty())
     }
 
-    /// Answers all transfers that can be.
+    /// Answers all transfers that can be answered now.
     pub(crate) fn serve(&mut self, now: Instant, answers: &mut Answers) {
         while self.packets.front().is_some_and(|(since, _)| now.duration_since(*since) > KEPT) {
             self.lose_oldest();

@@ -19,33 +19,33 @@ use crate::identity::Identity;
 use crate::peer::Peer;
 use crate::vhci::{PortChoice, Vhci, VhciError};
 
-/// Something is to be done to a function or to the plug.
+/// An order for a function or the plug.
 #[derive(Debug)]
 pub struct Order {
     /// Index of the function, as given to [`Plug::new`].
     pub function: usize,
-    /// What is to be done.
+    /// Applies to the function; `plug` and `unplug` apply to the whole device.
     pub command: PlugCommand,
-    /// Told when it is done.
+    /// Gets the outcome.
     pub done: oneshot::Sender<Result<(), PlugCommandError>>,
 }
 
 /// A USB device with its cable.
 pub struct Plug {
     vhci: Vhci,
-    /// A device that has just got power.
+    /// Makes the device anew each time it is plugged in.
     make: Box<dyn Fn() -> Gadget + Send>,
-    /// BackingDevice each function, one.
+    /// One per function.
     backing: Vec<BackingDevice>,
     orders: mpsc::Receiver<Order>,
     link: Link,
-    /// Where it was last.
+    /// Port of the virtual host controller at which it is, or was last.
     port: u32,
 }
 
 enum Link {
     In(Box<Connection>),
-    /// Pulled out; it goes in again then, or when it is told to.
+    /// Unplugged; plugged in again at this time, or by an order.
     Out(Option<Instant>),
 }
 
@@ -56,7 +56,7 @@ struct Connection {
 
 enum PlugEvent {
     Bytes(usize),
-    /// The kernel let go of the device.
+    /// The kernel released the device.
     Closed,
     /// It is time to plug it in again.
     Replug,
@@ -67,8 +67,8 @@ enum PlugEvent {
 }
 
 impl Plug {
-    /// Plugs in a device of these functions, each with the virtual device behind it. It runs at full speed if one of
-    /// the functions does, else at high speed.
+    /// Plugs in a device of these functions, each with the virtual device behind it. The device runs at full speed if one
+    /// of the functions does, else at high speed.
     ///
     /// # Errors
     /// If the system refuses.
@@ -89,12 +89,12 @@ impl Plug {
         Ok(plug)
     }
 
-    /// The port in which it is.
+    /// Port of the virtual host controller.
     pub fn port(&self) -> u32 {
         self.port
     }
 
-    /// Runs for ever: the devices' time goes on whether or not they are plugged in.
+    /// Runs forever, whether or not the device is plugged in.
     ///
     /// # Errors
     /// If it cannot be plugged in again.
@@ -116,7 +116,7 @@ impl Plug {
                 }
                 PlugEvent::Ordered(Order { function, command, done }) => {
                     let outcome = self.obey(function, command, now).await;
-                    // Whoever ordered may have gone meanwhile.
+                    // The sender may have gone meanwhile.
                     drop(done.send(outcome));
                 }
                 PlugEvent::Faulted | PlugEvent::Woken => {}
@@ -124,11 +124,11 @@ impl Plug {
         }
     }
 
-    /// Lets the devices and the peer do what they can do now.
+    /// Lets the devices and the peer do everything that is due.
     fn settle(&mut self, now: Instant) {
         let Link::In(connection) = &mut self.link else {
             for device in &mut self.backing {
-                // What leaves a device that is not plugged in is lost.
+                // Bytes of an unplugged device are lost.
                 drop(device.wake(now));
             }
             return;
@@ -165,12 +165,12 @@ impl Plug {
     fn receive(&mut self, bytes: &[u8], now: Instant) {
         let Link::In(connection) = &mut self.link else { return };
         if let Err(error) = connection.peer.receive(bytes, now) {
-            tracing::error!(%error, "the device is pulled out");
+            tracing::error!(%error, "the device is unplugged");
             self.pull_out(None);
         }
     }
 
-    /// Waits for what happens next. Cancel-safe.
+    /// Waits for the next event. Cancel-safe.
     async fn next_event(&mut self, buffer: &mut [u8]) -> PlugEvent {
         let wakes = self.backing.iter().filter_map(BackingDevice::next_wake).min();
         let (wake, listening) = match &mut self.link {

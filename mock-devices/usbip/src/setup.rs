@@ -1,4 +1,4 @@
-//! What a host asks on the control endpoint.
+//! Requests of the host on the control endpoint.
 //!
 //! # Source
 //! USB 2.0, section 9.3 (the setup data), table 9-4 (standard requests), table 9-5 (descriptor types).
@@ -39,7 +39,7 @@ pub(crate) enum RequestKind {
     Vendor,
 }
 
-/// Whom a request concerns.
+/// The recipient of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Recipient {
     Device,
@@ -47,7 +47,7 @@ pub(crate) enum Recipient {
     Endpoint,
 }
 
-/// A device does not take the request: the control endpoint stalls, until the next one.
+/// The device refuses the request: the control endpoint stalls until the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Refused;
 
@@ -70,7 +70,7 @@ impl Setup {
         self.request_type & 0x80 != 0
     }
 
-    /// Who defines the request; `None` for what the specification reserves.
+    /// Who defines the request; `None` for reserved values.
     pub(crate) fn kind(self) -> Option<RequestKind> {
         match self.request_type >> 5 & 0b11 {
             0 => Some(RequestKind::Standard),
@@ -80,7 +80,7 @@ impl Setup {
         }
     }
 
-    /// Whom it concerns; `None` for what the specification reserves.
+    /// Its recipient; `None` for reserved values.
     pub(crate) fn recipient(self) -> Option<Recipient> {
         match self.request_type & 0b1_1111 {
             0 => Some(Recipient::Device),
@@ -95,7 +95,7 @@ impl Setup {
         self.index.to_le_bytes()[0]
     }
 
-    /// Of a request for a descriptor: its type and its number.
+    /// Type and number of the descriptor, in a request for one.
     pub(crate) fn descriptor(self) -> (u8, u8) {
         let [number, kind] = self.value.to_le_bytes();
         (kind, number)

@@ -1,8 +1,7 @@
-//! The kernel's virtual host controller: where devices without hardware are plugged in.
+//! The kernel's virtual host controller, into which devices without hardware are plugged.
 //!
-//! It takes a socket whose other end answers USB/IP. Nobody asks what kind of socket: one end of a pair does, and
-//! then there is neither a network nor a tool. The kernel holds the socket for itself; when our end closes, the
-//! device is unplugged.
+//! It takes a socket whose other end answers USB/IP. Any kind of socket will do: one end of a socket pair needs neither a
+//! network nor a tool. The kernel keeps its end of the socket; when our end closes, the device is unplugged.
 //!
 //! # Source
 //! The Linux kernel's `drivers/usb/usbip/vhci_sysfs.c`: the files `status` and `attach`.
@@ -20,43 +19,39 @@ use crate::descriptor::Speed;
 
 const FOLDER: &str = "/sys/devices/platform/vhci_hcd.0";
 
-/// State of a port with nothing in it, in `status`.
+/// State of a free port in `status`.
 const FREE: &str = "004";
 
-/// The kernel frees a port some time after a device has gone; it tells nobody when.
+/// The kernel frees a port some time after a device has gone, without notice.
 const FREED_WITHIN: Duration = Duration::from_secs(10);
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Why a device cannot be plugged in.
 #[derive(Debug, thiserror::Error)]
 pub enum VhciError {
-    /// The driver is not there.
+    /// The driver is not loaded.
     #[error(
-        "{FOLDER} is not there: load the kernel's virtual host controller with `modprobe vhci-hcd`, as root; \
-         kernels for clouds have none, a machine with one is what `just vm` makes"
+        "{FOLDER} does not exist: load the kernel's virtual host controller with `modprobe vhci-hcd`, as root; \
+         cloud kernels lack it, and `just vm` starts a machine that has it"
     )]
     Absent,
-    /// It refused.
+    /// The controller refused.
     #[error("{file} of the virtual host controller: {source}; only root may plug in virtual devices")]
-    Refused {
-        /// The file.
-        file: &'static str,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// No port in time.
+    #[expect(missing_docs, reason = "the message says what each field is")]
+    Refused { file: &'static str, source: io::Error },
+    /// No port became free in time.
     #[error("no port of the virtual host controller is free; `cat {FOLDER}/status` shows them")]
     Full,
 }
 
-/// Where a device is to go.
+/// The port for a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PortChoice {
-    /// Anywhere.
+    /// Any port.
     Any,
-    /// Into this port.
+    /// This port.
     Port(u32),
-    /// Anywhere but this port.
+    /// Any other port than this.
     NotPort(u32),
 }
 
@@ -67,7 +62,7 @@ pub struct Vhci {
 }
 
 impl Vhci {
-    /// The first one of this machine.
+    /// The first controller of this machine.
     ///
     /// # Errors
     /// If there is none.
@@ -76,7 +71,7 @@ impl Vhci {
         if folder.join("attach").exists() { Ok(Self { folder }) } else { Err(VhciError::Absent) }
     }
 
-    /// Plugs a device in; gives the port, and our end of its cable.
+    /// Plugs a device in. Returns the port, and our end of the socket pair.
     ///
     /// # Errors
     /// If the system refuses, or no such port becomes free in time.
@@ -99,7 +94,7 @@ impl Vhci {
                 let order = attach_order(port, kernels.as_fd().as_raw_fd(), speed);
                 match fs::write(self.folder.join("attach"), order) {
                     Ok(()) => return Ok((port, ours)),
-                    // Somebody else was faster.
+                    // Another program took the port first.
                     Err(error) if error.kind() == io::ErrorKind::ResourceBusy => {}
                     Err(error) => return Err(refused("attach")(error)),
                 }
@@ -112,14 +107,14 @@ impl Vhci {
     }
 }
 
-/// What is written to `attach`: port, socket, a number for the device, speed.
+/// The line for `attach`: port, socket, device number, speed.
 fn attach_order(port: u32, socket: i32, speed: Speed) -> String {
-    // Bus 1, and a device number of the port's own: only people read it, in `status`.
+    // Bus 1 and a number derived from the port; it is only shown in `status`.
     let device = 1 << 16 | (port + 1);
     format!("{port} {socket} {device} {}", speed as u32)
 }
 
-/// Ports for devices up to high speed in which nothing is plugged.
+/// Free ports for devices up to high speed.
 fn free_ports(status: &str) -> impl Iterator<Item = u32> {
     status.lines().filter_map(|line| {
         let mut fields = line.split_whitespace();

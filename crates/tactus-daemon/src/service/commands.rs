@@ -1,4 +1,4 @@
-//! The desk where commands are answered.
+//! Answers the commands on the bus.
 
 use std::fmt;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use tracing::{info, warn};
 
 use super::health::health;
 
-/// The CLI's exit codes for what can go wrong with a command.
+/// The CLI's exit codes for a failed command.
 mod exit {
     pub(super) const FAILED: u32 = 1;
     pub(super) const USAGE: u32 = 2;
@@ -61,7 +61,7 @@ impl CommandDesk {
         while let Some(call) = commands.recv().await {
             match (call.command, call.request) {
                 (Command::Run, Request::Run(request)) => {
-                    // A dry run computes for a while: others are answered meanwhile.
+                    // A dry run takes a while: other commands are answered meanwhile.
                     let desk = Arc::clone(&self);
                     tokio::spawn(async move {
                         let done = desk.run(request).await;
@@ -69,7 +69,7 @@ impl CommandDesk {
                     });
                 }
                 (Command::Reset, _) => {
-                    // Homing takes its time.
+                    // Homing takes a while.
                     let desk = Arc::clone(&self);
                     tokio::spawn(async move {
                         let done = desk.reset().await;
@@ -99,9 +99,9 @@ impl CommandDesk {
         })
     }
 
-    /// Checks everything that can be checked, dry-runs, and starts the run.
+    /// Checks the request, dry-runs it, and starts the run.
     async fn run(&self, request: pb::RunRequest) -> Result<(), Refusal> {
-        // From here on a stop ends this run, be it before the dry run is over.
+        // From here on a stop ends this run, even before the dry run is over.
         let claim = self.engine.claim().map_err(Refusal::not_now)?;
         if let Some(fault) = self.engine.fault() {
             return Err(Refusal::refused(format!(
@@ -138,7 +138,7 @@ impl CommandDesk {
         order.recording = path.display().to_string();
         let run_id = order.run_id.clone();
         tokio::spawn(claim.run(order, record));
-        // The answer tells the state of the run that was asked for, not of the one before it.
+        // The answer contains the state of this run, not of the previous one.
         self.engine.state().wait_for(|state| state.run_id == run_id).await.map(drop).map_err(Refusal::failed)
     }
 

@@ -1,4 +1,4 @@
-//! The service's own pulse, once a second.
+//! Publishes the service's health once a second.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ pub(super) async fn publish(engine: Engine, publisher: Publisher) {
     }
 }
 
-/// The health as of now; the rate is over the time since `before`.
+/// The present health. The frame rate is over the time since `before`.
 pub(super) fn health(engine: &Engine, publisher: &Publisher, before: (u64, MonoTime)) -> pb::Health {
     let now = engine.clock().now();
     let pulse = *engine.pulse().borrow();

@@ -1,4 +1,4 @@
-//! The engine's viewers are the bus.
+//! Publishes the engine's frames, states and events on the bus.
 
 use tactus_bus::Publisher;
 use tactus_engine::Publish;

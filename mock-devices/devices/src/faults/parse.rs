@@ -12,7 +12,7 @@ const STAGE_FAULTS: &str = "alarm N, clear, disconnect DURATION, echo-garbage, h
      lost-steps MM, never-idle, refuse [ERROR], renumber, reset, stall DURATION";
 const RIG_FAULTS: &str = "covering MM, stiffness FACTOR, surface MM";
 
-/// What `refuse` answers unless told otherwise: an invalid target.
+/// The default error of `refuse`: an invalid target.
 const REFUSAL: u8 = 33;
 
 /// The longest frame, garbage or drop that makes sense as an argument.
@@ -20,57 +20,26 @@ const MAX_COUNT: usize = 32_000;
 
 /// Why a line is not a fault that this rig can have.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum FaultError {
     /// The line does not begin with a device.
     #[error("{found:?} is no device; there is: sensor, stage, rig")]
-    Device {
-        /// What stood there.
-        found: String,
-    },
+    Device { found: String },
     /// The device has no such fault.
     #[error("the {device} has no fault {found:?}; there is: {known}")]
-    Unknown {
-        /// The device.
-        device: &'static str,
-        /// What stood there.
-        found: String,
-        /// What could stand there.
-        known: &'static str,
-    },
+    Unknown { device: &'static str, found: String, known: &'static str },
     /// An argument is missing.
     #[error("{fault} needs {wanted}")]
-    Missing {
-        /// The fault's name.
-        fault: String,
-        /// What it needs.
-        wanted: &'static str,
-    },
+    Missing { fault: String, wanted: &'static str },
     /// An argument is not what it should be.
     #[error("{fault} needs {wanted}, not {found:?}")]
-    Argument {
-        /// The fault's name.
-        fault: String,
-        /// What it needs.
-        wanted: &'static str,
-        /// What stood there.
-        found: String,
-    },
+    Argument { fault: String, wanted: &'static str, found: String },
     /// There is more than the fault takes.
     #[error("{fault} takes nothing more, but {found:?} follows")]
-    TooMuch {
-        /// The fault's name.
-        fault: String,
-        /// What stood there.
-        found: String,
-    },
+    TooMuch { fault: String, found: String },
     /// The array has no such element.
     #[error("element {element}: elements are 0 to {last}")]
-    Element {
-        /// What was asked.
-        element: usize,
-        /// The array's last element.
-        last: usize,
-    },
+    Element { element: usize, last: usize },
     /// The device has too many faults waiting, or has ended.
     #[error("the device does not take faults at present: it has ended, or dozens are waiting")]
     NotTaken,
@@ -172,7 +141,7 @@ fn rig(arguments: &mut Arguments<'_>) -> Result<RigFault, FaultError> {
     })
 }
 
-/// What follows a fault's name.
+/// The words after a fault's name.
 struct Arguments<'a> {
     fault: &'a str,
     words: SplitWhitespace<'a>,
@@ -243,7 +212,7 @@ impl Arguments<'_> {
     }
 }
 
-/// A duration with its unit: `2s`, `500ms`.
+/// Parses a duration with its unit, such as `2s` or `500ms`; at most a year.
 pub fn duration(word: &str) -> Option<Duration> {
     let ms = milliseconds(word)?;
     (0.0..=MAX_MS).contains(&ms).then(|| Duration::from_secs_f64(ms / 1000.0))

@@ -15,41 +15,32 @@ use super::{Fault, FaultError};
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FaultScript {
-    /// In order of time.
+    /// Sorted by time.
     pub faults: Vec<TimedFault>,
 }
 
 /// One fault and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedFault {
-    /// Since the rig's start.
+    /// Time since the rig was switched on.
     pub at: Duration,
-    /// What happens.
+    /// The injected fault.
     pub fault: Fault,
 }
 
-/// Why a text is not a fault script.
+/// Why a text is not a fault script. `index` counts the entries from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
 pub enum FaultScriptError {
     /// Not TOML of the right form; the text names line and key.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
-    /// A time is not one.
+    /// A time is not between 0 and 1e9 s.
     #[error("fault[{index}].at_s: seconds from 0 on, not {at_s}")]
-    Time {
-        /// Which, counted from 0.
-        index: usize,
-        /// What stood there.
-        at_s: f64,
-    },
+    Time { index: usize, at_s: f64 },
     /// A command is not a fault.
     #[error("fault[{index}].command: {error}")]
-    Command {
-        /// Which, counted from 0.
-        index: usize,
-        /// Why not.
-        error: FaultError,
-    },
+    Command { index: usize, error: FaultError },
 }
 
 #[derive(Deserialize)]
@@ -67,7 +58,7 @@ struct RawFault {
 }
 
 impl FaultScript {
-    /// Reads a script; its entries may stand in any order.
+    /// Reads a script; its entries may be in any order.
     ///
     /// # Errors
     /// [`FaultScriptError`] names the line or the entry.

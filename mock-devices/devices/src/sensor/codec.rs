@@ -1,4 +1,4 @@
-//! How the virtual sensor speaks: its frames, answers and clock as bytes of its protocol.
+//! The device side of the sensor protocols: frames, answers and clock as bytes.
 
 use std::time::Duration;
 
@@ -19,16 +19,16 @@ const SERIAL_NUMBER: u32 = u32::from_le_bytes(*b"SIM\0");
 
 const MATRIX_UID: [u8; 6] = *b"SIMULA";
 
-/// What stands in a `SingleTact` element's register but for the reading.
+/// Content of a `SingleTact` element's register outside the reading.
 const REGISTER: &[u8] = b"SIMULATED ";
 
-/// A `SingleTact` element reads so many times as often as the array is to be read.
+/// Readings that a `SingleTact` element takes per frame of the array.
 const READINGS_PER_FRAME: f64 = 4.0;
 
-/// What the magnetometers of a board say of their temperature, in degrees Celsius.
+/// Temperature that the magnetometers of a board report, degrees Celsius.
 const TEMPERATURE_C: f32 = 25.0;
 
-/// A protocol's device side.
+/// The device side of a protocol.
 #[derive(Debug)]
 pub(super) enum DeviceCodec {
     Weiss { checksum: Checksum, decoder: weiss::Decoder },
@@ -37,14 +37,14 @@ pub(super) enum DeviceCodec {
     Declared { encoder: Encoder, clock: Option<DeviceClock> },
 }
 
-/// What a host asks.
+/// A request of the host.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum HostRequest {
     Weiss(Result<HostCommand, CommandError>),
     SingleTact { address: u8, id: u8, asked: Register },
 }
 
-/// What is asked of a `SingleTact` element.
+/// What a request to a `SingleTact` element accesses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Register {
     Reading,
@@ -60,7 +60,7 @@ pub(super) struct DeviceClock {
 }
 
 impl DeviceClock {
-    /// What it shows; `offset` is by how much it was set.
+    /// Its reading; `offset_ticks` is by how much it was set.
     pub(super) fn shows(self, running: Duration, offset_ticks: i128) -> u64 {
         let ticks = self.ticks(running).saturating_add(offset_ticks);
         let wrap = i128::try_from(self.wrap).unwrap_or(i128::MAX);
@@ -72,7 +72,7 @@ impl DeviceClock {
         (running.as_nanos() as f64 / self.tick_ns).floor() as i128
     }
 
-    /// By how much it must be set, so that it wraps after `to_go`.
+    /// By how many ticks it must be set so that it wraps after `to_go`.
     pub(super) fn until_wrap(self, shown: u64, to_go: Duration) -> i128 {
         let last = i128::try_from(self.wrap).unwrap_or(i128::MAX) - 1;
         last - i128::from(shown) - self.ticks(to_go)
@@ -96,7 +96,7 @@ impl DeviceCodec {
         }
     }
 
-    /// Forgets what it heard; a count of frames begins anew.
+    /// Forgets received bytes, and restarts the frame counter.
     pub(super) fn power_up(&mut self) {
         match self {
             Self::Weiss { checksum, decoder } => *decoder = weiss::Decoder::new().with_checksum(*checksum),
@@ -106,17 +106,17 @@ impl DeviceCodec {
         }
     }
 
-    /// True if it boots, with a message, before it listens.
+    /// True if the device sends boot messages before it listens.
     pub(super) fn boots(&self) -> bool {
         matches!(self, Self::Weiss { .. })
     }
 
-    /// True if it sends frames without being asked.
+    /// True if the device sends frames without a request.
     pub(super) fn streams(&self) -> bool {
         matches!(self, Self::AnySkin | Self::Declared { .. })
     }
 
-    /// Its clock, if it has one.
+    /// The device's clock, if it has one.
     pub(super) fn clock(&self) -> Option<DeviceClock> {
         let wide = |tick: Duration| DeviceClock { tick_ns: tick.as_nanos() as f64, wrap: 1 << 32 };
         match self {
@@ -127,7 +127,7 @@ impl DeviceCodec {
         }
     }
 
-    /// What it makes of bytes from the host. Real firmware does not answer what it cannot read.
+    /// Decodes bytes from the host. Like real firmware, it ignores what it cannot read.
     pub(super) fn decode(&mut self, bytes: &[u8]) -> Vec<HostRequest> {
         let mut asked = Vec::new();
         match self {
@@ -155,7 +155,7 @@ impl DeviceCodec {
         asked
     }
 
-    /// A frame is not sent; a device that counts its frames counts it.
+    /// Skips a frame. A device that counts its frames counts it.
     pub(super) fn skip_frame(&mut self) {
         match self {
             Self::Declared { encoder, .. } => encoder.lose_frame(),
@@ -163,7 +163,7 @@ impl DeviceCodec {
         }
     }
 
-    /// A frame that is pushed; `elements` is a wrong number of them.
+    /// Encodes a frame; `elements` is a wrong number of elements, for the fault `wrong-count`.
     pub(super) fn frame(
         &mut self,
         tick: u64,
@@ -185,7 +185,7 @@ impl DeviceCodec {
             Self::AnySkin => resized(&board(counts).encode(), counts.len(), elements),
             Self::Declared { encoder, .. } => {
                 let counts: Vec<f32> = counts.iter().map(|count| f32::from(*count)).collect();
-                // The rig was held against the description when both were read.
+                // The rig was checked against the description when both were read.
                 encoder.encode(tick, &counts).map_or_else(
                     |error| {
                         tracing::error!(%error, "the virtual sensor is silent");
@@ -197,7 +197,7 @@ impl DeviceCodec {
         }
     }
 
-    /// An answer that the device's checksum closes.
+    /// Appends the device's checksum to an answer.
     pub(super) fn close(&self, packet: Vec<u8>) -> Vec<u8> {
         match self {
             Self::Weiss { checksum, .. } => checksum.close(packet),
@@ -205,7 +205,7 @@ impl DeviceCodec {
         }
     }
 
-    /// Which element answers at an address; every one answers at the default too, where it is alone.
+    /// The element at an address. A single element answers at the default address too.
     pub(super) fn element_at(&self, address: u8) -> Option<usize> {
         let Self::SingleTact { addresses, .. } = self else { return None };
         let is_alone = addresses.len() == 1 && address == DEFAULT_ADDRESS;
@@ -213,17 +213,17 @@ impl DeviceCodec {
     }
 }
 
-/// What a `weiss-dsa` controller says of itself.
+/// A `weiss-dsa` controller's answer about itself.
 pub(super) fn controller() -> Vec<u8> {
     ControllerInfo { serial_number: SERIAL_NUMBER, ..ControllerInfo::default() }.encode()
 }
 
-/// What it says of its sensor.
+/// Its answer about its sensor.
 pub(super) fn sensor() -> Vec<u8> {
     SensorInfo { matrices: 1, serial_number: SERIAL_NUMBER, ..SensorInfo::default() }.encode()
 }
 
-/// What it says of one of the sensor's matrices.
+/// Its answer about one of the sensor's matrices.
 #[expect(clippy::cast_possible_truncation, reason = "the protocol has single precision and 16 bits")]
 pub(super) fn matrix(matrix: u8, truth: &Truth) -> Vec<u8> {
     if matrix > 0 {
@@ -241,7 +241,7 @@ pub(super) fn matrix(matrix: u8, truth: &Truth) -> Vec<u8> {
     .encode()
 }
 
-/// The answer of a `SingleTact` board: of an element with this reading, or of none.
+/// The answer of a `SingleTact` board for an element with this reading, or for an absent element (`None`).
 pub(super) fn reply(
     (address, id, asked): (u8, u8, Register),
     tick: u64,
@@ -280,7 +280,7 @@ fn board(counts: &[u16]) -> anyskin::DecodedFrame {
     frame
 }
 
-/// The counts cut off or, with the last repeated, drawn out to another length.
+/// The counts at another length: cut off, or with the last one repeated.
 fn with_length(counts: &[u16], elements: usize) -> Vec<u16> {
     let last = counts.last().copied().unwrap_or(0);
     counts.iter().copied().chain(std::iter::repeat(last)).take(elements).collect()

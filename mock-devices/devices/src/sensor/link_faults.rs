@@ -7,7 +7,7 @@ use tokio::time::Instant;
 use crate::faults::LinkFault;
 use crate::truth::RandomStream;
 
-/// Armed faults; each strikes the next frame or frames and is gone.
+/// Armed faults. Each hits the next frame or frames and is then over.
 #[derive(Debug)]
 pub(super) struct LinkFaults {
     rng: ChaCha8Rng,
@@ -22,7 +22,7 @@ struct Armed {
     garbage_bytes: usize,
     flip_bits: usize,
     wrong_count: Option<usize>,
-    // How many frames are still to be struck.
+    // How many frames each fault will still hit.
     drop_frames: usize,
     duplicate_frames: usize,
     reorder_frames: usize,
@@ -40,7 +40,7 @@ impl LinkFaults {
         Self { rng: RandomStream::SensorLink.rng(seed), armed: Armed::default() }
     }
 
-    /// Has a fault strike from now on.
+    /// Arms a fault from now on.
     pub(super) fn arm(&mut self, fault: LinkFault, now: Instant) {
         let armed = &mut self.armed;
         match fault {
@@ -74,18 +74,18 @@ impl LinkFaults {
         self.armed.dripping_until.is_some_and(|until| at < until)
     }
 
-    /// The bytes that leave the device for a frame sampled at `at`: none, one packet, or what became of it.
+    /// The bytes that leave the device for a frame sampled at `at`: none, one packet, or several.
     ///
-    /// Every frame is encoded, since those that are lost count too; with a number if it is to have as many elements.
+    /// Every frame is encoded, because the device counts lost ones too. `encode` gets the wrong number of elements, if any.
     pub(super) fn frame(&mut self, at: Instant, encode: impl FnOnce(Option<usize>) -> Vec<u8>) -> Vec<u8> {
         let is_stalled = self.is_stalled(at);
         let Self { rng, armed } = self;
-        let is_lost = is_stalled || strikes(&mut armed.drop_frames);
+        let is_lost = is_stalled || hits(&mut armed.drop_frames);
         let mut bytes = encode(if is_lost { None } else { armed.wrong_count.take() });
         if is_lost || bytes.is_empty() {
             return Vec::new();
         }
-        if strikes(&mut armed.wrong_checksum_frames)
+        if hits(&mut armed.wrong_checksum_frames)
             && let Some(last) = bytes.last_mut()
         {
             *last ^= 0xFF;
@@ -96,10 +96,10 @@ impl LinkFaults {
                 *byte ^= 1 << (bit % 8);
             }
         }
-        if strikes(&mut armed.truncate_frames) {
+        if hits(&mut armed.truncate_frames) {
             bytes.truncate(bytes.len() / 2);
         }
-        if strikes(&mut armed.duplicate_frames) {
+        if hits(&mut armed.duplicate_frames) {
             bytes.extend_from_within(..);
         }
         if armed.garbage_bytes > 0 {
@@ -107,19 +107,19 @@ impl LinkFaults {
             rng.fill_bytes(&mut garbage);
             bytes.splice(..0, garbage);
         }
-        if strikes(&mut armed.reorder_frames) {
+        if hits(&mut armed.reorder_frames) {
             armed.overtaken.extend(bytes);
             return Vec::new();
         }
         bytes.append(&mut armed.overtaken);
-        if strikes(&mut armed.burst_frames) {
+        if hits(&mut armed.burst_frames) {
             armed.burst.extend(bytes);
             return if armed.burst_frames == 0 { std::mem::take(&mut armed.burst) } else { Vec::new() };
         }
         bytes
     }
 
-    /// What arrives of what leaves.
+    /// Removes the bytes that are lost on the way.
     pub(super) fn pass(&mut self, mut bytes: Vec<u8>) -> Vec<u8> {
         let dropped = self.armed.drop_bytes.min(bytes.len());
         self.armed.drop_bytes -= dropped;
@@ -128,8 +128,8 @@ impl LinkFaults {
     }
 }
 
-/// True if one more frame is to be struck, which is then counted.
-fn strikes(frames: &mut usize) -> bool {
+/// True if the fault hits this frame; counts it.
+fn hits(frames: &mut usize) -> bool {
     let is_armed = *frames > 0;
     *frames = frames.saturating_sub(1);
     is_armed

@@ -1,9 +1,8 @@
 //! A controller that speaks `grbl`: its states, what time does to them, and its real-time commands.
 //!
-//! It does what Grbl 1.1 was seen to do, within what a stage needs: straight moves, jogs, hold and
-//! resume, reset, homing, limits, alarms, settings. Each move begins and ends at rest. Machine and work
-//! coordinates are one; how they lie in the robot's frame is what the rig says. `$I` and a message behind the banner say
-//! that it is simulated.
+//! It reproduces the observed behaviour of Grbl 1.1, as far as a stage needs it: straight moves, jogs, hold and resume,
+//! reset, homing, limits, alarms, settings. Each move begins and ends at rest. Machine and work coordinates are the same;
+//! the rig file gives their directions in the robot frame. `$I` and a message after the banner say that it is simulated.
 
 mod gcode;
 mod input;
@@ -29,13 +28,13 @@ use report::Status;
 use settings::Settings;
 use tactus_wire::grbl::Config;
 
-/// A status report leaves this long after it was asked for.
+/// A status report leaves this long after its request.
 const REPORT_LATENCY_MS: std::ops::RangeInclusive<u64> = 2..=5;
 
 /// From a reset to the banner.
 const RESTART: Duration = Duration::from_millis(5);
 
-/// Alarms after which the controller takes nothing but a reset.
+/// Alarms after which the controller accepts only a reset.
 const CRITICAL_ALARMS: std::ops::RangeInclusive<u8> = 1..=2;
 
 const ALARM_HARD_LIMIT: u8 = 1;
@@ -44,11 +43,11 @@ const ALARM_RESET_IN_MOTION: u8 = 3;
 const ALARM_HOMING_RESET: u8 = 6;
 const ALARM_HOMING_FAILED: u8 = 9;
 
-/// The controller.
+/// A virtual Grbl controller.
 #[derive(Debug)]
 pub(super) struct GrblController {
     world: SharedWorld,
-    /// How its coordinates lie in the robot's frame.
+    /// Relates its coordinates to the robot frame.
     frame: Config,
     settings: Settings,
     mode: Mode,
@@ -57,9 +56,9 @@ pub(super) struct GrblController {
     outbox: Outbox,
     report_due: Option<Instant>,
     reports: u32,
-    /// A command takes time: nothing else is taken until then, when it is answered by `ok`.
+    /// Until then a command is being executed; then `ok` is sent. No other line is taken meanwhile.
     busy_until: Option<Instant>,
-    /// When the tip runs into a limit switch.
+    /// When the tip hits a limit switch.
     limit_at: Option<Instant>,
     rng: ChaCha8Rng,
     defects: Defects,
@@ -67,10 +66,10 @@ pub(super) struct GrblController {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
-    /// Idle, or running what was planned.
+    /// Idle, or executing planned moves.
     Ready,
     Jog,
-    /// Braking or standing; what was not done is held.
+    /// Braking or at rest; the remaining moves are held.
     Hold,
     /// Braking at the end of a jog that was cancelled.
     JogCancel,
@@ -84,7 +83,7 @@ enum Mode {
     },
 }
 
-/// What lines leave behind for those after them.
+/// Modal state: set by lines, valid for the lines after them.
 #[derive(Debug, Default)]
 struct Modal {
     motion: MotionMode,
@@ -92,7 +91,7 @@ struct Modal {
     feed_mm_per_min: Option<f64>,
 }
 
-/// What is wrong with it.
+/// Its lasting faults.
 #[derive(Debug, Default)]
 struct Defects {
     lie_z_mm: f64,
@@ -107,7 +106,7 @@ impl Controller for GrblController {
         self.wake(now);
         for byte in bytes {
             if let Some(command) = self.input.push(*byte) {
-                self.obey(command, now);
+                self.execute_real_time(command, now);
             }
             self.take_lines(now);
         }
@@ -214,19 +213,19 @@ impl GrblController {
         controller
     }
 
-    /// As after a power failure: the controller believes to be at 0.
+    /// Restarts as after a power failure: the controller believes that it is at 0.
     fn power_up(&mut self, now: Instant) {
         let believed_mm = self.frame.to_stage([0.0; 3]);
         self.world.lock().motion.believe(believed_mm);
         self.mode = if self.settings.has_homing() { Mode::Alarm { is_critical: false } } else { Mode::Ready };
         if self.rng.random() {
-            // As seen on the real firmware, now and then: the stored settings could not be read.
+            // The real firmware sometimes says this: the stored settings could not be read.
             self.outbox.push(now + RESTART, report::error(GrblError(7)));
         }
         self.restart(now);
     }
 
-    /// Forgets everything but the position and an alarm.
+    /// Resets everything except the position and an alarm.
     fn restart(&mut self, now: Instant) {
         self.modal = Modal::default();
         self.input.clear();
@@ -240,7 +239,7 @@ impl GrblController {
         }
     }
 
-    fn obey(&mut self, command: RealTime, now: Instant) {
+    fn execute_real_time(&mut self, command: RealTime, now: Instant) {
         match (command, self.mode) {
             (RealTime::Report, Mode::Homing { .. }) => {}
             (RealTime::Report, _) => self.ask_for_report(now),
@@ -263,13 +262,13 @@ impl GrblController {
         self.only_move(now);
     }
 
-    /// Restarts the controller; motion is cut off where it is.
+    /// Restarts the controller; motion stops at once.
     fn reset(&mut self, now: Instant) {
         let is_moving = self.is_moving();
         self.world.lock().motion.freeze(now);
         match self.mode {
             Mode::Homing { .. } => self.alarm(ALARM_HOMING_RESET, now),
-            // The real firmware notices, or not.
+            // The real firmware notices this only sometimes.
             _ if is_moving && self.rng.random() => self.alarm(ALARM_RESET_IN_MOTION, now),
             Mode::Alarm { .. } => {}
             Mode::Ready | Mode::Jog | Mode::Hold | Mode::JogCancel | Mode::SoftLimit => {
@@ -282,7 +281,7 @@ impl GrblController {
         self.restart(now);
     }
 
-    /// Stops dead.
+    /// Stops at once and raises an alarm.
     fn alarm(&mut self, code: u8, now: Instant) {
         {
             let mut world = self.world.lock();
@@ -298,7 +297,7 @@ impl GrblController {
         }
     }
 
-    /// Where homing ends: off the switches.
+    /// Position at the end of homing: off the switches.
     fn home_mm(&self) -> Point {
         let pull_off_mm = self.settings.pull_off_mm();
         let [[x, _], [y, _], [_, z]] = self.world.lock().truth().stage.travel_mm;
@@ -319,7 +318,7 @@ impl GrblController {
         self.outbox.push(now, text);
     }
 
-    /// A report that is asked for while one is due is the same report.
+    /// Schedules a report, unless one is already due.
     fn ask_for_report(&mut self, now: Instant) {
         if self.report_due.is_none() {
             self.report_due = Some(now + Duration::from_millis(self.rng.random_range(REPORT_LATENCY_MS)));

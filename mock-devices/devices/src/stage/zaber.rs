@@ -1,9 +1,8 @@
-//! Devices that speak `zaber-ascii`, all on one line, of which each axis moves by itself.
+//! Devices that speak `zaber-ascii`, all on one serial line; each axis moves by itself.
 //!
-//! They do what Zaber's protocol description says, as [`tactus_wire::zaber`] tells of it, within what a stage needs:
-//! moves, homing, stops, warnings, the settings that a session asks for or sets. Position 0 is where the rig says; the
-//! travel is the rig's, and homing goes to its least x and y and its greatest z. An info behind the version says that they
-//! are simulated.
+//! They follow Zaber's protocol description (see [`tactus_wire::zaber`]), as far as a stage needs it: moves, homing, stops,
+//! warnings, and the settings that a session reads or writes. Position 0 and travel are the rig's. Homing goes to the
+//! least x and y and the greatest z. An info message after the version says that they are simulated.
 
 mod axis;
 
@@ -22,10 +21,10 @@ use crate::truth::RandomStream;
 use crate::world::SharedWorld;
 use axis::VirtualAxis;
 
-/// A reply leaves this long after its command.
+/// Delay from a command to its reply.
 const REPLY_LATENCY_MS: std::ops::RangeInclusive<u64> = 1..=3;
 
-/// What all devices answer to `get version`.
+/// Answer of all devices to `get version`.
 const VERSION: &str = "7.38";
 
 /// The devices of a stage.
@@ -41,7 +40,7 @@ pub(super) struct ZaberController {
     defects: Defects,
 }
 
-/// What is wrong with them.
+/// Lasting faults.
 #[derive(Debug, Default)]
 struct Defects {
     lie_z_mm: f64,
@@ -68,7 +67,7 @@ impl ZaberController {
         controller
     }
 
-    /// As after a power failure: every axis believes to be at its 0. Settings outlive it.
+    /// Restarts as after a power failure: every axis believes that it is at its 0. Settings are kept.
     fn power_up(&mut self, now: Instant) {
         self.ear = HostCommandDecoder::default();
         self.outbox.clear();
@@ -79,7 +78,7 @@ impl ZaberController {
         }
     }
 
-    /// Each device that a command is for answers it once.
+    /// Each addressed device answers a command once.
     fn obey(&mut self, command: &HostCommand, now: Instant) {
         let mut devices: Vec<u8> = self.axes.iter().map(VirtualAxis::device).collect();
         devices.sort_unstable();
@@ -119,7 +118,7 @@ impl ZaberController {
         }
     }
 
-    /// What a device's axis does with a command, or all of them with axis 0.
+    /// Executes a command on an axis of a device, or on all its axes (axis 0).
     fn obey_axes(
         &mut self,
         device: u8,
@@ -143,13 +142,13 @@ impl ZaberController {
         }
         match answers.first() {
             None => Err(Rejection::BadAxis),
-            // One answer for each, where they are asked for something; nothing to tell is `0` once.
+            // Equal answers are sent once, different ones side by side.
             Some(first) if answers.iter().all(|answer| answer == first) => Ok(first.clone()),
             Some(_) => Ok(answers.join(" ")),
         }
     }
 
-    /// Whether an axis of a device moves, or any with axis 0, and the gravest flag.
+    /// Whether an axis of a device moves (any of them with axis 0), and the most serious flag.
     fn status(&self, device: u8, number: u8) -> (bool, Flag) {
         let mut world = self.world.lock();
         let meant = self
@@ -219,7 +218,7 @@ impl Controller for ZaberController {
     fn fault(&mut self, fault: ControllerFault, now: Instant) {
         self.only_move(now);
         match fault {
-            // Zaber's faults have letters: whatever the number, z stalls.
+            // Zaber's faults have no numbers: z stalls.
             ControllerFault::Alarm(_) => {
                 let mut world = self.world.lock();
                 if let Some(z) = self.axes.iter_mut().find(|axis| axis.name() == AxisName::Z) {

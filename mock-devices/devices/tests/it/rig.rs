@@ -29,7 +29,7 @@ fn sim_rig() -> Rig {
     Rig::from_toml(include_str!("../../../../config/rigs/sim.toml")).unwrap()
 }
 
-/// The rig without what it hides but the kinematics, so that the declared model holds.
+/// The rig's twin: it hides only the kinematics, so the declared model holds.
 fn ideal_rig() -> Rig {
     twin_of(&sim_rig())
 }
@@ -57,7 +57,7 @@ async fn lab_speaking(codec: SensorCodec, rig: Rig, seed: u64) -> ConnectedRig {
 }
 
 impl ConnectedRig {
-    /// Goes up, over the place, and down to a depth.
+    /// Moves up, above the place, and down to a depth.
     async fn press(&self, [x, y]: [f64; 2], depth_mm: f64) -> Result<[f64; 3], StageError> {
         for z in [2.0, -depth_mm] {
             self.go([x, y, z]).await?;
@@ -82,7 +82,7 @@ impl ConnectedRig {
         (read, gaps)
     }
 
-    /// Passes over what was read before now; gives the first frame after it.
+    /// Skips frames that were read before now. Returns the first one after them.
     async fn fresh(&mut self) -> Frame {
         while timeout(Duration::from_millis(1), self.sensor.next()).await.is_ok() {}
         self.read(1).await.0.remove(0)
@@ -129,7 +129,7 @@ async fn a_press_reads_what_the_declared_model_says() {
     assert!(gaps.is_empty());
     for frame in &frames {
         for (got, want) in frame.counts.iter().zip(&want) {
-            // Half a count of rounding, and what half a step of 3 um makes on 80 counts/mm.
+            // Half a count of rounding, plus the effect of half a step of 3 um at 80 counts/mm.
             assert!((f64::from(*got) - want).abs() < 0.65, "{got} {want}");
         }
     }
@@ -151,7 +151,7 @@ async fn the_rig_hides_what_its_file_says_and_noise_averages_out() {
     let truth = lab.control.truth();
     let want = 100.0 + truth.model.response().sensitivity_counts_per_mm[27] * (0.5 + 0.15 * 0.25);
     let got = mean(&frames)[27];
-    // The true centre is 0.1 mm away, which costs a thousandth.
+    // The true centre is 0.1 mm away, which reduces the signal by a thousandth.
     assert!((got - want).abs() < 3.0, "{got} {want}");
 }
 
@@ -270,7 +270,7 @@ async fn garbage_on_every_link_harms_no_frame_and_no_move() {
     assert!(frames.windows(2).all(|pair| pair[1].seq == pair[0].seq + 1));
 }
 
-/// The declared format that is shipped.
+/// The shipped declared format.
 fn declared() -> SensorCodec {
     let toml = include_str!("../../../../config/links/digitacts.toml");
     let format = toml::from_str::<RawFormat>(toml).unwrap().check().unwrap();
@@ -387,7 +387,7 @@ async fn polls_that_are_not_answered_are_counted() {
         lab.fresh().await;
         lab.inject(fault);
         let (_, gaps) = lab.read(60).await;
-        // An answer is waited for for 250 ms, in which 7 frames could have been.
+        // The driver waits 250 ms for an answer; that is the time of 7 frames.
         let lost: u64 = gaps.iter().map(|gap| gap.frames_lost).sum();
         assert!((least..=most).contains(&lost), "{fault}: {gaps:?}");
     }

@@ -1,5 +1,5 @@
-//! The one stage driver over each protocol, against the virtual stage, in virtual time: a move that did not happen is
-//! never told as done.
+//! The stage driver with each protocol, against the virtual stage, in virtual time: a move that did not happen is never
+//! reported as done.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
@@ -16,7 +16,7 @@ use tokio::time::sleep;
 
 const SIM: &str = include_str!("../../../../config/rigs/sim.toml");
 
-/// Each stage under test, as the rig file writes it: axes as they come, and axes that are exchanged, turned and shifted.
+/// Each stage under test, as in a rig file: default axes, and axes that are exchanged, reversed and shifted.
 const STAGES: [&str; 4] = [
     "protocol = \"grbl\"\n",
     "protocol = \"grbl\"
@@ -39,7 +39,7 @@ axes.z = { device = 1, axis = 1, um_per_microstep = 0.124, direction = -1, origi
 ",
 ];
 
-/// Where every test begins.
+/// Start position of every test.
 const START_MM: [f64; 3] = [20.0, 15.0, 5.0];
 
 /// A virtual stage with its driver.
@@ -56,7 +56,7 @@ impl ConnectedRig {
         Self::speaking(&rig, &protocol)
     }
 
-    /// Whose driver is told of another protocol, or of other axes.
+    /// A stage whose driver expects another protocol, or other axes.
     fn speaking(rig: &Rig, protocol: &StageProtocol) -> Self {
         let mut devices = VirtualRig::start(rig, 1);
         let options = StageOptions { tolerance_mm: 0.005, simulated: true };
@@ -102,7 +102,7 @@ impl ConnectedRig {
     }
 }
 
-/// Within the stage's steps of 3 um and 1 um.
+/// True if two positions agree within the stage's steps of 3 um and 1 um.
 #[track_caller]
 fn near(got_mm: [f64; 3], want_mm: [f64; 3]) {
     let is_near = got_mm.iter().zip(want_mm).all(|(got, want)| (got - want).abs() < 0.0021);
@@ -181,7 +181,7 @@ async fn an_unplugged_stage_fails_the_move_and_must_be_homed_when_it_is_back() {
 #[tokio::test(start_paused = true)]
 async fn a_reset_leaves_the_position_suspect() {
     for lines in STAGES {
-        // At a stand, and in mid-move.
+        // At rest, and during a move.
         let lab = ConnectedRig::homed(lines).await;
         lab.inject("stage reset");
         lab.until(StageStatus::Unhomed).await;

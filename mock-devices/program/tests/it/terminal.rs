@@ -53,7 +53,7 @@ impl Mock {
         self.line()
     }
 
-    /// SIGTERM; true if it ended well.
+    /// Sends SIGTERM; true if the program then ended with status 0.
     fn terminate(&mut self) -> bool {
         let process = Pid::from_child(&self.child);
         kill_process(process, Signal::TERM).unwrap();
@@ -63,7 +63,7 @@ impl Mock {
 
 impl Drop for Mock {
     fn drop(&mut self) {
-        // It has ended already where the test went well.
+        // It has already ended if the test succeeded.
         drop(self.child.kill());
         drop(self.child.wait());
     }
@@ -189,7 +189,7 @@ async fn a_host_that_comes_later_reads_nothing_old() {
     let [last] = &frames(&mut sensor, 1).await[..] else { panic!("one frame") };
     let last_ms = last.device_tick.unwrap().0;
     drop(sensor);
-    // The device goes on pushing frames, for two seconds by the clock of another.
+    // The device continues to send frames, for two seconds by another device's clock.
     let mut other = Mock::start(&["--seed", "2"]);
     let mut elsewhere = open_sensor(Path::new(other.line().strip_prefix("sensor ").unwrap()));
     frames(&mut elsewhere, 60).await;

@@ -5,7 +5,7 @@
 use tactus_hidden::{CATALOGUE, Climate, Dose, HiddenSensor, RandomRig};
 use tactus_sets::{Plan, Separation};
 
-/// Counts of a short bundle, clean, with one physics or none.
+/// Counts of a short bundle without noise, with one physics or none.
 fn counts(base: &RandomRig, dose: Option<Dose>) -> Vec<f64> {
     let array = &base.rig.array;
     let run =

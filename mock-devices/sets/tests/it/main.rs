@@ -1,3 +1,3 @@
-//! The catalogue of hidden physics, held against the base model.
+//! Compares the catalogue of hidden physics with the base model.
 
 mod catalogue;

@@ -1,4 +1,4 @@
-//! CDC-ACM: a serial port as USB's own class has it; Linux calls it `ttyACM`.
+//! CDC-ACM: a serial port by USB's own class; Linux calls it `ttyACM`.
 //!
 //! # Source
 //! Class Definitions for Communication Devices 1.2, section 5.2.3 (functional descriptors), and its PSTN subclass
@@ -22,7 +22,7 @@ const DTR: u16 = 1;
 /// 115200 baud, 1 stop bit, no parity, 8 data bits.
 const LINE_CODING: [u8; 7] = [0x00, 0xC2, 0x01, 0x00, 0, 0, 8];
 
-/// A serial port. The line's speed is noted and means nothing: the device behind is not on a line.
+/// A serial port. The line's speed is stored but has no effect: there is no real line.
 #[derive(Debug)]
 pub(crate) struct Acm {
     packet_bytes: u16,

@@ -1,6 +1,6 @@
-//! Vendor bulk: a pair of endpoints with an interface of the vendor's class, for programs that read USB themselves.
+//! Vendor bulk: a pair of endpoints with an interface of the vendor's class, for programs that use USB directly.
 //!
-//! Each frame is a transfer of its own, which a short packet ends.
+//! Each frame is one transfer, which a short packet ends.
 //!
 //! # Source
 //! USB 2.0, section 5.8.
@@ -17,7 +17,7 @@ pub(crate) struct Bulk {
 }
 
 impl Bulk {
-    /// Frames of so many bytes, at least 1.
+    /// Frames of this many bytes, at least 1.
     pub(crate) fn new(speed: Speed, frame_bytes: usize) -> Self {
         Self { packet_bytes: speed.bulk_packet_bytes(), frame_bytes }
     }

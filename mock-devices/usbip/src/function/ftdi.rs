@@ -1,7 +1,7 @@
-//! FTDI's FT232R: a serial port as most adapters have it; Linux calls it `ttyUSB`.
+//! FTDI's FT232R: the serial port of most adapters; Linux calls it `ttyUSB`.
 //!
-//! The chip puts two bytes of status in front of every packet that it sends, and sends them alone when for a while
-//! (the latency timer) there is nothing else. Its requests are the vendor's; the host knows the chip by its numbers.
+//! The chip puts two status bytes in front of every packet. Without other data it sends them alone each time the latency
+//! timer runs out. Its requests are the vendor's; the host identifies the chip by its vendor and product numbers.
 //!
 //! # Source
 //! FTDI's application note AN232B-04 (packets, status bytes, latency timer) and the requests as the Linux kernel's
@@ -33,12 +33,12 @@ const DTR_MEANT: u16 = 0x0100;
 /// The modem's: a fixed bit, clear to send and data set ready. The line's: all has been sent.
 const STATUS: [u8; 2] = [0x31, 0x60];
 
-/// What a memory reads in which nothing was ever written.
+/// Content of an empty memory.
 const ERASED: [u8; 2] = [0xFF, 0xFF];
 
 const LATENCY_MS: u8 = 16;
 
-/// The chip. Its line's speed means nothing: the device behind is not on a line.
+/// The chip. The line's speed has no effect: there is no real line.
 #[derive(Debug)]
 pub(crate) struct Ftdi {
     latency_ms: u8,
@@ -51,7 +51,7 @@ impl Ftdi {
     /// FTDI's FT232R.
     pub(crate) const VENDOR: u16 = 0x0403;
     pub(crate) const PRODUCT: u16 = 0x6001;
-    /// By this the driver tells it from the vendor's other chips.
+    /// Identifies the chip among the vendor's others.
     pub(crate) const RELEASE: u16 = 0x0600;
 
     /// A port that nobody has opened.
@@ -100,7 +100,7 @@ impl Function for Ftdi {
 
     fn packets(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let room = usize::from(Self::SPEED.bulk_packet_bytes()) - STATUS.len();
-        // A last packet that is full ends no transfer; the latency timer's does.
+        // A full last packet does not end a transfer; the latency timer's packet does.
         bytes.chunks(room).map(|chunk| [&STATUS, chunk].concat()).collect()
     }
 

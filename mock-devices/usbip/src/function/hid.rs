@@ -1,4 +1,4 @@
-//! HID: reports of one length, numbered or not, on a usage page of the vendor's; Linux gives them at `hidraw`.
+//! HID: reports of one length, numbered or not, on a vendor's usage page; Linux offers them as `hidraw`.
 //!
 //! # Source
 //! Device Class Definition for Human Interface Devices 1.11: section 6.2.1 (the HID descriptor), section 6.2.2
@@ -24,17 +24,17 @@ pub const REPORT_BYTES_MAX: u16 = 1024;
 /// Every 8 microframes of 125 us: once a millisecond.
 const INTERVAL: u8 = 4;
 
-/// A device of reports. Each packet is a report, its number at its beginning where reports are numbered.
+/// A device that sends reports. Each packet is a report; numbered reports begin with their number.
 #[derive(Debug)]
 pub(crate) struct Hid {
-    /// Of a report, its number included.
+    /// Length of a report, its number included.
     report_bytes: u16,
     descriptor: Vec<u8>,
     last: Vec<u8>,
 }
 
 impl Hid {
-    /// Reports of so many bytes, the number included where there is one; 1 to [`REPORT_BYTES_MAX`].
+    /// Reports of this many bytes, their number included; 1 to [`REPORT_BYTES_MAX`].
     pub(crate) fn new(report_bytes: u16, number: Option<u8>) -> Self {
         let descriptor = report_descriptor(report_bytes, number);
         Self { report_bytes, descriptor, last: vec![0; report_bytes.into()] }
@@ -47,7 +47,7 @@ impl Hid {
     }
 }
 
-/// One input report of bytes that mean nothing to anybody but the vendor.
+/// One input report of bytes that only the vendor defines.
 fn report_descriptor(report_bytes: u16, number: Option<u8>) -> Vec<u8> {
     let [low, high] = (report_bytes - u16::from(number.is_some())).to_le_bytes();
     let mut bytes = vec![0x06, 0x00, 0xFF]; // Usage page: the vendor's.

@@ -1,6 +1,6 @@
-//! One line of G-code, as much of it as a stage needs.
+//! One line of G-code: the subset that a stage needs.
 
-/// What a line asks for.
+/// The words of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Block {
     /// G0 or G1 in this line.
@@ -11,13 +11,13 @@ pub(super) struct Block {
     pub(super) feed_mm_per_min: Option<f64>,
     /// X, Y, Z in this line, mm.
     pub(super) axes_mm: [Option<f64>; 3],
-    /// G4: stay.
+    /// G4: dwell.
     pub(super) dwell: bool,
     /// P in this line, s.
     pub(super) dwell_s: Option<f64>,
 }
 
-/// How a straight move is made.
+/// Speed of a straight move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum MotionMode {
     /// G0: as fast as it can.
@@ -51,7 +51,7 @@ impl GrblError {
 }
 
 impl Block {
-    /// Reads a line that is upper case and without blanks.
+    /// Parses a line in upper case without blanks.
     pub(super) fn parse(mut line: &str) -> Result<Self, GrblError> {
         let mut block = Self::default();
         while let Some(letter) = line.chars().next() {
@@ -79,15 +79,15 @@ impl Block {
             'X' => once(&mut self.axes_mm[0], number, GrblError::REPEATED),
             'Y' => once(&mut self.axes_mm[1], number, GrblError::REPEATED),
             'Z' => once(&mut self.axes_mm[2], number, GrblError::REPEATED),
-            // Line numbers mean nothing here.
+            // Line numbers are ignored.
             'N' => Ok(()),
             _ => Err(GrblError::UNSUPPORTED),
         }
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "what does not fit is no command that is known")]
+    #[expect(clippy::cast_possible_truncation, reason = "a number that does not fit is an unknown command")]
     fn command(&mut self, number: f64) -> Result<(), GrblError> {
-        // G38.2 and the like are told apart by tenths.
+        // Codes such as G38.2 differ in tenths.
         match (number * 10.0).round() as i64 {
             0 => once(&mut self.motion, MotionMode::Rapid, GrblError::MODAL_GROUP),
             10 => once(&mut self.motion, MotionMode::Feed, GrblError::MODAL_GROUP),
@@ -98,7 +98,7 @@ impl Block {
             }
             900 => once(&mut self.relative, false, GrblError::MODAL_GROUP),
             910 => once(&mut self.relative, true, GrblError::MODAL_GROUP),
-            // The XY plane, mm, machine coordinates, the first work coordinates, mm per minute: as it is anyway.
+            // XY plane, mm, machine coordinates, first work coordinates, mm per minute: the defaults.
             170 | 210 | 530 | 540 | 940 => Ok(()),
             _ => Err(GrblError::UNSUPPORTED),
         }

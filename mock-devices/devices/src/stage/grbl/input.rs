@@ -2,13 +2,13 @@
 
 use std::collections::VecDeque;
 
-/// Size of the receive buffer; what comes beyond it is lost, as on the real controller.
+/// Size of the receive buffer; further bytes are lost, as on the real controller.
 pub(super) const BUFFER_BYTES: usize = 128;
 
 /// Longest line, without its end.
 const LINE_BYTES: usize = 80;
 
-/// Commands of one byte that bypass the lines.
+/// Commands of one byte that bypass the line buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum RealTime {
     /// `?`
@@ -23,7 +23,7 @@ pub(super) enum RealTime {
     CancelJog,
 }
 
-/// A line as the parser wants it: upper case, without blanks and comments.
+/// A line in the parser's form: upper case, without blanks and comments.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Line {
     /// To be parsed; empty lines too.
@@ -32,7 +32,7 @@ pub(super) enum Line {
     Overflow,
 }
 
-/// Lines that have arrived and have not been taken, and the beginning of the next.
+/// Received lines, and the beginning of the next.
 #[derive(Debug, Default)]
 pub(super) struct Input {
     lines: VecDeque<Vec<u8>>,
@@ -40,7 +40,7 @@ pub(super) struct Input {
 }
 
 impl Input {
-    /// Takes one byte; gives the command if it is a real-time one.
+    /// Takes one byte. Returns the command if it is a real-time byte.
     pub(super) fn push(&mut self, byte: u8) -> Option<RealTime> {
         match byte {
             b'?' => return Some(RealTime::Report),
@@ -48,7 +48,7 @@ impl Input {
             b'~' => return Some(RealTime::Resume),
             0x18 => return Some(RealTime::Reset),
             0x85 => return Some(RealTime::CancelJog),
-            // Overrides and the door, which a stage does not have.
+            // Overrides and the safety door, which a stage does not have.
             0x80.. => {}
             _ if self.free_bytes() == 0 => {}
             b'\r' | b'\n' => self.lines.push_back(std::mem::take(&mut self.begun)),
@@ -59,7 +59,7 @@ impl Input {
         None
     }
 
-    /// Room for bytes.
+    /// Free bytes of the receive buffer.
     pub(super) fn free_bytes(&self) -> usize {
         let waiting: usize = self.lines.iter().map(|line| line.len() + 1).sum();
         BUFFER_BYTES.saturating_sub(waiting + self.begun.len())
@@ -76,7 +76,7 @@ impl Input {
         !self.lines.is_empty()
     }
 
-    /// Forgets everything.
+    /// Discards everything.
     pub(super) fn clear(&mut self) {
         *self = Self::default();
     }

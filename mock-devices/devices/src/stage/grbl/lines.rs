@@ -1,4 +1,4 @@
-//! What lines do: `$` statements, jogs, G-code.
+//! Execution of lines: `$` statements, jogs, G-code.
 
 use std::time::Duration;
 
@@ -11,24 +11,24 @@ use super::{GrblController, Modal, Mode, report};
 use crate::motion::Point;
 use crate::stage::Controller as _;
 
-/// Writing a setting takes this long, in which nothing else is done.
+/// Writing a setting blocks the controller for this long.
 const SETTING_WRITE_MS: std::ops::RangeInclusive<u64> = 100..=220;
 
-/// After this homing without a switch gives up.
+/// Homing that finds no switch gives up after this.
 const HOMING_GIVES_UP: Duration = Duration::from_secs(24);
 
-/// What becomes of a line.
-enum Reply {
+/// The answer to a line.
+enum LineReply {
     Ok,
     Text(String),
     /// `ok` after a time.
     After(Duration),
-    /// The answer comes when it is over, or never.
+    /// The answer comes at the end of the motion, or never.
     None,
 }
 
 impl GrblController {
-    /// Takes the lines that wait, as far as it may.
+    /// Executes waiting lines, as far as the controller accepts them.
     pub(super) fn take_lines(&mut self, now: Instant) {
         while self.input.has_line() && self.takes_a_line() {
             let Some(line) = self.input.take_line() else { return };
@@ -37,44 +37,44 @@ impl GrblController {
                 Line::Text(text) => self.execute(&text, now),
             };
             match reply {
-                Ok(Reply::Ok) => self.say(report::OK, now),
-                Ok(Reply::Text(text)) => {
+                Ok(LineReply::Ok) => self.say(report::OK, now),
+                Ok(LineReply::Text(text)) => {
                     self.outbox.push(now, text);
                     self.say(report::OK, now);
                 }
-                Ok(Reply::After(duration)) => self.busy_until = Some(now + duration),
-                Ok(Reply::None) => {}
+                Ok(LineReply::After(duration)) => self.busy_until = Some(now + duration),
+                Ok(LineReply::None) => {}
                 Err(error) => self.outbox.push(now, report::error(error)),
             }
         }
     }
 
-    /// In a hold lines wait, and while the planner is full.
+    /// False during a hold, and while the planner is full.
     fn takes_a_line(&self) -> bool {
         let is_open = matches!(self.mode, Mode::Ready | Mode::Jog | Mode::Alarm { .. });
         is_open && self.busy_until.is_none() && self.world.lock().motion.pending() < report::PLANNER_BLOCKS
     }
 
-    fn execute(&mut self, line: &str, now: Instant) -> Result<Reply, GrblError> {
+    fn execute(&mut self, line: &str, now: Instant) -> Result<LineReply, GrblError> {
         if self.mode == (Mode::Alarm { is_critical: true }) {
             return Err(GrblError::LOCKED);
         }
         match line.strip_prefix('$') {
             Some(statement) => self.execute_statement(statement, now),
-            None if line.is_empty() => Ok(Reply::Ok),
+            None if line.is_empty() => Ok(LineReply::Ok),
             None if matches!(self.mode, Mode::Alarm { .. } | Mode::Jog) => Err(GrblError::LOCKED),
             None => self.execute_gcode(line, now),
         }
     }
 
-    fn execute_statement(&mut self, statement: &str, now: Instant) -> Result<Reply, GrblError> {
+    fn execute_statement(&mut self, statement: &str, now: Instant) -> Result<LineReply, GrblError> {
         if let Some(jog) = statement.strip_prefix("J=") {
             return self.jog(jog, now);
         }
         match statement {
-            "" => return Ok(Reply::Text(report::HELP.to_owned())),
-            "#" => return Ok(Reply::Text(report::OFFSETS.to_owned())),
-            "G" => return Ok(Reply::Text(self.modal.line())),
+            "" => return Ok(LineReply::Text(report::HELP.to_owned())),
+            "#" => return Ok(LineReply::Text(report::OFFSETS.to_owned())),
+            "G" => return Ok(LineReply::Text(self.modal.line())),
             _ => {}
         }
         let is_locked = matches!(self.mode, Mode::Alarm { .. });
@@ -82,31 +82,31 @@ impl GrblController {
             return Err(GrblError::NOT_IDLE);
         }
         match statement {
-            "$" => Ok(Reply::Text(self.settings.list())),
-            "I" => Ok(Reply::Text(report::BUILD.to_owned())),
+            "$" => Ok(LineReply::Text(self.settings.list())),
+            "I" => Ok(LineReply::Text(report::BUILD.to_owned())),
             "X" if is_locked => {
                 self.mode = Mode::Ready;
-                Ok(Reply::Text(report::UNLOCKED.to_owned()))
+                Ok(LineReply::Text(report::UNLOCKED.to_owned()))
             }
-            "X" => Ok(Reply::Ok),
+            "X" => Ok(LineReply::Ok),
             "H" if !self.settings.has_homing() => Err(GrblError::HOMING_OFF),
             "H" => {
                 self.home(now);
-                Ok(Reply::None)
+                Ok(LineReply::None)
             }
             _ => {
                 self.settings.write(statement)?;
-                Ok(Reply::After(Duration::from_millis(self.rng.random_range(SETTING_WRITE_MS))))
+                Ok(LineReply::After(Duration::from_millis(self.rng.random_range(SETTING_WRITE_MS))))
             }
         }
     }
 
-    fn execute_gcode(&mut self, line: &str, now: Instant) -> Result<Reply, GrblError> {
+    fn execute_gcode(&mut self, line: &str, now: Instant) -> Result<LineReply, GrblError> {
         let block = Block::parse(line)?;
         if block.dwell {
             let dwell = Duration::from_secs_f64(block.dwell_s.ok_or(GrblError::NO_VALUE)?.min(1e6));
             let moves_end = self.world.lock().motion.last_end().unwrap_or(now);
-            return Ok(Reply::After(moves_end - now + dwell));
+            return Ok(LineReply::After(moves_end - now + dwell));
         }
         let motion = block.motion.unwrap_or(self.modal.motion);
         let feed_mm_per_min = block.feed_mm_per_min.or(self.modal.feed_mm_per_min);
@@ -116,7 +116,7 @@ impl GrblController {
         }
         self.modal = Modal { motion, relative, feed_mm_per_min };
         if !block.has_axes() {
-            return Ok(Reply::Ok);
+            return Ok(LineReply::Ok);
         }
         if let Some(code) = self.defects.refuses_next.take() {
             return Err(GrblError(code));
@@ -124,17 +124,17 @@ impl GrblController {
         let target_mm = self.target(&block, relative);
         if !self.is_within_travel(target_mm) {
             self.brake(Mode::SoftLimit, now);
-            return Ok(Reply::None);
+            return Ok(LineReply::None);
         }
         let feed_mm_per_min = match motion {
             MotionMode::Rapid => self.settings.rapid_mm_per_min(),
             MotionMode::Feed => feed_mm_per_min.unwrap_or_default(),
         };
         self.plan(target_mm, feed_mm_per_min, now);
-        Ok(Reply::Ok)
+        Ok(LineReply::Ok)
     }
 
-    fn jog(&mut self, line: &str, now: Instant) -> Result<Reply, GrblError> {
+    fn jog(&mut self, line: &str, now: Instant) -> Result<LineReply, GrblError> {
         if !(self.mode == Mode::Jog || self.mode == Mode::Ready && !self.is_moving()) {
             return Err(GrblError::NOT_IDLE);
         }
@@ -156,7 +156,7 @@ impl GrblController {
         self.mode = Mode::Jog;
         self.plan(target_mm, feed_mm_per_min, now);
         self.only_move(now);
-        Ok(Reply::Ok)
+        Ok(LineReply::Ok)
     }
 
     fn target(&self, block: &Block, relative: bool) -> Point {
@@ -183,9 +183,9 @@ impl GrblController {
         self.watch_limits();
     }
 
-    /// Up to the end of z, then to the least x and y, and off the switches again.
+    /// Homes: up to the end of z, then to the least x and y, and off the switches again.
     fn home(&mut self, now: Instant) {
-        // One report comes by itself; then `?` goes unanswered until it is over.
+        // One report comes unasked; then `?` is not answered until the end.
         self.mode = Mode::Homing { gives_up_at: None };
         self.ask_for_report(now);
         if std::mem::take(&mut self.defects.homing_fails) {

@@ -1,4 +1,4 @@
-//! What the controller says in words of its own.
+//! Texts that the controller sends.
 
 use super::gcode::GrblError;
 use super::input::BUFFER_BYTES;
@@ -26,16 +26,16 @@ pub(super) fn alarm(code: u8) -> String {
     format!("ALARM:{code}\r\n")
 }
 
-/// What a status report tells.
+/// Content of a status report.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Status {
     pub(super) state: &'static str,
     pub(super) position_mm: [f64; 3],
     pub(super) is_machine_position: bool,
-    /// Moves pending and receive bytes free, if asked for.
+    /// Pending moves and free receive bytes, if the settings ask for them.
     pub(super) buffers: Option<(usize, usize)>,
     pub(super) speed_mm_per_s: f64,
-    /// Which report since the reset, from 0 on: some fields come now and then.
+    /// Number of the report since the reset, from 0 on: some fields are only in some reports.
     pub(super) number: u32,
 }
 

@@ -25,7 +25,7 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    /// As delivered with a stage whose axes lie so. Where the rig says how many steps a mm has, it has them.
+    /// The settings of a stage with these axis directions. Steps per mm are the rig's, if the rig file gives them.
     pub(super) fn of(stage: &SimulatedStage, frame: &Config) -> Self {
         let rate_mm_per_min = stage.speed_max_mm_per_s * 60.0;
         let (mut steps_per_mm, mut length_mm) = ([0.0; 3], [0.0; 3]);
@@ -61,7 +61,7 @@ impl Settings {
         Self { values: BTreeMap::from(values) }
     }
 
-    /// Carries out `n=value`.
+    /// Executes `n=value`.
     pub(super) fn write(&mut self, statement: &str) -> Result<(), GrblError> {
         let (number, value) = statement.split_once('=').ok_or(GrblError::STATEMENT)?;
         let number: u16 = number.parse().map_err(|_| GrblError::STATEMENT)?;
@@ -111,12 +111,12 @@ impl Settings {
         self.get(HOMING_PULL_OFF)
     }
 
-    /// The speed that a feed means: within what the controller can do.
+    /// The speed of a feed, limited to the controller's maximum.
     pub(super) fn speed_mm_per_s(&self, feed_mm_per_min: f64) -> f64 {
         feed_mm_per_min.clamp(1.0, self.rapid_mm_per_min()) / 60.0
     }
 
-    /// Feed of a G0.
+    /// Feed of G0, mm/min.
     pub(super) fn rapid_mm_per_min(&self) -> f64 {
         MAX_RATES.map(|number| self.get(number)).fold(f64::INFINITY, f64::min).max(1.0)
     }

@@ -1,4 +1,4 @@
-//! One axis: what it is set to, what it does, and what is wrong with it.
+//! One axis: its settings, its motion and its faults.
 
 use std::time::Duration;
 
@@ -9,20 +9,20 @@ use tokio::time::Instant;
 
 use crate::world::{World, on_axis};
 
-/// Microsteps a full step, unless the rig says otherwise.
+/// Microsteps per full step, unless the rig file gives them.
 const RESOLUTION: u32 = 64;
 
-/// After this homing without a sensor gives up.
+/// Homing that finds no sensor gives up after this.
 const HOMING_GIVES_UP: Duration = Duration::from_secs(5);
 
 /// `FE`: the limit sensor cannot be reached.
 const LIMIT_ERROR: &str = "FE";
 
-/// One axis.
+/// An axis of a virtual Zaber device.
 #[derive(Debug)]
 pub(super) struct VirtualAxis {
     name: AxisName,
-    /// Which of the world's axes it moves.
+    /// Index of the world's axis that it moves: 0 is x.
     index: usize,
     axis: Axis,
     stage: SimulatedStage,
@@ -32,11 +32,11 @@ pub(super) struct VirtualAxis {
     homing: Option<Homing>,
     /// The next homing finds no sensor.
     fails_homing: bool,
-    /// When it runs into the end of its travel.
+    /// When it hits the end of its travel.
     limit_at: Option<Instant>,
 }
 
-/// How a homing under way will end.
+/// How the present homing will end.
 #[derive(Debug, Clone, Copy)]
 enum Homing {
     Found,
@@ -53,7 +53,7 @@ impl VirtualAxis {
             index: name.of([0, 1, 2]),
             axis,
             stage,
-            // 0 means no limit there, which is as fast as it can.
+            // 0 means no limit: as fast as it can.
             maxspeed: speed.unwrap_or(0),
             accel: accel.unwrap_or(0),
             flags: Vec::new(),
@@ -75,7 +75,7 @@ impl VirtualAxis {
         self.axis.number
     }
 
-    /// The gravest flag.
+    /// The most serious flag.
     pub(super) fn flag(&self) -> Flag {
         self.flags.iter().copied().fold(Flag::NONE, graver)
     }
@@ -93,7 +93,7 @@ impl VirtualAxis {
         [gives_up, self.limit_at, world.motion_of(self.index).next_end()].into_iter().flatten().min()
     }
 
-    /// As after a power failure: it stands, and believes to be at its 0.
+    /// Restarts as after a power failure: at rest, and believes that it is at its 0.
     pub(super) fn power_up(&mut self, world: &mut World, now: Instant) {
         self.flags = vec![Flag::NO_REFERENCE];
         (self.homing, self.limit_at) = (None, None);
@@ -103,14 +103,14 @@ impl VirtualAxis {
         motion.believe(believed_mm);
     }
 
-    /// Stalls if the end of its travel has come.
+    /// Stalls if it has hit the end of its travel.
     pub(super) fn run_into_limit(&mut self, world: &mut World, now: Instant) {
         if let Some(at) = self.limit_at.filter(|at| *at <= now) {
             self.stall(world, at);
         }
     }
 
-    /// Stops dead, at fault.
+    /// Stops at once with a fault.
     pub(super) fn stall(&mut self, world: &mut World, at: Instant) {
         world.settle(at);
         world.motion_of(self.index).freeze(at);
@@ -118,7 +118,7 @@ impl VirtualAxis {
         self.raise(Flag::STALLED);
     }
 
-    /// Does what follows when it has come to a stand.
+    /// Handles the end of a motion.
     pub(super) fn settle(&mut self, world: &mut World, now: Instant) {
         if world.motion_of(self.index).is_moving() {
             return;
@@ -147,7 +147,7 @@ impl VirtualAxis {
         self.fails_homing = fails;
     }
 
-    /// Carries out a command; `stays` if it is to accept a move and make none.
+    /// Executes a command. With `stays` it accepts a move but does not make it.
     pub(super) fn obey(
         &mut self,
         world: &mut World,
@@ -247,13 +247,13 @@ impl VirtualAxis {
             self.homing = Some(Homing::GivesUp(now + HOMING_GIVES_UP));
             return;
         }
-        // The sensor is found wherever it is.
+        // Homing ends at the true position of the sensor, and cancels an armed loss of steps.
         motion.lose_steps(0.0);
         motion.push_true(home_mm, speed_mm_per_s, now);
         self.homing = Some(Homing::Found);
     }
 
-    /// Another command takes the place of one under way.
+    /// Another command replaces the present one.
     fn interrupt(&mut self, world: &mut World) {
         if self.is_busy(world) {
             self.raise(Flag::INTERRUPTED);
@@ -273,7 +273,7 @@ impl VirtualAxis {
         self.limit_at = world.motion_of(self.index).leaves(travel_mm);
     }
 
-    /// Its flags, the gravest first, with their number in front.
+    /// The number of flags, then the flags, the most serious first.
     fn list(&self) -> String {
         let mut flags = self.flags.clone();
         flags.sort_by_key(|flag| std::cmp::Reverse(gravity(*flag)));
@@ -287,7 +287,7 @@ impl VirtualAxis {
         [a.min(b), a.max(b)]
     }
 
-    /// The end of the travel that it is homed at: x and y their least, z its greatest.
+    /// Home position: the least x and y, the greatest z.
     fn home_mm(&self) -> f64 {
         let [least, greatest] = self.stage.travel_mm[self.index];
         self.name.of([least, least, greatest])
@@ -309,12 +309,12 @@ impl VirtualAxis {
     }
 }
 
-/// The graver of two flags.
+/// The more serious of two flags.
 pub(super) fn graver(a: Flag, b: Flag) -> Flag {
     if gravity(b) > gravity(a) { b } else { a }
 }
 
-/// Faults before warnings before notices, as the letter says.
+/// Rank of a flag by its letter: faults, warnings, notices.
 fn gravity(flag: Flag) -> u8 {
     match flag.code().to_be_bytes() {
         [b'F', _] => 3,
