@@ -53,6 +53,9 @@ impl TerminalPort {
     }
 
     /// The device's side of the current pseudo-terminal. Opens one if there is none.
+    ///
+    /// # Errors
+    /// If the system gives no pseudo-terminal, or the link cannot be made.
     pub fn open(&mut self) -> io::Result<Box<dyn ByteStream>> {
         let terminal = match &self.terminal {
             Some(terminal) => terminal,
@@ -82,6 +85,9 @@ impl TerminalPort {
     }
 
     /// Hangs up and opens another pseudo-terminal, which has another number.
+    ///
+    /// # Errors
+    /// If the system gives no pseudo-terminal, or the link cannot be made.
     pub fn reopen_elsewhere(&mut self) -> io::Result<()> {
         // The old one still holds its number while the new one gets another.
         self.replace().map(drop)

@@ -95,7 +95,7 @@ pub(super) const ANSWERS_FOR_NEIGHBOUR: Definition = Definition {
         let beside = if element % cols + 1 < cols { element + 1 } else { element - 1 };
         let swapped = knobs.share("swapped", 1.0);
         PipelineHook::element(move |_, signal| {
-            signal[element] += swapped * (signal[beside] - signal[element])
+            signal[element] += swapped * (signal[beside] - signal[element]);
         })
     },
 };

@@ -103,7 +103,7 @@ pub(super) const SLOPING_SURFACE: Definition = Definition {
         let uphill = knobs.direction("direction_deg");
         let slope = knobs.scaled("slope", 0.01);
         PipelineHook::touch(move |_, touch| {
-            touch.depth_mm += slope * dot(uphill, minus(touch.point_mm, found_mm))
+            touch.depth_mm += slope * dot(uphill, minus(touch.point_mm, found_mm));
         })
     },
 };

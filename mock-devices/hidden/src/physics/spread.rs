@@ -53,7 +53,7 @@ pub(super) const STRETCHED: Definition = Definition {
         let stretch = 1.0 + knobs.scaled("stretch", 0.08);
         let by = if along_x { [stretch, 1.0 / stretch] } else { [1.0 / stretch, stretch] };
         PipelineHook::tool(move |_, tool| {
-            tool.sigma_mm = [tool.sigma_mm[0] * by[0], tool.sigma_mm[1] * by[1]]
+            tool.sigma_mm = [tool.sigma_mm[0] * by[0], tool.sigma_mm[1] * by[1]];
         })
     },
 };
