@@ -128,7 +128,7 @@ fn discover_on_threads(
     let before = search.locate(&base)?;
     let phase = |phase: SearchPhase| match phase {
         SearchPhase::Pruning => {
-            reporter.report("removing effects that the held-out presses do not support", 0.6)
+            reporter.report("removing effects that the held-out presses do not support", 0.6);
         }
         SearchPhase::Exchanging => reporter.report("comparing each effect with others in its place", 0.7),
     };

@@ -89,7 +89,7 @@ impl Setting<'_> {
             let (own, others): (Vec<&Design>, Vec<&Design>) =
                 designs.iter().partition(|design| shown_by.contains(&design.name));
             for designs in [own, others] {
-                let best = self.best(&designs, &separates, |design| self.separation(design, pair))?;
+                let best = Self::best(&designs, &separates, |design| self.separation(design, pair))?;
                 if !best.is_empty() {
                     proposals.extend(best);
                     break;
@@ -115,14 +115,13 @@ impl Setting<'_> {
             let own: Vec<&Design> =
                 designs.iter().filter(|design| definition.shown_by.contains(&design.name)).collect();
             let separates = [(*effect).to_owned(), "nothing".to_owned()];
-            let best = self.best(&own, &separates, |design| self.visibility(design, definition, at))?;
+            let best = Self::best(&own, &separates, |design| self.visibility(design, definition, at))?;
             proposals.extend(best.into_iter().take(1));
         }
         Ok(proposals)
     }
 
     fn best(
-        self,
         designs: &[&Design],
         separates: &[String; 2],
         expect: impl Fn(&Design) -> Result<Expected, DiscoverError> + Sync,
