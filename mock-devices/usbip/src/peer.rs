@@ -165,7 +165,7 @@ impl Peer {
                     self.heard.push((*function, data));
                 }
                 Some(Ear { is_halted: true, .. }) | None => {
-                    self.answers.taken(seq, TransferStatus::Stalled, 0)
+                    self.answers.taken(seq, TransferStatus::Stalled, 0);
                 }
             },
         }

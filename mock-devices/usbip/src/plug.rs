@@ -82,7 +82,7 @@ impl Plug {
         let speed =
             if kinds.iter().any(|kind| kind.speed() == Speed::Full) { Speed::Full } else { Speed::High };
         let make = Box::new(move || {
-            Gadget::new(identity.clone(), speed, kinds.iter().map(|kind| kind.function()).collect())
+            Gadget::new(identity.clone(), speed, kinds.iter().map(FunctionKind::function).collect())
         });
         let mut plug = Self { vhci, make, backing, orders, link: Link::Out(None), port: 0 };
         plug.plug_in(PortChoice::Any).await?;
