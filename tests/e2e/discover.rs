@@ -223,7 +223,8 @@ fn lost_motion_and_hysteresis_are_undecided_by_the_papers_corners_and_decided_by
     assert_eq!(said.code, Some(0), "{said:?}");
     let recording = said.json()["recording"].as_str().unwrap().to_owned();
     // One round decides it under 2 of the seeds 1 to 6: the seed draws the held-out presses. This is one of the two.
-    let active = ["--json", "discover", &recording, "--active", "--rounds", "1", "--budget-min", "3", "--seed", "2"];
+    let active =
+        ["--json", "discover", &recording, "--active", "--rounds", "1", "--budget-min", "3", "--seed", "2"];
     let said = tactus(folder, &[&active[..], &rig].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
     let report = said.json();
