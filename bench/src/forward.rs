@@ -15,11 +15,11 @@ const POSES: u32 = 4096;
 /// One measurement.
 #[derive(Debug, Clone)]
 pub struct Forward {
-    /// The array.
+    /// Array to press.
     pub array: Array,
-    /// The tool.
+    /// Tool that presses.
     pub tool: Tool,
-    /// The way.
+    /// Way from pose to image.
     pub way: Way,
     /// Number of threads.
     pub threads: usize,

@@ -36,7 +36,7 @@ pub struct Limits {
 pub struct Kernel {
     /// Name of the array.
     pub array: String,
-    /// The tool.
+    /// Tool that presses.
     pub tool: Tool,
     /// Floating-point operations of an image.
     pub flops: f64,

@@ -89,7 +89,7 @@ enum Part {
     },
     /// Time of a calibration from recordings: reading, the whole, and without the sweeps that the spreads are fitted to.
     Calibrate {
-        /// The recordings.
+        /// Recordings to read.
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// Print one JSON object, with the images of the sweeps, instead of a line of text.

@@ -28,7 +28,7 @@ pub enum Painter {
     Raster(Renderer),
     /// See [`Way::Exact`].
     Exact {
-        /// The model.
+        /// The exact forward model.
         model: ForwardModel,
         /// The tool at the last pose.
         contact: Contact,

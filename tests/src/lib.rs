@@ -198,7 +198,7 @@ impl Drop for Process {
 pub struct ServiceUnderTest {
     /// The virtual devices; faults are typed into them.
     pub mock: Process,
-    /// The service.
+    /// The running `tactusd`.
     pub daemon: Process,
     /// Bus endpoint of the service.
     pub endpoint: String,

@@ -52,7 +52,7 @@ pub struct Truth {
 /// A named effect.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct Named {
-    /// The effect.
+    /// Name of the effect in the library.
     pub effect: String,
     /// Effects that the data cannot tell from it, as the report says.
     pub equivalent: Vec<String>,

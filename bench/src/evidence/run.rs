@@ -27,7 +27,7 @@ pub struct Places {
 /// How `tactus discover` is run.
 #[derive(Debug, Clone)]
 pub struct Workflow {
-    /// The program.
+    /// Path of the program `tactus`.
     pub tactus: PathBuf,
     /// Further arguments of `tactus discover`.
     pub more: Vec<String>,

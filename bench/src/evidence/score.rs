@@ -94,7 +94,7 @@ pub struct Shrink {
 pub struct EffectScore {
     /// Its name.
     pub effect: String,
-    /// The scores.
+    /// Shares with their intervals.
     #[serde(flatten)]
     pub band: Band,
 }

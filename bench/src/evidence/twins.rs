@@ -48,7 +48,7 @@ pub struct Chosen {
 /// The result for one case of twins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decision {
-    /// The case.
+    /// The hidden physics and the effects that resemble it.
     pub twins: Twins,
     /// The experiments of the round, in order; empty if nothing was undecided.
     pub chosen: Vec<Chosen>,

@@ -41,7 +41,7 @@ pub(crate) const WIRING_PLACES_LEAST: usize = 4;
 pub struct FaultyElement {
     /// Its row-major index.
     pub element: usize,
-    /// The fault.
+    /// Class of the fault.
     pub kind: FaultKind,
     /// The numbers that show it, in a sentence.
     pub evidence: String,

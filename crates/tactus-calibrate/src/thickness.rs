@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::{Estimate, setting::same_covering, spread::Spreads};
 
-/// A scatter whose p-value is below this is not taken for chance.
+/// A scatter whose p-value is below this is not taken as random.
 pub(crate) const IMPLAUSIBLE: f64 = 1e-3;
 
 /// Spread of each covering, and its dependence on thickness.
@@ -38,7 +38,8 @@ pub struct CoveringSpread {
     /// Greatest difference between two of its depths.
     pub range_mm: f64,
     /// P-value of the differences between depths if the spread does not depend on depth; `None` with one depth.
-    pub chance: Option<f64>,
+    #[serde(rename = "chance")]
+    pub p_value: Option<f64>,
 }
 
 /// A polynomial in thickness with `N` coefficients, that of `t^0` first.
@@ -50,7 +51,8 @@ pub struct Curve<const N: usize> {
     /// Root mean square distance of the points from it, in mm.
     pub rms_mm: f64,
     /// P-value of the scatter if the polynomial holds; `None` without degrees of freedom.
-    pub chance: Option<f64>,
+    #[serde(rename = "chance")]
+    pub p_value: Option<f64>,
 }
 
 fn as_list<const N: usize, S: serde::Serializer>(values: &[Estimate; N], to: S) -> Result<S::Ok, S::Error> {
@@ -91,7 +93,7 @@ fn covering(spreads: &Spreads, rows: &[usize]) -> CoveringSpread {
         covering_mm: spreads.fits[rows[0]].covering_mm,
         sigma_mm: Estimate::new(sigmas.sum::<f64>() / count, variance),
         range_mm: most - least,
-        chance: chance(
+        p_value: p_value(
             &spreads_of(spreads, rows),
             &DMatrix::from_element(rows.len(), 1, 1.0),
             &among(spreads, rows),
@@ -109,9 +111,9 @@ fn curve<const N: usize>(spreads: &Spreads) -> Option<Curve<N>> {
     let solve = (design.transpose() * &design).try_inverse()? * design.transpose();
     let coefficients = &solve * &sigmas;
     let residuals = &sigmas - &design * &coefficients;
-    let chance = chance(&sigmas, &design, &covariance);
+    let p_value = p_value(&sigmas, &design, &covariance);
     let mut spread = &solve * covariance * solve.transpose();
-    if chance.is_some_and(|chance| chance < IMPLAUSIBLE) {
+    if p_value.is_some_and(|p_value| p_value < IMPLAUSIBLE) {
         let freedom = rows.len() as f64 - N as f64;
         let scatter = residuals.norm_squared() / freedom;
         spread += &solve * solve.transpose() * scatter;
@@ -119,7 +121,7 @@ fn curve<const N: usize>(spreads: &Spreads) -> Option<Curve<N>> {
     Some(Curve {
         coefficients: std::array::from_fn(|power| Estimate::new(coefficients[power], spread[(power, power)])),
         rms_mm: (residuals.norm_squared() / rows.len() as f64).sqrt(),
-        chance,
+        p_value,
     })
 }
 
@@ -133,7 +135,7 @@ fn among(spreads: &Spreads, rows: &[usize]) -> DMatrix<f64> {
 
 /// Probability that values with this covariance scatter as much or more about the model of this design: the upper tail of
 /// chi-squared at the least generalised sum of squares. `None` without degrees of freedom.
-fn chance(values: &DVector<f64>, design: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
+fn p_value(values: &DVector<f64>, design: &DMatrix<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
     let freedom = design.nrows().checked_sub(design.ncols()).filter(|freedom| *freedom > 0)?;
     let inverse = covariance.clone().cholesky()?.inverse();
     let weighted = design.transpose() * &inverse;

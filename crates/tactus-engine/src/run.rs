@@ -28,7 +28,7 @@ const REFERENCE: Duration = Duration::from_millis(300);
 pub struct RunOrder {
     /// Unique name of the run.
     pub run_id: String,
-    /// The experiment.
+    /// Parsed experiment script.
     pub script: Script,
     /// The parameters that differ from their defaults.
     pub arguments: Arguments,

@@ -10,7 +10,7 @@ use crate::quadrature::smooth;
 /// A tool at a place and depth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
-    /// The tool.
+    /// Shape and size of the tool that presses.
     pub indenter: Indenter,
     /// Position of the tool's axis, sensor frame.
     pub position_mm: [f64; 2],

@@ -81,7 +81,7 @@ impl ForwardModel {
         Ok(Self { array, psf, response, reference_mm2 })
     }
 
-    /// The elements.
+    /// Geometry of the array, sensor frame.
     pub fn array(&self) -> &Array {
         &self.array
     }

@@ -8,7 +8,7 @@ pub enum ScriptError {
     /// Not Starlark, or something that experiment scripts may not use.
     #[error("{at}: {problem}")]
     Syntax {
-        /// The line.
+        /// Where in the script the error is.
         at: Location,
         /// What is wrong with it.
         problem: String,
@@ -38,7 +38,7 @@ pub enum ScriptError {
     Limit {
         /// The line in execution.
         at: Location,
-        /// The limit.
+        /// Which limit, with its value.
         exceeded: Exceeded,
         /// The calls that led to the line, with the text of each line; empty if the thread had to be left behind.
         call_stack: String,

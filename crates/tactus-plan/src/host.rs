@@ -19,7 +19,7 @@ pub trait Host {
 /// A step and the line of the script that asks for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Call {
-    /// The step.
+    /// What to do, not yet checked against the envelope.
     pub step: Step,
     /// The innermost line of the script.
     pub at: Location,

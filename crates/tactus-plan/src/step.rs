@@ -37,7 +37,7 @@ pub enum Step {
     },
     /// Write a line into the run's events.
     Log {
-        /// The line.
+        /// Text for the run log, as the script gives it.
         message: String,
     },
     /// Have another covering put in place. A simulated rig changes it itself; a real one asks and waits.

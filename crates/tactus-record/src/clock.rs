@@ -35,7 +35,7 @@ const EVEN_TICKS: f64 = 0.75;
 /// The estimated clock of one connection of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EpochClock {
-    /// The connection.
+    /// Number of the connection, counted from 0 in a run.
     pub epoch: u32,
     /// Number of frames it was estimated from.
     pub frames: u64,

@@ -38,7 +38,7 @@ pub struct CalibrationReport<'a> {
     pub declared_registration: Registration,
     /// Point spread in the rig file.
     pub declared_psf: Psf,
-    /// The result.
+    /// What calibration found, to be shown.
     pub calibration: &'a Calibration,
     /// Sentences about defects of the files.
     pub notes: &'a [String],

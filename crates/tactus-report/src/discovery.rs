@@ -48,7 +48,7 @@ pub struct DiscoveryReport<'a> {
     pub notes: &'a [String],
     /// Experiments that were run to decide between explanations, in order; their recordings are among the data.
     pub active: &'a [ActiveRun],
-    /// The result.
+    /// What discovery found, to be shown.
     pub discovery: &'a Discovery,
 }
 

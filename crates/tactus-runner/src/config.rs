@@ -12,7 +12,7 @@ use crate::order::Texts;
 /// The checked configuration, with the rig that it names.
 #[derive(Debug, Clone)]
 pub struct Config {
-    /// The rig.
+    /// The rig file, with the files that it names.
     pub rig: RigFiles,
     /// Folder of experiment scripts, searched before the built-in ones.
     pub experiments: Option<PathBuf>,

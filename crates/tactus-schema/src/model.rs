@@ -29,7 +29,7 @@ pub struct Model {
 /// The base model's parameters, with standard errors where they were estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseModel {
-    /// The elements.
+    /// Geometry of the array, sensor frame.
     pub array: Array,
     /// Spread against covering thickness.
     pub psf: Psf,
@@ -86,7 +86,7 @@ pub enum ModelFileError {
     Effect {
         /// Index of the entry, from 0.
         index: usize,
-        /// The problem.
+        /// What is wrong with its parameters.
         source: EffectError,
     },
     /// One field is wrong.

@@ -28,7 +28,7 @@ pub struct Rig {
     pub name: String,
     /// True if it has no physical devices.
     pub simulated: bool,
-    /// The elements.
+    /// Geometry, rate and converter range of the array.
     pub array: Array,
     /// Where the sensor lies in the robot's frame.
     pub registration: Registration,
@@ -135,9 +135,9 @@ pub enum OnGap {
 /// The sensor's link.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SensorLink {
-    /// The protocol.
+    /// Which bytes the sensor sends and takes.
     pub protocol: SensorProtocol,
-    /// The transport.
+    /// How bytes get to the sensor.
     pub transport: Transport,
 }
 

@@ -93,7 +93,7 @@ enum CliCommand {
     Validate(ValidateArgs),
     /// Print the completions for a shell.
     Completions {
-        /// The shell.
+        /// Shell to complete for.
         shell: Shell,
     },
 }

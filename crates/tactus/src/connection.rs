@@ -35,7 +35,7 @@ pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
     }
 }
 
-/// The service.
+/// Connects to the service at the endpoint.
 ///
 /// # Errors
 /// If nothing listens at the endpoint.

@@ -27,7 +27,7 @@ pub struct Truth {
     pub effects: Vec<Effect>,
     /// Hidden physics. If there is any, `effects` are not used.
     pub physics: Vec<Dose>,
-    /// The converter.
+    /// Noise, saturation and quantisation of the converter.
     pub readout: Readout,
     /// Faults of elements, by index.
     pub faults: BTreeMap<usize, ElementFault>,
@@ -39,7 +39,7 @@ pub struct Truth {
     pub surface_mm: f64,
     /// The tool on the stage.
     pub indenter: Indenter,
-    /// The stage.
+    /// Steps, acceleration, speed and travel of the stage.
     pub stage: SimulatedStage,
     /// Protocol of its controller, and directions of its axes.
     pub stage_protocol: StageProtocol,

@@ -35,7 +35,7 @@ pub struct Definition {
 /// A physics at a strength.
 #[derive(Debug, Clone, Copy)]
 pub struct Dose {
-    /// The physics.
+    /// Its entry in the catalogue.
     pub physics: &'static Definition,
     /// 0 is none, 1 is that of a bad rig; at most [`STRENGTH_MAX`].
     pub strength: f64,

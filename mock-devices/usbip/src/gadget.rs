@@ -29,7 +29,7 @@ struct FunctionSlot {
 /// What became of a request.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// The answer.
+    /// Bytes of the answer, for the host.
     Data(Vec<u8>),
     /// Bytes for the device behind a function.
     Heard(usize, Vec<u8>),

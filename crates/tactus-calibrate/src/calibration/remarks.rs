@@ -178,7 +178,7 @@ impl Remarks {
             );
         }
         for covering in &thickness.coverings {
-            if covering.chance.is_some_and(|chance| chance < IMPLAUSIBLE) {
+            if covering.p_value.is_some_and(|p_value| p_value < IMPLAUSIBLE) {
                 self.warnings.push(format!(
                     "Under the covering of {:.3} mm the spread changes with depth by {:.3} mm, more than its errors explain.",
                     covering.covering_mm, covering.range_mm
@@ -196,7 +196,7 @@ impl Remarks {
             }
         }
         if let Some(line) = &thickness.linear
-            && line.chance.is_some_and(|chance| chance < IMPLAUSIBLE)
+            && line.p_value.is_some_and(|p_value| p_value < IMPLAUSIBLE)
         {
             self.warnings.push(format!(
                 "Spread against thickness is no straight line: points lie {:.3} mm rms off it, more than their errors explain. \

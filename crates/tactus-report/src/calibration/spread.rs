@@ -131,7 +131,7 @@ fn by_covering(f: &mut fmt::Formatter<'_>, thickness: &ThicknessFit, pitch_mm: f
             estimate(&covering.sigma_mm.in_units_of(pitch_mm)),
             number(PAPER_PITCHES + Psf::PAPER.sigma_per_mm * covering.covering_mm / pitch_mm, 3),
             digits(covering.range_mm, 2),
-            covering.chance.map_or_else(|| "\u{2013}".into(), probability),
+            covering.p_value.map_or_else(|| "\u{2013}".into(), probability),
         ]);
     }
     writeln!(
@@ -193,10 +193,10 @@ fn curves(
         )
     };
     if let Some(line) = &thickness.linear {
-        f.write_str(&scatter("line", line.rms_mm, line.chance))?;
+        f.write_str(&scatter("line", line.rms_mm, line.p_value))?;
     }
     if let Some(parabola) = &thickness.quadratic {
-        f.write_str(&scatter("parabola", parabola.rms_mm, parabola.chance))?;
+        f.write_str(&scatter("parabola", parabola.rms_mm, parabola.p_value))?;
     }
     match (report.calibration.psf(declared), &thickness.linear) {
         (Some(_), Some(_)) => Ok(()),

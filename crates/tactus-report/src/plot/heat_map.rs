@@ -19,11 +19,11 @@ pub struct HeatMap<'a> {
 /// A heat map with its own colour scale, for a [`Sheet`](super::Sheet); the origin is its upper left corner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image<'a> {
-    /// The values.
+    /// Values of the elements, row-major.
     pub heat: HeatMap<'a>,
     /// Side of an element's square.
     pub cell_px: f64,
-    /// The colours.
+    /// Colour scale, with its limits in the unit of the values.
     pub scale: Scale,
     /// Tooltip.
     pub title: String,
@@ -34,7 +34,7 @@ pub struct Image<'a> {
 pub struct Tile<'a> {
     /// Upper left corner.
     pub at_px: [f64; 2],
-    /// The image.
+    /// Values of the elements, row-major.
     pub heat: HeatMap<'a>,
     /// Tooltip.
     pub title: String,
@@ -49,9 +49,9 @@ pub struct Mosaic<'a> {
     pub size_px: [f64; 2],
     /// Side of an element's square.
     pub cell_px: f64,
-    /// The colours.
+    /// Colour scale that all tiles share.
     pub scale: Scale,
-    /// The images.
+    /// One image each, from left to right.
     pub tiles: Vec<Tile<'a>>,
     /// Texts with their lower left corners.
     pub captions: Vec<([f64; 2], String)>,

@@ -11,7 +11,7 @@ use crate::description::{WrongField, finite, positive, wrong};
 pub struct StageLink {
     /// The protocol, with the axes.
     pub protocol: StageProtocol,
-    /// The transport.
+    /// How bytes get to the controller.
     pub transport: Transport,
 }
 

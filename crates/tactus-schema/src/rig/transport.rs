@@ -64,7 +64,7 @@ pub struct UsbIdentity {
 /// The endpoints of a USB interface; the device's descriptor says whether they are bulk or interrupt endpoints.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UsbLink {
-    /// The device.
+    /// Vendor, product and serial number of the device.
     pub identity: UsbIdentity,
     /// Number of the interface.
     pub interface: u8,
@@ -77,7 +77,7 @@ pub struct UsbLink {
 /// A human interface device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HidLink {
-    /// The device.
+    /// Vendor, product and serial number of the device.
     pub identity: UsbIdentity,
     /// Number of its interface, for a device that has several.
     pub interface: Option<u8>,

@@ -117,7 +117,7 @@ impl Crc {
         Self { parameters, tables: Arc::new(tables(parameters)) }
     }
 
-    /// The parameters.
+    /// Width, polynomial, start value and reflections.
     pub fn parameters(&self) -> CrcParameters {
         self.parameters
     }

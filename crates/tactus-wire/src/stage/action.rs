@@ -94,7 +94,7 @@ pub enum Failure {
     },
     /// The controller refused the command or did not confirm it, or it is impossible.
     Refused {
-        /// The command.
+        /// What the controller refused, as text for a person.
         command: String,
         /// Why, in words.
         reason: String,

@@ -139,7 +139,7 @@ fn declared(path: &Path) -> anyhow::Result<Model> {
     Ok(model.map_err(|error| Failure::new(Exit::Usage, format!("{}: {error}", path.display())))?)
 }
 
-/// The model.
+/// Reads the start model: the given model file, or the base model of the rig file.
 ///
 /// # Errors
 /// If it is of another array than the data.

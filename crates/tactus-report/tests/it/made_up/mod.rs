@@ -76,12 +76,12 @@ pub(crate) fn whole() -> Calibration {
             linear: Some(Curve {
                 coefficients: [sure(2.2205, 0.0007), sure(0.49697, 0.00026)],
                 rms_mm: 0.000_11,
-                chance: Some(0.535),
+                p_value: Some(0.535),
             }),
             quadratic: Some(Curve {
                 coefficients: [sure(2.2208, 0.0007), sure(0.4967, 0.0003), sure(0.000_04, 0.000_03)],
                 rms_mm: 0.000_1,
-                chance: Some(1e-9),
+                p_value: Some(1e-9),
             }),
         }),
         spreads,
@@ -164,6 +164,6 @@ fn covering(covering_mm: f64) -> CoveringSpread {
         covering_mm,
         sigma_mm: sure(2.22 + 0.497 * covering_mm, 0.0007),
         range_mm: 0.000_14,
-        chance: Some(0.517),
+        p_value: Some(0.517),
     }
 }
