@@ -44,7 +44,7 @@ pub enum Outside {
     /// Longer than any step may last.
     #[error("{duration_s} s is too long for one step: the limit is {DURATION_MAX_S} s")]
     Duration { duration_s: f64 },
-    /// The covering is thicker than [`THICKNESS_MAX_MM`].
+    /// The covering is thicker than 20 mm.
     #[error("no covering is {thickness_mm} mm thick: the limit is {THICKNESS_MAX_MM} mm")]
     Covering { thickness_mm: f64 },
     /// Faster than the rig allows.
