@@ -26,7 +26,11 @@ rm -rf "$root/home/tactus"
 git clone --quiet --no-local "$repository" "$root/home/tactus"
 
 for folder in proc dev; do
-    mountpoint -q "$root/$folder" || mount --rbind "/$folder" "$root/$folder"
+    if ! mountpoint -q "$root/$folder"; then
+        mount --rbind "/$folder" "$root/$folder"
+        # What is unmounted there at the end stays mounted here.
+        mount --make-rslave "$root/$folder"
+    fi
 done
 trap 'umount --recursive --lazy "$root/proc" "$root/dev"' EXIT
 
