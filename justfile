@@ -46,13 +46,13 @@ build:
 fmt:
     cargo fmt --all --check
 
-# Lints; warnings are errors.
+# Lints; warnings are errors. The shaders' code is checked too, and run by `just gpu`.
 lint:
-    cargo clippy --workspace --all-targets -- -D warnings
+    cargo clippy --workspace --all-targets --features tactus-scene/gpu -- -D warnings
 
 # The documentation builds without a broken link.
 docs:
-    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --document-private-items
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features tactus-scene/gpu --no-deps --document-private-items
 
 # Licences, sources and doubles of the dependencies.
 deny: deny-tool
@@ -181,33 +181,33 @@ truth rigs="200":
 
 # How fast the models are, how they grow, how far from the machine's limits: bench/README.md.
 bench:
-    cargo bench --package tactus-bench --bench forward -- --quick
-    cargo bench --package tactus-bench --bench fem -- --quick
-    cargo bench --package tactus-bench --bench decode -- --quick
-    cargo run --release --package tactus-bench -- growth
-    cargo run --release --package tactus-bench -- limits
-    cargo run --release --package tactus-bench -- acuity
+    cargo bench --profile dist --package tactus-bench --bench forward -- --quick
+    cargo bench --profile dist --package tactus-bench --bench fem -- --quick
+    cargo bench --profile dist --package tactus-bench --bench decode -- --quick
+    cargo run --profile dist --package tactus-bench -- growth
+    cargo run --profile dist --package tactus-bench -- limits
+    cargo run --profile dist --package tactus-bench -- acuity
 
 # The same beside others' programs. Compiled for the processor at hand, as the peers' wheels choose their instructions when they run.
 bench-peers *arguments: bench-peers-tools
-    RUSTFLAGS="-C target-cpu=native" cargo build --release --package tactus-bench --target-dir target/native
-    {{ tools }}/peers/bin/python bench/peers/forward.py --binary target/native/release/tactus-bench {{ arguments }}
+    RUSTFLAGS="-C target-cpu=native" cargo build --profile dist --package tactus-bench --target-dir target/native
+    {{ tools }}/peers/bin/python bench/peers/forward.py --binary target/native/dist/tactus-bench {{ arguments }}
 
 # Both panels of Fig. 6 beside a numpy program.
 bench-acuity *arguments: bench-peers-tools
-    cargo build --release --package tactus-bench
+    cargo build --profile dist --package tactus-bench
     {{ tools }}/peers/bin/python bench/peers/acuity.py {{ arguments }}
 
 # The fit of the point spreads to the paper's sweep, beside scipy's.
 bench-calibration *arguments: bench-peers-tools
-    cargo build --release --package tactus --package tactus-bench
+    cargo build --profile dist --package tactus --package tactus-bench
     {{ tools }}/peers/bin/python bench/peers/calibration.py {{ arguments }}
 
 # Time and memory of `tactus discover` from 9,000 to 144,000 frames; PySINDy, gradient boosting and a Gaussian process on 36,000.
 bench-discovery: bench-peers-tools
-    cargo build --release --package tactus --package tactus-bench
+    cargo build --profile dist --package tactus --package tactus-bench
     mkdir -p target/evidence
-    target/release/tactus-bench evidence time --work target/evidence/time > target/evidence/ours.json
+    target/dist/tactus-bench evidence time --work target/evidence/time > target/evidence/ours.json
     {{ tools }}/peers/bin/python bench/peers/discovery.py time --work target/evidence/time --name 36000 > target/evidence/peers.json
     {{ tools }}/peers/bin/python -c 'import json; at = "target/evidence/"; \
         json.dump({who: json.load(open(f"{at}{who}.json")) for who in ("ours", "peers")}, open(f"{at}costs.json", "w"), indent=1)'
@@ -216,23 +216,23 @@ bench-discovery: bench-peers-tools
 # Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes.
 # What discovery finds and names of hidden physics, beside other ways to go about it: docs/discovery-evidence.md.
 discovery-evidence: bench-discovery
-    target/release/tactus-bench evidence run --size ablation --keep-tables
+    target/dist/tactus-bench evidence run --size ablation --keep-tables
     {{ tools }}/peers/bin/python bench/peers/discovery.py report --work target/evidence/work
-    target/release/tactus-bench evidence run --size ablation --work target/evidence/work/peers/bic --with=--ablation --with=bic
-    target/release/tactus-bench evidence run
-    target/release/tactus-bench evidence score --ablation target/evidence/work --costs target/evidence/costs.json \
+    target/dist/tactus-bench evidence run --size ablation --work target/evidence/work/peers/bic --with=--ablation --with=bic
+    target/dist/tactus-bench evidence run
+    target/dist/tactus-bench evidence score --ablation target/evidence/work --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
 
 # Twins that one active round on the embedded rig decides or does not, some ten minutes: docs/discovery-evidence.md.
 discovery-active:
-    cargo build --release --package tactus --package tactus-bench
-    target/release/tactus-bench evidence active --document docs/discovery-evidence.md
+    cargo build --profile dist --package tactus --package tactus-bench
+    target/dist/tactus-bench evidence active --document docs/discovery-evidence.md
 
 # The part of it that fails if discovery has become worse: always the same 46 sets, some two minutes on two cores.
 discovery-slice:
-    cargo build --release --package tactus --package tactus-bench
+    cargo build --profile dist --package tactus --package tactus-bench
     rm -rf target/evidence/slice
-    target/release/tactus-bench evidence run --size slice --check \
+    target/dist/tactus-bench evidence run --size slice --check \
         --work target/evidence/slice/work --sealed target/evidence/slice/sealed
 
 # The part of that which CI runs, 11 sets, with the programs that the tests have built.
@@ -249,7 +249,7 @@ bench-peers-tools:
 # The finite element model beside scikit-fem and CalculiX, which is installed from Debian where it is not; some ten minutes.
 fem-peers *arguments: solid-tools
     command -v ccx >/dev/null || (apt-get update -qq && apt-get install -qq --no-install-recommends calculix-ccx)
-    cargo build --release --package tactus-bench
+    cargo build --profile dist --package tactus-bench
     {{ tools }}/solid/bin/python bench/peers/fem.py {{ arguments }}
 
 # Build times from nothing, and the slowest crates.

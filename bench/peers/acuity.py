@@ -53,7 +53,7 @@ def main():
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/release/tactus-bench")
+    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/dist/tactus-bench")
     parser.add_argument("--rounds", type=int, default=5, help="the median of so many")
     parser.add_argument("--json", action="store_true")
     return parser.parse_args()

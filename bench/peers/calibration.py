@@ -139,8 +139,8 @@ def run(*command):
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/release/tactus-bench")
-    parser.add_argument("--tactus", type=Path, default=REPOSITORY / "target/release/tactus")
+    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/dist/tactus-bench")
+    parser.add_argument("--tactus", type=Path, default=REPOSITORY / "target/dist/tactus")
     parser.add_argument("--points", type=int, default=15, help="points along each side of the sweep")
     parser.add_argument("--rounds", type=int, default=5, help="the median of so many")
     return parser.parse_args()

@@ -47,7 +47,7 @@ def main():
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/release/tactus-bench")
+    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/dist/tactus-bench")
     meshes = [(20, 5), (40, 10), (64, 10), (100, 10)]
     parser.add_argument("--meshes", nargs="+", type=mesh, default=meshes, help="ACROSSxLAYERS")
     parser.add_argument("--poisson-ratios", nargs="+", type=float, default=[0.45])

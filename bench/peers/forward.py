@@ -48,7 +48,7 @@ def main():
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/release/tactus-bench")
+    parser.add_argument("--binary", type=Path, default=REPOSITORY / "target/dist/tactus-bench")
     parser.add_argument("--arrays", nargs="+", choices=ARRAYS, default=ARRAYS)
     parser.add_argument("--rounds", type=int, default=5, help="the median of so many counts")
     parser.add_argument("--seconds", type=float, default=0.5, help="of each measurement")
@@ -122,7 +122,7 @@ class Scene:
 
 
 class Ours:
-    """Our release program, with its own clock and threads."""
+    """Our optimised program, with its own clock and threads."""
 
     def __init__(self, binary, array, path, tool):
         self.binary, self.asked = binary, {"array": array, "path": path, "tool": tool}

@@ -33,7 +33,7 @@ enum Part {
 #[derive(Debug, Args)]
 struct ActiveArgs {
     /// The program that discovers.
-    #[arg(long, default_value = "target/release/tactus")]
+    #[arg(long, default_value = "target/dist/tactus")]
     tactus: PathBuf,
     /// Run only physics whose ids contain this.
     #[arg(long)]
@@ -49,7 +49,7 @@ struct ActiveArgs {
 #[derive(Debug, Args)]
 struct TimeArgs {
     /// The program that discovers.
-    #[arg(long, default_value = "target/release/tactus")]
+    #[arg(long, default_value = "target/dist/tactus")]
     tactus: PathBuf,
     /// Numbers of frames, separated by commas.
     #[arg(long, value_delimiter = ',', default_values_t = [9_000, 36_000, 144_000])]
@@ -67,7 +67,7 @@ struct RunArgs {
     #[command(flatten)]
     which: WhichArgs,
     /// The program that discovers.
-    #[arg(long, default_value = "target/release/tactus")]
+    #[arg(long, default_value = "target/dist/tactus")]
     tactus: PathBuf,
     /// Sets that run at the same time; by default the number of cores.
     #[arg(long)]
