@@ -38,7 +38,7 @@ def texts(package):
     licences = [path for path in files if path.name.lower().startswith(BEGINNINGS) and path.suffix not in CODE]
     if not licences:
         authors = ", ".join(package["authors"]) or "its authors"
-        return f"The crate contains no licence text. Copyright: {authors}. Source: {package['repository'] or 'crates.io'}."
+        return f"The crate contains no licence text. Copyright: {authors}. Source: {package['repository'] or 'not stated'}."
     return "\n\n".join(path.read_text(errors="replace").strip() for path in licences)
 
 
