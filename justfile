@@ -96,9 +96,14 @@ package: programs (package-of "target/dist")
 package-of folder:
     packaging/build.sh {{ folder }}
 
-# The package on a real systemd, booted in namespaces: readiness, watchdog, sandbox, removal. As root; some two minutes. CI tries the
-# programs that the tests have built.
-systemd-boot folder="target/dist": (package-of folder)
+# The package on a real systemd, booted in namespaces: readiness, watchdog, sandbox, removal. As root; some two minutes.
+systemd-boot: programs (boot-package-of "target/dist")
+
+# The same with the programs that the tests have built, as CI does it.
+systemd-boot-tested: build (boot-package-of "target/debug")
+
+[private]
+boot-package-of folder: (package-of folder)
     tests/systemd/base.sh target/systemd-boot/base.tar
     python3 tests/systemd/checks.py target/systemd-boot target/package/tactus.deb
 
