@@ -7,6 +7,7 @@ mod stop;
 mod zaber;
 
 use futures_util::future::BoxFuture;
+use tactus_safety::{HomingPermit, Permit, Void};
 use tactus_schema::pb;
 use tactus_schema::rig::{GrblAxes, ZaberAxes};
 use tactus_wire::stage::Direction;
@@ -16,32 +17,28 @@ use crate::DeviceError;
 
 pub use driven::{Connection, DrivenStage, StageOptions};
 
-/// The target of a move, in the stage's frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Target {
-    /// x, y, z in mm; z = 0 is the covering's nominal surface.
-    pub position_mm: [f64; 3],
-    /// Speed along the straight line to the target.
-    pub speed_mm_per_s: f64,
-}
-
 /// A stage that can be commanded from several tasks at once.
 pub trait Stage: Send + Sync {
     /// The latest report; updated with each.
     fn state(&self) -> watch::Receiver<pb::StageState>;
 
     /// Finds the reference position. The status is [`pb::StageStatus::Idle`] afterwards.
-    fn home(&self) -> BoxFuture<'_, Result<(), StageError>>;
+    fn home(&self, permit: HomingPermit) -> BoxFuture<'_, Result<(), StageError>>;
 
-    /// Moves in a straight line to the target, and returns the position reached in mm.
+    /// Moves in a straight line to the permitted target, and returns the position reached in mm. If the permit is void when
+    /// the driver comes to it, nothing is sent.
     ///
     /// The move is done when the controller is idle and the reported position is within tolerance. A move to the present
     /// position is done at once. There is one move at a time.
-    fn move_to(&self, target: Target) -> BoxFuture<'_, Result<[f64; 3], StageError>>;
+    fn move_to(&self, permit: Permit) -> BoxFuture<'_, Result<[f64; 3], StageError>>;
 
     /// Stops motion now. Never waits and is never queued. A move under way ends with [`StageError::Stopped`]. Further moves
     /// are accepted once the stage stands still.
     fn stop(&self);
+
+    /// Says that somebody still watches the stage. A stage that was watched once and is not watched for 100 ms while it
+    /// moves is stopped; its command ends with [`StageError::Unwatched`].
+    fn watch(&self);
 
     /// Clears an alarm, so that the stage accepts moves again. Its position is suspect until it is homed.
     fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>>;
@@ -85,6 +82,12 @@ pub enum StageError {
         "the move to {target_mm:?} mm was not done after {waited_s:.1} s; the stage was stopped at {position_mm:?} mm"
     )]
     Overdue { target_mm: [f64; 3], position_mm: [f64; 3], waited_s: f64 },
+    /// The permit was void before the command was sent.
+    #[error(transparent)]
+    Void(#[from] Void),
+    /// Nobody watched the stage for 100 ms.
+    #[error("the stage was stopped at {position_mm:?} mm: the frames and the stage were not watched for 0.1 s")]
+    Unwatched { position_mm: [f64; 3] },
     /// The link or the device failed.
     #[error(transparent)]
     Device(#[from] DeviceError),

@@ -1,11 +1,16 @@
-//! The acquisition task. Each frame goes to the safety supervisor, then to the recording, the run and the viewers.
+//! The acquisition task. It alone owns the supervisor and the recording; others ask it through a mailbox. Each frame goes to
+//! the safety supervisor, then to the recording, the run and the viewers.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::time::Duration;
 
+use futures_util::FutureExt;
 use tactus_device::{Sensor, SensorEvent};
 use tactus_model::Covering;
-use tactus_schema::rig::{OnGap, Service};
-use tactus_schema::{Frame, MonoTime, Rig, pb};
+use tactus_safety::{Fault, Supervisor, Violation};
+use tactus_schema::rig::OnGap;
+use tactus_schema::{Frame, MonoTime, pb};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::MissedTickBehavior;
 use tracing::{error, info, warn};
@@ -14,17 +19,21 @@ use crate::average::{Average, Window};
 use crate::engine::{Pulse, Shared};
 use crate::outlet::{Record, RecordFailure};
 use crate::run::Ending;
-use crate::supervisor::{Supervisor, Violation};
+
+/// Longest time between two looks at the clock. The stage's driver stops a stage that is unwatched for 80 ms.
+const TICK_MAX: Duration = Duration::from_millis(33);
 
 /// Supervisor ticks between two publications of the run's state.
 const TICKS_PER_STATE: u64 = 15;
 
-/// State that each frame and stage report passes through, and that the run reads and sets.
-pub(crate) struct Live {
+/// Questions that may wait for the task. Who asks then waits for room.
+const QUESTIONS_MAX: usize = 64;
+
+/// State that each frame and stage report passes through, owned by the acquisition task.
+pub(crate) struct Acquisition {
     pub(crate) supervisor: Supervisor,
     pub(crate) tally: Tally,
-    /// The covering in place. A script can have it changed; the change lasts beyond the run.
-    pub(crate) covering: Covering,
+    shared: Arc<Shared>,
     window: Option<Window>,
     recording: Option<Recording>,
     sensor_info: Option<pb::SensorInfo>,
@@ -47,37 +56,103 @@ struct Recording {
     failure: Option<RecordFailure>,
 }
 
-/// Acquires until aborted.
-pub(crate) async fn acquire(
-    shared: Arc<Shared>,
-    mut sensor: Box<dyn Sensor>,
-    mut reports: mpsc::Receiver<pb::StageState>,
-) {
-    let mut tick = tokio::time::interval(shared.sample_period());
-    tick.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let mut ticks = 0_u64;
-    loop {
-        tokio::select! {
-            biased;
-            event = sensor.next() => shared.on_sensor(event),
-            Some(report) = reports.recv() => shared.on_report(&report),
-            _ = tick.tick() => {
-                shared.on_time();
-                ticks += 1;
-                if ticks.is_multiple_of(TICKS_PER_STATE) {
-                    shared.refresh_state();
-                }
-            }
-        }
+/// Something that the task does for somebody else, between two frames.
+type Question = Box<dyn FnOnce(&mut Acquisition) + Send>;
+
+/// Asks the acquisition task.
+#[derive(Clone)]
+pub(crate) struct Mailbox(mpsc::Sender<Question>);
+
+/// The task's end of the mailbox.
+pub(crate) struct Questions(mpsc::Receiver<Question>);
+
+/// The acquisition task is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the acquisition task has ended; this is a defect of Tactus: restart the service")]
+pub(crate) struct Gone;
+
+/// A new mailbox.
+pub(crate) fn mailbox() -> (Mailbox, Questions) {
+    let (sender, questions) = mpsc::channel(QUESTIONS_MAX);
+    (Mailbox(sender), Questions(questions))
+}
+
+impl Mailbox {
+    /// The answer to a question.
+    pub(crate) async fn ask<T: Send + 'static>(
+        &self,
+        question: impl FnOnce(&mut Acquisition) -> T + Send + 'static,
+    ) -> Result<T, Gone> {
+        let (answer, answered) = oneshot::channel();
+        self.tell(move |acquisition| {
+            // Who asked may have been interrupted meanwhile.
+            let _unasked = answer.send(question(acquisition));
+        })
+        .await?;
+        answered.await.map_err(|_| Gone)
+    }
+
+    /// Has something done, in the order of the calls, without waiting for it.
+    pub(crate) async fn tell(&self, what: impl FnOnce(&mut Acquisition) + Send + 'static) -> Result<(), Gone> {
+        self.0.send(Box::new(what)).await.map_err(|_| Gone)
     }
 }
 
-impl Live {
-    pub(crate) fn new(rig: &Rig, service: &Service) -> Self {
+/// Acquires until aborted.
+pub(crate) async fn acquire(
+    shared: Arc<Shared>,
+    supervisor: Supervisor,
+    mut questions: Questions,
+    mut sensor: Box<dyn Sensor>,
+    mut reports: mpsc::Receiver<pb::StageState>,
+) {
+    let mut tick = tokio::time::interval(shared.sample_period().min(TICK_MAX));
+    tick.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    let mut ticks = 0_u64;
+    let mut acquisition = Acquisition::new(shared, supervisor, covering);
+    let mut has_sensor = true;
+    loop {
+        // A panic of the driver's, or of what handles its frames, must neither end the supervision nor go unnoticed.
+        let next = AssertUnwindSafe(sensor.next()).catch_unwind();
+        let handled = tokio::select! {
+            biased;
+            event = next, if has_sensor => match event {
+                Ok(event) => acquisition.attempt("a frame was handled", |this| this.on_sensor(event)),
+                Err(_) => {
+                    has_sensor = false;
+                    Err("the sensor was read")
+                }
+            },
+            Some(report) = reports.recv() => {
+                acquisition.attempt("a stage report was handled", |this| this.on_report(&report))
+            }
+            Some(question) = questions.0.recv() => {
+                acquisition.attempt("the run was answered", |this| question(this))
+            }
+            _ = tick.tick() => {
+                ticks += 1;
+                acquisition.attempt("the clock was checked", |this| {
+                    this.on_time();
+                    if ticks.is_multiple_of(TICKS_PER_STATE) {
+                        this.refresh_state();
+                    }
+                })
+            }
+        };
+        if let Err(when) = handled {
+            acquisition.defect(when);
+        }
+        acquisition.publish_fault();
+    }
+}
+
+impl Acquisition {
+    fn new(shared: Arc<Shared>, supervisor: Supervisor, covering: Covering) -> Self {
         Self {
-            supervisor: Supervisor::new(rig, service),
+            supervisor,
             tally: Tally::default(),
-            covering: rig.covering,
+            covering,
+            shared,
             window: None,
             recording: None,
             sensor_info: None,
@@ -86,6 +161,142 @@ impl Live {
         }
     }
 
+    /// Does something; the error says during what it panicked.
+    fn attempt(&mut self, when: &'static str, what: impl FnOnce(&mut Self)) -> Result<(), &'static str> {
+        catch_unwind(AssertUnwindSafe(|| what(self))).map_err(|_| when)
+    }
+
+    /// After a panic: stops, and lets nothing but the way up follow.
+    fn defect(&mut self, when: &str) {
+        self.shared.stop_motion();
+        error!("a panic while {when}: the stage is stopped; this is a defect of Tactus");
+        let why = format!("a panic while {when}");
+        self.shared.end(Ending::Defect(why.clone()));
+        self.supervisor.latch(Fault::Defect(why));
+    }
+
+    fn publish_fault(&self) {
+        let fault = self.supervisor.fault();
+        self.shared.fault.send_if_modified(|known| {
+            let is_news = *known != fault;
+            if is_news {
+                *known = fault;
+            }
+            is_news
+        });
+    }
+
+    // --- what happens -------------------------------------------------------------------------------------------------
+
+    fn on_sensor(&mut self, event: SensorEvent) {
+        match event {
+            SensorEvent::Frame(frame) => self.on_frame(&frame),
+            SensorEvent::Gap(gap) => self.on_gap(gap),
+            SensorEvent::Connected(info) => self.on_connected(&info),
+            SensorEvent::Lost(error) => {
+                warn!(%error, "sensor lost");
+                self.shared.pulse.send_modify(|pulse| pulse.sensor_connected = false);
+            }
+        }
+    }
+
+    fn on_frame(&mut self, frame: &Frame) {
+        // First of all: may stop the stage before anything else is done with the frame.
+        let violation = self.supervisor.on_frame(frame);
+        self.stop_for(violation.as_ref());
+        self.tally.frames += 1;
+        self.tally.frames_lost += u64::from(frame.lost_before);
+        self.record(|sink| sink.frame(frame));
+        self.window = self.window.take().and_then(|window| window.take(frame));
+        self.watch_clock(frame);
+        let clock_offset_s = self.clock_offset_s;
+        self.shared.pulse.send_modify(|pulse| {
+            *pulse = Pulse {
+                frames: pulse.frames + 1,
+                frames_lost: pulse.frames_lost + u64::from(frame.lost_before),
+                sensor_connected: true,
+                last_frame: frame.received.mono,
+                clock_offset_s,
+                ..*pulse
+            };
+        });
+        self.tell_violation(violation);
+        self.shared.publish.frame(frame);
+    }
+
+    fn on_gap(&mut self, gap: pb::Gap) {
+        warn!(lost = gap.frames_lost, after = gap.after_seq, reason = gap.reason, "frames lost");
+        let frames_lost = gap.frames_lost;
+        self.emit(pb::run_event::Event::Gap(gap));
+        if self.shared.service.policy.on_gap == OnGap::Fail && self.recording.is_some() {
+            self.end_run(Ending::FramesLost(frames_lost));
+        }
+    }
+
+    fn on_connected(&mut self, info: &pb::SensorInfo) {
+        info!(link = info.link, transport = info.transport, simulated = info.simulated, "sensor connected");
+        self.supervisor.on_connected();
+        let now = self.shared.clock.now();
+        self.record(|sink| sink.sensor_info(info, now));
+        self.sensor_info = Some(info.clone());
+        self.clock_offset_s = None;
+        self.shared.pulse.send_modify(|pulse| pulse.sensor_connected = true);
+        self.shared.publish.sensor_info(info);
+    }
+
+    fn on_report(&mut self, report: &pb::StageState) {
+        let violation = self.supervisor.on_report(report);
+        self.stop_for(violation.as_ref());
+        if report.status() != pb::StageStatus::Idle {
+            self.window.iter_mut().for_each(Window::disturb);
+        }
+        self.record(|sink| sink.stage(report));
+        self.tell_violation(violation);
+        self.shared.publish.stage(report);
+    }
+
+    fn on_time(&mut self) {
+        let now = self.shared.clock.now().mono;
+        let violation = self.supervisor.on_time(now);
+        self.stop_for(violation.as_ref());
+        self.shared.stage.watch();
+        self.shared.pulse.send_modify(|pulse| pulse.supervised = now);
+        self.tell_violation(violation);
+    }
+
+    /// Stops motion and ends the run because a rule was broken, before anything else is done.
+    fn stop_for(&self, violation: Option<&Violation>) {
+        if let Some(violation) = violation {
+            self.end_run(Ending::Safety(violation.clone()));
+        }
+    }
+
+    /// Records and publishes a broken rule, after motion was stopped.
+    fn tell_violation(&mut self, violation: Option<Violation>) {
+        let Some(violation) = violation else { return };
+        error!(%violation, "safety stop");
+        self.emit_safety(pb::SafetyVerdict::Stopped, violation.rule(), &violation.to_string());
+    }
+
+    fn end_run(&self, ending: Ending) {
+        self.shared.end(ending);
+        self.shared.stop_motion();
+    }
+
+    /// Estimates the offset between the device's clock and the host's. A frame never arrives before it is sampled, so
+    /// the least difference is the best estimate and the spread is its uncertainty.
+    fn watch_clock(&mut self, frame: &Frame) {
+        let tick_ns = self.sensor_info.as_ref().map_or(0, |info| info.tick_ns);
+        let Some(tick) = frame.device_tick.filter(|_| tick_ns > 0) else { return };
+        let offset_s = frame.received.mono.seconds() - tick.0 as f64 * tick_ns as f64 * 1e-9;
+        self.clock_offset_s = Some(match self.clock_offset_s {
+            Some([least_s, greatest_s]) => [least_s.min(offset_s), greatest_s.max(offset_s)],
+            None => [offset_s; 2],
+        });
+    }
+
+    // --- what is asked ------------------------------------------------------------------------------------------------
+
     /// Averages the frames that arrive within `[from, until)`. Replaces an average that is still in progress.
     pub(crate) fn average(&mut self, from: MonoTime, until: MonoTime) -> oneshot::Receiver<Average> {
         let (window, average) = Window::open(from, until);
@@ -93,49 +304,28 @@ impl Live {
         average
     }
 
-    fn record(&mut self, write: impl FnOnce(&mut dyn Record) -> Result<(), RecordFailure>) -> Option<Ending> {
-        let recording = self.recording.as_mut()?;
-        if recording.failure.is_some() {
-            return None;
-        }
-        let failure = write(recording.sink.as_mut()).err()?;
-        error!(%failure, "the run fails");
-        let ending = Ending::RecordFailed(failure.to_string());
-        recording.failure = Some(failure);
-        Some(ending)
-    }
-}
-
-impl Shared {
-    /// Records everything from now on into `sink`, until [`Shared::close_recording`].
-    pub(crate) fn open_recording(&self, sink: Box<dyn Record>, run_id: String) {
-        let now = self.clock.now();
-        let report = *self.stage.state().borrow();
-        let mut live = self.live();
-        live.tally = Tally::default();
-        live.recording = Some(Recording { sink, run_id, event_seq: 0, failure: None });
-        let info = live.sensor_info.clone();
-        let ending = live.record(|sink| {
+    /// Records everything from now on into `sink`, until [`Self::take_recording`].
+    pub(crate) fn open_recording(&mut self, sink: Box<dyn Record>, run_id: String) {
+        let now = self.shared.clock.now();
+        let report = *self.shared.stage.state().borrow();
+        self.tally = Tally::default();
+        self.recording = Some(Recording { sink, run_id, event_seq: 0, failure: None });
+        let info = self.sensor_info.clone();
+        self.record(|sink| {
             info.iter().try_for_each(|info| sink.sensor_info(info, now))?;
             sink.stage(&pb::StageState { t_mono_ns: now.mono.ns(), t_wall_ns: now.wall.ns(), ..report })
         });
-        drop(live);
-        self.end_with(ending);
     }
 
-    /// Closes the recording.
-    pub(crate) fn close_recording(&self) -> Result<(), RecordFailure> {
-        let recording = self.live().recording.take();
-        let Some(recording) = recording else { return Ok(()) };
-        let closed = recording.sink.finish();
-        recording.failure.map_or(closed, Err)
+    /// Ends the recording: what remains is to close it, which may take long; or why it failed.
+    pub(crate) fn take_recording(&mut self) -> Option<(Box<dyn Record>, Option<RecordFailure>)> {
+        self.recording.take().map(|recording| (recording.sink, recording.failure))
     }
 
     /// Records and publishes an event of the run in progress.
-    pub(crate) fn emit(&self, event: pb::run_event::Event) {
-        let now = self.clock.now();
-        let mut live = self.live();
-        let Some(recording) = live.recording.as_mut() else { return };
+    pub(crate) fn emit(&mut self, event: pb::run_event::Event) {
+        let now = self.shared.clock.now();
+        let Some(recording) = self.recording.as_mut() else { return };
         let event = pb::RunEvent {
             seq: recording.event_seq,
             run_id: recording.run_id.clone(),
@@ -144,39 +334,34 @@ impl Shared {
             event: Some(event),
         };
         recording.event_seq += 1;
-        let ending = live.record(|sink| sink.event(&event));
-        drop(live);
-        self.publish.event(&event);
-        self.end_with(ending);
+        self.record(|sink| sink.event(&event));
+        self.shared.publish.event(&event);
     }
 
     /// Records and publishes what the supervisor did.
-    pub(crate) fn emit_safety(&self, verdict: pb::SafetyVerdict, rule: &str, detail: &str) {
-        let now = self.clock.now();
-        let mut live = self.live();
+    pub(crate) fn emit_safety(&mut self, verdict: pb::SafetyVerdict, rule: &str, detail: &str) {
+        let now = self.shared.clock.now();
         let event = pb::SafetyEvent {
-            seq: live.safety_seq,
+            seq: self.safety_seq,
             t_mono_ns: now.mono.ns(),
             t_wall_ns: now.wall.ns(),
             verdict: verdict.into(),
             rule: rule.into(),
             detail: detail.into(),
         };
-        live.safety_seq += 1;
-        let ending = live.record(|sink| sink.safety(&event));
-        drop(live);
-        self.publish.safety(&event);
-        self.end_with(ending);
+        self.safety_seq += 1;
+        self.record(|sink| sink.safety(&event));
+        self.shared.publish.safety(&event);
     }
 
     /// Publishes the state of the run in progress as of now.
-    pub(crate) fn refresh_state(&self) {
-        let now = self.clock.now();
-        let tally = self.live().tally;
-        let fault = self.fault_text();
-        self.state.send_if_modified(|state| {
-            let active = !matches!(state.phase(), pb::RunPhase::Idle | pb::RunPhase::Finished);
-            if active {
+    pub(crate) fn refresh_state(&mut self) {
+        let now = self.shared.clock.now();
+        let tally = self.tally;
+        let fault = self.supervisor.fault().map_or_else(String::new, |fault| fault.to_string());
+        self.shared.state.send_if_modified(|state| {
+            let is_active = !matches!(state.phase(), pb::RunPhase::Idle | pb::RunPhase::Finished);
+            if is_active {
                 let advanced_s = (now.mono.ns() - state.t_mono_ns) as f64 * 1e-9;
                 state.t_mono_ns = now.mono.ns();
                 state.elapsed_s += advanced_s;
@@ -188,123 +373,21 @@ impl Shared {
             }
             let is_news = state.fault != fault;
             state.fault = fault;
-            active || is_news
+            is_active || is_news
         });
-        self.publish.state(&self.state.borrow());
+        self.shared.publish.state(&self.shared.state.borrow());
     }
 
-    fn on_sensor(&self, event: SensorEvent) {
-        match event {
-            SensorEvent::Frame(frame) => self.on_frame(&frame),
-            SensorEvent::Gap(gap) => self.on_gap(gap),
-            SensorEvent::Connected(info) => self.on_connected(&info),
-            SensorEvent::Lost(error) => {
-                warn!(%error, "sensor lost");
-                self.pulse.send_modify(|pulse| pulse.sensor_connected = false);
-            }
+    /// Writes to the recording of the run in progress. A failure ends the run.
+    fn record(&mut self, write: impl FnOnce(&mut dyn Record) -> Result<(), RecordFailure>) {
+        let Some(recording) = self.recording.as_mut().filter(|recording| recording.failure.is_none()) else {
+            return;
+        };
+        if let Err(failure) = write(recording.sink.as_mut()) {
+            error!(%failure, "the run fails");
+            let ending = Ending::RecordFailed(failure.to_string());
+            recording.failure = Some(failure);
+            self.end_run(ending);
         }
-    }
-
-    fn on_frame(&self, frame: &Frame) {
-        let mut live = self.live();
-        let violation = live.supervisor.on_frame(frame);
-        self.stop_for(violation.as_ref());
-        live.tally.frames += 1;
-        live.tally.frames_lost += u64::from(frame.lost_before);
-        let ending = live.record(|sink| sink.frame(frame));
-        live.window = live.window.take().and_then(|window| window.take(frame));
-        live.watch_clock(frame);
-        let clock_offset_s = live.clock_offset_s;
-        drop(live);
-        self.pulse.send_modify(|pulse| {
-            *pulse = Pulse {
-                frames: pulse.frames + 1,
-                frames_lost: pulse.frames_lost + u64::from(frame.lost_before),
-                sensor_connected: true,
-                last_frame: frame.received.mono,
-                clock_offset_s,
-                ..*pulse
-            };
-        });
-        self.trip(violation);
-        self.end_with(ending);
-        self.publish.frame(frame);
-    }
-
-    fn on_gap(&self, gap: pb::Gap) {
-        warn!(lost = gap.frames_lost, after = gap.after_seq, reason = gap.reason, "frames lost");
-        let frames_lost = gap.frames_lost;
-        self.emit(pb::run_event::Event::Gap(gap));
-        if self.service.policy.on_gap == OnGap::Fail && self.live().recording.is_some() {
-            self.end_with(Some(Ending::FramesLost(frames_lost)));
-        }
-    }
-
-    fn on_connected(&self, info: &pb::SensorInfo) {
-        info!(link = info.link, transport = info.transport, simulated = info.simulated, "sensor connected");
-        let now = self.clock.now();
-        let mut live = self.live();
-        let ending = live.record(|sink| sink.sensor_info(info, now));
-        live.sensor_info = Some(info.clone());
-        live.clock_offset_s = None;
-        drop(live);
-        self.pulse.send_modify(|pulse| pulse.sensor_connected = true);
-        self.end_with(ending);
-        self.publish.sensor_info(info);
-    }
-
-    fn on_report(&self, report: &pb::StageState) {
-        let mut live = self.live();
-        let violation = live.supervisor.on_report(report);
-        self.stop_for(violation.as_ref());
-        let ending = live.record(|sink| sink.stage(report));
-        drop(live);
-        self.trip(violation);
-        self.end_with(ending);
-        self.publish.stage(report);
-    }
-
-    fn on_time(&self) {
-        let now = self.clock.now().mono;
-        let violation = self.live().supervisor.on_time(now);
-        self.stop_for(violation.as_ref());
-        self.pulse.send_modify(|pulse| pulse.supervised = now);
-        self.trip(violation);
-    }
-
-    /// Stops motion and ends the run because a rule was broken, before anything else is done.
-    fn stop_for(&self, violation: Option<&Violation>) {
-        if let Some(violation) = violation {
-            self.end(Ending::Safety(violation.clone()));
-            self.stage.stop();
-        }
-    }
-
-    /// Records and publishes a broken rule, after motion was stopped.
-    fn trip(&self, violation: Option<Violation>) {
-        let Some(violation) = violation else { return };
-        error!(%violation, "safety stop");
-        self.emit_safety(pb::SafetyVerdict::Stopped, violation.rule(), &violation.to_string());
-    }
-
-    fn end_with(&self, ending: Option<Ending>) {
-        if let Some(ending) = ending {
-            self.end(ending);
-            self.stage.stop();
-        }
-    }
-}
-
-impl Live {
-    /// Estimates the offset between the device's clock and the host's. A frame never arrives before it is sampled, so
-    /// the least difference is the best estimate and the spread is its uncertainty.
-    fn watch_clock(&mut self, frame: &Frame) {
-        let tick_ns = self.sensor_info.as_ref().map_or(0, |info| info.tick_ns);
-        let Some(tick) = frame.device_tick.filter(|_| tick_ns > 0) else { return };
-        let offset_s = frame.received.mono.seconds() - tick.0 as f64 * tick_ns as f64 * 1e-9;
-        self.clock_offset_s = Some(match self.clock_offset_s {
-            Some([least_s, greatest_s]) => [least_s.min(offset_s), greatest_s.max(offset_s)],
-            None => [offset_s; 2],
-        });
     }
 }

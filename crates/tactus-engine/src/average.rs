@@ -14,6 +14,8 @@ pub(crate) struct Average {
     pub(crate) frames: u32,
     /// Frames of the interval that were lost.
     pub(crate) lost: u64,
+    /// True if the stage reported another state than idle meanwhile.
+    pub(crate) is_disturbed: bool,
     /// Arrival of the first and the last of them.
     pub(crate) span: [MonoTime; 2],
 }
@@ -33,6 +35,7 @@ pub(crate) struct Window {
     moments: Vec<Moments>,
     frames: u32,
     lost: u64,
+    is_disturbed: bool,
     span: [MonoTime; 2],
     done: oneshot::Sender<Average>,
 }
@@ -41,7 +44,12 @@ impl Window {
     /// A window that averages at least one frame, and every frame that arrives before `until`.
     pub(crate) fn open(from: MonoTime, until: MonoTime) -> (Self, oneshot::Receiver<Average>) {
         let (done, average) = oneshot::channel();
-        (Self { from, until, moments: Vec::new(), frames: 0, lost: 0, span: [from; 2], done }, average)
+        (Self { from, until, moments: Vec::new(), frames: 0, lost: 0, is_disturbed: false, span: [from; 2], done }, average)
+    }
+
+    /// The stage did not stand idle.
+    pub(crate) fn disturb(&mut self) {
+        self.is_disturbed = true;
     }
 
     /// Adds a frame. Returns itself while it needs more frames.
@@ -61,6 +69,7 @@ impl Window {
             rms_counts: self.moments.iter().map(|moments| (moments.squares / freedom).sqrt()).collect(),
             frames: self.frames,
             lost: self.lost,
+            is_disturbed: self.is_disturbed,
             span: self.span,
         };
         // The receiver is gone if the waiting run was interrupted; the average is then not needed.

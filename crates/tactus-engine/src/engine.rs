@@ -1,21 +1,39 @@
 //! The engine owns the devices for the life of the service and executes at most one run at a time.
 
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::io;
+use std::sync::Arc;
 use std::time::Duration;
 
 use tactus_device::{Clock, Sensor, Stage, StageError};
+use tactus_model::Covering;
+use tactus_safety::{Fault, Revocation, Supervisor};
 use tactus_schema::rig::Service;
 use tactus_schema::{MonoTime, Rig, pb};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 
-use crate::acquisition::{Live, acquire};
+use crate::acquisition::{Gone, Mailbox, acquire, mailbox};
 use crate::outlet::{Publish, Record};
-use crate::run::{Broken, Ending, Run, RunOrder, RunOutcome};
+use crate::run::{Broken, Ending, Run, RunOrder, RunOutcome, rescue};
 
 /// Puts a covering of a thickness in mm in place. Only a simulated rig has such a function.
 pub type ChangeCovering = Arc<dyn Fn(f64) + Send + Sync>;
+
+/// Remembers the covering in place beyond the end of the service.
+pub trait CoveringMemory: Send + Sync {
+    /// Thickness of the covering that was last confirmed, in mm; `None` if none ever was.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    fn recall(&self) -> io::Result<Option<f64>>;
+
+    /// Remembers the thickness, in mm. Returns once it is on disk.
+    ///
+    /// # Errors
+    /// If it cannot be stored.
+    fn remember(&self, thickness_mm: f64) -> io::Result<()>;
+}
 
 /// A rig's devices, started.
 pub struct Devices {
@@ -27,6 +45,8 @@ pub struct Devices {
     pub stage_reports: mpsc::Receiver<pb::StageState>,
     /// Changes the covering; `None` if a person changes it.
     pub change_covering: Option<ChangeCovering>,
+    /// Where the covering in place is kept; `None` if nothing outlives the engine, as on a simulated rig.
+    pub covering_memory: Option<Arc<dyn CoveringMemory>>,
 }
 
 impl fmt::Debug for Devices {
@@ -39,7 +59,7 @@ impl fmt::Debug for Devices {
 #[derive(Clone)]
 pub struct Engine {
     shared: Arc<Shared>,
-    acquisition: Arc<Acquisition>,
+    acquisition: Arc<AcquisitionTask>,
 }
 
 impl fmt::Debug for Engine {
@@ -93,23 +113,6 @@ pub struct Stopped {
     pub reason: String,
 }
 
-/// Why nothing may move before an [`Engine::reset`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Fault {
-    /// The engine is new, and nobody has allowed motion yet.
-    #[error("nothing has been reset since the service started")]
-    Started,
-    /// A reset is under way, or the last one failed.
-    #[error("the last reset was not finished")]
-    Unfinished,
-    /// The stage's controller is in alarm.
-    #[error("the stage is in alarm")]
-    Alarm,
-    /// The stage does not know its position, as after a reset of its controller.
-    #[error("the stage does not know where it is")]
-    Unhomed,
-}
-
 /// Why the stage could not be reset.
 #[derive(Debug, thiserror::Error)]
 pub enum ResetError {
@@ -136,22 +139,29 @@ pub enum EngineError {
         "rig {rig:?} has no envelope, motion, policy, sensor and stage: it describes data, not a service"
     )]
     NoService { rig: String },
+    /// The covering that was last in place is not known.
+    #[error("the covering that was last confirmed cannot be read: {why}; see which one is in place, then remove the file")]
+    Covering { why: String },
 }
 
-/// State that the run, the acquisition task and the handles share.
+/// What the run, the acquisition task and the handles share. The live state is the acquisition task's alone.
 pub(crate) struct Shared {
     pub(crate) rig: Rig,
     pub(crate) service: Service,
     pub(crate) clock: Clock,
     pub(crate) stage: Arc<dyn Stage>,
     pub(crate) change_covering: Option<ChangeCovering>,
+    pub(crate) covering_memory: Option<Arc<dyn CoveringMemory>>,
     pub(crate) publish: Arc<dyn Publish>,
     pub(crate) control: watch::Sender<Control>,
     pub(crate) state: watch::Sender<pb::RunState>,
     pub(crate) pulse: watch::Sender<Pulse>,
-    /// A fault that only a reset clears.
-    latched: watch::Sender<Option<Fault>>,
-    live: Mutex<Live>,
+    /// The supervisor's fault, kept up to date by the acquisition task.
+    pub(crate) fault: watch::Sender<Option<Fault>>,
+    /// The covering in place, kept up to date by the run.
+    pub(crate) covering: watch::Sender<Covering>,
+    pub(crate) acquisition: Mailbox,
+    permits: Revocation,
 }
 
 /// Requests to the run in progress.
@@ -159,24 +169,46 @@ pub(crate) struct Shared {
 pub(crate) struct Control {
     /// Somebody holds the [`Claim`].
     pub(crate) claimed: bool,
-    pub(crate) paused: bool,
+    /// Who paused it.
+    pub(crate) paused: Option<String>,
+    /// Who resumed it last.
+    pub(crate) resumed_by: String,
+    /// The covering that the run waits for, in mm: to be confirmed by its value.
+    pub(crate) wanted_covering_mm: Option<f64>,
     pub(crate) ending: Option<Ending>,
 }
 
-/// Ends the acquisition task with the engine.
-struct Acquisition(JoinHandle<()>);
+/// Why a run was not resumed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ResumeError {
+    /// No run is paused.
+    #[error("no run is paused")]
+    NotPaused,
+    /// The run waits for another covering, and its thickness was not confirmed.
+    #[error("the run waits for the {wanted_mm} mm covering: once it is in place, `tactus resume --covering {wanted_mm}`")]
+    CoveringNotConfirmed {
+        /// Thickness of the covering that the script asked for.
+        wanted_mm: f64,
+    },
+}
 
-impl Drop for Acquisition {
+/// Ends the acquisition task with the engine.
+struct AcquisitionTask(JoinHandle<()>);
+
+impl Drop for AcquisitionTask {
     fn drop(&mut self) {
         self.0.abort();
     }
 }
 
+/// Coverings that differ by less, in mm, are the same.
+const SAME_COVERING_MM: f64 = 1e-6;
+
 impl Engine {
     /// Starts acquiring.
     ///
     /// # Errors
-    /// [`EngineError::NoService`] if the rig has no service part.
+    /// [`EngineError`] if the rig has no service part, or the covering in place is not known.
     pub fn start(
         rig: Rig,
         devices: Devices,
@@ -193,26 +225,40 @@ impl Engine {
             fault: Fault::Started.to_string(),
             ..Default::default()
         };
+        let covering = covering_in_place(&rig, devices.covering_memory.as_deref())?;
+        let mut supervisor = Supervisor::new(&rig, &service);
+        supervisor.set_covering(covering);
+        let (mailbox, questions) = mailbox();
         let shared = Arc::new(Shared {
-            live: Mutex::new(Live::new(&rig, &service)),
             rig,
             service,
             clock,
             stage: devices.stage,
             change_covering: devices.change_covering,
+            covering_memory: devices.covering_memory,
             publish,
             control: watch::Sender::default(),
             state: watch::Sender::new(idle),
             pulse: watch::Sender::default(),
-            latched: watch::Sender::new(Some(Fault::Started)),
+            fault: watch::Sender::new(supervisor.fault()),
+            covering: watch::Sender::new(covering),
+            acquisition: mailbox,
+            permits: supervisor.revocation(),
         });
-        let task = tokio::spawn(acquire(Arc::clone(&shared), devices.sensor, devices.stage_reports));
-        Ok(Self { shared, acquisition: Arc::new(Acquisition(task)) })
+        let acquiring = acquire(
+            Arc::clone(&shared),
+            supervisor,
+            covering,
+            questions,
+            devices.sensor,
+            devices.stage_reports,
+        );
+        Ok(Self { shared, acquisition: Arc::new(AcquisitionTask(tokio::spawn(acquiring))) })
     }
 
     /// The rig, with the covering that is in place now.
     pub fn rig(&self) -> Rig {
-        Rig { covering: self.shared.live().covering, ..self.shared.rig.clone() }
+        Rig { covering: *self.shared.covering.borrow(), ..self.shared.rig.clone() }
     }
 
     /// The clock of all times of this engine.
@@ -253,7 +299,7 @@ impl Engine {
         if claimed {
             self.shared.end(Ending::Stop(order));
         }
-        self.shared.stage.stop();
+        self.shared.stop_motion();
         claimed
     }
 
@@ -269,61 +315,82 @@ impl Engine {
     }
 
     /// Clears the stage's alarm, if there is one, homes the stage, raises the tip, and checks that frames arrive. It is
-    /// required after the service starts, and after an alarm, a reset of the controller or an unfinished homing.
-    /// [`Engine::stop`] interrupts it.
+    /// required after the service starts, after a broken safety rule, an alarm, a reset of the controller, an unfinished
+    /// homing or a failed retract. [`Engine::stop`] interrupts it.
     ///
     /// # Errors
     /// [`ResetError`] if a run is in progress or the reset failed.
     pub async fn reset(&self) -> Result<(), ResetError> {
-        let not_ready = |why: Broken| ResetError::NotReady(why.to_string());
         let claim = self.claim()?;
-        let shared = &self.shared;
-        shared.latch(Some(Fault::Unfinished));
-        shared.wait_for_stage().await.map_err(not_ready)?;
-        let status = self.stage_state().status();
-        if status == pb::StageStatus::Alarm {
-            shared.stage.clear_alarm().await?;
-        }
-        // Make the order before the check, so that a stop between the two counts as later than the order.
-        let homing = shared.stage.home();
-        claim.check()?;
-        homing.await?;
-        claim.check()?;
-        shared.retract().await?;
-        shared.wait_for_sensor().await.map_err(not_ready)?;
-        claim.check()?;
-        let status = self.stage_state().status();
-        if status != pb::StageStatus::Idle {
-            let what = format!("homed, the stage did not stay idle: {}", status.as_str_name());
-            return Err(ResetError::NotReady(what));
-        }
-        shared.latch(None);
-        shared.refresh_state();
-        Ok(())
+        let shared = Arc::clone(&self.shared);
+        // A task of its own: it ends properly even if the caller gives up, and its panic is not the caller's.
+        let resetting = tokio::spawn(async move {
+            let task = tokio::spawn(reset(Arc::clone(&shared)));
+            let done = match task.await {
+                Ok(done) => done,
+                Err(panic) => {
+                    shared.stop_motion();
+                    let why = format!("the reset: {panic}");
+                    shared.acquisition.tell(move |live| live.supervisor.latch(Fault::Defect(why))).await?;
+                    Err(ResetError::NotReady("a defect of Tactus; see the log".into()))
+                }
+            };
+            shared.acquisition.ask(|live| {
+                live.supervisor.end();
+                live.refresh_state();
+            }).await?;
+            drop(claim);
+            done
+        });
+        resetting.await.unwrap_or_else(|panic| Err(ResetError::NotReady(panic.to_string())))
     }
 
     /// The fault that requires an [`Engine::reset`]; `None` if motion is allowed. No run starts while there is one.
     pub fn fault(&self) -> Option<Fault> {
-        self.shared.fault()
+        self.shared.fault.borrow().clone()
     }
 
     /// Pauses the run in progress before its next step. Every press ends at the safe height, so a paused run does not
     /// press.
     ///
     /// Returns false if there is no run to pause.
-    pub fn pause(&self) -> bool {
+    pub fn pause(&self, by: &str) -> bool {
         let claimed = self.shared.control.borrow().claimed;
         self.shared.control.send_if_modified(|control| {
-            let holds = control.claimed && control.ending.is_none() && !control.paused;
-            control.paused |= holds;
+            let holds = control.claimed && control.ending.is_none() && control.paused.is_none();
+            if holds {
+                control.paused = Some(by.to_owned());
+            }
             holds
         });
         claimed
     }
 
-    /// Resumes a paused run. Returns false if no run was paused.
-    pub fn resume(&self) -> bool {
-        self.shared.control.send_if_modified(|control| std::mem::take(&mut control.paused))
+    /// Resumes a paused run. If the run waits for another covering, `covering_mm` confirms that the covering of this
+    /// thickness is in place.
+    ///
+    /// # Errors
+    /// [`ResumeError`] if no run was paused, or if the covering is not confirmed by its value.
+    pub fn resume(&self, by: &str, covering_mm: Option<f64>) -> Result<(), ResumeError> {
+        let mut refused = None;
+        self.shared.control.send_if_modified(|control| {
+            refused = if control.paused.is_none() {
+                Some(ResumeError::NotPaused)
+            } else {
+                let unconfirmed = |wanted_mm: &f64| {
+                    !covering_mm.is_some_and(|mm| (mm - wanted_mm).abs() < SAME_COVERING_MM)
+                };
+                let wanted_mm = control.wanted_covering_mm.filter(unconfirmed);
+                wanted_mm.map(|wanted_mm| ResumeError::CoveringNotConfirmed { wanted_mm })
+            };
+            if refused.is_none() {
+                control.paused = None;
+                control.wanted_covering_mm = None;
+                by.clone_into(&mut control.resumed_by);
+            }
+            refused.is_none()
+        });
+        refused.map_or(Ok(()), Err)
     }
 
     /// State of the run, updated at each event and every half second.
@@ -353,37 +420,71 @@ impl Engine {
     }
 }
 
-impl Shared {
-    /// Sets or clears the fault that forbids motion.
-    pub(crate) fn latch(&self, fault: Option<Fault>) {
-        self.latched.send_replace(fault);
+/// The steps of a reset.
+async fn reset(shared: Arc<Shared>) -> Result<(), ResetError> {
+    let not_ready = |why: Broken| ResetError::NotReady(why.to_string());
+    let now = shared.clock.now().mono;
+    shared.acquisition.ask(move |live| live.supervisor.begin_reset(now)).await?;
+    shared.wait_for_stage().await.map_err(not_ready)?;
+    shared.wait_for_sensor().await.map_err(not_ready)?;
+    let status = shared.stage.state().borrow().status();
+    if status == pb::StageStatus::Alarm {
+        shared.stage.clear_alarm().await?;
     }
+    shared.home().await.map_err(ResetError::from)?;
+    shared.retract().await?;
+    shared.wait_for_sensor().await.map_err(not_ready)?;
+    shared.check_ended().map_err(ResetError::from)?;
+    let now = shared.clock.now().mono;
+    let finished = shared.acquisition.ask(move |live| live.supervisor.finish_reset(now)).await?;
+    finished.map_err(|denied| ResetError::NotReady(denied.to_string()))
+}
 
-    /// [`Shared::fault`] in words; empty if there is none.
-    pub(crate) fn fault_text(&self) -> String {
-        self.fault().map_or_else(String::new, |fault| fault.to_string())
+/// The covering of the rig file or the one that was last confirmed, whichever is thinner: the limit of depth follows it.
+fn covering_in_place(rig: &Rig, memory: Option<&dyn CoveringMemory>) -> Result<Covering, EngineError> {
+    let in_file_mm = rig.covering.thickness_mm;
+    let kept_mm = memory.map_or(Ok(None), CoveringMemory::recall);
+    let kept_mm = kept_mm.map_err(|error| EngineError::Covering { why: error.to_string() })?;
+    if let Some(kept_mm) = kept_mm.filter(|kept_mm| (kept_mm - in_file_mm).abs() > SAME_COVERING_MM) {
+        tracing::warn!(kept_mm, in_file_mm, "the last run and the rig file name different coverings: the thinner counts");
     }
+    Ok(Covering { thickness_mm: kept_mm.map_or(in_file_mm, |kept_mm| kept_mm.min(in_file_mm)) })
+}
 
-    pub(crate) fn fault(&self) -> Option<Fault> {
-        let status = self.stage.state().borrow().status();
-        if status == pb::StageStatus::Alarm {
-            return Some(Fault::Alarm);
+impl From<Broken> for ResetError {
+    fn from(broken: Broken) -> Self {
+        match broken {
+            Broken::Ended(_) => Self::Stopped(Stopped { reason: broken.to_string() }),
+            Broken::Stage(error) => Self::Stage(error),
+            _ => Self::NotReady(broken.to_string()),
         }
-        let latched = *self.latched.borrow();
-        latched.or((status == pb::StageStatus::Unhomed).then_some(Fault::Unhomed))
+    }
+}
+
+impl From<Gone> for ResetError {
+    fn from(gone: Gone) -> Self {
+        Self::NotReady(gone.to_string())
+    }
+}
+
+impl Shared {
+    /// Stops motion now and voids all permits. Never waits.
+    pub(crate) fn stop_motion(&self) {
+        self.permits.revoke();
+        self.stage.stop();
     }
 
-    /// State that the acquisition task and the run share. The lock is never held across an await.
-    pub(crate) fn live(&self) -> MutexGuard<'_, Live> {
-        // A panic elsewhere must not stop the supervisor.
-        self.live.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The fault in words; empty if there is none.
+    pub(crate) fn fault_text(&self) -> String {
+        self.fault.borrow().as_ref().map_or_else(String::new, ToString::to_string)
     }
 
     /// Asks the run to end. The first reason counts, except that any other reason replaces a silence of the sensor,
     /// after which the run might have continued.
     pub(crate) fn end(&self, ending: Ending) {
         self.control.send_modify(|control| {
-            control.paused = false;
+            control.paused = None;
+            control.wanted_covering_mm = None;
             if control.ending.as_ref().is_none_or(Ending::is_silence) {
                 control.ending = Some(ending);
             }
@@ -407,9 +508,22 @@ impl fmt::Debug for Claim {
 }
 
 impl Claim {
-    /// Executes an experiment, and returns when it is over and the tip retracted, however it ended.
+    /// Executes an experiment, and returns when it is over and the tip retracted, however it ended. The run goes on if
+    /// the caller does not wait for it.
     pub async fn run(self, order: RunOrder, record: Box<dyn Record>) -> RunOutcome {
-        Run::new(&self.0, order).execute(record).await
+        let (run_id, experiment) = (order.run_id.clone(), order.script.name().to_owned());
+        // A task of its own, watched by another: neither a panic of the run nor an impatient caller leaves the tip.
+        let run = tokio::spawn(async move {
+            let shared = Arc::clone(&self.0);
+            let run = tokio::spawn(Run::execute(Arc::clone(&shared), order.clone(), record));
+            let outcome = match run.await {
+                Ok(outcome) => outcome,
+                Err(panic) => rescue(&shared, order, &panic).await,
+            };
+            drop(self);
+            outcome
+        });
+        run.await.unwrap_or_else(|panic| RunOutcome::defect(run_id, experiment, panic.to_string()))
     }
 
     /// Checks whether the run was stopped already.

@@ -72,7 +72,7 @@ impl Bounds {
 
     /// Greatest depth, in mm.
     pub fn depth_max_mm(&self) -> f64 {
-        self.envelope.depth_share_max * self.covering.thickness_mm
+        self.envelope.depth_max_mm(self.covering)
     }
 
     /// Checks a step.

@@ -13,12 +13,12 @@ mod motion;
 mod outlet;
 mod run;
 mod script;
-mod supervisor;
 
 pub use engine::{
-    Busy, ChangeCovering, Claim, Devices, Engine, EngineError, Fault, Pulse, ResetError, StopOrder, Stopped,
+    Busy, ChangeCovering, Claim, CoveringMemory, Devices, Engine, EngineError, Pulse, ResetError, ResumeError, StopOrder,
+    Stopped,
 };
 pub use envelope::{Bounds, Outside};
 pub use outlet::{Publish, Record, RecordFailure, Unpublished};
 pub use run::{Planned, RunOrder, RunOutcome};
-pub use supervisor::{Supervisor, Violation};
+pub use tactus_safety::{Fault, Violation};

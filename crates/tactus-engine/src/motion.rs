@@ -1,26 +1,29 @@
-//! Motion of the tip: first up, then sideways, last down in small confirmed steps.
+//! Motion of the tip: first up, then sideways, last down in small confirmed steps. Each needs the supervisor's permit.
 
 use std::time::Duration;
 
 use tactus_device::{StageError, Target};
+use tactus_safety::{Permit, SAME_HEIGHT_MM, STEP_DOWN_MAX_MM};
 use tactus_schema::pb::StageStatus;
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 use crate::engine::Shared;
 use crate::run::Broken;
 
-/// Longest downward step near the covering. The next step is commanded only after the last is confirmed, so that a host
-/// that dies leaves the tip at most this far below its last confirmed height.
-const UNCONFIRMED_MAX_MM: f64 = 0.1;
-
-/// Heights that differ by less count as equal: a third of the stage's vertical step.
-const SAME_HEIGHT_MM: f64 = 0.0003;
-
 /// Longest time that a stopped stage may take to stand still.
 const STANDSTILL: Duration = Duration::from_secs(5);
 
-/// Greatest number of refused retract commands before the run gives up.
-const REFUSALS_MAX: u32 = 5;
+/// Greatest number of commands of one retract that the stage may refuse or lose before it counts as failed.
+const TROUBLES_MAX: u32 = 5;
+
+/// Greatest number of stops that one retract outlasts. Somebody who stops it more often is told that the tip is not up.
+const STOPS_MAX: u32 = 200;
+
+/// Greatest number of permits for one move: a slow computer may let some expire.
+const PERMITS_MAX: u32 = 5;
+
+/// Longest time to wait for a permit that the next frame or report may bring.
+const PERMIT_PATIENCE: Duration = Duration::from_secs(5);
 
 impl Shared {
     /// The confirmed position, robot frame.
@@ -78,45 +81,114 @@ impl Shared {
     }
 
     /// Moves straight up to the safe height, also after a stop: the stop halts the tip, and once the stage stands still
-    /// the tip is raised, so that it does not stay pressed in.
+    /// the tip is raised, so that it does not stay pressed in. What goes wrong is tried again a few times.
     ///
     /// Returns the height reached, or why the tip could not be retracted.
-    pub(crate) async fn retract(&self) -> Result<f64, StageError> {
-        let motion = &self.service.motion;
-        let mut refusals = 0;
+    pub(crate) async fn retract(&self) -> Result<f64, Broken> {
+        let (mut troubles, mut stops) = (0, 0);
         loop {
             self.stand_still().await;
-            let [x_mm, y_mm, z_mm] = self.position_mm();
-            let reached = if z_mm >= motion.safe_height_mm - motion.tolerance_mm && self.is_idle() {
-                Ok([x_mm, y_mm, z_mm])
-            } else {
-                let up = Target {
-                    position_mm: [x_mm, y_mm, motion.safe_height_mm.max(z_mm)],
-                    speed_mm_per_s: motion.travel_speed_mm_per_s,
-                };
-                self.stage.move_to(up).await
-            };
-            match reached {
+            let error = match self.rise().await {
                 Ok([_, _, z_mm]) => return Ok(z_mm),
-                Err(StageError::Stopped { .. }) => {}
-                Err(StageError::Refused { .. }) if refusals < REFUSALS_MAX => refusals += 1,
-                Err(error) => return Err(error),
+                Err(error) => error,
+            };
+            match &error {
+                Broken::Stage(StageError::Stopped { .. } | StageError::Void(_)) => stops += 1,
+                Broken::Stage(StageError::Unhomed | StageError::Alarm { .. }) => return Err(error),
+                Broken::Stage(StageError::Device(_)) => {
+                    troubles += 1;
+                    self.stage_returns().await;
+                }
+                _ => troubles += 1,
+            }
+            if troubles > TROUBLES_MAX || stops > STOPS_MAX {
+                return Err(error);
+            }
+            tracing::warn!(%error, troubles, stops, "the tip is not up yet: trying again");
+        }
+    }
+
+    /// One try to reach the safe height.
+    async fn rise(&self) -> Result<[f64; 3], Broken> {
+        let motion = &self.service.motion;
+        let [x_mm, y_mm, z_mm] = self.position_mm();
+        if z_mm >= motion.safe_height_mm - motion.tolerance_mm && self.is_idle() {
+            // The stage is asked: the position may be an old one.
+            let reached_mm = self.stage.look().await?;
+            if reached_mm[2] >= motion.safe_height_mm - motion.tolerance_mm {
+                return Ok(reached_mm);
             }
         }
+        let up = Target {
+            position_mm: [x_mm, y_mm, motion.safe_height_mm.max(z_mm)],
+            speed_mm_per_s: motion.travel_speed_mm_per_s,
+        };
+        let permit = self.permit(up).await?;
+        Ok(self.stage.move_to(permit).await?)
+    }
+
+    /// Homes the stage. If a stop ends it, the error is the reason of the stop.
+    pub(crate) async fn home(&self) -> Result<(), Broken> {
+        self.check_ended()?;
+        let now = self.clock.now().mono;
+        let permit = self.acquisition.ask(move |live| live.supervisor.permit_homing(now)).await??;
+        let homed = self.stage.home(permit).await;
+        self.check_ended()?;
+        Ok(homed?)
     }
 
     /// Makes one straight move. If a stop ends it, the error is the reason of the stop.
     async fn go(&self, position_mm: [f64; 3], speed_mm_per_s: f64) -> Result<[f64; 3], Broken> {
-        // Make the order before the check, so that a stop between the two counts as later than the order.
-        let order = self.stage.move_to(Target { position_mm, speed_mm_per_s });
-        self.check_ended()?;
-        let moved = order.await;
-        self.check_ended()?;
-        Ok(moved?)
+        let to = Target { position_mm, speed_mm_per_s };
+        let mut permits = 0;
+        loop {
+            self.check_ended()?;
+            permits += 1;
+            let permit = self.unless_ended(self.permit(to)).await??;
+            let moved = self.stage.move_to(permit).await;
+            self.check_ended()?;
+            match moved {
+                Err(StageError::Void(_) | StageError::Unwatched { .. }) if permits < PERMITS_MAX => {}
+                moved => return Ok(moved?),
+            }
+        }
+    }
+
+    /// Leave to make one move. Waits a while if the next frame or report may bring it.
+    async fn permit(&self, to: Target) -> Result<Permit, Broken> {
+        let deadline = self.clock.now().mono.after(PERMIT_PATIENCE);
+        loop {
+            let now = self.clock.now().mono;
+            match self.acquisition.ask(move |live| live.supervisor.permit(to, now)).await? {
+                Err(denied) if denied.may_pass() && now < deadline => sleep(self.sample_period()).await,
+                permit => return Ok(permit?),
+            }
+        }
+    }
+
+    /// Checks that the stage stands idle within tolerance of a place: it is asked, and its answer is younger than the
+    /// question. Returns the epoch of its position.
+    pub(crate) async fn stands_at(&self, target_mm: [f64; 3]) -> Result<u32, Broken> {
+        let position_mm = self.stage.look().await?;
+        let away_mm = position_mm.iter().zip(target_mm).map(|(at, to)| (at - to).powi(2)).sum::<f64>().sqrt();
+        if away_mm > self.service.motion.tolerance_mm {
+            return Err(StageError::NotThere { target_mm, position_mm }.into());
+        }
+        Ok(self.stage.state().borrow().epoch)
     }
 
     fn is_idle(&self) -> bool {
         self.stage.state().borrow().status() == StageStatus::Idle
+    }
+
+    /// Waits until the stage answers again, as long as the rig's policy allows.
+    async fn stage_returns(&self) {
+        let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
+        let mut state = self.stage.state();
+        let returned = state.wait_for(|report| report.status() != StageStatus::Disconnected);
+        if timeout(patience, returned).await.is_err() {
+            tracing::warn!("the stage did not come back within {patience:?}");
+        }
     }
 
     /// Waits until a stopped stage stands still. If it does not, the next command fails.
@@ -135,5 +207,5 @@ impl Shared {
 /// the stage hardly accelerates.
 fn confirmed_step_mm(way_mm: f64) -> f64 {
     // Rounding must not add a step to a whole number of steps.
-    way_mm / (way_mm / UNCONFIRMED_MAX_MM - 1e-6).ceil().max(1.0)
+    way_mm / (way_mm / STEP_DOWN_MAX_MM - 1e-6).ceil().max(1.0)
 }

@@ -3,25 +3,31 @@
 mod steps;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use tactus_device::StageError;
 use tactus_model::Covering;
 use tactus_plan::{Arguments, Limits, RigView, Script};
+use tactus_safety::{Denied, Fault, Violation};
 use tactus_schema::table::Phase;
 use tactus_schema::{MonoTime, Rig, pb};
+use tokio::task::{JoinError, spawn_blocking};
 use tokio::time::timeout;
 use tracing::{error, info};
 
+use crate::acquisition::Gone;
 use crate::engine::{Shared, StopOrder};
 use crate::envelope::{Bounds, Outside};
-use crate::outlet::Record;
+use crate::outlet::{Record, RecordFailure};
 use crate::script::{self, Request};
-use crate::supervisor::Violation;
 use pb::run_event::Event;
 
 /// Averaging time of the run's reference zero.
 const REFERENCE: Duration = Duration::from_millis(300);
+
+/// Longest time to close a recording.
+const CLOSE_PATIENCE: Duration = Duration::from_secs(30);
 
 /// An experiment to be run.
 #[derive(Debug, Clone)]
@@ -92,6 +98,7 @@ pub(crate) enum Ending {
     Safety(Violation),
     FramesLost(u64),
     RecordFailed(String),
+    Defect(String),
 }
 
 /// Why a step was not done.
@@ -103,8 +110,14 @@ pub(crate) enum Broken {
     Outside(#[from] Outside),
     #[error(transparent)]
     Stage(#[from] StageError),
+    #[error(transparent)]
+    Denied(#[from] Denied),
+    #[error(transparent)]
+    Gone(#[from] Gone),
     #[error("{0} frames were lost during a dwell")]
     FramesLost(u64),
+    #[error("the stage did not stand still in its place throughout a dwell")]
+    Disturbed,
     #[error("no frame from the sensor for {0:.1} s: is it plugged in and switched on?")]
     SensorSilent(f64),
     #[error("no answer from the stage for {0:.1} s: is it plugged in and switched on?")]
@@ -134,16 +147,19 @@ fn describe(ending: &Ending) -> String {
             format!("{lost} frames were lost, and the rig's policy.on_gap is \"fail\"")
         }
         Ending::RecordFailed(failure) => failure.clone(),
+        Ending::Defect(what) => format!("stopped by a defect of Tactus: {what}"),
     }
 }
 
 /// A run in progress.
-pub(crate) struct Run<'a> {
-    shared: &'a Shared,
+pub(crate) struct Run {
+    shared: Arc<Shared>,
     order: RunOrder,
     bounds: Bounds,
     covering: Covering,
     started: MonoTime,
+    /// The run has begun to move.
+    is_prepared: bool,
     steps: u64,
     next_press: i32,
     presses: u32,
@@ -153,15 +169,34 @@ pub(crate) struct Run<'a> {
     travel_mm: [[f64; 2]; 3],
 }
 
-impl<'a> Run<'a> {
-    pub(crate) fn new(shared: &'a Shared, order: RunOrder) -> Self {
+impl Run {
+    /// Runs the experiment. Whatever happens, the tip is retracted and the recording closed.
+    pub(crate) async fn execute(shared: Arc<Shared>, order: RunOrder, record: Box<dyn Record>) -> RunOutcome {
+        info!(run = order.run_id, experiment = order.script.name(), "run starts");
+        let mut run = Self::new(shared, order);
+        let run_id = run.order.run_id.clone();
+        let opened = run.shared.acquisition.tell(move |live| live.open_recording(record, run_id)).await;
+        let result = match opened {
+            Ok(()) => run.perform_all().await,
+            Err(gone) => Err(gone.into()),
+        };
+        if matches!(result, Err(Broken::Refused(_))) && !run.is_prepared {
+            // The tip is not moved, not even up.
+            let z_mm = run.shared.position_mm()[2];
+            return run.conclude(&result, Ok(z_mm)).await;
+        }
+        let retracted = run.end(&result).await;
+        run.conclude(&result, retracted).await
+    }
+
+    fn new(shared: Arc<Shared>, order: RunOrder) -> Self {
         let rig = &shared.rig;
-        let covering = shared.live().covering;
+        let covering = *shared.covering.borrow();
         Self {
-            shared,
             bounds: Bounds::new(rig, &shared.service.envelope, &shared.service.motion, covering),
             covering,
             started: shared.clock.now().mono,
+            is_prepared: false,
             steps: 0,
             next_press: 0,
             presses: 0,
@@ -170,83 +205,79 @@ impl<'a> Run<'a> {
             phase: None,
             travel_mm: [[f64::INFINITY, f64::NEG_INFINITY]; 3],
             order,
+            shared,
         }
     }
 
-    /// Runs the experiment. Whatever happens, the tip is retracted and the recording closed.
-    pub(crate) async fn execute(mut self, record: Box<dyn Record>) -> RunOutcome {
-        info!(run = self.order.run_id, experiment = self.order.script.name(), "run starts");
-        self.shared.open_recording(record, self.order.run_id.clone());
-        self.set_state(pb::RunPhase::Preparing, "preparing");
-        self.shared.emit(Event::Started(self.describe_start()));
-        let mut result = self.admit().await;
-        if matches!(result, Err(Broken::Refused(_))) {
-            // The tip is not moved, not even up.
-            let z_mm = self.shared.position_mm()[2];
-            return self.conclude(&result, Ok(z_mm));
-        }
-        if result.is_ok() {
-            result = self.prepare().await;
-        }
-        if result.is_ok() {
-            self.set_state(pb::RunPhase::Running, "");
-            result = self.run_script().await;
-        }
-        self.set_state(pb::RunPhase::Stopping, "retracting");
-        if let Err(Broken::Ended(Ending::Stop(order))) = &result {
-            self.shared.emit(Event::StopRequested(pb::StopRequested {
+    /// From the first check to the end of the script.
+    async fn perform_all(&mut self) -> Result<(), Broken> {
+        self.set_state(pb::RunPhase::Preparing, "preparing").await;
+        self.emit(Event::Started(self.describe_start())).await;
+        self.admit().await?;
+        self.prepare().await?;
+        self.set_state(pb::RunPhase::Running, "").await;
+        self.run_script().await
+    }
+
+    /// Retracts the tip after the script, or after what broke it.
+    async fn end(&mut self, result: &Result<(), Broken>) -> Result<f64, Broken> {
+        self.set_state(pb::RunPhase::Stopping, "retracting").await;
+        if let Err(Broken::Ended(Ending::Stop(order))) = result {
+            self.emit(Event::StopRequested(pb::StopRequested {
                 by: order.by.clone(),
                 reason: order.reason.clone(),
                 abort: order.abort,
-            }));
+            }))
+            .await;
         }
-        let retracted = self.clean_up().await;
-        self.conclude(&result, retracted)
+        self.clean_up().await
     }
 
     /// Checks that the stage answers and that no reset is required.
     async fn admit(&self) -> Result<(), Broken> {
         self.shared.wait_for_stage().await?;
-        match self.shared.fault().filter(|_| !self.order.resets) {
-            Some(fault) => self.refused("reset", fault.to_string()),
+        let fault = self.shared.acquisition.ask(|live| live.supervisor.fault()).await?;
+        match fault.filter(|_| !self.order.resets) {
+            Some(fault) => self.refused("reset", fault.to_string()).await,
             None => Ok(()),
         }
     }
 
     /// Waits for the sensor, homes the stage if necessary, raises the tip and takes the reference zero.
     async fn prepare(&mut self) -> Result<(), Broken> {
-        self.set_phase(Phase::Idle, -1);
-        let now = self.shared.clock.now().mono;
-        {
-            let mut live = self.shared.live();
-            live.supervisor.begin(self.bounds.depth_max_mm());
-            live.supervisor.rearm(now);
-        }
+        self.set_phase(Phase::Idle, -1).await;
+        self.shared.acquisition.ask(|live| live.supervisor.begin_run()).await?;
         self.shared.wait_for_sensor().await?;
+        self.is_prepared = true;
         if self.order.resets {
-            self.home().await?;
+            self.reset().await?;
         }
         self.shared.retract().await?;
-        let reference = self.whole_average(REFERENCE).await?;
-        self.zero_counts.clone_from(&reference.mean_counts);
-        self.shared.live().supervisor.set_reference(reference.mean_counts);
-        Ok(())
+        self.take_reference().await
     }
 
-    /// Homes the stage if it does not know where it is.
-    async fn home(&self) -> Result<(), Broken> {
+    /// Does what a reset does, as far as it is necessary: homes a stage that does not know where it is.
+    async fn reset(&self) -> Result<(), Broken> {
+        let now = self.shared.clock.now().mono;
+        self.shared.acquisition.ask(move |live| live.supervisor.begin_reset(now)).await?;
         if self.shared.stage.state().borrow().status() == pb::StageStatus::Unhomed {
             info!("homing the stage");
-            // As in a reset: make the order before the check.
-            let homing = self.shared.stage.home();
-            self.shared.check_ended()?;
-            let homed = homing.await;
-            // If it was stopped, the reason of the stop is the error.
-            self.shared.check_ended()?;
-            homed?;
+            self.shared.home().await?;
         }
-        self.shared.latch(None);
-        Ok(())
+        self.shared.retract().await?;
+        let now = self.shared.clock.now().mono;
+        Ok(self.shared.acquisition.ask(move |live| live.supervisor.finish_reset(now)).await??)
+    }
+
+    /// Takes the run's first zero, with the tip up.
+    async fn take_reference(&mut self) -> Result<(), Broken> {
+        let reference = self.whole_average(REFERENCE).await?;
+        self.zero_counts.clone_from(&reference.mean_counts);
+        let set = self.shared.acquisition.ask(move |live| live.supervisor.set_reference(&reference.mean_counts));
+        match set.await? {
+            Ok(()) => Ok(()),
+            Err(violation) => self.refused(violation.rule(), violation.to_string()).await,
+        }
     }
 
     async fn run_script(&mut self) -> Result<(), Broken> {
@@ -271,51 +302,58 @@ impl<'a> Run<'a> {
                 // The script's error repeats the cause, with the line.
                 Request::Ended(Err(error)) => {
                     self.shared.check_ended()?;
-                    return Err(match broken {
-                        Some(Broken::Outside(_)) => return self.refused("envelope", error.to_string()),
-                        _ => Broken::Script(error.to_string()),
-                    });
+                    return match broken {
+                        Some(Broken::Outside(_)) => self.refused("envelope", error.to_string()).await,
+                        Some(Broken::Refused(_)) => Err(Broken::Refused(error.to_string())),
+                        _ => Err(Broken::Script(error.to_string())),
+                    };
                 }
             }
         }
         Err(Broken::Script("the script's thread died; this is a defect of Tactus".into()))
     }
 
-    fn refused(&self, rule: &str, message: String) -> Result<(), Broken> {
-        self.shared.emit_safety(pb::SafetyVerdict::Refused, rule, &message);
+    async fn refused(&self, rule: &'static str, message: String) -> Result<(), Broken> {
+        let detail = message.clone();
+        let told = self.shared.acquisition.tell(move |live| {
+            live.emit_safety(pb::SafetyVerdict::Refused, rule, &detail);
+        });
+        told.await?;
         Err(Broken::Refused(message))
     }
 
-    /// Retracts the tip and records the outcome.
-    async fn clean_up(&mut self) -> Result<f64, StageError> {
-        self.set_phase(Phase::Retract, self.phase.map_or(-1, |(_, press)| press));
+    /// Retracts the tip and records the outcome. A tip that cannot be retracted is a fault until the next reset.
+    async fn clean_up(&mut self) -> Result<f64, Broken> {
+        self.set_phase(Phase::Retract, self.phase.map_or(-1, |(_, press)| press)).await;
         let retracted = self.shared.retract().await;
-        self.set_phase(Phase::Idle, -1);
+        self.set_phase(Phase::Idle, -1).await;
         let cleanup = match &retracted {
             Ok(z_mm) => pb::Cleanup { retracted: true, z_mm: *z_mm, detail: String::new() },
-            Err(error) => {
-                error!(%error, "the tip could not be retracted");
-                pb::Cleanup {
-                    retracted: false,
-                    z_mm: self.shared.position_mm()[2],
-                    detail: error.to_string(),
-                }
+            Err(broken) => {
+                self.shared.latch_not_retracted(broken.to_string()).await;
+                let z_mm = self.shared.position_mm()[2];
+                pb::Cleanup { retracted: false, z_mm, detail: broken.to_string() }
             }
         };
-        self.shared.emit(Event::Cleanup(cleanup));
+        self.emit(Event::Cleanup(cleanup)).await;
         retracted
     }
 
     /// Closes the recording and returns the outcome.
-    fn conclude(self, result: &Result<(), Broken>, retracted: Result<f64, StageError>) -> RunOutcome {
-        let tally = self.shared.live().tally;
+    async fn conclude(self, result: &Result<(), Broken>, retracted: Result<f64, Broken>) -> RunOutcome {
+        // After this nothing is permitted to this run.
+        let tally = self.shared.acquisition.ask(|live| {
+            live.supervisor.end();
+            live.tally
+        });
+        let tally = tally.await.unwrap_or_default();
         let (mut exit_status, mut message) = verdict(result, tally.frames_lost);
         if let Err(error) = retracted {
             exit_status = pb::ExitStatus::Failed;
             message = format!("{message}; THE TIP IS NOT RETRACTED: {error}");
         }
         let duration_s = self.shared.clock.now().mono.since(self.started).as_secs_f64();
-        self.shared.emit(Event::Finished(pb::RunFinished {
+        self.emit(Event::Finished(pb::RunFinished {
             exit_status: exit_status.into(),
             message: message.clone(),
             frames: tally.frames,
@@ -323,8 +361,9 @@ impl<'a> Run<'a> {
             presses: self.presses,
             dwells: self.dwells,
             duration_s,
-        }));
-        if let Err(failure) = self.shared.close_recording() {
+        }))
+        .await;
+        if let Err(failure) = self.shared.close_recording().await {
             exit_status = pb::ExitStatus::Failed;
             message = failure.to_string();
         }
@@ -338,7 +377,9 @@ impl<'a> Run<'a> {
             state.elapsed_s = duration_s;
             state.remaining_s = 0.0;
         });
-        self.shared.refresh_state();
+        if let Err(gone) = self.shared.acquisition.ask(|live| live.refresh_state()).await {
+            error!("{gone}");
+        }
         RunOutcome {
             run_id: self.order.run_id,
             experiment: self.order.script.name().to_owned(),
@@ -350,6 +391,13 @@ impl<'a> Run<'a> {
             dwells: self.dwells,
             duration_s,
             travel_mm: self.travel_mm,
+        }
+    }
+
+    /// Records and publishes an event.
+    async fn emit(&self, event: Event) {
+        if let Err(gone) = self.shared.acquisition.tell(move |live| live.emit(event)).await {
+            error!("an event is lost: {gone}");
         }
     }
 
@@ -373,16 +421,15 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn set_phase(&mut self, phase: Phase, press: i32) {
+    async fn set_phase(&mut self, phase: Phase, press: i32) {
         if self.phase.replace((phase, press)) != Some((phase, press)) {
-            self.shared
-                .emit(Event::PhaseChanged(pb::PhaseChanged { phase: pb::Phase::from(phase).into(), press }));
+            self.emit(Event::PhaseChanged(pb::PhaseChanged { phase: pb::Phase::from(phase).into(), press })).await;
         }
     }
 
-    fn set_state(&self, phase: pb::RunPhase, message: &str) {
+    async fn set_state(&self, phase: pb::RunPhase, message: &str) {
         let now = self.shared.clock.now().mono;
-        let tally = self.shared.live().tally;
+        let tally = self.shared.acquisition.ask(|live| live.tally).await.unwrap_or_default();
         let planned = self.order.planned;
         let elapsed_s = now.since(self.started).as_secs_f64();
         self.shared.state.send_replace(pb::RunState {
@@ -408,7 +455,68 @@ impl<'a> Run<'a> {
     }
 }
 
+/// What is left to do for a run whose task panicked: stop, retract, close the recording.
+pub(crate) async fn rescue(shared: &Arc<Shared>, order: RunOrder, panic: &JoinError) -> RunOutcome {
+    shared.stop_motion();
+    error!(%panic, "the run's task failed; this is a defect of Tactus");
+    let why = format!("the run: {panic}");
+    shared.end(Ending::Defect(why.clone()));
+    let latched = why.clone();
+    let told = shared.acquisition.tell(move |live| live.supervisor.latch(Fault::Defect(latched))).await;
+    let mut run = Run::new(Arc::clone(shared), order);
+    let result = Err(told.map_or_else(Broken::Gone, |()| Broken::Ended(Ending::Defect(why))));
+    let retracted = run.end(&result).await;
+    run.conclude(&result, retracted).await
+}
+
+impl RunOutcome {
+    /// The outcome of a run of which nothing is known.
+    pub(crate) fn defect(run_id: String, experiment: String, message: String) -> Self {
+        Self {
+            run_id,
+            experiment,
+            exit_status: pb::ExitStatus::Failed,
+            message,
+            frames: 0,
+            frames_lost: 0,
+            presses: 0,
+            dwells: 0,
+            duration_s: 0.0,
+            travel_mm: [[f64::INFINITY, f64::NEG_INFINITY]; 3],
+        }
+    }
+}
+
 impl Shared {
+    /// Latches that the tip stays where it is, and tells it loudly.
+    async fn latch_not_retracted(&self, why: String) {
+        error!("THE TIP IS NOT RETRACTED: {why}");
+        let told = self.acquisition.tell(move |live| {
+            live.emit_safety(pb::SafetyVerdict::Stopped, "retract", &format!("THE TIP IS NOT RETRACTED: {why}"));
+            live.supervisor.latch(Fault::NotRetracted(why));
+        });
+        if let Err(gone) = told.await {
+            error!("{gone}");
+        }
+    }
+
+    /// Closes the recording on a thread of its own: a disk that hangs holds up nothing else.
+    async fn close_recording(&self) -> Result<(), RecordFailure> {
+        let recording = match self.acquisition.ask(|live| live.take_recording()).await {
+            Ok(recording) => recording,
+            Err(gone) => return Err(RecordFailure(gone.into())),
+        };
+        let Some((sink, failure)) = recording else { return Ok(()) };
+        let closed = match timeout(CLOSE_PATIENCE, spawn_blocking(move || sink.finish())).await {
+            Ok(Ok(closed)) => closed,
+            Ok(Err(panic)) => Err(RecordFailure(panic.into())),
+            Err(_) => Err(RecordFailure(
+                format!("it was not closed within {CLOSE_PATIENCE:?}: does the disk hang?").into(),
+            )),
+        };
+        failure.map_or(closed, Err)
+    }
+
     /// Waits until frames arrive, as long as the rig's policy allows.
     pub(crate) async fn wait_for_sensor(&self) -> Result<(), Broken> {
         let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
@@ -464,7 +572,10 @@ fn refusal(broken: &Broken) -> tactus_plan::Refusal {
         Broken::Ended(_) => Refusal::Stopped(broken.to_string()),
         Broken::Outside(outside) => Refusal::Outside(outside.to_string()),
         Broken::Stage(_)
+        | Broken::Denied(_)
+        | Broken::Gone(_)
         | Broken::FramesLost(_)
+        | Broken::Disturbed
         | Broken::SensorSilent(_)
         | Broken::StageSilent(_)
         | Broken::Script(_)
@@ -487,9 +598,13 @@ fn verdict(result: &Result<(), Broken>, frames_lost: u64) -> (pb::ExitStatus, St
         Broken::Ended(Ending::Stop(order)) if order.abort => ExitStatus::Aborted,
         Broken::Ended(Ending::Stop(_)) => ExitStatus::Stopped,
         Broken::Ended(ending) if ending.is_silence() => ExitStatus::Failed,
-        Broken::Ended(Ending::Safety(_)) | Broken::Outside(_) | Broken::Refused(_) => ExitStatus::Refused,
-        Broken::Ended(Ending::FramesLost(_) | Ending::RecordFailed(_))
+        Broken::Ended(Ending::Safety(_)) | Broken::Outside(_) | Broken::Refused(_) | Broken::Denied(_) => {
+            ExitStatus::Refused
+        }
+        Broken::Ended(Ending::FramesLost(_) | Ending::RecordFailed(_) | Ending::Defect(_))
         | Broken::Stage(_)
+        | Broken::Gone(_)
+        | Broken::Disturbed
         | Broken::FramesLost(_)
         | Broken::SensorSilent(_)
         | Broken::StageSilent(_)

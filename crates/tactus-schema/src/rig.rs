@@ -93,8 +93,21 @@ pub struct Envelope {
     pub load_speed_max_mm_per_s: f64,
     /// Greatest rise of any element above its tare.
     pub element_max_counts: f64,
-    /// Greatest sum of the rises of all elements above their tares.
+    /// Greatest sum of the rises of all elements above their tares; elements that fall count as 0.
     pub sum_max_counts: f64,
+    /// Greatest depth under any covering: a hard cap. Without the key, the limit under the file's own covering.
+    pub depth_max_mm: f64,
+    /// Greatest distance of a zero from the element's `baseline_counts`. A quarter of `element_max_counts` without the key.
+    pub baseline_band_counts: f64,
+    /// Elements that are known to be faulty: they have no limits and no zero. The others must see the load.
+    pub unwatched_elements: Vec<usize>,
+}
+
+impl Envelope {
+    /// Greatest depth under a covering, in mm.
+    pub fn depth_max_mm(&self, covering: Covering) -> f64 {
+        (self.depth_share_max * covering.thickness_mm).min(self.depth_max_mm)
+    }
 }
 
 /// How the stage moves; speeds within the envelope's.
@@ -276,7 +289,7 @@ impl From<WrongField> for RigError {
 impl Rig {
     /// Greatest depth that the envelope allows under the covering in place, in mm; `None` without a service part.
     pub fn depth_max_mm(&self) -> Option<f64> {
-        self.service.as_ref().map(|service| service.envelope.depth_share_max * self.covering.thickness_mm)
+        self.service.as_ref().map(|service| service.envelope.depth_max_mm(self.covering))
     }
 
     /// The tool on the stage.

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 26] = [
+const ROWS: [&str; 27] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -14,6 +14,7 @@ const ROWS: [&str; 26] = [
     "tactus-calibrate",
     "tactus-discover",
     "tactus-wire",
+    "tactus-safety",
     "tactus-plan",
     "tactus-device",
     "tactus-engine",
@@ -36,7 +37,7 @@ const ROWS: [&str; 26] = [
 ];
 
 /// Crates that must not be direct dependencies of a crate.
-const NEVER: [(&str, &[&str]); 7] = [
+const NEVER: [(&str, &[&str]); 8] = [
     ("tactus-model", &["tokio", "rand", "serde"]),
     ("tactus-solid", &["tokio", "rand", "serde"]),
     ("tactus-scene", &["tokio", "rand", "serde"]),
@@ -44,6 +45,7 @@ const NEVER: [(&str, &[&str]); 7] = [
     ("tactus-discover", &["tokio", "rand"]),
     ("tactus-wire", &["tokio", "rand"]),
     ("tactus-plan", &["tokio"]),
+    ("tactus-safety", &["tokio", "rand"]),
 ];
 
 /// Who may be built from the crates of `mock-devices`: the service embeds virtual devices with their hidden physics,

@@ -4,14 +4,16 @@ use std::sync::Arc;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
+use tactus_safety::{HomingPermit, Permit};
 use tactus_schema::pb;
 use tactus_schema::rig::StageProtocol;
 use tactus_wire::stage::{Controller, Session};
 use tokio::sync::{mpsc, oneshot, watch};
+use tokio::time::Instant;
 
 use super::driver::{CommandRequest, Driver, Progress, StageCommand};
 use super::stop::StopSwitch;
-use super::{Stage, StageError, Target, grbl_config, zaber_config};
+use super::{Stage, StageError, grbl_config, zaber_config};
 use crate::transport::Connect;
 use crate::{Clock, DeviceError, ErrorKind};
 
@@ -27,6 +29,7 @@ pub struct DrivenStage {
     device: String,
     requests: mpsc::Sender<CommandRequest>,
     stop: Arc<StopSwitch>,
+    watched: watch::Sender<Option<Instant>>,
     state: watch::Receiver<pb::StageState>,
     connection: watch::Receiver<Connection>,
 }
@@ -108,6 +111,7 @@ impl DrivenStage {
         let (latest, state) = watch::channel(gone);
         let (connected, connection) = watch::channel(Connection::Seeking(None));
         let stop = Arc::new(StopSwitch::default());
+        let (watched, is_watched) = watch::channel(None);
         let device = format!("stage on {connect}");
         let driver = Driver {
             connect: connect.into(),
@@ -116,13 +120,14 @@ impl DrivenStage {
             clock,
             requests,
             stop: Arc::clone(&stop),
+            watched: is_watched,
             reports,
             latest,
             connection: connected,
             progress: Progress::default(),
         };
         tokio::spawn(driver.run());
-        (Arc::new(Self { device, requests: sender, stop, state, connection }), all_reports)
+        (Arc::new(Self { device, requests: sender, stop, watched, state, connection }), all_reports)
     }
 
     fn command(&self, command: StageCommand) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
@@ -143,16 +148,20 @@ impl Stage for DrivenStage {
         self.state.clone()
     }
 
-    fn home(&self) -> BoxFuture<'_, Result<(), StageError>> {
-        self.command(StageCommand::Home).map(|result| result.map(|_| ())).boxed()
+    fn home(&self, permit: HomingPermit) -> BoxFuture<'_, Result<(), StageError>> {
+        self.command(StageCommand::Home(permit)).map(|result| result.map(|_| ())).boxed()
     }
 
-    fn move_to(&self, target: Target) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
-        self.command(StageCommand::MoveTo(target))
+    fn move_to(&self, permit: Permit) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
+        self.command(StageCommand::MoveTo(permit))
     }
 
     fn stop(&self) {
         self.stop.press();
+    }
+
+    fn watch(&self) {
+        self.watched.send_replace(Some(Instant::now()));
     }
 
     fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>> {

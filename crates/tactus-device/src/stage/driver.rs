@@ -2,19 +2,21 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::Duration;
 
-use tactus_schema::{TimeStamp, pb};
+use tactus_safety::{HomingPermit, Permit, Void};
+use tactus_schema::{MonoTime, TimeStamp, pb};
 use tactus_wire::stage::{Action, Cause, Failure, Report, Session, Status};
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{mpsc, oneshot, watch};
-use tokio::time::sleep;
+use tokio::time::{Instant, sleep, sleep_until};
 
 use super::driven::{Connection, StageOptions};
 use super::stop::StopSwitch;
 use crate::backoff::Backoff;
 use crate::link::{Link, LinkEvent, since_start};
 use crate::transport::Connect;
-use crate::{Clock, DeviceError, ErrorKind, StageError, Target};
+use crate::{Clock, DeviceError, ErrorKind, StageError};
 
 /// Receives the result of a command: the position in mm.
 type Reply = oneshot::Sender<Result<[f64; 3], StageError>>;
@@ -28,12 +30,15 @@ pub(super) struct CommandRequest {
     pub(super) reply: Reply,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(super) enum StageCommand {
-    Home,
-    MoveTo(Target),
+    Home(HomingPermit),
+    MoveTo(Permit),
     ClearAlarm,
 }
+
+/// Longest time that a moving stage may be unwatched. With the time of a status poll it is below 100 ms to the stop.
+const UNWATCHED_MAX: Duration = Duration::from_millis(80);
 
 /// Owns the stage. Reports go to `reports` and `latest`; commands come from `requests` and `stop`.
 pub(super) struct Driver<S> {
@@ -44,6 +49,8 @@ pub(super) struct Driver<S> {
     pub(super) clock: Clock,
     pub(super) requests: mpsc::Receiver<CommandRequest>,
     pub(super) stop: Arc<StopSwitch>,
+    /// When somebody last watched the stage; `None` if nobody ever has.
+    pub(super) watched: watch::Receiver<Option<Instant>>,
     pub(super) reports: mpsc::Sender<pb::StageState>,
     pub(super) latest: watch::Sender<pb::StageState>,
     pub(super) connection: watch::Sender<Connection>,
@@ -57,6 +64,8 @@ pub(super) struct Progress {
     connected: bool,
     /// Receives the result of the command under way.
     active: Option<Reply>,
+    /// The command under way was stopped because nobody watched it.
+    is_abandoned: bool,
     /// Reports that found no room yet. The device is not read meanwhile, so there are few.
     waiting: VecDeque<pb::StageState>,
     /// The kind of the present loss, once it has been logged.
@@ -130,6 +139,12 @@ where
                     now = self.clock.now();
                     session.stop(since_start(now))
                 }
+                () = unwatched(&mut self.watched), if active.is_some() && !self.progress.is_abandoned => {
+                    tracing::error!(device = self.device(), "nobody watches the stage: it is stopped");
+                    self.progress.is_abandoned = true;
+                    now = self.clock.now();
+                    session.stop(since_start(now))
+                }
                 () = room(&self.reports), if !has_room => {
                     self.hand_over();
                     Vec::new()
@@ -164,12 +179,15 @@ where
             StageError::Refused { command: format!("{command:?}"), reason }
         } else if stops_before != self.stop.count() {
             StageError::Stopped { position_mm: self.position_mm() }
+        } else if let Err(void) = command.check(now.mono) {
+            void.into()
         } else {
             self.progress.active = Some(reply);
             let now = since_start(now);
             return match command {
-                StageCommand::Home => session.home(now),
-                StageCommand::MoveTo(target) => {
+                StageCommand::Home(_) => session.home(now),
+                StageCommand::MoveTo(permit) => {
+                    let target = permit.target();
                     session.move_to(now, target.position_mm, target.speed_mm_per_s)
                 }
                 StageCommand::ClearAlarm => session.clear_alarm(now),
@@ -205,8 +223,9 @@ where
                     tracing::warn!(device = self.device(), why, "the stage's position is suspect");
                 }
                 Action::Done(result) => {
+                    let is_abandoned = std::mem::take(&mut self.progress.is_abandoned);
                     if let Some(reply) = self.progress.active.take() {
-                        answer(reply, result.map_err(stage_error));
+                        answer(reply, result.map_err(|failure| stage_error(failure, is_abandoned)));
                     }
                 }
                 Action::Failed(error) => return Err(self.describe(&error)),
@@ -277,6 +296,7 @@ where
             self.progress.logged = Some(error.kind);
         }
         self.progress.connected = false;
+        self.progress.is_abandoned = false;
         if let Some(reply) = self.progress.active.take() {
             answer(reply, Err(DeviceError::new(&error.device, error.kind, &error.what).into()));
         }
@@ -319,8 +339,9 @@ where
     }
 }
 
-fn stage_error(failure: Failure) -> StageError {
+fn stage_error(failure: Failure, is_abandoned: bool) -> StageError {
     match failure {
+        Failure::Stopped { position_mm } if is_abandoned => StageError::Unwatched { position_mm },
         Failure::Stopped { position_mm } => StageError::Stopped { position_mm },
         Failure::Refused { command, reason } => StageError::Refused { command, reason },
         Failure::Alarm(alarm) => StageError::Alarm {
@@ -335,6 +356,35 @@ fn stage_error(failure: Failure) -> StageError {
         Failure::NotThere { target_mm, position_mm } => StageError::NotThere { target_mm, position_mm },
         Failure::Overdue { target_mm, position_mm, waited } => {
             StageError::Overdue { target_mm, position_mm, waited_s: waited.as_secs_f64() }
+        }
+    }
+}
+
+impl StageCommand {
+    /// Checks that the command may still be sent.
+    fn check(&self, now: MonoTime) -> Result<(), Void> {
+        match self {
+            Self::Home(permit) => permit.check(now),
+            Self::MoveTo(permit) => permit.check(now),
+            Self::ClearAlarm => Ok(()),
+        }
+    }
+}
+
+/// Returns once nobody has watched the stage for too long. Never, if nobody ever has.
+async fn unwatched(watched: &mut watch::Receiver<Option<Instant>>) {
+    loop {
+        let last = *watched.borrow_and_update();
+        let overdue = async {
+            match last {
+                Some(last) => sleep_until(last + UNWATCHED_MAX).await,
+                None => std::future::pending().await,
+            }
+        };
+        tokio::select! {
+            biased;
+            Ok(()) = watched.changed() => {}
+            () = overdue => return,
         }
     }
 }

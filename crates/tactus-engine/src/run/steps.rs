@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
+use tactus_device::StageError;
 use tactus_model::Covering;
 use tactus_plan::{Call, MeanReading, Position, Press, Reply, Step};
+use tactus_safety::{Denied, Violation};
 use tactus_schema::pb::{self, run_event::Event};
 use tactus_schema::rig::OnGap;
 use tactus_schema::table::Phase;
@@ -12,7 +14,6 @@ use tracing::{info, warn};
 
 use super::{Broken, Ending, Run};
 use crate::average::Average;
-use crate::supervisor::Violation;
 
 /// Repetitions of one press before the run fails.
 const REPEATS_MAX: u32 = 3;
@@ -20,20 +21,20 @@ const REPEATS_MAX: u32 = 3;
 /// Sample periods to wait for an average beyond its end.
 const LATE_PERIODS_MAX: u32 = 5;
 
-impl Run<'_> {
+impl Run {
     /// Checks a step against the envelope and performs it.
     pub(super) async fn perform(&mut self, call: &Call) -> Result<Reply, Broken> {
         self.hold_while_paused().await?;
         self.bounds.check(&call.step)?;
         let step = self.steps;
         self.steps += 1;
-        self.shared.emit(Event::StepStarted(pb::StepStarted {
+        self.emit(Event::StepStarted(pb::StepStarted {
             step,
             what: describe(&call.step),
             at: call.at.to_string(),
-        }));
+        })).await;
         let reply = self.act(&call.step).await?;
-        self.shared.emit(Event::StepDone(pb::StepDone { step }));
+        self.emit(Event::StepDone(pb::StepDone { step })).await;
         Ok(reply)
     }
 
@@ -52,7 +53,7 @@ impl Run<'_> {
             Step::Wait { duration_s } => self.wait(*duration_s).await.map(|()| Reply::Done),
             Step::Log { message } => {
                 info!(script = self.order.script.name(), "{message}");
-                self.shared.emit(Event::Log(pb::Log { message: message.clone() }));
+                self.emit(Event::Log(pb::Log { message: message.clone() })).await;
                 Ok(Reply::Done)
             }
             Step::Covering { thickness_mm } => self.change_covering(*thickness_mm).await,
@@ -61,22 +62,28 @@ impl Run<'_> {
 
     /// Waits while the run is paused. Every press ends at the safe height, so a paused run does not press.
     async fn hold_while_paused(&mut self) -> Result<(), Broken> {
-        if !self.shared.control.borrow().paused {
-            return self.shared.check_ended();
-        }
-        self.set_state(pb::RunPhase::Paused, "paused: `tactus resume` goes on, `tactus stop` ends the run");
-        self.shared.emit(Event::Paused(pb::Paused {}));
-        self.resumed().await?;
-        self.shared.emit(Event::Resumed(pb::Resumed {}));
-        self.set_state(pb::RunPhase::Running, "");
+        let paused_by = self.shared.control.borrow().paused.clone();
+        let Some(by) = paused_by else { return self.shared.check_ended() };
+        self.pause(by, "paused: `tactus resume` goes on, `tactus stop` ends the run").await
+    }
+
+    /// Waits until the run is resumed.
+    async fn pause(&mut self, by: String, message: &str) -> Result<(), Broken> {
+        self.set_state(pb::RunPhase::Paused, message).await;
+        self.emit(Event::Paused(pb::Paused { by })).await;
+        let by = self.resumed().await?;
+        self.emit(Event::Resumed(pb::Resumed { by })).await;
+        self.set_state(pb::RunPhase::Running, "").await;
         Ok(())
     }
 
-    async fn resumed(&self) -> Result<(), Broken> {
+    /// Waits until the run is resumed; returns by whom.
+    async fn resumed(&self) -> Result<String, Broken> {
         let mut control = self.shared.control.subscribe();
-        let going_on = async { control.wait_for(|control| !control.paused).await.is_ok() };
+        let going_on = async { control.wait_for(|control| control.paused.is_none()).await.is_ok() };
         self.shared.unless_ended(going_on).await?;
-        self.shared.check_ended()
+        self.shared.check_ended()?;
+        Ok(self.shared.control.borrow().resumed_by.clone())
     }
 
     async fn go_to(
@@ -103,7 +110,7 @@ impl Run<'_> {
                 Ok(readings) => {
                     self.presses += 1;
                     self.dwells += u32::try_from(readings.len()).unwrap_or(u32::MAX);
-                    self.set_state(pb::RunPhase::Running, "");
+                    self.set_state(pb::RunPhase::Running, "").await;
                     return Ok(readings);
                 }
                 Err(broken) => broken,
@@ -113,8 +120,7 @@ impl Run<'_> {
             }
             repeats += 1;
             warn!(press = index, %broken, "press broken off; it will be repeated");
-            self.shared
-                .emit(Event::PressRepeated(pb::PressRepeated { press: index, reason: broken.to_string() }));
+            self.emit(Event::PressRepeated(pb::PressRepeated { press: index, reason: broken.to_string() })).await;
             self.recover().await?;
         }
     }
@@ -124,7 +130,7 @@ impl Run<'_> {
         let at_mm = self.shared.rig.registration.to_robot([press.at.x_mm, press.at.y_mm]);
         let speed_mm_per_s = press.speed_mm_per_s.unwrap_or(motion.load_speed_mm_per_s);
         self.note_travel(at_mm, motion.safe_height_mm);
-        self.set_phase(Phase::Approach, index);
+        self.set_phase(Phase::Approach, index).await;
         match press.approach_from_mm {
             Some([dx_mm, dy_mm]) => {
                 let aside = [press.at.x_mm + dx_mm, press.at.y_mm + dy_mm];
@@ -142,47 +148,54 @@ impl Run<'_> {
         let mut depth_before_mm = 0.0;
         for (dwell, &depth_mm) in (0_u32..).zip(&press.depths_mm) {
             let deeper = depth_mm >= depth_before_mm;
-            self.set_phase(if deeper { Phase::Load } else { Phase::Unload }, index);
+            self.set_phase(if deeper { Phase::Load } else { Phase::Unload }, index).await;
             self.note_travel(at_mm, -depth_mm);
             self.shared.descend(at_mm, -depth_mm, speed_mm_per_s).await?;
-            self.set_phase(Phase::Hold, index);
-            readings.push(self.hold(press, index, dwell, depth_mm).await?);
+            self.set_phase(Phase::Hold, index).await;
+            readings.push(self.hold(press, index, dwell, [at_mm[0], at_mm[1], -depth_mm]).await?);
             depth_before_mm = depth_mm;
         }
         if depth_before_mm > 0.0 {
-            self.set_phase(Phase::Unload, index);
+            self.set_phase(Phase::Unload, index).await;
             self.shared.descend(at_mm, 0.0, speed_mm_per_s).await?;
         }
-        self.set_phase(Phase::Retract, index);
+        self.set_phase(Phase::Retract, index).await;
         self.shared.descend(at_mm, motion.safe_height_mm, motion.travel_speed_mm_per_s).await?;
-        self.set_phase(Phase::Idle, -1);
+        self.set_phase(Phase::Idle, -1).await;
         Ok(readings)
     }
 
-    /// One dwell: waits for the settling time, then averages.
+    /// One dwell: waits for the settling time, then averages. The stage must stand idle in its place, at the same epoch, at
+    /// the start, at the end and in between.
     async fn hold(
         &self,
         press: &Press,
         index: i32,
         dwell: u32,
-        depth_mm: f64,
+        tip_mm: [f64; 3],
     ) -> Result<MeanReading, Broken> {
+        let epoch = self.shared.stands_at(tip_mm).await?;
         self.wait(self.shared.service.motion.settle_s).await?;
         let average = self.average(Duration::from_secs_f64(press.dwell_s)).await?;
+        let is_same = self.shared.stands_at(tip_mm).await? == epoch;
         if average.lost > 0 {
             return Err(Broken::FramesLost(average.lost));
         }
-        self.shared.emit(Event::DwellDone(pb::DwellDone {
+        if average.is_disturbed || !is_same {
+            return Err(Broken::Disturbed);
+        }
+        self.emit(Event::DwellDone(pb::DwellDone {
             press: index,
             dwell,
             x_mm: press.at.x_mm,
             y_mm: press.at.y_mm,
-            depth_mm,
+            depth_mm: -tip_mm[2],
             frames: average.frames,
             mean_counts: as_f32(&average.mean_counts),
             from_mono_ns: average.span[0].ns(),
             to_mono_ns: average.span[1].ns(),
-        }));
+        }))
+        .await;
         Ok(self.reading(average))
     }
 
@@ -191,44 +204,53 @@ impl Run<'_> {
             broken,
             Broken::FramesLost(_)
                 | Broken::SensorSilent(_)
+                | Broken::Denied(Denied::NoZero)
                 | Broken::Ended(Ending::Safety(Violation::Silence { .. }))
         );
         lost && self.shared.service.policy.on_gap == OnGap::Repeat
     }
 
-    /// After frames were lost: raises the tip, waits for the sensor, and has the supervisor check again.
+    /// After frames were lost: raises the tip, and goes on once the sensor is back.
     async fn recover(&mut self) -> Result<(), Broken> {
-        self.set_phase(Phase::Retract, -1);
+        self.set_phase(Phase::Retract, -1).await;
         self.shared.retract().await?;
-        self.set_phase(Phase::Idle, -1);
-        self.await_the_sensors_return().await
+        self.set_phase(Phase::Idle, -1).await;
+        self.await_the_sensors_return().await?;
+        if !self.shared.acquisition.ask(|live| live.supervisor.has_zero()).await? {
+            // It connected anew: its zeros may be others now.
+            self.take_reference().await?;
+        }
+        Ok(())
     }
 
     /// Withdraws a silence as the reason to end once frames arrive again, and has the supervisor check again.
     async fn await_the_sensors_return(&self) -> Result<(), Broken> {
         self.shared.forgive_silence();
         self.shared.wait_for_sensor().await?;
-        self.shared.live().supervisor.rearm(self.shared.clock.now().mono);
-        Ok(())
+        let now = self.shared.clock.now().mono;
+        Ok(self.shared.acquisition.ask(move |live| live.supervisor.forgive_silence(now)).await?)
     }
 
     async fn read(&mut self, duration_s: f64) -> Result<Reply, Broken> {
         let average = self.whole_average(Duration::from_secs_f64(duration_s)).await?;
-        self.shared.emit(Event::ReadDone(pb::ReadDone {
+        self.emit(Event::ReadDone(pb::ReadDone {
             frames: average.frames,
             mean_counts: as_f32(&average.mean_counts),
-        }));
+        })).await;
         Ok(Reply::Reading(self.reading(average)))
     }
 
     async fn tare(&mut self, duration_s: f64) -> Result<Reply, Broken> {
         let average = self.whole_average(Duration::from_secs_f64(duration_s)).await?;
-        self.shared.emit(Event::TareDone(pb::TareDone {
+        self.emit(Event::TareDone(pb::TareDone {
             frames: average.frames,
             baseline_counts: as_f32(&average.mean_counts),
-        }));
+        })).await;
+        let counts = average.mean_counts.clone();
+        if let Err(violation) = self.shared.acquisition.ask(move |live| live.supervisor.set_tare(&counts)).await? {
+            self.refused(violation.rule(), violation.to_string()).await?;
+        }
         self.zero_counts.clone_from(&average.mean_counts);
-        self.shared.live().supervisor.set_tare(average.mean_counts.clone());
         Ok(Reply::Reading(self.reading(average)))
     }
 
@@ -236,6 +258,7 @@ impl Run<'_> {
         self.shared.unless_ended(sleep(Duration::from_secs_f64(duration_s))).await
     }
 
+    /// Has another covering put in place. A person confirms it by its value; the confirmed one outlives the run.
     async fn change_covering(&mut self, thickness_mm: f64) -> Result<Reply, Broken> {
         let covering = Covering { thickness_mm };
         if covering == self.covering {
@@ -246,20 +269,29 @@ impl Run<'_> {
             change(thickness_mm);
         } else {
             let ask = format!(
-                "put the {thickness_mm} mm covering in place, set its surface to z = 0, then `tactus resume`"
+                "put the {thickness_mm} mm covering in place, set its surface to z = 0, then `tactus resume --covering \
+                 {thickness_mm}`"
             );
-            self.shared.control.send_modify(|control| control.paused = true);
-            self.set_state(pb::RunPhase::Paused, &ask);
-            self.shared.emit(Event::Paused(pb::Paused {}));
-            self.resumed().await?;
-            self.shared.emit(Event::Resumed(pb::Resumed {}));
-            self.set_state(pb::RunPhase::Running, "");
+            self.shared.control.send_modify(|control| {
+                control.paused = Some("the script".into());
+                control.wanted_covering_mm = Some(thickness_mm);
+            });
+            self.pause("the script".into(), &ask).await?;
+        }
+        if let Some(memory) = &self.shared.covering_memory {
+            memory.remember(thickness_mm).map_err(|error| {
+                Broken::Refused(format!("the covering in place cannot be stored: {error}; see the disk"))
+            })?;
         }
         self.covering = covering;
-        self.shared.live().covering = covering;
         self.bounds = self.bounds.clone().under(covering);
-        self.shared.live().supervisor.set_depth_max_mm(self.bounds.depth_max_mm());
-        self.shared.emit(Event::CoveringChanged(pb::CoveringChanged { covering_mm: thickness_mm }));
+        let set = self.shared.acquisition.ask(move |live| {
+            live.covering = covering;
+            live.supervisor.set_covering(covering);
+        });
+        set.await?;
+        self.shared.covering.send_replace(covering);
+        self.emit(Event::CoveringChanged(pb::CoveringChanged { covering_mm: thickness_mm })).await;
         Ok(Reply::Done)
     }
 
@@ -284,7 +316,8 @@ impl Run<'_> {
     /// The mean over the frames that arrive within the next `duration`.
     pub(super) async fn average(&self, duration: Duration) -> Result<Average, Broken> {
         let now = self.shared.clock.now().mono;
-        let average = self.shared.live().average(now, now.after(duration));
+        let until = now.after(duration);
+        let average = self.shared.acquisition.ask(move |live| live.average(now, until)).await?;
         let patience = duration + self.shared.sample_period() * LATE_PERIODS_MAX;
         match self.shared.unless_ended(timeout(patience, average)).await? {
             Ok(Ok(average)) => Ok(average),

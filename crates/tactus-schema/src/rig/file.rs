@@ -148,32 +148,41 @@ impl RawRig {
             covering: covering("sensitivity_reference.covering_mm", self.sensitivity_reference.covering_mm)?,
             indenter: known("sensitivity_reference.indenter", self.sensitivity_reference.indenter)?,
         };
+        let sensitivity_counts_per_mm =
+            self.sensitivity_counts_per_mm.check("sensitivity_counts_per_mm", elements)?;
+        let baseline_counts = self.baseline_counts.check("baseline_counts", elements)?;
+        let covering = match self.covering {
+            Some(RawCovering { thickness_mm }) => covering("covering.thickness_mm", thickness_mm)?,
+            None => reference.covering,
+        };
+        let rest = service::Rest {
+            covering,
+            baseline_counts: &baseline_counts,
+            sensitivity_counts_per_mm: &sensitivity_counts_per_mm,
+        };
+        let service = service::check(
+            &array,
+            rest,
+            self.envelope,
+            self.motion,
+            self.policy,
+            self.sensor,
+            self.stage,
+        )?;
         let rig = Rig {
             name: self.name,
             simulated: self.simulated,
             registration: self.registration.check("registration")?,
             psf: self.psf.check()?,
-            sensitivity_counts_per_mm: self
-                .sensitivity_counts_per_mm
-                .check("sensitivity_counts_per_mm", elements)?,
-            baseline_counts: self.baseline_counts.check("baseline_counts", elements)?,
+            sensitivity_counts_per_mm,
+            baseline_counts,
             indenter: match self.indenter {
                 Some(id) => known("indenter", id)?,
                 None => reference.indenter.clone(),
             },
-            covering: match self.covering {
-                Some(RawCovering { thickness_mm }) => covering("covering.thickness_mm", thickness_mm)?,
-                None => reference.covering,
-            },
+            covering,
             sensitivity_reference: reference,
-            service: service::check(
-                &array,
-                self.envelope,
-                self.motion,
-                self.policy,
-                self.sensor,
-                self.stage,
-            )?,
+            service,
             simulation: self.simulation.map(|simulation| simulation.check(&array)).transpose()?,
             array,
             indenters,

@@ -1,7 +1,7 @@
 //! The rig file's sections for the lab service: limits, motion, policy, links.
 
 use serde::Deserialize;
-use tactus_model::Array;
+use tactus_model::{Array, Covering};
 
 use super::stage::RawStageLink;
 use super::transport::RawTransport;
@@ -21,7 +21,18 @@ pub(super) struct RawEnvelope {
     load_speed_max_mm_per_s: f64,
     element_max_counts: f64,
     sum_max_counts: f64,
+    depth_max_mm: Option<f64>,
+    baseline_band_counts: Option<f64>,
+    #[serde(default)]
+    unwatched_elements: Vec<usize>,
 }
+
+/// `envelope.baseline_band_counts` where the file does not say it, as a share of `envelope.element_max_counts`.
+const BASELINE_BAND_SHARE: f64 = 0.25;
+
+/// Share of full scale that baseline, its band and the element's limit together must stay below: above it a converter may
+/// saturate before the limit is reached.
+const FULL_SCALE_SHARE_MAX: f64 = 0.95;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -76,9 +87,18 @@ enum RawWeissChecksum {
     Sum8,
 }
 
+/// The rig's state at rest, which the limits refer to.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rest<'a> {
+    pub(super) covering: Covering,
+    pub(super) baseline_counts: &'a [f64],
+    pub(super) sensitivity_counts_per_mm: &'a [f64],
+}
+
 /// Checks the sections; they are present together or not at all.
 pub(super) fn check(
     array: &Array,
+    rest: Rest<'_>,
     envelope: Option<RawEnvelope>,
     motion: Option<RawMotion>,
     policy: Option<RawPolicy>,
@@ -88,7 +108,7 @@ pub(super) fn check(
     match (envelope, motion, policy, sensor, stage) {
         (None, None, None, None, None) => Ok(None),
         (Some(envelope), Some(motion), Some(policy), Some(sensor), Some(stage)) => {
-            let envelope = envelope.check()?;
+            let envelope = envelope.check(array, rest)?;
             Ok(Some(Service {
                 motion: motion.check(&envelope)?,
                 envelope,
@@ -115,7 +135,7 @@ pub(super) fn check(
 }
 
 impl RawEnvelope {
-    fn check(self) -> Result<Envelope, WrongField> {
+    fn check(self, array: &Array, rest: Rest<'_>) -> Result<Envelope, WrongField> {
         let field = |name: &str| format!("envelope.{name}");
         let Self { load_speed_max_mm_per_s, depth_share_max, .. } = self;
         if !(depth_share_max > 0.0 && depth_share_max < 1.0) {
@@ -124,6 +144,20 @@ impl RawEnvelope {
                 "a share of the covering's thickness between 0 and 1",
             ));
         }
+        let depth_max_mm = self.depth_max_mm.unwrap_or(depth_share_max * rest.covering.thickness_mm);
+        let element_max_counts = positive(field("element_max_counts"), self.element_max_counts)?;
+        let band_counts = self.baseline_band_counts.unwrap_or(BASELINE_BAND_SHARE * element_max_counts);
+        let baseline_band_counts = positive(field("baseline_band_counts"), band_counts)?;
+        if let Some(element) = self.unwatched_elements.iter().find(|element| **element >= array.elements()) {
+            let problem = format!("{element} is no element: there are {}, from 0", array.elements());
+            return Err(wrong(field("unwatched_elements"), problem));
+        }
+        check_headroom(
+            array,
+            rest,
+            element_max_counts + baseline_band_counts,
+            &self.unwatched_elements,
+        )?;
         Ok(Envelope {
             x_mm: range(field("x_mm"), self.x_mm)?,
             y_mm: range(field("y_mm"), self.y_mm)?,
@@ -131,10 +165,42 @@ impl RawEnvelope {
             depth_share_max,
             speed_max_mm_per_s: positive(field("speed_max_mm_per_s"), self.speed_max_mm_per_s)?,
             load_speed_max_mm_per_s: positive(field("load_speed_max_mm_per_s"), load_speed_max_mm_per_s)?,
-            element_max_counts: positive(field("element_max_counts"), self.element_max_counts)?,
+            element_max_counts,
             sum_max_counts: positive(field("sum_max_counts"), self.sum_max_counts)?,
+            depth_max_mm: positive(field("depth_max_mm"), depth_max_mm)?,
+            baseline_band_counts,
+            unwatched_elements: self.unwatched_elements,
         })
     }
+}
+
+/// Checks that no element can reach the end of its range before its limit. An element that falls when it is pressed has its
+/// end at 0, unless its readings have a sign.
+fn check_headroom(
+    array: &Array,
+    rest: Rest<'_>,
+    reach_counts: f64,
+    unwatched: &[usize],
+) -> Result<(), WrongField> {
+    let full_scale_counts = array.full_scale_counts();
+    let pairs = rest.baseline_counts.iter().zip(rest.sensitivity_counts_per_mm).enumerate();
+    for (element, (baseline_counts, sensitivity)) in pairs.filter(|(element, _)| !unwatched.contains(element)) {
+        let room_counts = if *sensitivity >= 0.0 {
+            FULL_SCALE_SHARE_MAX * full_scale_counts - baseline_counts
+        } else if *baseline_counts > 0.0 {
+            baseline_counts - (1.0 - FULL_SCALE_SHARE_MAX) * full_scale_counts
+        } else {
+            baseline_counts + FULL_SCALE_SHARE_MAX * full_scale_counts
+        };
+        if reach_counts > room_counts {
+            let problem = format!(
+                "with baseline_band_counts {reach_counts} counts, but element {element} has only {room_counts:.0} between its \
+                 baseline and 95 % of full scale: a load could saturate it unseen"
+            );
+            return Err(wrong("envelope.element_max_counts", problem));
+        }
+    }
+    Ok(())
 }
 
 /// Greatest allowed `motion.tolerance_mm`.

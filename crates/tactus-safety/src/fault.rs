@@ -1,0 +1,97 @@
+//! What forbids motion: broken rules, and states that only a reset ends.
+
+/// A rule that was broken; motion must stop and the tip retract.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the message says what each field is")]
+pub enum Violation {
+    /// One element reads too much.
+    #[error(
+        "element {element} reads {rise_counts:.0} counts above {against}; the limit is {limit_counts} (envelope.element_max_counts)"
+    )]
+    ElementForce {
+        element: usize,
+        rise_counts: f64,
+        limit_counts: f64,
+        /// Above which zero: the current tare, the run's reference, or the rig's baseline.
+        against: &'static str,
+    },
+    /// All elements together read too much.
+    #[error(
+        "all elements together read {rise_counts:.0} counts above {against}; the limit is {limit_counts} (envelope.sum_max_counts)"
+    )]
+    SumForce { rise_counts: f64, limit_counts: f64, against: &'static str },
+    /// No fresh frame while the tip was near the covering.
+    #[error(
+        "no frame for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
+    )]
+    Silence { silent_s: f64, limit_s: f64, z_mm: f64 },
+    /// An element that was read for the run's first zero is no longer read, so a load on it would not be seen.
+    #[error(
+        "element {element} was not read for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
+    )]
+    ElementSilence { element: usize, silent_s: f64, limit_s: f64, z_mm: f64 },
+    /// The stage reports a depth beyond the limit.
+    #[error(
+        "the stage reports a depth of {depth_mm:.3} mm; the limit is {limit_mm:.3} mm (envelope.depth_share_max)"
+    )]
+    Depth { depth_mm: f64, limit_mm: f64 },
+    /// The same frame comes again and again although the tip moves.
+    #[error(
+        "the sensor has sent the same counts in {frames} frames while the tip went {way_mm:.3} mm into the covering: it is frozen"
+    )]
+    Frozen { frames: u32, way_mm: f64 },
+    /// The tip is deep in the covering and no element responds.
+    #[error(
+        "no element rose by more than {rise_counts:.0} counts with the tip {depth_mm:.3} mm deep over the array; at least \
+         {least_counts:.0} are expected: is the covering in place, and its surface at z = 0?"
+    )]
+    NoResponse { rise_counts: f64, least_counts: f64, depth_mm: f64 },
+    /// A reading without load lies far from the rig's baseline.
+    #[error(
+        "element {element} reads {counts:.0} counts without load; the rig file says {baseline_counts:.0} +- {band_counts:.0} \
+         (envelope.baseline_band_counts)"
+    )]
+    Zero { element: usize, counts: f64, baseline_counts: f64, band_counts: f64 },
+}
+
+impl Violation {
+    /// Short name of the rule, for the safety event.
+    pub fn rule(&self) -> &'static str {
+        match self {
+            Self::ElementForce { .. } => "element-force",
+            Self::SumForce { .. } => "sum-force",
+            Self::Silence { .. } => "silence",
+            Self::ElementSilence { .. } => "element-silence",
+            Self::Depth { .. } => "depth",
+            Self::Frozen { .. } => "frozen",
+            Self::NoResponse { .. } => "no-response",
+            Self::Zero { .. } => "zero",
+        }
+    }
+}
+
+/// Why nothing but the way up is permitted before a reset.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// The supervisor is new, and nobody has allowed motion yet.
+    #[error("nothing has been reset since the service started")]
+    Started,
+    /// A reset is under way, or the last one failed.
+    #[error("the last reset was not finished")]
+    Unfinished,
+    /// The stage's controller is in alarm.
+    #[error("the stage is in alarm")]
+    Alarm,
+    /// The stage does not know its position, as after a reset of its controller.
+    #[error("the stage does not know where it is")]
+    Unhomed,
+    /// A rule was broken.
+    #[error("a safety rule was broken: {0}")]
+    Tripped(Violation),
+    /// The tip could not be raised.
+    #[error("THE TIP IS NOT RETRACTED: {0}")]
+    NotRetracted(String),
+    /// A task of the service failed while it was responsible for the tip.
+    #[error("a task of the service failed: {0}")]
+    Defect(String),
+}

@@ -1,0 +1,296 @@
+//! The supervisor: it sees every frame and every stage report first, and nothing moves without its permit.
+
+use std::time::Duration;
+
+use tactus_model::Covering;
+use tactus_schema::pb::StageStatus;
+use tactus_schema::rig::Service;
+use tactus_schema::{Frame, MonoTime, Rig, pb};
+
+use crate::contact::Contact;
+use crate::force::Elements;
+use crate::limits::Limits;
+use crate::{Denied, Fault, HomingPermit, Permit, Revocation, Target, Violation};
+
+/// Watches one rig. The caller stops the stage whenever a method returns a [`Violation`].
+#[derive(Debug)]
+pub struct Supervisor {
+    limits: Limits,
+    elements: Elements,
+    contact: Contact,
+    permits: Revocation,
+    /// The last report of the stage.
+    report: Option<pb::StageState>,
+    /// The last known height of the tip.
+    z_mm: Option<f64>,
+    /// What a reset must clear; [`Self::fault`] adds what the stage reports.
+    fault: Option<Fault>,
+    /// True while somebody may move the stage: loads count then at any height.
+    is_active: bool,
+    has_sensor: bool,
+}
+
+impl Supervisor {
+    /// A supervisor for a rig with the covering that its description names. It wants a reset before anything moves.
+    pub fn new(rig: &Rig, service: &Service) -> Self {
+        let limits = Limits::new(rig, service);
+        Self {
+            elements: Elements::new(rig, &limits),
+            contact: Contact::new(rig),
+            limits,
+            permits: Revocation::default(),
+            report: None,
+            z_mm: None,
+            fault: Some(Fault::Started),
+            is_active: false,
+            has_sensor: true,
+        }
+    }
+
+    /// A supervisor for a stage alone, as for a check of the stage by hand. It permits no step down below the safe height.
+    pub fn without_sensor(rig: &Rig, service: &Service) -> Self {
+        Self { fault: None, is_active: true, has_sensor: false, ..Self::new(rig, service) }
+    }
+
+    /// Voids permits from anywhere, as a stop does.
+    pub fn revocation(&self) -> Revocation {
+        self.permits.clone()
+    }
+
+    /// The fault that forbids motion, other than the way up.
+    pub fn fault(&self) -> Option<Fault> {
+        let status = self.status();
+        if status == StageStatus::Alarm {
+            return Some(Fault::Alarm);
+        }
+        self.fault.clone().or((status == StageStatus::Unhomed).then_some(Fault::Unhomed))
+    }
+
+    // --- what happens -------------------------------------------------------------------------------------------------
+
+    /// Checks a frame.
+    pub fn on_frame(&mut self, frame: &Frame) -> Option<Violation> {
+        self.elements.take(frame);
+        let position_mm = self.position_mm();
+        let is_near = self.z_mm.is_some_and(|z_mm| self.limits.is_near(z_mm));
+        let response = position_mm
+            .and_then(|position_mm| self.contact.take(frame, position_mm, &self.elements, &self.limits))
+            .filter(|_| self.is_active);
+        let overload = self.elements.overload(&self.limits).filter(|_| self.is_active || is_near);
+        self.trip(overload.or(response))
+    }
+
+    /// The sensor connected anew: its zeros do not hold any more, and nothing goes down before new ones are taken.
+    pub fn on_connected(&mut self) {
+        self.elements.forget_zeros();
+        self.permits.revoke();
+    }
+
+    /// Checks a report of the stage. If the stage does not know its position, the last known height is kept.
+    pub fn on_report(&mut self, report: &pb::StageState) -> Option<Violation> {
+        self.report = Some(*report);
+        if !is_placed(report.status()) {
+            return None;
+        }
+        self.z_mm = Some(report.z_mm);
+        let (depth_mm, limit_mm) = (-report.z_mm, self.limits.depth_max_mm);
+        let slack_mm = self.limits.motion.tolerance_mm;
+        self.trip((depth_mm > limit_mm + slack_mm).then_some(Violation::Depth { depth_mm, limit_mm }))
+    }
+
+    /// Checks the time since the last frame: near the covering, and while the stage is homing, frames must not cease.
+    pub fn on_time(&mut self, now: MonoTime) -> Option<Violation> {
+        let is_homing = self.status() == StageStatus::Homing;
+        let is_near = self.z_mm.is_some_and(|z_mm| self.limits.is_near(z_mm));
+        if !self.has_sensor || !(is_near || is_homing) {
+            return None;
+        }
+        let (limit_s, z_mm) = (self.limits.silence_max_s(), self.z_mm.unwrap_or(f64::NAN));
+        let silent_s = Limits::silence_s(now, self.elements.last_frame());
+        let violation = if silent_s > limit_s {
+            Some(Violation::Silence { silent_s, limit_s, z_mm })
+        } else {
+            let silent = self.elements.silent_element(now, &self.limits);
+            silent.map(|(element, silent_s)| Violation::ElementSilence { element, silent_s, limit_s, z_mm })
+        };
+        self.trip(violation)
+    }
+
+    // --- what is asked ------------------------------------------------------------------------------------------------
+
+    /// Permits a move from where the stage stands, for one sample period; a way up for as long as nothing is stopped.
+    ///
+    /// # Errors
+    /// [`Denied`], with the reason.
+    pub fn permit(&mut self, to: Target, now: MonoTime) -> Result<Permit, Denied> {
+        let from_mm = self.standing_mm()?;
+        if self.limits.goes_up(from_mm, to) {
+            self.limits.check_up(from_mm, to)?;
+            return Ok(self.permits.permit(to, None));
+        }
+        self.check_fault()?;
+        self.limits.check_way(from_mm, to)?;
+        let safe_mm = self.limits.motion.safe_height_mm - self.limits.motion.tolerance_mm;
+        if self.has_sensor || to.position_mm[2] < safe_mm {
+            self.check_frame(now)?;
+        }
+        if self.limits.is_near(to.position_mm[2]) && !self.elements.has_zero() {
+            return Err(Denied::NoZero);
+        }
+        Ok(self.permits.permit(to, Some(self.expiry(now))))
+    }
+
+    /// Permits the stage to be homed. Frames must arrive, so that a load is seen on the way.
+    ///
+    /// # Errors
+    /// [`Denied`], with the reason.
+    pub fn permit_homing(&mut self, now: MonoTime) -> Result<HomingPermit, Denied> {
+        match self.fault() {
+            None | Some(Fault::Unfinished | Fault::Unhomed) => {}
+            Some(fault) => return Err(Denied::Fault(fault)),
+        }
+        if self.has_sensor {
+            self.check_frame(now)?;
+        }
+        Ok(self.permits.homing_permit(self.expiry(now)))
+    }
+
+    /// A run begins: the zeros of the last one are discarded.
+    pub fn begin_run(&mut self) {
+        self.elements.forget_zeros();
+        self.is_active = true;
+    }
+
+    /// The run or reset is over, however it ended.
+    pub fn end(&mut self) {
+        self.is_active = false;
+        self.permits.revoke();
+    }
+
+    /// A reset begins: all faults become one, which permits homing and the way up.
+    pub fn begin_reset(&mut self, now: MonoTime) {
+        self.fault = Some(Fault::Unfinished);
+        self.is_active = true;
+        self.elements.forget_zeros();
+        self.elements.excuse_silence(now);
+    }
+
+    /// A reset ends: the fault is cleared if the stage stands at a known place and frames arrive.
+    ///
+    /// # Errors
+    /// [`Denied`] if they do not; the fault then remains.
+    pub fn finish_reset(&mut self, now: MonoTime) -> Result<(), Denied> {
+        match &self.fault {
+            None | Some(Fault::Unfinished) => {}
+            Some(fault) => return Err(Denied::Fault(fault.clone())),
+        }
+        self.standing_mm()?;
+        self.check_frame(now)?;
+        self.fault = None;
+        Ok(())
+    }
+
+    /// Latches a fault until the next reset. An earlier one is kept, because it is the cause.
+    pub fn latch(&mut self, fault: Fault) {
+        self.permits.revoke();
+        let is_silence = matches!(self.fault, Some(Fault::Tripped(Violation::Silence { .. })));
+        if is_silence || self.fault.is_none() {
+            self.fault = Some(fault);
+        }
+    }
+
+    /// Forgives a silence of the sensor, and nothing else, once the tip is up.
+    pub fn forgive_silence(&mut self, now: MonoTime) {
+        let is_silence = matches!(
+            self.fault,
+            Some(Fault::Tripped(Violation::Silence { .. } | Violation::ElementSilence { .. }))
+        );
+        if is_silence {
+            self.fault = None;
+        }
+        self.elements.excuse_silence(now);
+    }
+
+    /// Sets the run's first zero and the tare. Loads are limited relative to both, so that repeated taring cannot raise the
+    /// limit step by step.
+    ///
+    /// # Errors
+    /// [`Violation::Zero`] if an element reads far from its baseline: it may be loaded, or the array may be another one.
+    pub fn set_reference(&mut self, counts: &[f64]) -> Result<(), Violation> {
+        self.elements.set_reference(counts, &self.limits)
+    }
+
+    /// Sets the script's new zero.
+    ///
+    /// # Errors
+    /// As [`Self::set_reference`].
+    pub fn set_tare(&mut self, counts: &[f64]) -> Result<(), Violation> {
+        self.elements.set_tare(counts, &self.limits)
+    }
+
+    /// True if a zero was taken since the sensor connected.
+    pub fn has_zero(&self) -> bool {
+        self.elements.has_zero()
+    }
+
+    /// Another covering is in place.
+    pub fn set_covering(&mut self, covering: Covering) {
+        self.limits.depth_max_mm = self.limits.envelope.depth_max_mm(covering);
+    }
+
+    // --- how ----------------------------------------------------------------------------------------------------------
+
+    /// Reports a violation only once: later ones occur while the first is handled.
+    fn trip(&mut self, violation: Option<Violation>) -> Option<Violation> {
+        let is_tripped = matches!(self.fault, Some(Fault::Tripped(_)));
+        let fresh = violation.filter(|_| !is_tripped)?;
+        self.permits.revoke();
+        self.fault = Some(Fault::Tripped(fresh.clone()));
+        Some(fresh)
+    }
+
+    fn check_fault(&self) -> Result<(), Denied> {
+        self.fault().map_or(Ok(()), |fault| Err(Denied::Fault(fault)))
+    }
+
+    fn check_frame(&self, now: MonoTime) -> Result<(), Denied> {
+        let (age_s, limit_s) =
+            (Limits::silence_s(now, self.elements.last_frame()), self.limits.silence_max_s());
+        if age_s <= limit_s { Ok(()) } else { Err(Denied::NoFreshFrame { age_s, limit_s }) }
+    }
+
+    fn expiry(&self, now: MonoTime) -> MonoTime {
+        now.after(Duration::from_secs_f64(self.limits.sample_period_s))
+    }
+
+    fn status(&self) -> StageStatus {
+        self.report.map_or(StageStatus::Unspecified, |report| report.status())
+    }
+
+    /// Where the stage stands idle.
+    fn standing_mm(&self) -> Result<[f64; 3], Denied> {
+        match self.report {
+            Some(report) if report.status() == StageStatus::Idle => {
+                Ok([report.x_mm, report.y_mm, report.z_mm])
+            }
+            _ => Err(Denied::NotStanding { status: self.status().as_str_name() }),
+        }
+    }
+
+    fn position_mm(&self) -> Option<[f64; 3]> {
+        let report = self.report.filter(|report| is_placed(report.status()))?;
+        Some([report.x_mm, report.y_mm, report.z_mm])
+    }
+}
+
+/// True if a report with this status tells the position.
+fn is_placed(status: StageStatus) -> bool {
+    match status {
+        StageStatus::Unspecified | StageStatus::Disconnected | StageStatus::Unhomed | StageStatus::Homing => false,
+        StageStatus::Idle | StageStatus::Moving | StageStatus::Hold | StageStatus::Alarm => true,
+    }
+}
+
+#[cfg(test)]
+#[path = "supervisor_tests.rs"]
+mod tests;
