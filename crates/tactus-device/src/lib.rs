@@ -22,6 +22,7 @@ pub use error::{DeviceError, ErrorKind};
 pub use inventory::{Access, FoundDevice, Holder, inventory};
 pub use sensor::{ArrayExpectation, LinkFile, LinkFileError, Sensor, SensorCodec, SensorDriver, SensorEvent};
 pub use stage::{
-    Connection, DrivenStage, Stage, StageError, StageOptions, Target, grbl_config, zaber_config,
+    Connection, DrivenStage, Stage, StageError, StageOptions, grbl_config, zaber_config,
 };
+pub use tactus_safety::{HomingPermit, Permit, Target};
 pub use tactus_wire::stage::{Controller, Setting};

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use futures_util::FutureExt;
 use tactus_device::{Sensor, SensorEvent};
-use tactus_model::Covering;
 use tactus_safety::{Fault, Supervisor, Violation};
 use tactus_schema::rig::OnGap;
 use tactus_schema::{Frame, MonoTime, pb};
@@ -109,7 +108,7 @@ pub(crate) async fn acquire(
     let mut tick = tokio::time::interval(shared.sample_period().min(TICK_MAX));
     tick.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut ticks = 0_u64;
-    let mut acquisition = Acquisition::new(shared, supervisor, covering);
+    let mut acquisition = Acquisition::new(shared, supervisor);
     let mut has_sensor = true;
     loop {
         // A panic of the driver's, or of what handles its frames, must neither end the supervision nor go unnoticed.
@@ -147,11 +146,10 @@ pub(crate) async fn acquire(
 }
 
 impl Acquisition {
-    fn new(shared: Arc<Shared>, supervisor: Supervisor, covering: Covering) -> Self {
+    fn new(shared: Arc<Shared>, supervisor: Supervisor) -> Self {
         Self {
             supervisor,
             tally: Tally::default(),
-            covering,
             shared,
             window: None,
             recording: None,

@@ -248,7 +248,6 @@ impl Engine {
         let acquiring = acquire(
             Arc::clone(&shared),
             supervisor,
-            covering,
             questions,
             devices.sensor,
             devices.stage_reports,

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use tactus_device::{StageError, Target};
-use tactus_safety::{Permit, SAME_HEIGHT_MM, STEP_DOWN_MAX_MM};
+use tactus_safety::{Denied, Permit, SAME_HEIGHT_MM, STEP_DOWN_MAX_MM};
 use tactus_schema::pb::StageStatus;
 use tokio::time::{sleep, timeout};
 
@@ -94,8 +94,10 @@ impl Shared {
             };
             match &error {
                 Broken::Stage(StageError::Stopped { .. } | StageError::Void(_)) => stops += 1,
-                Broken::Stage(StageError::Unhomed | StageError::Alarm { .. }) => return Err(error),
-                Broken::Stage(StageError::Device(_)) => {
+                Broken::Gone(_)
+                | Broken::Denied(Denied::Fault(_))
+                | Broken::Stage(StageError::Unhomed | StageError::Alarm { .. }) => return Err(error),
+                Broken::Denied(Denied::NoStage) | Broken::Stage(StageError::Device(_)) => {
                     troubles += 1;
                     self.stage_returns().await;
                 }

@@ -180,8 +180,8 @@ impl Run {
             Ok(()) => run.perform_all().await,
             Err(gone) => Err(gone.into()),
         };
-        if matches!(result, Err(Broken::Refused(_))) && !run.is_prepared {
-            // The tip is not moved, not even up.
+        if !run.is_prepared {
+            // Nothing has moved, and the tip is not moved now, not even up.
             let z_mm = run.shared.position_mm()[2];
             return run.conclude(&result, Ok(z_mm)).await;
         }

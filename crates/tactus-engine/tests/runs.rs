@@ -7,7 +7,7 @@ use pb::ExitStatus;
 use pb::Phase::{Approach, Hold, Idle, Load, Retract, Unload};
 use pb::run_event::Event;
 use rig::{Bench, Memory};
-use tactus_engine::{Fault, RunOrder, StopOrder};
+use tactus_engine::{Fault, ResumeError, RunOrder, StopOrder};
 use tactus_schema::pb::{self, RunPhase, StageStatus};
 
 const PRESS: &str = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2, 0.4])\n";
@@ -133,7 +133,7 @@ async fn stop_works_while_preparing_moving_paused_and_retracting() {
     let bench = Bench::start(|rig| rig);
     let run = start(&bench, PRESSES, &Memory::default());
     until_phase(&bench, RunPhase::Running).await;
-    assert!(bench.engine.pause());
+    assert!(bench.engine.pause("test"));
     until_phase(&bench, RunPhase::Paused).await;
     bench.engine.stop(order(false));
     assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
@@ -158,14 +158,14 @@ async fn stop_works_while_preparing_moving_paused_and_retracting() {
 async fn a_pause_comes_between_steps_with_the_tip_up_and_resuming_does_every_press_once() {
     let mut bench = Bench::start(|rig| rig);
     let memory = Memory::default();
-    assert!(!bench.engine.pause(), "nothing runs yet");
+    assert!(!bench.engine.pause("test"), "nothing runs yet");
     let run = start(&bench, PRESSES, &memory);
     until_deep(&mut bench, 0.2).await;
-    assert!(bench.engine.pause());
+    assert!(bench.engine.pause("test"));
     until_phase(&bench, RunPhase::Paused).await;
     assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
-    assert!(bench.engine.resume());
-    assert!(!bench.engine.resume(), "it goes on already");
+    bench.engine.resume("test", None).unwrap();
+    assert_eq!(bench.engine.resume("test", None), Err(ResumeError::NotPaused), "it goes on already");
     let outcome = run.await.unwrap();
     assert_eq!((outcome.exit_status, outcome.presses, outcome.dwells), (ExitStatus::Done, 3, 6));
     let kinds = memory.kinds();
@@ -296,7 +296,10 @@ async fn a_change_of_covering_is_asked_for_waited_for_and_moves_the_depth_limit(
     let run = start(&bench, script, &memory);
     until_phase(&bench, RunPhase::Paused).await;
     assert!(bench.engine.state().borrow().message.contains("2.54 mm covering"));
-    bench.engine.resume();
+    let unconfirmed = bench.engine.resume("test", None).unwrap_err();
+    assert_eq!(unconfirmed, ResumeError::CoveringNotConfirmed { wanted_mm: 2.54 });
+    bench.engine.resume("test", Some(1.016)).unwrap_err();
+    bench.engine.resume("test", Some(2.54)).unwrap();
     let outcome = run.await.unwrap();
     assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
     assert!(memory.kinds().iter().any(|kind| matches!(kind, Event::CoveringChanged(_))));
@@ -358,7 +361,7 @@ async fn the_covering_in_place_stays_from_run_to_run() {
     let thinner = "def run(rig):\n    covering(0.5)\n";
     let run = start(&bench, thinner, &Memory::default());
     until_phase(&bench, RunPhase::Paused).await;
-    bench.engine.resume();
+    bench.engine.resume("test", Some(0.5)).unwrap();
     assert_eq!(run.await.unwrap().exit_status, ExitStatus::Done);
     assert!((bench.engine.rig().covering.thickness_mm - 0.5).abs() < 1e-12);
     let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();

@@ -5,13 +5,14 @@ use tactus_schema::{Frame, Rig};
 
 use crate::Violation;
 use crate::force::Elements;
-use crate::limits::Limits;
+use crate::limits::{Limits, STEP_DOWN_MAX_MM};
 
-/// Identical frames after which the array counts as frozen, if the tip moved meanwhile.
+/// Frames with the old counts, received after the tip has moved, after which the array counts as frozen.
 const FROZEN_FRAMES: u32 = 3;
 
-/// Way of the tip in the covering during identical frames.
-const FROZEN_WAY_MM: f64 = 0.08;
+/// Way of the tip in the covering during identical frames: a step and a half, because a frame may show one step that the
+/// stage has not yet reported.
+const FROZEN_WAY_MM: f64 = 1.5 * STEP_DOWN_MAX_MM;
 
 /// Share of the depth limit from which a response is expected.
 const FELT_DEPTH_SHARE: f64 = 0.5;
@@ -19,6 +20,9 @@ const FELT_DEPTH_SHARE: f64 = 0.5;
 /// Share of the reading of a press at the element's centre that the best element must show. Between elements, under the
 /// widest point spread, the nearest one shows more than half.
 const FELT_RISE_SHARE: f64 = 0.05;
+
+/// Frames without a response, with the tip standing deep, that are a stop. The first two may be older than the stage's report.
+const UNFELT_FRAMES: u32 = 4;
 
 /// Watches the response to the tip.
 #[derive(Debug)]
@@ -30,12 +34,15 @@ pub(crate) struct Contact {
     sensitivity_counts_per_mm: f64,
     /// The frame that has been repeated, with the height of the tip at its first arrival.
     repeated: Option<Repeated>,
+    /// Frames without a response since the tip stands deep.
+    unfelt_frames: u32,
 }
 
 #[derive(Debug)]
 struct Repeated {
     counts: Vec<f32>,
     z_mm: f64,
+    /// Since the tip has moved.
     frames: u32,
 }
 
@@ -48,7 +55,13 @@ impl Contact {
             extent_mm: rig.array.extent_mm(),
             sensitivity_counts_per_mm: sensitivities.get(sensitivities.len() / 2).copied().unwrap_or(0.0),
             repeated: None,
+            unfelt_frames: 0,
         }
+    }
+
+    /// The tip is about to move: a frame may show that before the stage reports it.
+    pub(crate) fn expect_motion(&mut self) {
+        self.unfelt_frames = 0;
     }
 
     /// Takes a frame that arrived with the tip at a known position, robot frame.
@@ -56,27 +69,29 @@ impl Contact {
         &mut self,
         frame: &Frame,
         [x_mm, y_mm, z_mm]: [f64; 3],
+        is_standing: bool,
         elements: &Elements,
         limits: &Limits,
     ) -> Option<Violation> {
         let is_new = self.repeated.as_ref().is_none_or(|repeated| repeated.counts[..] != frame.counts[..]);
         let is_over_array = self.is_over_array([x_mm, y_mm]);
         if is_new || z_mm >= 0.0 || !is_over_array {
-            self.repeated = Some(Repeated { counts: frame.counts.to_vec(), z_mm, frames: 1 });
+            self.repeated = Some(Repeated { counts: frame.counts.to_vec(), z_mm, frames: 0 });
         } else if let Some(repeated) = &mut self.repeated {
-            repeated.frames += 1;
             let way_mm = (z_mm - repeated.z_mm).abs();
-            if repeated.frames > FROZEN_FRAMES && way_mm > FROZEN_WAY_MM {
+            // A frame that was taken before the tip moved is no evidence.
+            repeated.frames += u32::from(way_mm > FROZEN_WAY_MM);
+            if repeated.frames >= FROZEN_FRAMES {
                 return Some(Violation::Frozen { frames: repeated.frames, way_mm });
             }
         }
         let depth_mm = -z_mm;
-        if !is_over_array || depth_mm < FELT_DEPTH_SHARE * limits.depth_max_mm {
-            return None;
-        }
         let rise_counts = elements.greatest_rise_counts()?;
         let least_counts = FELT_RISE_SHARE * self.sensitivity_counts_per_mm * depth_mm;
-        (rise_counts < least_counts).then_some(Violation::NoResponse { rise_counts, least_counts, depth_mm })
+        let is_deep = depth_mm >= FELT_DEPTH_SHARE * limits.depth_max_mm;
+        let is_unfelt = is_over_array && is_standing && is_deep && rise_counts < least_counts;
+        self.unfelt_frames = if is_unfelt { self.unfelt_frames + 1 } else { 0 };
+        (self.unfelt_frames >= UNFELT_FRAMES).then_some(Violation::NoResponse { rise_counts, least_counts, depth_mm })
     }
 
     fn is_over_array(&self, at_mm: [f64; 2]) -> bool {

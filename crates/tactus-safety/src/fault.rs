@@ -37,7 +37,7 @@ pub enum Violation {
     Depth { depth_mm: f64, limit_mm: f64 },
     /// The same frame comes again and again although the tip moves.
     #[error(
-        "the sensor has sent the same counts in {frames} frames while the tip went {way_mm:.3} mm into the covering: it is frozen"
+        "the sensor still sends the same counts, {frames} frames after the tip has moved by {way_mm:.3} mm in the covering: it is frozen"
     )]
     Frozen { frames: u32, way_mm: f64 },
     /// The tip is deep in the covering and no element responds.

@@ -18,6 +18,8 @@ pub(crate) struct Elements {
     /// By index; as many as the last frame had.
     states: Vec<ElementState>,
     last_frame: Option<MonoTime>,
+    /// Silences before this were dealt with.
+    excused: Option<MonoTime>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +55,7 @@ impl Elements {
             tare: None,
             states: Vec::new(),
             last_frame: None,
+            excused: None,
         }
     }
 
@@ -137,12 +140,14 @@ impl Elements {
         counts.get(element).copied().filter(|counts| is_watched && counts.is_finite())
     }
 
-    /// Counts silences of elements from `now` at the earliest.
+    /// Counts silences from `now` at the earliest.
     pub(crate) fn excuse_silence(&mut self, now: MonoTime) {
-        self.last_frame = self.last_frame.map(|last| last.max(now));
-        for state in &mut self.states {
-            state.last_read = state.last_read.map(|read| read.max(now));
-        }
+        self.excused = Some(now);
+    }
+
+    /// Time without a frame, excused times left out.
+    pub(crate) fn silence_s(&self, now: MonoTime) -> f64 {
+        Limits::silence_s(now, self.last_frame.max(self.excused))
     }
 
     /// Greatest load, if it is over a limit.
@@ -189,7 +194,7 @@ impl Elements {
     pub(crate) fn silent_element(&self, now: MonoTime, limits: &Limits) -> Option<(usize, f64)> {
         let zeros = self.reference.as_ref()?.iter();
         zeros.zip(&self.states).enumerate().find_map(|(element, (zero, state))| {
-            let silent_s = Limits::silence_s(now, state.last_read);
+            let silent_s = Limits::silence_s(now, state.last_read.max(self.excused));
             let is_silent = zero.is_some() && !state.is_read && silent_s > limits.silence_max_s();
             is_silent.then_some((element, silent_s))
         })

@@ -67,9 +67,12 @@ pub enum Denied {
     /// Elements have no zero since the sensor connected, so a load would not be seen.
     #[error("no zero was taken since the sensor connected")]
     NoZero,
-    /// The stage does not report an idle state and a known position.
-    #[error("the stage does not stand still at a known position: {status}")]
+    /// The stage moves.
+    #[error("the stage does not stand still: {status}")]
     NotStanding { status: &'static str },
+    /// The stage does not answer.
+    #[error("the stage does not answer: is it plugged in and switched on?")]
+    NoStage,
     /// Deeper than the covering in place allows.
     #[error("{depth_mm:.3} mm is too deep: the limit is {limit_mm:.3} mm")]
     TooDeep { depth_mm: f64, limit_mm: f64 },

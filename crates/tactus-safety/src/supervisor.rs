@@ -73,8 +73,9 @@ impl Supervisor {
         self.elements.take(frame);
         let position_mm = self.position_mm();
         let is_near = self.z_mm.is_some_and(|z_mm| self.limits.is_near(z_mm));
+        let is_standing = self.status() == StageStatus::Idle;
         let response = position_mm
-            .and_then(|position_mm| self.contact.take(frame, position_mm, &self.elements, &self.limits))
+            .and_then(|at_mm| self.contact.take(frame, at_mm, is_standing, &self.elements, &self.limits))
             .filter(|_| self.is_active);
         let overload = self.elements.overload(&self.limits).filter(|_| self.is_active || is_near);
         self.trip(overload.or(response))
@@ -106,7 +107,7 @@ impl Supervisor {
             return None;
         }
         let (limit_s, z_mm) = (self.limits.silence_max_s(), self.z_mm.unwrap_or(f64::NAN));
-        let silent_s = Limits::silence_s(now, self.elements.last_frame());
+        let silent_s = self.elements.silence_s(now);
         let violation = if silent_s > limit_s {
             Some(Violation::Silence { silent_s, limit_s, z_mm })
         } else {
@@ -124,6 +125,7 @@ impl Supervisor {
     /// [`Denied`], with the reason.
     pub fn permit(&mut self, to: Target, now: MonoTime) -> Result<Permit, Denied> {
         let from_mm = self.standing_mm()?;
+        self.contact.expect_motion();
         if self.limits.goes_up(from_mm, to) {
             self.limits.check_up(from_mm, to)?;
             return Ok(self.permits.permit(to, None));
@@ -269,11 +271,16 @@ impl Supervisor {
 
     /// Where the stage stands idle.
     fn standing_mm(&self) -> Result<[f64; 3], Denied> {
-        match self.report {
-            Some(report) if report.status() == StageStatus::Idle => {
-                Ok([report.x_mm, report.y_mm, report.z_mm])
+        let Some(report) = self.report else { return Err(Denied::NoStage) };
+        let status = report.status();
+        match status {
+            StageStatus::Idle => Ok([report.x_mm, report.y_mm, report.z_mm]),
+            StageStatus::Unspecified | StageStatus::Disconnected => Err(Denied::NoStage),
+            StageStatus::Alarm => Err(Denied::Fault(Fault::Alarm)),
+            StageStatus::Unhomed => Err(Denied::Fault(Fault::Unhomed)),
+            StageStatus::Moving | StageStatus::Hold | StageStatus::Homing => {
+                Err(Denied::NotStanding { status: status.as_str_name() })
             }
-            _ => Err(Denied::NotStanding { status: self.status().as_str_name() }),
         }
     }
 

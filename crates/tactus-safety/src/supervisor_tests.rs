@@ -1,11 +1,31 @@
 use tactus_schema::{FrameFlags, Rig, TimeStamp, WallTime};
 
 use super::*;
+use crate::Void;
+
+fn rig(change: impl Fn(String) -> String) -> Rig {
+    Rig::from_toml(&change(include_str!("../../../config/rigs/sim.toml").to_owned())).unwrap()
+}
+
+/// Of the simulated rig, changed, with a run in progress and nothing to reset.
+fn changed(change: impl Fn(String) -> String) -> Supervisor {
+    let rig = rig(change);
+    let mut supervisor = Supervisor::new(&rig, &rig.service.clone().unwrap());
+    supervisor.fault = None;
+    supervisor.begin_run();
+    supervisor
+}
 
 fn supervisor() -> Supervisor {
-    let rig = Rig::from_toml(include_str!("../../../config/rigs/sim.toml")).unwrap();
-    let service = rig.service.clone().unwrap();
-    Supervisor::new(&rig, &service)
+    changed(|rig| rig)
+}
+
+/// Of an array with a baseline of 10,000 and much room above it.
+fn wide() -> Supervisor {
+    changed(|rig| {
+        rig.replace("full_scale_counts = 4095", "full_scale_counts = 100000")
+            .replace("baseline_counts = 100.0", "baseline_counts = 10000.0")
+    })
 }
 
 fn at_ms(ms: i64) -> MonoTime {
@@ -27,16 +47,16 @@ fn frame(ms: i64, counts: &[f32]) -> Frame {
 }
 
 fn at_height(z_mm: f64) -> pb::StageState {
-    pb::StageState { z_mm, status: pb::StageStatus::Idle.into(), ..Default::default() }
+    pb::StageState { z_mm, status: StageStatus::Idle.into(), ..Default::default() }
 }
 
 #[test]
 fn repeated_taring_cannot_ratchet_the_force_limit_up() {
     let mut supervisor = supervisor();
-    supervisor.set_reference(vec![100.0; 4]);
+    supervisor.set_reference(&[100.0; 4]).unwrap();
     assert_eq!(supervisor.on_frame(&frame(0, &[100.0, 1500.0, 100.0, 100.0])), None);
-    supervisor.set_tare(vec![1500.0; 4]);
-    let violation = supervisor.on_frame(&frame(33, &[1500.0, 2200.0, 1500.0, 1500.0])).unwrap();
+    supervisor.set_tare(&[550.0; 4]).unwrap();
+    let violation = supervisor.on_frame(&frame(33, &[550.0, 2200.0, 550.0, 550.0])).unwrap();
     assert!(
         matches!(violation, Violation::ElementForce { element: 1, against: "the run's first zero", .. }),
         "{violation}"
@@ -46,8 +66,8 @@ fn repeated_taring_cannot_ratchet_the_force_limit_up() {
 #[test]
 fn many_elements_below_their_limit_are_still_too_much_together() {
     let mut supervisor = supervisor();
-    supervisor.set_reference(vec![0.0; 48]);
-    let violation = supervisor.on_frame(&frame(0, &[1000.0; 48])).unwrap();
+    supervisor.set_reference(&[100.0; 48]).unwrap();
+    let violation = supervisor.on_frame(&frame(0, &[1100.0; 48])).unwrap();
     assert_eq!(violation.rule(), "sum-force");
 }
 
@@ -68,7 +88,7 @@ fn a_violation_is_told_once_until_rearmed() {
     let mut supervisor = supervisor();
     assert_eq!(supervisor.on_report(&at_height(-0.72)).unwrap().rule(), "depth");
     assert_eq!(supervisor.on_report(&at_height(-0.73)), None);
-    supervisor.rearm(at_ms(0));
+    supervisor.begin_reset(at_ms(0));
     assert_eq!(supervisor.on_report(&at_height(-0.73)).unwrap().rule(), "depth");
 }
 
@@ -77,14 +97,14 @@ fn rearming_gives_a_returning_sensor_its_full_time() {
     let mut supervisor = supervisor();
     assert_eq!(supervisor.on_report(&at_height(0.0)), None);
     assert!(supervisor.on_time(at_ms(200)).is_some());
-    supervisor.rearm(at_ms(300));
+    supervisor.forgive_silence(at_ms(300));
     assert_eq!(supervisor.on_time(at_ms(350)), None);
     assert!(supervisor.on_time(at_ms(401)).is_some());
 }
 
 #[test]
 fn a_stage_that_does_not_know_where_it_is_counts_as_where_it_was_last() {
-    let lost = |z_mm| pb::StageState { z_mm, status: pb::StageStatus::Unhomed.into(), ..Default::default() };
+    let lost = |z_mm| pb::StageState { z_mm, status: StageStatus::Unhomed.into(), ..Default::default() };
     let mut supervisor = supervisor();
     assert_eq!(supervisor.on_report(&lost(0.0)), None);
     assert_eq!(supervisor.on_time(at_ms(500)), None, "nothing says yet that the tip is near");
@@ -98,11 +118,11 @@ fn a_stage_that_does_not_know_where_it_is_counts_as_where_it_was_last() {
 
 #[test]
 fn a_sensor_that_falls_when_pressed_is_limited_too() {
-    let rig = include_str!("../../../config/rigs/sim.toml")
-        .replace("sensitivity_counts_per_mm = 1000.0", "sensitivity_counts_per_mm = -1000.0");
-    let rig = Rig::from_toml(&rig).unwrap();
-    let mut supervisor = Supervisor::new(&rig, &rig.service.clone().unwrap());
-    supervisor.set_reference(vec![3000.0; 48]);
+    let mut supervisor = changed(|rig| {
+        rig.replace("sensitivity_counts_per_mm = 1000.0", "sensitivity_counts_per_mm = -1000.0")
+            .replace("\nbaseline_counts = 100.0", "\nbaseline_counts = 3000.0")
+    });
+    supervisor.set_reference(&[3000.0; 48]).unwrap();
     assert_eq!(supervisor.on_frame(&frame(0, &[4000.0; 48])), None, "it rises when it is let go");
     let violation = supervisor.on_frame(&frame(33, &[900.0; 48])).unwrap();
     assert_eq!(violation.rule(), "element-force");
@@ -115,8 +135,8 @@ fn partly_read(ms: i64, counts: &[f32], bad: &[u32]) -> Frame {
 
 #[test]
 fn what_was_not_read_neither_trips_nor_hides_a_load() {
-    let mut supervisor = supervisor();
-    supervisor.set_reference(vec![10_000.0; 48]);
+    let mut supervisor = wide();
+    supervisor.set_reference(&[10_000.0; 48]).unwrap();
     let mut counts = [10_000.0; 48];
     counts[3] = f32::NAN;
     counts[4] = 60_000.0;
@@ -133,7 +153,7 @@ fn what_was_not_read_neither_trips_nor_hides_a_load() {
 fn an_element_that_falls_silent_near_the_covering_is_a_stop() {
     let mut supervisor = supervisor();
     assert_eq!(supervisor.on_frame(&partly_read(0, &[100.0; 4], &[2])), None);
-    supervisor.set_reference(vec![100.0; 4]);
+    supervisor.set_reference(&[100.0; 4]).unwrap();
     assert_eq!(supervisor.on_report(&at_height(-0.2)), None);
     for ms in [33, 67, 100] {
         assert_eq!(supervisor.on_frame(&partly_read(ms, &[100.0; 4], &[1, 2])), None);
@@ -148,14 +168,224 @@ fn an_element_that_falls_silent_near_the_covering_is_a_stop() {
 fn an_element_that_was_never_read_stops_nothing_until_it_has_a_zero() {
     let mut supervisor = supervisor();
     assert_eq!(supervisor.on_frame(&partly_read(0, &[0.0, 100.0], &[0])), None);
-    supervisor.set_reference(vec![0.0, 100.0]);
+    supervisor.set_reference(&[0.0, 100.0]).unwrap();
     assert_eq!(supervisor.on_report(&at_height(-0.2)), None);
-    assert_eq!(supervisor.on_frame(&frame(2000, &[9000.0, 100.0])), None, "its zero was never read");
-    supervisor.set_tare(vec![9000.0, 100.0]);
-    assert_eq!(supervisor.on_frame(&frame(2033, &[9000.0, 100.0])), None);
-    let violation = supervisor.on_frame(&frame(2067, &[11_001.0, 100.0])).unwrap();
+    assert_eq!(supervisor.on_frame(&frame(2000, &[3000.0, 100.0])), None, "its zero was never read");
+    supervisor.set_tare(&[500.0, 100.0]).unwrap();
+    assert_eq!(supervisor.on_frame(&frame(2033, &[2400.0, 100.0])), None);
+    let violation = supervisor.on_frame(&frame(2067, &[2501.0, 100.0])).unwrap();
     assert!(
         matches!(violation, Violation::ElementForce { element: 0, against: "the tare", .. }),
         "{violation}"
     );
+}
+
+#[test]
+fn elements_that_fall_do_not_hide_the_load_on_those_that_rise() {
+    let mut supervisor = wide();
+    supervisor.set_reference(&[10_000.0; 48]).unwrap();
+    let mut counts = [11_900.0; 48];
+    counts[24..].fill(5_000.0);
+    assert_eq!(supervisor.on_frame(&frame(0, &counts)).unwrap().rule(), "sum-force");
+}
+
+#[test]
+fn a_zero_far_from_the_rigs_baseline_is_refused_and_changes_nothing() {
+    let mut supervisor = supervisor();
+    let refused = supervisor.set_reference(&[100.0, 601.0, 100.0, 100.0]).unwrap_err();
+    assert!(matches!(refused, Violation::Zero { element: 1, .. }), "{refused}");
+    assert!(!supervisor.has_zero());
+    supervisor.set_reference(&[100.0, 599.0, 100.0, 100.0]).unwrap();
+    supervisor.set_tare(&[100.0, 700.0, 100.0, 100.0]).unwrap_err();
+
+    let mut unwatched = changed(|rig| rig.replace("[motion]", "unwatched_elements = [1]\n[motion]"));
+    unwatched.set_reference(&[100.0, 4000.0, 100.0, 100.0]).unwrap();
+    assert_eq!(unwatched.on_frame(&frame(0, &[100.0, 0.0, 100.0, 100.0])), None);
+}
+
+#[test]
+fn before_the_first_zero_loads_are_held_against_the_baseline() {
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.on_frame(&frame(0, &[2599.0; 4])), None);
+    let violation = supervisor.on_frame(&frame(33, &[2601.0; 4])).unwrap();
+    assert!(
+        matches!(violation, Violation::ElementForce { against: "the rig's baseline", .. }),
+        "{violation}"
+    );
+}
+
+fn to(z_mm: f64) -> Target {
+    Target { position_mm: [25.0, 20.0, z_mm], speed_mm_per_s: 1.0 }
+}
+
+fn standing(z_mm: f64) -> pb::StageState {
+    pb::StageState { x_mm: 25.0, y_mm: 20.0, ..at_height(z_mm) }
+}
+
+/// Over the array at a height, with a zero and a frame at 1 s.
+fn ready(z_mm: f64) -> Supervisor {
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.on_frame(&frame(1000, &[100.0; 48])), None);
+    supervisor.set_reference(&[100.0; 48]).unwrap();
+    assert_eq!(supervisor.on_report(&standing(z_mm)), None);
+    supervisor
+}
+
+#[test]
+fn a_permit_down_lasts_one_sample_period_and_one_up_lasts() {
+    let mut supervisor = ready(0.1);
+    let down = supervisor.permit(to(0.0), at_ms(1010)).unwrap();
+    assert_eq!(down.check(at_ms(1043)), Ok(()));
+    assert_eq!(down.check(at_ms(1044)), Err(Void::Expired));
+    let up = supervisor.permit(to(2.0), at_ms(1010)).unwrap();
+    assert_eq!(up.check(at_ms(100_000)), Ok(()));
+}
+
+#[test]
+fn whatever_stops_voids_every_permit_that_was_given_before() {
+    let mut supervisor = ready(0.1);
+    let before_stop = supervisor.permit(to(0.0), at_ms(1010)).unwrap();
+    supervisor.revocation().revoke();
+    assert_eq!(before_stop.check(at_ms(1010)), Err(Void::Revoked));
+
+    let before_trip = supervisor.permit(to(0.0), at_ms(1010)).unwrap();
+    supervisor.on_frame(&frame(1033, &[3000.0; 48])).unwrap();
+    assert_eq!(before_trip.check(at_ms(1033)), Err(Void::Revoked));
+
+    supervisor.begin_reset(at_ms(1033));
+    let homing = supervisor.permit_homing(at_ms(1034)).unwrap();
+    supervisor.on_connected();
+    assert_eq!(homing.check(at_ms(1034)), Err(Void::Revoked));
+}
+
+#[test]
+fn a_step_down_wants_frames_a_zero_small_steps_and_a_straight_way() {
+    let denied = |supervisor: &mut Supervisor, to: Target, ms: i64| supervisor.permit(to, at_ms(ms)).unwrap_err();
+    let mut supervisor = ready(0.3);
+    assert!(matches!(denied(&mut supervisor, to(0.2), 1101), Denied::NoFreshFrame { .. }));
+    assert!(matches!(denied(&mut supervisor, to(0.19), 1010), Denied::TooFarDown { .. }));
+    let aside = Target { position_mm: [26.0, 20.0, 0.25], ..to(0.0) };
+    assert!(matches!(denied(&mut supervisor, aside, 1010), Denied::Sideways { .. }));
+    let outside = Target { position_mm: [9.0, 20.0, 0.3], ..to(0.3) };
+    assert!(matches!(denied(&mut supervisor, outside, 1010), Denied::Outside { axis: "x", .. }));
+    let fast = Target { speed_mm_per_s: 6.0, ..to(0.2) };
+    assert!(matches!(denied(&mut supervisor, fast, 1010), Denied::TooFast { .. }));
+    let nowhere = Target { position_mm: [25.0, 20.0, f64::NAN], ..to(0.2) };
+    assert!(matches!(denied(&mut supervisor, nowhere, 1010), Denied::Outside { axis: "z", .. }));
+    supervisor.permit(to(0.2), at_ms(1010)).unwrap();
+
+    let mut deep = ready(-0.7);
+    assert!(matches!(denied(&mut deep, to(-0.72), 1010), Denied::TooDeep { .. }));
+    deep.permit(to(-0.71), at_ms(1010)).unwrap();
+
+    let mut supervisor = ready(0.3);
+    supervisor.on_connected();
+    assert_eq!(denied(&mut supervisor, to(0.2), 1010), Denied::NoZero);
+
+    let mut moving = ready(0.3);
+    let report = pb::StageState { status: StageStatus::Moving.into(), ..standing(0.3) };
+    assert_eq!(moving.on_report(&report), None);
+    assert!(matches!(denied(&mut moving, to(0.2), 1010), Denied::NotStanding { .. }));
+}
+
+#[test]
+fn a_fault_permits_the_way_up_and_lasts_until_a_reset() {
+    let mut supervisor = ready(-0.3);
+    supervisor.on_frame(&frame(1033, &[3000.0; 48])).unwrap();
+    assert_eq!(supervisor.on_frame(&frame(1067, &[100.0; 48])), None);
+    assert!(matches!(supervisor.permit(to(-0.35), at_ms(1070)), Err(Denied::Fault(Fault::Tripped(_)))));
+    assert!(matches!(supervisor.permit_homing(at_ms(1070)), Err(Denied::Fault(Fault::Tripped(_)))));
+    supervisor.permit(to(2.0), at_ms(1070)).unwrap();
+    supervisor.end();
+    supervisor.begin_run();
+    supervisor.forgive_silence(at_ms(1070));
+    assert!(supervisor.fault().is_some(), "neither a new run nor a returning sensor clears it");
+
+    supervisor.begin_reset(at_ms(1070));
+    assert_eq!(supervisor.fault(), Some(Fault::Unfinished));
+    supervisor.permit_homing(at_ms(1070)).unwrap();
+    assert!(supervisor.permit(to(-0.35), at_ms(1070)).is_err(), "nothing goes down in a reset");
+    supervisor.finish_reset(at_ms(1070)).unwrap();
+    assert_eq!(supervisor.fault(), None);
+}
+
+#[test]
+fn a_reset_does_not_end_while_the_stage_or_the_sensor_is_missing() {
+    let mut supervisor = ready(2.0);
+    supervisor.begin_reset(at_ms(1010));
+    assert!(matches!(supervisor.finish_reset(at_ms(1200)), Err(Denied::NoFreshFrame { .. })));
+    let unhomed = pb::StageState { status: StageStatus::Unhomed.into(), ..standing(2.0) };
+    supervisor.on_report(&unhomed);
+    assert_eq!(supervisor.finish_reset(at_ms(1010)), Err(Denied::Fault(Fault::Unhomed)));
+    let alarm = pb::StageState { status: StageStatus::Alarm.into(), ..standing(2.0) };
+    supervisor.on_report(&alarm);
+    assert!(matches!(supervisor.permit_homing(at_ms(1010)), Err(Denied::Fault(Fault::Alarm))));
+    assert!(supervisor.finish_reset(at_ms(1010)).is_err());
+}
+
+#[test]
+fn homing_is_watched_for_silence_wherever_the_tip_is() {
+    let mut supervisor = ready(2.0);
+    supervisor.begin_reset(at_ms(1000));
+    let homing = pb::StageState { status: StageStatus::Homing.into(), ..standing(2.0) };
+    supervisor.on_report(&homing);
+    assert_eq!(supervisor.on_time(at_ms(1099)), None);
+    assert_eq!(supervisor.on_time(at_ms(1101)).unwrap().rule(), "silence");
+}
+
+#[test]
+fn a_thinner_covering_lowers_the_limit_and_a_thicker_one_does_not_pass_the_cap() {
+    let mut supervisor = ready(-0.3);
+    supervisor.set_covering(Covering { thickness_mm: 0.5 });
+    assert!(matches!(supervisor.permit(to(-0.36), at_ms(1010)), Err(Denied::TooDeep { .. })));
+    supervisor.set_covering(Covering { thickness_mm: 20.0 });
+    assert_eq!(supervisor.on_report(&standing(-3.5)), None);
+    assert_eq!(supervisor.on_report(&standing(-3.6)).unwrap().rule(), "depth");
+}
+
+#[test]
+fn a_frozen_array_is_a_stop_and_a_steady_one_is_not() {
+    let mut supervisor = ready(-0.1);
+    let pressed = [250.0; 48];
+    for ms in (1033..1400).step_by(33) {
+        assert_eq!(supervisor.on_frame(&frame(ms, &pressed)), None, "it stands still");
+    }
+    assert_eq!(supervisor.on_report(&standing(-0.2)), None);
+    for ms in (1400..1700).step_by(33) {
+        assert_eq!(supervisor.on_frame(&frame(ms, &pressed)), None, "its reading was ahead of the report");
+    }
+    assert_eq!(supervisor.on_report(&standing(-0.3)), None);
+    assert_eq!(supervisor.on_frame(&frame(1700, &pressed)), None);
+    assert_eq!(supervisor.on_frame(&frame(1733, &pressed)), None);
+    assert_eq!(supervisor.on_frame(&frame(1767, &pressed)).unwrap().rule(), "frozen");
+}
+
+#[test]
+fn a_deep_tip_that_no_element_feels_is_a_stop_over_the_array_only() {
+    let at = |supervisor: &mut Supervisor, ms: i64| {
+        #[expect(clippy::cast_precision_loss, reason = "a small number that makes frames differ")]
+        supervisor.on_frame(&frame(ms, &[110.0 + (ms % 7) as f32; 48]))
+    };
+    let mut supervisor = ready(-0.4);
+    assert_eq!([1033, 1067, 1100].map(|ms| at(&mut supervisor, ms)), [None, None, None]);
+    assert_eq!(at(&mut supervisor, 1133).unwrap().rule(), "no-response");
+
+    let mut rising = ready(-0.4);
+    assert_eq!([1033, 1067, 1100].map(|ms| at(&mut rising, ms)), [None, None, None]);
+    rising.permit(to(2.0), at_ms(1101)).unwrap();
+    assert_eq!([1133, 1167, 1200].map(|ms| at(&mut rising, ms)), [None, None, None], "it is on its way up");
+
+    let mut beside = ready(2.0);
+    assert_eq!(beside.on_report(&pb::StageState { x_mm: 12.0, y_mm: 12.0, ..at_height(-0.4) }), None);
+    assert_eq!([1033, 1067, 1100, 1133].map(|ms| at(&mut beside, ms)), [None, None, None, None]);
+}
+
+#[test]
+fn without_a_sensor_nothing_goes_below_the_safe_height() {
+    let rig = rig(|rig| rig);
+    let mut supervisor = Supervisor::without_sensor(&rig, &rig.service.clone().unwrap());
+    supervisor.permit_homing(at_ms(0)).unwrap();
+    assert_eq!(supervisor.on_report(&standing(10.0)), None);
+    supervisor.permit(to(2.0), at_ms(0)).unwrap();
+    assert!(supervisor.permit(to(1.9), at_ms(0)).is_err());
 }

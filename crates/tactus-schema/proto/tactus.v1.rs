@@ -65,6 +65,8 @@ pub struct StageState {
     pub alarm: ::core::option::Option<u32>,
     #[prost(bool, tag = "9")]
     pub simulated: bool,
+    #[prost(uint32, tag = "10")]
+    pub epoch: u32,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct RunEvent {
@@ -218,11 +220,15 @@ pub struct Gap {
     #[prost(string, tag = "4")]
     pub reason: ::prost::alloc::string::String,
 }
-#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Paused {
+    #[prost(string, tag = "1")]
+    pub by: ::prost::alloc::string::String,
 }
-#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Resumed {
+    #[prost(string, tag = "1")]
+    pub by: ::prost::alloc::string::String,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StopRequested {
@@ -365,7 +371,7 @@ pub struct RunRequest {
     #[prost(string, tag = "5")]
     pub who: ::prost::alloc::string::String,
 }
-#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct CommandRequest {
     #[prost(string, tag = "1")]
     pub who: ::prost::alloc::string::String,
@@ -373,6 +379,8 @@ pub struct CommandRequest {
     pub reason: ::prost::alloc::string::String,
     #[prost(bool, tag = "3")]
     pub abort: bool,
+    #[prost(double, optional, tag = "5")]
+    pub covering_mm: ::core::option::Option<f64>,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct CommandReply {

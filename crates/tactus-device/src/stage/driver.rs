@@ -34,6 +34,7 @@ pub(super) struct CommandRequest {
 pub(super) enum StageCommand {
     Home(HomingPermit),
     MoveTo(Permit),
+    Look,
     ClearAlarm,
 }
 
@@ -68,6 +69,8 @@ pub(super) struct Progress {
     is_abandoned: bool,
     /// Reports that found no room yet. The device is not read meanwhile, so there are few.
     waiting: VecDeque<pb::StageState>,
+    /// See [`pb::StageState::epoch`].
+    epoch: u32,
     /// The kind of the present loss, once it has been logged.
     logged: Option<ErrorKind>,
 }
@@ -190,6 +193,7 @@ where
                     let target = permit.target();
                     session.move_to(now, target.position_mm, target.speed_mm_per_s)
                 }
+                StageCommand::Look => session.look(now),
                 StageCommand::ClearAlarm => session.clear_alarm(now),
             };
         };
@@ -216,10 +220,12 @@ where
                     backoff.reset();
                     self.progress.logged = None;
                     self.progress.connected = true;
+                    self.progress.epoch += 1;
                     self.connection.send_replace(Connection::Connected(controller));
                 }
                 Action::Report(report) => self.report(now, report),
                 Action::Suspect { why } => {
+                    self.progress.epoch += 1;
                     tracing::warn!(device = self.device(), why, "the stage's position is suspect");
                 }
                 Action::Done(result) => {
@@ -262,6 +268,9 @@ where
                 tracing::info!(device = self.device(), from = ?before.status(), to = ?status, alarm, "stage");
             }
         }
+        if before.status() != status && is_doubtful(status) {
+            self.progress.epoch += 1;
+        }
         let state = pb::StageState {
             seq: before.seq + 1,
             t_mono_ns: now.mono.ns(),
@@ -272,6 +281,7 @@ where
             status: status.into(),
             alarm,
             simulated: self.options.simulated,
+            epoch: self.progress.epoch,
         };
         self.latest.send_replace(state);
         self.progress.waiting.push_back(state);
@@ -339,6 +349,18 @@ where
     }
 }
 
+/// True for a status after which the position is not the one before.
+fn is_doubtful(status: pb::StageStatus) -> bool {
+    match status {
+        pb::StageStatus::Unspecified
+        | pb::StageStatus::Disconnected
+        | pb::StageStatus::Unhomed
+        | pb::StageStatus::Homing
+        | pb::StageStatus::Alarm => true,
+        pb::StageStatus::Idle | pb::StageStatus::Moving | pb::StageStatus::Hold => false,
+    }
+}
+
 fn stage_error(failure: Failure, is_abandoned: bool) -> StageError {
     match failure {
         Failure::Stopped { position_mm } if is_abandoned => StageError::Unwatched { position_mm },
@@ -353,6 +375,7 @@ fn stage_error(failure: Failure, is_abandoned: bool) -> StageError {
         Failure::Interrupted { axis, meaning, position_mm } => {
             StageError::Interrupted { axis: axis.to_string(), meaning: meaning.to_owned(), position_mm }
         }
+        Failure::NotIdle { position_mm } => StageError::NotIdle { position_mm },
         Failure::NotThere { target_mm, position_mm } => StageError::NotThere { target_mm, position_mm },
         Failure::Overdue { target_mm, position_mm, waited } => {
             StageError::Overdue { target_mm, position_mm, waited_s: waited.as_secs_f64() }
@@ -366,7 +389,7 @@ impl StageCommand {
         match self {
             Self::Home(permit) => permit.check(now),
             Self::MoveTo(permit) => permit.check(now),
-            Self::ClearAlarm => Ok(()),
+            Self::Look | Self::ClearAlarm => Ok(()),
         }
     }
 }

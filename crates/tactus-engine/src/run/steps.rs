@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use tactus_device::StageError;
 use tactus_model::Covering;
 use tactus_plan::{Call, MeanReading, Position, Press, Reply, Step};
 use tactus_safety::{Denied, Violation};
@@ -92,7 +91,7 @@ impl Run {
         height_mm: Option<f64>,
         speed_mm_per_s: Option<f64>,
     ) -> Result<Reply, Broken> {
-        let motion = &self.shared.service.motion;
+        let motion = self.shared.service.motion.clone();
         let to_mm = self.shared.rig.registration.to_robot([to.x_mm, to.y_mm]);
         let z_mm = height_mm.unwrap_or(motion.safe_height_mm);
         self.note_travel(to_mm, z_mm);
@@ -286,7 +285,6 @@ impl Run {
         self.covering = covering;
         self.bounds = self.bounds.clone().under(covering);
         let set = self.shared.acquisition.ask(move |live| {
-            live.covering = covering;
             live.supervisor.set_covering(covering);
         });
         set.await?;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use tactus_device::{Clock, Sensor, SensorEvent, Stage, StageError, Target};
+use tactus_device::{Clock, Sensor, SensorEvent, HomingPermit, Permit, Stage, StageError};
 use tactus_engine::{Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
 use tactus_plan::{Arguments, Limits, RigView, Script};
 use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp, pb};
@@ -129,16 +129,19 @@ impl Stage for FakeStage {
         self.state.subscribe()
     }
 
-    fn home(&self) -> BoxFuture<'_, Result<(), StageError>> {
-        async {
+    fn home(&self, permit: HomingPermit) -> BoxFuture<'_, Result<(), StageError>> {
+        async move {
+            permit.check(self.clock.now().mono)?;
             self.report([25.0, 20.0, 10.0], pb::StageStatus::Idle).await;
             Ok(())
         }
         .boxed()
     }
 
-    fn move_to(&self, target: Target) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
+    fn move_to(&self, permit: Permit) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
         async move {
+            permit.check(self.clock.now().mono)?;
+            let target = permit.target();
             let from = self.position_mm();
             let way: Vec<_> = from.iter().zip(target.position_mm).map(|(from, to)| to - from).collect();
             let distance_mm = way.iter().map(|d| d * d).sum::<f64>().sqrt();
@@ -165,9 +168,15 @@ impl Stage for FakeStage {
         .boxed()
     }
 
+    fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
+        async { Ok(self.position_mm()) }.boxed()
+    }
+
     fn stop(&self) {
         self.stops.send_modify(|stops| *stops += 1);
     }
+
+    fn watch(&self) {}
 
     fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>> {
         async { Ok(()) }.boxed()
@@ -203,7 +212,7 @@ impl Bench {
             pending: None,
         };
         let state = stage.state();
-        let devices = Devices { sensor: Box::new(sensor), stage, stage_reports, change_covering: None };
+        let devices = Devices { sensor: Box::new(sensor), stage, stage_reports, change_covering: None, covering_memory: None };
         let engine = Engine::start(rig, devices, clock, Arc::new(Unpublished)).unwrap();
         Self { engine, trouble, deepest_mm, stage: state }
     }
