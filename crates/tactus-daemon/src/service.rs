@@ -3,7 +3,7 @@
 //! | task | waits for |
 //! |---|---|
 //! | acquisition (in the engine) | frames, reports of the stage, the supervisor's clock |
-//! | stops | `cmd/stop`; nothing else, so that no other command can delay it |
+//! | stops (a thread) | `cmd/stop`, `tactus/stop` and datagrams; nothing else, so that no other command can delay it |
 //! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status` |
 //! | run | the order of one run, until its recording is closed |
 //! | health | once a second |
@@ -12,11 +12,13 @@
 
 mod commands;
 mod health;
+mod lease;
 mod publish;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::thread;
 use std::time::Duration;
 
 use clap::Parser;
@@ -27,9 +29,10 @@ use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles};
 use tactus_runner::embedded::Truth;
 use tactus_runner::{devices, logging};
 use tactus_schema::key::Keys;
+use tokio::runtime::Handle;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::timeout;
-use tracing::{error, info, warn};
+use tracing::{error, info};
 
 use crate::notify;
 use commands::CommandDesk;
@@ -115,10 +118,9 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     let endpoints = BusConfig {
         listen: config.bus.listen.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         connect: config.bus.connect.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
+        guests: config.bus.guests.clone(),
+        tls: None,
     };
-    if !endpoints.is_loopback() {
-        warn!("the bus listens or connects beyond this machine, without access control");
-    }
     let (bus, calls) = Bus::open(&endpoints, keys).await?;
     let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
     let opened = devices::open(&rig, &rig_service, codec, truth, clock);
@@ -126,8 +128,16 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
 
     let Calls { stops, commands } = calls;
     let desk = Arc::new(CommandDesk::new(engine.clone(), config, bus.publisher()));
+    // A thread of its own: no task that waits or computes can keep it from running. It ends with the bus.
+    let (stop_desk, runtime) = (Arc::clone(&desk), Handle::current());
+    thread::Builder::new()
+        .name("stops".into())
+        .spawn(move || {
+            let _entered = runtime.enter();
+            stop_desk.answer_stops(stops);
+        })
+        .map_err(system("thread"))?;
     let tasks = [
-        tokio::spawn(Arc::clone(&desk).answer_stops(stops)),
         tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
         tokio::spawn(health::publish(engine.clone(), bus.publisher())),
         tokio::spawn(notify::feed_watchdog(engine.clone())),

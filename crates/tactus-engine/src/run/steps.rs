@@ -65,9 +65,9 @@ impl Run<'_> {
             return self.shared.check_ended();
         }
         self.set_state(pb::RunPhase::Paused, "paused: `tactus resume` goes on, `tactus stop` ends the run");
-        self.shared.emit(Event::Paused(pb::Paused {}));
+        self.shared.emit(Event::Paused(pb::Paused::default()));
         self.resumed().await?;
-        self.shared.emit(Event::Resumed(pb::Resumed {}));
+        self.shared.emit(Event::Resumed(pb::Resumed::default()));
         self.set_state(pb::RunPhase::Running, "");
         Ok(())
     }
@@ -250,9 +250,9 @@ impl Run<'_> {
             );
             self.shared.control.send_modify(|control| control.paused = true);
             self.set_state(pb::RunPhase::Paused, &ask);
-            self.shared.emit(Event::Paused(pb::Paused {}));
+            self.shared.emit(Event::Paused(pb::Paused::default()));
             self.resumed().await?;
-            self.shared.emit(Event::Resumed(pb::Resumed {}));
+            self.shared.emit(Event::Resumed(pb::Resumed::default()));
             self.set_state(pb::RunPhase::Running, "");
         }
         self.covering = covering;
