@@ -31,7 +31,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let rate_hz: f64 = arguments.next().map_or(Ok(30.0), |text| text.parse())?;
     let lose_every: u64 = arguments.next().map_or(Ok(u64::MAX), |text| text.parse())?;
 
-    let config = BusConfig { listen: vec![endpoint.clone()], connect: Vec::new() };
+    let config = BusConfig { listen: vec![endpoint.clone()], ..BusConfig::default() };
     let (bus, mut calls) = Bus::open(&config, Keys::new(RIG)).await?;
     let mut pulse = Pulse { out: bus.publisher(), start: Instant::now(), run: None, events: 0, rate_hz };
     pulse.introduce();
@@ -126,7 +126,7 @@ impl Pulse {
 
     fn answer(&mut self, CommandCall { command, request, reply }: CommandCall) {
         let refusal = match (command, request, &mut self.run) {
-            (Command::Status | Command::Reset, ..) => None,
+            (Command::Status | Command::Reset | Command::Lease, ..) => None,
             (Command::Run, Request::Run(request), run) => {
                 *run = Some(pb::RunState {
                     run_id: format!("{RIG}-1"),
@@ -148,28 +148,31 @@ impl Pulse {
                 None
             }
             (_, _, None) => Some("no run is going on"),
-            (Command::Pause, ..) => {
-                self.tell(Event::Paused(pb::Paused {}));
+            (Command::Pause, Request::Control(pb::CommandRequest { who, .. }), _) => {
+                self.tell(Event::Paused(pb::Paused { by: who }));
                 self.enter(pb::RunPhase::Paused);
                 None
             }
-            (Command::Resume, ..) => {
-                self.tell(Event::Resumed(pb::Resumed {}));
+            (Command::Resume, Request::Control(pb::CommandRequest { who, .. }), _) => {
+                self.tell(Event::Resumed(pb::Resumed { by: who }));
                 self.enter(pb::RunPhase::Running);
                 None
             }
-            (Command::Stop | Command::Run, ..) => {
+            (Command::Stop, ..) => {
                 let exit_status = pb::ExitStatus::Stopped.into();
                 self.tell(Event::Finished(pb::RunFinished { exit_status, ..Default::default() }));
                 self.enter(pb::RunPhase::Finished);
                 None
             }
+            (Command::Run | Command::Pause | Command::Resume, ..) => Some("the request is another command's"),
         };
         reply.reply(pb::CommandReply {
             ok: refusal.is_none(),
             error: refusal.unwrap_or_default().to_owned(),
             exit_code: u32::from(refusal.is_some()),
             state: self.run.clone(),
+            // Everybody gets it: nothing moves here.
+            lease: Some(pb::Lease { holder: "everybody".to_owned(), expires_in_s: 5.0, lease: vec![1] }),
             rig: RIG.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             ..Default::default()

@@ -1,66 +1,102 @@
 //! The bus on a client's side.
 
-use std::{io, time::Duration};
+use std::{collections::BTreeMap, error::Error, io, time::Duration};
 
 use tactus_schema::{
     Message,
-    key::{Command, Keys},
+    key::{Command, Keys, STOP_EVERY_RIG},
     pb,
 };
-use tokio::{net::TcpStream, time::timeout};
+use tokio::{
+    net::{TcpStream, UnixStream},
+    time::{Instant, timeout, timeout_at},
+};
 use zenoh::{
     Session,
+    handlers::FifoChannelHandler,
     qos::{CongestionControl, Priority},
-    query::ConsolidationMode,
+    query::{ConsolidationMode, QueryTarget, Reply},
+    sample::Sample,
+    session::ZenohId,
 };
 
 use crate::{
-    Alive, BusError, Endpoint, History, Published, Subscription, config, liveness::Roster, topic::encoding,
+    Alive, BusError, Credentials, Endpoint, HeldLease, History, Hold, Published, Subscription, config,
+    liveness::{Roster, Trust},
+    topic::encoding,
 };
 
 /// Time limit for a machine that does not answer.
 const REACH_TIMEOUT: Duration = Duration::from_secs(2);
+/// Time that the other services on the bus have to answer a stop after the one at the endpoint did.
+const OTHERS_PATIENCE: Duration = Duration::from_secs(1);
 
 /// A client of one rig's service.
 #[derive(Debug)]
 pub struct Client {
-    session: Session,
+    caller: Caller,
     endpoint: Endpoint,
-    keys: Keys,
     roster: Roster,
+}
+
+/// What it takes to send commands.
+#[derive(Debug, Clone)]
+pub(crate) struct Caller {
+    session: Session,
+    keys: Keys,
+    trust: Trust,
 }
 
 impl Client {
     /// Connects to the service at an endpoint; fails at once if nothing listens there. Without a rig's name it connects to
-    /// the only rig that is ready.
+    /// the rig of the service that listens there or, if that is a router, to the only rig that is ready.
     ///
     /// # Errors
     /// [`BusError::NoService`], [`BusError::Session`]; [`BusError::RigName`] for an invalid name;
-    /// without a name also [`BusError::NoRig`] and [`BusError::SeveralRigs`].
+    /// without a name also [`BusError::NoRig`] and [`BusError::SeveralRigs`]; behind a router
+    /// [`BusError::SeveralServices`].
     ///
     /// # Panics
     /// On a current-thread tokio runtime, as zenoh does.
     pub async fn connect(endpoint: &Endpoint, rig: Option<&str>) -> Result<Self, BusError> {
+        Self::connect_as(endpoint, rig, &Credentials::default()).await
+    }
+
+    /// As [`Client::connect`], with a certificate for `tls/` endpoints.
+    ///
+    /// # Errors
+    /// As [`Client::connect`].
+    ///
+    /// # Panics
+    /// As [`Client::connect`].
+    pub async fn connect_as(
+        endpoint: &Endpoint,
+        rig: Option<&str>,
+        credentials: &Credentials,
+    ) -> Result<Self, BusError> {
         if let Some(rig) = rig {
             check_rig_name(rig)?;
         }
         reach(endpoint)
             .await
             .map_err(|source| BusError::NoService { endpoint: endpoint.to_string(), source })?;
-        let session = zenoh::open(config::client(endpoint)?)
-            .await
-            .map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source })?;
+        let session = open(endpoint, credentials).await?;
         let roster = Roster::keep(&session).await?;
+        let neighbours: Vec<ZenohId> = session.info().peers_zid().await.collect();
         let rig = match rig {
             Some(rig) => rig.to_owned(),
-            None => the_only_rig(roster.rigs(), endpoint)?,
+            None => the_rig_of(&neighbours, &roster, endpoint)?,
         };
-        Ok(Self { session, endpoint: endpoint.clone(), keys: Keys::new(rig), roster })
+        if roster.is_ambiguous(&rig, &neighbours) {
+            return Err(BusError::SeveralServices { endpoint: endpoint.to_string(), rig });
+        }
+        let caller = Caller { session, trust: roster.trust(&rig), keys: Keys::new(rig) };
+        Ok(Self { caller, endpoint: endpoint.clone(), roster })
     }
 
     /// Name of the rig that this client commands.
     pub fn rig(&self) -> &str {
-        self.keys.rig()
+        self.caller.keys.rig()
     }
 
     /// Endpoint of its service.
@@ -78,9 +114,8 @@ impl Client {
         self.roster.alive(self.rig())
     }
 
-    /// Sends a command and waits for the reply. The request is a [`pb::RunRequest`] for [`Command::Run`] and a
-    /// [`pb::CommandRequest`] for all others. A stop has the highest priority. A refusal is a reply, not an error: see
-    /// [`pb::CommandReply::ok`].
+    /// Sends a command and waits for the reply. The request is that of [`Command`]. A refusal is a reply, not an error: see
+    /// [`pb::CommandReply::ok`]. Answers of others than the rig's service are ignored.
     ///
     /// # Errors
     /// [`BusError::NoAnswer`] if there is no reply in time or the service ended;
@@ -91,36 +126,52 @@ impl Client {
         request: &M,
         patience: Duration,
     ) -> Result<pb::CommandReply, BusError> {
-        let key = self.keys.command(command);
-        let priority = if command == Command::Stop { Priority::RealTime } else { Priority::InteractiveHigh };
-        let replies = self
-            .session
-            .get(&key)
-            .payload(request.encode_to_vec())
-            .encoding(encoding(M::NAME))
-            .consolidation(ConsolidationMode::None)
-            .congestion_control(CongestionControl::Block)
-            .priority(priority)
-            .express(true)
-            .timeout(patience)
-            .await
-            .map_err(BusError::key(&key))?;
-        while let Ok(reply) = replies.recv_async().await {
-            // Errors come from zenoh: a timeout, or a service that ended.
-            if let Ok(sample) = reply.result() {
-                return <pb::CommandReply as prost::Message>::decode(&*sample.payload().to_bytes())
-                    .map_err(|source| BusError::Answer { key, source });
-            }
-        }
-        Err(BusError::NoAnswer { key, waited: patience })
+        self.caller.command(command, request, patience).await
     }
 
-    /// Subscribes to a message's topic.
+    /// Stops the rig, by datagram and on the bus at once; returns the first answer.
+    ///
+    /// # Errors
+    /// As [`Client::command`].
+    pub async fn stop(
+        &self,
+        request: &pb::CommandRequest,
+        patience: Duration,
+    ) -> Result<pb::CommandReply, BusError> {
+        let on_bus = self.command(Command::Stop, request, patience);
+        let datagram = stop_by_datagram(&self.endpoint, Some(self.rig()), request, patience);
+        tokio::pin!(on_bus, datagram);
+        tokio::select! {
+            answer = &mut datagram => match answer {
+                Ok(Some(reply)) => Ok(reply),
+                Ok(None) | Err(_) => on_bus.await,
+            },
+            answer = &mut on_bus => match answer {
+                Ok(reply) => Ok(reply),
+                Err(error) => match datagram.await {
+                    Ok(Some(reply)) => Ok(reply),
+                    Ok(None) | Err(_) => Err(error),
+                },
+            },
+        }
+    }
+
+    /// Takes the lease that run, pause, resume and reset want, and keeps it. With a reason it is taken from whoever has it.
+    ///
+    /// # Errors
+    /// As [`Client::command`].
+    pub async fn hold(&self, who: &str, take_over: Option<&str>) -> Result<Hold, BusError> {
+        HeldLease::take(self.caller.clone(), who, take_over).await
+    }
+
+    /// Subscribes to a message's topic. Messages of others than the rig's service are dropped and counted: see
+    /// [`crate::Losses::foreign`].
     ///
     /// # Errors
     /// [`BusError::Key`] if the session is closed.
     pub async fn subscribe<M: Published>(&self, history: History) -> Result<Subscription<M>, BusError> {
-        Subscription::declare(&self.session, &self.keys, history).await
+        let Caller { session, keys, trust } = &self.caller;
+        Subscription::declare(session, keys, history, trust.clone()).await
     }
 
     /// Closes the connection; subscriptions end.
@@ -128,8 +179,161 @@ impl Client {
     /// # Errors
     /// [`BusError::Close`] if zenoh could not close the session cleanly.
     pub async fn close(self) -> Result<(), BusError> {
-        self.session.close().await.map_err(|source| BusError::Close { source })
+        self.caller.session.close().await.map_err(|source| BusError::Close { source })
     }
+}
+
+impl Caller {
+    /// As [`Client::command`].
+    pub(crate) async fn command<M: Message>(
+        &self,
+        command: Command,
+        request: &M,
+        patience: Duration,
+    ) -> Result<pb::CommandReply, BusError> {
+        let key = self.keys.command(command);
+        let replies = ask(&self.session, &key, command, request, patience).await?;
+        while let Ok(reply) = replies.recv_async().await {
+            // Errors come from zenoh: a timeout, or a service that ended.
+            let (Ok(sample), Some(replier)) = (reply.result(), reply.replier_id()) else { continue };
+            if self.trust.has(&replier.zid()) == Some(true) {
+                return decode(&key, sample);
+            }
+            tracing::warn!(key, replier = %replier.zid(), "an answer that is not the service's is ignored");
+        }
+        Err(BusError::NoAnswer { key, waited: patience })
+    }
+}
+
+/// Stops the rig of that name, or every rig that the bus at an endpoint reaches: by datagram and on the bus at once, without
+/// a lease, and without waiting until a service says that it is ready. Returns the answer of each service.
+///
+/// # Errors
+/// [`BusError::RigName`] for an invalid name; [`BusError::NotStopped`] if no service has answered: then nothing is known.
+///
+/// # Panics
+/// As [`Client::connect`].
+pub async fn stop(
+    endpoint: &Endpoint,
+    rig: Option<&str>,
+    request: &pb::CommandRequest,
+    credentials: &Credentials,
+    patience: Duration,
+) -> Result<Vec<pb::CommandReply>, BusError> {
+    if let Some(rig) = rig {
+        check_rig_name(rig)?;
+    }
+    let datagram = stop_by_datagram(endpoint, rig, request, patience);
+    let on_bus = timeout(patience, stop_on_bus(endpoint, rig, request, credentials, patience));
+    tokio::pin!(datagram, on_bus);
+    let late = |_| Err(BusError::NoAnswer { key: STOP_EVERY_RIG.to_owned(), waited: patience });
+    let (by_datagram, on_bus) = tokio::select! {
+        answer = &mut datagram => {
+            let limit = if matches!(answer, Ok(Some(_))) { OTHERS_PATIENCE } else { patience };
+            (answer, timeout(limit, on_bus).await.unwrap_or(Ok(Ok(Vec::new()))).unwrap_or_else(late))
+        }
+        answers = &mut on_bus => match answers {
+            Ok(Ok(answers)) if !answers.is_empty() => (Ok(None), Ok(answers)),
+            answers => (datagram.await, answers.unwrap_or_else(late)),
+        }
+    };
+    let mut answers = BTreeMap::new();
+    let mut sources: Vec<Box<dyn Error + Send + Sync>> = Vec::new();
+    match by_datagram {
+        Ok(reply) => answers.extend(reply.map(|reply| (reply.rig.clone(), reply))),
+        Err(error) => sources.push(Box::new(error)),
+    }
+    match on_bus {
+        Ok(replies) => answers.extend(replies.into_iter().map(|reply| (reply.rig.clone(), reply))),
+        Err(error) => sources.push(Box::new(error)),
+    }
+    if answers.is_empty() {
+        let source = sources.pop().unwrap_or_else(|| "nobody serves the rig there".into());
+        return Err(BusError::NotStopped { endpoint: endpoint.to_string(), source });
+    }
+    Ok(answers.into_values().collect())
+}
+
+/// Sends a stop to the endpoint's place for datagrams, if it has one.
+async fn stop_by_datagram(
+    endpoint: &Endpoint,
+    rig: Option<&str>,
+    request: &pb::CommandRequest,
+    patience: Duration,
+) -> io::Result<Option<pb::CommandReply>> {
+    let (endpoint, rig, request) = (endpoint.clone(), rig.map(str::to_owned), request.clone());
+    tokio::task::spawn_blocking(move || crate::stop::send(&endpoint, rig.as_deref(), &request, patience))
+        .await
+        .map_err(io::Error::other)?
+}
+
+/// Sends a stop on the bus, and waits for the answers of all services that it concerns.
+async fn stop_on_bus(
+    endpoint: &Endpoint,
+    rig: Option<&str>,
+    request: &pb::CommandRequest,
+    credentials: &Credentials,
+    patience: Duration,
+) -> Result<Vec<pb::CommandReply>, BusError> {
+    let until = Instant::now() + patience;
+    let session = open(endpoint, credentials).await?;
+    let key = rig.map_or(STOP_EVERY_RIG.to_owned(), |rig| Keys::new(rig).command(Command::Stop));
+    let replies = ask(&session, &key, Command::Stop, request, patience).await?;
+    // The stop is on its way; only now it is asked who has to answer it.
+    let roster = Roster::keep(&session).await?;
+    let mut awaited = roster.running();
+    awaited.retain(|(of, _)| rig.is_none_or(|rig| rig == of));
+    let mut answers = Vec::new();
+    while !awaited.is_empty()
+        && let Ok(Ok(reply)) = timeout_at(until, replies.recv_async()).await
+    {
+        let (Ok(sample), Some(replier)) = (reply.result(), reply.replier_id()) else { continue };
+        if let Some(known) = awaited.iter().position(|(_, id)| *id == replier.zid()) {
+            let (rig, _) = awaited.remove(known);
+            answers.push(pb::CommandReply { rig, ..decode(&key, sample)? });
+        }
+    }
+    // Another service may only say that it is the rig's: it counts if all have answered.
+    answers.retain(|reply| awaited.iter().all(|(rig, _)| *rig != reply.rig));
+    if let Err(error) = session.close().await {
+        tracing::debug!(%error, "the connection did not close cleanly");
+    }
+    Ok(answers)
+}
+
+/// Sends a request; all services that have the key answer.
+async fn ask<M: Message>(
+    session: &Session,
+    key: &str,
+    command: Command,
+    request: &M,
+    patience: Duration,
+) -> Result<FifoChannelHandler<Reply>, BusError> {
+    // A stop has the highest priority.
+    let priority = if command == Command::Stop { Priority::RealTime } else { Priority::InteractiveHigh };
+    session
+        .get(key)
+        .payload(request.encode_to_vec())
+        .encoding(encoding(M::NAME))
+        .target(QueryTarget::All)
+        .consolidation(ConsolidationMode::None)
+        .congestion_control(CongestionControl::Block)
+        .priority(priority)
+        .express(true)
+        .timeout(patience)
+        .await
+        .map_err(BusError::key(key))
+}
+
+fn decode(key: &str, sample: &Sample) -> Result<pb::CommandReply, BusError> {
+    <pb::CommandReply as prost::Message>::decode(&*sample.payload().to_bytes())
+        .map_err(|source| BusError::Answer { key: key.to_owned(), source })
+}
+
+async fn open(endpoint: &Endpoint, credentials: &Credentials) -> Result<Session, BusError> {
+    zenoh::open(config::client(endpoint, credentials)?)
+        .await
+        .map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source })
 }
 
 /// Refuses names with wildcards, which would command every rig on the bus.
@@ -143,9 +347,24 @@ fn check_rig_name(rig: &str) -> Result<(), BusError> {
 
 /// Checks with a plain connection whether anything listens; zenoh would need seconds.
 async fn reach(endpoint: &Endpoint) -> io::Result<()> {
-    match timeout(REACH_TIMEOUT, TcpStream::connect(endpoint.address())).await {
-        Ok(connected) => connected.map(drop),
+    let connected = async {
+        match endpoint.unix_path() {
+            Some(path) => UnixStream::connect(path).await.map(drop),
+            None => TcpStream::connect(endpoint.address()).await.map(drop),
+        }
+    };
+    match timeout(REACH_TIMEOUT, connected).await {
+        Ok(connected) => connected,
         Err(_) => Err(io::Error::new(io::ErrorKind::TimedOut, "the machine does not answer")),
+    }
+}
+
+/// The rig of the service at the other end of the connection or, if that is a router, the only one that is ready.
+fn the_rig_of(neighbours: &[ZenohId], roster: &Roster, endpoint: &Endpoint) -> Result<String, BusError> {
+    let mut own = roster.rigs_of(neighbours);
+    match (own.pop(), own.is_empty()) {
+        (Some(rig), true) => Ok(rig),
+        _ => the_only_rig(roster.rigs(), endpoint),
     }
 }
 

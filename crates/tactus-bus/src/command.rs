@@ -1,11 +1,11 @@
 //! Commands on the service's side.
 
-use std::sync::Arc;
+use std::{mem, sync::Arc};
 
 use prost::{DecodeError, Message as _};
 use tactus_schema::{
     Message,
-    key::{Command, Keys},
+    key::{Command, Keys, STOP_EVERY_RIG},
     pb,
 };
 use tokio::{
@@ -14,17 +14,20 @@ use tokio::{
 };
 use zenoh::{
     Session, Wait,
-    bytes::Encoding,
+    bytes::{Encoding, ZBytes},
     query::{Query, Queryable},
 };
 
-use crate::{BusError, queue::Queue, topic::encoding};
+use crate::{BusError, queue::Queue, stop::StopSender, topic::encoding};
 
 /// Commands that can wait for the service. Further ones are refused with an error.
 const WAITING_COMMANDS: usize = 16;
 
 /// Replies that can wait to be sent.
 const WAITING_ANSWERS: usize = 256;
+
+/// Longest request, in bytes: a script with its parameters. A longer one is refused.
+const REQUEST_BYTES_MAX: usize = 1 << 20;
 
 /// Exit code of an invalid request.
 const EXIT_USAGE: u32 = 2;
@@ -36,7 +39,7 @@ const EXIT_FAILED: u32 = 1;
 /// Stops have their own channel. Read [`Calls::stops`] in its own task, so that a stop never waits for another command.
 #[derive(Debug)]
 pub struct Calls {
-    /// Calls of `cmd/stop`.
+    /// Stops: of `cmd/stop`, of [`STOP_EVERY_RIG`], and datagrams.
     pub stops: mpsc::Receiver<CommandCall>,
     /// All other calls, in order of arrival.
     pub commands: mpsc::Receiver<CommandCall>,
@@ -53,11 +56,13 @@ pub struct CommandCall {
     pub reply: Responder,
 }
 
-/// Arguments of a command.
+/// Arguments of a command. Who asks is not empty.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Request {
     /// Of [`Command::Run`].
     Run(pb::RunRequest),
+    /// Of [`Command::Lease`].
+    Lease(pb::LeaseRequest),
     /// Of all other commands.
     Control(pb::CommandRequest),
 }
@@ -65,8 +70,13 @@ pub enum Request {
 /// Sends the reply to the client.
 #[derive(Debug)]
 pub struct Responder {
-    query: Query,
-    replies: Replies,
+    to: ReplyTo,
+}
+
+#[derive(Debug)]
+enum ReplyTo {
+    Bus { query: Query, key: Arc<str>, replies: Replies },
+    Datagram(StopSender),
 }
 
 /// A reply waiting to be sent. One thread sends all replies: a stalled client can delay another client's reply, once,
@@ -74,6 +84,7 @@ pub struct Responder {
 #[derive(Debug)]
 pub(crate) struct PendingReply {
     query: Query,
+    key: Arc<str>,
     reply: pb::CommandReply,
 }
 
@@ -85,10 +96,17 @@ pub(crate) struct Replies {
 }
 
 impl Responder {
+    /// Replies to a datagram.
+    pub(crate) fn to_datagram(sender: StopSender) -> Self {
+        Self { to: ReplyTo::Datagram(sender) }
+    }
+
     /// Sends the reply. Never waits.
     pub fn reply(self, reply: pb::CommandReply) {
-        let Self { query, replies } = self;
-        replies.send(query, reply);
+        match self.to {
+            ReplyTo::Bus { query, key, replies } => replies.send(query, key, reply),
+            ReplyTo::Datagram(sender) => sender.answer(&reply),
+        }
     }
 }
 
@@ -98,10 +116,10 @@ impl Replies {
         Self { answers, runtime: Handle::current() }
     }
 
-    fn send(&self, query: Query, reply: pb::CommandReply) {
-        if let Some(displaced) = self.answers.push(PendingReply { query, reply }) {
+    fn send(&self, query: Query, key: Arc<str>, reply: pb::CommandReply) {
+        if let Some(displaced) = self.answers.push(PendingReply { query, key, reply }) {
             tracing::warn!(
-                key = %displaced.query.key_expr(),
+                key = %displaced.key,
                 "a reply is not sent: too many are waiting, or the bus is closed"
             );
             drop_on_blocking_thread(displaced.query, &self.runtime);
@@ -118,13 +136,11 @@ pub(crate) fn answers() -> Arc<Queue<PendingReply>> {
 impl PendingReply {
     /// Sends the reply; may wait for the client.
     pub(crate) fn send(self) {
-        let Self { query, reply } = self;
-        let sent = query
-            .reply(query.key_expr(), reply.encode_to_vec())
-            .encoding(encoding(pb::CommandReply::NAME))
-            .wait();
+        let Self { query, key, reply } = self;
+        let sent =
+            query.reply(&*key, reply.encode_to_vec()).encoding(encoding(pb::CommandReply::NAME)).wait();
         if let Err(error) = sent {
-            tracing::warn!(key = %query.key_expr(), %error, "the reply did not reach its client");
+            tracing::warn!(%key, %error, "the reply did not reach its client");
         }
     }
 }
@@ -134,34 +150,54 @@ pub(crate) fn drop_on_blocking_thread(query: Query, runtime: &Handle) {
     runtime.spawn_blocking(move || drop(query));
 }
 
+/// The two channels of [`Calls`], on the side that receives from the bus.
+#[derive(Debug, Clone)]
+pub(crate) struct Intake {
+    pub(crate) stops: mpsc::Sender<CommandCall>,
+    commands: mpsc::Sender<CommandCall>,
+}
+
+/// The channels.
+pub(crate) fn channels() -> (Intake, Calls) {
+    // Both bounded; a call that does not fit is refused at once.
+    let (stop, stops) = mpsc::channel(WAITING_COMMANDS);
+    let (other, commands) = mpsc::channel(WAITING_COMMANDS);
+    (Intake { stops: stop, commands: other }, Calls { stops, commands })
+}
+
 /// Declares the rig's commands.
 pub(crate) async fn declare(
     session: &Session,
     keys: &Keys,
+    intake: &Intake,
     replies: &Replies,
-) -> Result<(Vec<Queryable<()>>, Calls), BusError> {
-    // Both bounded; a call that does not fit is refused at once.
-    let (stop, stops) = mpsc::channel(WAITING_COMMANDS);
-    let (other, commands) = mpsc::channel(WAITING_COMMANDS);
+) -> Result<Vec<Queryable<()>>, BusError> {
+    let of_rig = Command::ALL.map(|command| (command, keys.command(command)));
     let mut queryables = Vec::new();
-    for command in Command::ALL {
-        let key = keys.command(command);
-        let calls = if command == Command::Stop { stop.clone() } else { other.clone() };
+    for (command, key) in of_rig.into_iter().chain([(Command::Stop, STOP_EVERY_RIG.to_owned())]) {
+        let calls = if command == Command::Stop { &intake.stops } else { &intake.commands }.clone();
         let replies = replies.clone();
         let rig = keys.rig().to_owned();
+        let exact: Arc<str> = key.as_str().into();
         let queryable = session
             .declare_queryable(&key)
             .callback(move |query| {
-                if let Err(refusal) = take_in(command, query, &calls, &replies) {
+                // A question to many keys is a read: a wildcard must not command.
+                if query.key_expr().as_str() != &*exact {
+                    tracing::debug!(asked = %query.key_expr(), key = %exact, "a wildcard commands nothing");
+                    drop_on_blocking_thread(query, &replies.runtime);
+                    return;
+                }
+                if let Err(refusal) = take_in(command, query, &exact, &calls, &replies) {
                     let (query, reply) = *refusal;
-                    replies.send(query, pb::CommandReply { rig: rig.clone(), ..reply });
+                    replies.send(query, exact.clone(), pb::CommandReply { rig: rig.clone(), ..reply });
                 }
             })
             .await
             .map_err(BusError::key(&key))?;
         queryables.push(queryable);
     }
-    Ok((queryables, Calls { stops, commands }))
+    Ok(queryables)
 }
 
 /// Passes a query on to the service.
@@ -170,21 +206,28 @@ pub(crate) async fn declare(
 /// The refusal, with its query.
 fn take_in(
     command: Command,
-    query: Query,
+    mut query: Query,
+    key: &Arc<str>,
     calls: &mpsc::Sender<CommandCall>,
     replies: &Replies,
 ) -> Result<(), Box<(Query, pb::CommandReply)>> {
-    let request = match read(command, &query) {
+    // Taken out: a waiting reply then holds no request.
+    let payload = query.payload_mut().map(mem::take);
+    let request = match read(command, query.encoding(), payload.as_ref()) {
         Ok(request) => request,
         Err(error) => return Err(Box::new((query, refusal(EXIT_USAGE, error)))),
     };
-    let call = CommandCall { command, request, reply: Responder { query, replies: replies.clone() } };
-    calls.try_send(call).map_err(|refused| {
+    let to = ReplyTo::Bus { query, key: key.clone(), replies: replies.clone() };
+    let call = CommandCall { command, request, reply: Responder { to } };
+    calls.try_send(call).or_else(|refused| {
         let (call, error) = match refused {
             TrySendError::Full(call) => (call, format!("{WAITING_COMMANDS} commands are waiting; try again")),
             TrySendError::Closed(call) => (call, "the service is shutting down".to_owned()),
         };
-        Box::new((call.reply.query, refusal(EXIT_FAILED, error)))
+        match call.reply.to {
+            ReplyTo::Bus { query, .. } => Err(Box::new((query, refusal(EXIT_FAILED, error)))),
+            ReplyTo::Datagram(_) => Ok(()),
+        }
     })
 }
 
@@ -193,28 +236,56 @@ fn refusal(exit_code: u32, error: String) -> pb::CommandReply {
 }
 
 /// Decodes the arguments of a command. A stop is valid whatever its arguments are.
-fn read(command: Command, query: &Query) -> Result<Request, String> {
-    let payload = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+fn read(command: Command, given: Option<&Encoding>, payload: Option<&ZBytes>) -> Result<Request, String> {
     match command {
-        Command::Run => decode::<pb::RunRequest>(query.encoding(), &payload).map(Request::Run),
-        Command::Status | Command::Pause | Command::Resume | Command::Reset => {
-            decode::<pb::CommandRequest>(query.encoding(), &payload).map(Request::Control)
+        Command::Run => {
+            let request: pb::RunRequest = decode(given, payload)?;
+            named(&request.who)?;
+            Ok(Request::Run(request))
         }
-        Command::Stop => {
-            let request = decode::<pb::CommandRequest>(query.encoding(), &payload).unwrap_or_else(|error| {
-                tracing::warn!(%error, "a stop with an unreadable request; stopping anyway");
-                pb::CommandRequest { who: "unknown".to_owned(), reason: error, abort: false }
-            });
+        Command::Lease => {
+            let request: pb::LeaseRequest = decode(given, payload)?;
+            named(&request.who)?;
+            Ok(Request::Lease(request))
+        }
+        Command::Status | Command::Pause | Command::Resume | Command::Reset => {
+            let request: pb::CommandRequest = decode(given, payload)?;
+            named(&request.who)?;
             Ok(Request::Control(request))
         }
+        Command::Stop => Ok(Request::Control(match decode::<pb::CommandRequest>(given, payload) {
+            Ok(request) if request.who.is_empty() => {
+                pb::CommandRequest { who: "unknown".to_owned(), ..request }
+            }
+            Ok(request) => request,
+            Err(error) => unreadable_stop(error),
+        })),
     }
 }
 
-fn decode<M: Message>(given: Option<&Encoding>, payload: &[u8]) -> Result<M, String> {
+/// The stop of a client that nobody understands.
+pub(crate) fn unreadable_stop(error: String) -> pb::CommandRequest {
+    tracing::warn!(%error, "a stop with an unreadable request; stopping anyway");
+    pb::CommandRequest { who: "unknown".to_owned(), reason: error, ..Default::default() }
+}
+
+fn named(who: &str) -> Result<(), String> {
+    if who.is_empty() { Err("the request does not say who asks".to_owned()) } else { Ok(()) }
+}
+
+fn decode<M: Message>(given: Option<&Encoding>, payload: Option<&ZBytes>) -> Result<M, String> {
     let expected = encoding(M::NAME);
+    let Some(payload) = payload else { return Err(format!("a command carries a {}", M::NAME)) };
+    if payload.len() > REQUEST_BYTES_MAX {
+        return Err(format!(
+            "the request has {} bytes; at most {REQUEST_BYTES_MAX} are taken",
+            payload.len()
+        ));
+    }
     // Simple tools send no encoding, or zenoh's default, bytes.
     if let Some(given) = given.filter(|given| **given != Encoding::ZENOH_BYTES && **given != expected) {
         return Err(format!("this command takes {expected}, not {given}"));
     }
-    M::decode(payload).map_err(|error: DecodeError| format!("this is not a {}: {error}", M::NAME))
+    M::decode(&*payload.to_bytes())
+        .map_err(|error: DecodeError| format!("this is not a {}: {error}", M::NAME))
 }

@@ -2,7 +2,14 @@ use super::Endpoint;
 
 #[test]
 fn well_formed_endpoints_keep_their_text() {
-    for text in ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tcp/lab-3.example.org:1", "tcp/0.0.0.0:65535"] {
+    for text in [
+        "tcp/127.0.0.1:7447",
+        "tcp/[::1]:7447",
+        "tcp/lab-3.example.org:1",
+        "tcp/0.0.0.0:65535",
+        "tls/lab-3:7447",
+        "unixsock-stream//run/tactus/bus.sock",
+    ] {
         assert_eq!(text.parse::<Endpoint>().unwrap().to_string(), text);
     }
     assert_eq!(Endpoint::default().to_string(), "tcp/127.0.0.1:7447");
@@ -23,6 +30,8 @@ fn malformed_endpoints_are_refused_with_the_reason() {
         ("tcp/a b:7447", "host"),
         ("tcp/127.0.0.1?rel=0:7447", "host"),
         ("tcp/127.0.0.1:7447#iface=eth0", "1 to 65535"),
+        ("unixsock-stream/bus.sock", "begins with /"),
+        ("unixsock-stream//run/a?b", "letters"),
     ] {
         let error = text.parse::<Endpoint>().unwrap_err().to_string();
         assert!(error.contains(reason) && error.contains(&format!("{text:?}")), "{text}: {error}");
@@ -36,6 +45,9 @@ fn loopback_is_told_from_the_world() {
         ("tcp/127.9.9.9:7447", true),
         ("tcp/[::1]:7447", true),
         ("tcp/localhost:7447", true),
+        ("tls/127.0.0.1:7447", true),
+        ("unixsock-stream//run/tactus/bus.sock", true),
+        ("tls/0.0.0.0:7447", false),
         ("tcp/0.0.0.0:7447", false),
         ("tcp/[::]:7447", false),
         ("tcp/192.168.1.4:7447", false),

@@ -6,9 +6,20 @@ use std::{error::Error, io, time::Duration};
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum BusError {
-    /// An endpoint that is not `tcp/HOST:PORT`.
+    /// An endpoint that is none of the forms of [`crate::Endpoint`].
     #[error("endpoint {endpoint:?}: {reason}; it should read tcp/HOST:PORT, such as tcp/127.0.0.1:7447")]
     Endpoint { endpoint: String, reason: &'static str },
+    /// An endpoint that other machines reach without a certificate.
+    #[error("the bus does not listen on {endpoint}: {reason}")]
+    Unprotected { endpoint: String, reason: &'static str },
+    /// What should be denied was not: see [`crate::BusConfig`].
+    #[error(
+        "the bus does not listen on {endpoint}: a client {who} could command the rig; see docs/security.md"
+    )]
+    NotDenied { endpoint: String, who: String },
+    /// Another program takes the datagrams of stops.
+    #[error("cannot take stops at {endpoint}; does another program use that place?")]
+    Stop { endpoint: String, source: io::Error },
     /// The service's session could not be opened.
     #[error("cannot open the bus on {listen}; is another service listening there?")]
     Open { listen: String, source: Box<dyn Error + Send + Sync> },
@@ -18,6 +29,11 @@ pub enum BusError {
     /// The program that listens at the endpoint does not use the bus's protocol.
     #[error("the program at {endpoint} does not answer as a Tactus service")]
     Session { endpoint: String, source: Box<dyn Error + Send + Sync> },
+    /// Two programs say that they are one rig's service.
+    #[error(
+        "several programs at {endpoint} say that they are the service of rig {rig:?}; connect to the service itself"
+    )]
+    SeveralServices { endpoint: String, rig: String },
     /// A rig's name with characters that a key cannot have.
     #[error("rig name {rig:?}: letters, digits, '-' and '_' only")]
     RigName { rig: String },
@@ -27,6 +43,9 @@ pub enum BusError {
     /// Several rigs are ready and none was named.
     #[error("several rigs are ready at {endpoint}: {}; name one", .rigs.join(", "))]
     SeveralRigs { endpoint: String, rigs: Vec<String> },
+    /// No service answered a stop, neither to a datagram nor on the bus.
+    #[error("STOP WAS NOT CONFIRMED: no service at {endpoint} answered. Use the emergency stop")]
+    NotStopped { endpoint: String, source: Box<dyn Error + Send + Sync> },
     /// Zenoh refused a key.
     #[error("the bus refused {key}")]
     Key { key: String, source: Box<dyn Error + Send + Sync> },

@@ -20,27 +20,35 @@
 //!
 //! By default the bus uses loopback only: multicast scouting and gossip are off, and the service listens on
 //! `tcp/127.0.0.1:7447`.
+//!
+//! A client can read, ask and command, and nothing else: `access` has the rules. A command is a request to exactly its key
+//! by who holds the lease ([`Client::hold`]); a stop needs neither a lease nor a connection ([`stop()`]). Clients
+//! believe only the session that the service has announced.
 
+mod access;
 mod cache;
 mod client;
 mod command;
 mod config;
 mod endpoint;
 mod error;
+mod lease;
 mod liveness;
 mod merge;
 mod publisher;
 mod queue;
 mod service;
+mod stop;
 mod subscription;
 mod topic;
 mod worker;
 
-pub use client::Client;
+pub use client::{Client, stop};
 pub use command::{Calls, CommandCall, Request, Responder};
-pub use config::BusConfig;
+pub use config::{BusConfig, Credentials, TlsConfig};
 pub use endpoint::Endpoint;
 pub use error::BusError;
+pub use lease::{HeldLease, Hold};
 pub use liveness::{Alive, AliveToken};
 pub use publisher::Publisher;
 pub use service::Bus;

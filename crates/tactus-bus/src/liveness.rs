@@ -1,6 +1,12 @@
-//! Liveliness: the service's token, and the clients' view of it.
+//! Liveliness: the service's tokens, and the clients' view of them.
+//!
+//! A service holds two tokens. `tactus/<rig>/service/<instance>` says from its start which session on the bus is the
+//! rig's: clients believe the answers and messages of that session only. `tactus/<rig>/alive` says that it is ready.
 
-use std::{collections::BTreeSet, time::Duration};
+use std::{
+    collections::{BTreeSet, VecDeque},
+    time::Duration,
+};
 
 use tactus_schema::key::Keys;
 use tokio::sync::watch;
@@ -9,12 +15,18 @@ use zenoh::{
     liveliness::LivelinessToken,
     pubsub::Subscriber,
     sample::{Sample, SampleKind},
+    session::ZenohId,
 };
 
 use crate::BusError;
 
-/// Time limit for the list of ready rigs when a client connects.
+/// Time limit for the list of services when a client connects.
 const ROLL_CALL_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// Instances of one rig that are remembered, so that their last messages are still believed after they have ended.
+const REMEMBERED: usize = 16;
+/// Services that a client keeps in mind; announcements of further ones are ignored.
+const SERVICES_MAX: usize = 1_024;
 
 /// Shows clients that the service is ready. They see it disappear when it is dropped or the process dies.
 #[derive(Debug)]
@@ -23,94 +35,251 @@ pub struct AliveToken {
     _token: LivelinessToken,
 }
 
+/// Shows clients which session is the service's.
+#[derive(Debug)]
+pub(crate) struct InstanceToken {
+    _token: LivelinessToken,
+}
+
 /// Follows whether a rig's service is ready.
 #[derive(Debug)]
 pub struct Alive {
     rig: String,
-    ready: watch::Receiver<BTreeSet<String>>,
+    known: watch::Receiver<Known>,
     /// The state told last.
-    known: bool,
+    told: bool,
 }
 
-/// The set of ready rigs, kept up to date.
+/// The services on the bus, kept up to date.
 #[derive(Debug)]
 pub(crate) struct Roster {
-    ready: watch::Receiver<BTreeSet<String>>,
+    known: watch::Receiver<Known>,
     _subscriber: Subscriber<()>,
+}
+
+/// Which sessions on the bus speak for one rig.
+#[derive(Debug, Clone)]
+pub(crate) struct Trust {
+    rig: String,
+    known: watch::Receiver<Known>,
+}
+
+/// The announced services.
+#[derive(Debug, Default)]
+pub(crate) struct Known {
+    /// Rigs that are ready.
+    ready: BTreeSet<String>,
+    /// Running instances in the order of their announcements.
+    running: Vec<(String, ZenohId)>,
+    /// Instances that speak for their rig, the newest last. An instance that is announced while another one speaks for
+    /// the same rig does not, until that one has ended.
+    believed: VecDeque<(String, ZenohId)>,
+}
+
+/// What an announcement is about.
+#[derive(Debug, PartialEq, Eq)]
+enum Announced<'a> {
+    Alive(&'a str),
+    Instance(&'a str, ZenohId),
 }
 
 impl AliveToken {
     pub(crate) async fn declare(session: &Session, keys: &Keys) -> Result<Self, BusError> {
-        let key = keys.alive();
-        let token = session.liveliness().declare_token(&key).await.map_err(BusError::key(&key))?;
-        Ok(Self { _token: token })
+        Ok(Self { _token: token(session, &keys.alive()).await? })
     }
+}
+
+impl InstanceToken {
+    pub(crate) async fn declare(session: &Session, keys: &Keys) -> Result<Self, BusError> {
+        Ok(Self { _token: token(session, &keys.instance(&session.zid().to_string())).await? })
+    }
+}
+
+async fn token(session: &Session, key: &str) -> Result<LivelinessToken, BusError> {
+    session.liveliness().declare_token(key.to_owned()).await.map_err(BusError::key(key))
 }
 
 impl Alive {
     /// True if the service is ready now.
     pub fn now(&self) -> bool {
-        self.ready.borrow().contains(&self.rig)
+        self.known.borrow().ready.contains(&self.rig)
     }
 
     /// Waits for a change and returns the new state; `None` once the client is closed. The first change is relative to the
     /// state at creation. Cancel-safe.
     pub async fn changed(&mut self) -> Option<bool> {
-        let (rig, known) = (&self.rig, self.known);
-        self.ready.wait_for(|ready| ready.contains(rig) != known).await.ok()?;
-        self.known = !known;
-        Some(self.known)
+        let (rig, told) = (&self.rig, self.told);
+        self.known.wait_for(|known| known.ready.contains(rig) != told).await.ok()?;
+        self.told = !told;
+        Some(self.told)
+    }
+}
+
+impl Trust {
+    /// True if the session speaks for the rig; `None` while no session does.
+    pub(crate) fn has(&self, session: &ZenohId) -> Option<bool> {
+        self.known.borrow().believes(&self.rig, session)
+    }
+
+    /// As [`Trust::has`], once a session speaks for the rig; `None` once the client is closed. Cancel-safe.
+    pub(crate) async fn wait(&mut self, session: &ZenohId) -> Option<bool> {
+        let rig = self.rig.clone();
+        self.known
+            .wait_for(|known| known.believes(&rig, session).is_some())
+            .await
+            .ok()?
+            .believes(&rig, session)
+    }
+}
+
+impl Known {
+    /// False for a session that is not believed while another one is; `None` without any.
+    fn believes(&self, rig: &str, session: &ZenohId) -> Option<bool> {
+        if self.believed.iter().any(|(of, id)| of == rig && id == session) {
+            return Some(true);
+        }
+        self.speaks(rig).map(|_| false)
+    }
+
+    /// The running instance that is believed.
+    fn speaks(&self, rig: &str) -> Option<ZenohId> {
+        let runs = |of: &str, id: &ZenohId| self.running.iter().any(|(other, run)| other == of && run == id);
+        self.believed.iter().rev().find(|(of, id)| of == rig && runs(of, id)).map(|(_, id)| *id)
+    }
+
+    fn on_token(&mut self, announced: &Announced<'_>, kind: SampleKind) {
+        match (announced, kind) {
+            (Announced::Alive(rig), SampleKind::Put) => {
+                if self.ready.len() < SERVICES_MAX {
+                    self.ready.insert((*rig).to_owned());
+                }
+            }
+            (Announced::Alive(rig), SampleKind::Delete) => {
+                self.ready.remove(*rig);
+            }
+            (Announced::Instance(rig, id), SampleKind::Put) => {
+                let one = ((*rig).to_owned(), *id);
+                if self.running.len() < SERVICES_MAX && !self.running.contains(&one) {
+                    self.running.push(one);
+                    self.believe_the_first(rig);
+                }
+            }
+            (Announced::Instance(rig, id), SampleKind::Delete) => {
+                self.running.retain(|(of, run)| (of, run) != (&(*rig).to_owned(), id));
+                self.believe_the_first(rig);
+            }
+        }
+    }
+
+    /// Believes the longest running instance of a rig that nobody speaks for.
+    fn believe_the_first(&mut self, rig: &str) {
+        if self.speaks(rig).is_none()
+            && let Some(first) = self.running.iter().find(|(of, _)| of == rig)
+        {
+            self.believed.push_back(first.clone());
+            if self.believed.iter().filter(|(of, _)| of == rig).count() > REMEMBERED
+                && let Some(oldest) = self.believed.iter().position(|(of, _)| of == rig)
+            {
+                self.believed.remove(oldest);
+            }
+        }
+    }
+
+    /// Believes an instance although another one was announced first: the client is connected to it.
+    fn prefer(&mut self, neighbours: &[ZenohId]) {
+        let own = self.running.iter().filter(|(_, id)| neighbours.contains(id)).cloned().collect::<Vec<_>>();
+        for (rig, id) in own {
+            self.believed.retain(|(of, _)| *of != rig);
+            self.believed.push_back((rig, id));
+        }
     }
 }
 
 impl Roster {
-    /// Returns once the ready rigs are known.
+    /// Returns once the services are known.
     pub(crate) async fn keep(session: &Session) -> Result<Self, BusError> {
-        let everyone = Keys::new("*").alive();
+        let everyone = "tactus/**";
         // Only the latest state counts, and a watch keeps no more.
-        let (told, ready) = watch::channel(BTreeSet::new());
+        let (to_known, known) = watch::channel(Known::default());
+        let hear = {
+            let to_known = to_known.clone();
+            move |sample: Sample| {
+                if let Some(announced) = announced(sample.key_expr().as_str()) {
+                    to_known.send_modify(|known| known.on_token(&announced, sample.kind()));
+                }
+            }
+        };
         // Reports present tokens first, then changes.
         let subscriber = session
             .liveliness()
-            .declare_subscriber(&everyone)
+            .declare_subscriber(everyone)
             .history(true)
-            .callback(move |sample: Sample| {
-                let Some(rig) = rig_of(sample.key_expr().as_str()) else { return };
-                told.send_modify(|ready| {
-                    match sample.kind() {
-                        SampleKind::Put => ready.insert(rig.to_owned()),
-                        SampleKind::Delete => ready.remove(rig),
-                    };
-                });
-            })
+            .callback(hear)
             .await
-            .map_err(BusError::key(&everyone))?;
+            .map_err(BusError::key(everyone))?;
         // The subscriber does not show when all present tokens were reported. The end of a query on the same link, sent
         // after the subscription, does. Its replies are ignored, because zenoh may omit known tokens.
         let roll_call = session
             .liveliness()
-            .get(&everyone)
+            .get(everyone)
             .timeout(ROLL_CALL_TIMEOUT)
             .await
-            .map_err(BusError::key(&everyone))?;
+            .map_err(BusError::key(everyone))?;
         while roll_call.recv_async().await.is_ok() {}
-        Ok(Self { ready, _subscriber: subscriber })
+        let neighbours: Vec<_> = session.info().peers_zid().await.collect();
+        to_known.send_modify(|known| known.prefer(&neighbours));
+        Ok(Self { known, _subscriber: subscriber })
     }
 
     /// Names of the rigs that are ready now, sorted.
     pub(crate) fn rigs(&self) -> Vec<String> {
-        self.ready.borrow().iter().cloned().collect()
+        self.known.borrow().ready.iter().cloned().collect()
+    }
+
+    /// Names of the ready rigs whose service is one of these sessions, sorted.
+    pub(crate) fn rigs_of(&self, sessions: &[ZenohId]) -> Vec<String> {
+        let known = self.known.borrow();
+        let of = |rig: &&String| known.speaks(rig).is_some_and(|id| sessions.contains(&id));
+        known.ready.iter().filter(of).cloned().collect()
+    }
+
+    /// The instances that run, with their rigs.
+    pub(crate) fn running(&self) -> Vec<(String, ZenohId)> {
+        self.known.borrow().running.clone()
+    }
+
+    /// True if more than one instance says that it is the rig's, and none of them is at the other end of the connection.
+    pub(crate) fn is_ambiguous(&self, rig: &str, neighbours: &[ZenohId]) -> bool {
+        let known = self.known.borrow();
+        let mut of_rig = known.running.iter().filter(|(of, _)| of == rig);
+        of_rig.clone().count() > 1 && !of_rig.any(|(_, id)| neighbours.contains(id))
     }
 
     /// Follows one rig.
     pub(crate) fn alive(&self, rig: &str) -> Alive {
-        let ready = self.ready.clone();
-        let known = ready.borrow().contains(rig);
-        Alive { rig: rig.to_owned(), ready, known }
+        let known = self.known.clone();
+        let told = known.borrow().ready.contains(rig);
+        Alive { rig: rig.to_owned(), known, told }
+    }
+
+    /// The sessions that speak for a rig.
+    pub(crate) fn trust(&self, rig: &str) -> Trust {
+        Trust { rig: rig.to_owned(), known: self.known.clone() }
     }
 }
 
-/// The rig in `tactus/<rig>/alive`.
-fn rig_of(key: &str) -> Option<&str> {
-    key.split('/').nth(1)
+/// Reads `tactus/<rig>/alive` and `tactus/<rig>/service/<instance>`.
+fn announced(key: &str) -> Option<Announced<'_>> {
+    let mut parts = key.strip_prefix("tactus/")?.split('/');
+    let rig = parts.next()?;
+    let announced = match (parts.next()?, parts.next()) {
+        ("alive", None) => Announced::Alive(rig),
+        ("service", Some(instance)) => Announced::Instance(rig, instance.parse().ok()?),
+        _ => return None,
+    };
+    parts.next().is_none().then_some(announced)
 }
+
+#[cfg(test)]
+#[path = "liveness_tests.rs"]
+mod tests;

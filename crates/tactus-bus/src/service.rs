@@ -6,11 +6,13 @@ use tactus_schema::key::Keys;
 use zenoh::{Session, query::Queryable};
 
 use crate::{
-    AliveToken, BusConfig, BusError, Calls, Publisher,
+    AliveToken, BusConfig, BusError, Calls, Endpoint, Publisher,
     cache::{self, HistoryQuery},
-    command::{self, PendingReply, Replies},
+    command::{self, Intake, PendingReply, Replies},
+    liveness::InstanceToken,
     publisher::{Lanes, Outgoing, TopicPublishers},
     queue::Queue,
+    stop::StopSocket,
     topic::Lane,
     worker::Worker,
 };
@@ -26,6 +28,8 @@ pub struct Bus {
     command_replies: Worker<PendingReply>,
     history_replies: Worker<HistoryQuery>,
     _queryables: Vec<Queryable<()>>,
+    _stop_sockets: Vec<StopSocket>,
+    _instance: InstanceToken,
 }
 
 impl Bus {
@@ -33,25 +37,28 @@ impl Bus {
     /// [`Bus::declare_alive`].
     ///
     /// # Errors
-    /// [`BusError::Open`] if an endpoint cannot be listened on; [`BusError::Key`] if the rig's name
-    /// is not valid in a key; [`BusError::Thread`] if the system is out of threads.
+    /// [`BusError::Open`] or [`BusError::Stop`] if an endpoint cannot be listened on; [`BusError::Unprotected`] if other
+    /// machines would reach one without a certificate; [`BusError::Key`] if the rig's name is not valid in a key;
+    /// [`BusError::Thread`] if the system is out of threads.
     ///
     /// # Panics
     /// On a current-thread tokio runtime, as zenoh does.
     pub async fn open(config: &BusConfig, keys: Keys) -> Result<(Self, Calls), BusError> {
-        if !config.is_loopback() {
-            tracing::warn!(
-                ?config,
-                "the bus is reachable from other machines; whoever reaches it can command the rig"
-            );
-        }
-        let session = zenoh::open(config.service()?).await.map_err(|source| {
+        config.check()?;
+        let session = zenoh::open(config.service(&keys)?).await.map_err(|source| {
             let listen: Vec<_> = config.listen.iter().map(ToString::to_string).collect();
             BusError::Open { listen: listen.join(", "), source }
         })?;
+        // Stops first, and before anything can wait for a client.
+        let (intake, calls) = command::channels();
+        let stop_sockets = stop_sockets(config, &keys, &intake)?;
+        let instance = InstanceToken::declare(&session, &keys).await?;
+        let answers = command::answers();
+        let command_replies = start("bus-answers", &answers, PendingReply::send)?;
+        let queryables = command::declare(&session, &keys, &intake, &Replies::to(answers)).await?;
+
         let history_queries = cache::history_queries();
         let history_replies = start("bus-history", &history_queries, HistoryQuery::answer)?;
-
         let lanes = Arc::new(Lanes::new());
         let frames = TopicPublishers::declare(&session, &keys, Lane::Frames, &history_queries).await?;
         let updates = TopicPublishers::declare(&session, &keys, Lane::Updates, &history_queries).await?;
@@ -59,10 +66,6 @@ impl Bus {
             start("bus-frames", lanes.queue(Lane::Frames), move |message| frames.publish(message))?,
             start("bus-updates", lanes.queue(Lane::Updates), move |message| updates.publish(message))?,
         ];
-
-        let answers = command::answers();
-        let command_replies = start("bus-answers", &answers, PendingReply::send)?;
-        let (queryables, calls) = command::declare(&session, &keys, &Replies::to(answers)).await?;
         let bus = Self {
             session,
             keys,
@@ -71,6 +74,8 @@ impl Bus {
             command_replies,
             history_replies,
             _queryables: queryables,
+            _stop_sockets: stop_sockets,
+            _instance: instance,
         };
         Ok((bus, calls))
     }
@@ -109,4 +114,13 @@ fn start<T: Send + 'static>(
     work: impl FnMut(T) + Send + 'static,
 ) -> Result<Worker<T>, BusError> {
     Worker::start(name, queue.clone(), work).map_err(|source| BusError::Thread { source })
+}
+
+fn stop_sockets(config: &BusConfig, keys: &Keys, intake: &Intake) -> Result<Vec<StopSocket>, BusError> {
+    let open = |endpoint: &Endpoint| {
+        StopSocket::open(endpoint, keys.rig(), intake.stops.clone())
+            .map_err(|source| BusError::Stop { endpoint: endpoint.to_string(), source })
+            .transpose()
+    };
+    config.listen.iter().filter_map(open).collect()
 }

@@ -2,6 +2,7 @@
 
 use std::{
     marker::PhantomData,
+    mem,
     sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
@@ -17,6 +18,7 @@ use zenoh_ext::{AdvancedSubscriber, AdvancedSubscriberBuilderExt, RecoveryConfig
 
 use crate::{
     BusError, Published,
+    liveness::Trust,
     merge::{Merge, Numbered},
     queue::Queue,
     topic::{Policy, encoding},
@@ -46,13 +48,19 @@ pub struct Losses {
     pub overrun: u64,
     /// Received, but not decodable as the topic's message.
     pub unreadable: u64,
+    /// Received, but not from the rig's service.
+    pub foreign: u64,
 }
 
 /// Messages of one topic, in order.
 #[derive(Debug)]
 pub struct Subscription<M> {
     reception: Arc<Reception>,
+    trust: Trust,
+    /// Taken, while nobody speaks for the rig yet.
+    undecided: Option<Sample>,
     unreadable: u64,
+    foreign: u64,
     _subscriber: AdvancedSubscriber<()>,
     _message: PhantomData<fn() -> M>,
 }
@@ -66,7 +74,12 @@ struct Reception {
 
 impl<M: Published> Subscription<M> {
     /// Returns once the history has arrived.
-    pub(crate) async fn declare(session: &Session, keys: &Keys, history: History) -> Result<Self, BusError> {
+    pub(crate) async fn declare(
+        session: &Session,
+        keys: &Keys,
+        history: History,
+        trust: Trust,
+    ) -> Result<Self, BusError> {
         let key = keys.topic(M::TOPIC);
         let reception = Arc::new(Reception {
             merge: Mutex::new(Merge::awaiting_history()),
@@ -84,7 +97,15 @@ impl<M: Published> Subscription<M> {
             .map_err(BusError::key(&key))?;
         // Requested after the subscription, so that no message is lost between the two.
         reception.join(past(session, &key, history).await?);
-        Ok(Self { reception, unreadable: 0, _subscriber: subscriber, _message: PhantomData })
+        Ok(Self {
+            reception,
+            trust,
+            undecided: None,
+            unreadable: 0,
+            foreign: 0,
+            _subscriber: subscriber,
+            _message: PhantomData,
+        })
     }
 
     /// The next message; `None` once the client is closed. If the service restarts, the subscription continues: see
@@ -92,7 +113,7 @@ impl<M: Published> Subscription<M> {
     pub async fn recv(&mut self) -> Option<M> {
         let expected = encoding(M::NAME);
         loop {
-            let sample = self.reception.arrived.pop().await?;
+            let sample = self.next_of_service().await?;
             if *sample.encoding() == expected
                 && let Ok(message) = M::decode(&*sample.payload().to_bytes())
             {
@@ -103,12 +124,43 @@ impl<M: Published> Subscription<M> {
         }
     }
 
+    /// The next sample from a session that speaks for the rig.
+    async fn next_of_service(&mut self) -> Option<Sample> {
+        loop {
+            let sample = match self.undecided.take() {
+                Some(sample) => sample,
+                None => self.reception.arrived.pop().await?,
+            };
+            let source = sample.source_info().map(|source| source.source_id().zid());
+            self.undecided = Some(sample);
+            // A service that has just come back may be heard before it has announced itself.
+            let is_own = match source {
+                Some(source) => self.trust.wait(&source).await?,
+                None => false,
+            };
+            let sample = mem::take(&mut self.undecided);
+            if is_own {
+                return sample;
+            }
+            self.foreign += 1;
+            if self.foreign.is_power_of_two() {
+                let key = sample.as_ref().map(|sample| sample.key_expr().as_str());
+                tracing::warn!(
+                    key,
+                    foreign = self.foreign,
+                    "messages that are not the service's are dropped"
+                );
+            }
+        }
+    }
+
     /// Messages that did not reach the reader so far.
     pub fn losses(&self) -> Losses {
         Losses {
             missed: self.reception.merge.lock().unwrap_or_else(PoisonError::into_inner).missed(),
             overrun: self.reception.arrived.dropped(),
             unreadable: self.unreadable,
+            foreign: self.foreign,
         }
     }
 }

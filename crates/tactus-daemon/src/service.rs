@@ -3,7 +3,7 @@
 //! | task | waits for |
 //! |---|---|
 //! | acquisition (in the engine) | frames, reports of the stage, the supervisor's clock |
-//! | stops | `cmd/stop`; nothing else, so that no other command can delay it |
+//! | stops (a thread) | `cmd/stop`, `tactus/stop` and datagrams; nothing else, so that no other command can delay it |
 //! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status` |
 //! | run | the order of one run, until its recording is closed |
 //! | health | once a second |
@@ -12,24 +12,28 @@
 
 mod commands;
 mod health;
+mod lease;
 mod publish;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::thread;
 use std::time::Duration;
 
 use clap::Parser;
 use tactus_bus::{Bus, BusConfig, BusError, Calls};
 use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
+use tactus_runner::covering_file::CoveringFile;
 use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles};
 use tactus_runner::embedded::Truth;
 use tactus_runner::{devices, logging};
 use tactus_schema::key::Keys;
+use tokio::runtime::Handle;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::timeout;
-use tracing::{error, info, warn};
+use tracing::{error, info};
 
 use crate::notify;
 use commands::CommandDesk;
@@ -115,19 +119,31 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     let endpoints = BusConfig {
         listen: config.bus.listen.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         connect: config.bus.connect.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
+        guests: config.bus.guests.clone(),
+        tls: None,
     };
-    if !endpoints.is_loopback() {
-        warn!("the bus listens or connects beyond this machine, without access control");
-    }
     let (bus, calls) = Bus::open(&endpoints, keys).await?;
     let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
-    let opened = devices::open(&rig, &rig_service, codec, truth, clock);
+    let mut opened = devices::open(&rig, &rig_service, codec, truth, clock);
+    if opened.devices.change_covering.is_none() {
+        // A person changes the covering, and may do so while the service is down.
+        let file = CoveringFile::of(&rig.name, &config.recordings);
+        opened.devices.covering_memory = Some(Arc::new(file));
+    }
     let engine = Engine::start(rig, opened.devices, clock, Arc::new(BusPublisher(bus.publisher())))?;
 
     let Calls { stops, commands } = calls;
     let desk = Arc::new(CommandDesk::new(engine.clone(), config, bus.publisher()));
+    // A thread of its own: no task that waits or computes can keep it from running. It ends with the bus.
+    let (stop_desk, runtime) = (Arc::clone(&desk), Handle::current());
+    thread::Builder::new()
+        .name("stops".into())
+        .spawn(move || {
+            let _entered = runtime.enter();
+            stop_desk.answer_stops(stops);
+        })
+        .map_err(system("thread"))?;
     let tasks = [
-        tokio::spawn(Arc::clone(&desk).answer_stops(stops)),
         tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
         tokio::spawn(health::publish(engine.clone(), bus.publisher())),
         tokio::spawn(notify::feed_watchdog(engine.clone())),

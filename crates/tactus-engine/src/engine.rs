@@ -392,6 +392,17 @@ impl Engine {
         refused.map_or(Ok(()), Err)
     }
 
+    /// Records in the run in progress that somebody took the lease over.
+    pub fn record_takeover(&self, taken: pb::LeaseTaken) {
+        let mailbox = self.shared.acquisition.clone();
+        tokio::spawn(async move {
+            let event = pb::run_event::Event::LeaseTaken(taken);
+            if let Err(gone) = mailbox.tell(move |live| live.emit(event)).await {
+                tracing::error!("a takeover is not recorded: {gone}");
+            }
+        });
+    }
+
     /// State of the run, updated at each event and every half second.
     pub fn state(&self) -> watch::Receiver<pb::RunState> {
         self.shared.state.subscribe()

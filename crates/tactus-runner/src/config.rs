@@ -54,6 +54,9 @@ pub struct BusSection {
     /// Routers to connect to.
     #[serde(default)]
     pub connect: Vec<String>,
+    /// Names of rigs whose services connect to this one.
+    #[serde(default)]
+    pub guests: Vec<String>,
 }
 
 /// `[log]`.
@@ -119,7 +122,7 @@ struct RawConfig {
 
 impl Default for BusSection {
     fn default() -> Self {
-        Self { listen: loopback(), connect: Vec::new() }
+        Self { listen: loopback(), connect: Vec::new(), guests: Vec::new() }
     }
 }
 

@@ -13,6 +13,7 @@
 //! | [`logging`] | logs for terminals, the journal and machines |
 
 pub mod config;
+pub mod covering_file;
 pub mod devices;
 pub mod embedded;
 pub mod experiments;

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use tactus_device::{Clock, Connection, Controller, DrivenStage, SensorCodec, Stage, StageError, Target};
+use tactus_safety::Supervisor;
 use tactus_schema::Rig;
 use tactus_schema::pb::{StageState, StageStatus};
 use tactus_schema::rig::{Service, StageProtocol, Transport};
@@ -130,8 +131,9 @@ pub fn run(rig: &Rig, home: bool, started: impl FnOnce(&RigControl)) -> Result<S
     if service.stage.transport != Transport::Embedded {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
         return Ok(runtime.block_on(async {
-            let (stage, reports) = devices::open_stage(rig, service, || None, Clock::real());
-            check_until_interrupted(stage, reports, service, home).await
+            let subject = Subject { rig, service, clock: Clock::real() };
+            let (stage, reports) = devices::open_stage(rig, service, || None, subject.clock);
+            check_until_interrupted(stage, reports, subject, home).await
         }));
     }
     let runtime = virtual_time::runtime()?;
@@ -140,21 +142,30 @@ pub fn run(rig: &Rig, home: bool, started: impl FnOnce(&RigControl)) -> Result<S
         let mut virtual_rig = VirtualRig::of(Truth::of_rig(rig, seed), rig.covering, &SensorCodec::default());
         started(&virtual_rig.control());
         let embedded = || Some(virtual_rig.stage_connector());
-        let (stage, reports) = devices::open_stage(rig, service, embedded, Clock::paused());
+        let subject = Subject { rig, service, clock: Clock::paused() };
+        let (stage, reports) = devices::open_stage(rig, service, embedded, subject.clock);
         let never = AtomicBool::new(false);
-        check(&stage, reports, service, home, &never).await
+        check(&stage, reports, subject, home, &never).await
     }))
+}
+
+/// What is checked.
+#[derive(Debug, Clone, Copy)]
+struct Subject<'a> {
+    rig: &'a Rig,
+    service: &'a Service,
+    clock: Clock,
 }
 
 /// Ctrl-C stops the stage; the check then ends with the move that was stopped.
 async fn check_until_interrupted(
     stage: Arc<DrivenStage>,
     reports: mpsc::Receiver<StageState>,
-    service: &Service,
+    subject: Subject<'_>,
     home: bool,
 ) -> StageCheck {
     let interrupted = AtomicBool::new(false);
-    let checked = check(&stage, reports, service, home, &interrupted);
+    let checked = check(&stage, reports, subject, home, &interrupted);
     tokio::pin!(checked);
     loop {
         tokio::select! {
@@ -172,13 +183,13 @@ async fn check_until_interrupted(
 async fn check(
     stage: &DrivenStage,
     mut reports: mpsc::Receiver<StageState>,
-    service: &Service,
+    subject: Subject<'_>,
     home: bool,
     interrupted: &AtomicBool,
 ) -> StageCheck {
     // The driver waits until its reports are taken. The task ends with the driver.
     tokio::spawn(async move { while reports.recv().await.is_some() {} });
-    let mut checking = Checking { stage, service, interrupted, controller: None, moves: Vec::new() };
+    let mut checking = Checking { stage, subject, interrupted, controller: None, moves: Vec::new() };
     let trouble = checking.go_through(home).await.err();
     let Checking { controller, moves, .. } = checking;
     let state = *stage.state().borrow();
@@ -194,7 +205,7 @@ async fn check(
 /// A check in progress.
 struct Checking<'a> {
     stage: &'a DrivenStage,
-    service: &'a Service,
+    subject: Subject<'a>,
     interrupted: &'a AtomicBool,
     controller: Option<Controller>,
     moves: Vec<CheckedMove>,
@@ -224,7 +235,8 @@ impl Checking<'_> {
             }
         }
         if home {
-            let order = self.stage.home();
+            let permit = self.supervisor().permit_homing(self.subject.clock.now().mono);
+            let order = self.stage.home(permit.map_err(|denied| format!("homing: {denied}"))?);
             self.check_interrupted()?;
             order.await.map_err(|error| format!("homing: {error}"))?;
         } else if status != StageStatus::Idle {
@@ -260,7 +272,7 @@ impl Checking<'_> {
 
     /// Moves straight up to the safe height, if the stage is lower.
     async fn rise(&mut self) -> Result<(), String> {
-        let motion = &self.service.motion;
+        let motion = &self.subject.service.motion;
         let [x_mm, y_mm, z_mm] = self.position_mm();
         if z_mm >= motion.safe_height_mm - motion.tolerance_mm {
             return Ok(());
@@ -283,7 +295,7 @@ impl Checking<'_> {
 
     /// A step away from the nearer end of the envelope; z goes up if there is room.
     fn step_mm(&self, axis: usize, at_mm: f64) -> f64 {
-        let envelope = &self.service.envelope;
+        let envelope = &self.subject.service.envelope;
         let grows = match axis {
             0 | 1 => {
                 let [least, greatest] = if axis == 0 { envelope.x_mm } else { envelope.y_mm };
@@ -296,7 +308,7 @@ impl Checking<'_> {
 
     async fn checked(&mut self, axis: usize, asked_mm: [f64; 3]) -> Result<(), String> {
         let (from_mm, began) = (self.position_mm(), Instant::now());
-        let ended = self.go(asked_mm, self.service.motion.load_speed_mm_per_s).await?;
+        let ended = self.go(asked_mm, self.subject.service.motion.load_speed_mm_per_s).await?;
         let has_failed = ended.is_err();
         self.moves.push(CheckedMove::judge(axis, from_mm, asked_mm, began.elapsed(), ended));
         if has_failed {
@@ -308,9 +320,20 @@ impl Checking<'_> {
     /// One straight move. The outer error is an interrupt before it.
     async fn go(&self, position_mm: [f64; 3], speed_mm_per_s: f64) -> Result<Ended, String> {
         // The order comes before the check of the flag, so that a stop in between comes after the order.
-        let order = self.stage.move_to(Target { position_mm, speed_mm_per_s });
+        let to = Target { position_mm, speed_mm_per_s };
+        let permit = self.supervisor().permit(to, self.subject.clock.now().mono).map_err(|denied| denied.to_string())?;
+        let order = self.stage.move_to(permit);
         self.check_interrupted()?;
         Ok(order.await)
+    }
+
+    /// Permits what the stage's last report allows.
+    fn supervisor(&self) -> Supervisor {
+        let mut supervisor = Supervisor::without_sensor(self.subject.rig, self.subject.service);
+        if let Some(violation) = supervisor.on_report(&self.stage.state().borrow()) {
+            tracing::warn!(%violation, "the stage is checked all the same");
+        }
+        supervisor
     }
 
     fn check_interrupted(&self) -> Result<(), String> {
@@ -324,7 +347,7 @@ impl Checking<'_> {
     }
 
     fn has_axis(&self, axis: usize) -> bool {
-        match &self.service.stage.protocol {
+        match &self.subject.service.stage.protocol {
             StageProtocol::Grbl(_) => true,
             StageProtocol::Zaber(zaber) => zaber.axes.get(axis).is_some_and(Option::is_some),
         }

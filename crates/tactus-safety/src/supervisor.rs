@@ -47,9 +47,13 @@ impl Supervisor {
         }
     }
 
-    /// A supervisor for a stage alone, as for a check of the stage by hand. It permits no step down below the safe height.
+    /// A supervisor for a stage alone, as for a check of the stage by hand. It permits no step down below the safe height;
+    /// above it x and y are free, because homing may end outside the envelope.
     pub fn without_sensor(rig: &Rig, service: &Service) -> Self {
-        Self { fault: None, is_active: true, has_sensor: false, ..Self::new(rig, service) }
+        let mut supervisor = Self { fault: None, is_active: true, has_sensor: false, ..Self::new(rig, service) };
+        let envelope = &mut supervisor.limits.envelope;
+        (envelope.x_mm, envelope.y_mm) = ([f64::NEG_INFINITY, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]);
+        supervisor
     }
 
     /// Voids permits from anywhere, as a stop does.

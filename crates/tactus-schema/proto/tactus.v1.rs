@@ -78,7 +78,7 @@ pub struct RunEvent {
     pub t_mono_ns: i64,
     #[prost(int64, tag = "4")]
     pub t_wall_ns: i64,
-    #[prost(oneof = "run_event::Event", tags = "10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25")]
+    #[prost(oneof = "run_event::Event", tags = "10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 40")]
     pub event: ::core::option::Option<run_event::Event>,
 }
 /// Nested message and enum types in `RunEvent`.
@@ -117,6 +117,8 @@ pub mod run_event {
         Cleanup(super::Cleanup),
         #[prost(message, tag = "25")]
         Finished(super::RunFinished),
+        #[prost(message, tag = "40")]
+        LeaseTaken(super::LeaseTaken),
     }
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -229,6 +231,15 @@ pub struct Paused {
 pub struct Resumed {
     #[prost(string, tag = "1")]
     pub by: ::prost::alloc::string::String,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct LeaseTaken {
+    #[prost(string, tag = "1")]
+    pub by: ::prost::alloc::string::String,
+    #[prost(string, tag = "2")]
+    pub from: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub reason: ::prost::alloc::string::String,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StopRequested {
@@ -370,6 +381,8 @@ pub struct RunRequest {
     pub seed: ::core::option::Option<u64>,
     #[prost(string, tag = "5")]
     pub who: ::prost::alloc::string::String,
+    #[prost(bytes = "vec", tag = "6")]
+    pub lease: ::prost::alloc::vec::Vec<u8>,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct CommandRequest {
@@ -379,8 +392,30 @@ pub struct CommandRequest {
     pub reason: ::prost::alloc::string::String,
     #[prost(bool, tag = "3")]
     pub abort: bool,
+    #[prost(bytes = "vec", tag = "4")]
+    pub lease: ::prost::alloc::vec::Vec<u8>,
     #[prost(double, optional, tag = "5")]
     pub covering_mm: ::core::option::Option<f64>,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct LeaseRequest {
+    #[prost(enumeration = "LeaseAction", tag = "1")]
+    pub action: i32,
+    #[prost(string, tag = "2")]
+    pub who: ::prost::alloc::string::String,
+    #[prost(string, tag = "3")]
+    pub reason: ::prost::alloc::string::String,
+    #[prost(bytes = "vec", tag = "4")]
+    pub lease: ::prost::alloc::vec::Vec<u8>,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Lease {
+    #[prost(string, tag = "1")]
+    pub holder: ::prost::alloc::string::String,
+    #[prost(double, tag = "2")]
+    pub expires_in_s: f64,
+    #[prost(bytes = "vec", tag = "3")]
+    pub lease: ::prost::alloc::vec::Vec<u8>,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct CommandReply {
@@ -400,6 +435,8 @@ pub struct CommandReply {
     pub stage: ::core::option::Option<StageState>,
     #[prost(message, optional, tag = "8")]
     pub health: ::core::option::Option<Health>,
+    #[prost(message, optional, tag = "9")]
+    pub lease: ::core::option::Option<Lease>,
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
@@ -634,6 +671,41 @@ impl SafetyVerdict {
             "SAFETY_VERDICT_CLEAR" => Some(Self::Clear),
             "SAFETY_VERDICT_REFUSED" => Some(Self::Refused),
             "SAFETY_VERDICT_STOPPED" => Some(Self::Stopped),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum LeaseAction {
+    Unspecified = 0,
+    Acquire = 1,
+    Renew = 2,
+    Release = 3,
+    TakeOver = 4,
+}
+impl LeaseAction {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "LEASE_ACTION_UNSPECIFIED",
+            Self::Acquire => "LEASE_ACTION_ACQUIRE",
+            Self::Renew => "LEASE_ACTION_RENEW",
+            Self::Release => "LEASE_ACTION_RELEASE",
+            Self::TakeOver => "LEASE_ACTION_TAKE_OVER",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "LEASE_ACTION_UNSPECIFIED" => Some(Self::Unspecified),
+            "LEASE_ACTION_ACQUIRE" => Some(Self::Acquire),
+            "LEASE_ACTION_RENEW" => Some(Self::Renew),
+            "LEASE_ACTION_RELEASE" => Some(Self::Release),
+            "LEASE_ACTION_TAKE_OVER" => Some(Self::TakeOver),
             _ => None,
         }
     }

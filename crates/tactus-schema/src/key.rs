@@ -1,5 +1,8 @@
 //! Key expressions on the bus: `tactus/<rig>/...`.
 
+/// Key of a stop for every rig that the bus reaches, without its name. Each service answers it, with or without a sensor.
+pub const STOP_EVERY_RIG: &str = "tactus/stop";
+
 /// The keys of one rig.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Keys {
@@ -25,8 +28,9 @@ pub enum Topic {
     SafetyState,
 }
 
-/// A command that the service answers. The request is [`crate::pb::RunRequest`] for [`Command::Run`], otherwise
-/// [`crate::pb::CommandRequest`]; the answer is [`crate::pb::CommandReply`].
+/// A command that the service answers. The request is [`crate::pb::RunRequest`] for [`Command::Run`],
+/// [`crate::pb::LeaseRequest`] for [`Command::Lease`], otherwise [`crate::pb::CommandRequest`]; the answer is
+/// [`crate::pb::CommandReply`]. The service answers only a request to exactly this key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Command {
     /// Report the state of the service.
@@ -41,6 +45,8 @@ pub enum Command {
     Stop,
     /// Clear the stage's alarm and home it. Refused during a run.
     Reset,
+    /// Acquire, renew, release or take over the lease, which run, pause, resume and reset want.
+    Lease,
 }
 
 impl Topic {
@@ -71,7 +77,8 @@ impl Topic {
 
 impl Command {
     /// In the order of the enumeration.
-    pub const ALL: [Self; 6] = [Self::Status, Self::Run, Self::Pause, Self::Resume, Self::Stop, Self::Reset];
+    pub const ALL: [Self; 7] =
+        [Self::Status, Self::Run, Self::Pause, Self::Resume, Self::Stop, Self::Reset, Self::Lease];
 
     /// The key below `tactus/<rig>/`.
     pub const fn suffix(self) -> &'static str {
@@ -82,6 +89,7 @@ impl Command {
             Self::Resume => "cmd/resume",
             Self::Stop => "cmd/stop",
             Self::Reset => "cmd/reset",
+            Self::Lease => "cmd/lease",
         }
     }
 }
@@ -105,6 +113,12 @@ impl Keys {
     /// Key of a command, such as `tactus/sim/cmd/stop`.
     pub fn command(&self, command: Command) -> String {
         format!("tactus/{}/{}", self.rig, command.suffix())
+    }
+
+    /// Key of the liveliness token that the service holds from its start: `instance` is the id of its session on the bus,
+    /// which its answers and messages carry.
+    pub fn instance(&self, instance: &str) -> String {
+        format!("tactus/{}/service/{instance}", self.rig)
     }
 
     /// Key of the liveliness token, held while the service is ready.

@@ -28,7 +28,7 @@ macro_rules! name_messages {
 
 name_messages! {
     Frame, SensorInfo, StageState, RunEvent, RunState, SafetyEvent, Health,
-    RunRequest, CommandRequest, CommandReply,
+    RunRequest, CommandRequest, LeaseRequest, CommandReply,
 }
 
 macro_rules! words {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use tactus_bus::{BusError, Client, Endpoint, History};
+use tactus_bus::{BusError, Client, Credentials, Endpoint, History, Hold};
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tokio::sync::watch;
@@ -21,9 +21,24 @@ const RECONNECTED: Duration = Duration::from_secs(2);
 /// Time limit for the reply to `reset`, because homing is slow.
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
 
+/// Time limit for the replies to a stop on the bus; a datagram is answered at once.
+const STOP_PATIENCE: Duration = Duration::from_secs(5);
+/// This program's name for the service.
+const WHO: &str = "dashboard";
+
+/// Why a command was not done.
+#[derive(Debug)]
+pub(crate) enum NotDone {
+    /// Another client holds the lease.
+    Held(String),
+    /// Any other reason.
+    Failed(String),
+}
+
 /// Connection to the rig, and its latest view.
 #[derive(Debug, Clone)]
 pub(crate) struct Live {
+    service: Arc<(Endpoint, Option<String>)>,
     client: watch::Receiver<Option<Arc<Client>>>,
     view: watch::Receiver<View>,
 }
@@ -32,6 +47,7 @@ impl Live {
     /// Connects, and reconnects whenever the connection is lost.
     pub(crate) fn start(endpoint: Endpoint, rig: Option<String>) -> Self {
         let (to_client, client) = watch::channel(None);
+        let service = Arc::new((endpoint.clone(), rig.clone()));
         let problem = format!("no service at {endpoint} yet");
         let (to_view, view) = watch::channel(View { problem, ..View::default() });
         tokio::spawn(async move {
@@ -57,7 +73,7 @@ impl Live {
                 sleep(AGAIN).await;
             }
         });
-        Self { client, view }
+        Self { service, client, view }
     }
 
     /// The latest view and its changes.
@@ -65,23 +81,65 @@ impl Live {
         self.view.clone()
     }
 
-    /// Sends a command to the service.
+    /// Stops the rig, connected or not.
     ///
     /// # Errors
     /// A message for the user.
-    pub(crate) async fn command(&self, command: Command) -> Result<(), String> {
+    pub(crate) async fn stop(&self) -> Result<(), String> {
+        let request = pb::CommandRequest { who: WHO.into(), reason: "button".into(), ..Default::default() };
+        // Copied out: nothing may be borrowed while this waits.
+        let connected = self.client.borrow().clone();
+        if let Some(client) = connected
+            && let Ok(reply) = client.stop(&request, STOP_PATIENCE).await
+        {
+            return done(&reply);
+        }
+        let (endpoint, rig) = &*self.service;
+        let answers =
+            tactus_bus::stop(endpoint, rig.as_deref(), &request, &Credentials::default(), STOP_PATIENCE)
+                .await;
+        answers.map_err(in_words)?.iter().try_for_each(done)
+    }
+
+    /// Sends a command that wants the lease, which is held for it; with a reason it is taken over.
+    ///
+    /// # Errors
+    /// What keeps the rig from doing it.
+    pub(crate) async fn command(&self, command: Command, take_over: Option<&str>) -> Result<(), NotDone> {
         let mut clients = self.client.clone();
         let client = match timeout(RECONNECTED, clients.wait_for(Option::is_some)).await {
             Ok(Ok(client)) => client.clone(),
             Ok(Err(_)) | Err(_) => None,
         };
-        let Some(client) = client else { return Err(self.view.borrow().problem.clone()) };
-        let request =
-            pb::CommandRequest { who: "dashboard".into(), reason: "button".into(), ..Default::default() };
+        let Some(client) = client else { return Err(NotDone::Failed(self.view.borrow().problem.clone())) };
+        let held =
+            match client.hold(WHO, take_over).await.map_err(|error| NotDone::Failed(in_words(error)))? {
+                Hold::Held(held) => held,
+                Hold::Refused(reply) => return Err(NotDone::Held(reply.error)),
+            };
+        let request = pb::CommandRequest {
+            who: WHO.into(),
+            reason: take_over.unwrap_or("button").into(),
+            lease: held.secret(),
+            ..Default::default()
+        };
         let patience = if command == Command::Reset { HOMING_PATIENCE } else { PATIENCE };
-        let reply = client.command(command, &request, patience).await.map_err(|error| error.to_string())?;
-        if reply.ok { Ok(()) } else { Err(reply.error) }
+        let reply = client.command(command, &request, patience).await;
+        if let Err(error) = held.release().await {
+            warn!(%error, "the lease was not given back; it ends by itself");
+        }
+        let reply = reply.map_err(|error| NotDone::Failed(in_words(error)))?;
+        done(&reply).map_err(NotDone::Failed)
     }
+}
+
+fn done(reply: &pb::CommandReply) -> Result<(), String> {
+    if reply.ok { Ok(()) } else { Err(reply.error.clone()) }
+}
+
+/// An error with its causes.
+fn in_words(error: BusError) -> String {
+    format!("{:#}", anyhow::Error::from(error))
 }
 
 /// Keeps `view` up to date until the service ends.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::extract::{Path, State};
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{from_fn_with_state, map_response};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -17,12 +17,15 @@ use tokio::sync::Semaphore;
 use tokio::time::{Instant, sleep_until};
 
 use crate::guard::{Hosts, guard};
-use crate::live::Live;
+use crate::live::{Live, NotDone};
 
 /// Shortest time between two views sent to one page.
 const PERIOD: Duration = Duration::from_millis(50);
 /// Open pages at most.
 const PAGES_MAX: usize = 64;
+
+/// Carries the reason to take over the lease.
+const TAKE_OVER: HeaderName = HeaderName::from_static("x-take-over");
 
 const HTML: &str = include_str!("../page/index.html");
 const STYLE: &str = include_str!("../page/style.css");
@@ -47,6 +50,7 @@ pub(crate) fn site(live: Live, hosts: Arc<Hosts>) -> Router {
         .route("/style.css", file("text/css; charset=utf-8", STYLE))
         .route("/script.js", file("text/javascript; charset=utf-8", SCRIPT))
         .route("/live", get(live_views))
+        .route("/stop", post(stop))
         .route("/{command}", post(command))
         .with_state(Shared { live, pages: Arc::new(Semaphore::new(PAGES_MAX)) })
         .layer(from_fn_with_state(hosts, guard))
@@ -82,16 +86,30 @@ fn views<H>(live: &Live, held: H) -> impl Stream<Item = Result<Event, Infallible
     })
 }
 
-async fn command(State(Shared { live, .. }): State<Shared>, Path(name): Path<String>) -> Response {
+/// A stop, which wants neither the token nor the lease.
+async fn stop(State(Shared { live, .. }): State<Shared>) -> Response {
+    match live.stop().await {
+        Ok(()) => StatusCode::NO_CONTENT.into_response(),
+        Err(error) => (StatusCode::CONFLICT, error).into_response(),
+    }
+}
+
+/// A command that wants the lease: 423 if another client holds it.
+async fn command(
+    State(Shared { live, .. }): State<Shared>,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+) -> Response {
     let command = match name.as_str() {
-        "stop" => Command::Stop,
         "pause" => Command::Pause,
         "resume" => Command::Resume,
         "reset" => Command::Reset,
         _ => return StatusCode::NOT_FOUND.into_response(),
     };
-    match live.command(command).await {
+    let take_over = headers.get(TAKE_OVER).and_then(|reason| reason.to_str().ok());
+    match live.command(command, take_over).await {
         Ok(()) => StatusCode::NO_CONTENT.into_response(),
-        Err(error) => (StatusCode::CONFLICT, error).into_response(),
+        Err(NotDone::Held(error)) => (StatusCode::LOCKED, error).into_response(),
+        Err(NotDone::Failed(error)) => (StatusCode::CONFLICT, error).into_response(),
     }
 }

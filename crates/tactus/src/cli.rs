@@ -51,11 +51,11 @@ enum CliCommand {
     /// Stop motion now, retract and end the run.
     Stop(StopArgs),
     /// Pause the run before its next step.
-    Pause,
+    Pause(LeaseArgs),
     /// Continue a paused run.
-    Resume,
+    Resume(ResumeArgs),
     /// Clear the stage's alarm, home it and raise the tip. Needed after each start of the service before runs can start.
-    Reset,
+    Reset(LeaseArgs),
     /// Show the image, the stage and the run live.
     Watch,
     /// Inspect recordings.
@@ -129,7 +129,7 @@ pub(crate) struct RunArgs {
     /// Run the embedded rig in real time; the default is virtual time, without waiting.
     #[arg(long)]
     pub(crate) real_time: bool,
-    /// Folder in which the run's folder is created.
+    /// Folder in which the run's folder is created: by the embedded rig for the recording, and for the report of a run on a service.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     pub(crate) out: PathBuf,
     /// Who runs it, for the recording.
@@ -138,6 +138,26 @@ pub(crate) struct RunArgs {
     /// Do not write a report.
     #[arg(long)]
     pub(crate) no_report: bool,
+    #[command(flatten)]
+    pub(crate) lease: LeaseArgs,
+}
+
+/// Arguments of commands that want the lease, which one client holds at a time.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct LeaseArgs {
+    /// Command the rig although another client holds its lease; the reason is kept with the run.
+    #[arg(long, value_name = "REASON")]
+    pub(crate) take_over: Option<String>,
+}
+
+/// Arguments of `resume`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ResumeArgs {
+    #[command(flatten)]
+    pub(crate) lease: LeaseArgs,
+    /// Confirms that the covering of this thickness is in place, for a run that waits for it.
+    #[arg(long, value_name = "MM")]
+    pub(crate) covering: Option<f64>,
 }
 
 /// Arguments of `plan`.
@@ -500,9 +520,9 @@ fn dispatch(common: &Common, command: CliCommand) -> anyhow::Result<Exit> {
         CliCommand::Plan(args) => commands::plan::plan(common, &args),
         CliCommand::Status => commands::control::status(common),
         CliCommand::Stop(args) => commands::control::stop(common, &args),
-        CliCommand::Pause => commands::control::pause(common),
-        CliCommand::Resume => commands::control::resume(common),
-        CliCommand::Reset => commands::control::reset(common),
+        CliCommand::Pause(args) => commands::control::pause(common, &args),
+        CliCommand::Resume(args) => commands::control::resume(common, &args),
+        CliCommand::Reset(args) => commands::control::reset(common, &args),
         CliCommand::Watch => commands::watch::watch(common),
         CliCommand::Record(RecordCommand::Info { file }) => commands::files::info(common, &file),
         CliCommand::Export(args) => commands::files::export(common, &args),

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use anyhow::Context;
-use tactus_bus::{BusError, Client, Endpoint};
+use tactus_bus::{BusError, Client, Endpoint, HeldLease, Hold};
 use tactus_schema::key::Command;
 use tactus_schema::{Message, pb};
 use tokio::runtime::Runtime;
 
-use crate::cli::Common;
+use crate::cli::{Common, LeaseArgs};
 use crate::exit::{Exit, Failure};
 
 /// How long to wait for an answer to any command but `run` and `reset`.
@@ -23,10 +23,44 @@ pub(crate) fn runtime() -> anyhow::Result<Runtime> {
         .context("cannot start the async runtime")
 }
 
+/// The endpoint of the command line.
+///
+/// # Errors
+/// If it is none.
+pub(crate) fn endpoint(common: &Common) -> anyhow::Result<Endpoint> {
+    Ok(common.endpoint.parse().map_err(|error: BusError| Failure::new(Exit::Usage, error))?)
+}
+
+/// Who sends commands, for the service's log and the run's events.
+pub(crate) fn who() -> String {
+    std::env::var("USER").map_or_else(|_| "cli".to_owned(), |user| format!("cli:{user}"))
+}
+
+/// Takes the lease, which is kept while the returned value is.
+///
+/// # Errors
+/// If another client holds it.
+pub(crate) async fn hold(client: &Client, args: &LeaseArgs) -> anyhow::Result<HeldLease> {
+    match client.hold(&who(), args.take_over.as_deref()).await? {
+        Hold::Held(held) => Ok(held),
+        Hold::Refused(reply) => {
+            let exit = Exit::of_reply(reply.exit_code);
+            let hint = if exit == Exit::NotNow { " (--take-over REASON)" } else { "" };
+            Err(Failure::new(exit, format!("{}{hint}", reply.error)).into())
+        }
+    }
+}
+
+/// Gives the lease back. If the service does not answer, it ends by itself.
+pub(crate) async fn release(held: HeldLease) {
+    if let Err(error) = held.release().await {
+        tracing::debug!(%error, "the lease was not given back");
+    }
+}
+
 /// The service, or `None` if nothing listens at the endpoint.
 pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
-    let endpoint: Endpoint =
-        common.endpoint.parse().map_err(|error: BusError| Failure::new(Exit::Usage, error))?;
+    let endpoint = endpoint(common)?;
     match Client::connect(&endpoint, common.rig.as_deref()).await {
         Ok(client) => Ok(Some(client)),
         Err(BusError::NoService { .. }) => Ok(None),

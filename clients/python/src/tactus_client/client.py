@@ -93,9 +93,13 @@ class Client:
         """Holds the run after its present step. Raises ``Refused``, ``NoAnswer``."""
         return self._command("pause", messages.CommandRequest(who=_who(), reason=reason), timeout_s)
 
-    def resume(self, reason: str = "", timeout_s: float = 5.0):
-        """Continues a run that is held. Raises ``Refused``, ``NoAnswer``."""
-        return self._command("resume", messages.CommandRequest(who=_who(), reason=reason), timeout_s)
+    def resume(self, reason: str = "", covering_mm: float | None = None, timeout_s: float = 5.0):
+        """Continues a run that is held. ``covering_mm`` confirms the covering that the run waits for, once it is in place.
+
+        Raises ``Refused``, ``NoAnswer``.
+        """
+        request = messages.CommandRequest(who=_who(), reason=reason, covering_mm=covering_mm)
+        return self._command("resume", request, timeout_s)
 
     def stop(self, reason: str = "", abort: bool = False, timeout_s: float = 5.0):
         """Stops motion now, retracts, ends the run; has priority over all else. Raises ``NoAnswer``, ``Refused``."""

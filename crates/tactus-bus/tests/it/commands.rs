@@ -12,7 +12,12 @@ use tokio::{net::TcpListener, sync::mpsc};
 const PATIENCE: Duration = Duration::from_hours(1);
 
 fn asked_by(who: &str) -> pb::CommandRequest {
-    pb::CommandRequest { who: who.to_owned(), reason: "to see".to_owned(), abort: true }
+    pb::CommandRequest { who: who.to_owned(), reason: "to see".to_owned(), abort: true, ..Default::default() }
+}
+
+/// A request as stock tools send it.
+fn status() -> Vec<u8> {
+    asked_by("test").encode_to_vec()
 }
 
 /// Answers every call with its own command and request.
@@ -89,10 +94,11 @@ async fn a_stop_passes_a_full_queue_and_the_queue_says_that_it_is_full() {
     let session = raw_session(&service.endpoint).await;
     let mut waiting = Vec::new();
     for _ in 0..16 {
-        waiting.push(session.get("tactus/bench/cmd/status").timeout(PATIENCE).await.unwrap());
+        waiting
+            .push(session.get("tactus/bench/cmd/status").payload(status()).timeout(PATIENCE).await.unwrap());
     }
     // Same session, so behind them: all 16 are in when this one is refused.
-    let refused = session.get("tactus/bench/cmd/status").timeout(PATIENCE).await.unwrap();
+    let refused = session.get("tactus/bench/cmd/status").payload(status()).timeout(PATIENCE).await.unwrap();
     let refused = refused.recv_async().await.unwrap();
     let refused = pb::CommandReply::decode(&*refused.result().unwrap().payload().to_bytes()).unwrap();
     assert_eq!((refused.ok, refused.exit_code), (false, 1));

@@ -32,13 +32,23 @@ pub(crate) fn free_endpoint() -> Endpoint {
 
 /// Opens a service that connects to `connect`.
 pub(crate) async fn open(rig: &str, connect: &[Endpoint]) -> Service {
+    open_for(rig, &[], connect).await
+}
+
+/// As [`open`], for services of other rigs too.
+pub(crate) async fn open_for(rig: &str, guests: &[&str], connect: &[Endpoint]) -> Service {
     loop {
         let endpoint = free_endpoint();
-        let config = BusConfig { listen: vec![endpoint.clone()], connect: connect.to_vec() };
+        let config = BusConfig {
+            listen: vec![endpoint.clone()],
+            connect: connect.to_vec(),
+            guests: guests.iter().map(|&guest| guest.to_owned()).collect(),
+            ..BusConfig::default()
+        };
         match Bus::open(&config, Keys::new(rig)).await {
             Ok((bus, calls)) => return Service { bus, calls, endpoint },
             // Somebody else took the port meanwhile.
-            Err(BusError::Open { .. }) => {}
+            Err(BusError::Open { .. } | BusError::Stop { .. }) => {}
             Err(error) => panic!("{error}"),
         }
     }
@@ -53,10 +63,24 @@ pub(crate) async fn raw_session(endpoint: &Endpoint) -> zenoh::Session {
     zenoh::open(config).await.unwrap()
 }
 
+/// A zenoh router without access control, and its endpoint.
+pub(crate) async fn router() -> (zenoh::Session, Endpoint) {
+    loop {
+        let endpoint = free_endpoint();
+        let mut config = zenoh::Config::default();
+        config.insert_json5("mode", "\"router\"").unwrap();
+        config.insert_json5("scouting/multicast/enabled", "false").unwrap();
+        config.insert_json5("listen/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
+        if let Ok(session) = zenoh::open(config).await {
+            return (session, endpoint);
+        }
+    }
+}
+
 /// Returns once the service has processed the client's earlier declarations: declarations and commands of one session keep
 /// their order.
 pub(crate) async fn settled(client: &Client, calls: &mut Calls) {
-    let request = pb::CommandRequest::default();
+    let request = pb::CommandRequest { who: "test".to_owned(), ..Default::default() };
     let asked = client.command(Command::Status, &request, Duration::from_hours(1));
     let (answer, ()) = tokio::join!(asked, async { drop(calls.commands.recv().await) });
     assert!(matches!(answer, Err(BusError::NoAnswer { .. })), "{answer:?}");

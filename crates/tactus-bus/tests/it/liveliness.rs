@@ -1,6 +1,6 @@
 //! Clients see a rig appear, disappear and crash.
 
-use crate::lab::{Link, event, open};
+use crate::lab::{Link, event, open, open_for, router};
 use tactus_bus::{Bus, BusConfig, BusError, Client, History, Losses};
 use tactus_schema::{key::Keys, pb};
 
@@ -53,7 +53,7 @@ async fn a_service_that_comes_back_is_heard_again_from_its_first_word() {
     service.bus.close().await.unwrap();
     assert_eq!(alive.changed().await, Some(false));
 
-    let config = BusConfig { listen: vec![service.endpoint], connect: vec![] };
+    let config = BusConfig { listen: vec![service.endpoint], ..BusConfig::default() };
     let (bus, _calls) = Bus::open(&config, Keys::new("bench")).await.unwrap();
     // Most likely before the client has found the service again.
     bus.publisher().publish(&event(0));
@@ -68,7 +68,7 @@ async fn a_service_that_comes_back_is_heard_again_from_its_first_word() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn two_rigs_on_one_bus_are_told_apart() {
-    let first = open("left", &[]).await;
+    let first = open_for("left", &["right"], &[]).await;
     let _left = first.bus.declare_alive().await.unwrap();
     let second = open("right", std::slice::from_ref(&first.endpoint)).await;
     let _right = second.bus.declare_alive().await.unwrap();
@@ -78,8 +78,8 @@ async fn two_rigs_on_one_bus_are_told_apart() {
     let mut there = right.alive();
     assert!(there.now() || there.changed().await == Some(true));
     assert_eq!(right.rigs(), ["left", "right"]);
-    let error = Client::connect(&first.endpoint, None).await.unwrap_err();
-    assert!(matches!(&error, BusError::SeveralRigs { rigs, .. } if *rigs == ["left", "right"]), "{error:?}");
+    let unnamed = Client::connect(&first.endpoint, None).await.unwrap();
+    assert_eq!(unnamed.rig(), "left", "the rig of the service that listens there");
 
     second.bus.publisher().publish(&event(5));
     first.bus.publisher().publish(&event(3));
@@ -89,4 +89,23 @@ async fn two_rigs_on_one_bus_are_told_apart() {
     assert_eq!(from_right.recv().await.unwrap().seq, 5);
     second.bus.close().await.unwrap();
     first.bus.close().await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn at_a_router_with_several_rigs_one_must_be_named() {
+    let (_router, endpoint) = router().await;
+    let left = open("left", std::slice::from_ref(&endpoint)).await;
+    let _left = left.bus.declare_alive().await.unwrap();
+    let right = open("right", std::slice::from_ref(&endpoint)).await;
+    let _right = right.bus.declare_alive().await.unwrap();
+    let client = Client::connect(&endpoint, Some("left")).await.unwrap();
+    let mut alive = client.alive();
+    assert!(alive.now() || alive.changed().await == Some(true));
+    let client = Client::connect(&endpoint, Some("right")).await.unwrap();
+    let mut alive = client.alive();
+    assert!(alive.now() || alive.changed().await == Some(true));
+    let error = Client::connect(&endpoint, None).await.unwrap_err();
+    assert!(matches!(&error, BusError::SeveralRigs { rigs, .. } if *rigs == ["left", "right"]), "{error:?}");
+    left.bus.close().await.unwrap();
+    right.bus.close().await.unwrap();
 }

@@ -1,8 +1,10 @@
 //! The bus, through its public interface and raw zenoh clients.
 
+mod access;
 mod commands;
 mod history;
 mod lab;
 mod liveliness;
 mod stalled;
+mod stop;
 mod wire;

@@ -16,7 +16,8 @@ async fn keys_and_encodings_are_those_of_the_contract() {
     let session = raw_session(&service.endpoint).await;
     let subscriber = session.declare_subscriber("tactus/bench/**").await.unwrap();
     // Once the service has the query, it has the subscription before it.
-    let _replies = session.get("tactus/bench/cmd/status").await.unwrap();
+    let request = pb::CommandRequest { who: "test".to_owned(), ..Default::default() };
+    let _replies = session.get("tactus/bench/cmd/status").payload(request.encode_to_vec()).await.unwrap();
     service.calls.commands.recv().await.unwrap();
 
     let publisher = service.bus.publisher();
@@ -126,7 +127,7 @@ fn golden(message: &str) -> Vec<u8> {
 async fn a_service_listens_where_it_was_told_and_nowhere_else() {
     let service = open("bench", &[]).await;
     let (silent, _calls) =
-        Bus::open(&BusConfig { listen: vec![], connect: vec![] }, Keys::new("silent")).await.unwrap();
+        Bus::open(&BusConfig { listen: vec![], ..BusConfig::default() }, Keys::new("silent")).await.unwrap();
     let listening = listening_sockets();
     assert!(listening.iter().any(|socket| socket == service.endpoint.address()), "{listening:?}");
     assert!(listening.iter().all(|socket| socket.starts_with("127.0.0.1:")), "{listening:?}");
@@ -137,7 +138,7 @@ async fn a_service_listens_where_it_was_told_and_nowhere_else() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_port_in_use_is_an_error_that_names_it() {
     let service = open("bench", &[]).await;
-    let config = BusConfig { listen: vec![service.endpoint.clone()], connect: vec![] };
+    let config = BusConfig { listen: vec![service.endpoint.clone()], ..BusConfig::default() };
     let error = Bus::open(&config, Keys::new("other")).await.unwrap_err();
     assert!(matches!(error, BusError::Open { .. }), "{error:?}");
     assert!(error.to_string().contains(service.endpoint.address()), "{error}");

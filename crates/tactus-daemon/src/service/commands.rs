@@ -1,10 +1,12 @@
 //! Answers the commands on the bus.
 
 use std::fmt;
-use std::sync::Arc;
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tactus_bus::{CommandCall, Publisher, Request};
-use tactus_engine::{Engine, ResetError, StopOrder};
+use tactus_engine::{Engine, ResetError, ResumeError, StopOrder};
 use tactus_plan::{Arguments, Script};
 use tactus_runner::config::Config;
 use tactus_runner::order::{self, RunRequest};
@@ -16,6 +18,7 @@ use tokio::sync::mpsc;
 use tracing::{info, warn};
 
 use super::health::health;
+use super::lease::{Lease, Secret};
 
 /// The CLI's exit codes for a failed command.
 mod exit {
@@ -30,6 +33,7 @@ pub(super) struct CommandDesk {
     engine: Engine,
     config: Config,
     publisher: Publisher,
+    lease: Mutex<Lease>,
 }
 
 /// Why a command was not done.
@@ -40,16 +44,19 @@ struct Refusal {
 
 impl CommandDesk {
     pub(super) fn new(engine: Engine, config: Config, publisher: Publisher) -> Self {
-        Self { engine, config, publisher }
+        Self { engine, config, publisher, lease: Mutex::default() }
     }
 
-    pub(super) async fn answer_stops(self: Arc<Self>, mut stops: mpsc::Receiver<CommandCall>) {
-        while let Some(call) = stops.recv().await {
+    /// Stops want neither a lease nor a free task: this blocks a thread of its own.
+    pub(super) fn answer_stops(&self, mut stops: mpsc::Receiver<CommandCall>) {
+        while let Some(call) = stops.blocking_recv() {
             let order = match call.request {
                 Request::Control(request) => {
                     StopOrder { by: request.who, reason: request.reason, abort: request.abort }
                 }
-                Request::Run(_) => StopOrder { by: "unknown".into(), reason: String::new(), abort: false },
+                Request::Run(_) | Request::Lease(_) => {
+                    StopOrder { by: "unknown".into(), reason: String::new(), abort: false }
+                }
             };
             let was_running = self.engine.stop(order.clone());
             warn!(by = order.by, reason = order.reason, was_running, "stop");
@@ -68,31 +75,108 @@ impl CommandDesk {
                         call.reply.reply(desk.reply(done));
                     });
                 }
-                (Command::Reset, _) => {
+                (Command::Reset, Request::Control(request)) => {
                     // Homing takes a while.
                     let desk = Arc::clone(&self);
                     tokio::spawn(async move {
-                        let done = desk.reset().await;
+                        let done = desk.reset(&request).await;
                         call.reply.reply(desk.reply(done));
                     });
                 }
-                (Command::Pause, _) => call.reply.reply(self.reply(self.pause())),
-                (Command::Resume, _) => call.reply.reply(self.reply(self.resume())),
-                (Command::Status | Command::Stop | Command::Run, _) => call.reply.reply(self.reply(Ok(()))),
+                (Command::Lease, Request::Lease(request)) => {
+                    let reply = match self.change_lease(&request) {
+                        Ok(lease) => pb::CommandReply { lease: Some(lease), ..self.reply(Ok(())) },
+                        Err(refusal) => self.reply(Err(refusal)),
+                    };
+                    call.reply.reply(reply);
+                }
+                (Command::Pause, Request::Control(request)) => {
+                    call.reply.reply(self.reply(self.pause(&request)));
+                }
+                (Command::Resume, Request::Control(request)) => {
+                    call.reply.reply(self.reply(self.resume(&request)));
+                }
+                (Command::Status, Request::Control(_)) => call.reply.reply(self.reply(Ok(()))),
+                // The bus decodes each command's own request, and gives stops to `answer_stops`.
+                (command, request) => {
+                    warn!(?command, ?request, "a command with another command's request");
+                    let error = "this is another command's request";
+                    call.reply.reply(self.reply(Err(Refusal::usage(error))));
+                }
             }
         }
     }
 
-    fn pause(&self) -> Result<(), Refusal> {
-        if self.engine.pause() { Ok(()) } else { Err(Refusal::failed("no run is in progress")) }
+    fn pause(&self, request: &pb::CommandRequest) -> Result<(), Refusal> {
+        self.want_lease(&request.lease)?;
+        info!(by = request.who, "pause");
+        if self.engine.pause(&request.who) { Ok(()) } else { Err(Refusal::failed("no run is in progress")) }
     }
 
-    fn resume(&self) -> Result<(), Refusal> {
-        if self.engine.resume() { Ok(()) } else { Err(Refusal::failed("no run is paused")) }
+    fn resume(&self, request: &pb::CommandRequest) -> Result<(), Refusal> {
+        self.want_lease(&request.lease)?;
+        info!(by = request.who, "resume");
+        self.engine.resume(&request.who, request.covering_mm).map_err(|error| match error {
+            ResumeError::NotPaused => Refusal::failed(error),
+            ResumeError::CoveringNotConfirmed { .. } => Refusal::usage(error),
+        })
     }
 
-    async fn reset(&self) -> Result<(), Refusal> {
-        info!("reset: clearing the stage's alarm and homing");
+    /// Refuses a command of a client that does not hold the lease.
+    fn want_lease(&self, lease: &[u8]) -> Result<(), Refusal> {
+        let now = self.engine.clock().now().mono;
+        self.lease().check(lease, now).map_err(Refusal::not_now)
+    }
+
+    /// Gives, keeps or ends the lease. Who takes it gets its secret.
+    fn change_lease(&self, request: &pb::LeaseRequest) -> Result<pb::Lease, Refusal> {
+        let now = self.engine.clock().now().mono;
+        let who = &request.who;
+        let mut given = Vec::new();
+        let mut lease = self.lease();
+        match request.action() {
+            pb::LeaseAction::Acquire => {
+                let secret = new_secret()?;
+                lease.acquire(who, secret, now).map_err(Refusal::not_now)?;
+                given = secret.0.to_vec();
+            }
+            pb::LeaseAction::TakeOver => {
+                if request.reason.trim().is_empty() {
+                    return Err(Refusal::usage("who takes the lease over says why"));
+                }
+                let secret = new_secret()?;
+                if let Some(from) = lease.take_over(who, secret, now) {
+                    self.record_takeover(pb::LeaseTaken {
+                        by: who.clone(),
+                        from,
+                        reason: request.reason.clone(),
+                    });
+                }
+                given = secret.0.to_vec();
+            }
+            pb::LeaseAction::Renew => lease.renew(&request.lease, now).map_err(Refusal::not_now)?,
+            pb::LeaseAction::Release => lease.release(&request.lease, now).map_err(Refusal::not_now)?,
+            pb::LeaseAction::Unspecified => {
+                return Err(Refusal::usage("what to do with the lease is missing"));
+            }
+        }
+        Ok(pb::Lease { lease: given, ..told(&lease, now) })
+    }
+
+    /// Tells and records a takeover: who, from whom and why.
+    fn record_takeover(&self, taken: pb::LeaseTaken) {
+        warn!(by = taken.by, from = taken.from, reason = taken.reason, "the lease is taken over");
+        self.engine.record_takeover(taken);
+    }
+
+    fn lease(&self) -> MutexGuard<'_, Lease> {
+        // Nothing panics under this lock.
+        self.lease.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    async fn reset(&self, request: &pb::CommandRequest) -> Result<(), Refusal> {
+        self.want_lease(&request.lease)?;
+        info!(by = request.who, "reset: clearing the stage's alarm and homing");
         self.engine.reset().await.map_err(|error| match error {
             ResetError::Busy(busy) => Refusal::not_now(busy),
             ResetError::Stopped(_) | ResetError::Stage(_) | ResetError::NotReady(_) => Refusal::failed(error),
@@ -101,6 +185,8 @@ impl CommandDesk {
 
     /// Checks the request, dry-runs it, and starts the run.
     async fn run(&self, request: pb::RunRequest) -> Result<(), Refusal> {
+        self.want_lease(&request.lease)?;
+        let lease = request.lease.clone();
         // From here on a stop ends this run, even before the dry run is over.
         let claim = self.engine.claim().map_err(Refusal::not_now)?;
         if let Some(fault) = self.engine.fault() {
@@ -110,8 +196,7 @@ impl CommandDesk {
         }
         let script = self.script(&request)?;
         let arguments = Arguments::from_json(&request.parameters_json).map_err(Refusal::usage)?;
-        let who = if request.who.is_empty() { "unknown".into() } else { request.who };
-        let request = RunRequest { script, arguments, seed: request.seed, who };
+        let request = RunRequest { script, arguments, seed: request.seed, who: request.who };
         let rig = self.engine.rig();
         let now = self.engine.clock().now().wall;
         let mut order = order::order(request, &rig, now).map_err(Refusal::usage)?;
@@ -128,6 +213,8 @@ impl CommandDesk {
             return Err(Refusal { exit_code, error: plan.outcome.message });
         }
         claim.check().map_err(Refusal::failed)?;
+        // Somebody may have taken it over during the dry run.
+        self.want_lease(&lease)?;
         order.planned = Some(plan.promise());
         let texts = self.config.rig.texts.all();
         let (recording, path) =
@@ -165,8 +252,22 @@ impl CommandDesk {
             version: env!("CARGO_PKG_VERSION").into(),
             stage: Some(self.engine.stage_state()),
             health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()))),
+            lease: Some(told(&self.lease(), self.engine.clock().now().mono)),
         }
     }
+}
+
+/// Who holds the lease, as everybody may know it.
+fn told(lease: &Lease, now: MonoTime) -> pb::Lease {
+    let (holder, left) = lease.holder(now).unwrap_or_default();
+    pb::Lease { holder: holder.to_owned(), expires_in_s: left.as_secs_f64(), lease: Vec::new() }
+}
+
+fn new_secret() -> Result<Secret, Refusal> {
+    let mut bytes = [0; 16];
+    let read = File::open("/dev/urandom").and_then(|mut random| random.read_exact(&mut bytes));
+    read.map(|()| Secret(bytes))
+        .map_err(|error: io::Error| Refusal::failed(format!("the system gives no random numbers: {error}")))
 }
 
 impl Refusal {

@@ -1,14 +1,17 @@
 use std::path::Path;
 use std::sync::mpsc;
+use std::thread;
 use std::time::Duration;
 
-use tactus_bus::{Bus, BusConfig};
+use tactus_bus::{Bus, BusConfig, Calls, Client, Endpoint, Hold};
 use tactus_device::Clock;
 use tactus_engine::Unpublished;
 use tactus_runner::config::RigFiles;
 use tactus_runner::devices;
 use tactus_runner::embedded::Truth;
 use tactus_schema::key::Keys;
+use tokio::runtime::Handle;
+use tokio::sync::Barrier;
 
 use super::*;
 
@@ -22,19 +25,119 @@ fn answers_and_reports_of_the_stage_never_wait_for_each_other() {
     assert!(waited.is_ok_and(|homed| homed > 0), "homing or an answer hangs: {waited:?}");
 }
 
-/// Asks as often as can be while the stage homes and tells all the time: how many answers saw it homed; an error if that takes
-/// a minute.
-async fn ask_while_homing() -> Result<u32, mpsc::RecvTimeoutError> {
+/// A bus at these endpoints, and the desk of the shipped simulated rig, which nobody has reset.
+async fn lab(listen: Vec<Endpoint>) -> (Bus, Calls, CommandDesk) {
     let config = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/tactusd.toml"));
     let config = Config::load(config).unwrap();
     let RigFiles { rig, codec, .. } = config.rig.clone();
-    let nowhere = BusConfig { listen: Vec::new(), connect: Vec::new() };
-    let (bus, _calls) = Bus::open(&nowhere, Keys::new(rig.name.clone())).await.unwrap();
+    let bus_config = BusConfig { listen, ..BusConfig::default() };
+    let (bus, calls) = Bus::open(&bus_config, Keys::new(rig.name.clone())).await.unwrap();
     let clock = Clock::real();
     let service = rig.service.clone().unwrap();
     let opened = devices::open(&rig, &service, codec, || Truth::of_rig(&rig, 1), clock);
-    let engine = Engine::start(rig.clone(), opened.devices, clock, Arc::new(Unpublished)).unwrap();
-    let desk = CommandDesk::new(engine.clone(), config, bus.publisher());
+    let engine = Engine::start(rig, opened.devices, clock, Arc::new(Unpublished)).unwrap();
+    let desk = CommandDesk::new(engine, config, bus.publisher());
+    (bus, calls, desk)
+}
+
+/// A client, and what it got when it asked for the lease.
+async fn racer(endpoint: &Endpoint, number: usize, start: Arc<Barrier>) -> (Client, Hold) {
+    let client = Client::connect(endpoint, Some("sim")).await.unwrap();
+    start.wait().await;
+    let hold = client.hold(&format!("client {number}"), None).await.unwrap();
+    (client, hold)
+}
+
+async fn ask(client: &Client, command: Command, lease: Vec<u8>) -> pb::CommandReply {
+    let request = pb::CommandRequest { who: "racer".into(), lease, ..Default::default() };
+    client.command(command, &request, Duration::from_mins(1)).await.unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn of_twenty_clients_one_gets_the_lease_and_only_its_commands_move_anything() {
+    let endpoint: Endpoint = free_endpoint();
+    let (bus, Calls { stops, commands }, desk) = lab(vec![endpoint.clone()]).await;
+    let desk = Arc::new(desk);
+    let stopping = thread::spawn({
+        let (desk, runtime) = (Arc::clone(&desk), Handle::current());
+        move || {
+            let _entered = runtime.enter();
+            desk.answer_stops(stops);
+        }
+    });
+    let answering = tokio::spawn(Arc::clone(&desk).answer_commands(commands));
+
+    let start = Arc::new(Barrier::new(20));
+    let racers = (0..20).map(|number| {
+        let (endpoint, start) = (endpoint.clone(), Arc::clone(&start));
+        tokio::spawn(async move { racer(&endpoint, number, start).await })
+    });
+    let racers: Vec<_> = racers.collect();
+    let (mut winners, mut losers) = (Vec::new(), Vec::new());
+    for racer in racers {
+        match racer.await.unwrap() {
+            (client, Hold::Held(held)) => winners.push((client, held)),
+            (client, Hold::Refused(reply)) => {
+                // The second if too many ask at once.
+                assert!(matches!(reply.exit_code, exit::NOT_NOW | exit::FAILED), "{}", reply.error);
+                losers.push(client);
+            }
+        }
+    }
+    assert_eq!(winners.len(), 1);
+    let (winner, held) = winners.pop().unwrap();
+
+    // Nobody has homed the stage, and nobody but the holder can.
+    let start = desk.engine.stage_state();
+    for (number, loser) in losers.iter().enumerate() {
+        for command in [Command::Reset, Command::Pause, Command::Resume] {
+            for lease in [Vec::new(), vec![0; 16], held.secret()[..15].to_vec()] {
+                let reply = ask(loser, command, lease).await;
+                assert_eq!(reply.exit_code, exit::NOT_NOW, "{number}: {command:?} {}", reply.error);
+            }
+        }
+        let run = pb::RunRequest { experiment: "corners".into(), who: "racer".into(), ..Default::default() };
+        let reply = loser.command(Command::Run, &run, Duration::from_mins(1)).await.unwrap();
+        assert_eq!(reply.exit_code, exit::NOT_NOW, "{}", reply.error);
+        let reply = ask(loser, Command::Status, Vec::new()).await;
+        assert!(reply.ok && reply.lease.as_ref().is_some_and(|lease| lease.lease.is_empty()), "{reply:?}");
+    }
+    let now = desk.engine.stage_state();
+    assert_eq!((now.status(), now.z_mm.to_bits()), (start.status(), start.z_mm.to_bits()));
+
+    // A takeover wants a reason, and makes the first lease stale.
+    assert!(
+        matches!(losers[0].hold("loser", Some(" ")).await, Ok(Hold::Refused(reply)) if reply.exit_code == exit::USAGE)
+    );
+    let Ok(Hold::Held(taken)) = losers[0].hold("loser", Some("smoke")).await else {
+        panic!("not taken over")
+    };
+    let reply = ask(&winner, Command::Reset, held.secret()).await;
+    assert_eq!(reply.exit_code, exit::NOT_NOW, "{}", reply.error);
+    assert!(reply.error.contains("loser holds the lease"), "{}", reply.error);
+    assert_eq!(desk.engine.stage_state().status(), start.status());
+    let reply = ask(&losers[0], Command::Reset, taken.secret()).await;
+    assert!(reply.ok, "{}", reply.error);
+    assert_eq!(desk.engine.stage_state().status(), pb::StageStatus::Idle);
+
+    // A stop wants nothing.
+    let stop = pb::CommandRequest::default();
+    assert!(losers[1].stop(&stop, Duration::from_mins(1)).await.unwrap().ok);
+    answering.abort();
+    bus.close().await.unwrap();
+    tokio::task::spawn_blocking(|| stopping.join()).await.unwrap().unwrap();
+}
+
+fn free_endpoint() -> Endpoint {
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    format!("tcp/127.0.0.1:{port}").parse().unwrap()
+}
+
+/// Asks as often as can be while the stage homes and tells all the time: how many answers saw it homed; an error if that takes
+/// a minute.
+async fn ask_while_homing() -> Result<u32, mpsc::RecvTimeoutError> {
+    let (_bus, _calls, desk) = lab(Vec::new()).await;
+    let engine = desk.engine.clone();
 
     let homing = tokio::spawn(async move { engine.reset().await });
     let (done, ended) = mpsc::channel();

@@ -9,19 +9,40 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fake::{Fault, Shared};
+use tactus_safety::Supervisor;
 use tactus_schema::pb::{StageState, StageStatus};
 use tactus_schema::rig::{GrblAxes, StageProtocol};
+use tactus_schema::{MonoTime, Rig};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep};
 
 use super::{Connection, DrivenStage, REPORTS_MAX, StageOptions};
 use crate::transport::memory::{MemoryPort, pair};
-use crate::{Clock, ErrorKind, Stage, StageError, Target};
+use crate::{Clock, ErrorKind, HomingPermit, Permit, Stage, StageError, Target};
 
 const OPTIONS: StageOptions = StageOptions { tolerance_mm: 0.005, simulated: true };
 
 fn to(x_mm: f64, speed_mm_per_s: f64) -> Target {
     Target { position_mm: [x_mm, 1.0, 5.0], speed_mm_per_s }
+}
+
+/// Leave to move anywhere: a supervisor that takes the stage to stand there already.
+fn permit(target: Target) -> Permit {
+    let [x_mm, y_mm, z_mm] = target.position_mm;
+    let status = StageStatus::Idle.into();
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.on_report(&StageState { x_mm, y_mm, z_mm, status, ..Default::default() }), None);
+    supervisor.permit(target, MonoTime::default()).unwrap()
+}
+
+/// Leave to home, which does not expire in a test.
+fn homing() -> HomingPermit {
+    supervisor().permit_homing(MonoTime::default().after(Duration::from_secs(1_000_000))).unwrap()
+}
+
+fn supervisor() -> Supervisor {
+    let rig = Rig::from_toml(include_str!("../../../../config/rigs/sim.toml")).unwrap();
+    Supervisor::without_sensor(&rig, rig.service.as_ref().unwrap())
 }
 
 fn start() -> (Arc<DrivenStage>, mpsc::Receiver<StageState>, MemoryPort) {
@@ -38,7 +59,7 @@ async fn homed() -> (Arc<DrivenStage>, Shared) {
     tokio::spawn(fake::run(port, shared.clone()));
     tokio::spawn(drain(reports));
     until(&stage, StageStatus::Unhomed).await;
-    stage.home().await.unwrap();
+    stage.home(homing()).await.unwrap();
     assert_eq!(stage.state().borrow().status(), StageStatus::Idle);
     (stage, shared)
 }
@@ -62,7 +83,7 @@ async fn begin(
     under_way: Duration,
 ) -> tokio::task::JoinHandle<Result<[f64; 3], StageError>> {
     let stage = Arc::clone(stage);
-    let moving = tokio::spawn(async move { stage.move_to(target).await });
+    let moving = tokio::spawn(async move { stage.move_to(permit(target)).await });
     sleep(under_way).await;
     moving
 }
@@ -71,7 +92,7 @@ async fn begin(
 async fn a_move_is_done_soon_after_the_stage_arrives() {
     let (stage, shared) = homed().await;
     let began = Instant::now();
-    let reached = stage.move_to(to(11.0, 10.0)).await.unwrap();
+    let reached = stage.move_to(permit(to(11.0, 10.0))).await.unwrap();
     assert_eq!(reached, [11.0, 1.0, 5.0]);
     assert_eq!(shared.count("G90 G21 G1 X11.000 Y1.000 Z5.000 F600.000"), 1);
     // The way takes a second; the stage is asked every 50 ms.
@@ -85,7 +106,7 @@ async fn a_move_is_done_soon_after_the_stage_arrives() {
 async fn a_move_to_the_present_place_moves_nothing_and_asks() {
     let (stage, shared) = homed().await;
     let asked = shared.count("?");
-    assert_eq!(stage.move_to(to(1.0, 10.0)).await.unwrap(), [1.0, 1.0, 5.0]);
+    assert_eq!(stage.move_to(permit(to(1.0, 10.0))).await.unwrap(), [1.0, 1.0, 5.0]);
     assert_eq!(stage.look().await.unwrap(), [1.0, 1.0, 5.0]);
     assert_eq!((shared.count("?"), shared.count("G")), (asked + 4, 0));
 }
@@ -103,7 +124,7 @@ async fn the_epoch_rises_with_whatever_makes_the_position_doubtful_and_with_noth
     let (stage, shared) = homed().await;
     let epoch = || stage.state().borrow().epoch;
     let homed = epoch();
-    stage.move_to(to(3.0, 10.0)).await.unwrap();
+    stage.move_to(permit(to(3.0, 10.0))).await.unwrap();
     let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(200)).await;
     stage.stop();
     assert!(matches!(moving.await.unwrap(), Err(StageError::Stopped { .. })));
@@ -111,12 +132,12 @@ async fn the_epoch_rises_with_whatever_makes_the_position_doubtful_and_with_noth
     assert_eq!(epoch(), homed);
 
     shared.set(Fault::Resets);
-    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Unhomed)));
+    assert!(matches!(stage.move_to(permit(to(2.0, 10.0))).await, Err(StageError::Unhomed)));
     let reset = epoch();
-    stage.home().await.unwrap();
+    stage.home(homing()).await.unwrap();
     let homed_again = epoch();
     shared.set(Fault::HardLimit);
-    assert!(matches!(stage.move_to(to(11.0, 10.0)).await, Err(StageError::Alarm { .. })));
+    assert!(matches!(stage.move_to(permit(to(11.0, 10.0))).await, Err(StageError::Alarm { .. })));
     let alarmed = epoch();
     shared.fall_silent();
     until(&stage, StageStatus::Disconnected).await;
@@ -138,13 +159,13 @@ async fn stop_is_sent_in_the_same_instant_and_keeps_the_position() {
     assert!((position_mm[0] - 6.37).abs() < 0.001, "{position_mm:?}");
     assert!((position_mm[0] - shared.position_mm()[0]).abs() < 0.0006);
     // Still homed: it goes on from where it stands.
-    assert_eq!(stage.move_to(to(6.0, 10.0)).await.unwrap(), [6.0, 1.0, 5.0]);
+    assert_eq!(stage.move_to(permit(to(6.0, 10.0))).await.unwrap(), [6.0, 1.0, 5.0]);
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_command_given_before_the_stop_is_not_begun_after_it() {
     let (stage, shared) = homed().await;
-    let given = stage.move_to(to(11.0, 10.0));
+    let given = stage.move_to(permit(to(11.0, 10.0)));
     stage.stop();
     assert!(matches!(given.await, Err(StageError::Stopped { .. })));
     assert_eq!(shared.count("G"), 0);
@@ -155,7 +176,7 @@ async fn a_command_given_while_the_stage_comes_to_a_stand_waits_for_it() {
     let (stage, shared) = homed().await;
     let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(500)).await;
     stage.stop();
-    assert_eq!(stage.move_to(to(2.0, 10.0)).await.unwrap(), [2.0, 1.0, 5.0]);
+    assert_eq!(stage.move_to(permit(to(2.0, 10.0))).await.unwrap(), [2.0, 1.0, 5.0]);
     assert!(matches!(moving.await.unwrap(), Err(StageError::Stopped { .. })));
     assert_eq!(shared.count("\x18"), 2, "one at the greeting, one after the hold");
 }
@@ -164,7 +185,7 @@ async fn a_command_given_while_the_stage_comes_to_a_stand_waits_for_it() {
 async fn a_second_move_is_refused_while_one_is_in_hand() {
     let (stage, _shared) = homed().await;
     let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(500)).await;
-    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Refused { .. })));
+    assert!(matches!(stage.move_to(permit(to(2.0, 10.0))).await, Err(StageError::Refused { .. })));
     assert_eq!(moving.await.unwrap().unwrap(), [11.0, 1.0, 5.0]);
 }
 
@@ -172,7 +193,7 @@ async fn a_second_move_is_refused_while_one_is_in_hand() {
 async fn a_stage_that_lies_is_not_there() {
     let (stage, shared) = homed().await;
     shared.set(Fault::StopsShort);
-    let result = stage.move_to(to(11.0, 10.0)).await;
+    let result = stage.move_to(permit(to(11.0, 10.0))).await;
     let Err(StageError::NotThere { target_mm, position_mm }) = result else { panic!("{result:?}") };
     assert_eq!((target_mm[0], position_mm[0]), (11.0, 10.0));
 }
@@ -181,7 +202,7 @@ async fn a_stage_that_lies_is_not_there() {
 async fn a_move_that_does_not_end_is_stopped_and_overdue() {
     let (stage, shared) = homed().await;
     shared.set(Fault::NeverIdle);
-    let result = stage.move_to(to(11.0, 10.0)).await;
+    let result = stage.move_to(permit(to(11.0, 10.0))).await;
     let Err(StageError::Overdue { position_mm, waited_s, .. }) = result else { panic!("{result:?}") };
     assert_eq!((position_mm[0], waited_s), (11.0, 4.0));
     assert!(shared.first_heard("!").is_some());
@@ -191,24 +212,24 @@ async fn a_move_that_does_not_end_is_stopped_and_overdue() {
 async fn an_alarm_is_told_and_cleared() {
     let (stage, shared) = homed().await;
     shared.set(Fault::HardLimit);
-    let result = stage.move_to(to(11.0, 10.0)).await;
+    let result = stage.move_to(permit(to(11.0, 10.0))).await;
     let Err(StageError::Alarm { code: 1, meaning, .. }) = result else { panic!("{result:?}") };
     assert_eq!(meaning, "a hard limit switch was hit");
     let state = *stage.state().borrow();
     assert_eq!((state.status(), state.alarm), (StageStatus::Alarm, Some(1)));
-    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Alarm { code: 1, .. })));
+    assert!(matches!(stage.move_to(permit(to(2.0, 10.0))).await, Err(StageError::Alarm { code: 1, .. })));
     stage.clear_alarm().await.unwrap();
     assert_eq!(stage.state().borrow().status(), StageStatus::Unhomed);
-    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Unhomed)));
-    stage.home().await.unwrap();
-    stage.move_to(to(2.0, 10.0)).await.unwrap();
+    assert!(matches!(stage.move_to(permit(to(2.0, 10.0))).await, Err(StageError::Unhomed)));
+    stage.home(homing()).await.unwrap();
+    stage.move_to(permit(to(2.0, 10.0))).await.unwrap();
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_reset_leaves_the_stage_unhomed() {
     let (stage, shared) = homed().await;
     shared.set(Fault::Resets);
-    assert!(matches!(stage.move_to(to(11.0, 10.0)).await, Err(StageError::Unhomed)));
+    assert!(matches!(stage.move_to(permit(to(11.0, 10.0))).await, Err(StageError::Unhomed)));
     assert_eq!(stage.state().borrow().status(), StageStatus::Unhomed);
 }
 
@@ -216,12 +237,12 @@ async fn a_reset_leaves_the_stage_unhomed() {
 async fn a_stage_that_falls_silent_is_held_and_found_again() {
     let (stage, shared) = homed().await;
     shared.set(Fault::FallsSilent);
-    let result = stage.move_to(to(31.0, 10.0)).await;
+    let result = stage.move_to(permit(to(31.0, 10.0))).await;
     let Err(StageError::Device(error)) = result else { panic!("{result:?}") };
     assert_eq!(error.kind, ErrorKind::Timeout);
     assert!(shared.first_heard("!").is_some());
     assert_eq!(stage.state().borrow().status(), StageStatus::Disconnected);
-    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Device(_))));
+    assert!(matches!(stage.move_to(permit(to(2.0, 10.0))).await, Err(StageError::Device(_))));
     until(&stage, StageStatus::Unhomed).await;
 }
 
@@ -242,17 +263,17 @@ async fn an_unplugged_stage_fails_the_move_and_is_unhomed_when_it_is_back() {
             port
         }
     });
-    assert!(matches!(stage.home().await, Err(StageError::Device(_))), "it cannot have answered yet");
+    assert!(matches!(stage.home(homing()).await, Err(StageError::Device(_))), "it cannot have answered yet");
     until(&stage, StageStatus::Unhomed).await;
-    stage.home().await.unwrap();
-    let result = stage.move_to(to(31.0, 10.0)).await;
+    stage.home(homing()).await.unwrap();
+    let result = stage.move_to(permit(to(31.0, 10.0))).await;
     let Err(StageError::Device(error)) = result else { panic!("{result:?}") };
     assert_eq!(error.kind, ErrorKind::Disconnected);
     until(&stage, StageStatus::Disconnected).await;
     sleep(Duration::from_secs(5)).await;
     tokio::spawn(fake::run(plugged.await.unwrap(), shared));
     until(&stage, StageStatus::Unhomed).await;
-    stage.home().await.unwrap();
+    stage.home(homing()).await.unwrap();
 }
 
 #[tokio::test(start_paused = true)]
@@ -281,8 +302,8 @@ async fn two_runs_are_alike() {
         let (stage, mut reports, port) = start();
         tokio::spawn(fake::run(port, Shared::new()));
         until(&stage, StageStatus::Unhomed).await;
-        stage.home().await.unwrap();
-        stage.move_to(to(3.0, 1.0)).await.unwrap();
+        stage.home(homing()).await.unwrap();
+        stage.move_to(permit(to(3.0, 1.0))).await.unwrap();
         drop(stage);
         let mut run = Vec::new();
         while let Some(report) = reports.recv().await {
@@ -318,7 +339,7 @@ async fn a_controller_that_is_not_the_rigs_is_refused_and_not_moved() {
     let refused = connection.wait_for(|now| matches!(now, Connection::Seeking(Some(_)))).await;
     assert!(refused.is_ok());
     drop(refused);
-    let Err(StageError::Device(error)) = stage.home().await else { panic!() };
+    let Err(StageError::Device(error)) = stage.home(homing()).await else { panic!() };
     assert_eq!(error.kind, ErrorKind::DeviceFault);
     let both = ["$100 = 250.000", "80 steps/mm", "not connected", "stage on memory:stage"];
     assert!(both.iter().all(|part| error.to_string().contains(part)), "{error}");

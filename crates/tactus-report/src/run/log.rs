@@ -66,8 +66,9 @@ fn describe(event: &Event) -> (&'static str, String) {
             "gap",
             format!("{} frames lost between {} and {}: {}", e.frames_lost, e.after_seq, e.next_seq, e.reason),
         ),
-        Event::Paused(_) => ("paused", String::new()),
-        Event::Resumed(_) => ("resumed", String::new()),
+        Event::Paused(e) => ("paused", author(&e.by)),
+        Event::Resumed(e) => ("resumed", author(&e.by)),
+        Event::LeaseTaken(e) => ("lease taken", format!("by {} from {}: {}", e.by, e.from, e.reason)),
         Event::StopRequested(e) => {
             (if e.abort { "abort" } else { "stop" }, format!("by {}: {}", e.by, e.reason))
         }
@@ -88,4 +89,9 @@ fn verdict(verdict: pb::SafetyVerdict) -> &'static str {
         pb::SafetyVerdict::Refused => "refused",
         pb::SafetyVerdict::Stopped => "stopped",
     }
+}
+
+/// Recordings before version 0.2 do not say who paused.
+fn author(by: &str) -> String {
+    if by.is_empty() { String::new() } else { format!("by {by}") }
 }

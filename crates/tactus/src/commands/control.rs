@@ -3,51 +3,99 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use tactus_bus::Credentials;
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 
-use crate::cli::{Common, StopArgs};
+use crate::cli::{Common, LeaseArgs, ResumeArgs, StopArgs};
 use crate::connection::{self, PATIENCE};
-use crate::exit::Exit;
+use crate::exit::{Exit, Failure};
 use crate::output::{duration, print_fields};
 
 /// How long to wait for `reset`: homing is slow.
 const HOMING_PATIENCE: Duration = Duration::from_mins(2);
 
 pub(crate) fn status(common: &Common) -> anyhow::Result<Exit> {
-    command(common, Command::Status, &pb::CommandRequest::default())
-}
-
-pub(crate) fn stop(common: &Common, args: &StopArgs) -> anyhow::Result<Exit> {
-    let request = pb::CommandRequest { who: "cli".into(), reason: args.reason.clone(), abort: args.abort };
-    command(common, Command::Stop, &request)
-}
-
-pub(crate) fn pause(common: &Common) -> anyhow::Result<Exit> {
-    command(common, Command::Pause, &pb::CommandRequest { who: "cli".into(), ..Default::default() })
-}
-
-pub(crate) fn resume(common: &Common) -> anyhow::Result<Exit> {
-    command(common, Command::Resume, &pb::CommandRequest { who: "cli".into(), ..Default::default() })
-}
-
-pub(crate) fn reset(common: &Common) -> anyhow::Result<Exit> {
-    command(common, Command::Reset, &pb::CommandRequest { who: "cli".into(), ..Default::default() })
-}
-
-fn command(common: &Common, command: Command, request: &pb::CommandRequest) -> anyhow::Result<Exit> {
     let reply = connection::runtime()?.block_on(async {
         let client = connection::require(common).await?;
-        let reply = connection::ask(&client, command, request, patience(command)).await?;
+        let request = pb::CommandRequest { who: connection::who(), ..Default::default() };
+        let reply = connection::ask(&client, Command::Status, &request, PATIENCE).await?;
         client.close().await?;
         anyhow::Ok(reply)
     })?;
-    if common.json {
-        println!("{}", to_json(&reply));
-    } else {
-        print(&reply);
+    show(common, &reply);
+    Ok(Exit::Done)
+}
+
+/// Needs no lease, no rig's name, and no service that is ready.
+pub(crate) fn stop(common: &Common, args: &StopArgs) -> anyhow::Result<Exit> {
+    let endpoint = connection::endpoint(common)?;
+    let request = pb::CommandRequest {
+        who: connection::who(),
+        reason: args.reason.clone(),
+        abort: args.abort,
+        ..Default::default()
+    };
+    let answers = connection::runtime()?.block_on(tactus_bus::stop(
+        &endpoint,
+        common.rig.as_deref(),
+        &request,
+        &Credentials::default(),
+        PATIENCE,
+    ))?;
+    if let Some(refusal) = answers.iter().find(|reply| !reply.ok) {
+        return Err(Failure::new(Exit::of_reply(refusal.exit_code), &refusal.error).into());
+    }
+    for reply in &answers {
+        show(common, reply);
     }
     Ok(Exit::Done)
+}
+
+pub(crate) fn pause(common: &Common, args: &LeaseArgs) -> anyhow::Result<Exit> {
+    command(common, Command::Pause, args, None)
+}
+
+pub(crate) fn resume(common: &Common, args: &ResumeArgs) -> anyhow::Result<Exit> {
+    command(common, Command::Resume, &args.lease, args.covering)
+}
+
+pub(crate) fn reset(common: &Common, args: &LeaseArgs) -> anyhow::Result<Exit> {
+    command(common, Command::Reset, args, None)
+}
+
+/// Sends a command that wants the lease.
+fn command(
+    common: &Common,
+    command: Command,
+    args: &LeaseArgs,
+    covering_mm: Option<f64>,
+) -> anyhow::Result<Exit> {
+    let reply = connection::runtime()?.block_on(async {
+        let client = connection::require(common).await?;
+        let held = connection::hold(&client, args).await?;
+        let request = pb::CommandRequest {
+            who: connection::who(),
+            reason: args.take_over.clone().unwrap_or_default(),
+            lease: held.secret(),
+            covering_mm,
+            ..Default::default()
+        };
+        let reply = connection::ask(&client, command, &request, patience(command)).await;
+        connection::release(held).await;
+        client.close().await?;
+        reply
+    })?;
+    show(common, &reply);
+    Ok(Exit::Done)
+}
+
+fn show(common: &Common, reply: &pb::CommandReply) {
+    if common.json {
+        println!("{}", to_json(reply));
+    } else {
+        print(reply);
+    }
 }
 
 fn patience(command: Command) -> Duration {
@@ -63,6 +111,7 @@ fn to_json(reply: &pb::CommandReply) -> Value {
         "rig": reply.rig,
         "version": reply.version,
         "simulated": health.simulated,
+        "lease": holder(reply).map(|lease| json!({ "holder": lease.holder, "expires_in_s": lease.expires_in_s })),
         "fault": (!state.fault.is_empty()).then_some(&state.fault),
         "run": {
             "run_id": state.run_id,
@@ -148,9 +197,15 @@ fn print(reply: &pb::CommandReply) {
             ),
         ),
         ("sensor", format!("{sensor}, {} frames, {} lost; {clock}", health.frames, health.frames_lost)),
+        ("lease", holder(reply).map_or_else(|| "nobody's".to_owned(), |lease| lease.holder.clone())),
         ("service", format!("version {}, up {}", reply.version, duration(health.uptime_s))),
     ]);
     print_fields(&fields);
+}
+
+/// The lease, if somebody holds it.
+fn holder(reply: &pb::CommandReply) -> Option<&pb::Lease> {
+    reply.lease.as_ref().filter(|lease| !lease.holder.is_empty())
 }
 
 /// A fault and how to clear it.

@@ -33,8 +33,7 @@ pub(super) struct RunSummary {
 
 pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
     let summary = execute(common, args)?;
-    let report =
-        if args.no_report { None } else { make_report(&summary.recording, &args.out.join(&summary.run_id)) };
+    let report = if args.no_report { None } else { make_report(&summary, &args.out) };
     if common.json {
         println!("{}", to_json(&summary, report.as_deref()));
     } else {
@@ -74,12 +73,19 @@ pub(super) fn experiment(args: &ExperimentArgs) -> anyhow::Result<(Script, Argum
     Ok((script, arguments))
 }
 
-/// Writes the report beside the recording or, if that folder is not writable, into `folder`.
-fn make_report(recording: &Path, folder: &Path) -> Option<PathBuf> {
-    let made = write_report(recording, &recording.with_file_name("report.html")).or_else(|_| {
-        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        write_report(recording, &folder.join("report.html"))
-    });
+/// Writes the report of a run: beside the recording of the embedded rig; for a run on a service into the run's folder in `out`,
+/// because a client writes to no path that came over the bus.
+fn make_report(summary: &RunSummary, out: &Path) -> Option<PathBuf> {
+    let recording = &summary.recording;
+    let made = if summary.embedded {
+        write_report(recording, &recording.with_file_name("report.html"))
+    } else {
+        folder_of(&summary.run_id, out).and_then(|folder| {
+            anyhow::ensure!(recording.is_file(), "the recording is not on this machine");
+            std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+            write_report(recording, &folder.join("report.html"))
+        })
+    };
     match made {
         Ok(path) => Some(path),
         Err(error) => {
@@ -88,6 +94,17 @@ fn make_report(recording: &Path, folder: &Path) -> Option<PathBuf> {
             None
         }
     }
+}
+
+/// The folder of a run in `out`.
+///
+/// # Errors
+/// If the run's id is no plain file name.
+fn folder_of(run_id: &str, out: &Path) -> anyhow::Result<PathBuf> {
+    let plain = |c: char| !c.is_control() && c != '/' && c != '\\';
+    let is_plain = !run_id.is_empty() && !run_id.starts_with('.') && run_id.chars().all(plain);
+    anyhow::ensure!(is_plain, "the service names the run {run_id:?}, which is no name for a folder");
+    Ok(out.join(run_id))
 }
 
 /// Writes the report of a recording and returns its absolute path.
@@ -130,3 +147,7 @@ fn print(summary: &RunSummary, report: Option<&Path>) {
     }
     print_fields(&fields);
 }
+
+#[cfg(test)]
+#[path = "run_tests.rs"]
+mod tests;

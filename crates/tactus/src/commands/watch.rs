@@ -8,7 +8,6 @@ use anyhow::Context;
 use ratatui::crossterm::event::{Event, KeyCode, KeyModifiers, poll, read};
 use serde_json::json;
 use tactus_bus::{Client, History};
-use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
@@ -77,10 +76,11 @@ async fn show(client: &Client) -> anyhow::Result<Exit> {
             Some(key) = keys.recv() => match key {
                 KeyAction::Quit => break Ok(()),
                 KeyAction::Stop => {
-                    let request = pb::CommandRequest { who: "watch".into(), reason: "key S".into(), abort: false };
-                    screen.note = match connection::ask(client, Command::Stop, &request, PATIENCE).await {
+                    let request =
+                        pb::CommandRequest { who: "watch".into(), reason: "key S".into(), ..Default::default() };
+                    screen.note = match client.stop(&request, PATIENCE).await {
                         Ok(_) => "STOP sent".into(),
-                        Err(error) => format!("STOP FAILED: {}", in_words(&error)),
+                        Err(error) => format!("STOP FAILED: {}", in_words(&error.into())),
                     };
                 }
                 KeyAction::Tare => screen.tare(),

@@ -48,6 +48,25 @@ struct ConnectedRig {
     control: RigControl,
 }
 
+/// Leave to move anywhere: a supervisor that takes the stage to stand there already.
+fn permit(target: Target) -> Permit {
+    let [x_mm, y_mm, z_mm] = target.position_mm;
+    let status = StageStatus::Idle.into();
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.on_report(&StageState { x_mm, y_mm, z_mm, status, ..Default::default() }), None);
+    supervisor.permit(target, MonoTime::default()).unwrap()
+}
+
+/// Leave to home, which does not expire in a test.
+fn homing() -> HomingPermit {
+    supervisor().permit_homing(MonoTime::default().after(Duration::from_secs(1_000_000))).unwrap()
+}
+
+fn supervisor() -> Supervisor {
+    let rig = Rig::from_toml(include_str!("../../../../config/rigs/sim.toml")).unwrap();
+    Supervisor::without_sensor(&rig, rig.service.as_ref().unwrap())
+}
+
 impl ConnectedRig {
     /// Connected, and not homed.
     fn new(lines: &str) -> Self {
@@ -70,7 +89,7 @@ impl ConnectedRig {
     async fn homed(lines: &str) -> Self {
         let lab = Self::new(lines);
         lab.until(StageStatus::Unhomed).await;
-        lab.stage.home().await.unwrap();
+        lab.stage.home(homing()).await.unwrap();
         near(lab.go(START_MM).await.unwrap(), START_MM);
         lab
     }
@@ -88,14 +107,14 @@ impl ConnectedRig {
     }
 
     async fn go(&self, position_mm: [f64; 3]) -> Result<[f64; 3], StageError> {
-        self.stage.move_to(Target { position_mm, speed_mm_per_s: 10.0 }).await
+        self.stage.move_to(permit(Target { position_mm, speed_mm_per_s: 10.0 })).await
     }
 
     /// A move of 20 mm along x, half a second after it began.
     async fn under_way(&self) -> JoinHandle<Result<[f64; 3], StageError>> {
         let stage = Arc::clone(&self.stage);
         let target = Target { position_mm: [40.0, 15.0, 5.0], speed_mm_per_s: 10.0 };
-        let moving = tokio::spawn(async move { stage.move_to(target).await });
+        let moving = tokio::spawn(async move { stage.move_to(permit(target)).await });
         sleep(Duration::from_millis(500)).await;
         assert!(self.control.is_moving());
         moving
@@ -149,7 +168,7 @@ async fn homing_can_be_stopped_and_leaves_the_stage_unhomed() {
         let lab = ConnectedRig::new(lines);
         lab.until(StageStatus::Unhomed).await;
         let stage = Arc::clone(&lab.stage);
-        let homing = tokio::spawn(async move { stage.home().await });
+        let homing = tokio::spawn(async move { stage.home(homing()).await });
         sleep(Duration::from_millis(500)).await;
         lab.stage.stop();
         assert!(matches!(homing.await.unwrap(), Err(StageError::Stopped { .. })), "{lines}");
@@ -172,7 +191,7 @@ async fn an_unplugged_stage_fails_the_move_and_must_be_homed_when_it_is_back() {
         assert!(matches!(refused, Err(StageError::Device(_))), "{lines}: {refused:?}");
         lab.until(StageStatus::Unhomed).await;
         assert!(matches!(lab.go(START_MM).await, Err(StageError::Unhomed)));
-        lab.stage.home().await.unwrap();
+        lab.stage.home(homing()).await.unwrap();
         near(lab.go(START_MM).await.unwrap(), START_MM);
         near(lab.control.tip_mm(), START_MM);
     }
@@ -258,10 +277,10 @@ async fn an_alarm_stops_the_stage_until_it_is_cleared_and_homed() {
         assert!(!lab.control.is_moving());
         assert_eq!(lab.status(), StageStatus::Alarm);
         assert!(matches!(lab.go(START_MM).await, Err(StageError::Alarm { .. })));
-        assert!(matches!(lab.stage.home().await, Err(StageError::Alarm { .. })));
+        assert!(matches!(lab.stage.home(homing()).await, Err(StageError::Alarm { .. })));
         lab.stage.clear_alarm().await.unwrap();
         assert!(matches!(lab.go(START_MM).await, Err(StageError::Unhomed)));
-        lab.stage.home().await.unwrap();
+        lab.stage.home(homing()).await.unwrap();
         near(lab.go(START_MM).await.unwrap(), START_MM);
     }
 }
@@ -272,7 +291,7 @@ async fn homing_that_fails_is_an_alarm() {
         let lab = ConnectedRig::new(lines);
         lab.until(StageStatus::Unhomed).await;
         lab.inject("stage homing-fails");
-        let result = lab.stage.home().await;
+        let result = lab.stage.home(homing()).await;
         assert!(matches!(result, Err(StageError::Alarm { .. })), "{lines}: {result:?}");
         assert_eq!(lab.status(), StageStatus::Alarm);
     }
@@ -332,7 +351,7 @@ async fn another_stage_than_the_rigs_is_refused_with_both_values() {
         let Connection::Seeking(Some(error)) = lost else { panic!() };
         assert_eq!(error.kind, ErrorKind::DeviceFault);
         assert!(both.iter().all(|part| error.what.contains(part)), "{error}");
-        assert!(matches!(lab.stage.home().await, Err(StageError::Device(_))));
+        assert!(matches!(lab.stage.home(homing()).await, Err(StageError::Device(_))));
     }
 }
 

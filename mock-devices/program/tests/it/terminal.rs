@@ -150,6 +150,25 @@ fn its_paths_come_as_json_and_its_mistakes_with_their_place() {
     assert_eq!(fs::read_to_string(folder.path().join("sensor")).unwrap(), "precious");
 }
 
+/// Leave to move anywhere: a supervisor that takes the stage to stand there already.
+fn permit(target: Target) -> Permit {
+    let [x_mm, y_mm, z_mm] = target.position_mm;
+    let status = pb::StageStatus::Idle.into();
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.on_report(&pb::StageState { x_mm, y_mm, z_mm, status, ..Default::default() }), None);
+    supervisor.permit(target, MonoTime::default()).unwrap()
+}
+
+/// Leave to home, which does not expire in a test.
+fn homing() -> HomingPermit {
+    supervisor().permit_homing(MonoTime::default().after(Duration::from_secs(1_000_000))).unwrap()
+}
+
+fn supervisor() -> Supervisor {
+    let rig = Rig::from_toml(include_str!("../../../../config/rigs/sim.toml")).unwrap();
+    Supervisor::without_sensor(&rig, rig.service.as_ref().unwrap())
+}
+
 #[tokio::test]
 async fn the_production_drivers_work_with_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -164,9 +183,9 @@ async fn the_production_drivers_work_with_it() {
     let (stage, mut reports) = DrivenStage::start(Box::new(connector), &protocol, options, Clock::real());
     tokio::spawn(async move { while reports.recv().await.is_some() {} });
     stage.state().wait_for(|state| state.status() != pb::StageStatus::Disconnected).await.unwrap();
-    stage.home().await.unwrap();
+    stage.home(homing()).await.unwrap();
     let target = Target { position_mm: [2.0, 2.0, 28.0], speed_mm_per_s: 20.0 };
-    let reached = stage.move_to(target).await.unwrap();
+    let reached = stage.move_to(permit(target)).await.unwrap();
     assert!(reached.iter().zip(target.position_mm).all(|(got, want)| (got - want).abs() < 0.005));
     let truth: serde_json::Value = serde_json::from_str(&mock.command("truth")).unwrap();
     let tip_mm = ["x_mm", "y_mm", "z_mm"].map(|axis| truth[axis].as_f64().unwrap());

@@ -9,7 +9,7 @@ use tactus_wire::zaber::{Flag, Header, HostCommand, HostCommandDecoder, Message}
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use tokio::time::{Instant, sleep};
 
-use super::{OPTIONS, drain, until};
+use super::{homing, permit, OPTIONS, drain, until};
 use crate::transport::memory::pair;
 use crate::{Clock, Connection, DrivenStage, ErrorKind, Stage, StageError, Target};
 
@@ -124,8 +124,8 @@ async fn stop_goes_out_at_once_while_a_reply_is_awaited() {
         let stage = Arc::clone(&stage);
         async move {
             until(&stage, StageStatus::Unhomed).await;
-            stage.home().await.unwrap();
-            stage.move_to(up()).await
+            stage.home(homing()).await.unwrap();
+            stage.move_to(permit(up())).await
         }
     });
     // The move is heard, and not answered.
@@ -149,8 +149,8 @@ async fn a_knob_that_is_turned_ends_the_move_by_name() {
         let stage = Arc::clone(&stage);
         async move {
             until(&stage, StageStatus::Unhomed).await;
-            stage.home().await.unwrap();
-            stage.move_to(up()).await
+            stage.home(homing()).await.unwrap();
+            stage.move_to(permit(up())).await
         }
     });
     let command = devices.answer_until("move abs 20000").await;

@@ -11,7 +11,7 @@ use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
 
 use super::Discovered;
-use crate::cli::{Common, DiscoverArgs, ExperimentArgs, RunArgs};
+use crate::cli::{Common, DiscoverArgs, ExperimentArgs, LeaseArgs, RunArgs};
 use crate::commands::run::{RunSummary, execute};
 use crate::connection;
 use crate::exit::{Exit, Failure};
@@ -205,6 +205,7 @@ impl<'a> ExperimentRunner<'a> {
             out: self.args.out.join("runs"),
             who: self.args.who.clone(),
             no_report: true,
+            lease: LeaseArgs::default(),
         };
         // Suppresses the run's own first line.
         let summary = execute(&Common { json: true, ..self.common.clone() }, &args)?;

@@ -30,12 +30,14 @@ pub(super) async fn run(
         println!("running on the service at {} (rig {:?})", client.endpoint(), client.rig());
     }
     let mut states = client.subscribe::<RunState>(History::Last).await?;
+    let held = connection::hold(&client, &args.lease).await?;
     let request = pb::RunRequest {
         experiment: script.name().to_owned(),
         script: script.source().to_owned(),
         parameters_json: arguments.to_json(),
         seed: args.experiment.seed,
         who: args.who.clone(),
+        lease: held.secret(),
     };
     let reply = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await?;
     let accepted = reply.state.context("the service's answer has no state; is it of another version?")?;
@@ -43,15 +45,27 @@ pub(super) async fn run(
     let progress = RunProgress::new(common.json);
     let mut alive = client.alive();
     let mut interrupts = signal(SignalKind::interrupt())?;
+    let mut held = Some(held);
     let finished = loop {
+        let lost = async {
+            match &mut held {
+                Some(held) => held.lost().await,
+                None => std::future::pending().await,
+            }
+        };
         tokio::select! {
             biased;
             Some(()) = interrupts.recv() => {
                 progress.say("Ctrl-C: stopping and retracting");
-                let request = pb::CommandRequest { who: "cli".into(), reason: "Ctrl-C".into(), abort: false };
-                if let Err(error) = connection::ask(&client, Command::Stop, &request, PATIENCE).await {
-                    progress.say(&format!("STOP FAILED: {}; Ctrl-C tries again", in_words(&error)));
+                let request =
+                    pb::CommandRequest { who: connection::who(), reason: "Ctrl-C".into(), ..Default::default() };
+                if let Err(error) = client.stop(&request, PATIENCE).await {
+                    progress.say(&format!("STOP FAILED: {}; Ctrl-C tries again", in_words(&error.into())));
                 }
+            }
+            why = lost => {
+                progress.say(&format!("the lease is lost, the run goes on without it: {why}"));
+                held = None;
             }
             there = alive.changed() => if there != Some(true) {
                 bail!("the service disappeared during run {}; `tactus status` shows whether it is back", accepted.run_id);
@@ -69,6 +83,9 @@ pub(super) async fn run(
         }
     };
     progress.clear();
+    if let Some(held) = held {
+        connection::release(held).await;
+    }
     client.close().await?;
     Ok(RunSummary {
         exit_status: finished.exit_status(),

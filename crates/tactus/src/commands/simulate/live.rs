@@ -103,7 +103,7 @@ pub(super) fn publish(
                 rng: ChaCha8Rng::seed_from_u64(args.seed.wrapping_add(u64::from(copy))),
                 clock,
             };
-            let listen = BusConfig { listen: vec![endpoint.clone()], connect: Vec::new() };
+            let listen = BusConfig { listen: vec![endpoint.clone()], ..BusConfig::default() };
             let (bus, calls) = Bus::open(&listen, Keys::new(name.clone())).await?;
             let alive = bus.declare_alive().await?;
             if common.json {

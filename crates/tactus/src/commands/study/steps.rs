@@ -10,7 +10,7 @@ use tactus_report::figures::COVERINGS;
 use tactus_report::study::StudyRun;
 use tactus_schema::pb::ExitStatus;
 
-use crate::cli::{Common, ExperimentArgs, RunArgs, StudyArgs};
+use crate::cli::{Common, ExperimentArgs, LeaseArgs, RunArgs, StudyArgs};
 use crate::commands::run::execute;
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
@@ -166,6 +166,7 @@ impl StudySteps {
                 out: args.out.join("runs"),
                 who: args.who.clone(),
                 no_report: true,
+                lease: LeaseArgs::default(),
             },
         )
         .with_context(|| format!("step {:?}", step.name))?;

@@ -1,0 +1,48 @@
+use super::*;
+
+fn id(number: u8) -> ZenohId {
+    format!("{number:x}0").parse().unwrap()
+}
+
+fn known(announcements: &[(Announced<'_>, SampleKind)]) -> Known {
+    let mut known = Known::default();
+    for (announced, kind) in announcements {
+        known.on_token(announced, *kind);
+    }
+    known
+}
+
+#[test]
+fn keys_of_tokens_are_read_and_others_are_not() {
+    assert_eq!(announced("tactus/sim/alive"), Some(Announced::Alive("sim")));
+    assert_eq!(announced("tactus/sim/service/a1"), Some(Announced::Instance("sim", "a1".parse().unwrap())));
+    for key in
+        ["tactus/sim", "tactus/sim/alive/x", "tactus/sim/service", "tactus/sim/service/no", "sim/alive"]
+    {
+        assert_eq!(announced(key), None, "{key}");
+    }
+}
+
+#[test]
+fn the_first_instance_speaks_until_it_ends_and_its_last_words_are_still_believed() {
+    let rogue = (Announced::Instance("sim", id(2)), SampleKind::Put);
+    let mut known = known(&[(Announced::Instance("sim", id(1)), SampleKind::Put), rogue]);
+    assert_eq!(known.believes("sim", &id(1)), Some(true));
+    assert_eq!(known.believes("sim", &id(2)), Some(false));
+    assert_eq!(known.believes("other", &id(1)), None);
+    known.on_token(&Announced::Instance("sim", id(2)), SampleKind::Delete);
+    known.on_token(&Announced::Instance("sim", id(1)), SampleKind::Delete);
+    assert_eq!(known.believes("sim", &id(3)), None, "nobody speaks for it");
+    known.on_token(&Announced::Instance("sim", id(3)), SampleKind::Put);
+    assert_eq!(known.believes("sim", &id(3)), Some(true));
+    assert_eq!(known.believes("sim", &id(1)), Some(true));
+}
+
+#[test]
+fn the_service_that_a_client_is_connected_to_is_believed_before_one_that_was_announced_first() {
+    let rogue = (Announced::Instance("sim", id(2)), SampleKind::Put);
+    let mut known = known(&[rogue, (Announced::Instance("sim", id(1)), SampleKind::Put)]);
+    known.prefer(&[id(1)]);
+    assert_eq!(known.believes("sim", &id(1)), Some(true));
+    assert_eq!(known.believes("sim", &id(2)), Some(false));
+}
