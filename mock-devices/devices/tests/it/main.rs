@@ -1,4 +1,5 @@
 //! Virtual devices, through the production drivers.
 
+mod permits;
 mod rig;
 mod stages;

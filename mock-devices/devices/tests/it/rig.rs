@@ -17,6 +17,8 @@ use tactus_wire::declared::RawFormat;
 use tactus_wire::weiss::Checksum;
 use tokio::time::{sleep, timeout};
 
+use crate::permits::{homing, permit};
+
 /// A rig with its drivers connected.
 struct ConnectedRig {
     rig: Rig,
@@ -52,7 +54,7 @@ async fn lab_speaking(codec: SensorCodec, rig: Rig, seed: u64) -> ConnectedRig {
     if state.borrow().status() == pb::StageStatus::Alarm {
         stage.clear_alarm().await.unwrap();
     }
-    stage.home().await.unwrap();
+    stage.home(homing()).await.unwrap();
     ConnectedRig { rig, control: devices.control(), sensor, stage }
 }
 
@@ -66,7 +68,7 @@ impl ConnectedRig {
     }
 
     async fn go(&self, position_mm: [f64; 3]) -> Result<[f64; 3], StageError> {
-        self.stage.move_to(Target { position_mm, speed_mm_per_s: 20.0 }).await
+        self.stage.move_to(permit(Target { position_mm, speed_mm_per_s: 20.0 })).await
     }
 
     /// The next frames, and the gaps among them.
@@ -204,7 +206,7 @@ async fn a_stop_leaves_the_tip_near_where_it_was() {
     lab.go([20.0, 20.0, 20.0]).await.unwrap();
     let stage = Arc::clone(&lab.stage);
     let going = tokio::spawn(async move {
-        stage.move_to(Target { position_mm: [20.0, 20.0, -0.7], speed_mm_per_s: 20.0 }).await
+        stage.move_to(permit(Target { position_mm: [20.0, 20.0, -0.7], speed_mm_per_s: 20.0 })).await
     });
     sleep(Duration::from_millis(500)).await;
     let before_mm = lab.control.tip_mm()[2];

@@ -6,13 +6,17 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use tactus_device::{Clock, Connection, DrivenStage, ErrorKind, Stage, StageError, StageOptions, Target};
+use tactus_device::{
+    Clock, Connection, DrivenStage, ErrorKind, Stage, StageError, StageOptions, Target,
+};
 use tactus_schema::Rig;
 use tactus_schema::pb::StageStatus;
 use tactus_schema::rig::StageProtocol;
 use tactus_virtual::{RigControl, VirtualRig};
 use tokio::task::JoinHandle;
 use tokio::time::sleep;
+
+use crate::permits::{homing, permit};
 
 const SIM: &str = include_str!("../../../../config/rigs/sim.toml");
 
@@ -46,25 +50,6 @@ const START_MM: [f64; 3] = [20.0, 15.0, 5.0];
 struct ConnectedRig {
     stage: Arc<DrivenStage>,
     control: RigControl,
-}
-
-/// Leave to move anywhere: a supervisor that takes the stage to stand there already.
-fn permit(target: Target) -> Permit {
-    let [x_mm, y_mm, z_mm] = target.position_mm;
-    let status = StageStatus::Idle.into();
-    let mut supervisor = supervisor();
-    assert_eq!(supervisor.on_report(&StageState { x_mm, y_mm, z_mm, status, ..Default::default() }), None);
-    supervisor.permit(target, MonoTime::default()).unwrap()
-}
-
-/// Leave to home, which does not expire in a test.
-fn homing() -> HomingPermit {
-    supervisor().permit_homing(MonoTime::default().after(Duration::from_secs(1_000_000))).unwrap()
-}
-
-fn supervisor() -> Supervisor {
-    let rig = Rig::from_toml(include_str!("../../../../config/rigs/sim.toml")).unwrap();
-    Supervisor::without_sensor(&rig, rig.service.as_ref().unwrap())
 }
 
 impl ConnectedRig {

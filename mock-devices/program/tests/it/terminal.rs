@@ -6,16 +6,18 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process};
 use tactus_device::transport::Connect;
 use tactus_device::transport::serial::SerialConnector;
 use tactus_device::{
-    ArrayExpectation, Clock, DrivenStage, Sensor, SensorCodec, SensorDriver, SensorEvent, Stage,
-    StageOptions, Target,
+    ArrayExpectation, Clock, DrivenStage, HomingPermit, Permit, Sensor, SensorCodec, SensorDriver, SensorEvent,
+    Stage, StageOptions, Target,
 };
+use tactus_safety::Supervisor;
 use tactus_schema::rig::{GrblAxes, StageProtocol};
-use tactus_schema::{Frame, Rig, pb};
+use tactus_schema::{Frame, MonoTime, Rig, pb};
 use tactus_wire::weiss::{self as wire, Decoder};
 use tokio::io::AsyncReadExt;
 
