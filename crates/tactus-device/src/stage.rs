@@ -36,8 +36,14 @@ pub trait Stage: Send + Sync {
     /// Moves in a straight line to the target, and returns the position reached in mm.
     ///
     /// The move is done when the controller is idle and the reported position is within tolerance. A move to the present
-    /// position is done at once. There is one move at a time.
+    /// position moves nothing; it becomes a [`look`](Self::look). There is one move at a time.
     fn move_to(&self, target: Target) -> BoxFuture<'_, Result<[f64; 3], StageError>>;
+
+    /// Asks the controller where it stands now, and returns that position in mm. Moves nothing.
+    ///
+    /// It fails if the controller does not answer, is in alarm, is not homed or is not idle. The result never comes from an
+    /// earlier report.
+    fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>>;
 
     /// Stops motion now. Never waits and is never queued. A move under way ends with [`StageError::Stopped`]. Further moves
     /// are accepted once the stage stands still.
@@ -77,6 +83,11 @@ pub enum StageError {
     /// The position is not known: the stage has not been homed since it started, was reset or lost steps.
     #[error("the stage's position is not known: `tactus reset` homes it")]
     Unhomed,
+    /// The stage was asked where it stands, and is not idle.
+    #[error(
+        "the stage was asked where it stands, and is not idle at {position_mm:?} mm: something else commands it"
+    )]
+    NotIdle { position_mm: [f64; 3] },
     /// The controller is idle, but not at the target.
     #[error("the stage says it has arrived at {target_mm:?} mm, but stands at {position_mm:?} mm")]
     NotThere { target_mm: [f64; 3], position_mm: [f64; 3] },

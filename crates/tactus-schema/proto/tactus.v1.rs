@@ -65,6 +65,8 @@ pub struct StageState {
     pub alarm: ::core::option::Option<u32>,
     #[prost(bool, tag = "9")]
     pub simulated: bool,
+    #[prost(uint32, tag = "10")]
+    pub epoch: u32,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct RunEvent {

@@ -151,6 +151,10 @@ impl Stage for DrivenStage {
         self.command(StageCommand::MoveTo(target))
     }
 
+    fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
+        self.command(StageCommand::Look)
+    }
+
     fn stop(&self) {
         self.stop.press();
     }

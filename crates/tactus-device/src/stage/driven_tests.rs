@@ -82,12 +82,50 @@ async fn a_move_is_done_soon_after_the_stage_arrives() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_move_to_the_present_place_takes_no_time() {
+async fn a_move_to_the_present_place_moves_nothing_and_asks() {
     let (stage, shared) = homed().await;
-    let began = Instant::now();
+    let asked = shared.count("?");
     assert_eq!(stage.move_to(to(1.0, 10.0)).await.unwrap(), [1.0, 1.0, 5.0]);
-    assert_eq!(began.elapsed(), Duration::ZERO);
-    assert_eq!(shared.count("G"), 0);
+    assert_eq!(stage.look().await.unwrap(), [1.0, 1.0, 5.0]);
+    assert_eq!((shared.count("?"), shared.count("G")), (asked + 4, 0));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stage_that_falls_silent_answers_no_look() {
+    let (stage, shared) = homed().await;
+    shared.fall_silent();
+    assert!(matches!(stage.look().await, Err(StageError::Device(_))));
+    assert!(matches!(stage.look().await, Err(StageError::Device(_))));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_epoch_rises_with_whatever_makes_the_position_doubtful_and_with_nothing_else() {
+    let (stage, shared) = homed().await;
+    let epoch = || stage.state().borrow().epoch;
+    let homed = epoch();
+    stage.move_to(to(3.0, 10.0)).await.unwrap();
+    let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(200)).await;
+    stage.stop();
+    assert!(matches!(moving.await.unwrap(), Err(StageError::Stopped { .. })));
+    stage.look().await.unwrap();
+    assert_eq!(epoch(), homed);
+
+    shared.set(Fault::Resets);
+    assert!(matches!(stage.move_to(to(2.0, 10.0)).await, Err(StageError::Unhomed)));
+    let reset = epoch();
+    stage.home().await.unwrap();
+    let homed_again = epoch();
+    shared.set(Fault::HardLimit);
+    assert!(matches!(stage.move_to(to(11.0, 10.0)).await, Err(StageError::Alarm { .. })));
+    let alarmed = epoch();
+    // In an alarm a controller may stay silent.
+    stage.clear_alarm().await.unwrap();
+    shared.fall_silent();
+    until(&stage, StageStatus::Disconnected).await;
+    let lost = epoch();
+    until(&stage, StageStatus::Unhomed).await;
+    let epochs = [homed, reset, homed_again, alarmed, lost, epoch()];
+    assert!(epochs.is_sorted_by(|a, b| a < b), "{epochs:?}");
 }
 
 #[tokio::test(start_paused = true)]

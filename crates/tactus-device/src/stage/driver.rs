@@ -32,6 +32,7 @@ pub(super) struct CommandRequest {
 pub(super) enum StageCommand {
     Home,
     MoveTo(Target),
+    Look,
     ClearAlarm,
 }
 
@@ -59,6 +60,8 @@ pub(super) struct Progress {
     active: Option<Reply>,
     /// Reports that found no room yet. The device is not read meanwhile, so there are few.
     waiting: VecDeque<pb::StageState>,
+    /// See [`pb::StageState::epoch`].
+    epoch: u32,
     /// The kind of the present loss, once it has been logged.
     logged: Option<ErrorKind>,
 }
@@ -172,6 +175,7 @@ where
                 StageCommand::MoveTo(target) => {
                     session.move_to(now, target.position_mm, target.speed_mm_per_s)
                 }
+                StageCommand::Look => session.look(now),
                 StageCommand::ClearAlarm => session.clear_alarm(now),
             };
         };
@@ -198,10 +202,12 @@ where
                     backoff.reset();
                     self.progress.logged = None;
                     self.progress.connected = true;
+                    self.progress.epoch += 1;
                     self.connection.send_replace(Connection::Connected(controller));
                 }
                 Action::Report(report) => self.report(now, report),
                 Action::Suspect { why } => {
+                    self.progress.epoch += 1;
                     tracing::warn!(device = self.device(), why, "the stage's position is suspect");
                 }
                 Action::Done(result) => {
@@ -243,6 +249,9 @@ where
                 tracing::info!(device = self.device(), from = ?before.status(), to = ?status, alarm, "stage");
             }
         }
+        if before.status() != status && is_doubtful(status) {
+            self.progress.epoch += 1;
+        }
         let state = pb::StageState {
             seq: before.seq + 1,
             t_mono_ns: now.mono.ns(),
@@ -253,6 +262,7 @@ where
             status: status.into(),
             alarm,
             simulated: self.options.simulated,
+            epoch: self.progress.epoch,
         };
         self.latest.send_replace(state);
         self.progress.waiting.push_back(state);
@@ -319,6 +329,18 @@ where
     }
 }
 
+/// True for a status after which the position is not the one before.
+fn is_doubtful(status: pb::StageStatus) -> bool {
+    match status {
+        pb::StageStatus::Unspecified
+        | pb::StageStatus::Disconnected
+        | pb::StageStatus::Unhomed
+        | pb::StageStatus::Homing
+        | pb::StageStatus::Alarm => true,
+        pb::StageStatus::Idle | pb::StageStatus::Moving | pb::StageStatus::Hold => false,
+    }
+}
+
 fn stage_error(failure: Failure) -> StageError {
     match failure {
         Failure::Stopped { position_mm } => StageError::Stopped { position_mm },
@@ -332,6 +354,7 @@ fn stage_error(failure: Failure) -> StageError {
         Failure::Interrupted { axis, meaning, position_mm } => {
             StageError::Interrupted { axis: axis.to_string(), meaning: meaning.to_owned(), position_mm }
         }
+        Failure::NotIdle { position_mm } => StageError::NotIdle { position_mm },
         Failure::NotThere { target_mm, position_mm } => StageError::NotThere { target_mm, position_mm },
         Failure::Overdue { target_mm, position_mm, waited } => {
             StageError::Overdue { target_mm, position_mm, waited_s: waited.as_secs_f64() }

@@ -165,6 +165,10 @@ impl Stage for FakeStage {
         .boxed()
     }
 
+    fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
+        async { Ok(self.position_mm()) }.boxed()
+    }
+
     fn stop(&self) {
         self.stops.send_modify(|stops| *stops += 1);
     }

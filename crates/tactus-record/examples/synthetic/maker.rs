@@ -176,8 +176,8 @@ impl Maker {
                 y_mm,
                 z_mm,
                 status: pb::StageStatus::Idle.into(),
-                alarm: None,
                 simulated: true,
+                ..Default::default()
             })
         };
         times.iter().enumerate().map(state).collect()

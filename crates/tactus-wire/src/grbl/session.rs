@@ -170,10 +170,22 @@ impl stage::Session for Session {
         } else if self.state == Some(MachineState::Idle)
             && distance_mm(self.position_mm, travel.arrival().target_mm()) < SAME_PLACE_MM
         {
-            self.done(Ok(self.position_mm));
+            self.begin_look(now, Some(travel.arrival().target_mm()));
         } else {
             self.send_line(travel.line());
             self.phase = Phase::Moving(travel);
+        }
+        self.finish(now)
+    }
+
+    /// Two reports in a row must say the same: a report has no number, so the first may be a copy of an earlier one.
+    fn look(&mut self, now: Duration) -> Vec<Action> {
+        if self.is_over() {
+            return Vec::new();
+        }
+        match self.check_ready("?").and_then(|()| self.check_alarm()) {
+            Err(failure) => self.done(Err(failure)),
+            Ok(()) => self.begin_look(now, None),
         }
         self.finish(now)
     }
@@ -201,7 +213,9 @@ impl stage::Session for Session {
             // It stands still, and would not answer.
             Phase::Ready if self.alarm.is_some() => self.send(FEED_HOLD),
             Phase::Ready | Phase::Looking { purpose: Purpose::Recover, .. } => self.hold(now, None),
-            Phase::Moving(_) | Phase::Unlocking { .. } | Phase::Looking { purpose: Purpose::Clear, .. } => {
+            Phase::Moving(_)
+            | Phase::Unlocking { .. }
+            | Phase::Looking { purpose: Purpose::Clear | Purpose::Look { .. }, .. } => {
                 self.hold(now, stopped);
             }
             Phase::Looking { purpose: Purpose::Stop { failure, .. }, .. } => self.hold(now, failure),

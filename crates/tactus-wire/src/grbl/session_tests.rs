@@ -9,6 +9,8 @@ mod alarms;
 mod any_dialogue;
 #[path = "session_tests/connect.rs"]
 mod connect;
+#[path = "session_tests/looks.rs"]
+mod looks;
 #[path = "session_tests/moves.rs"]
 mod moves;
 #[path = "session_tests/settings.rs"]
@@ -120,6 +122,7 @@ fn command(session: &mut Session, now: Duration, text: &str) -> Vec<Action> {
     match words[..] {
         ["start"] => session.start(now),
         ["home"] => session.home(now),
+        ["look"] => session.look(now),
         ["stop"] => session.stop(now),
         ["clear"] => session.clear_alarm(now),
         ["move", x, y, z, "at", speed] => {
@@ -147,6 +150,7 @@ fn describe(now: Duration, action: &Action) -> String {
             Failure::Refused { reason, .. } => format!("= refused {reason}"),
             Failure::Alarm(alarm) => format!("= alarm {}", alarm.name()),
             Failure::Unhomed => "= unhomed".to_owned(),
+            Failure::NotIdle { position_mm } => format!("= not idle at {}", place(*position_mm)),
             Failure::Interrupted { .. } => "= interrupted".to_owned(),
             Failure::NotThere { target_mm, position_mm } => {
                 format!("= not at {} but at {}", place(*target_mm), place(*position_mm))

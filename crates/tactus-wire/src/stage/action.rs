@@ -103,6 +103,11 @@ pub enum Failure {
     Alarm(Alarm),
     /// The position is not known.
     Unhomed,
+    /// The stage was asked where it stands, and is not idle.
+    NotIdle {
+        /// Position that the controller reports.
+        position_mm: [f64; 3],
+    },
     /// Someone else moved an axis meanwhile, by its knob or from another host. The stage was stopped.
     Interrupted {
         /// The axis that was moved.
@@ -163,7 +168,11 @@ impl Failure {
             Self::Stopped { .. } => Self::Stopped { position_mm },
             Self::Overdue { target_mm, waited, .. } => Self::Overdue { target_mm, position_mm, waited },
             Self::Interrupted { axis, meaning, .. } => Self::Interrupted { axis, meaning, position_mm },
-            Self::Refused { .. } | Self::Alarm(_) | Self::Unhomed | Self::NotThere { .. } => self,
+            Self::Refused { .. }
+            | Self::Alarm(_)
+            | Self::Unhomed
+            | Self::NotIdle { .. }
+            | Self::NotThere { .. } => self,
         }
     }
 }

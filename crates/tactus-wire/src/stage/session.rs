@@ -10,8 +10,8 @@ use super::{Action, Cause};
 /// Call [`start`](Self::start) once, [`receive`](Self::receive) with each read, and [`timer`](Self::timer) when
 /// [`deadline`](Self::deadline) is reached. Carry out the actions in their order. Times never decrease.
 ///
-/// Give one command at a time ([`home`](Self::home), [`move_to`](Self::move_to), [`clear_alarm`](Self::clear_alarm)),
-/// while [`is_ready`](Self::is_ready) is true. Each ends with one [`Action::Done`]. [`stop`](Self::stop) may be called at
+/// Give one command at a time ([`home`](Self::home), [`move_to`](Self::move_to), [`look`](Self::look),
+/// [`clear_alarm`](Self::clear_alarm)), while [`is_ready`](Self::is_ready) is true. Each ends with one [`Action::Done`]. [`stop`](Self::stop) may be called at
 /// any time. After [`Action::Failed`] the session does nothing more, and a command under way ends without
 /// [`Action::Done`]: open the link again.
 ///
@@ -41,13 +41,20 @@ pub trait Session {
     /// Searches for the reference position.
     fn home(&mut self, now: Duration) -> Vec<Action<Self::Error>>;
 
-    /// Moves to a target in a straight line. A move to the present position is done at once.
+    /// Moves to a target in a straight line. A move to the present position moves nothing; it becomes a
+    /// [`look`](Self::look), and fails if the stage is elsewhere.
     fn move_to(
         &mut self,
         now: Duration,
         target_mm: [f64; 3],
         speed_mm_per_s: f64,
     ) -> Vec<Action<Self::Error>>;
+
+    /// Asks the controller where it stands now, and whether it is idle. Moves nothing.
+    ///
+    /// Only answers to questions asked after the call count. It fails in an alarm, on a stage that is not homed, and if
+    /// the stage is not idle. Its result therefore never comes from a position that was known before.
+    fn look(&mut self, now: Duration) -> Vec<Action<Self::Error>>;
 
     /// Clears an alarm, after which the position is suspect. Does nothing without an alarm.
     fn clear_alarm(&mut self, now: Duration) -> Vec<Action<Self::Error>>;

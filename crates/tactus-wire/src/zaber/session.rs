@@ -272,10 +272,22 @@ impl stage::Session for Session {
             .and_then(|()| self.plan(now, &command, target_mm, speed_mm_per_s));
         match checked {
             Err(failure) => self.done(Err(failure)),
-            Ok(None) => self.done(Ok(self.position_mm())),
+            Ok(None) => self.begin_look(now, Some(target_mm)),
             Ok(Some(travel)) => {
                 self.phase = Phase::Moving(travel);
             }
+        }
+        self.finish(now)
+    }
+
+    /// A new round of queries answers it.
+    fn look(&mut self, now: Duration) -> Vec<Action> {
+        if self.is_over() {
+            return Vec::new();
+        }
+        match self.check_ready("get pos").and_then(|()| self.check_alarm()) {
+            Err(failure) => self.done(Err(failure)),
+            Ok(()) => self.begin_look(now, None),
         }
         self.finish(now)
     }
@@ -314,7 +326,9 @@ impl stage::Session for Session {
             Phase::Over => {}
             Phase::Greeting => self.send_stop("stop"),
             Phase::Ready => self.halt(now, None),
-            Phase::Moving(_) | Phase::Homing { .. } | Phase::Clearing => self.halt(now, Some(stopped)),
+            Phase::Moving(_) | Phase::Homing { .. } | Phase::Clearing | Phase::Looking { .. } => {
+                self.halt(now, Some(stopped));
+            }
             Phase::Stopping(stop) => {
                 let text = stop.text();
                 self.repeat_stop(now, text);

@@ -9,6 +9,8 @@ mod connect;
 mod fake;
 #[path = "session_tests/faults.rs"]
 mod faults;
+#[path = "session_tests/looks.rs"]
+mod looks;
 #[path = "session_tests/moves.rs"]
 mod moves;
 #[path = "session_tests/stops.rs"]
@@ -98,6 +100,11 @@ impl Play {
         let actions = self.session.stop(self.now);
         let says_stop = |bytes: &[u8]| String::from_utf8_lossy(bytes).contains("stop");
         assert!(matches!(&actions[..], [Action::Send(bytes), ..] if says_stop(bytes)), "{actions:?}");
+        self.act(actions);
+    }
+
+    fn look(&mut self) {
+        let actions = self.session.look(self.now);
         self.act(actions);
     }
 

@@ -62,6 +62,11 @@ impl Shared {
         self.0.lock().unwrap().fault = fault;
     }
 
+    /// Says nothing more until it is reset.
+    pub(super) fn fall_silent(&self) {
+        self.0.lock().unwrap().silent = true;
+    }
+
     /// When a byte or line was heard first.
     pub(super) fn first_heard(&self, what: &str) -> Option<Instant> {
         self.0.lock().unwrap().heard.iter().find(|(_, heard)| heard == what).map(|(at, _)| *at)

@@ -11,6 +11,9 @@ use crate::stage::{Controller, Judgement, distance_mm};
 /// Longest time for `$X`.
 const UNLOCK_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// Reports that must agree before a look is believed.
+const LOOKS: u32 = 2;
+
 /// The error that may precede the banner at boot. It answers no line.
 const ERROR_AT_BOOT: u8 = 7;
 
@@ -44,7 +47,7 @@ impl Session {
             *accepted = Some(now);
             self.poll.at_once();
         } else if let Phase::Unlocking { .. } = self.phase {
-            self.look(now, Purpose::Clear);
+            self.ask_position(now, Purpose::Clear);
         } else if let Phase::Asking { query, .. } = self.phase {
             self.handle_answered(now, query);
         }
@@ -115,7 +118,7 @@ impl Session {
             Phase::Moving(_)
             | Phase::Homing { .. }
             | Phase::Unlocking { .. }
-            | Phase::Looking { purpose: Purpose::Clear, .. } => true,
+            | Phase::Looking { purpose: Purpose::Clear | Purpose::Look { .. }, .. } => true,
             Phase::Holding { failure, .. } => failure.is_some(),
             // A reset may raise an alarm; its banner follows.
             Phase::Resetting { .. } | Phase::Looking { .. } | Phase::Asking { .. } | Phase::Over => {
@@ -140,17 +143,17 @@ impl Session {
                 self.phase = Phase::Unlocking { deadline: now + UNLOCK_TIMEOUT };
                 return;
             }
-            Phase::Resetting { purpose, .. } => return self.look(now, purpose),
+            Phase::Resetting { purpose, .. } => return self.ask_position(now, purpose),
             // The banner at opening, and the one after the reset.
             Phase::Looking { purpose: Purpose::Greet, .. } | Phase::Asking { .. } => {
-                return self.look(now, Purpose::Greet);
+                return self.ask_position(now, Purpose::Greet);
             }
             Phase::Looking { purpose: Purpose::Stop { failure, .. }, .. }
             | Phase::Holding { failure, .. } => failure,
             Phase::Moving(_)
             | Phase::Homing { .. }
             | Phase::Unlocking { .. }
-            | Phase::Looking { purpose: Purpose::Clear, .. } => Some(Failure::Unhomed),
+            | Phase::Looking { purpose: Purpose::Clear | Purpose::Look { .. }, .. } => Some(Failure::Unhomed),
             Phase::Looking { purpose: Purpose::Recover, .. } | Phase::Ready | Phase::Over => None,
         };
         self.homed = false;
@@ -159,7 +162,7 @@ impl Session {
         if let Some(failure) = failure {
             self.done(Err(failure));
         }
-        self.look(now, Purpose::Recover);
+        self.ask_position(now, Purpose::Recover);
     }
 
     fn handle_report(&mut self, now: Duration, report: &StatusReport) {
@@ -255,6 +258,25 @@ impl Session {
         }
     }
 
+    /// Ends the command to look, if enough reports have come.
+    fn conclude_command_to_look(&mut self, now: Duration, target_mm: Option<[f64; 3]>, reports: u32) {
+        let position_mm = self.position_mm;
+        self.report();
+        let result = self.check_alarm().and_then(|()| self.check_homed()).and_then(|()| {
+            let is_elsewhere = |target| distance_mm(target, position_mm) > self.config.tolerance_mm;
+            match target_mm.filter(|target_mm| is_elsewhere(*target_mm)) {
+                _ if self.state != Some(MachineState::Idle) => Err(Failure::NotIdle { position_mm }),
+                Some(target_mm) => Err(Failure::NotThere { target_mm, position_mm }),
+                None => Ok(position_mm),
+            }
+        });
+        if result.is_ok() && reports < LOOKS {
+            return self.ask_position(now, Purpose::Look { target_mm, reports });
+        }
+        self.phase = Phase::Ready;
+        self.done(result);
+    }
+
     fn conclude_look(&mut self, now: Duration, purpose: Purpose) {
         let position_mm = self.position_mm;
         match purpose {
@@ -262,6 +284,9 @@ impl Session {
             Purpose::Recover => {
                 self.phase = Phase::Ready;
                 self.report();
+            }
+            Purpose::Look { target_mm, reports } => {
+                self.conclude_command_to_look(now, target_mm, reports + 1)
             }
             Purpose::Clear => {
                 self.phase = Phase::Ready;

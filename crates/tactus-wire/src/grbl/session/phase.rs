@@ -40,7 +40,7 @@ pub(super) enum Query {
     Settings,
 }
 
-/// Purpose of a reset.
+/// Purpose of a reset, or of a request for the position.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Purpose {
     /// To find out whether a controller answers.
@@ -49,6 +49,9 @@ pub(super) enum Purpose {
     Recover,
     /// To clear an alarm.
     Clear,
+    /// None, because nothing is reset: a person or a program wants to know where the stage stands. With a target it must
+    /// stand there. `reports` is how many have said so.
+    Look { target_mm: Option<[f64; 3]>, reports: u32 },
     /// To discard the commands that the controller holds. It stood still at `held_mm`; `None` if it may have been moving.
     Stop { failure: Option<Failure>, held_mm: Option<[f64; 3]> },
 }

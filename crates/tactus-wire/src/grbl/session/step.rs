@@ -69,10 +69,15 @@ impl Session {
         self.phase = Phase::Resetting { purpose, resets, deadline: now + BANNER_TIMEOUT };
     }
 
-    /// Requests the position after a reset.
-    pub(super) fn look(&mut self, now: Duration, purpose: Purpose) {
+    /// Requests the position, after a reset or for a command.
+    pub(super) fn ask_position(&mut self, now: Duration, purpose: Purpose) {
         self.phase = Phase::Looking { purpose, since: now };
         self.poll.at_once();
+    }
+
+    /// Begins the command to look where the stage stands, which is at the target if there is one.
+    pub(super) fn begin_look(&mut self, now: Duration, target_mm: Option<[f64; 3]>) {
+        self.ask_position(now, Purpose::Look { target_mm, reports: 0 });
     }
 
     /// Queries the controller, for the `tries`th time.

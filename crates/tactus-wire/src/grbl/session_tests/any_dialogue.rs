@@ -40,7 +40,7 @@ fn line() -> impl Strategy<Value = &'static str> {
 
 fn event() -> impl Strategy<Value = Event> {
     let commands =
-        prop::sample::select(vec!["home", "move 2 1 5 at 10", "move 1 1 5 at 10", "clear", "stop"]);
+        prop::sample::select(vec!["home", "move 2 1 5 at 10", "move 1 1 5 at 10", "look", "clear", "stop"]);
     prop_oneof![
         2 => (0..400u64).prop_map(Event::Wait),
         4 => line().prop_map(Event::Line),

@@ -160,12 +160,18 @@ fn commands_that_cannot_be_done_are_refused_before_anything_is_sent() {
 }
 
 #[test]
-fn a_move_to_where_the_stage_stands_is_done_at_once() {
+fn a_move_to_where_the_stage_stands_becomes_a_look() {
     homed(
         "950 * move 1.0004 1 5 at 10
-        950 = done 1.000 1.000 5.000
-        951 * move 1 1 4.9994 at 0.5
-        951 > G90 G21 G1 X1.000 Y1.000 Z4.999 F30.000",
+        950 > ?
+        955 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        955 = Idle 1.000 1.000 5.000
+        955 > ?
+        960 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        960 = Idle 1.000 1.000 5.000
+        960 = done 1.000 1.000 5.000
+        961 * move 1 1 4.9994 at 0.5
+        961 > G90 G21 G1 X1.000 Y1.000 Z4.999 F30.000",
     );
 }
 
@@ -186,8 +192,8 @@ fn a_target_is_rounded_to_the_three_decimals_that_the_controller_knows() {
 fn a_probing_that_someone_else_made_is_passed_over() {
     let session = homed(
         "950 < [PRB:1.000,2.000,-0.250:1]
-        960 * move 1 1 5 at 10
-        960 = done 1.000 1.000 5.000",
+        960 * move 1 1 6 at 10
+        960 > G90 G21 G1 X1.000 Y1.000 Z6.000 F600.000",
     );
     assert_eq!(session.unknown_lines(), 0);
 }

@@ -163,8 +163,8 @@ fn stop_while_standing_leaves_the_stage_ready() {
         970 > ?
         980 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
         980 = Idle 1.000 1.000 5.000
-        990 * move 1 1 5 at 10
-        990 = done 1.000 1.000 5.000",
+        990 * move 1 1 6 at 10
+        990 > G90 G21 G1 X1.000 Y1.000 Z6.000 F600.000",
     );
 }
 

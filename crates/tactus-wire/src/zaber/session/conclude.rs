@@ -6,7 +6,7 @@ use super::axis_state::Reference;
 use super::phase::Phase;
 use super::request::{Request, SlotRequest};
 use super::{Action, Failure, Session};
-use crate::stage::{Controller, Judgement};
+use crate::stage::{Controller, Judgement, distance_mm};
 
 impl Session {
     /// Continues after the last answer of a batch or a round.
@@ -24,6 +24,8 @@ impl Session {
             Phase::Moving(_) => self.judge(now),
             Phase::Homing { .. } => self.conclude_homing(),
             Phase::Clearing => self.conclude_clearing(),
+            Phase::Looking { .. } if !was_round => self.at_once = true,
+            Phase::Looking { .. } => self.conclude_look(),
             Phase::Stopping(_) => self.conclude_stop(),
         }
     }
@@ -87,6 +89,24 @@ impl Session {
         self.renew_alarm();
         self.report();
         let result = self.alarm.map_or(Ok(self.position_mm()), |alarm| Err(Failure::Alarm(alarm)));
+        self.done(result);
+    }
+
+    fn conclude_look(&mut self) {
+        self.report();
+        // The next round requests the list of warnings, if it is needed.
+        if self.axes.iter().any(|state| state.needs_list) {
+            self.at_once = true;
+            return;
+        }
+        let Phase::Looking { target_mm } = core::mem::replace(&mut self.phase, Phase::Ready) else { return };
+        let (position_mm, tolerance_mm, moves) = (self.position_mm(), self.config.tolerance_mm, self.moves());
+        let elsewhere = target_mm.filter(|target_mm| distance_mm(*target_mm, position_mm) > tolerance_mm);
+        let result = self.check_alarm().and_then(|()| self.check_homed()).and_then(|()| match elsewhere {
+            _ if moves => Err(Failure::NotIdle { position_mm }),
+            Some(target_mm) => Err(Failure::NotThere { target_mm, position_mm }),
+            None => Ok(position_mm),
+        });
         self.done(result);
     }
 

@@ -213,7 +213,9 @@ impl Session {
                 self.pending = None;
                 self.at_once = true;
             }
-            Phase::Moving(_) | Phase::Homing { .. } => self.halt(now, Some(Failure::Alarm(alarm))),
+            Phase::Moving(_) | Phase::Homing { .. } | Phase::Looking { .. } => {
+                self.halt(now, Some(Failure::Alarm(alarm)));
+            }
             Phase::Greeting | Phase::Ready | Phase::Clearing | Phase::Over => self.halt(now, None),
         }
         self.report();

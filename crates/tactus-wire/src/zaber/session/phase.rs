@@ -24,6 +24,8 @@ pub(super) enum Phase {
     Homing { group: Vec<usize>, then: Option<Vec<usize>>, deadline: Duration },
     /// Clearing an alarm.
     Clearing,
+    /// A round of queries answers where the stage stands; with a target it must stand there.
+    Looking { target_mm: Option<[f64; 3]> },
     /// A stop was sent.
     Stopping(Stop),
     /// The session has not started, or has failed.
@@ -63,7 +65,7 @@ impl Phase {
             Self::Moving(travel) => Some(travel.arrival.overdue()),
             Self::Homing { deadline, .. } => Some(*deadline),
             Self::Stopping(stop) => Some(stop.deadline()),
-            Self::Greeting | Self::Ready | Self::Clearing | Self::Over => None,
+            Self::Greeting | Self::Ready | Self::Clearing | Self::Looking { .. } | Self::Over => None,
         }
     }
 }

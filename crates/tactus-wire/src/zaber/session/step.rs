@@ -40,6 +40,15 @@ impl Session {
         self.actions.push(Action::Failed(error));
     }
 
+    /// Begins the command to look where the stage stands, which is at the target if there is one. A round that is under
+    /// way does not count.
+    pub(super) fn begin_look(&mut self, now: Duration, target_mm: Option<[f64; 3]>) {
+        self.queue.clear();
+        self.round_ended = Some(now);
+        self.at_once = true;
+        self.phase = Phase::Looking { target_mm };
+    }
+
     /// Stops all axes. The command under way then ends with `failure`.
     pub(super) fn halt(&mut self, now: Duration, failure: Option<Failure>) {
         self.queue.clear();
@@ -92,7 +101,7 @@ impl Session {
                 self.halt(now, Some(Failure::refused("home", "the reference was not found in time")));
             }
             Phase::Stopping(stop) => self.stop_overdue(now, &stop),
-            Phase::Greeting | Phase::Ready | Phase::Clearing | Phase::Over => {}
+            Phase::Greeting | Phase::Ready | Phase::Clearing | Phase::Looking { .. } | Phase::Over => {}
         }
     }
 
@@ -166,7 +175,11 @@ impl Session {
             Phase::Greeting | Phase::Clearing | Phase::Over => return None,
             _ if self.at_once => Duration::ZERO,
             Phase::Ready if !self.moves() => POLL_IDLE,
-            Phase::Ready | Phase::Moving(_) | Phase::Homing { .. } | Phase::Stopping(_) => POLL_MOVING,
+            Phase::Ready
+            | Phase::Moving(_)
+            | Phase::Homing { .. }
+            | Phase::Looking { .. }
+            | Phase::Stopping(_) => POLL_MOVING,
         };
         Some(self.round_began.map_or(Duration::ZERO, |began| began + interval))
     }

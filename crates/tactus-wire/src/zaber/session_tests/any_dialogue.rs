@@ -17,6 +17,7 @@ enum Event {
     Bytes(Vec<u8>),
     Home,
     Move(f64),
+    Look,
     Clear,
     Stop,
     Lose(usize),
@@ -44,6 +45,7 @@ fn event() -> impl Strategy<Value = Event> {
         1 => prop::collection::vec(any::<u8>(), 0..40).prop_map(Event::Bytes),
         1 => Just(Event::Home),
         3 => (0.0..20.0).prop_map(Event::Move),
+        1 => Just(Event::Look),
         1 => Just(Event::Clear),
         2 => Just(Event::Stop),
         1 => (1..4usize).prop_map(Event::Lose),
@@ -54,7 +56,7 @@ fn event() -> impl Strategy<Value = Event> {
 
 fn step(play: &mut Play, given: &mut usize, event: &Event) {
     let is_over = play.session.deadline().is_none();
-    if matches!(event, Event::Home | Event::Move(_) | Event::Clear) {
+    if matches!(event, Event::Home | Event::Move(_) | Event::Look | Event::Clear) {
         *given += usize::from(!is_over);
     }
     match event {
@@ -78,6 +80,7 @@ fn step(play: &mut Play, given: &mut usize, event: &Event) {
         Event::Die(is_dead) => play.stage.is_dead = *is_dead,
         Event::Home => play.home(),
         Event::Move(mm) => play.move_to([*mm, mm / 2.0, 20.0 - mm / 3.0], 5.0),
+        Event::Look => play.look(),
         Event::Clear => play.clear(),
     }
 }

@@ -40,9 +40,11 @@ fn the_acceleration_is_shared_like_the_speed() {
 }
 
 #[test]
-fn a_move_to_the_present_place_is_done_at_once() {
+fn a_move_to_the_present_place_becomes_a_look() {
     let mut play = Play::homed();
     play.move_to([0.0001, 0.0, 20.0], 5.0);
+    assert_eq!(play.results, []);
+    play.run(50);
     assert_eq!(play.result(), Ok([0.0, 0.0, 20.0]));
     assert_eq!(play.commands(), [""; 0]);
 }
