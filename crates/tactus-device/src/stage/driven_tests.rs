@@ -139,6 +139,8 @@ async fn the_epoch_rises_with_whatever_makes_the_position_doubtful_and_with_noth
     shared.set(Fault::HardLimit);
     assert!(matches!(stage.move_to(permit(to(11.0, 10.0))).await, Err(StageError::Alarm { .. })));
     let alarmed = epoch();
+    // In an alarm a controller may stay silent.
+    stage.clear_alarm().await.unwrap();
     shared.fall_silent();
     until(&stage, StageStatus::Disconnected).await;
     let lost = epoch();

@@ -285,7 +285,9 @@ impl Session {
                 self.phase = Phase::Ready;
                 self.report();
             }
-            Purpose::Look { target_mm, reports } => self.conclude_command_to_look(now, target_mm, reports + 1),
+            Purpose::Look { target_mm, reports } => {
+                self.conclude_command_to_look(now, target_mm, reports + 1)
+            }
             Purpose::Clear => {
                 self.phase = Phase::Ready;
                 self.homed = false;

@@ -23,7 +23,7 @@ fn a_round_that_begins_after_the_look_answers_it() {
 fn a_stage_that_moves_is_not_idle_and_one_elsewhere_not_at_the_target() {
     let mut play = Play::homed();
     play.look();
-    play.stage.axes[0].target = 1000.0;
+    play.stage.axes[0].target = 90_000.0;
     play.run(50);
     assert!(matches!(play.result(), Err(Failure::NotIdle { .. })));
 
