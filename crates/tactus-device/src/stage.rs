@@ -39,12 +39,6 @@ pub trait Stage: Send + Sync {
     /// earlier report.
     fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>>;
 
-    /// Asks the controller where it stands now, and returns that position in mm. Moves nothing.
-    ///
-    /// It fails if the controller does not answer, is in alarm, is not homed or is not idle. The result never comes from an
-    /// earlier report.
-    fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>>;
-
     /// Stops motion now. Never waits and is never queued. A move under way ends with [`StageError::Stopped`]. Further moves
     /// are accepted once the stage stands still.
     fn stop(&self);

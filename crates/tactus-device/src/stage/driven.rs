@@ -160,10 +160,6 @@ impl Stage for DrivenStage {
         self.command(StageCommand::Look)
     }
 
-    fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
-        self.command(StageCommand::Look)
-    }
-
     fn stop(&self) {
         self.stop.press();
     }
