@@ -22,6 +22,9 @@ const STOPS_MAX: u32 = 200;
 /// Greatest number of permits for one move: a slow computer may let some expire.
 const PERMITS_MAX: u32 = 5;
 
+/// Greatest number of homings for one reset.
+const HOMINGS_MAX: u32 = 4;
+
 /// Longest time to wait for a permit that the next frame or report may bring.
 const PERMIT_PATIENCE: Duration = Duration::from_secs(5);
 
@@ -129,8 +132,31 @@ impl Shared {
         Ok(self.stage.move_to(permit).await?)
     }
 
-    /// Homes the stage. If a stop ends it, the error is the reason of the stop.
+    /// Homes the stage. If a stop ends it, the error is the reason of the stop. After a silence of the sensor, or of the
+    /// computer, it is homed anew.
     pub(crate) async fn home(&self) -> Result<(), Broken> {
+        let mut tries = 0;
+        loop {
+            tries += 1;
+            let error = match self.home_once().await {
+                Ok(()) => return Ok(()),
+                Err(error) => error,
+            };
+            let is_silence = match &error {
+                Broken::Ended(ending) => ending.is_silence(),
+                Broken::Stage(StageError::Unwatched { .. } | StageError::Void(_)) | Broken::Denied(_) => true,
+                _ => false,
+            };
+            if !is_silence || tries == HOMINGS_MAX {
+                return Err(error);
+            }
+            tracing::warn!(%error, "homing was broken off: it begins anew");
+            self.stand_still().await;
+            self.await_the_sensors_return().await?;
+        }
+    }
+
+    async fn home_once(&self) -> Result<(), Broken> {
         self.check_ended()?;
         let now = self.clock.now().mono;
         let permit = self.acquisition.ask(move |live| live.supervisor.permit_homing(now)).await??;

@@ -517,6 +517,16 @@ impl Shared {
         failure.map_or(closed, Err)
     }
 
+    /// Withdraws a silence as the reason to end once frames arrive again, and has the supervisor check again.
+    pub(crate) async fn await_the_sensors_return(&self) -> Result<(), Broken> {
+        self.control.send_modify(|control| {
+            control.ending.take_if(|ending| ending.is_silence());
+        });
+        self.wait_for_sensor().await?;
+        let now = self.clock.now().mono;
+        Ok(self.acquisition.ask(move |live| live.supervisor.forgive_silence(now)).await?)
+    }
+
     /// Waits until frames arrive, as long as the rig's policy allows.
     pub(crate) async fn wait_for_sensor(&self) -> Result<(), Broken> {
         let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());

@@ -22,14 +22,20 @@ pub enum Violation {
     SumForce { rise_counts: f64, limit_counts: f64, against: &'static str },
     /// No fresh frame while the tip was near the covering.
     #[error(
-        "no frame for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
+        "no frame for {silent_s:.3} s with the tip at {}; at most {limit_s:.3} s are allowed", height(*z_mm)
     )]
-    Silence { silent_s: f64, limit_s: f64, z_mm: f64 },
+    Silence {
+        silent_s: f64,
+        limit_s: f64,
+        /// `None` while the stage is homing for the first time.
+        z_mm: Option<f64>,
+    },
     /// An element that was read for the run's first zero is no longer read, so a load on it would not be seen.
     #[error(
-        "element {element} was not read for {silent_s:.3} s with the tip at z = {z_mm:.3} mm; at most {limit_s:.3} s are allowed"
+        "element {element} was not read for {silent_s:.3} s with the tip at {}; at most {limit_s:.3} s are allowed",
+        height(*z_mm)
     )]
-    ElementSilence { element: usize, silent_s: f64, limit_s: f64, z_mm: f64 },
+    ElementSilence { element: usize, silent_s: f64, limit_s: f64, z_mm: Option<f64> },
     /// The stage reports a depth beyond the limit.
     #[error(
         "the stage reports a depth of {depth_mm:.3} mm; the limit is {limit_mm:.3} mm (envelope.depth_share_max)"
@@ -68,6 +74,10 @@ impl Violation {
             Self::Zero { .. } => "zero",
         }
     }
+}
+
+fn height(z_mm: Option<f64>) -> String {
+    z_mm.map_or_else(|| "an unknown height".into(), |z_mm| format!("z = {z_mm:.3} mm"))
 }
 
 /// Why nothing but the way up is permitted before a reset.

@@ -27,6 +27,8 @@ pub struct Supervisor {
     fault: Option<Fault>,
     /// True while somebody may move the stage: loads count then at any height.
     is_active: bool,
+    /// Between the begin and the end of a reset.
+    is_resetting: bool,
     has_sensor: bool,
 }
 
@@ -43,6 +45,7 @@ impl Supervisor {
             z_mm: None,
             fault: Some(Fault::Started),
             is_active: false,
+            is_resetting: false,
             has_sensor: true,
         }
     }
@@ -110,7 +113,7 @@ impl Supervisor {
         if !self.has_sensor || !(is_near || is_homing) {
             return None;
         }
-        let (limit_s, z_mm) = (self.limits.silence_max_s(), self.z_mm.unwrap_or(f64::NAN));
+        let (limit_s, z_mm) = (self.limits.silence_max_s(), self.z_mm);
         let silent_s = self.elements.silence_s(now);
         let violation = if silent_s > limit_s {
             Some(Violation::Silence { silent_s, limit_s, z_mm })
@@ -170,6 +173,7 @@ impl Supervisor {
     /// The run or reset is over, however it ended.
     pub fn end(&mut self) {
         self.is_active = false;
+        self.is_resetting = false;
         self.permits.revoke();
     }
 
@@ -177,6 +181,7 @@ impl Supervisor {
     pub fn begin_reset(&mut self, now: MonoTime) {
         self.fault = Some(Fault::Unfinished);
         self.is_active = true;
+        self.is_resetting = true;
         self.elements.forget_zeros();
         self.elements.excuse_silence(now);
     }
@@ -193,26 +198,22 @@ impl Supervisor {
         self.standing_mm()?;
         self.check_frame(now)?;
         self.fault = None;
+        self.is_resetting = false;
         Ok(())
     }
 
     /// Latches a fault until the next reset. An earlier one is kept, because it is the cause.
     pub fn latch(&mut self, fault: Fault) {
         self.permits.revoke();
-        let is_silence = matches!(self.fault, Some(Fault::Tripped(Violation::Silence { .. })));
-        if is_silence || self.fault.is_none() {
+        if self.is_silent() || self.fault.is_none() {
             self.fault = Some(fault);
         }
     }
 
     /// Forgives a silence of the sensor, and nothing else, once the tip is up.
     pub fn forgive_silence(&mut self, now: MonoTime) {
-        let is_silence = matches!(
-            self.fault,
-            Some(Fault::Tripped(Violation::Silence { .. } | Violation::ElementSilence { .. }))
-        );
-        if is_silence {
-            self.fault = None;
+        if self.is_silent() {
+            self.fault = self.is_resetting.then_some(Fault::Unfinished);
         }
         self.elements.excuse_silence(now);
     }
@@ -253,6 +254,11 @@ impl Supervisor {
         self.permits.revoke();
         self.fault = Some(Fault::Tripped(fresh.clone()));
         Some(fresh)
+    }
+
+    /// The fault is a silence of the sensor, which its return may end.
+    fn is_silent(&self) -> bool {
+        matches!(self.fault, Some(Fault::Tripped(Violation::Silence { .. })))
     }
 
     fn check_fault(&self) -> Result<(), Denied> {

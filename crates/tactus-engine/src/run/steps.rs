@@ -214,20 +214,12 @@ impl Run {
         self.set_phase(Phase::Retract, -1).await;
         self.shared.retract().await?;
         self.set_phase(Phase::Idle, -1).await;
-        self.await_the_sensors_return().await?;
+        self.shared.await_the_sensors_return().await?;
         if !self.shared.acquisition.ask(|live| live.supervisor.has_zero()).await? {
             // It connected anew: its zeros may be others now.
             self.take_reference().await?;
         }
         Ok(())
-    }
-
-    /// Withdraws a silence as the reason to end once frames arrive again, and has the supervisor check again.
-    async fn await_the_sensors_return(&self) -> Result<(), Broken> {
-        self.shared.forgive_silence();
-        self.shared.wait_for_sensor().await?;
-        let now = self.shared.clock.now().mono;
-        Ok(self.shared.acquisition.ask(move |live| live.supervisor.forgive_silence(now)).await?)
     }
 
     async fn read(&mut self, duration_s: f64) -> Result<Reply, Broken> {
@@ -307,7 +299,7 @@ impl Run {
             }
             repeats += 1;
             warn!(%broken, "average broken off; it will be repeated");
-            self.await_the_sensors_return().await?;
+            self.shared.await_the_sensors_return().await?;
         }
     }
 
@@ -338,15 +330,6 @@ impl Run {
         for (range, value) in self.travel_mm.iter_mut().zip([x_mm, y_mm, z_mm]) {
             *range = [range[0].min(value), range[1].max(value)];
         }
-    }
-}
-
-impl crate::engine::Shared {
-    /// Withdraws a silence as the reason to end: the run continues once the sensor is back.
-    fn forgive_silence(&self) {
-        self.control.send_modify(|control| {
-            control.ending.take_if(|ending| ending.is_silence());
-        });
     }
 }
 
