@@ -1,4 +1,6 @@
 //! Virtual devices, through the production drivers.
 
+mod damage;
 mod rig;
+mod schedules;
 mod stages;
