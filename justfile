@@ -287,6 +287,10 @@ fuzz seconds="600":
         fuzzed "$(basename "$source" .rs)"
     done
 
+# So many schedules of faults against a virtual stage and its driver, each from its seed; TACTUS_SEED=7 plays one again.
+simulate-faults schedules="2000":
+    TACTUS_SCHEDULES={{ schedules }} cargo test --package tactus-virtual --test it schedules
+
 # A bare Debian 12 with cargo, gcc and git: both of the README's commands in it, timed. As root; the first time some 20 minutes.
 bare:
     tests/bare/run.sh

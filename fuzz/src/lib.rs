@@ -114,6 +114,7 @@ pub fn run_stage(mut session: impl stage::Session, input: &[u8]) {
                 match kind {
                     0 => session.home(now),
                     1 => session.clear_alarm(now),
+                    2 => session.look(now),
                     _ => session.move_to(now, [f64::from(kind), 0.5, -0.25], 10.0),
                 }
             }

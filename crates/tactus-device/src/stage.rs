@@ -87,6 +87,12 @@ pub enum StageError {
     /// The controller is idle, but not at the target.
     #[error("the stage says it has arrived at {target_mm:?} mm, but stands at {position_mm:?} mm")]
     NotThere { target_mm: [f64; 3], position_mm: [f64; 3] },
+    /// A report of the move was off its way, or ahead of its speed, and the stage was stopped.
+    #[error(
+        "on the way to {target_mm:?} mm the stage was off its way, or too fast, and was stopped at {position_mm:?} mm: \
+         a command or a report was damaged on the link, or something else commands the stage"
+    )]
+    Astray { target_mm: [f64; 3], position_mm: [f64; 3] },
     /// The move took much longer than expected.
     #[error(
         "the move to {target_mm:?} mm was not done after {waited_s:.1} s; the stage was stopped at {position_mm:?} mm"

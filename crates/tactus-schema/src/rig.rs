@@ -18,7 +18,7 @@ use tactus_model::{Array, ArrayError, Covering, Indenter, Psf, Registration};
 use crate::description::WrongField;
 
 pub use file::SCHEMA;
-pub use stage::{GrblAxes, GrblAxis, MachineAxis, StageLink, StageProtocol, ZaberAxes, ZaberAxis};
+pub use stage::{AxisEnd, GrblAxes, GrblAxis, MachineAxis, StageLink, StageProtocol, ZaberAxes, ZaberAxis};
 pub use transport::{HidLink, IdentityError, MAX_REPORT_BYTES, SerialPort, Transport, UsbIdentity, UsbLink};
 
 /// A checked rig description.

@@ -13,13 +13,16 @@
 //!   setting takes 100-220 ms; this host writes none.
 //! - With homing switched off, `$H` gives `error:5`. During `$H` one `<Home|...>` is sent, then nothing until `ok`, or
 //!   `ALARM:9` after about 24 s.
-//! - There is no heartbeat.
+//! - There is no heartbeat, and nothing has a checksum. The parser ignores `/`, and drops bytes above 0x7F as real-time
+//!   commands. `$G` prints the modes, and the feed as a whole number. A reset forgets both.
 //!
 //! [`Response`] parses lines of the controller. [`Session`] is the host's side.
 
 mod active_move;
 mod config;
+mod feed;
 mod meaning;
+mod number;
 mod poll;
 mod response;
 mod session;

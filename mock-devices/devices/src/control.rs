@@ -106,6 +106,17 @@ impl RigControl {
         self.world.lock().deepest_mm(Instant::now())
     }
 
+    /// True position of the tip at an instant that is not before the last change, for tests that keep their own time.
+    pub fn tip_at_mm(&self, at: Instant) -> [f64; 3] {
+        self.world.lock().tip_mm(at)
+    }
+
+    /// The greatest true depth until an instant, for tests that keep their own time. Exact between events, too: on a straight
+    /// way the greatest depth is at an end.
+    pub fn deepest_by_mm(&self, now: Instant) -> f64 {
+        self.world.lock().deepest_mm(now)
+    }
+
     /// True while the tip touches the covering.
     pub fn is_in_contact(&self) -> bool {
         self.depth_mm() > 0.0

@@ -36,6 +36,40 @@ pub enum CableFault {
     Renumber,
 }
 
+/// A way of a device's link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// `to-stage`, `to-sensor`: what the host sends.
+    FromHost,
+    /// `from-stage`, `from-sensor`: what the device sends.
+    FromDevice,
+}
+
+/// Faults of the bytes on one way of a link. A chunk is what is sent at once: a line, a frame, a query.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WireFault {
+    /// `lose 2s`: what is sent in this time is lost.
+    Lose(Duration),
+    /// `hold 2s`: what is sent in this time arrives all at once at its end.
+    Hold(Duration),
+    /// `drip 2s`: what is sent in this time arrives one byte at a time, a millisecond each.
+    Drip(Duration),
+    /// `drop 3`: the next bytes are lost.
+    Drop(usize),
+    /// `flip-bits 1`: this many random bits of the next chunk are flipped.
+    FlipBits(usize),
+    /// `double 1`: this many random bytes of the next chunk come twice.
+    Double(usize),
+    /// `garbage 8`: random bytes before the next chunk.
+    Garbage(usize),
+    /// `repeat`: the next chunk comes twice.
+    Repeat,
+    /// `truncate`: the next chunk ends in its middle.
+    Truncate,
+    /// `reorder`: the next chunk comes after the one that follows it.
+    Reorder,
+}
+
 /// Faults of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorFault {
@@ -52,6 +86,12 @@ pub enum SensorFault {
     Stuck(usize),
     /// `saturate 7`: the element reads full scale.
     Saturate(usize),
+    /// `freeze 2s`: the same reading again and again for this time, with clock and counters going on.
+    Freeze(Duration),
+    /// `zeros 60`: from the next time it is plugged in, every reading is higher by this many counts.
+    Zeros(u16),
+    /// Of the bytes on its link.
+    Wire(Way, WireFault),
     /// `clear`: ends lasting faults.
     Clear,
 }
@@ -92,6 +132,8 @@ pub enum StageFault {
     Controller(ControllerFault),
     /// `echo-garbage`: sends every line back, followed by garbage.
     EchoGarbage,
+    /// Of the bytes on its link.
+    Wire(Way, WireFault),
     /// `stall 2s`: the controller neither receives nor sends for this time; motion continues.
     Stall(Duration),
     /// `clear`: ends lasting faults.

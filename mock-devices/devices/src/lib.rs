@@ -7,10 +7,13 @@
 //! `[simulation]`, or a model or hidden physics in its place ([`TruthFile`]). [`RigControl`] sees all of it, and makes
 //! things go wrong ([`faults`]).
 //!
+//! A [`schedule`] is a script of faults made from a seed.
+//!
 //! Everything random follows from one seed, so that two runs in virtual time are identical to the byte.
 
 pub mod cable;
 pub mod faults;
+pub mod schedule;
 
 mod control;
 mod kinematics;
@@ -26,6 +29,7 @@ mod test_bench;
 mod truth;
 mod truth_file;
 mod twin;
+mod wire;
 mod world;
 
 pub use control::{FaultReceivers, RigControl};

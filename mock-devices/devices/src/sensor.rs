@@ -16,8 +16,10 @@ use tactus_wire::weiss::{BOOT_MESSAGE, CommandError, ErrorCode, HostCommand, ack
 use tokio::time::Instant;
 
 use crate::cable::Device;
-use crate::faults::SensorFault;
+use crate::faults::{SensorFault, Way};
 use crate::outbox::Outbox;
+use crate::truth::RandomStream;
+use crate::wire::Wire;
 use crate::world::SharedWorld;
 use codec::{DeviceCodec, HostRequest, Register};
 use link_faults::LinkFaults;
@@ -48,8 +50,16 @@ pub struct VirtualSensor {
     counts: Vec<u16>,
     /// Elements with the faults `stuck` and `saturate`, and their readings.
     overridden: BTreeMap<usize, u16>,
+    /// Until then every reading is the last one.
+    frozen_until: Option<Instant>,
+    /// Added to every reading, and what will be from the next time it is plugged in.
+    zeros_counts: u16,
+    next_zeros_counts: u16,
     link_faults: LinkFaults,
     outbox: Outbox,
+    /// Bytes from and to the host.
+    heard: Wire,
+    said: Wire,
 }
 
 /// An acquisition in progress.
@@ -74,8 +84,13 @@ impl VirtualSensor {
             acquisition: None,
             counts: Vec::new(),
             overridden: BTreeMap::new(),
+            frozen_until: None,
+            zeros_counts: 0,
+            next_zeros_counts: 0,
             link_faults: LinkFaults::new(seed),
             outbox: Outbox::default(),
+            heard: Wire::new(RandomStream::ToSensor.rng(seed)),
+            said: Wire::new(RandomStream::FromSensor.rng(seed)),
         };
         sensor.power_up(now);
         sensor
@@ -159,11 +174,50 @@ impl VirtualSensor {
     }
 
     fn sample(&mut self, at: Instant) {
+        if self.frozen_until.is_some_and(|until| at < until) && !self.counts.is_empty() {
+            return;
+        }
         self.world.lock().sample(at, &mut self.counts);
+        for count in &mut self.counts {
+            *count = count.saturating_add(self.zeros_counts);
+        }
         for (element, reading) in &self.overridden {
             if let Some(count) = self.counts.get_mut(*element) {
                 *count = *reading;
             }
+        }
+    }
+
+    /// Answers what has arrived from the host.
+    fn hear(&mut self, now: Instant) {
+        let bytes = self.heard.take_due(now);
+        if self.is_booting || bytes.is_empty() {
+            return;
+        }
+        for asked in self.codec.decode(&bytes) {
+            let answer = self.answer(asked, now);
+            if !self.link_faults.is_stalled(now) {
+                self.outbox.push(now, answer);
+            }
+        }
+    }
+
+    /// Takes the samplings that are due.
+    fn sample_due(&mut self, now: Instant) {
+        if now >= self.powered_up + BOOT {
+            self.is_booting = false;
+        }
+        while let Some(acquisition) = self.acquisition {
+            let at = self.instant(acquisition);
+            if at > now {
+                break;
+            }
+            self.acquisition = Some(Acquisition { next: acquisition.next + 1, ..acquisition });
+            if at + BACKLOG < now {
+                self.codec.skip_frame();
+                continue;
+            }
+            self.take_frame(at, acquisition.run_length, Duration::from_secs_f64(1.0 / acquisition.rate_hz));
         }
     }
 
@@ -186,44 +240,27 @@ impl Device for VirtualSensor {
     type Fault = SensorFault;
 
     fn receive(&mut self, bytes: &[u8], now: Instant) {
-        if self.is_booting {
-            return;
-        }
-        for asked in self.codec.decode(bytes) {
-            let answer = self.answer(asked, now);
-            if !self.link_faults.is_stalled(now) {
-                self.outbox.push(now, answer);
-            }
-        }
+        self.heard.push(bytes, now);
+        self.hear(now);
     }
 
     fn wake(&mut self, now: Instant) {
-        if now >= self.powered_up + BOOT {
-            self.is_booting = false;
-        }
-        while let Some(acquisition) = self.acquisition {
-            let at = self.instant(acquisition);
-            if at > now {
-                break;
-            }
-            self.acquisition = Some(Acquisition { next: acquisition.next + 1, ..acquisition });
-            if at + BACKLOG < now {
-                self.codec.skip_frame();
-                continue;
-            }
-            self.take_frame(at, acquisition.run_length, Duration::from_secs_f64(1.0 / acquisition.rate_hz));
-        }
+        self.sample_due(now);
+        self.hear(now);
     }
 
     fn next_wake(&self) -> Option<Instant> {
         let sampling = self.acquisition.map(|acquisition| self.instant(acquisition));
         let booted = self.is_booting.then_some(self.powered_up + BOOT);
-        [sampling, booted, self.outbox.next_due()].into_iter().flatten().min()
+        let wires = [self.heard.next_due(), self.said.next_due()];
+        [sampling, booted, self.outbox.next_due()].into_iter().chain(wires).flatten().min()
     }
 
     fn output(&mut self, now: Instant) -> Vec<u8> {
         let bytes = self.outbox.take_due(now);
-        self.link_faults.pass(bytes)
+        let bytes = self.link_faults.pass(bytes);
+        self.said.push(&bytes, now);
+        self.said.take_due(now)
     }
 
     fn fault(&mut self, fault: SensorFault, now: Instant) {
@@ -253,14 +290,22 @@ impl Device for VirtualSensor {
                 )]
                 self.overridden.insert(element, full_scale_counts.min(f64::from(u16::MAX)) as u16);
             }
+            SensorFault::Freeze(duration) => self.frozen_until = Some(now + duration),
+            SensorFault::Zeros(counts) => self.next_zeros_counts = counts,
+            SensorFault::Wire(Way::FromHost, fault) => self.heard.arm(fault, now),
+            SensorFault::Wire(Way::FromDevice, fault) => self.said.arm(fault, now),
             SensorFault::Clear => {
                 self.overridden.clear();
+                self.frozen_until = None;
+                self.heard.clear();
+                self.said.clear();
                 self.link_faults.clear();
             }
         }
     }
 
     fn plugged_in(&mut self, now: Instant) {
+        self.zeros_counts = self.next_zeros_counts;
         self.power_up(now);
     }
 }

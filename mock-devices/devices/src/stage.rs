@@ -14,8 +14,9 @@ use tactus_schema::rig::StageProtocol;
 use tokio::time::Instant;
 
 use crate::cable::Device;
-use crate::faults::{ControllerFault, StageFault};
+use crate::faults::{ControllerFault, StageFault, Way};
 use crate::truth::RandomStream;
+use crate::wire::Wire;
 use crate::world::SharedWorld;
 use grbl::GrblController;
 use zaber::ZaberController;
@@ -30,6 +31,9 @@ const GARBAGE_BYTES: usize = 8;
 #[derive(Debug)]
 pub struct VirtualStage {
     controller: Box<dyn Controller>,
+    /// Bytes from and to the host.
+    heard: Wire,
+    said: Wire,
     /// Until then it neither receives nor sends; received bytes wait.
     hung_until: Option<Instant>,
     unheard: Vec<u8>,
@@ -82,6 +86,8 @@ impl VirtualStage {
         };
         Self {
             controller,
+            heard: Wire::new(RandomStream::ToStage.rng(seed)),
+            said: Wire::new(RandomStream::FromStage.rng(seed)),
             hung_until: None,
             unheard: Vec::new(),
             echoes: false,
@@ -92,6 +98,34 @@ impl VirtualStage {
 
     fn is_hung(&self, now: Instant) -> bool {
         self.hung_until.is_some_and(|until| now < until)
+    }
+
+    /// Takes the bytes that have arrived from the host.
+    fn hear(&mut self, now: Instant) {
+        let bytes = self.heard.take_due(now);
+        if bytes.is_empty() {
+            return;
+        }
+        if self.is_hung(now) {
+            self.unheard.extend_from_slice(&bytes);
+            return;
+        }
+        if self.echoes {
+            self.echo(&bytes);
+        }
+        self.controller.receive(&bytes, now);
+    }
+
+    fn wake_controller(&mut self, now: Instant) {
+        if self.is_hung(now) {
+            self.controller.only_move(now);
+            return;
+        }
+        self.controller.wake(now);
+        if self.hung_until.take().is_some() {
+            let unheard = std::mem::take(&mut self.unheard);
+            self.controller.receive(&unheard, now);
+        }
     }
 
     /// Sends a received line back, followed by garbage.
@@ -112,53 +146,45 @@ impl Device for VirtualStage {
     type Fault = StageFault;
 
     fn receive(&mut self, bytes: &[u8], now: Instant) {
-        if self.is_hung(now) {
-            self.unheard.extend_from_slice(bytes);
-            return;
-        }
-        if self.echoes {
-            self.echo(bytes);
-        }
-        self.controller.receive(bytes, now);
+        self.heard.push(bytes, now);
+        self.hear(now);
     }
 
     fn wake(&mut self, now: Instant) {
-        if self.is_hung(now) {
-            self.controller.only_move(now);
-            return;
-        }
-        self.controller.wake(now);
-        if self.hung_until.take().is_some() {
-            let unheard = std::mem::take(&mut self.unheard);
-            self.controller.receive(&unheard, now);
-        }
+        self.wake_controller(now);
+        self.hear(now);
     }
 
     fn next_wake(&self) -> Option<Instant> {
-        match self.hung_until {
+        let controller = match self.hung_until {
             Some(until) => [Some(until), self.controller.limit_at()].into_iter().flatten().min(),
             None => self.controller.next_wake(),
-        }
+        };
+        [controller, self.heard.next_due(), self.said.next_due()].into_iter().flatten().min()
     }
 
     fn output(&mut self, now: Instant) -> Vec<u8> {
-        if self.is_hung(now) {
-            return Vec::new();
+        if !self.is_hung(now) {
+            let mut bytes = std::mem::take(&mut self.echo);
+            bytes.extend(self.controller.output(now));
+            self.said.push(&bytes, now);
         }
-        let mut bytes = std::mem::take(&mut self.echo);
-        bytes.extend(self.controller.output(now));
-        bytes
+        self.said.take_due(now)
     }
 
     fn fault(&mut self, fault: StageFault, now: Instant) {
         match fault {
             StageFault::Controller(fault) => self.controller.fault(fault, now),
+            StageFault::Wire(Way::FromHost, fault) => self.heard.arm(fault, now),
+            StageFault::Wire(Way::FromDevice, fault) => self.said.arm(fault, now),
             StageFault::EchoGarbage => self.echoes = true,
             StageFault::Stall(duration) => {
                 self.hung_until = Some(now + duration.max(Duration::from_millis(1)));
             }
             StageFault::Clear => {
                 self.echoes = false;
+                self.heard.clear();
+                self.said.clear();
                 self.controller.mend();
             }
         }

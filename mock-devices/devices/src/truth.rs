@@ -53,6 +53,10 @@ pub(crate) enum RandomStream {
     SensorLink,
     StageLink,
     StageController,
+    ToStage,
+    FromStage,
+    ToSensor,
+    FromSensor,
 }
 
 impl RandomStream {

@@ -377,6 +377,7 @@ fn stage_error(failure: Failure, is_abandoned: bool) -> StageError {
         }
         Failure::NotIdle { position_mm } => StageError::NotIdle { position_mm },
         Failure::NotThere { target_mm, position_mm } => StageError::NotThere { target_mm, position_mm },
+        Failure::Astray { target_mm, position_mm } => StageError::Astray { target_mm, position_mm },
         Failure::Overdue { target_mm, position_mm, waited } => {
             StageError::Overdue { target_mm, position_mm, waited_s: waited.as_secs_f64() }
         }

@@ -44,6 +44,8 @@ pub struct GrblAxis {
     pub origin_mm: f64,
     /// Steps per mm that the controller must be set to; `None` if the rig file does not say.
     pub steps_per_mm: Option<f64>,
+    /// End of the axis where its home switch is; `None` if the rig file does not say. z's is always the high end.
+    pub home: Option<AxisEnd>,
 }
 
 /// One of a controller's three axes.
@@ -58,6 +60,16 @@ pub enum MachineAxis {
     Z,
 }
 
+/// An end of an axis, in the robot's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AxisEnd {
+    /// Its smallest coordinate.
+    Low,
+    /// Its greatest coordinate.
+    High,
+}
+
 /// The axes of Zaber devices on one port.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZaberAxes {
@@ -67,7 +79,8 @@ pub struct ZaberAxes {
     pub accel_mm_per_s2: Option<f64>,
     /// Speed of each axis during homing; `None` keeps that of the last move.
     pub homing_speed_mm_per_s: Option<f64>,
-    /// True if both sides send checksums: the devices' setting `comm.checksum` is switched on.
+    /// True if both sides send checksums: the devices' setting `comm.checksum` is switched on. True unless the rig file says
+    /// otherwise.
     pub checksums: bool,
     /// True if a stage that reports a valid reference counts as homed when it is connected.
     pub trusts_reference: bool,
@@ -104,8 +117,7 @@ pub(super) enum RawStageLink {
         axes: RawAxes<RawZaberAxis>,
         accel_mm_per_s2: Option<f64>,
         homing_speed_mm_per_s: Option<f64>,
-        #[serde(default)]
-        checksums: bool,
+        checksums: Option<bool>,
         #[serde(default)]
         trusts_reference: bool,
     },
@@ -126,6 +138,7 @@ pub(super) struct RawGrblAxis {
     direction: Option<i64>,
     origin_mm: Option<f64>,
     steps_per_mm: Option<f64>,
+    home: Option<AxisEnd>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -160,6 +173,7 @@ impl Default for GrblAxes {
             is_forward: true,
             origin_mm: 0.0,
             steps_per_mm: None,
+            home: (machine_axis == MachineAxis::Z).then_some(AxisEnd::High),
         });
         Self { axes, soft_limits: true }
     }
@@ -187,7 +201,7 @@ impl RawStageLink {
                     axes: axes.check()?,
                     accel_mm_per_s2: more_than_0("accel_mm_per_s2", accel_mm_per_s2)?,
                     homing_speed_mm_per_s: more_than_0("homing_speed_mm_per_s", homing_speed_mm_per_s)?,
-                    checksums,
+                    checksums: checksums.unwrap_or(true),
                     trusts_reference,
                 };
                 (StageProtocol::Zaber(zaber), transport)
@@ -218,7 +232,12 @@ impl RawAxes<RawGrblAxis> {
                     Some(steps_per_mm) => Some(positive(field("steps_per_mm"), steps_per_mm)?),
                     None => None,
                 },
+                home: raw.home.or(plain[at].home),
             };
+            if axes[at].home == Some(AxisEnd::Low) && NAMES[at] == "z" {
+                let problem = "z must home upwards, to its high end: the other way is into the sensor";
+                return Err(wrong(field("home"), problem));
+            }
         }
         if let Some([first, second]) = twins(|at| Some(axes[at].machine_axis)) {
             let problem = format!(

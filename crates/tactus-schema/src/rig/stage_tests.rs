@@ -43,10 +43,20 @@ fn axes_of_grbl_may_be_exchanged_turned_and_shifted() {
         is_forward: false,
         origin_mm: 0.0,
         steps_per_mm: Some(250.0),
+        home: None,
     };
     assert_eq!(x, turned);
     assert_eq!((y.machine_axis, y.is_forward, y.steps_per_mm), (MachineAxis::X, true, None));
     assert_eq!((z.machine_axis, z.origin_mm.to_bits()), (MachineAxis::Z, (-30.0_f64).to_bits()));
+}
+
+#[test]
+fn z_homes_upwards_and_the_rig_file_says_where_the_others_home() {
+    let lines = "protocol = \"grbl\"\naxes.x.home = \"low\"\naxes.z.home = \"high\"";
+    let Ok(StageProtocol::Grbl(GrblAxes { axes: [x, y, z], .. })) = stage(lines) else { panic!() };
+    assert_eq!((x.home, y.home, z.home), (Some(AxisEnd::Low), None, Some(AxisEnd::High)));
+    let down = stage("protocol = \"grbl\"\naxes.z.home = \"low\"").unwrap_err();
+    assert!(down.to_string().contains("into the sensor"), "{down}");
 }
 
 #[test]
@@ -65,7 +75,7 @@ fn a_zaber_stage_names_its_axes() {
         zaber.axes[1].map(|y| (y.device, y.axis, y.is_forward, y.resolution)),
         Some((1, 2, true, None))
     );
-    assert!(!zaber.checksums && !zaber.trusts_reference && zaber.accel_mm_per_s2.is_none());
+    assert!(zaber.checksums && !zaber.trusts_reference && zaber.accel_mm_per_s2.is_none());
     assert_eq!(stage(ZABER).unwrap().name(), "zaber-ascii");
 }
 

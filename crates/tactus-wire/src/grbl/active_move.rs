@@ -3,32 +3,54 @@
 use core::time::Duration;
 
 use super::Config;
-use crate::stage::{ArrivalCheck, Judgement, distance_mm};
+use super::number::{round_to_um, short};
+use crate::stage::{ArrivalCheck, AxisName, Course, Judgement, Shape, distance_mm};
 
 /// A move under way.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ActiveMove {
     arrival: ArrivalCheck,
+    course: Course,
     line: String,
-    /// When the controller accepted the line.
+    /// Where the controller's parser stands after the line, in its coordinates.
+    parsed_mm: [f64; 3],
+    sent: Duration,
+    /// When the controller accepted the line, or showed that it executes it.
     accepted: Option<Duration>,
 }
 
 impl ActiveMove {
-    /// A move that starts now. The target is rounded to the three decimals that are sent.
+    /// A move that starts now from `base_mm`, in the controller's coordinates. The target is rounded to the three decimals
+    /// that are sent. `None` if no axis moves.
+    ///
+    /// The line has the axes that move, as increments, and nothing else: see `docs/decisions/0020-a-damaged-byte.md`.
     pub(super) fn new(
         now: Duration,
         config: &Config,
-        from_mm: [f64; 3],
+        base_mm: [f64; 3],
         target_mm: [f64; 3],
         speed_mm_per_s: f64,
-    ) -> Self {
+    ) -> Option<Self> {
         let machine_mm = config.to_machine(target_mm).map(round_to_um);
-        let target_mm = config.to_stage(machine_mm);
-        let [x, y, z] = machine_mm;
-        let line = format!("G90 G21 G1 X{x:.3} Y{y:.3} Z{z:.3} F{:.3}", speed_mm_per_s * 60.0);
+        let (mut line, mut parsed_mm) = (String::new(), base_mm);
+        for name in AxisName::ALL {
+            let way_mm = round_to_um(name.of(machine_mm) - name.of(base_mm));
+            if way_mm != 0.0 {
+                line.push_str(name.of(["X", "Y", "Z"]));
+                line.push_str(&short(way_mm));
+                name.set(&mut parsed_mm, name.of(base_mm) + way_mm);
+            }
+        }
+        let (from_mm, target_mm) = (config.to_stage(base_mm), config.to_stage(parsed_mm));
         let expected_s = distance_mm(from_mm, target_mm) / speed_mm_per_s;
-        Self { arrival: ArrivalCheck::new(now, target_mm, expected_s), line, accepted: None }
+        (!line.is_empty()).then(|| Self {
+            arrival: ArrivalCheck::new(now, target_mm, expected_s),
+            course: Course::new(now, from_mm, target_mm, speed_mm_per_s, Shape::Line),
+            line,
+            parsed_mm,
+            sent: now,
+            accepted: None,
+        })
     }
 
     /// The line to send, without its end.
@@ -40,31 +62,41 @@ impl ActiveMove {
         &self.arrival
     }
 
+    /// Where the controller's parser stands after the line, in its coordinates.
+    pub(super) fn parsed_mm(&self) -> [f64; 3] {
+        self.parsed_mm
+    }
+
     /// True if the line has not been accepted yet.
     pub(super) fn awaits_ok(&self) -> bool {
         self.accepted.is_none()
     }
 
     pub(super) fn accept(&mut self, now: Duration) {
-        self.accepted = Some(now);
+        self.accepted.get_or_insert(now);
     }
 
-    /// Judges a report received now that was requested at `asked`. A report that was requested before the `ok` does not
-    /// show that the move has ended.
+    /// True if the stage cannot be here if it is on the way to the target.
+    pub(super) fn strays(&self, now: Duration, position_mm: [f64; 3], tolerance_mm: f64) -> bool {
+        self.course.strays(now, position_mm, tolerance_mm)
+    }
+
+    /// Judges a report received now that was requested at `asked`.
+    ///
+    /// The controller counts as having accepted the line if it said `ok`, or if a report that was requested after the line
+    /// shows motion: an `ok` may be lost. A report that was requested before does not show that the move has ended.
     pub(super) fn judge(
         &mut self,
         now: Duration,
         asked: Option<Duration>,
-        stands: bool,
+        (stands, moves): (bool, bool),
         position_mm: [f64; 3],
         tolerance_mm: f64,
     ) -> Judgement {
+        if moves && let Some(asked) = asked.filter(|asked| *asked >= self.sent) {
+            self.accept(asked);
+        }
         let asked_after_ok = asked.zip(self.accepted).is_some_and(|(asked, accepted)| asked >= accepted);
         self.arrival.judge(now, stands && asked_after_ok, position_mm, tolerance_mm)
     }
-}
-
-/// Rounds to the controller's three decimals; no negative zero.
-fn round_to_um(mm: f64) -> f64 {
-    (mm * 1000.0).round() / 1000.0 + 0.0
 }

@@ -24,6 +24,9 @@ pub struct Axis {
     pub origin_mm: f64,
     /// Required steps per mm (`$100` to `$102`), more than 0; `None` accepts any.
     pub steps_per_mm: Option<f64>,
+    /// End of the stage's axis that homing must go to (`$23`); `None` accepts either. z must home upwards: the other way
+    /// is into the sensor.
+    pub home: Option<Direction>,
 }
 
 /// Why a configuration is invalid.
@@ -49,6 +52,7 @@ impl Config {
             direction: Direction::Positive,
             origin_mm: 0.0,
             steps_per_mm: None,
+            home: (machine == AxisName::Z).then_some(Direction::Positive),
         });
         Self { tolerance_mm, axes, needs_soft_limits: true }
     }

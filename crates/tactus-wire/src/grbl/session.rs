@@ -7,14 +7,14 @@ mod step;
 
 use core::time::Duration;
 
-use phase::{Phase, Purpose};
+use phase::{Phase, Purpose, Wanted};
 
-use super::active_move::ActiveMove;
+use super::feed::Feed;
 use super::poll::StatusPoll;
 use super::settings::Settings;
 use super::{Config, ConfigError, FEED_HOLD, MachineState, Response, alarm_meaning};
 use crate::lines::Lines;
-use crate::stage::{self, Alarm, Cause, Failure, Session as _, distance_mm};
+use crate::stage::{self, Alarm, Cause, Failure, Session as _};
 
 pub use error::SessionError;
 
@@ -53,6 +53,14 @@ pub struct Session {
     state: Option<MachineState>,
     position_mm: [f64; 3],
     work_offset_mm: Option<[f64; 3]>,
+    /// The feed that the controller has confirmed, with the modes of a move. A reset forgets both.
+    feed: Option<Feed>,
+    /// Where the controller's parser stands after the last move, in its coordinates.
+    parsed_mm: Option<[f64; 3]>,
+    /// Position of the last report, if it said that the stage stands.
+    stood_mm: Option<[f64; 3]>,
+    /// The last two reports agree on where it stands.
+    is_steady: bool,
     unknown_lines: u64,
     actions: Vec<Action>,
 }
@@ -76,6 +84,10 @@ impl Session {
             state: None,
             position_mm: [0.0; 3],
             work_offset_mm: None,
+            feed: None,
+            parsed_mm: None,
+            stood_mm: None,
+            is_steady: false,
             unknown_lines: 0,
             actions: Vec::new(),
         })
@@ -116,6 +128,7 @@ impl stage::Session for Session {
                 matches!(purpose, Purpose::Stop { .. })
             }
             Phase::Ready
+            | Phase::Preparing(_)
             | Phase::Moving(_)
             | Phase::Homing { .. }
             | Phase::Unlocking { .. }
@@ -125,8 +138,8 @@ impl stage::Session for Session {
     }
 
     fn deadline(&self) -> Option<Duration> {
-        let poll = self.poll_interval().map(|interval| self.poll.next(interval));
-        [self.phase.deadline(), poll].into_iter().flatten().min()
+        let poll = self.poll_interval().map(|interval| self.poll.next(interval, self.report_timeout()));
+        [self.phase.deadline(), poll, self.unwatched()].into_iter().flatten().min()
     }
 
     fn unknown_lines(&self) -> u64 {
@@ -147,6 +160,7 @@ impl stage::Session for Session {
             return self.finish(now);
         }
         self.homed = false;
+        self.forget_modes();
         // `?` is not answered during homing.
         self.poll.reset();
         self.phase = Phase::Homing { deadline: now + HOMING_TIMEOUT, accepted: None };
@@ -159,21 +173,16 @@ impl stage::Session for Session {
         if self.is_over() {
             return Vec::new();
         }
-        let travel = ActiveMove::new(now, &self.config, self.position_mm, target_mm, speed_mm_per_s);
+        let [x, y, z] = target_mm;
+        let command = format!("move to {x:.3} {y:.3} {z:.3} mm at {speed_mm_per_s:.3} mm/s");
         let checked = self
-            .check_ready(travel.line())
-            .and_then(|()| check_numbers(travel.line(), target_mm, speed_mm_per_s))
+            .check_ready(&command)
+            .and_then(|()| check_numbers(&command, target_mm, speed_mm_per_s))
             .and_then(|()| self.check_alarm())
             .and_then(|()| self.check_homed());
-        if let Err(failure) = checked {
-            self.done(Err(failure));
-        } else if self.state == Some(MachineState::Idle)
-            && distance_mm(self.position_mm, travel.arrival().target_mm()) < SAME_PLACE_MM
-        {
-            self.begin_look(now, Some(travel.arrival().target_mm()));
-        } else {
-            self.send_line(travel.line());
-            self.phase = Phase::Moving(travel);
+        match checked {
+            Err(failure) => self.done(Err(failure)),
+            Ok(()) => self.begin_move(now, target_mm, speed_mm_per_s),
         }
         self.finish(now)
     }
@@ -185,7 +194,7 @@ impl stage::Session for Session {
         }
         match self.check_ready("?").and_then(|()| self.check_alarm()) {
             Err(failure) => self.done(Err(failure)),
-            Ok(()) => self.begin_look(now, None),
+            Ok(()) => self.begin_look(now, Wanted::Position),
         }
         self.finish(now)
     }
@@ -213,7 +222,8 @@ impl stage::Session for Session {
             // It stands still, and would not answer.
             Phase::Ready if self.alarm.is_some() => self.send(FEED_HOLD),
             Phase::Ready | Phase::Looking { purpose: Purpose::Recover, .. } => self.hold(now, None),
-            Phase::Moving(_)
+            Phase::Preparing(_)
+            | Phase::Moving(_)
             | Phase::Unlocking { .. }
             | Phase::Looking { purpose: Purpose::Clear | Purpose::Look { .. }, .. } => {
                 self.hold(now, stopped);
@@ -241,6 +251,9 @@ impl stage::Session for Session {
     fn timer(&mut self, now: Duration) -> Vec<Action> {
         if self.phase.deadline().is_some_and(|deadline| now >= deadline) {
             self.overdue(now);
+        }
+        if self.unwatched().is_some_and(|limit| now >= limit) {
+            self.hold_unwatched(now);
         }
         // In an alarm the controller may stay silent until it is reset.
         let excused = self.alarm.is_some() && self.is_ready();

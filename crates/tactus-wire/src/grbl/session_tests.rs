@@ -40,6 +40,7 @@ const HOMED: &str = "
     531 > $$
     532 < $20=1
     532 < $22=1
+    532 < $23=3
     532 < $100=250.000
     532 < ok
     532 = connected Grbl 1.1h ['$' for help], VER:1.1h.20190830
@@ -47,21 +48,52 @@ const HOMED: &str = "
     540 * home
     540 > $H
     540 = Homing 0.000 0.000 0.000
-    900 < ok
+    895 < ok
+    895 > ?
+    900 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+    900 = Homing 1.000 1.000 5.000
     900 > ?
     910 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
     910 = Idle 1.000 1.000 5.000
     910 = done 1.000 1.000 5.000
 ";
 
+/// And on to a stage that stands there again, with a feed of 10 mm/s.
+const FED: &str = "
+    920 * move 1 1 5.05 at 10
+    920 > G91G21G94G1F600
+    921 < ok
+    921 > $G
+    922 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+    922 < ok
+    922 > Z.05
+    923 < ok
+    923 > ?
+    930 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+    930 = Idle 1.000 1.000 5.050
+    930 = done 1.000 1.000 5.050
+    931 * move 1 1 5 at 10
+    931 > Z-.05
+    932 < ok
+    932 > ?
+    950 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+    950 = Idle 1.000 1.000 5.000
+    950 = done 1.000 1.000 5.000
+";
+
 /// And on to a move of 10 mm at 10 mm/s that has been accepted.
 const MOVING: &str = "
     950 * move 11 1 5 at 10
-    950 > G90 G21 G1 X11.000 Y1.000 Z5.000 F600.000
+    950 > G91G21G94G1F600
+    952 < ok
+    952 > $G
+    954 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+    954 < ok
+    954 > X10
     955 < ok
     955 > ?
-    965 < <Run|MPos:1.010,1.000,5.000|FS:600,0>
-    965 = Moving 1.010 1.000 5.000
+    1005 < <Run|MPos:1.010,1.000,5.000|FS:600,0>
+    1005 = Moving 1.010 1.000 5.000
     1005 > ?
 ";
 
@@ -155,6 +187,9 @@ fn describe(now: Duration, action: &Action) -> String {
             Failure::NotThere { target_mm, position_mm } => {
                 format!("= not at {} but at {}", place(*target_mm), place(*position_mm))
             }
+            Failure::Astray { target_mm, position_mm } => {
+                format!("= astray at {} on the way to {}", place(*position_mm), place(*target_mm))
+            }
             Failure::Overdue { position_mm, waited, .. } => {
                 format!("= overdue after {} ms at {}", waited.as_millis(), place(*position_mm))
             }
@@ -166,6 +201,10 @@ fn describe(now: Duration, action: &Action) -> String {
 
 fn homed(rest: &str) -> Session {
     check(&format!("{HOMED}{rest}"))
+}
+
+fn fed(rest: &str) -> Session {
+    check(&format!("{HOMED}{FED}{rest}"))
 }
 
 fn moving(rest: &str) -> Session {

@@ -8,6 +8,9 @@ use crate::stage::Setting;
 const SOFT_LIMITS: u16 = 20;
 const HOMING: u16 = 22;
 
+/// Bit by axis: set if homing goes towards smaller coordinates.
+const HOMING_DIRECTIONS: u16 = 23;
+
 /// `$100` for x; y and z follow.
 const STEPS_PER_MM: u16 = 100;
 
@@ -31,9 +34,19 @@ impl Settings {
     /// Checks the settings against the requirements. Changes nothing.
     pub(super) fn check(&self, config: &Config) -> Result<(), SessionError> {
         // Higher bits are options of grblHAL's homing.
-        self.need(HOMING, "1, homing on", is_odd)?;
+        self.need(HOMING, "1, homing on", |value| has_bits(value, 1))?;
         if config.needs_soft_limits {
             self.need(SOFT_LIMITS, "1, soft limits on", |value| value != 0.0)?;
+        }
+        for (name, axis) in config.named_axes() {
+            let Some(home) = axis.home else { continue };
+            let is_down = home.sign() * axis.direction.sign() < 0.0;
+            let bit = axis.machine.of([1, 2, 4]);
+            let (state, end) =
+                (if is_down { "set" } else { "clear" }, if home.sign() < 0.0 { "low" } else { "high" });
+            let needed =
+                format!("{bit} {state} in it, so that homing takes the rig's {name} to its {end} end");
+            self.need(HOMING_DIRECTIONS, &needed, |value| has_bits(value, bit) == is_down)?;
         }
         for (name, axis) in config.named_axes() {
             let Some(steps_per_mm) = axis.steps_per_mm else { continue };
@@ -65,8 +78,8 @@ impl Settings {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "masks are small whole numbers")]
-fn is_odd(value: f64) -> bool {
-    value as i64 & 1 == 1
+fn has_bits(value: f64, bits: i64) -> bool {
+    value as i64 & bits == bits
 }
 
 /// Meaning of a setting; `None` if it is not relevant to a stage.
@@ -79,6 +92,7 @@ fn meaning(number: u16) -> Option<String> {
         SOFT_LIMITS => "soft limits",
         21 => "hard limits",
         HOMING => "homing",
+        HOMING_DIRECTIONS => "axes that home towards smaller coordinates: 1 x, 2 y, 4 z",
         27 => "homing pull-off, mm",
         100..=102 => return of_axis("steps/mm"),
         110..=112 => return of_axis("greatest speed, mm/min,"),

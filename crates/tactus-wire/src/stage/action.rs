@@ -124,6 +124,13 @@ pub enum Failure {
         /// Position that the controller reports.
         position_mm: [f64; 3],
     },
+    /// A report of the move was off its way, or ahead of its speed. The stage was stopped.
+    Astray {
+        /// Target of the move.
+        target_mm: [f64; 3],
+        /// Position of the stage.
+        position_mm: [f64; 3],
+    },
     /// The move took too long. The stage was stopped.
     Overdue {
         /// Target of the move.
@@ -168,11 +175,9 @@ impl Failure {
             Self::Stopped { .. } => Self::Stopped { position_mm },
             Self::Overdue { target_mm, waited, .. } => Self::Overdue { target_mm, position_mm, waited },
             Self::Interrupted { axis, meaning, .. } => Self::Interrupted { axis, meaning, position_mm },
-            Self::Refused { .. }
-            | Self::Alarm(_)
-            | Self::Unhomed
-            | Self::NotIdle { .. }
-            | Self::NotThere { .. } => self,
+            Self::Refused { .. } | Self::Alarm(_) | Self::Unhomed | Self::NotIdle { .. } => self,
+            Self::NotThere { target_mm, .. } => Self::NotThere { target_mm, position_mm },
+            Self::Astray { target_mm, .. } => Self::Astray { target_mm, position_mm },
         }
     }
 }

@@ -17,7 +17,9 @@ use request::{Pending, Request, SlotRequest};
 
 use super::path::axis_move;
 use super::{Config, ConfigError, Decoder, Flag};
-use crate::stage::{self, Alarm, ArrivalCheck, AxisName, Cause, Failure, Session as _, Setting, distance_mm};
+use crate::stage::{
+    self, Alarm, ArrivalCheck, AxisName, Cause, Course, Failure, Session as _, Setting, Shape, distance_mm,
+};
 
 pub use error::SessionError;
 
@@ -140,8 +142,9 @@ impl Session {
         self.queue.extend(settings.into_iter().chain(moves));
         let expected_s = path_mm / speed_mm_per_s + accel.map_or(0.0, |accel| speed_mm_per_s / accel);
         let arrival = ArrivalCheck::new(now, reached_mm, expected_s);
+        let course = Course::new(now, from_mm, reached_mm, speed_mm_per_s, Shape::Box);
         let command = command.to_owned();
-        Ok(Some(ActiveMove { command, arrival, set_out: false }))
+        Ok(Some(ActiveMove { command, arrival, course, set_out: false }))
     }
 
     fn is_over(&self) -> bool {

@@ -3,13 +3,17 @@
 use std::str::{FromStr, SplitWhitespace};
 use std::time::Duration;
 
-use super::{CableFault, ControllerFault, Fault, LinkFault, RigFault, SensorFault, StageFault};
+use super::{
+    CableFault, ControllerFault, Fault, LinkFault, RigFault, SensorFault, StageFault, Way, WireFault,
+};
 
 const SENSOR_FAULTS: &str = "burst N, clear, clock-jump DURATION, clock-wrap, disconnect DURATION, drip DURATION, drop BYTES, \
-     drop-frames N, duplicate, flip-bits N, garbage BYTES, renumber, reorder, saturate ELEMENT, stall DURATION, \
-     stuck ELEMENT, truncate, wrong-checksum, wrong-count N";
+     drop-frames N, duplicate, flip-bits N, freeze DURATION, garbage BYTES, renumber, reorder, saturate ELEMENT, \
+     stall DURATION, stuck ELEMENT, truncate, wrong-checksum, wrong-count N, zeros COUNTS";
 const STAGE_FAULTS: &str = "alarm N, clear, disconnect DURATION, echo-garbage, homing-fails, ignore-moves, lie MM, \
      lost-steps MM, never-idle, refuse [ERROR], renumber, reset, stall DURATION";
+const WIRE_FAULTS: &str = "double BYTES, drip DURATION, drop BYTES, flip-bits N, garbage BYTES, hold DURATION, lose DURATION, \
+     reorder, repeat, truncate";
 const RIG_FAULTS: &str = "covering MM, stiffness FACTOR, surface MM";
 
 /// The default error of `refuse`: an invalid target.
@@ -23,7 +27,9 @@ const MAX_COUNT: usize = 32_000;
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum FaultError {
     /// The line does not begin with a device.
-    #[error("{found:?} is no device; there is: sensor, stage, rig")]
+    #[error(
+        "{found:?} is no device; there is: sensor, stage, rig, to-sensor, from-sensor, to-stage, from-stage"
+    )]
     Device { found: String },
     /// The device has no such fault.
     #[error("the {device} has no fault {found:?}; there is: {known}")]
@@ -61,6 +67,10 @@ impl FromStr for Fault {
                 Some(fault) => Self::StageCable(fault),
                 None => Self::Stage(stage(&mut arguments)?),
             },
+            "to-sensor" => Self::Sensor(SensorFault::Wire(Way::FromHost, wire(&mut arguments)?)),
+            "from-sensor" => Self::Sensor(SensorFault::Wire(Way::FromDevice, wire(&mut arguments)?)),
+            "to-stage" => Self::Stage(StageFault::Wire(Way::FromHost, wire(&mut arguments)?)),
+            "from-stage" => Self::Stage(StageFault::Wire(Way::FromDevice, wire(&mut arguments)?)),
             "rig" => Self::Rig(rig(&mut arguments)?),
             found => return Err(FaultError::Device { found: found.to_owned() }),
         };
@@ -83,8 +93,26 @@ fn sensor(arguments: &mut Arguments<'_>) -> Result<SensorFault, FaultError> {
         "clock-wrap" => SensorFault::ClockWrap,
         "stuck" => SensorFault::Stuck(arguments.count()?),
         "saturate" => SensorFault::Saturate(arguments.count()?),
+        "freeze" => SensorFault::Freeze(arguments.duration()?),
+        "zeros" => SensorFault::Zeros(u16::try_from(arguments.count()?).unwrap_or(u16::MAX)),
         "clear" => SensorFault::Clear,
         _ => SensorFault::Link(link(arguments)?),
+    })
+}
+
+fn wire(arguments: &mut Arguments<'_>) -> Result<WireFault, FaultError> {
+    Ok(match arguments.fault {
+        "lose" => WireFault::Lose(arguments.duration()?),
+        "hold" => WireFault::Hold(arguments.duration()?),
+        "drip" => WireFault::Drip(arguments.duration()?),
+        "drop" => WireFault::Drop(arguments.count()?),
+        "flip-bits" => WireFault::FlipBits(arguments.count()?),
+        "double" => WireFault::Double(arguments.count()?),
+        "garbage" => WireFault::Garbage(arguments.count()?),
+        "repeat" => WireFault::Repeat,
+        "truncate" => WireFault::Truncate,
+        "reorder" => WireFault::Reorder,
+        _ => return Err(arguments.unknown("link", WIRE_FAULTS)),
     })
 }
 

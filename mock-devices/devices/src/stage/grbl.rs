@@ -26,7 +26,8 @@ use gcode::{GrblError, MotionMode};
 use input::{Input, RealTime};
 use report::Status;
 use settings::Settings;
-use tactus_wire::grbl::Config;
+use tactus_wire::grbl::{Axis, Config};
+use tactus_wire::stage::Direction;
 
 /// A status report leaves this long after its request.
 const REPORT_LATENCY_MS: std::ops::RangeInclusive<u64> = 2..=5;
@@ -297,11 +298,27 @@ impl GrblController {
         }
     }
 
+    /// Ends of the travel that homing goes to (`$23`).
+    fn home_ends_mm(&self) -> Point {
+        let travel_mm = self.world.lock().truth().stage.travel_mm;
+        std::array::from_fn(|axis| {
+            let [least, greatest] = travel_mm[axis];
+            if self.homes_to_least(axis) { least } else { greatest }
+        })
+    }
+
     /// Position at the end of homing: off the switches.
     fn home_mm(&self) -> Point {
-        let pull_off_mm = self.settings.pull_off_mm();
-        let [[x, _], [y, _], [_, z]] = self.world.lock().truth().stage.travel_mm;
-        [x + pull_off_mm, y + pull_off_mm, z - pull_off_mm]
+        let (ends_mm, pull_off_mm) = (self.home_ends_mm(), self.settings.pull_off_mm());
+        std::array::from_fn(|axis| {
+            ends_mm[axis] + if self.homes_to_least(axis) { pull_off_mm } else { -pull_off_mm }
+        })
+    }
+
+    /// True if an axis of the robot frame homes to its least coordinate.
+    fn homes_to_least(&self, axis: usize) -> bool {
+        let Axis { machine, direction, .. } = self.frame.axes[axis];
+        self.settings.homes_down(machine) == (direction == Direction::Positive)
     }
 
     fn watch_limits(&mut self) {

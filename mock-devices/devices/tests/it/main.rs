@@ -1,5 +1,7 @@
 //! Virtual devices, through the production drivers.
 
+mod damage;
 mod permits;
 mod rig;
+mod schedules;
 mod stages;

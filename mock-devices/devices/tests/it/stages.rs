@@ -205,12 +205,23 @@ async fn a_reset_leaves_the_position_suspect() {
 async fn a_stage_that_lies_is_not_there() {
     for lines in STAGES {
         let lab = ConnectedRig::homed(lines).await;
-        lab.inject("stage lie 0.05");
+        lab.inject("stage lie 0.008");
         let result = lab.go([20.0, 15.0, 4.0]).await;
         let Err(StageError::NotThere { target_mm, position_mm }) = result else {
             panic!("{lines}: {result:?}")
         };
-        assert!((position_mm[2] - target_mm[2] - 0.05).abs() < 0.002, "{lines}: {position_mm:?}");
+        assert!((position_mm[2] - target_mm[2] - 0.008).abs() < 0.002, "{lines}: {position_mm:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stage_that_is_off_its_way_is_stopped_at_once() {
+    for lines in STAGES {
+        let lab = ConnectedRig::homed(lines).await;
+        lab.inject("stage lie 0.05");
+        let result = lab.go([20.0, 15.0, 4.0]).await;
+        assert!(matches!(result, Err(StageError::Astray { .. })), "{lines}: {result:?}");
+        assert!(lab.control.tip_mm()[2] > 4.5, "{lines}: it went on");
     }
 }
 

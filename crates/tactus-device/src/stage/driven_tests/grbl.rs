@@ -37,7 +37,7 @@ struct State {
     from_mm: [f64; 3],
     to_mm: [f64; 3],
     set_out: Instant,
-    speed_mm_per_s: f64,
+    feed_mm_per_min: f64,
     held: bool,
     locked: bool,
     silent: bool,
@@ -51,7 +51,7 @@ impl Shared {
             from_mm: [0.0; 3],
             to_mm: [0.0; 3],
             set_out: Instant::now(),
-            speed_mm_per_s: 1.0,
+            feed_mm_per_min: 60.0,
             held: false,
             locked: false,
             silent: false,
@@ -130,24 +130,39 @@ impl State {
         self.heard.push((Instant::now(), line.to_owned()));
         match line {
             "$I" => return "[VER:1.1h.20190830:]\r\nok\r\n".to_owned(),
-            "$$" => return "$20=1\r\n$22=1\r\n$100=250.000\r\nok\r\n".to_owned(),
+            "$$" => return "$20=1\r\n$22=1\r\n$23=3\r\n$100=250.000\r\nok\r\n".to_owned(),
             "$X" => self.locked = false,
             "$H" => {
                 self.stand([1.0, 1.0, 5.0]);
                 self.locked = false;
             }
+            "$G" => {
+                return format!(
+                    "[GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F{:.0} S0]\r\nok\r\n",
+                    self.feed_mm_per_min
+                );
+            }
             _ if self.locked => return "error:9\r\n".to_owned(),
+            _ if line.starts_with('G') => {
+                let feed = line.split_once('F').and_then(|(_, feed)| feed.parse().ok());
+                self.feed_mm_per_min = feed.unwrap();
+            }
             _ => return self.set_out(line),
         }
         "ok\r\n".to_owned()
     }
 
     fn set_out(&mut self, line: &str) -> String {
-        let word =
-            |letter| line.split(' ').find_map(|word| word.strip_prefix(letter)?.parse::<f64>().ok()).unwrap();
+        let word = |letter| {
+            let Some((_, rest)) = line.split_once(letter) else { return 0.0 };
+            let end = rest.find(|c: char| c.is_ascii_uppercase()).unwrap_or(rest.len());
+            rest[..end].parse::<f64>().unwrap()
+        };
         self.from_mm = self.position_mm();
-        self.to_mm = [word('X'), word('Y'), word('Z')];
-        self.speed_mm_per_s = word('F') / 60.0;
+        self.to_mm = self.from_mm;
+        for (place, letter) in self.to_mm.iter_mut().zip(['X', 'Y', 'Z']) {
+            *place += word(letter);
+        }
         self.set_out = Instant::now();
         match self.fault {
             Fault::None | Fault::NeverIdle => {}
@@ -184,7 +199,7 @@ impl State {
 
     fn duration(&self) -> Duration {
         let squares: f64 = self.from_mm.iter().zip(self.to_mm).map(|(a, b)| (a - b) * (a - b)).sum();
-        Duration::from_secs_f64(squares.sqrt() / self.speed_mm_per_s)
+        Duration::from_secs_f64(squares.sqrt() * 60.0 / self.feed_mm_per_min)
     }
 
     fn position_mm(&self) -> [f64; 3] {

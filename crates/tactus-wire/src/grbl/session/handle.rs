@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::phase::{Phase, Purpose, Query};
+use super::phase::{Phase, Purpose, Query, Wanted};
 use super::{Action, Failure, SAME_PLACE_MM, Session, SessionError, alarm};
 use crate::grbl::active_move::ActiveMove;
 use crate::grbl::{FEED_HOLD, MachineState, Position, Response, StatusReport, error_meaning};
@@ -11,8 +11,11 @@ use crate::stage::{Controller, Judgement, distance_mm};
 /// Longest time for `$X`.
 const UNLOCK_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Reports that must agree before a look is believed.
+/// Reports that must agree before a look is believed: a report has no number, so the first may be a copy of an earlier one.
 const LOOKS: u32 = 2;
+
+/// Reports after which a look without two that agree has failed.
+const LOOKS_MAX: u32 = 8;
 
 /// The error that may precede the banner at boot. It answers no line.
 const ERROR_AT_BOOT: u8 = 7;
@@ -31,14 +34,21 @@ impl Session {
             Response::Status(report) => self.handle_report(now, &report),
             Response::Unknown(_) => self.unknown_lines += 1,
             Response::Setting { number, value } => self.settings.take(number, value),
-            Response::Feedback(text) => self.handle_feedback(&text),
+            Response::Feedback(text) => self.handle_feedback(now, &text),
             Response::Message(_) | Response::Probe { .. } => {}
         }
     }
 
     /// Ignores an `ok` that does not answer the last line: the controller answers noise on the link, too.
     fn handle_ok(&mut self, now: Duration) {
-        if let Phase::Moving(travel) = &mut self.phase
+        if let Phase::Preparing(preparation) = self.phase {
+            if !preparation.asked {
+                self.ask_feed(now, preparation);
+            } else if preparation.told {
+                self.feed = Some(preparation.feed);
+                self.begin_move(now, preparation.target_mm, preparation.speed_mm_per_s);
+            }
+        } else if let Phase::Moving(travel) = &mut self.phase
             && travel.awaits_ok()
         {
             travel.accept(now);
@@ -53,8 +63,20 @@ impl Session {
         }
     }
 
-    /// Takes the version from the answer to `$I`.
-    fn handle_feedback(&mut self, text: &str) {
+    /// Takes the version from the answer to `$I`, and the feed from the answer to `$G`.
+    fn handle_feedback(&mut self, now: Duration, text: &str) {
+        if let Phase::Preparing(preparation) = &mut self.phase
+            && preparation.asked
+        {
+            match preparation.feed.is_told(text) {
+                Some(true) => preparation.told = true,
+                Some(false) => {
+                    let preparation = *preparation;
+                    self.retry_feed(now, preparation, format!("the controller has understood [{text}]"));
+                }
+                None => {}
+            }
+        }
         if let Phase::Asking { query: Query::Build, .. } = self.phase
             && text.starts_with("VER:")
         {
@@ -92,11 +114,18 @@ impl Session {
                 }),
             };
         }
-        let command = if let Phase::Moving(travel) = &self.phase
+        let reason = format!("error {code}: {}", error_meaning(code));
+        if let Phase::Preparing(preparation) = self.phase {
+            return self.retry_feed(now, preparation, reason);
+        }
+        if let Phase::Moving(travel) = &self.phase
             && travel.awaits_ok()
         {
-            travel.line().to_owned()
-        } else if let Phase::Homing { accepted: None, .. } = self.phase {
+            // The refusal may be a copy of an earlier one: whatever the controller holds is discarded.
+            let command = travel.line().to_owned();
+            return self.hold(now, Some(Failure::Refused { command, reason }));
+        }
+        let command = if let Phase::Homing { accepted: None, .. } = self.phase {
             "$H".to_owned()
         } else if let Phase::Unlocking { .. } = self.phase {
             "$X".to_owned()
@@ -104,7 +133,6 @@ impl Session {
             return;
         };
         self.phase = Phase::Ready;
-        let reason = format!("error {code}: {}", error_meaning(code));
         self.report();
         self.done(Err(Failure::Refused { command, reason }));
     }
@@ -114,8 +142,10 @@ impl Session {
         self.alarm = Some(code);
         self.state = Some(MachineState::Alarm);
         self.homed = false;
+        self.forget_modes();
         let ended = match &self.phase {
-            Phase::Moving(_)
+            Phase::Preparing(_)
+            | Phase::Moving(_)
             | Phase::Homing { .. }
             | Phase::Unlocking { .. }
             | Phase::Looking { purpose: Purpose::Clear | Purpose::Look { .. }, .. } => true,
@@ -135,6 +165,7 @@ impl Session {
 
     fn handle_banner(&mut self, now: Duration, banner: &str) {
         self.poll.reset();
+        self.forget_modes();
         self.state = None;
         banner.clone_into(&mut self.identity);
         let failure = match core::mem::replace(&mut self.phase, Phase::Ready) {
@@ -150,7 +181,8 @@ impl Session {
             }
             Phase::Looking { purpose: Purpose::Stop { failure, .. }, .. }
             | Phase::Holding { failure, .. } => failure,
-            Phase::Moving(_)
+            Phase::Preparing(_)
+            | Phase::Moving(_)
             | Phase::Homing { .. }
             | Phase::Unlocking { .. }
             | Phase::Looking { purpose: Purpose::Clear | Purpose::Look { .. }, .. } => Some(Failure::Unhomed),
@@ -166,9 +198,12 @@ impl Session {
     }
 
     fn handle_report(&mut self, now: Duration, report: &StatusReport) {
-        let asked = self.poll.answered();
+        let asked = self.poll.answered(now);
         self.state = Some(report.state);
         let offset_moved = self.take_position(report);
+        if asked.is_some() {
+            self.take_stand();
+        }
         if report.state != MachineState::Alarm {
             self.alarm = None;
         } else if self.alarm.is_none() && (self.homed || matches!(self.phase, Phase::Moving(_))) {
@@ -177,6 +212,7 @@ impl Session {
         }
         if offset_moved {
             self.homed = false;
+            self.forget_modes();
         }
         let asked_since = |since: Duration| asked.is_some_and(|asked| asked >= since);
         match self.phase.clone() {
@@ -193,6 +229,7 @@ impl Session {
             | Phase::Looking { .. }
             | Phase::Resetting { .. }
             | Phase::Asking { .. }
+            | Phase::Preparing(_)
             | Phase::Unlocking { .. }
             | Phase::Ready
             | Phase::Over => self.report(),
@@ -214,24 +251,48 @@ impl Session {
         before.is_some_and(|before| distance_mm(before, offset_mm) > SAME_PLACE_MM)
     }
 
+    /// Notes whether this report and the last one agree on where the stage stands.
+    fn take_stand(&mut self) {
+        let stands = self.state == Some(MachineState::Idle);
+        let agrees = |stood_mm: [f64; 3]| distance_mm(stood_mm, self.position_mm) < SAME_PLACE_MM;
+        self.is_steady = stands && self.stood_mm.is_some_and(agrees);
+        self.stood_mm = stands.then_some(self.position_mm);
+    }
+
     fn judge(&mut self, now: Duration, asked: Option<Duration>, mut travel: ActiveMove) {
-        let (position_mm, stands) = (self.position_mm, self.state == Some(MachineState::Idle));
+        let (position_mm, tolerance_mm) = (self.position_mm, self.config.tolerance_mm);
         let target_mm = travel.arrival().target_mm();
-        let result = match travel.judge(now, asked, stands, position_mm, self.config.tolerance_mm) {
+        if travel.strays(now, position_mm, tolerance_mm) {
+            self.report();
+            return self.hold(now, Some(Failure::Astray { target_mm, position_mm }));
+        }
+        let stands = (self.state == Some(MachineState::Idle), self.moves());
+        match travel.judge(now, asked, stands, position_mm, tolerance_mm) {
             Judgement::Underway => {
                 self.phase = Phase::Moving(travel);
-                return self.report();
+                self.report();
             }
-            Judgement::Done => Ok(position_mm),
-            Judgement::NotThere => Err(Failure::NotThere { target_mm, position_mm }),
-        };
-        self.phase = Phase::Ready;
-        self.report();
-        self.done(result);
+            Judgement::Done => {
+                self.parsed_mm = Some(travel.parsed_mm());
+                self.phase = Phase::Ready;
+                self.report();
+                self.done(Ok(position_mm));
+            }
+            // The line may still wait in the controller: it is discarded.
+            Judgement::NotThere => {
+                self.report();
+                self.hold(now, Some(Failure::NotThere { target_mm, position_mm }));
+            }
+        }
     }
 
     fn conclude_homing(&mut self) {
         match self.state {
+            // An `ok` may be a copy of an earlier one, and the stage not have set out. A second report comes only after homing.
+            Some(MachineState::Idle) if !self.is_steady => {
+                self.poll.at_once();
+                self.report();
+            }
             Some(MachineState::Idle) => {
                 self.homed = true;
                 self.phase = Phase::Ready;
@@ -258,23 +319,41 @@ impl Session {
         }
     }
 
-    /// Ends the command to look, if enough reports have come.
-    fn conclude_command_to_look(&mut self, now: Duration, target_mm: Option<[f64; 3]>, reports: u32) {
+    /// Goes on with a command that asked where the stage stands, if enough reports have come.
+    fn conclude_wanted(&mut self, now: Duration, wanted: Wanted, reports: u32) {
         let position_mm = self.position_mm;
         self.report();
-        let result = self.check_alarm().and_then(|()| self.check_homed()).and_then(|()| {
-            let is_elsewhere = |target| distance_mm(target, position_mm) > self.config.tolerance_mm;
-            match target_mm.filter(|target_mm| is_elsewhere(*target_mm)) {
-                _ if self.state != Some(MachineState::Idle) => Err(Failure::NotIdle { position_mm }),
-                Some(target_mm) => Err(Failure::NotThere { target_mm, position_mm }),
-                None => Ok(position_mm),
+        let stands = if self.state == Some(MachineState::Idle) {
+            Ok(())
+        } else {
+            Err(Failure::NotIdle { position_mm })
+        };
+        let checked = self.check_alarm().and_then(|()| self.check_homed()).and(stands);
+        let is_known = match wanted {
+            Wanted::Position | Wanted::At(_) => reports >= LOOKS && self.is_steady,
+            Wanted::Move { .. } => self.base_mm().is_some(),
+        };
+        if checked.is_ok() && !is_known {
+            if reports < LOOKS_MAX {
+                return self.ask_position(now, Purpose::Look { wanted, reports });
             }
-        });
-        if result.is_ok() && reports < LOOKS {
-            return self.ask_position(now, Purpose::Look { target_mm, reports });
+            let reason = "it says that it stands, but every report has another position";
+            self.phase = Phase::Ready;
+            return self.done(Err(Failure::refused("?", reason)));
         }
         self.phase = Phase::Ready;
-        self.done(result);
+        match (checked, wanted) {
+            (Err(failure), _) => self.done(Err(failure)),
+            (Ok(()), Wanted::Move { target_mm, speed_mm_per_s }) => {
+                self.begin_move(now, target_mm, speed_mm_per_s);
+            }
+            (Ok(()), Wanted::At(target_mm))
+                if distance_mm(target_mm, position_mm) > self.config.tolerance_mm =>
+            {
+                self.done(Err(Failure::NotThere { target_mm, position_mm }));
+            }
+            (Ok(()), Wanted::Position | Wanted::At(_)) => self.done(Ok(position_mm)),
+        }
     }
 
     fn conclude_look(&mut self, now: Duration, purpose: Purpose) {
@@ -285,9 +364,7 @@ impl Session {
                 self.phase = Phase::Ready;
                 self.report();
             }
-            Purpose::Look { target_mm, reports } => {
-                self.conclude_command_to_look(now, target_mm, reports + 1)
-            }
+            Purpose::Look { wanted, reports } => self.conclude_wanted(now, wanted, reports + 1),
             Purpose::Clear => {
                 self.phase = Phase::Ready;
                 self.homed = false;

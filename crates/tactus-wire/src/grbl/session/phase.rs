@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use super::Failure;
 use crate::grbl::active_move::ActiveMove;
+use crate::grbl::feed::Feed;
 
 /// Longest deceleration after a hold, before the controller is reset in motion.
 const HOLD_TIMEOUT: Duration = Duration::from_secs(3);
@@ -19,6 +20,8 @@ pub(super) enum Phase {
     Asking { query: Query, tries: u32, deadline: Duration },
     /// No command is under way.
     Ready,
+    /// A move waits for its feed.
+    Preparing(Preparation),
     /// A move is under way.
     Moving(ActiveMove),
     /// Homing; `accepted` is when the controller reported its end.
@@ -49,11 +52,35 @@ pub(super) enum Purpose {
     Recover,
     /// To clear an alarm.
     Clear,
-    /// None, because nothing is reset: a person or a program wants to know where the stage stands. With a target it must
-    /// stand there. `reports` is how many have said so.
-    Look { target_mm: Option<[f64; 3]>, reports: u32 },
+    /// None, because nothing is reset: a command wants to know where the stage stands. So many `reports` have come.
+    Look { wanted: Wanted, reports: u32 },
     /// To discard the commands that the controller holds. It stood still at `held_mm`; `None` if it may have been moving.
     Stop { failure: Option<Failure>, held_mm: Option<[f64; 3]> },
+}
+
+/// What a command wants to know the position for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Wanted {
+    /// To tell it.
+    Position,
+    /// To tell whether it is this one.
+    At([f64; 3]),
+    /// To move from it.
+    Move { target_mm: [f64; 3], speed_mm_per_s: f64 },
+}
+
+/// A move whose feed is being set and read back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Preparation {
+    pub(super) target_mm: [f64; 3],
+    pub(super) speed_mm_per_s: f64,
+    pub(super) feed: Feed,
+    /// It is being set for this time.
+    pub(super) tries: u32,
+    /// The controller was asked for its feed, and has told the right one.
+    pub(super) asked: bool,
+    pub(super) told: bool,
+    pub(super) deadline: Duration,
 }
 
 impl Phase {
@@ -63,7 +90,8 @@ impl Phase {
             Self::Resetting { deadline, .. }
             | Self::Asking { deadline, .. }
             | Self::Homing { deadline, .. }
-            | Self::Unlocking { deadline } => Some(*deadline),
+            | Self::Unlocking { deadline }
+            | Self::Preparing(Preparation { deadline, .. }) => Some(*deadline),
             Self::Moving(travel) => Some(travel.arrival().overdue()),
             Self::Holding { since, .. } => Some(*since + HOLD_TIMEOUT),
             Self::Looking { .. } | Self::Ready | Self::Over => None,

@@ -2,16 +2,33 @@
 
 use core::time::Duration;
 
-use super::phase::{Phase, Purpose, Query};
+use super::phase::{Phase, Preparation, Purpose, Query, Wanted};
 use super::{Action, Failure, Session, SessionError, alarm};
+use crate::grbl::active_move::ActiveMove;
+use crate::grbl::feed::Feed;
 use crate::grbl::{FEED_HOLD, MachineState, SOFT_RESET, STATUS_QUERY};
-use crate::stage::{Report, Status};
+use crate::stage::{Report, Status, distance_mm};
 
 /// Interval of status reports at standstill.
 const POLL_IDLE: Duration = Duration::from_millis(100);
 
 /// Interval of status reports in motion, or while waiting for one.
-const POLL_MOVING: Duration = Duration::from_millis(50);
+const POLL_MOVING: Duration = Duration::from_millis(20);
+
+/// Interval of status reports while a line has not been accepted. A query delays the answer.
+const POLL_SENT: Duration = Duration::from_millis(50);
+
+/// A report that has not arrived after this is requested again. It usually takes 5-60 ms.
+const REPORT_TIMEOUT: Duration = Duration::from_millis(250);
+
+/// The same in motion.
+const REPORT_TIMEOUT_MOVING: Duration = Duration::from_millis(100);
+
+/// A stage that moves without a report for this long is stopped.
+const UNWATCHED_MAX: Duration = Duration::from_millis(300);
+
+/// Longest time to the answer to a feed, or to `$G`.
+const FEED_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Longest time from a reset to the banner. Some boards run a boot loader first.
 const BANNER_TIMEOUT: Duration = Duration::from_secs(2);
@@ -21,6 +38,9 @@ const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Attempts at `$I` and `$$`.
 const TRIES_MAX: u32 = 3;
+
+/// Attempts at setting the feed.
+const FEEDS_MAX: u32 = 3;
 
 /// Attempts at a reset.
 const RESETS_MAX: u32 = 4;
@@ -49,6 +69,7 @@ impl Session {
             Phase::Resetting { .. }
             | Phase::Looking { .. }
             | Phase::Asking { .. }
+            | Phase::Preparing(_)
             | Phase::Unlocking { .. }
             | Phase::Over => {}
         }
@@ -75,9 +96,88 @@ impl Session {
         self.poll.at_once();
     }
 
-    /// Begins the command to look where the stage stands, which is at the target if there is one.
-    pub(super) fn begin_look(&mut self, now: Duration, target_mm: Option<[f64; 3]>) {
-        self.ask_position(now, Purpose::Look { target_mm, reports: 0 });
+    /// Asks where the stage stands, for a command.
+    pub(super) fn begin_look(&mut self, now: Duration, wanted: Wanted) {
+        self.ask_position(now, Purpose::Look { wanted, reports: 0 });
+    }
+
+    /// Begins a move, once it is known from where, and at what feed.
+    pub(super) fn begin_move(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) {
+        let Some(base_mm) = self.base_mm() else {
+            return self.begin_look(now, Wanted::Move { target_mm, speed_mm_per_s });
+        };
+        let Some(travel) = ActiveMove::new(now, &self.config, base_mm, target_mm, speed_mm_per_s) else {
+            return self.begin_look(now, Wanted::At(target_mm));
+        };
+        let feed = Feed::of(speed_mm_per_s);
+        if self.feed != Some(feed) {
+            return self.set_feed(now, target_mm, speed_mm_per_s, feed, 1);
+        }
+        self.parsed_mm = None;
+        self.send_line(travel.line());
+        self.poll.defer(now);
+        self.phase = Phase::Moving(travel);
+    }
+
+    /// Where an increment is counted from, in the controller's coordinates: where its parser stands, if the report agrees,
+    /// or where two reports in a row say that it stands. One report alone may be damaged.
+    pub(super) fn base_mm(&self) -> Option<[f64; 3]> {
+        let here_mm = self.config.to_machine(self.position_mm);
+        let is_near = |parsed_mm: &[f64; 3]| distance_mm(*parsed_mm, here_mm) <= self.config.tolerance_mm;
+        let base_mm = self.parsed_mm.filter(is_near).or(self.is_steady.then_some(here_mm));
+        base_mm.filter(|_| self.state == Some(MachineState::Idle))
+    }
+
+    /// Sets the feed of a move, for the `tries`th time.
+    fn set_feed(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64, feed: Feed, tries: u32) {
+        self.feed = None;
+        self.send_line(&feed.line());
+        let deadline = now + FEED_TIMEOUT;
+        let (asked, told) = (false, false);
+        self.phase =
+            Phase::Preparing(Preparation { target_mm, speed_mm_per_s, feed, tries, asked, told, deadline });
+    }
+
+    /// Asks for the feed that was set.
+    pub(super) fn ask_feed(&mut self, now: Duration, preparation: Preparation) {
+        self.send_line("$G");
+        self.phase =
+            Phase::Preparing(Preparation { asked: true, deadline: now + FEED_TIMEOUT, ..preparation });
+    }
+
+    /// Sets the feed again, or gives up the move: nothing has moved yet.
+    pub(super) fn retry_feed(&mut self, now: Duration, preparation: Preparation, why: String) {
+        let Preparation { target_mm, speed_mm_per_s, feed, tries, .. } = preparation;
+        if tries < FEEDS_MAX {
+            self.set_feed(now, target_mm, speed_mm_per_s, feed, tries + 1);
+        } else {
+            self.hold(now, Some(Failure::Refused { command: feed.line(), reason: why }));
+        }
+    }
+
+    /// Forgets what a reset forgets, and where the stage stood.
+    pub(super) fn forget_modes(&mut self) {
+        (self.feed, self.parsed_mm, self.stood_mm, self.is_steady) = (None, None, None, false);
+    }
+
+    /// When a stage that moves has been without a report for too long.
+    pub(super) fn unwatched(&self) -> Option<Duration> {
+        let since = self.poll.unanswered().filter(|_| matches!(self.phase, Phase::Moving(_)))?;
+        Some(since + UNWATCHED_MAX)
+    }
+
+    /// Stops a stage that moves without reports.
+    pub(super) fn hold_unwatched(&mut self, now: Duration) {
+        if let Phase::Moving(travel) = &self.phase {
+            let reason = format!("it gave no report for {UNWATCHED_MAX:?} of the move, and was stopped");
+            let failure = Failure::Refused { command: travel.line().to_owned(), reason };
+            self.hold(now, Some(failure));
+        }
+    }
+
+    /// How long to wait for a report.
+    pub(super) fn report_timeout(&self) -> Duration {
+        if matches!(self.phase, Phase::Moving(_)) { REPORT_TIMEOUT_MOVING } else { REPORT_TIMEOUT }
     }
 
     /// Queries the controller, for the `tries`th time.
@@ -96,6 +196,9 @@ impl Session {
                 self.fail(SessionError::NoBanner { resets });
             }
             Phase::Resetting { purpose, resets, .. } => self.reset(now, purpose, resets + 1),
+            Phase::Preparing(preparation) => {
+                self.retry_feed(now, preparation, "no answer came".to_owned());
+            }
             Phase::Moving(travel) => {
                 let (target_mm, waited) = (travel.arrival().target_mm(), travel.arrival().waited(now));
                 let failure = Failure::Overdue { target_mm, position_mm: self.position_mm, waited };
@@ -114,7 +217,8 @@ impl Session {
 
     /// Requests a report if it is due, and returns the actions.
     pub(super) fn finish(&mut self, now: Duration) -> Vec<Action> {
-        if self.poll_interval().is_some_and(|interval| now >= self.poll.next(interval)) {
+        if self.poll_interval().is_some_and(|interval| now >= self.poll.next(interval, self.report_timeout()))
+        {
             self.poll.sent(now);
             if self.poll.is_repeated() && matches!(self.phase, Phase::Holding { .. }) {
                 self.send(FEED_HOLD);
@@ -127,10 +231,14 @@ impl Session {
     /// Interval of requests for a report; `None` if they would not be answered.
     pub(super) fn poll_interval(&self) -> Option<Duration> {
         match self.phase {
-            Phase::Resetting { .. } | Phase::Asking { .. } | Phase::Unlocking { .. } | Phase::Over => None,
+            Phase::Resetting { .. }
+            | Phase::Asking { .. }
+            | Phase::Preparing(_)
+            | Phase::Unlocking { .. }
+            | Phase::Over => None,
             Phase::Homing { accepted, .. } => accepted.map(|_| POLL_MOVING),
             // A query now would only delay the one that follows the `ok`.
-            Phase::Moving(ref travel) if travel.awaits_ok() => Some(POLL_IDLE),
+            Phase::Moving(ref travel) if travel.awaits_ok() => Some(POLL_SENT),
             Phase::Ready if !self.moves() => Some(POLL_IDLE),
             Phase::Ready | Phase::Moving(_) | Phase::Holding { .. } | Phase::Looking { .. } => {
                 Some(POLL_MOVING)

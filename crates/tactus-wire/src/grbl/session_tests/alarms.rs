@@ -31,8 +31,11 @@ fn a_hard_limit_is_told_cleared_and_homed_again() {
         9900 < ok
         9900 > ?
         9910 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
-        9910 = Idle 1.000 1.000 5.000
-        9910 = done 1.000 1.000 5.000",
+        9910 = Homing 1.000 1.000 5.000
+        9910 > ?
+        9920 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        9920 = Idle 1.000 1.000 5.000
+        9920 = done 1.000 1.000 5.000",
     );
 }
 
@@ -79,7 +82,12 @@ fn stop_in_an_alarm_is_sent_and_no_more() {
 fn a_soft_limit_is_an_alarm_too() {
     homed(
         "950 * move 900 1 5 at 10
-        950 > G90 G21 G1 X900.000 Y1.000 Z5.000 F600.000
+        950 > G91G21G94G1F600
+        950 < ok
+        950 > $G
+        950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        950 < ok
+        950 > X899
         960 < ALARM:2
         960 = Alarm 2 1.000 1.000 5.000
         960 = alarm 2",
@@ -161,7 +169,12 @@ fn a_banner_at_a_stand_does_too() {
 fn the_error_of_boot_is_no_answer_to_a_move() {
     homed(
         "950 * move 2 1 5 at 10
-        950 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
+        950 > G91G21G94G1F600
+        950 < ok
+        950 > $G
+        950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        950 < ok
+        950 > X1
         955 < error:7
         960 < Grbl 1.1h ['$' for help]
         960 = suspect: the controller was reset: Grbl 1.1h ['$' for help]
@@ -176,19 +189,16 @@ fn a_locked_controller_refuses_moves_until_it_is_reset_and_unlocked() {
     // The alarm's line was lost, and `?` goes unanswered: the refusal is what shows it.
     homed(
         "950 * move 2 1 5 at 10
-        950 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
+        950 > G91G21G94G1F600
+        950 < ok
+        950 > $G
+        950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        950 < ok
+        950 > X1
         955 < error:9
-        955 = Idle 1.000 1.000 5.000
-        955 = refused error 9: locked by an alarm or a jog
-        1000 > ?
-        1250 > ?
-        1500 > ?
-        1750 > ?
-        2000 > ?
-        2250 > ?
-        2500 > ?
-        2750 > ?
-        3000 > !
-        3000 = failed: the controller did not answer for its status",
+        955 > !
+        955 > ?
+        ...
+        2955 = failed: the controller did not answer for its status",
     );
 }

@@ -34,6 +34,8 @@ fn line() -> impl Strategy<Value = &'static str> {
         "<Idle|MPos:1.000,1.000,5.000|WCO:1.000,0.000,0.000>",
         "$22=0",
         "[VER:1.1h.20190830:]",
+        "[GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]",
+        "[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]",
         "noise",
     ])
 }
@@ -72,9 +74,11 @@ impl Play {
             Event::Line("ok"),
             Event::Line("$20=1"),
             Event::Line("$22=1"),
+            Event::Line("$23=3"),
             Event::Line("ok"),
             Event::Command("home"),
             Event::Line("ok"),
+            Event::Line(at_home),
             Event::Line(at_home),
         ] {
             play.step(&event);
@@ -98,7 +102,9 @@ impl Play {
             Event::Command(text) => {
                 self.in_hand += usize::from(self.session.deadline().is_some());
                 let actions = command(&mut self.session, self.now, text);
-                let moves = actions.iter().any(|a| matches!(a, Action::Send(b) if b.starts_with(b"G90")));
+                let moves = actions
+                    .iter()
+                    .any(|a| matches!(a, Action::Send(b) if matches!(b[..], [b'X'..=b'Z', ..])));
                 assert!(!moves || self.known, "a move on a stage that is not homed");
                 actions
             }

@@ -17,6 +17,7 @@ fn a_banner_that_comes_by_itself_needs_no_reset() {
         180 > $$
         180 < $20=1
         180 < $22=1
+        180 < $23=3
         180 < ok
         180 = connected Grbl 1.1h ['$' for help]
         180 = Unhomed 0.000 0.000 0.000
@@ -53,6 +54,7 @@ fn a_banner_of_its_own_and_the_one_asked_for() {
         510 > $$
         510 < $20=1
         510 < $22=1
+        510 < $23=3
         510 < ok
         510 = connected Grbl 1.1h ['$' for help]
         510 = Unhomed 0.000 0.000 0.000",
@@ -75,20 +77,21 @@ fn a_standing_stage_is_asked_ten_times_a_second() {
 #[test]
 fn a_lost_report_is_asked_for_again() {
     moving(
-        "1255 > ?
-        1260 < <Run|MPos:5.000,1.000,5.000|FS:600,0>
-        1260 = Moving 5.000 1.000 5.000
-        1305 > ?",
+        "1105 > ?
+        1110 < <Run|MPos:2.000,1.000,5.000|FS:600,0>
+        1110 = Moving 2.000 1.000 5.000
+        1125 > ?",
     );
 }
 
 #[test]
 fn silence_in_motion_holds_the_stage_and_ends_the_session() {
     let session = moving(
-        "1255 > ?
+        "1105 > ?
+        1205 > ?
+        1305 > !
         ...
-        3005 > !
-        3005 = failed: the controller did not answer for its status",
+        3205 = failed: the controller did not answer for its status",
     );
     assert_eq!(session.deadline(), None);
 }
@@ -101,7 +104,8 @@ fn noise_and_echoes_are_counted_and_passed_over() {
         1012 < okk
         1013 < error:7
         1014 < ok
-        1255 > ?",
+        1105 > ?
+        1205 > ?",
     );
     // `error:7` and the second `ok` are answers to nothing, but they are known.
     assert_eq!(session.unknown_lines(), 3);

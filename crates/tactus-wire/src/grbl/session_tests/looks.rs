@@ -59,7 +59,10 @@ fn a_stage_that_stands_elsewhere_fails_a_move_to_where_it_was_last_seen() {
         950 > ?
         960 < <Idle|MPos:1.000,1.000,4.000|FS:0,0>
         960 = Idle 1.000 1.000 4.000
-        960 = not at 1.000 1.000 5.000 but at 1.000 1.000 4.000",
+        960 > ?
+        965 < <Idle|MPos:1.000,1.000,4.000|FS:0,0>
+        965 = Idle 1.000 1.000 4.000
+        965 = not at 1.000 1.000 5.000 but at 1.000 1.000 4.000",
     );
 }
 

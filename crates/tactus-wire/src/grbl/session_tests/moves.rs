@@ -1,19 +1,21 @@
 //! When a move is done, and when it is not.
 
-use super::{homed, moving};
+use super::{fed, homed, moving};
 use crate::stage::Session as _;
 
 #[test]
 fn a_move_is_done_when_idle_at_the_target() {
-    moving(
-        "1020 < <Run|MPos:5.000,1.000,5.000|FS:600,0>
-        1020 = Moving 5.000 1.000 5.000
-        1055 > ?
-        1120 < <Idle|MPos:10.998,1.003,5.000|FS:0,0>
-        1120 = Idle 10.998 1.003 5.000
-        1120 = done 10.998 1.003 5.000
-        1155 > ?",
-    );
+    fed("960 * move 1.5 1 5 at 10
+        960 > X.5
+        965 < ok
+        965 > ?
+        970 < <Run|MPos:1.050,1.000,5.000|FS:600,0>
+        970 = Moving 1.050 1.000 5.000
+        985 > ?
+        1015 < <Idle|MPos:1.498,1.003,5.000|FS:0,0>
+        1015 = Idle 1.498 1.003 5.000
+        1015 = done 1.498 1.003 5.000
+        1085 > ?");
 }
 
 #[test]
@@ -22,7 +24,12 @@ fn a_report_asked_for_before_the_ok_proves_nothing() {
     homed(
         "1000 > ?
         1005 * move 1.004 1 5 at 1
-        1005 > G90 G21 G1 X1.004 Y1.000 Z5.000 F60.000
+        1005 > G91G21G94G1F60
+        1005 < ok
+        1005 > $G
+        1005 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F60 S0]
+        1005 < ok
+        1005 > X.004
         1010 < ok
         1030 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
         1030 = Idle 1.000 1.000 5.000
@@ -38,14 +45,21 @@ fn a_late_report_is_not_taken_for_the_answer_to_the_later_question() {
     homed(
         "1000 > ?
         1100 * move 1.004 1 5 at 1
-        1100 > G90 G21 G1 X1.004 Y1.000 Z5.000 F60.000
+        1100 > G91G21G94G1F60
+        1100 < ok
+        1100 > $G
+        1100 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F60 S0]
+        1100 < ok
+        1100 > X.004
+        1100 > ?
         1110 < ok
-        1250 > ?
+        1200 > ?
         1255 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
         1255 = Idle 1.000 1.000 5.000
+        1255 > ?
         1260 < <Idle|MPos:1.003,1.000,5.000|FS:0,0>
         1260 = Idle 1.003 1.000 5.000
-        1300 > ?
+        1275 > ?
         1310 < <Idle|MPos:1.003,1.000,5.000|FS:0,0>
         1310 = Idle 1.003 1.000 5.000
         1310 = done 1.003 1.000 5.000",
@@ -56,15 +70,20 @@ fn a_late_report_is_not_taken_for_the_answer_to_the_later_question() {
 fn idle_right_after_the_ok_is_not_yet_the_end() {
     homed(
         "950 * move 2 1 5 at 10
-        950 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
+        950 > G91G21G94G1F600
+        950 < ok
+        950 > $G
+        950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        950 < ok
+        950 > X1
         955 < ok
         955 > ?
         960 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
         960 = Idle 1.000 1.000 5.000
-        1005 > ?
+        975 > ?
         1010 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
         1010 = Moving 1.400 1.000 5.000
-        1055 > ?
+        1010 > ?
         1060 < <Idle|MPos:2.000,1.000,5.000|FS:0,0>
         1060 = Idle 2.000 1.000 5.000
         1060 = done 2.000 1.000 5.000",
@@ -72,74 +91,255 @@ fn idle_right_after_the_ok_is_not_yet_the_end() {
 }
 
 #[test]
-fn idle_elsewhere_is_not_there() {
+fn idle_elsewhere_is_not_there_and_what_the_controller_holds_is_discarded() {
     moving(
-        "1010 < <Idle|MPos:10.990,1.000,5.000|FS:0,0>
-        1010 = Idle 10.990 1.000 5.000
-        1055 > ?
-        1110 < <Idle|MPos:10.990,1.000,5.000|FS:0,0>
-        1110 = Idle 10.990 1.000 5.000
+        "1010 < <Idle|MPos:1.300,1.000,5.000|FS:0,0>
+        1010 = Idle 1.300 1.000 5.000
+        1025 > ?
+        1110 < <Idle|MPos:1.300,1.000,5.000|FS:0,0>
+        1110 = Idle 1.300 1.000 5.000
         1110 > ?
-        1210 < <Idle|MPos:10.990,1.000,5.000|FS:0,0>
-        1210 = Idle 10.990 1.000 5.000
-        1210 = not at 11.000 1.000 5.000 but at 10.990 1.000 5.000
-        1210 > ?",
+        1210 < <Idle|MPos:1.300,1.000,5.000|FS:0,0>
+        1210 = Idle 1.300 1.000 5.000
+        1210 > !
+        1210 > ?
+        1220 < <Hold:0|MPos:1.300,1.000,5.000|FS:0,0>
+        1220 = Hold 1.300 1.000 5.000
+        1220 > ^X
+        1230 < Grbl 1.1h ['$' for help]
+        1230 > ?
+        1240 < <Idle|MPos:1.300,1.000,5.000|FS:0,0>
+        1240 = Idle 1.300 1.000 5.000
+        1240 = not at 11.000 1.000 5.000 but at 1.300 1.000 5.000",
     );
 }
 
 #[test]
 fn an_overdue_move_is_stopped_and_told() {
-    // 10 mm at 10 mm/s: twice one second and two more after it was sent at 950 ms.
-    moving(
-        "1010 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
-        1010 = Moving 1.400 1.000 5.000
-        ...
-        2950 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
-        2950 = Moving 1.400 1.000 5.000
-        ...
-        4900 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
-        4900 = Moving 1.400 1.000 5.000
-        4900 > ?
-        4910 < <Run|MPos:1.400,1.000,5.000|FS:600,0>
-        4910 = Moving 1.400 1.000 5.000
-        4950 > !
-        4950 > ?
+    // 10 mm at 10 mm/s: twice one second and two more after it was sent at 954 ms.
+    let stuck: String = (1010..4950)
+        .step_by(90)
+        .map(|ms| {
+            format!("{ms} < <Run|MPos:1.400,1.000,5.000|FS:600,0>\n{ms} = Moving 1.400 1.000 5.000\n...\n")
+        })
+        .collect();
+    moving(&format!(
+        "{stuck}4954 > !
         4960 < <Hold:0|MPos:1.400,1.000,5.000|FS:0,0>
         4960 = Hold 1.400 1.000 5.000
-        4960 > ^X
+        4960 > ?
+        4965 < <Hold:0|MPos:1.400,1.000,5.000|FS:0,0>
+        4965 = Hold 1.400 1.000 5.000
+        4965 > ^X
         4970 < Grbl 1.1h ['$' for help]
         4970 > ?
         4980 < <Idle|MPos:1.400,1.000,5.000|FS:0,0>
         4980 = Idle 1.400 1.000 5.000
-        4980 = overdue after 4000 ms at 1.400 1.000 5.000",
+        4980 = overdue after 4000 ms at 1.400 1.000 5.000"
+    ));
+}
+
+#[test]
+fn motion_and_arrival_show_that_a_line_was_accepted_whose_ok_was_lost() {
+    fed("960 * move 1 1 5.1 at 10
+        960 > Z.1
+        1010 > ?
+        1015 < <Run|MPos:1.000,1.000,5.050|FS:600,0>
+        1015 = Moving 1.000 1.000 5.050
+        1030 > ?
+        1035 < <Idle|MPos:1.000,1.000,5.100|FS:0,0>
+        1035 = Idle 1.000 1.000 5.100
+        1035 = done 1.000 1.000 5.100");
+}
+
+#[test]
+fn a_line_that_gets_lost_with_its_ok_is_an_overdue_move() {
+    let stands: String = (970..2990)
+        .step_by(90)
+        .map(|ms| {
+            format!("...\n{ms} < <Idle|MPos:1.000,1.000,5.000|FS:0,0>\n{ms} = Idle 1.000 1.000 5.000\n")
+        })
+        .collect();
+    fed(&format!(
+        "960 * move 1 1 5.1 at 10
+        960 > Z.1
+        {stands}...
+        2980 > !
+        ..."
+    ));
+}
+
+#[test]
+fn the_copy_of_an_ok_starts_nothing_and_ends_nothing() {
+    // Each ok comes twice: the copies answer neither `$G` nor the move.
+    homed(
+        "950 * move 1 1 4.9 at 1
+        950 > G91G21G94G1F60
+        952 < ok
+        952 > $G
+        952 < ok
+        960 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F60 S0]
+        960 < ok
+        960 > Z-.1
+        961 < ok
+        961 > ?
+        966 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        966 = Idle 1.000 1.000 5.000
+        970 < ok
+        981 > ?
+        990 < <Run|MPos:1.000,1.000,4.990|FS:60,0>
+        990 = Moving 1.000 1.000 4.990
+        1001 > ?
+        1080 < <Idle|MPos:1.000,1.000,4.900|FS:0,0>
+        1080 = Idle 1.000 1.000 4.900
+        1080 = done 1.000 1.000 4.900",
     );
 }
 
 #[test]
-fn a_lost_ok_is_an_overdue_move() {
+fn a_speed_that_was_damaged_is_set_again_and_then_given_up() {
+    let wrong = "[GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]";
+    homed(&format!(
+        "950 * move 1 1 4.9 at 1
+        950 > G91G21G94G1F60
+        952 < ok
+        952 > $G
+        954 < {wrong}
+        954 > G91G21G94G1F60
+        954 < ok
+        954 > $G
+        956 < ok
+        958 < {wrong}
+        958 > G91G21G94G1F60
+        958 < ok
+        958 > $G
+        960 < ok
+        962 < {wrong}
+        962 > !
+        962 > ?
+        970 < <Hold:0|MPos:1.000,1.000,5.000|FS:0,0>
+        970 = Hold 1.000 1.000 5.000
+        970 > ^X
+        980 < Grbl 1.1h ['$' for help]
+        980 > ?
+        990 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        990 = Idle 1.000 1.000 5.000
+        990 = refused the controller has understood {wrong}"
+    ));
+}
+
+#[test]
+fn a_speed_without_an_answer_is_set_three_times() {
     homed(
-        "950 * move 1 1 5.1 at 10
-        950 > G90 G21 G1 X1.000 Y1.000 Z5.100 F600.000
-        ...
-        1950 < <Idle|MPos:1.000,1.000,5.100|FS:0,0>
-        1950 = Idle 1.000 1.000 5.100
-        ...
-        2970 > !
-        ...
-        2980 < <Idle|MPos:1.000,1.000,5.100|FS:0,0>
-        2980 = Idle 1.000 1.000 5.100
+        "950 * move 1 1 4.9 at 1
+        950 > G91G21G94G1F60
+        1450 > G91G21G94G1F60
+        1460 < ok
+        1460 > $G
+        1960 > G91G21G94G1F60
+        2460 > !
+        2460 > ?",
+    );
+}
+
+#[test]
+fn a_stage_off_its_way_or_too_fast_is_stopped_at_once() {
+    // Sideways.
+    moving(
+        "1020 < <Run|MPos:1.100,1.100,5.000|FS:600,0>
+        1020 = Moving 1.100 1.100 5.000
+        1020 > !
+        1020 > ?
+        1025 < <Hold:0|MPos:1.100,1.110,5.000|FS:0,0>
+        1025 = Hold 1.100 1.110 5.000
+        1025 > ^X
+        1030 < Grbl 1.1h ['$' for help]
+        1030 > ?
+        1035 < <Idle|MPos:1.100,1.110,5.000|FS:0,0>
+        1035 = Idle 1.100 1.110 5.000
+        1035 = astray at 1.100 1.110 5.000 on the way to 11.000 1.000 5.000",
+    );
+    // 1 mm in 66 ms.
+    moving(
+        "1020 < <Run|MPos:2.000,1.000,5.000|FS:6000,0>
+        1020 = Moving 2.000 1.000 5.000
+        1020 > !
         ...",
     );
+    // Beyond the target: `.5` was heard as `5`.
+    fed("960 * move 1 1 4.5 at 10
+        960 > Z-.5
+        965 < ok
+        965 > ?
+        970 < <Run|MPos:1.000,1.000,4.950|FS:600,0>
+        970 = Moving 1.000 1.000 4.950
+        985 > ?
+        1020 < <Run|MPos:1.000,1.000,4.480|FS:600,0>
+        1020 = Moving 1.000 1.000 4.480
+        1020 > !
+        ...");
+}
+
+#[test]
+fn a_stage_that_moves_without_reports_is_stopped() {
+    moving(
+        "1105 > ?
+        1205 > ?
+        1305 > !
+        1310 < <Hold:0|MPos:3.000,1.000,5.000|FS:0,0>
+        1310 = Hold 3.000 1.000 5.000
+        1310 > ?
+        ...
+        1610 < <Hold:0|MPos:3.000,1.000,5.000|FS:0,0>
+        1610 = Hold 3.000 1.000 5.000
+        1610 > ^X
+        1620 < Grbl 1.1h ['$' for help]
+        1620 > ?
+        1625 < <Idle|MPos:3.000,1.000,5.000|FS:0,0>
+        1625 = Idle 3.000 1.000 5.000
+        1625 = refused it gave no report for 300ms of the move, and was stopped",
+    );
+}
+
+#[test]
+fn one_damaged_report_is_not_where_an_increment_is_counted_from() {
+    fed("1032 > ?
+        1040 < <Idle|MPos:1.000,1.000,9.000|FS:0,0>
+        1040 = Idle 1.000 1.000 9.000
+        1050 * move 1 1 4.9 at 10
+        1050 > ?
+        1055 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        1055 = Idle 1.000 1.000 5.000
+        1055 > Z-.1");
+}
+
+#[test]
+fn an_axis_that_does_not_move_is_not_named() {
+    fed("960 * move 1.0004 1 4.9 at 10
+        960 > Z-.1");
 }
 
 #[test]
 fn a_refused_move_is_told_in_words() {
     homed(
         "950 * move 2 1 5 at 10
-        950 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
+        950 > G91G21G94G1F600
+        950 < ok
+        950 > $G
+        950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        950 < ok
+        950 > X1
         960 < error:9
-        960 = Idle 1.000 1.000 5.000
-        960 = refused error 9: locked by an alarm or a jog",
+        960 > !
+        960 > ?
+        965 < <Hold:0|MPos:1.000,1.000,5.000|FS:0,0>
+        965 = Hold 1.000 1.000 5.000
+        965 > ^X
+        970 < Grbl 1.1h ['$' for help]
+        970 > ?
+        975 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        975 = Idle 1.000 1.000 5.000
+        975 = refused error 9: locked by an alarm or a jog",
     );
 }
 
@@ -153,7 +353,12 @@ fn commands_that_cannot_be_done_are_refused_before_anything_is_sent() {
         952 * move 2 1 5 at -1
         952 = refused the speed is too low or not a number
         953 * move 2 1 5 at 10
-        953 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
+        953 > G91G21G94G1F600
+        953 < ok
+        953 > $G
+        953 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        953 < ok
+        953 > X1
         954 * home
         954 = refused another command is under way",
     );
@@ -171,7 +376,12 @@ fn a_move_to_where_the_stage_stands_becomes_a_look() {
         960 = Idle 1.000 1.000 5.000
         960 = done 1.000 1.000 5.000
         961 * move 1 1 4.9994 at 0.5
-        961 > G90 G21 G1 X1.000 Y1.000 Z4.999 F30.000",
+        961 > G91G21G94G1F30
+        961 < ok
+        961 > $G
+        961 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F30 S0]
+        961 < ok
+        961 > Z-.001",
     );
 }
 
@@ -179,12 +389,14 @@ fn a_move_to_where_the_stage_stands_becomes_a_look() {
 fn a_target_is_rounded_to_the_three_decimals_that_the_controller_knows() {
     homed(
         "950 * move 1.50049 1 -0.0004 at 10
-        950 > G90 G21 G1 X1.500 Y1.000 Z0.000 F600.000
+        950 > G91G21G94G1F600
+        950 < ok
+        950 > $G
+        950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        950 < ok
+        950 > X.5Z-5
         955 < ok
-        955 > ?
-        960 < <Idle|MPos:1.500,1.000,0.000|FS:0,0>
-        960 = Idle 1.500 1.000 0.000
-        960 = done 1.500 1.000 0.000",
+        955 > ?",
     );
 }
 
@@ -193,7 +405,12 @@ fn a_probing_that_someone_else_made_is_passed_over() {
     let session = homed(
         "950 < [PRB:1.000,2.000,-0.250:1]
         960 * move 1 1 6 at 10
-        960 > G90 G21 G1 X1.000 Y1.000 Z6.000 F600.000",
+        960 > G91G21G94G1F600
+        960 < ok
+        960 > $G
+        960 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        960 < ok
+        960 > Z1",
     );
     assert_eq!(session.unknown_lines(), 0);
 }

@@ -44,6 +44,7 @@ fn a_controller_without_homing_or_soft_limits_is_refused() {
         "{ASKED}
         22 < $20=0
         22 < $22=1
+        22 < $23=3
         22 < ok
         22 = failed: the controller has $20 = 0, but the rig needs 1, soft limits on: correct the rig file, or the \
          controller's setting by its own tools; nothing was changed"
@@ -58,6 +59,7 @@ fn other_steps_than_the_rigs_are_refused_with_both_values() {
             "{ASKED}
             22 < $20=1
             22 < $22=1
+            22 < $23=3
             22 < $102=80.000
             22 < ok
             22 = failed: the controller has $102 = 80.000, but the rig needs 250 steps/mm of its z for the rig's z: \
@@ -71,6 +73,7 @@ fn settings_that_do_not_come_are_asked_for_again_and_given_up() {
     check(&format!(
         "{ASKED}
         30 < $22=1
+        30 < $23=3
         2021 > $$
         2030 < $20=1
         4021 > $$
@@ -95,6 +98,7 @@ fn a_controller_that_has_no_version_to_tell_is_taken() {
         21 > $$
         22 < $20=1
         22 < $22=1
+        22 < $23=3
         22 < ok
         22 = connected Grbl 1.1h ['$' for help]
         22 = Unhomed 0.000 0.000 0.000",
@@ -123,19 +127,25 @@ fn positions_and_moves_are_in_the_stages_frame() {
         // What the session tells; what the controller says stays as it is.
         .replace("= Unhomed 0.000 0.000 0.000", "= Unhomed 0.000 0.000 30.000")
         .replace("= Homing 0.000 0.000 0.000", "= Homing 0.000 0.000 30.000")
+        .replace("= Homing 1.000 1.000 5.000", "= Homing -1.000 1.000 35.000")
         .replace("= Idle 1.000 1.000 5.000", "= Idle -1.000 1.000 35.000")
         .replace("= done 1.000 1.000 5.000", "= done -1.000 1.000 35.000");
     check_with(
         crossed(),
         &format!(
             "{homed}
-            950 * move -11 2 1.5 at 10
-            950 > G90 G21 G1 X2.000 Y11.000 Z-28.500 F600.000
+            950 * move -11 2 1.5 at 1000
+            950 > G91G21G94G1F60000
+            951 < ok
+            951 > $G
+            952 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F60000 S0]
+            952 < ok
+            952 > X1Y10Z-33.5
             955 < ok
             955 > ?
-            965 < <Run|MPos:1.500,6.000,-20.000|FS:600,0>
-            965 = Moving -6.000 1.500 10.000
-            1005 > ?
+            965 < <Run|MPos:1.250,3.500,-3.375|FS:60000,0>
+            965 = Moving -3.500 1.250 26.625
+            975 > ?
             1015 < <Idle|MPos:2.000,11.000,-28.500|FS:0,0>
             1015 = Idle -11.000 2.000 1.500
             1015 = done -11.000 2.000 1.500

@@ -12,7 +12,7 @@ fn stop_holds_then_flushes_at_a_stand_and_keeps_the_position() {
         1015 > ?
         1030 < <Hold:1|MPos:1.500,1.000,5.000|FS:300,0>
         1030 = Hold 1.500 1.000 5.000
-        1065 > ?
+        1035 > ?
         1075 < <Hold:0|MPos:1.520,1.000,5.000|FS:0,0>
         1075 = Hold 1.520 1.000 5.000
         1075 > ^X
@@ -22,7 +22,15 @@ fn stop_holds_then_flushes_at_a_stand_and_keeps_the_position() {
         1100 = Idle 1.520 1.000 5.000
         1100 = stopped 1.520 1.000 5.000
         1110 * move 1.52 1 6 at 10
-        1110 > G90 G21 G1 X1.520 Y1.000 Z6.000 F600.000",
+        1110 > ?
+        1115 < <Idle|MPos:1.520,1.000,5.000|FS:0,0>
+        1115 = Idle 1.520 1.000 5.000
+        1115 > G91G21G94G1F600
+        1116 < ok
+        1116 > $G
+        1117 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        1117 < ok
+        1117 > Z1",
     );
 }
 
@@ -96,7 +104,12 @@ fn a_reset_that_raises_an_alarm_leaves_the_position_suspect() {
 fn a_line_that_waits_in_the_controller_is_flushed_by_a_stop() {
     homed(
         "950 * move 2 1 5 at 10
-        950 > G90 G21 G1 X2.000 Y1.000 Z5.000 F600.000
+        950 > G91G21G94G1F600
+        950 < ok
+        950 > $G
+        950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        950 < ok
+        950 > X1
         951 * stop
         951 > !
         951 > ?
@@ -122,9 +135,9 @@ fn a_stage_that_moves_on_is_told_again_to_hold() {
         1010 < <Run|MPos:1.500,1.000,5.000|FS:600,0>
         1010 = Moving 1.500 1.000 5.000
         1010 > !
-        1058 > ?
-        1308 > !
-        1308 > ?",
+        1028 > ?
+        1278 > !
+        1278 > ?",
     );
 }
 
@@ -164,7 +177,15 @@ fn stop_while_standing_leaves_the_stage_ready() {
         980 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
         980 = Idle 1.000 1.000 5.000
         990 * move 1 1 6 at 10
-        990 > G90 G21 G1 X1.000 Y1.000 Z6.000 F600.000",
+        990 > ?
+        995 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        995 = Idle 1.000 1.000 5.000
+        995 > G91G21G94G1F600
+        996 < ok
+        996 > $G
+        997 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        997 < ok
+        997 > Z1",
     );
 }
 
@@ -206,8 +227,8 @@ fn a_stage_that_says_even_after_the_reset_that_it_moves_is_not_waited_for() {
         4030 < <Run|MPos:1.500,1.000,5.000|FS:0,0>
         4030 = Moving 1.500 1.000 5.000
         4030 = stopped 1.500 1.000 5.000
-        4040 * move 1 1 6 at 10
-        4040 = unhomed",
+        4035 * move 1 1 6 at 10
+        4035 = unhomed",
     );
 }
 
@@ -223,7 +244,7 @@ fn a_jog_of_someone_else_is_stopped_too() {
         1030 < <Jog|MPos:1.200,1.000,5.000|FS:100,0>
         1030 = Moving 1.200 1.000 5.000
         1030 > !
-        1070 > ?
+        1040 > ?
         1080 < <Idle|MPos:1.210,1.000,5.000|FS:0,0>
         1080 = Idle 1.210 1.000 5.000
         1080 > ^X

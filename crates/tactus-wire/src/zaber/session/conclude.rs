@@ -50,6 +50,9 @@ impl Session {
         let position_mm = self.position_mm();
         let Phase::Moving(travel) = &mut self.phase else { return };
         let target_mm = travel.arrival.target_mm();
+        if travel.course.strays(now, position_mm, self.config.tolerance_mm) {
+            return self.halt(now, Some(Failure::Astray { target_mm, position_mm }));
+        }
         let result = match travel.arrival.judge(now, !moves, position_mm, self.config.tolerance_mm) {
             Judgement::Underway => return,
             Judgement::Done => Ok(position_mm),

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use super::Failure;
-use crate::stage::ArrivalCheck;
+use crate::stage::{ArrivalCheck, Course};
 
 /// A stop that a device has not confirmed after this is sent again.
 const STOP_REPLY_TIMEOUT: Duration = Duration::from_millis(250);
@@ -38,6 +38,7 @@ pub(super) struct ActiveMove {
     pub(super) command: String,
     /// In whole microsteps.
     pub(super) arrival: ArrivalCheck,
+    pub(super) course: Course,
     /// Every axis has confirmed its move.
     pub(super) set_out: bool,
 }

@@ -89,6 +89,8 @@ fn clean(raw: &[u8]) -> String {
     for byte in raw.iter().take_while(|byte| **byte != b';') {
         match byte {
             b'(' => in_comment = true,
+            // Block delete is not supported: the character is ignored.
+            b'/' => {}
             b')' => in_comment = false,
             _ if in_comment || *byte <= b' ' => {}
             _ => text.push(char::from(byte.to_ascii_uppercase())),

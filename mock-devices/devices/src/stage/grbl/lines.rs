@@ -183,7 +183,7 @@ impl GrblController {
         self.watch_limits();
     }
 
-    /// Homes: up to the end of z, then to the least x and y, and off the switches again.
+    /// Homes: z to its switch first, then x and y, and off the switches again.
     fn home(&mut self, now: Instant) {
         // One report comes unasked; then `?` is not answered until the end.
         self.mode = Mode::Homing { gives_up_at: None };
@@ -193,10 +193,10 @@ impl GrblController {
             return;
         }
         let [home_x, home_y, home_z] = self.home_mm();
+        let [end_x, end_y, end_z] = self.home_ends_mm();
         let speed_mm_per_s = self.settings.seek_mm_per_s();
         let mut world = self.world.lock();
         world.motion.lose_steps(0.0);
-        let [[end_x, _], [end_y, _], [_, end_z]] = world.truth().stage.travel_mm;
         let [x, y, _] = world.motion.true_mm(now);
         let waypoints = [[x, y, end_z], [x, y, home_z], [end_x, end_y, home_z], [home_x, home_y, home_z]];
         for true_mm in waypoints {

@@ -14,6 +14,8 @@ const REPORT_MASK: u16 = 10;
 const SOFT_LIMITS: u16 = 20;
 const HARD_LIMITS: u16 = 21;
 const HOMING: u16 = 22;
+/// Bit by axis: set if it homes towards smaller coordinates.
+const HOMING_DIRECTIONS: u16 = 23;
 const HOMING_SEEK: u16 = 25;
 const HOMING_PULL_OFF: u16 = 27;
 const MAX_RATES: std::ops::RangeInclusive<u16> = 110..=112;
@@ -29,10 +31,15 @@ impl Settings {
     pub(super) fn of(stage: &SimulatedStage, frame: &Config) -> Self {
         let rate_mm_per_min = stage.speed_max_mm_per_s * 60.0;
         let (mut steps_per_mm, mut length_mm) = ([0.0; 3], [0.0; 3]);
+        let mut homes_down = 0.0;
         for (name, axis) in AxisName::ALL.into_iter().zip(frame.axes) {
             let [least, greatest] = name.of(stage.travel_mm);
             let step_mm = name.of([stage.lateral_step_mm, stage.lateral_step_mm, stage.vertical_step_mm]);
             axis.machine.set(&mut length_mm, greatest - least);
+            // x and y to their least, z to its greatest.
+            if name.of([-1.0, -1.0, 1.0]) * axis.direction.sign() < 0.0 {
+                homes_down += axis.machine.of([1.0, 2.0, 4.0]);
+            }
             axis.machine.set(&mut steps_per_mm, axis.steps_per_mm.unwrap_or(1.0 / step_mm));
         }
         let values = [
@@ -40,8 +47,7 @@ impl Settings {
             (SOFT_LIMITS, 1.0),
             (HARD_LIMITS, 1.0),
             (HOMING, 1.0),
-            // Homing: x and y to their least, z to its greatest.
-            (23, 3.0),
+            (HOMING_DIRECTIONS, homes_down),
             (24, 60.0),
             (HOMING_SEEK, rate_mm_per_min.min(1500.0)),
             (HOMING_PULL_OFF, 1.0),
@@ -101,6 +107,11 @@ impl Settings {
 
     pub(super) fn has_homing(&self) -> bool {
         self.get(HOMING) != 0.0
+    }
+
+    /// True if homing takes one of the controller's axes towards smaller coordinates.
+    pub(super) fn homes_down(&self, machine: AxisName) -> bool {
+        self.mask(HOMING_DIRECTIONS) & machine.of([1, 2, 4]) != 0
     }
 
     pub(super) fn seek_mm_per_s(&self) -> f64 {
