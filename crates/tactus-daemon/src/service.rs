@@ -7,6 +7,7 @@
 //! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status` |
 //! | run | the order of one run, until its recording is closed |
 //! | health | once a second |
+//! | closing of crashed runs (once, at the start) | the disk |
 //! | watchdog | half of systemd's limit |
 //! | main | SIGTERM or SIGINT |
 
@@ -25,7 +26,7 @@ use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
 use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles};
 use tactus_runner::embedded::Truth;
-use tactus_runner::{devices, logging};
+use tactus_runner::{crashed, devices, logging};
 use tactus_schema::key::Keys;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::timeout;
@@ -119,6 +120,8 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     if !endpoints.is_loopback() {
         warn!("the bus listens or connects beyond this machine, without access control");
     }
+    let recordings = config.recordings.clone();
+    let closing = tokio::task::spawn_blocking(move || crashed::close_all(&recordings));
     let (bus, calls) = Bus::open(&endpoints, keys).await?;
     let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
     let opened = devices::open(&rig, &rig_service, codec, truth, clock);
@@ -140,6 +143,9 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
         _ = interrupt.recv() => "SIGINT",
         never = async {
             frames_flow(&engine).await;
+            if closing.await.is_err() {
+                error!("the recordings were not checked for crashed runs: this is a defect of Tactus");
+            }
             alive = Some(bus.declare_alive().await);
             notify::ready(&engine.rig().name);
             info!("ready: frames flow");

@@ -7,12 +7,14 @@
 //! | [`order`] | turns a request into a checked order with its run id and recording |
 //! | [`devices`] | transports, drivers and virtual devices of a rig |
 //! | [`recorder`] | writes the recording for the engine |
+//! | [`crashed`] | closes the recordings of runs whose service died |
 //! | [`twin`] | the dry run on a simulated twin |
 //! | [`embedded`] | one run in this process, without a service |
 //! | [`stage_check`] | a check of a rig's stage alone: its identity, and whether it moves as it reports |
 //! | [`logging`] | logs for terminals, the journal and machines |
 
 pub mod config;
+pub mod crashed;
 pub mod devices;
 pub mod embedded;
 pub mod experiments;

@@ -169,7 +169,11 @@ impl Gauge {
 
     fn fail(&self, failure: &RecordError) {
         error!(%failure, "the recording fails");
-        self.0.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| failure.to_string());
+        self.0
+            .failure
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert_with(|| failure.to_string());
     }
 
     fn show(&self, backlog: &Backlog) {
@@ -193,16 +197,24 @@ impl Gauge {
 fn age(since_ns: &AtomicI64, now: MonoTime) -> Option<Duration> {
     match since_ns.load(Ordering::Relaxed) {
         NEVER => None,
-        since_ns => Some(Duration::from_nanos(u64::try_from(now.ns().saturating_sub(since_ns)).unwrap_or(0))),
+        since_ns => Some(now.since(MonoTime::from_ns(since_ns))),
     }
 }
 
 impl ThreadRecorder {
-    /// Starts the threads. The gauge shows this recorder from now on.
+    /// Starts the threads.
     ///
     /// # Errors
     /// If the system gives no threads or no second handle to the file.
-    pub fn start<S: Storage + 'static>(recording: Recording<S>, gauge: Gauge) -> std::io::Result<Self> {
+    pub fn start<S: Storage + 'static>(recording: Recording<S>) -> std::io::Result<Self> {
+        Self::start_with(recording, Gauge::default())
+    }
+
+    /// Starts the threads. The gauge shows this recorder from now on.
+    ///
+    /// # Errors
+    /// As [`ThreadRecorder::start`].
+    pub fn start_with<S: Storage + 'static>(recording: Recording<S>, gauge: Gauge) -> std::io::Result<Self> {
         gauge.reset();
         let path = recording.path().display().to_string();
         // Overflow policy: never dropped; a full queue is an error that fails the run.
@@ -213,8 +225,11 @@ impl ThreadRecorder {
         // One wish at a time: a second one while the disk is busy would say nothing new.
         let (sync_to, wishes) = sync_channel(1);
         let of_sync = gauge.clone();
-        thread::Builder::new().name("recorder-sync".into()).spawn(move || sync_all(sync, &wishes, &of_sync))?;
-        let writer = Writer { recording, gauge: gauge.clone(), sync_to, wished: None, at: MonoTime::default() };
+        thread::Builder::new()
+            .name("recorder-sync".into())
+            .spawn(move || sync_all(sync, &wishes, &of_sync))?;
+        let writer =
+            Writer { recording, gauge: gauge.clone(), sync_to, wished: None, at: MonoTime::default() };
         thread::Builder::new().name("recorder".into()).spawn(move || {
             // Nobody may wait for the result any more.
             let _told = end.send(writer.write_all(&queue));
@@ -262,16 +277,14 @@ impl ThreadRecorder {
         };
         gauge.clear();
         // A failure beside the writer's, such as of a sync, fails the run, too.
-        result.and(gauge.failure().map_or(Ok(()), |text| Err(RecordFailure(Box::new(QueueError::Failed(text))))))
+        result.and(
+            gauge.failure().map_or(Ok(()), |text| Err(RecordFailure(Box::new(QueueError::Failed(text))))),
+        )
     }
 
     fn queue(&mut self, entry: Entry, at: MonoTime) -> Result<(), RecordFailure> {
         let (bytes, is_frame) = (entry.bytes(), matches!(entry, Entry::Frame(_)));
-        let refused = match self.entries.try_send(entry) {
-            Ok(()) => None,
-            Err(refused) => Some(refused),
-        };
-        match refused {
+        match self.entries.try_send(entry).err() {
             None => {
                 self.backlog.queued(at, bytes, is_frame);
                 self.check(at)
@@ -407,7 +420,10 @@ impl<S: Storage> Writer<S> {
         if self.sync_to.try_send(self.at).is_err() {
             let unsynced = self.gauge.unsynced(self.at).unwrap_or_default();
             if unsynced > UNSYNCED_MAX {
-                warn!(unsynced_s = unsynced.as_secs_f64(), "the disk is slow: a loss of power would cost these seconds");
+                warn!(
+                    unsynced_s = unsynced.as_secs_f64(),
+                    "the disk is slow: a loss of power would cost these seconds"
+                );
             }
         }
     }

@@ -49,8 +49,8 @@ impl Backlog {
             self.alarmed = false;
             return Verdict::KeepsUp;
         };
-        // Messages are queued a little out of the order of their times.
-        let age = if now > oldest { now.since(oldest) } else { Duration::ZERO };
+        // Messages are queued a little out of the order of their times: then it is zero.
+        let age = now.since(oldest);
         if age > AGE_MAX || self.bytes > BYTES_MAX {
             return Verdict::TooLate(age);
         }
