@@ -233,8 +233,8 @@ fn stop_pause_and_resume_work_from_another_client() {
 }
 
 #[test]
-fn a_service_that_is_killed_leaves_a_recording_that_lacks_at_most_a_second() {
-    let lab = ServiceUnderTest::start(|rig| rig);
+fn a_service_that_is_killed_leaves_a_recording_that_lacks_at_most_a_second_and_closes_it_at_its_next_start() {
+    let mut lab = ServiceUnderTest::start(|rig| rig);
     let script = lab.script("hold.star", HOLD);
     let _client = lab.start_tactus(&["run", &script]);
     wait_until_pressing(&lab);
@@ -248,6 +248,15 @@ fn a_service_that_is_killed_leaves_a_recording_that_lacks_at_most_a_second() {
     assert!(frames + 30 >= before, "{frames} of {before}");
     let info = tactus(lab.folder.path(), &["record", "info", &recording.display().to_string()]);
     assert_eq!(info.code, Some(3), "{info:?}");
+
+    lab.daemon = Process::start("tactusd", lab.folder.path(), &["--config", "tactusd.toml"]);
+    lab.daemon.wait_for("MAY STAND IN CONTACT");
+    lab.daemon.wait_for("ready");
+    let info = tactus(lab.folder.path(), &["--json", "record", "info", &recording.display().to_string()]);
+    assert_eq!(info.code, Some(0), "{info:?}");
+    let info = info.json();
+    assert_eq!((&info["exit_status"], info["frames"].as_u64()), (&"crashed".into(), Some(frames)));
+    assert!(info["message"].as_str().unwrap().contains("the stage last reported the tip at z = "), "{info}");
 }
 
 #[test]

@@ -7,6 +7,7 @@
 //! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status` |
 //! | run | the order of one run, until its recording is closed |
 //! | health | once a second |
+//! | closing of crashed runs (once, at the start) | the disk |
 //! | watchdog | half of systemd's limit |
 //! | main | SIGTERM or SIGINT |
 
@@ -28,7 +29,7 @@ use tactus_engine::{Engine, EngineError, StopOrder};
 use tactus_runner::covering_file::CoveringFile;
 use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles};
 use tactus_runner::embedded::Truth;
-use tactus_runner::{devices, logging};
+use tactus_runner::{crashed, devices, logging};
 use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
 use tokio::signal::unix::{SignalKind, signal};
@@ -122,6 +123,8 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
         guests: config.bus.guests.clone(),
         tls: None,
     };
+    let recordings = config.recordings.clone();
+    let closing = tokio::task::spawn_blocking(move || crashed::close_all(&recordings));
     let (bus, calls) = Bus::open(&endpoints, keys).await?;
     let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
     let mut opened = devices::open(&rig, &rig_service, codec, truth, clock);
@@ -156,6 +159,9 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
         _ = interrupt.recv() => "SIGINT",
         never = async {
             frames_flow(&engine).await;
+            if closing.await.is_err() {
+                error!("the recordings were not checked for crashed runs: this is a defect of Tactus");
+            }
             alive = Some(bus.declare_alive().await);
             notify::ready(&engine.rig().name);
             info!("ready: frames flow");

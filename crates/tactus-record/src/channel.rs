@@ -1,36 +1,63 @@
-//! Writes messages to the channels of a recording, and decides when they reach the file.
+//! Encodes messages into the channels of a recording, and decides when their chunks are closed.
 
 use std::{
     collections::BTreeMap,
-    io::{BufWriter, Write},
+    io::{self, BufWriter, Write},
+    sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
 
 use mcap::{Compression, McapError, WriteOptions, records::MessageHeader, write::NoSeek};
 use tactus_schema::{DESCRIPTOR_SET, TimeStamp, key::Keys};
 
-use crate::{MessageKind, header::Header, message::Recorded};
+use crate::{
+    MessageKind,
+    header::{Header, LIBRARY},
+    message::Recorded,
+};
 
 /// A chunk is closed and handed to the system once it spans this much time. A reader cannot use a partial chunk, so a
 /// killed process loses this much.
-const CHUNK_SPAN: Duration = Duration::from_millis(500);
+pub(crate) const CHUNK_SPAN: Duration = Duration::from_millis(500);
 
 /// A chunk of this size is closed even if it spans less time.
-const CHUNK_BYTES: u64 = 256 * 1024;
+pub(crate) const CHUNK_BYTES: u64 = 256 * 1024;
 
 /// Name of a protobuf schema's and message's encoding in MCAP.
 pub(crate) const PROTOBUF: &str = "protobuf";
 
-type Output<W> = NoSeek<BufWriter<W>>;
-
-/// Writes the messages of one run into an MCAP stream.
-pub(crate) struct ChannelWriter<W: Write> {
-    mcap: mcap::Writer<Output<W>>,
+/// Encodes the messages of one run as an MCAP stream, of which it gives out whole records only.
+pub(crate) struct ChannelWriter {
+    mcap: mcap::Writer<NoSeek<Spool>>,
+    closed: Spool,
     /// Channels by kind of message.
-    ids: [u16; MessageKind::ALL.len()],
+    ids: ChannelIds,
     encoded: Vec<u8>,
     chunk_began: Option<TimeStamp>,
-    failed: bool,
+}
+
+/// Channels by kind of message, in the order of [`MessageKind::ALL`].
+pub(crate) type ChannelIds = [u16; MessageKind::ALL.len()];
+
+/// Bytes in memory: writing to it never fails, so the encoder can go on when a disk cannot.
+#[derive(Debug, Clone, Default)]
+struct Spool(Arc<Mutex<Vec<u8>>>);
+
+impl Spool {
+    fn take(&self) -> Vec<u8> {
+        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Write for Spool {
+    fn write(&mut self, piece: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(piece);
+        Ok(piece.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// How recordings are written.
@@ -53,21 +80,22 @@ pub(crate) fn options() -> WriteOptions {
         .chunk_size(Some(CHUNK_BYTES))
         // A chunk is assembled in memory and written at once, so that the file never contains a partial header.
         .disable_seeking(true)
-        .library(concat!("tactus-record ", env!("CARGO_PKG_VERSION")))
+        .library(format!("{LIBRARY} {}", env!("CARGO_PKG_VERSION")))
 }
 
 /// An MCAP writer over a sink that is written to in large pieces.
-pub(crate) fn writer<W: Write>(sink: W) -> Result<mcap::Writer<Output<W>>, McapError> {
+pub(crate) fn writer<W: Write>(sink: W) -> Result<mcap::Writer<NoSeek<BufWriter<W>>>, McapError> {
     options().create(NoSeek::new(BufWriter::with_capacity(
         usize::try_from(CHUNK_BYTES).unwrap_or(usize::MAX),
         sink,
     )))
 }
 
-impl<W: Write> ChannelWriter<W> {
-    /// Begins a recording: metadata, attachments, schemas and channels reach the sink before this returns.
-    pub(crate) fn new(sink: W, header: &Header<'_>) -> Result<Self, McapError> {
-        let mut mcap = writer(sink)?;
+impl ChannelWriter {
+    /// Begins a recording with its metadata, attachments, schemas and channels.
+    pub(crate) fn new(header: &Header<'_>) -> Result<Self, McapError> {
+        let closed = Spool::default();
+        let mut mcap = options().create(NoSeek::new(closed.clone()))?;
         mcap.write_metadata(&header.metadata().to_record())?;
         for attachment in header.attachments() {
             mcap.attach(&mcap::Attachment {
@@ -80,24 +108,23 @@ impl<W: Write> ChannelWriter<W> {
         }
         let ids = declare(&mut mcap, &Keys::new(header.rig.name.clone()))?;
         mcap.flush()?;
-        Ok(Self { mcap, ids, encoded: Vec::new(), chunk_began: None, failed: false })
+        Ok(Self { mcap, closed, ids, encoded: Vec::new(), chunk_began: None })
     }
 
-    /// Closes the current chunk and gives it to the system.
-    pub(crate) fn flush(&mut self) -> Result<(), McapError> {
-        self.once_failed_always()?;
+    /// The whole records that were finished since the last call.
+    pub(crate) fn take_closed(&mut self) -> Vec<u8> {
+        self.closed.take()
+    }
+
+    /// Closes the current chunk.
+    pub(crate) fn close_chunk(&mut self) -> Result<(), McapError> {
         self.chunk_began = None;
-        let flushed = self.mcap.flush();
-        self.failed = flushed.is_err();
-        flushed
+        self.mcap.flush()
     }
 
-    /// Writes the summary and returns the sink, which then contains everything.
-    pub(crate) fn finish(mut self) -> Result<W, McapError> {
-        self.once_failed_always()?;
-        self.mcap.finish()?;
-        let buffered = self.mcap.into_inner().into_inner();
-        buffered.into_inner().map_err(|error| McapError::Io(error.into_error()))
+    /// Closes the current chunk and writes the summary and the end mark. Nothing may follow.
+    pub(crate) fn finish(&mut self) -> Result<(), McapError> {
+        self.mcap.finish().map(drop)
     }
 
     /// Writes a message to the channel of its kind, and first closes the current chunk if it spans [`CHUNK_SPAN`].
@@ -107,11 +134,10 @@ impl<W: Write> ChannelWriter<W> {
         seq: u64,
         at: TimeStamp,
     ) -> Result<(), McapError> {
-        self.once_failed_always()?;
         // A clock that runs backwards closes the chunk, too.
         let spans = |began: TimeStamp| at.mono < began.mono || at.mono.since(began.mono) >= CHUNK_SPAN;
         if self.chunk_began.is_some_and(spans) {
-            self.flush()?;
+            self.close_chunk()?;
         }
         self.chunk_began.get_or_insert(at);
         self.encoded.clear();
@@ -119,28 +145,39 @@ impl<W: Write> ChannelWriter<W> {
         let channel_id = self.ids[M::KIND as usize];
         let log_time = unsigned(at.wall.ns());
         let header = MessageHeader { channel_id, sequence: wrapped(seq), log_time, publish_time: log_time };
-        let written = self.mcap.write_to_known_channel(&header, &self.encoded);
-        self.failed = written.is_err();
-        written
-    }
-
-    /// After an error the sink may hold any part of its last input, so nothing may follow.
-    fn once_failed_always(&self) -> Result<(), McapError> {
-        if self.failed { Err(McapError::AttemptedWriteAfterFailure) } else { Ok(()) }
+        self.mcap.write_to_known_channel(&header, &self.encoded)
     }
 }
 
-/// Declares the channel of every kind of message; their ids, in the order of [`MessageKind::ALL`].
-fn declare<W: Write>(
-    mcap: &mut mcap::Writer<Output<W>>,
+/// Declares the channel of every kind of message. In an empty file they get the ids 1, 2, 3, ...: [`standard_channel`]
+/// relies on it.
+pub(crate) fn declare<W: Write + io::Seek>(
+    mcap: &mut mcap::Writer<W>,
     keys: &Keys,
-) -> Result<[u16; MessageKind::ALL.len()], McapError> {
+) -> Result<ChannelIds, McapError> {
     let mut ids = [0; MessageKind::ALL.len()];
     for (id, kind) in ids.iter_mut().zip(MessageKind::ALL) {
         let schema = mcap.add_schema(kind.schema(), PROTOBUF, DESCRIPTOR_SET)?;
         *id = mcap.add_channel(schema, &keys.topic(kind.topic()), PROTOBUF, &BTreeMap::new())?;
     }
     Ok(ids)
+}
+
+/// The channel that has this id in every recording of the rig, for a recording whose declarations are lost.
+pub(crate) fn standard_channel(id: u16, rig: &str) -> Option<mcap::Channel<'static>> {
+    let kind = *MessageKind::ALL.get(usize::from(id).checked_sub(1)?)?;
+    Some(mcap::Channel {
+        id,
+        topic: Keys::new(rig).topic(kind.topic()),
+        schema: Some(Arc::new(mcap::Schema {
+            id,
+            name: kind.schema().into(),
+            encoding: PROTOBUF.into(),
+            data: DESCRIPTOR_SET.into(),
+        })),
+        message_encoding: PROTOBUF.into(),
+        metadata: BTreeMap::new(),
+    })
 }
 
 /// MCAP has no times before 1970; they become 0.
@@ -154,7 +191,3 @@ pub(crate) fn wrapped(seq: u64) -> u32 {
     let low = seq as u32;
     low
 }
-
-#[cfg(test)]
-#[path = "channel_tests.rs"]
-mod tests;

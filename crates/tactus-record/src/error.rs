@@ -1,10 +1,10 @@
 //! What can go wrong with a recording.
 
-use std::{io, path::PathBuf};
+use std::{fmt, io, path::PathBuf};
 
 use tactus_schema::RigError;
 
-use crate::table::TableError;
+use crate::{MessageKind, table::TableError};
 
 /// Why a recording could not be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -13,14 +13,23 @@ pub enum RecordError {
     /// The file system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io { action: &'static str, path: PathBuf, source: io::Error },
-    /// A message could not be stored: what was taken in before may be incomplete.
+    /// A message could not be encoded.
     #[error("cannot write {}: {source}", path.display())]
     Write { path: PathBuf, source: mcap::McapError },
+    /// The disk did not take what was to be recorded.
+    #[error("cannot write {}: {source}{missing}", path.display())]
+    Store { path: PathBuf, source: io::Error, missing: Missing },
+    /// The file is not where it was while it is being written.
+    #[error("{} was deleted, moved or replaced while it was written: what is recorded is lost", path.display())]
+    Vanished { path: PathBuf },
+    /// The disk has too little space for a run.
+    #[error("too little space for a run in {}: {} are free, {} are needed: delete what is not needed, or set `recordings` to a folder on another disk", folder.display(), in_mib(*free_bytes), in_mib(*needed_bytes))]
+    NoSpace { folder: PathBuf, needed_bytes: u64, free_bytes: u64 },
     /// The file does not begin as an MCAP file does.
     #[error("{} is not an MCAP file", path.display())]
     NotMcap { path: PathBuf },
     /// The file is MCAP, but not a recording of a run, or it was cut off before it said which run it is.
-    #[error("{}: no metadata record {:?}, so this is no recording of a run, or its first bytes are lost", path.display(), crate::header::METADATA_NAME)]
+    #[error("{}: no metadata record {:?}, so this is no recording of a run, or its first bytes are lost: `tactus recover` tries to go without them", path.display(), crate::header::METADATA_NAME)]
     NoRun { path: PathBuf },
     /// An attachment or metadata field of the recording's start is missing or wrong.
     #[error("{}: {what}: {problem}", path.display())]
@@ -34,6 +43,48 @@ pub enum RecordError {
     /// What recovery wrote does not read back as what was meant; the output was removed.
     #[error("{}: the recovered file does not read back: {problem}", path.display())]
     Unverified { path: PathBuf, problem: String },
+}
+
+/// What a recording lacks after its storage failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Missing {
+    /// Number of messages that are not in the file.
+    pub messages: u64,
+    /// Number of frames among them.
+    pub frames: u64,
+    /// True once the recording is over, so that the numbers are final.
+    pub told: bool,
+    /// True if the end of the recording could not be written either.
+    pub unclosed: bool,
+}
+
+impl Missing {
+    pub(crate) fn one(kind: MessageKind) -> Self {
+        Self { messages: 1, frames: u64::from(kind == MessageKind::Frame), ..Self::default() }
+    }
+
+    pub(crate) fn plus(self, more: Self) -> Self {
+        Self { messages: self.messages + more.messages, frames: self.frames + more.frames, ..self }
+    }
+}
+
+impl fmt::Display for Missing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { messages, frames, told, unclosed } = self;
+        match messages {
+            0 if *told => f.write_str("; nothing is missing of what was received until then")?,
+            0 => {}
+            _ => write!(f, "; {messages} messages are missing, {frames} of them frames")?,
+        }
+        if *unclosed {
+            f.write_str("; the recording has no end: the service closes it at its next start, `tactus recover` at once")?;
+        }
+        Ok(())
+    }
+}
+
+fn in_mib(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / (1024.0 * 1024.0))
 }
 
 /// Why recordings and measurement tables gave no rows, or no table could be made of them.

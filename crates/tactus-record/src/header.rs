@@ -7,6 +7,12 @@ use tactus_schema::{Rig, WallTime};
 /// Name of the metadata record that distinguishes a run's recording from any other MCAP file.
 pub(crate) const METADATA_NAME: &str = "tactus.run";
 
+/// Name of the program in the file's header, before its version.
+pub(crate) const LIBRARY: &str = "tactus-record";
+
+/// Key of the checksum over the other fields of the metadata record: MCAP has none for it.
+const CHECKSUM: &str = "crc32";
+
 /// Attachment: the rig as JSON, [`tactus_schema::rig::SCHEMA`].
 pub(crate) const RIG_JSON: &str = "rig.json";
 /// Attachment: the rig file as it was read.
@@ -122,18 +128,23 @@ impl Header<'_> {
 impl RunMetadata {
     pub(crate) fn to_record(&self) -> mcap::records::Metadata {
         let field = |name: &str, value: String| (name.to_owned(), value);
-        mcap::records::Metadata {
-            name: METADATA_NAME.into(),
-            metadata: BTreeMap::from([
-                field("run_id", self.run_id.clone()),
-                field("experiment", self.experiment.clone()),
-                field("who", self.who.clone()),
-                field("rig", self.rig.clone()),
-                field("script", self.script.clone()),
-                field("simulated", self.simulated.to_string()),
-                field("started_wall_ns", self.started.ns().to_string()),
-            ]),
-        }
+        let mut metadata = BTreeMap::from([
+            field("run_id", self.run_id.clone()),
+            field("experiment", self.experiment.clone()),
+            field("who", self.who.clone()),
+            field("rig", self.rig.clone()),
+            field("script", self.script.clone()),
+            field("simulated", self.simulated.to_string()),
+            field("started_wall_ns", self.started.ns().to_string()),
+        ]);
+        metadata.insert(CHECKSUM.into(), checksum(&metadata));
+        mcap::records::Metadata { name: METADATA_NAME.into(), metadata }
+    }
+
+    /// False if the record has a checksum, and it is wrong.
+    pub(crate) fn checked(record: &mcap::records::Metadata) -> bool {
+        record.name != METADATA_NAME
+            || record.metadata.get(CHECKSUM).is_none_or(|written| *written == checksum(&record.metadata))
     }
 
     /// Reads the metadata record; the error is the name of the field that is missing or wrong.
@@ -149,4 +160,14 @@ impl RunMetadata {
             started: WallTime::from_ns(field("started_wall_ns")?.parse().map_err(|_| "started_wall_ns")?),
         })
     }
+}
+
+/// The checksum of all other fields, as text.
+fn checksum(fields: &BTreeMap<String, String>) -> String {
+    let mut hasher = crc32fast::Hasher::new();
+    for text in fields.iter().filter(|(name, _)| *name != CHECKSUM).flat_map(|(name, value)| [name, value]) {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    }
+    format!("{:08x}", hasher.finalize())
 }

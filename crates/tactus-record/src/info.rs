@@ -38,6 +38,8 @@ pub struct Info {
     pub frames: u64,
     /// Number of frames that the sensor took and that never arrived.
     pub frames_lost: u64,
+    /// Number of frames that were received, but that a damaged part of the file had.
+    pub frames_missing: u64,
     /// Number of gaps in the sequence of frames.
     pub gaps: u64,
     /// Number of presses with at least one completed dwell.
@@ -129,6 +131,7 @@ impl Counts {
             message: tally.finished().map(|finished| finished.message.clone()).unwrap_or_default(),
             frames: tally.frames(),
             frames_lost: tally.frames_lost(),
+            frames_missing: tally.frames_missing(),
             gaps: tally.gaps(),
             presses: tally.presses(),
             dwells: tally.dwells(),
@@ -158,11 +161,12 @@ impl fmt::Display for Info {
         let colon = if self.message.is_empty() { "" } else { ": " };
         let status = self.exit_status.unwrap_or("open (never closed)");
         writeln!(f, "exit status  {status}{colon}{}", self.message)?;
-        writeln!(
-            f,
-            "frames       {} recorded, {} lost in {} gaps",
-            self.frames, self.frames_lost, self.gaps
-        )?;
+        let missing = match self.frames_missing {
+            0 => String::new(),
+            missing => format!(", {missing} MISSING: they were received, and the file lacks them"),
+        };
+        let Self { frames, frames_lost, gaps, .. } = self;
+        writeln!(f, "frames       {frames} recorded, {frames_lost} lost in {gaps} gaps{missing}")?;
         writeln!(f, "presses      {} with {} dwells", self.presses, self.dwells)?;
         for (index, (topic, count)) in self.topics.iter().enumerate() {
             writeln!(f, "{:<12} {topic}: {count}", if index == 0 { "topics" } else { "" })?;
@@ -179,11 +183,6 @@ impl fmt::Display for Info {
         for (index, (name, version)) in self.versions.iter().enumerate() {
             writeln!(f, "{:<12} {name} {version}", if index == 0 { "versions" } else { "" })?;
         }
-        match &self.completeness {
-            Completeness::Complete => writeln!(f, "file         complete"),
-            Completeness::Truncated { at_byte, reason } => {
-                writeln!(f, "file         readable up to byte {at_byte}: {reason}")
-            }
-        }
+        writeln!(f, "file         {}", self.completeness)
     }
 }

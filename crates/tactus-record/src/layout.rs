@@ -5,23 +5,47 @@
 
 use mcap::records::op;
 
-/// True if every length written in the record's body stays within the body.
-pub(crate) fn fits(opcode: u8, body: &[u8]) -> bool {
-    let mut fields = Fields { rest: body };
-    let read = match opcode {
+/// True if the lengths written in a record's body add up to the length of the body.
+pub(crate) fn is_whole(opcode: u8, body: &[u8]) -> bool {
+    match opcode {
+        op::MESSAGE => body.len() >= 22,
+        // Kinds of others' making.
+        128.. => true,
+        _ => inner_bytes(opcode, body) == Some(body.len()),
+    }
+}
+
+/// Number of bytes of the record's body at the start of `bytes`, by the lengths written in it; `None` if fewer bytes are
+/// there, or if the kind has no such lengths.
+pub(crate) fn inner_bytes(opcode: u8, bytes: &[u8]) -> Option<usize> {
+    let mut fields = Fields { rest: bytes };
+    match opcode {
+        op::HEADER => fields.strings(2),
+        op::FOOTER => fields.skip(20),
         op::SCHEMA => fields.skip(2).and_then(|()| fields.strings(3)),
         op::CHANNEL => fields.skip(4).and_then(|()| fields.strings(2)).and_then(|()| fields.map()),
-        op::MESSAGE => fields.skip(22),
-        op::METADATA => fields.strings(1).and_then(|()| fields.map()),
+        op::CHUNK => fields.skip(28).and_then(|()| fields.strings(1)).and_then(|()| fields.blob()),
+        op::MESSAGE_INDEX => fields.skip(2).and_then(|()| fields.strings(1)),
+        op::CHUNK_INDEX => fields
+            .skip(32)
+            .and_then(|()| fields.strings(1))
+            .and_then(|()| fields.skip(8))
+            .and_then(|()| fields.strings(1))
+            .and_then(|()| fields.skip(16)),
         op::ATTACHMENT => fields
             .skip(16)
             .and_then(|()| fields.strings(2))
             .and_then(|()| fields.blob())
-            .and_then(|()| fields.skip(4))
-            .filter(|()| fields.rest.is_empty()),
-        _ => Some(()),
-    };
-    read.is_some()
+            .and_then(|()| fields.skip(4)),
+        op::ATTACHMENT_INDEX => fields.skip(40).and_then(|()| fields.strings(2)),
+        op::STATISTICS => fields.skip(42).and_then(|()| fields.strings(1)),
+        op::METADATA => fields.strings(1).and_then(|()| fields.map()),
+        op::METADATA_INDEX => fields.skip(16).and_then(|()| fields.strings(1)),
+        op::SUMMARY_OFFSET => fields.skip(17),
+        op::DATA_END => fields.skip(4),
+        _ => None,
+    }?;
+    Some(bytes.len() - fields.rest.len())
 }
 
 /// The rest of a body. Each method removes a field from its front, or gives `None` if too little is left.

@@ -4,7 +4,8 @@
 //! run events, safety events and the sensor's description. The rig, the script, the versions and the parameters are
 //! attachments at the start of the file, so a recording that is cut off later still says what it is.
 //!
-//! - [`Recording`] writes a recording, and loses at most half a second of it when the process is killed.
+//! - [`Recording`] writes a recording, and loses at most half a second of it when the process is killed. It goes to a
+//!   [`Storage`]: [`FileStorage`] locks its file, and keeps disk space in reserve for its end. [`space`] says how much is needed.
 //! - [`Reader`] streams a recording, complete or damaged; [`info()`] summarises it; [`recover()`] makes a complete one from a
 //!   damaged one.
 //! - [`Timeline`] gives the stage's position and phase at each frame's sampling time.
@@ -14,10 +15,15 @@
 //! Everything here blocks: callers run it on a thread of its own.
 
 pub mod rows;
+pub mod space;
 pub mod table;
+pub mod tail;
 
 mod channel;
+mod chunk;
 mod clock;
+mod completeness;
+mod confirmed;
 mod error;
 mod export;
 mod header;
@@ -28,18 +34,21 @@ mod reader;
 mod recording;
 mod recover;
 mod scan;
+mod storage;
 mod tally;
 mod timeline;
 
 pub use clock::{EpochClock, NoClock};
-pub use error::{RecordError, RowsError};
+pub use completeness::{Completeness, Damage};
+pub use confirmed::{ConfirmedPress, confirmed_presses};
+pub use error::{Missing, RecordError, RowsError};
 pub use export::{ExportSummary, export};
 pub use header::{Attachment, Header, RunMetadata, Script};
 pub use info::{AttachmentInfo, Info, info};
 pub use message::{Message, MessageKind, Recorded, Timed};
 pub use reader::{Entry, Reader, read};
 pub use recording::{Recording, Summary};
-pub use recover::{Recovery, recover};
-pub use scan::Completeness;
+pub use recover::{LastPress, Recovery, recover};
+pub use storage::{FileStorage, Storage, SyncHandle, sync_folder_of};
 pub use tally::Tally;
 pub use timeline::{Sampling, StageReport, Timeline};

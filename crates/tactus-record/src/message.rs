@@ -110,9 +110,9 @@ macro_rules! kinds {
 
             /// Writes it as its own kind.
             #[cfg(test)]
-            pub(crate) fn write<W: std::io::Write>(
+            pub(crate) fn write(
                 &self,
-                writer: &mut crate::channel::ChannelWriter<W>,
+                writer: &mut crate::channel::ChannelWriter,
                 at: TimeStamp,
             ) -> Result<(), mcap::McapError> {
                 match self {
@@ -158,6 +158,7 @@ macro_rules! kinds {
     };
 }
 
+// The order is part of the format, and only ever grows at its end: recovery knows the channels by it.
 kinds! {
     /// One reading of all elements.
     Frame(Frame) {

@@ -23,12 +23,13 @@ fn every_kind_of_the_list_is_written_to_its_channel_and_read_back() {
         started: WallTime::from_ns(1),
         simulated: true,
     };
-    let mut writer = ChannelWriter::new(Vec::new(), &header).unwrap();
+    let mut writer = ChannelWriter::new(&header).unwrap();
     let at = TimeStamp { mono: MonoTime::from_ns(1), wall: WallTime::from_ns(2) };
     for message in Message::empty() {
         message.write(&mut writer, at).unwrap();
     }
-    let bytes = writer.finish().unwrap();
+    writer.finish().unwrap();
+    let bytes = writer.take_closed();
 
     let read: Vec<(String, Message)> = Reader::new(bytes.as_slice())
         .filter_map(|entry| match entry.unwrap() {

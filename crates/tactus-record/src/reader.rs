@@ -34,11 +34,9 @@ pub enum Entry {
     },
 }
 
-/// Gives a recording's entries in order, up to its end or to the first damage. It never holds more than one chunk in
-/// memory.
+/// Gives a recording's entries in order, around whatever is damaged. It never holds more than one chunk in memory.
 ///
-/// The iterator gives an error only if the file system does. Damage ends it; [`Reader::completeness`] then says where
-/// and why.
+/// The iterator gives an error only if the file system does. At the end, [`Reader::completeness`] says what was damaged.
 pub struct Reader<R = BufReader<File>> {
     scan: Scan<R>,
     topics: BTreeMap<u16, Arc<str>>,
@@ -50,7 +48,7 @@ pub struct Reader<R = BufReader<File>> {
 /// If the file cannot be read or does not begin as an MCAP file.
 pub fn read(path: impl AsRef<Path>) -> Result<Reader, RecordError> {
     let path = path.as_ref();
-    if first_bytes(path)? != mcap::MAGIC {
+    if !is_mcap(&first_bytes(path)?) {
         return Err(RecordError::NotMcap { path: path.to_owned() });
     }
     Ok(Reader::new(BufReader::with_capacity(64 * 1024, open(path)?)))
@@ -75,6 +73,12 @@ pub(crate) fn first_bytes(path: &Path) -> Result<Vec<u8>, RecordError> {
     let mut bytes = open(path)?.take(mcap::MAGIC.len() as u64);
     bytes.read_to_end(&mut start).map_err(|source| io_error(path, source))?;
     Ok(start)
+}
+
+/// True if the first bytes are MCAP's. One of them may be damaged.
+pub(crate) fn is_mcap(first: &[u8]) -> bool {
+    first.len() == mcap::MAGIC.len()
+        && first.iter().zip(mcap::MAGIC).filter(|(byte, magic)| byte != magic).count() <= 1
 }
 
 fn open(path: &Path) -> Result<File, RecordError> {
@@ -118,7 +122,7 @@ impl<R: Read> Reader<R> {
             };
             match entry {
                 Ok(entry) => return Ok(Some(entry)),
-                Err(reason) => self.scan.give_up(reason),
+                Err(reason) => self.scan.condemn(reason),
             }
         }
         Ok(None)

@@ -11,7 +11,7 @@ use tactus_schema::{Frame, MonoTime, Rig, table::RowView};
 
 use crate::{
     Completeness, Entry, Message, RowsError, Sampling, Timeline,
-    reader::{first_bytes, io_error, read_run},
+    reader::{first_bytes, io_error, is_mcap, read_run},
     table::{Checker, TableReader},
 };
 
@@ -61,7 +61,7 @@ pub fn visit<P: AsRef<Path>>(
     };
     for path in paths.iter().map(AsRef::as_ref) {
         let start = first_bytes(path)?;
-        if start == mcap::MAGIC {
+        if is_mcap(&start) {
             sources.recording(&Timeline::read(path)?, &mut take)?;
         } else if start.starts_with(PARQUET_MAGIC) {
             sources.table(TableReader::open(path)?, &mut take)?;
@@ -114,6 +114,7 @@ impl RowSources {
             by_arrival: 0,
             bad_elements: BTreeSet::new(),
             partly_read: 0,
+            untold: 0,
         };
         let mut checker = Checker::new(timeline.rig());
         let mut index = 0;
@@ -121,7 +122,7 @@ impl RowSources {
         for entry in reader {
             let entry = entry.map_err(|source| io_error(path, source))?;
             if let Entry::Message { message: Message::Frame(frame), .. } = entry {
-                let row = frames.row(&frame)?;
+                let Some(row) = frames.row(&frame)? else { continue };
                 checker.check(&row).map_err(|fault| fault.at(path, index))?;
                 take(timeline.rig(), row)?;
                 index += 1;
@@ -191,12 +192,19 @@ struct RowMaker<'a> {
     bad_elements: BTreeSet<u32>,
     /// Number of these frames.
     partly_read: u64,
+    /// Frames of which nobody knows what the stage did.
+    untold: u64,
 }
 
 impl RowMaker<'_> {
-    fn row<'a>(&'a mut self, frame: &'a Frame) -> Result<RowView<'a>, RowsError> {
+    /// The row of a frame; `None` if it is left out.
+    fn row<'a>(&'a mut self, frame: &'a Frame) -> Result<Option<RowView<'a>>, RowsError> {
         let timeline = self.timeline;
         let sampling = timeline.sampling(frame);
+        if !timeline.knows_phase(sampling.time()) {
+            self.untold += 1;
+            return Ok(None);
+        }
         self.by_arrival += u64::from(matches!(sampling, Sampling::Arrival(_)));
         self.bad_elements.extend(frame.bad_elements.iter());
         self.partly_read += u64::from(!frame.bad_elements.is_empty());
@@ -210,7 +218,7 @@ impl RowMaker<'_> {
         let position_mm =
             position_mm.ok_or_else(|| RowsError::NoStage { path: timeline.path().to_owned() })?;
         let (phase, press) = timeline.phase(at);
-        Ok(RowView {
+        Ok(Some(RowView {
             run: &timeline.run().run_id,
             press,
             phase,
@@ -220,14 +228,29 @@ impl RowMaker<'_> {
             indenter: timeline.indenter(),
             temperature_c: None,
             counts: &frame.counts,
-        })
+        }))
     }
 
     fn warnings(&self) -> Vec<String> {
-        let Self { timeline, moved, by_arrival, partly_read, .. } = *self;
+        let Self { timeline, moved, by_arrival, partly_read, untold, .. } = *self;
         let mut warnings = Vec::new();
-        if let Completeness::Truncated { at_byte, reason } = timeline.completeness() {
-            warnings.push(format!("the recording is readable up to byte {at_byte} only: {reason}"));
+        match timeline.completeness() {
+            Completeness::Complete => {}
+            incomplete @ (Completeness::Truncated { .. } | Completeness::Damaged(_)) => {
+                warnings.push(format!("the recording is {incomplete}"));
+            }
+        }
+        match timeline.tally().frames_missing() {
+            0 => {}
+            missing => warnings.push(format!("{missing} frames were received and are not in the recording")),
+        }
+        if untold > 0 {
+            warnings.push(format!(
+                "{untold} frames are left out: the events that say what the stage did then are lost"
+            ));
+        }
+        if timeline.lacks_events() {
+            warnings.push("events are lost: a change of the covering among them would go unnoticed".into());
         }
         for (epoch, clock) in timeline.clocks() {
             if let Err(absent) = clock {

@@ -14,6 +14,7 @@ use crate::Message;
 pub struct Tally {
     frames: u64,
     frames_lost: u64,
+    frames_unaccounted: u64,
     gaps: u64,
     last_seq: Option<u64>,
     dwells: BTreeSet<(i32, u32)>,
@@ -34,10 +35,14 @@ impl Tally {
     pub fn frame(&mut self, frame: &Frame) -> u64 {
         self.time(frame.received.mono);
         self.frames += 1;
+        let lost_before = u64::from(frame.lost_before);
         let lost = self.last_seq.map_or(0, |last| {
             let step = frame.seq.saturating_sub(last);
-            u64::from(frame.lost_before).max(step.saturating_sub(1))
+            lost_before.max(step.saturating_sub(1))
         });
+        if self.last_seq.is_some() {
+            self.frames_unaccounted += lost - lost_before;
+        }
         self.last_seq = Some(frame.seq);
         self.frames_lost += lost;
         self.gaps += u64::from(lost > 0);
@@ -74,6 +79,13 @@ impl Tally {
         self.frames_lost
     }
 
+    /// Number of frames that were received and are not here, as far as the numbers of the others and the end of the run
+    /// tell: the part of the recording that had them is lost. Those that leave a gap are counted as lost, too.
+    pub fn frames_missing(&self) -> u64 {
+        let received = self.finished.as_ref().map_or(0, |finished| finished.frames);
+        self.frames_unaccounted.max(received.saturating_sub(self.frames))
+    }
+
     /// Number of gaps in the sequence of frames.
     pub fn gaps(&self) -> u64 {
         self.gaps
@@ -98,6 +110,19 @@ impl Tally {
     /// How the run ended; `None` if it never said.
     pub fn finished(&self) -> Option<&pb::RunFinished> {
         self.finished.as_ref()
+    }
+
+    /// The totals as the end of the run.
+    pub(crate) fn finish(&self, exit_status: pb::ExitStatus, message: String) -> pb::RunFinished {
+        pb::RunFinished {
+            exit_status: exit_status.into(),
+            message,
+            frames: self.frames(),
+            frames_lost: self.frames_lost(),
+            presses: self.presses(),
+            dwells: self.dwells(),
+            duration_s: self.duration().as_secs_f64(),
+        }
     }
 
     /// How the run ended; `None` if it never said.

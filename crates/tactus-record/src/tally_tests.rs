@@ -39,6 +39,7 @@ fn received_and_lost_add_up_to_what_the_sensor_took() {
     assert_eq!(lost, [0, 0, 2, 0, 5, 0]);
     assert_eq!((tally.frames(), tally.frames_lost(), tally.gaps()), (6, 7, 2));
     assert_eq!(tally.frames() + tally.frames_lost(), 22 - 10 + 1);
+    assert_eq!(tally.frames_missing(), 5, "those that no frame reports");
 }
 
 #[test]

@@ -33,6 +33,8 @@ pub struct Timeline {
     clocks: BTreeMap<u32, Result<EpochClock, NoClock>>,
     stage: Vec<StageReport>,
     phases: Vec<(MonoTime, Phase, i32)>,
+    /// Where events are lost, so that the phase is not known: from, until.
+    untold: Vec<(MonoTime, MonoTime)>,
     coverings: Vec<(MonoTime, f64)>,
     events: Vec<pb::RunEvent>,
     tally: Tally,
@@ -153,6 +155,16 @@ impl Timeline {
         let next = self.phases.partition_point(|(from, _, _)| *from <= at);
         let now = next.checked_sub(1).and_then(|index| self.phases.get(index));
         now.map_or((Phase::Idle, -1), |(_, phase, press)| (*phase, *press))
+    }
+
+    /// False where events are lost: from the last one before to the next one that says the phase.
+    pub fn knows_phase(&self, at: MonoTime) -> bool {
+        !self.untold.iter().any(|(from, until)| (from..until).contains(&&at))
+    }
+
+    /// True if events of the run are lost, as their numbers tell.
+    pub fn lacks_events(&self) -> bool {
+        !self.untold.is_empty()
     }
 
     /// Thickness of the covering in place at a time.

@@ -89,10 +89,18 @@ pub fn run_report(recording: &Path) -> Result<RunReport, ReportError> {
 
 fn notes(timeline: &Timeline, presses: &Presses, summary: &RunSummary) -> Vec<String> {
     let mut notes = Vec::new();
-    if let Completeness::Truncated { at_byte, reason } = timeline.completeness() {
-        notes.push(format!(
+    match timeline.completeness() {
+        Completeness::Complete => {}
+        Completeness::Truncated { at_byte, reason } => notes.push(format!(
             "The file is readable up to byte {at_byte} only ({reason}); this report covers the part before it."
-        ));
+        )),
+        damaged @ Completeness::Damaged(_) => {
+            notes.push(format!("The file is {damaged}. This report covers what is intact."));
+        }
+    }
+    match timeline.tally().frames_missing() {
+        0 => {}
+        missing => notes.push(format!("{missing} frames were received and are missing in the recording.")),
     }
     match timeline.tally().finished() {
         None => notes.push("The recording was never closed: how the run ended is not known.".into()),

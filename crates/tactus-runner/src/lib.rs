@@ -7,6 +7,7 @@
 //! | [`order`] | turns a request into a checked order with its run id and recording |
 //! | [`devices`] | transports, drivers and virtual devices of a rig |
 //! | [`recorder`] | writes the recording for the engine |
+//! | [`crashed`] | closes the recordings of runs whose service died |
 //! | [`twin`] | the dry run on a simulated twin |
 //! | [`embedded`] | one run in this process, without a service |
 //! | [`stage_check`] | a check of a rig's stage alone: its identity, and whether it moves as it reports |
@@ -14,6 +15,7 @@
 
 pub mod config;
 pub mod covering_file;
+pub mod crashed;
 pub mod devices;
 pub mod embedded;
 pub mod experiments;

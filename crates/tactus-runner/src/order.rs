@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use jiff::Timestamp;
 use tactus_engine::RunOrder;
 use tactus_plan::{Arguments, Limits, RigView, Script, ScriptError};
-use tactus_record::{Header, RecordError, Recording};
+use tactus_record::{Header, RecordError, Recording, space, sync_folder_of};
 use tactus_schema::{Rig, WallTime};
 
 /// A request for a run.
@@ -60,10 +60,10 @@ pub fn order(request: RunRequest, rig: &Rig, at: WallTime) -> Result<RunOrder, S
 }
 
 /// Opens the recording of an order: `recording.mcap` in a new folder of the run, below `folder`. It contains the texts of
-/// the rig's files.
+/// the rig's files. The disk must have room for the planned duration, with a margin.
 ///
 /// # Errors
-/// [`RecordError`] names the path.
+/// [`RecordError`] names the path. Nothing is left behind then.
 pub fn recording(
     order: &RunOrder,
     rig: &Rig,
@@ -71,14 +71,17 @@ pub fn recording(
     folder: &Path,
     started: WallTime,
 ) -> Result<(Recording, PathBuf), RecordError> {
+    let error = |action, path: &Path| {
+        let path = path.to_owned();
+        move |source| RecordError::Io { action, path, source }
+    };
+    std::fs::create_dir_all(folder).map_err(error("create", folder))?;
+    space::check_free(folder, rig, order.planned.map(|planned| planned.duration_s))?;
     let folder = folder.join(&order.run_id);
-    std::fs::create_dir_all(&folder).map_err(|source| RecordError::Io {
-        action: "create",
-        path: folder.clone(),
-        source,
-    })?;
+    std::fs::create_dir(&folder).map_err(error("create", &folder))?;
+    sync_folder_of(&folder).map_err(error("sync the folder of", &folder))?;
     let path = folder.join("recording.mcap");
-    let recording = Recording::create(
+    let created = Recording::create(
         &path,
         &Header {
             run_id: &order.run_id,
@@ -96,8 +99,12 @@ pub fn recording(
             started,
             simulated: rig.simulated,
         },
-    )?;
-    Ok((recording, path))
+    );
+    if created.is_err() {
+        // An error of the removal would hide the one that matters.
+        drop(std::fs::remove_dir(&folder));
+    }
+    Ok((created?, path))
 }
 
 /// `20260131-142530`, UTC.

@@ -1,14 +1,45 @@
 //! Writes the engine's recording: directly in virtual time, on a separate thread in real time.
+//!
+//! | thread | does | waits for |
+//! |---|---|---|
+//! | the engine's | queues each message, and checks how old the oldest unwritten one is | nothing |
+//! | recorder | writes the messages, closes a chunk after half a second | the queue, the disk |
+//! | recorder-sync | makes durable what was written | the recorder's word, every two seconds of the run; the disk |
+//!
+//! A disk that is slow to sync delays only the last of them.
 
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::thread::{self, JoinHandle};
+mod backlog;
+
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use tactus_engine::{Record, RecordFailure};
-use tactus_record::{RecordError, Recording};
-use tactus_schema::{Frame, TimeStamp, pb};
+use tactus_record::{RecordError, Recording, Storage, SyncHandle};
+use tactus_schema::{Frame, MonoTime, TimeStamp, pb};
+use tracing::{error, warn};
 
-/// Capacity of the queue to the disk: about a minute of frames, reports and events. If it is full the run fails.
+use backlog::{Backlog, Verdict};
+
+/// Capacity of the queue to the disk, in messages. The backlog's age fails a run earlier, except at rates beyond 4 kHz.
 const QUEUE: usize = 4096;
+
+/// Without messages for so long, the current chunk is closed.
+const IDLE: Duration = Duration::from_millis(250);
+
+/// What was written is made durable at least this often, in time of the run: with the disk's time for it, within five seconds.
+const SYNC_EVERY: Duration = Duration::from_secs(2);
+
+/// Data that are older than this and not durable are an alarm.
+const UNSYNCED_MAX: Duration = Duration::from_secs(5);
+
+/// The longest that the end of a run waits for the disk.
+const FINISH_PATIENCE: Duration = Duration::from_secs(10);
+
+/// No time: nothing is waiting.
+const NEVER: i64 = i64::MIN;
 
 /// Writes directly: in virtual time nothing has to keep up with a clock.
 #[derive(Debug)]
@@ -18,18 +49,61 @@ pub struct DirectRecorder(pub Recording);
 #[derive(Debug)]
 pub struct ThreadRecorder {
     entries: SyncSender<Entry>,
-    writer: JoinHandle<Result<(), RecordError>>,
+    backlog: Backlog,
+    gauge: Gauge,
+    ended: Receiver<Result<(), RecordError>>,
+    path: String,
 }
 
-/// The disk could not keep up, or writing failed earlier.
+/// What a recorder is behind with, for health messages and watchdogs. Clones show the same recorder.
+#[derive(Debug, Clone, Default)]
+pub struct Gauge(Arc<Readings>);
+
+#[derive(Debug)]
+struct Readings {
+    /// Number of messages that were written.
+    written: AtomicU64,
+    /// Time of the oldest message that waits.
+    oldest_ns: AtomicI64,
+    /// Size of the messages that wait.
+    waiting_bytes: AtomicU64,
+    /// Everything up to this time of the run is durable.
+    synced_ns: AtomicI64,
+    /// The first failure of one of the recorder's threads.
+    failure: Mutex<Option<String>>,
+}
+
+impl Default for Readings {
+    fn default() -> Self {
+        Self {
+            written: AtomicU64::new(0),
+            oldest_ns: AtomicI64::new(NEVER),
+            waiting_bytes: AtomicU64::new(0),
+            synced_ns: AtomicI64::new(NEVER),
+            failure: Mutex::default(),
+        }
+    }
+}
+
+/// Why a message was not taken, or the recording is not whole.
 #[derive(Debug, thiserror::Error)]
 enum QueueError {
-    #[error("the disk cannot keep up: {QUEUE} entries are waiting to be written")]
-    Full,
-    #[error("the recording's thread ended early; its error follows when the recording is closed")]
+    #[error(
+        "the disk cannot keep up with {path}: messages wait to be written since {:.2} s; {messages} of them \
+         ({bytes} bytes), with {frames} frames",
+        age.as_secs_f64()
+    )]
+    Late { path: String, age: Duration, messages: u64, frames: u64, bytes: u64 },
+    #[error("{0}")]
+    Failed(String),
+    #[error("the recording's thread ended early; this is a defect of Tactus")]
     Gone,
-    #[error("the recording's thread panicked; this is a defect of Tactus")]
-    Panicked,
+    #[error(
+        "the disk did not answer within {} s: {messages} messages with {frames} frames are not in {path}, which has no end; \
+         the service closes it at its next start",
+        FINISH_PATIENCE.as_secs()
+    )]
+    Hung { path: String, messages: u64, frames: u64 },
 }
 
 #[derive(Debug)]
@@ -67,73 +141,308 @@ impl Record for DirectRecorder {
     }
 }
 
-impl ThreadRecorder {
-    /// Starts the thread.
-    ///
-    /// # Errors
-    /// If the system gives no thread.
-    pub fn start(recording: Recording) -> std::io::Result<Self> {
-        // Overflow policy: never dropped; a full queue is an error that fails the run.
-        let (entries, queue) = sync_channel(QUEUE);
-        let writer =
-            thread::Builder::new().name("recorder".into()).spawn(move || write_all(recording, &queue))?;
-        Ok(Self { entries, writer })
+impl Gauge {
+    /// Number of messages that were written: it rises while the recorder makes progress.
+    pub fn written(&self) -> u64 {
+        self.0.written.load(Ordering::Relaxed)
     }
 
-    fn queue(&self, entry: Entry) -> Result<(), RecordFailure> {
-        self.entries.try_send(entry).map_err(|refused| {
-            RecordFailure(Box::new(match refused {
-                TrySendError::Full(_) => QueueError::Full,
-                TrySendError::Disconnected(_) => QueueError::Gone,
-            }))
-        })
+    /// Age of the oldest message that waits to be written; zero if none does.
+    pub fn backlog(&self, now: MonoTime) -> Duration {
+        age(&self.0.oldest_ns, now).unwrap_or_default()
+    }
+
+    /// Size of the messages that wait to be written.
+    pub fn waiting_bytes(&self) -> u64 {
+        self.0.waiting_bytes.load(Ordering::Relaxed)
+    }
+
+    /// Age of the oldest data that a loss of power would take; `None` if nothing is being recorded.
+    pub fn unsynced(&self, now: MonoTime) -> Option<Duration> {
+        age(&self.0.synced_ns, now)
+    }
+
+    /// The failure of the recorder, if it has failed.
+    pub fn failure(&self) -> Option<String> {
+        self.0.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn fail(&self, failure: &RecordError) {
+        error!(%failure, "the recording fails");
+        self.0
+            .failure
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert_with(|| failure.to_string());
+    }
+
+    fn show(&self, backlog: &Backlog) {
+        self.0.oldest_ns.store(backlog.oldest().map_or(NEVER, MonoTime::ns), Ordering::Relaxed);
+        self.0.waiting_bytes.store(backlog.bytes(), Ordering::Relaxed);
+    }
+
+    fn reset(&self) {
+        self.0.written.store(0, Ordering::Relaxed);
+        self.clear();
+        *self.0.failure.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    fn clear(&self) {
+        self.0.oldest_ns.store(NEVER, Ordering::Relaxed);
+        self.0.waiting_bytes.store(0, Ordering::Relaxed);
+        self.0.synced_ns.store(NEVER, Ordering::Relaxed);
+    }
+}
+
+fn age(since_ns: &AtomicI64, now: MonoTime) -> Option<Duration> {
+    match since_ns.load(Ordering::Relaxed) {
+        NEVER => None,
+        since_ns => Some(now.since(MonoTime::from_ns(since_ns))),
+    }
+}
+
+impl ThreadRecorder {
+    /// Starts the threads.
+    ///
+    /// # Errors
+    /// If the system gives no threads or no second handle to the file.
+    pub fn start<S: Storage + 'static>(recording: Recording<S>) -> std::io::Result<Self> {
+        Self::start_with(recording, Gauge::default())
+    }
+
+    /// Starts the threads. The gauge shows this recorder from now on.
+    ///
+    /// # Errors
+    /// As [`ThreadRecorder::start`].
+    pub fn start_with<S: Storage + 'static>(recording: Recording<S>, gauge: Gauge) -> std::io::Result<Self> {
+        gauge.reset();
+        let path = recording.path().display().to_string();
+        // Overflow policy: never dropped; a full queue is an error that fails the run.
+        let (entries, queue) = sync_channel(QUEUE);
+        // The result of one recording.
+        let (end, ended) = sync_channel(1);
+        let sync = recording.sync_handle().map_err(std::io::Error::other)?;
+        // One wish at a time: a second one while the disk is busy would say nothing new.
+        let (sync_to, wishes) = sync_channel(1);
+        let of_sync = gauge.clone();
+        thread::Builder::new()
+            .name("recorder-sync".into())
+            .spawn(move || sync_all(sync, &wishes, &of_sync))?;
+        let writer =
+            Writer { recording, gauge: gauge.clone(), sync_to, wished: None, at: MonoTime::default() };
+        thread::Builder::new().name("recorder".into()).spawn(move || {
+            // Nobody may wait for the result any more.
+            let _told = end.send(writer.write_all(&queue));
+        })?;
+        Ok(Self { entries, backlog: Backlog::default(), gauge, ended, path })
+    }
+
+    /// Checks without a message whether the recorder keeps up: for times in which no message comes.
+    ///
+    /// # Errors
+    /// As for a message.
+    pub fn check(&mut self, now: MonoTime) -> Result<(), RecordFailure> {
+        if let Some(failure) = self.gauge.failure() {
+            return Err(RecordFailure(Box::new(QueueError::Failed(failure))));
+        }
+        let verdict = self.backlog.check(self.gauge.written(), now);
+        self.gauge.show(&self.backlog);
+        match verdict {
+            Verdict::KeepsUp => Ok(()),
+            Verdict::Alarm(age) => {
+                let backlog_s = age.as_secs_f64();
+                warn!(backlog_s, messages = self.backlog.messages(), path = self.path, "the disk is late");
+                Ok(())
+            }
+            Verdict::TooLate(age) => Err(self.late(age)),
+        }
+    }
+
+    /// As [`Record::finish`], but waits for the disk this long at most.
+    ///
+    /// # Errors
+    /// As [`Record::finish`].
+    pub fn finish_within(self, patience: Duration) -> Result<(), RecordFailure> {
+        let Self { entries, mut backlog, gauge, ended, path } = self;
+        // The thread ends when the queue does; then everything is on disk.
+        drop(entries);
+        let result = match ended.recv_timeout(patience) {
+            Ok(written) => written.map_err(failure),
+            Err(RecvTimeoutError::Disconnected) => Err(RecordFailure(Box::new(QueueError::Gone))),
+            Err(RecvTimeoutError::Timeout) => {
+                backlog.settle(gauge.written());
+                let (messages, frames) = (backlog.messages(), backlog.frames());
+                Err(RecordFailure(Box::new(QueueError::Hung { path, messages, frames })))
+            }
+        };
+        gauge.clear();
+        // A failure beside the writer's, such as of a sync, fails the run, too.
+        result.and(
+            gauge.failure().map_or(Ok(()), |text| Err(RecordFailure(Box::new(QueueError::Failed(text))))),
+        )
+    }
+
+    fn queue(&mut self, entry: Entry, at: MonoTime) -> Result<(), RecordFailure> {
+        let (bytes, is_frame) = (entry.bytes(), matches!(entry, Entry::Frame(_)));
+        match self.entries.try_send(entry).err() {
+            None => {
+                self.backlog.queued(at, bytes, is_frame);
+                self.check(at)
+            }
+            Some(TrySendError::Full(_)) => {
+                self.check(at)?;
+                let age = self.gauge.backlog(at);
+                Err(self.late(age))
+            }
+            Some(TrySendError::Disconnected(_)) => {
+                self.check(at)?;
+                Err(RecordFailure(Box::new(QueueError::Gone)))
+            }
+        }
+    }
+
+    fn late(&self, age: Duration) -> RecordFailure {
+        RecordFailure(Box::new(QueueError::Late {
+            path: self.path.clone(),
+            age,
+            messages: self.backlog.messages(),
+            frames: self.backlog.frames(),
+            bytes: self.backlog.bytes(),
+        }))
     }
 }
 
 impl Record for ThreadRecorder {
     fn sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordFailure> {
-        self.queue(Entry::SensorInfo(info.clone(), at))
+        self.queue(Entry::SensorInfo(info.clone(), at), at.mono)
     }
 
     fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure> {
-        self.queue(Entry::Frame(frame.clone()))
+        self.queue(Entry::Frame(frame.clone()), frame.received.mono)
     }
 
     fn stage(&mut self, state: &pb::StageState) -> Result<(), RecordFailure> {
-        self.queue(Entry::Stage(*state))
+        self.queue(Entry::Stage(*state), MonoTime::from_ns(state.t_mono_ns))
     }
 
     fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure> {
-        self.queue(Entry::Event(event.clone()))
+        self.queue(Entry::Event(event.clone()), MonoTime::from_ns(event.t_mono_ns))
     }
 
     fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure> {
-        self.queue(Entry::Safety(event.clone()))
+        self.queue(Entry::Safety(event.clone()), MonoTime::from_ns(event.t_mono_ns))
     }
 
     fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
-        // The thread ends when the queue does; then everything is on disk.
-        drop(self.entries);
-        match self.writer.join() {
-            Ok(written) => written.map_err(failure),
-            Err(_) => Err(RecordFailure(Box::new(QueueError::Panicked))),
+        self.finish_within(FINISH_PATIENCE)
+    }
+}
+
+impl Entry {
+    /// About how much memory it takes.
+    fn bytes(&self) -> u64 {
+        let text = match self {
+            Self::Frame(frame) => size_of_val(&*frame.counts),
+            Self::Event(event) => prost::Message::encoded_len(event),
+            Self::Safety(event) => prost::Message::encoded_len(event),
+            Self::SensorInfo(info, _) => prost::Message::encoded_len(info),
+            Self::Stage(_) => 0,
+        };
+        (size_of::<Self>() + text) as u64
+    }
+
+    fn at(&self) -> MonoTime {
+        match self {
+            Self::SensorInfo(_, at) => at.mono,
+            Self::Frame(frame) => frame.received.mono,
+            Self::Stage(state) => MonoTime::from_ns(state.t_mono_ns),
+            Self::Event(event) => MonoTime::from_ns(event.t_mono_ns),
+            Self::Safety(event) => MonoTime::from_ns(event.t_mono_ns),
         }
     }
 }
 
-fn write_all(mut recording: Recording, queue: &Receiver<Entry>) -> Result<(), RecordError> {
-    for entry in queue {
-        match &entry {
-            Entry::SensorInfo(info, at) => recording.write_sensor_info(info, *at),
-            Entry::Frame(frame) => recording.write(frame),
-            Entry::Stage(state) => recording.write(state),
-            Entry::Event(event) => recording.write(event),
-            Entry::Safety(event) => recording.write(event),
-        }?;
+/// The recorder thread.
+struct Writer<S> {
+    recording: Recording<S>,
+    gauge: Gauge,
+    sync_to: SyncSender<MonoTime>,
+    /// Time of the run at which a sync was last wished for.
+    wished: Option<MonoTime>,
+    at: MonoTime,
+}
+
+impl<S: Storage> Writer<S> {
+    /// Writes until the queue ends. After a failure it takes what comes nevertheless: the recording keeps what it can.
+    fn write_all(mut self, queue: &Receiver<Entry>) -> Result<(), RecordError> {
+        loop {
+            let written = match queue.recv_timeout(IDLE) {
+                Ok(entry) => {
+                    let written = self.write(&entry);
+                    self.gauge.0.written.fetch_add(1, Ordering::Relaxed);
+                    written
+                }
+                Err(RecvTimeoutError::Timeout) => self.recording.flush(),
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
+            if let Err(failure) = written
+                && self.gauge.failure().is_none()
+            {
+                self.gauge.fail(&failure);
+            }
+        }
+        // The handle for syncs must not outlive the recording by more than the sync in progress.
+        drop(self.sync_to);
+        self.recording.finish().map(drop)
     }
-    recording.finish().map(drop)
+
+    fn write(&mut self, entry: &Entry) -> Result<(), RecordError> {
+        self.at = self.at.max(entry.at());
+        self.wish_for_sync();
+        match entry {
+            Entry::SensorInfo(info, at) => self.recording.write_sensor_info(info, *at),
+            Entry::Frame(frame) => self.recording.write(frame),
+            Entry::Stage(state) => self.recording.write(state),
+            Entry::Event(event) => self.recording.write(event),
+            Entry::Safety(event) => self.recording.write(event),
+        }
+    }
+
+    fn wish_for_sync(&mut self) {
+        let wished = *self.wished.get_or_insert_with(|| {
+            self.gauge.0.synced_ns.store(self.at.ns(), Ordering::Relaxed);
+            self.at
+        });
+        if self.at.since(wished) < SYNC_EVERY {
+            return;
+        }
+        self.wished = Some(self.at);
+        if self.sync_to.try_send(self.at).is_err() {
+            let unsynced = self.gauge.unsynced(self.at).unwrap_or_default();
+            if unsynced > UNSYNCED_MAX {
+                warn!(
+                    unsynced_s = unsynced.as_secs_f64(),
+                    "the disk is slow: a loss of power would cost these seconds"
+                );
+            }
+        }
+    }
+}
+
+/// The sync thread. Its failure fails the run.
+fn sync_all(mut sync: Box<dyn SyncHandle>, wishes: &Receiver<MonoTime>, gauge: &Gauge) {
+    for at in wishes {
+        match sync.sync() {
+            Ok(()) => gauge.0.synced_ns.store(at.ns(), Ordering::Relaxed),
+            Err(failure) => return gauge.fail(&failure),
+        }
+    }
 }
 
 fn failure(error: RecordError) -> RecordFailure {
     RecordFailure(Box::new(error))
 }
+
+#[cfg(test)]
+#[path = "recorder_tests.rs"]
+mod tests;

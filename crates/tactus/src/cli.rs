@@ -63,7 +63,7 @@ enum CliCommand {
     Record(RecordCommand),
     /// Write the measurement table (Parquet) of recordings.
     Export(ExportArgs),
-    /// Repair a recording that was cut off.
+    /// Repair a recording that was cut off or is damaged.
     Recover(RecoverArgs),
     /// Write the report of a recording.
     Report(ReportArgs),
@@ -204,7 +204,7 @@ pub(crate) struct ExportArgs {
 /// Arguments of `recover`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RecoverArgs {
-    /// The recording that was cut off.
+    /// The recording that was cut off or is damaged.
     pub(crate) recording: PathBuf,
     /// The repaired recording to write; default: beside the original.
     #[arg(short, long, value_name = "FILE")]

@@ -24,6 +24,7 @@ pub(super) struct TimelineBuilder {
     stage: Vec<StageReport>,
     phases: Vec<(MonoTime, Phase, i32)>,
     coverings: Vec<(MonoTime, f64)>,
+    untold: Vec<(MonoTime, MonoTime)>,
     events: Vec<pb::RunEvent>,
     tally: Tally,
 }
@@ -74,8 +75,17 @@ impl TimelineBuilder {
 
     fn event(&mut self, event: pb::RunEvent) {
         let at = MonoTime::from_ns(event.t_mono_ns);
+        let (next, since) = self.events.last().map_or((0, MonoTime::from_ns(i64::MIN)), |last| {
+            (last.seq + 1, MonoTime::from_ns(last.t_mono_ns))
+        });
+        if event.seq > next {
+            self.untold.push((since, MonoTime::from_ns(i64::MAX)));
+        }
         match &event.event {
             Some(Event::PhaseChanged(changed)) => {
+                for (_, until) in &mut self.untold {
+                    *until = at.min(*until);
+                }
                 if let Ok(phase) = Phase::try_from(changed.phase()) {
                     self.phases.push((at, phase, changed.press.max(-1)));
                 }
@@ -101,6 +111,12 @@ impl TimelineBuilder {
         };
         let rig =
             Rig::from_json(&rig_json).map_err(|source| RecordError::Rig { path: path.to_owned(), source })?;
+        let lost_chunks = matches!(&completeness, Completeness::Damaged(damage) if damage.chunks > 0);
+        if lost_chunks && self.tally.finished().is_none() {
+            // Nothing tells whether the last event here was the last.
+            let since = self.events.last().map_or(i64::MIN, |last| last.t_mono_ns);
+            self.untold.push((MonoTime::from_ns(since), MonoTime::from_ns(i64::MAX)));
+        }
         // Sorted by the messages' own times; a stable sort keeps the order of equal times.
         self.stage.sort_by_key(|report| report.at);
         self.stage.dedup_by(|later, kept| {
@@ -130,6 +146,7 @@ impl TimelineBuilder {
             clocks,
             stage: self.stage,
             phases: self.phases,
+            untold: self.untold,
             coverings: self.coverings,
             events: self.events,
             tally: self.tally,

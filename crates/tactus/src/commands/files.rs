@@ -4,11 +4,15 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use tactus_record::Completeness;
+use tactus_schema::pb;
 
 use crate::cli::{Common, ExportArgs, RecoverArgs, ReportArgs};
 use crate::commands::run::write_report;
 use crate::exit::Exit;
 use crate::output::print_fields;
+
+/// The exit status of a run whose service died, as recordings tell it.
+const CRASHED: &str = pb::ExitStatus::Crashed.word();
 
 pub(crate) fn info(common: &Common, file: &Path) -> anyhow::Result<Exit> {
     let info = tactus_record::info(file)?;
@@ -19,9 +23,14 @@ pub(crate) fn info(common: &Common, file: &Path) -> anyhow::Result<Exit> {
     }
     let whole = info.completeness == Completeness::Complete && info.exit_status.is_some();
     if !whole {
-        eprintln!("tactus: this recording was cut off; `tactus recover {}` repairs it", file.display());
+        let is_damaged = matches!(info.completeness, Completeness::Damaged(_));
+        let what = if is_damaged { "is damaged" } else { "was cut off" };
+        eprintln!("tactus: this recording {what}; `tactus recover {}` repairs it", file.display());
     }
-    Ok(if whole { Exit::Done } else { Exit::Degraded })
+    if info.frames_missing > 0 {
+        eprintln!("tactus: {} frames were received and are missing in this recording", info.frames_missing);
+    }
+    Ok(if whole && info.frames_missing == 0 { Exit::Done } else { Exit::Degraded })
 }
 
 pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit> {
@@ -51,16 +60,28 @@ pub(crate) fn recover(common: &Common, args: &RecoverArgs) -> anyhow::Result<Exi
             json!({
                 "recording": out,
                 "damage": recovery.damage,
+                "lossy": recovery.is_lossy,
                 "messages": recovery.messages,
-                "closed_as_crashed": recovery.closed,
+                "frames_missing": recovery.frames_missing,
+                "closed_as_crashed": recovery.closed && recovery.info.exit_status == Some(CRASHED),
+                "rebuilt": recovery.rebuilt,
                 "info": recovery.info,
             })
         );
     } else {
         println!("recovered {} messages into {}", recovery.messages, out.display());
+        println!("the original is {}", recovery.damage);
+        for what in &recovery.rebuilt {
+            println!("rebuilt from the rest: {what}");
+        }
         println!("{}", recovery.info);
     }
-    Ok(Exit::Done)
+    let lacks = recovery.is_lossy || recovery.frames_missing > 0;
+    if lacks {
+        let missing = recovery.frames_missing;
+        eprintln!("tactus: parts of the original could not be read; at least {missing} frames are missing");
+    }
+    Ok(if lacks { Exit::Degraded } else { Exit::Done })
 }
 
 pub(crate) fn report(common: &Common, args: &ReportArgs) -> anyhow::Result<Exit> {

@@ -117,8 +117,8 @@ fn check_recording(file: &Path) -> anyhow::Result<String> {
             info.run_id, info.frames, info.frames_lost
         )),
         (Completeness::Complete, None) => bail!("the run was never closed; `tactus recover` closes it"),
-        (Completeness::Truncated { at_byte, reason }, _) => {
-            bail!("damaged at byte {at_byte}: {reason}; `tactus recover` saves what is before it")
+        (incomplete @ (Completeness::Truncated { .. } | Completeness::Damaged(_)), _) => {
+            bail!("{incomplete}; `tactus recover` saves everything that is intact")
         }
     }
 }
