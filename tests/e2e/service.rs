@@ -210,7 +210,10 @@ fn stop_pause_and_resume_work_from_another_client() {
     let script = lab.script("presses.star", PRESSES);
     let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
     wait_until_pressing(&lab);
-    assert_eq!(lab.tactus(&["pause"]).code, Some(0));
+    let held = lab.tactus(&["pause"]);
+    assert_eq!(held.code, Some(5), "the client that runs the experiment holds the lease: {held:?}");
+    assert!(held.err.contains("holds the lease") && held.err.contains("--take-over"), "{held:?}");
+    assert_eq!(lab.tactus(&["pause", "--take-over", "to look"]).code, Some(0));
     let paused = loop {
         let status = status(&lab);
         if status["run"]["phase"] == "paused" {
