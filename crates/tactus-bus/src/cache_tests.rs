@@ -1,5 +1,3 @@
-use std::collections::VecDeque;
-
 use super::{KeptMessages, wanted};
 
 /// The numbers found after so many messages, of which the last `capacity` are kept.
@@ -50,12 +48,12 @@ fn what_cannot_be_read_is_taken_as_not_said() {
 fn the_kept_messages_are_bounded_in_bytes_and_the_last_is_kept_in_any_case() {
     let mut kept = KeptMessages::new(65_536);
     for _ in 0..40 {
-        kept.push(ZBytes::from(vec![0; 1 << 20]));
+        kept.push(vec![0; 1 << 20].into());
     }
     assert_eq!(kept.find(&(0..=u32::MAX), usize::MAX).len(), 16);
-    kept.push(ZBytes::from(vec![0; 20 << 20]));
+    kept.push(vec![0; 20 << 20].into());
     let all = kept.find(&(0..=u32::MAX), usize::MAX);
     assert_eq!(all.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [40]);
-    kept.push(ZBytes::from(vec![0; 1]));
+    kept.push(vec![0; 1].into());
     assert_eq!(kept.find(&(0..=u32::MAX), usize::MAX).len(), 1);
 }

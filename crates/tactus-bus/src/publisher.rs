@@ -88,9 +88,13 @@ impl Lanes {
     pub(crate) fn new() -> Self {
         Self {
             // Drop-oldest, counted: 10 s of frames.
-            frames: Arc::new(Queue::bounded(300, WAITING_BYTES_MAX, |message: &Outgoing| message.payload.len())),
+            frames: Arc::new(Queue::bounded(300, WAITING_BYTES_MAX, |message: &Outgoing| {
+                message.payload.len()
+            })),
             // Drop-oldest, counted: far more than a run sends while stalled clients cost a millisecond per message each.
-            updates: Arc::new(Queue::bounded(8_192, WAITING_BYTES_MAX, |message: &Outgoing| message.payload.len())),
+            updates: Arc::new(Queue::bounded(8_192, WAITING_BYTES_MAX, |message: &Outgoing| {
+                message.payload.len()
+            })),
         }
     }
 

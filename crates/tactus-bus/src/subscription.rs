@@ -99,10 +99,8 @@ impl<M: Published> Subscription<M> {
             foreign: AtomicU64::new(0),
         });
         let receiver = Receiver(reception.clone(), trust.clone());
-        let builder = session
-            .declare_subscriber(key.clone())
-            .callback(move |sample| receiver.hear(sample))
-            .advanced();
+        let builder =
+            session.declare_subscriber(key.clone()).callback(move |sample| receiver.hear(sample)).advanced();
         let recovery = RecoveryConfig::default().heartbeat();
         let subscriber = if history == History::None { builder } else { builder.recovery(recovery) }
             .await
@@ -153,15 +151,7 @@ impl<M: Published> Subscription<M> {
             if is_own {
                 return sample;
             }
-            self.foreign += 1;
-            if self.foreign.is_power_of_two() {
-                let key = sample.as_ref().map(|sample| sample.key_expr().as_str());
-                tracing::warn!(
-                    key,
-                    foreign = self.foreign,
-                    "messages that are not the service's are dropped"
-                );
-            }
+            self.reception.drop_foreign();
         }
     }
 

@@ -42,8 +42,8 @@ use token::Token;
 #[derive(Debug, Parser)]
 #[command(name = "tactus-web", version, about)]
 struct Options {
-    /// Address of the service.
-    #[arg(long, env = "TACTUS_ENDPOINT", default_value = "tcp/127.0.0.1:7447")]
+    /// Address of the service. Default: the socket of the installed service if it has one, else loopback.
+    #[arg(long, env = "TACTUS_ENDPOINT", default_value_t = Endpoint::of_this_machine())]
     endpoint: Endpoint,
     /// Name of the rig, if several are served.
     #[arg(long, env = "TACTUS_RIG")]

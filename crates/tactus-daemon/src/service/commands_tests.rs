@@ -141,7 +141,7 @@ async fn ask_while_homing() -> Result<u32, mpsc::RecvTimeoutError> {
 
     let homing = tokio::spawn(async move { engine.reset().await });
     let (done, ended) = mpsc::channel();
-    std::thread::spawn(move || {
+    thread::spawn(move || {
         let mut homed = 0;
         while !homing.is_finished() {
             let stage = desk.reply(Ok(())).stage.unwrap();
