@@ -1,6 +1,7 @@
 """The dashboard in a real browser. Screenshots go to target/browser."""
 
 import pathlib
+import re
 import shutil
 import sys
 
@@ -44,8 +45,8 @@ def dashboard(web, browser):
     errors = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     # The console also reports a command that the service refuses as an error.
-    refused = "the server responded with a status of 409"
-    page.on("console", lambda message: message.type in ("error", "warning") and refused not in message.text and errors.append(message.text))
+    refused = re.compile("the server responded with a status of (409|423)")
+    page.on("console", lambda message: message.type in ("error", "warning") and not refused.search(message.text) and errors.append(message.text))
     PICTURES.mkdir(parents=True, exist_ok=True)
     page.keep = lambda name: page.screenshot(path=PICTURES / f"{name}.png")
     page.goto(web)

@@ -31,6 +31,14 @@ def test_a_run_is_watched_and_stopped(lab, dashboard):
     assert max(rises) > 100
     page.keep("pressing")
 
+    # The client that runs the experiment holds the lease: whoever takes it over says why.
+    page.locator("#pause").click()
+    expect(page.locator("#holder")).to_contain_text("holds the lease")
+    page.locator("#reason").fill("to show it, with an s")
+    page.get_by_role("button", name="Take over").click()
+    expect(page.locator("#answer")).to_have_text("pause: done")
+    page.keep("taken-over")
+
     page.locator("#stop").click()
     expect(page.locator("#stopped")).to_have_text("stop: done")
     expect(page.locator("#run")).to_contain_text("finished: stopped")

@@ -2,11 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::fs;
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 
 use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{Process, ServiceUnderTest, repository, tactus};
+use tactus_e2e::{Process, ServiceUnderTest, free_endpoint, repository, tactus};
 use tactus_record::{Entry, Message};
 use tactus_schema::pb::{self, run_event::Event};
 
@@ -207,10 +208,14 @@ fn stop_pause_and_resume_work_from_another_client() {
     assert_eq!(lab.tactus(&["pause"]).code, Some(1), "no run can be paused");
     assert_eq!(lab.tactus(&["stop"]).code, Some(0), "stop is never refused");
 
-    let script = lab.script("presses.star", PRESSES);
+    // Long enough for slow machines: it is stopped in the end.
+    let script = lab.script("presses.star", &PRESSES.replace("range(4)", "range(400)"));
     let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
     wait_until_pressing(&lab);
-    assert_eq!(lab.tactus(&["pause"]).code, Some(0));
+    let held = lab.tactus(&["pause"]);
+    assert_eq!(held.code, Some(5), "the client that runs the experiment holds the lease: {held:?}");
+    assert!(held.err.contains("holds the lease") && held.err.contains("--take-over"), "{held:?}");
+    assert_eq!(lab.tactus(&["pause", "--take-over", "to look"]).code, Some(0));
     let paused = loop {
         let status = status(&lab);
         if status["run"]["phase"] == "paused" {
@@ -310,4 +315,30 @@ fn an_alarm_fails_the_run_and_only_an_explicit_reset_makes_the_stage_move_again(
     assert_eq!(reset.json()["stage"]["status"], "idle");
     let done = lab.tactus(&["--json", "run", &presses, "--no-report"]);
     assert_eq!(done.code, Some(0), "{done:?}");
+}
+
+#[test]
+fn a_stop_needs_no_sensor_no_name_and_no_free_connection() {
+    let folder = tempfile::TempDir::new().unwrap();
+    fs::copy(repository("config/rigs/pty.toml"), folder.path().join("rig.toml")).unwrap();
+    let endpoint = free_endpoint();
+    let config = format!("rig = \"rig.toml\"\nrecordings = \"runs\"\n[bus]\nlisten = [\"{endpoint}\"]\n");
+    fs::write(folder.path().join("tactusd.toml"), config).unwrap();
+    // Its devices do not exist, so it is never ready.
+    let mut daemon = Process::start("tactusd", folder.path(), &["--config", "tactusd.toml"]);
+    daemon.wait_for("tactusd starts");
+    let address = endpoint.strip_prefix("tcp/").unwrap();
+    let mut idle = Vec::new();
+    while idle.len() < 900 {
+        match TcpStream::connect(address) {
+            Ok(socket) => idle.push(socket),
+            // It listens a moment later.
+            Err(error) if idle.is_empty() && error.kind() == std::io::ErrorKind::ConnectionRefused => {}
+            Err(_) => break,
+        }
+    }
+    assert!(idle.len() >= 200, "{}", idle.len());
+    let said = tactus(folder.path(), &["--endpoint", &endpoint, "stop", "--reason", "smoke"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    daemon.wait_for("smoke");
 }

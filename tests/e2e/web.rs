@@ -14,6 +14,8 @@ const HOLD: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [
 struct Web {
     _process: Process,
     address: String,
+    /// The header of commands, with the token.
+    token: String,
 }
 
 impl Web {
@@ -21,8 +23,8 @@ impl Web {
         let arguments = ["--endpoint", endpoint, "--listen", "127.0.0.1:0"];
         let mut process = Process::start("tactus-web", lab.folder.path(), &arguments);
         let line = process.wait_for("http://");
-        let address = line.split("http://").nth(1).unwrap().trim().to_owned();
-        Self { _process: process, address }
+        let (address, token) = line.split("http://").nth(1).unwrap().trim().split_once("/#").unwrap();
+        Self { _process: process, address: address.to_owned(), token: format!("X-Tactus-Token: {token}\r\n") }
     }
 
     fn send(&self, request: &str, headers: &str) -> TcpStream {
@@ -85,7 +87,10 @@ fn the_page_shows_live_frames_and_stops_a_run() {
     web.until(|view| {
         view["run"]["phase"] == "running" && view["stage"]["z_mm"].as_f64().is_some_and(|z_mm| z_mm < -0.2)
     });
-    let (status, answer) = web.ask("POST /pause", "");
+    // The client that runs the experiment holds the lease.
+    let (status, answer) = web.ask("POST /pause", &web.token);
+    assert!(status == 423 && answer.contains("holds the lease"), "{answer}");
+    let (status, answer) = web.ask("POST /pause", &format!("{}X-Take-Over: smoke\r\n", web.token));
     assert_eq!(status, 204, "{answer}");
     let (status, answer) =
         web.ask("POST /stop", &format!("Origin: http://{}\r\nSec-Fetch-Site: same-origin\r\n", web.address));
@@ -94,7 +99,7 @@ fn the_page_shows_live_frames_and_stops_a_run() {
     assert_eq!(ended["run"]["exit_status"], "stopped");
     assert!(ended["run"]["message"].as_str().unwrap().contains("stopped by dashboard"), "{ended}");
     assert_eq!(client.wait().0, Some(1));
-    assert_eq!(web.ask("POST /resume", "").0, 409, "there is no run to go on with");
+    assert_eq!(web.ask("POST /resume", &web.token).0, 409, "there is no run to go on with");
 }
 
 #[test]
@@ -105,7 +110,7 @@ fn pages_of_other_sites_command_and_read_nothing() {
     for headers in
         ["Origin: http://elsewhere.example\r\n", "Origin: null\r\n", "Sec-Fetch-Site: cross-site\r\n"]
     {
-        let (status, answer) = web.ask("POST /reset", headers);
+        let (status, answer) = web.ask("POST /reset", &format!("{}{headers}", web.token));
         assert_eq!(status, 403, "{headers}: {answer}");
     }
     for path in ["GET /", "GET /live", "POST /stop"] {
@@ -113,7 +118,12 @@ fn pages_of_other_sites_command_and_read_nothing() {
         assert_eq!(status, 403, "{path}: {answer}");
     }
     web.until(|view| view["run"]["fault"].as_str().is_some_and(|fault| !fault.is_empty()));
-    assert_eq!(web.ask("POST /reset", "").0, 204);
+    for token in ["", "X-Tactus-Token: 0123\r\n"] {
+        let (status, answer) = web.ask("POST /reset", token);
+        assert!(status == 401 && answer.contains("token"), "{answer}");
+    }
+    assert_eq!(web.ask("POST /stop", "").0, 204, "a stop wants no token");
+    assert_eq!(web.ask("POST /reset", &web.token).0, 204);
     web.until(|view| view["run"]["fault"] == "");
     assert_eq!(web.ask("POST /fire", "").0, 404);
     assert_eq!(web.ask("GET /stop", "").0, 405, "looking at an address changes nothing");
@@ -127,6 +137,8 @@ fn without_a_service_it_says_so_and_finds_it_when_it_comes() {
         .until(|view| view["problem"].as_str().is_some_and(|problem| problem.contains("no service at")));
     assert_eq!(view["frame"], Value::Null);
     let (status, answer) = nobody.ask("POST /stop", "");
+    assert!(status == 409 && answer.contains("STOP WAS NOT CONFIRMED"), "{answer}");
+    let (status, answer) = nobody.ask("POST /pause", &nobody.token);
     assert!(status == 409 && answer.contains("no service at"), "{answer}");
 
     let web = Web::start(&lab, &lab.endpoint);
@@ -136,4 +148,27 @@ fn without_a_service_it_says_so_and_finds_it_when_it_comes() {
     lab.daemon = Process::start("tactusd", lab.folder.path(), &["--config", "tactusd.toml"]);
     lab.daemon.wait_for("ready");
     web.until(|view| view["frame"].is_object());
+}
+
+#[test]
+fn a_stop_finds_a_place_among_a_thousand_connections_that_ask_nothing() {
+    let lab = ServiceUnderTest::start(|rig| rig);
+    let web = Web::start(&lab, &lab.endpoint);
+    web.until(|view| view["frame"].is_object());
+    let script = lab.script("hold.star", HOLD);
+    let client = lab.start_tactus(&["--json", "run", &script, "--no-report"]);
+    web.until(|view| view["run"]["phase"] == "running");
+    let mut idle = Vec::new();
+    // As many as this process may open, 1,000 at most.
+    while idle.len() < 900
+        && let Ok(mut socket) = TcpStream::connect(&web.address)
+    {
+        // Half a request: its headers never end.
+        socket.write_all(b"POST /stop HTTP/1.1\r\nHost: ").unwrap();
+        idle.push(socket);
+    }
+    assert!(idle.len() >= 512, "{}", idle.len());
+    let (status, answer) = web.ask("POST /stop", "");
+    assert_eq!(status, 204, "{answer}");
+    assert_eq!(client.wait().0, Some(1));
 }

@@ -6,9 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+import zenoh
 
 import tactus_client
 from tactus_client import messages
+from tactus_client.client import _config
 
 COUNT_FRAMES = Path(__file__).parents[1] / "examples" / "count_frames.py"
 
@@ -104,3 +106,36 @@ def test_the_example_counts(pulse):
     assert (tally["frames"], tally["bus_missing"]) == (200, 0)
     span = tally["last_seq"] - tally["first_seq"] + 1
     assert tally["device_lost"] == span - 200 > 0
+
+
+def test_a_read_commands_nothing_and_a_stop_needs_no_name(pulse):
+    with tactus_client.connect(pulse) as client:
+        client.run("corners")
+        request = messages.CommandRequest(who="reader").SerializeToString()
+        for selector in ["tactus/**", "tactus/*/cmd/*", "**", "tactus/pulse/cmd/*"]:
+            for payload in [None, request]:
+                # What is refused is not answered.
+                replies = client._session.get(selector, payload=payload, target=zenoh.QueryTarget.ALL, timeout=0.05)
+                assert [reply for reply in replies if reply.ok is not None] == []
+        assert messages.name_of(client.status().state, "phase") == "RUN_PHASE_RUNNING"
+        assert tactus_client.stop(pulse).rig == "pulse"
+        assert messages.name_of(client.status().state, "phase") == "RUN_PHASE_FINISHED"
+
+
+def test_the_lease_is_held_for_several_commands(client):
+    with client.lease() as lease:
+        assert lease.is_held and lease.secret
+        client.run("corners")
+        client.pause()
+    assert not lease.is_held
+    client.stop()
+
+
+def test_frames_of_another_publisher_are_not_the_rigs(client, pulse):
+    rogue = zenoh.open(_config(pulse))
+    frames = client.frames(history=1)
+    fake = messages.Frame(seq=10**9).SerializeToString()
+    for _ in range(100):
+        rogue.put("tactus/pulse/sensor/frame", fake, encoding=messages.encoding(messages.Frame))
+    assert all(next(frames).seq < 10**9 for _ in range(50))
+    rogue.close()

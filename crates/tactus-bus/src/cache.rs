@@ -23,6 +23,9 @@ use crate::{BusError, command::drop_on_blocking_thread, queue::Queue};
 /// Queries that can wait for a reply.
 const WAITING_HISTORY_QUERIES: usize = 64;
 
+/// Messages that are kept of one topic, in bytes; the last one is kept in any case.
+const KEPT_BYTES_MAX: usize = 16 << 20;
+
 /// Keeps the last messages of one publisher.
 #[derive(Debug)]
 pub(crate) struct Cache {
@@ -51,6 +54,7 @@ pub(crate) struct HistoryQuery {
 struct KeptMessages {
     capacity: usize,
     next: u32,
+    bytes: usize,
     messages: VecDeque<(u32, ZBytes)>,
 }
 
@@ -63,7 +67,7 @@ impl Cache {
         history_queries: Arc<Queue<HistoryQuery>>,
     ) -> Result<Self, BusError> {
         let key = format!("{}/@adv/pub/{}/{}/_", source.key, source.publisher.zid(), source.publisher.eid());
-        let kept = Arc::new(Mutex::new(KeptMessages { capacity, next: 0, messages: VecDeque::new() }));
+        let kept = Arc::new(Mutex::new(KeptMessages::new(capacity)));
         let queryable = session
             .declare_queryable(&key)
             .callback({
@@ -90,9 +94,16 @@ impl Cache {
 }
 
 impl KeptMessages {
+    fn new(capacity: usize) -> Self {
+        Self { capacity, next: 0, bytes: 0, messages: VecDeque::new() }
+    }
+
     fn push(&mut self, payload: ZBytes) {
-        if self.messages.len() == self.capacity {
-            self.messages.pop_front();
+        self.bytes = self.bytes.saturating_add(payload.len());
+        while (self.messages.len() == self.capacity || self.bytes > KEPT_BYTES_MAX)
+            && let Some((_, oldest)) = self.messages.pop_front()
+        {
+            self.bytes = self.bytes.saturating_sub(oldest.len());
         }
         self.messages.push_back((self.next, payload));
         self.next = self.next.wrapping_add(1);

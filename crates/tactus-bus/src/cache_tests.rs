@@ -1,10 +1,8 @@
-use std::collections::VecDeque;
-
 use super::{KeptMessages, wanted};
 
 /// The numbers found after so many messages, of which the last `capacity` are kept.
 fn check(published: u32, capacity: usize, numbers: Option<&str>, limit: Option<&str>) -> Vec<u32> {
-    let mut kept = KeptMessages { capacity, next: 0, messages: VecDeque::new() };
+    let mut kept = KeptMessages::new(capacity);
     for number in 0..published {
         kept.push(number.to_le_bytes().into());
     }
@@ -44,4 +42,18 @@ fn a_question_may_limit_itself_to_the_last() {
 fn what_cannot_be_read_is_taken_as_not_said() {
     assert_eq!(check(3, 10, Some("..many"), Some("-1")), [0, 1, 2]);
     assert_eq!(check(3, 10, Some(""), Some("")), [0, 1, 2]);
+}
+
+#[test]
+fn the_kept_messages_are_bounded_in_bytes_and_the_last_is_kept_in_any_case() {
+    let mut kept = KeptMessages::new(65_536);
+    for _ in 0..40 {
+        kept.push(vec![0; 1 << 20].into());
+    }
+    assert_eq!(kept.find(&(0..=u32::MAX), usize::MAX).len(), 16);
+    kept.push(vec![0; 20 << 20].into());
+    let all = kept.find(&(0..=u32::MAX), usize::MAX);
+    assert_eq!(all.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [40]);
+    kept.push(vec![0; 1].into());
+    assert_eq!(kept.find(&(0..=u32::MAX), usize::MAX).len(), 1);
 }

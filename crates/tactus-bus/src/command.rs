@@ -95,6 +95,17 @@ pub(crate) struct Replies {
     runtime: Handle,
 }
 
+impl CommandCall {
+    /// True if that is who asks.
+    pub(crate) fn is_by(&self, who: &str) -> bool {
+        match &self.request {
+            Request::Run(request) => request.who == who,
+            Request::Lease(request) => request.who == who,
+            Request::Control(request) => request.who == who,
+        }
+    }
+}
+
 impl Responder {
     /// Replies to a datagram.
     pub(crate) fn to_datagram(sender: StopSender) -> Self {

@@ -1,6 +1,6 @@
 //! Endpoints of the bus, and zenoh's settings for service and client.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use tactus_schema::key::Keys;
@@ -46,6 +46,8 @@ pub struct TlsConfig {
     pub commanders: Vec<String>,
     /// Common names that may only read and stop.
     pub readers: Vec<String>,
+    /// Certificate and key of a reader, with which the service checks at its start that a reader cannot command.
+    pub check: Option<(PathBuf, PathBuf)>,
 }
 
 /// A client's own certificate, for `tls/` endpoints.
@@ -57,6 +59,14 @@ pub struct Credentials {
     pub certificate: Option<PathBuf>,
     /// Its private key.
     pub key: Option<PathBuf>,
+}
+
+impl Credentials {
+    /// The files `authority.pem`, `client.pem` and `client.key` of a folder.
+    pub fn in_folder(folder: &Path) -> Self {
+        let file = |name| Some(folder.join(name));
+        Self { authority: file("authority.pem"), certificate: file("client.pem"), key: file("client.key") }
+    }
 }
 
 impl Default for BusConfig {

@@ -4,6 +4,9 @@ use std::{fmt, net::IpAddr, path::Path, str::FromStr};
 
 use crate::BusError;
 
+/// Where the packaged service can listen for the members of its group.
+const INSTALLED: &str = "/run/tactus/bus.sock";
+
 /// A checked address on the bus, in zenoh's form: `tcp/HOST:PORT` or `tls/HOST:PORT`, with `[...]` around an IPv6 host, or
 /// `unixsock-stream/PATH`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,6 +31,15 @@ impl Endpoint {
     /// The loopback address with [`Endpoint::DEFAULT_PORT`].
     pub fn loopback() -> Self {
         Self { transport: Transport::Tcp, address: format!("127.0.0.1:{}", Self::DEFAULT_PORT) }
+    }
+
+    /// The socket of the installed service of this machine if there is one, else [`Endpoint::loopback`].
+    pub fn of_this_machine() -> Self {
+        if Path::new(INSTALLED).exists() {
+            Self { transport: Transport::Unix, address: INSTALLED.to_owned() }
+        } else {
+            Self::loopback()
+        }
     }
 
     /// `HOST:PORT`, as sockets take it, or the path of a Unix socket.

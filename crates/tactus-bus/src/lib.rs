@@ -30,6 +30,7 @@ mod cache;
 mod client;
 mod command;
 mod config;
+mod denial;
 mod endpoint;
 mod error;
 mod lease;

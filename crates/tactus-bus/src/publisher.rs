@@ -25,6 +25,9 @@ use crate::{
 /// a burst.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
+/// Bytes that wait in each outgoing queue at most.
+const WAITING_BYTES_MAX: usize = 16 << 20;
+
 /// Publishes for the service. Cheap to clone; no call ever waits.
 #[derive(Debug, Clone)]
 pub struct Publisher {
@@ -85,9 +88,13 @@ impl Lanes {
     pub(crate) fn new() -> Self {
         Self {
             // Drop-oldest, counted: 10 s of frames.
-            frames: Arc::new(Queue::new(300)),
+            frames: Arc::new(Queue::bounded(300, WAITING_BYTES_MAX, |message: &Outgoing| {
+                message.payload.len()
+            })),
             // Drop-oldest, counted: far more than a run sends while stalled clients cost a millisecond per message each.
-            updates: Arc::new(Queue::new(8_192)),
+            updates: Arc::new(Queue::bounded(8_192, WAITING_BYTES_MAX, |message: &Outgoing| {
+                message.payload.len()
+            })),
         }
     }
 

@@ -1,4 +1,5 @@
-//! A bounded queue that drops its oldest item when it is full, and counts what it dropped.
+//! A bounded queue that drops its oldest items when it is full, and counts what it dropped. It is bounded in items and, where they
+//! differ in size, in bytes.
 
 use std::{
     collections::VecDeque,
@@ -11,6 +12,9 @@ use tokio::sync::Notify;
 #[derive(Debug)]
 pub(crate) struct Queue<T> {
     capacity: usize,
+    bytes_max: usize,
+    /// Size of an item.
+    bytes_of: fn(&T) -> usize,
     inside: Mutex<Inside<T>>,
     ready: Notify,
 }
@@ -18,6 +22,7 @@ pub(crate) struct Queue<T> {
 #[derive(Debug)]
 struct Inside<T> {
     items: VecDeque<T>,
+    bytes: usize,
     dropped: u64,
     closed: bool,
 }
@@ -25,25 +30,44 @@ struct Inside<T> {
 impl<T> Queue<T> {
     /// A queue with the given capacity, at least 1.
     pub(crate) fn new(capacity: usize) -> Self {
-        let inside = Inside { items: VecDeque::new(), dropped: 0, closed: false };
-        Self { capacity: capacity.max(1), inside: Mutex::new(inside), ready: Notify::new() }
+        Self::bounded(capacity, usize::MAX, |_| 0)
     }
 
-    /// Appends an item and returns the displaced one: the oldest of a full queue or, once the queue is closed, the item
-    /// itself.
+    /// A queue with the given capacity, at least 1, for items of at most `bytes_max` bytes together. One item always fits.
+    pub(crate) fn bounded(capacity: usize, bytes_max: usize, bytes_of: fn(&T) -> usize) -> Self {
+        let inside = Inside { items: VecDeque::new(), bytes: 0, dropped: 0, closed: false };
+        let capacity = capacity.max(1);
+        Self { capacity, bytes_max, bytes_of, inside: Mutex::new(inside), ready: Notify::new() }
+    }
+
+    /// Appends an item and returns a displaced one: the last of the oldest that gave way or, once the queue is closed, the
+    /// item itself.
     pub(crate) fn push(&self, item: T) -> Option<T> {
         let displaced = {
             let mut inside = self.lock();
             if inside.closed {
                 return Some(item);
             }
-            let oldest = if inside.items.len() == self.capacity { inside.items.pop_front() } else { None };
-            inside.dropped += u64::from(oldest.is_some());
+            let added = (self.bytes_of)(&item);
+            let mut displaced = None;
+            while inside.items.len() == self.capacity
+                || (!inside.items.is_empty() && inside.bytes.saturating_add(added) > self.bytes_max)
+            {
+                displaced = self.take_oldest(&mut inside);
+                inside.dropped += 1;
+            }
+            inside.bytes = inside.bytes.saturating_add(added);
             inside.items.push_back(item);
-            oldest
+            displaced
         };
         self.ready.notify_one();
         displaced
+    }
+
+    fn take_oldest(&self, inside: &mut Inside<T>) -> Option<T> {
+        let oldest = inside.items.pop_front()?;
+        inside.bytes = inside.bytes.saturating_sub((self.bytes_of)(&oldest));
+        Some(oldest)
     }
 
     /// Waits for the oldest item and takes it; `None` once the queue is closed and empty.
@@ -53,7 +77,7 @@ impl<T> Queue<T> {
         loop {
             {
                 let mut inside = self.lock();
-                if let Some(item) = inside.items.pop_front() {
+                if let Some(item) = self.take_oldest(&mut inside) {
                     return Some(item);
                 }
                 if inside.closed {

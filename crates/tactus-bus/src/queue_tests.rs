@@ -38,3 +38,16 @@ async fn a_closed_queue_takes_nothing_in() {
     assert_eq!(queue.pop().await, None);
     assert_eq!(queue.dropped(), 0);
 }
+
+#[tokio::test]
+async fn bytes_are_bounded_too_and_one_item_always_fits() {
+    let queue = Queue::bounded(10, 8, Vec::len);
+    for item in [vec![1; 4], vec![2; 4], vec![3; 3]] {
+        queue.push(item);
+    }
+    assert_eq!(queue.dropped(), 1);
+    assert_eq!(queue.push(vec![4; 100]), Some(vec![3; 3]));
+    assert_eq!((queue.pop().await, queue.dropped()), (Some(vec![4; 100]), 3));
+    queue.push(vec![5; 8]);
+    assert_eq!((queue.pop().await, queue.dropped()), (Some(vec![5; 8]), 3));
+}

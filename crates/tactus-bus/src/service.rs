@@ -1,6 +1,12 @@
 //! The bus on the service's side.
 
-use std::sync::Arc;
+use std::{
+    fs::{self, Permissions},
+    io,
+    os::unix::fs::PermissionsExt as _,
+    path::Path,
+    sync::Arc,
+};
 
 use tactus_schema::key::Keys;
 use zenoh::{Session, query::Queryable};
@@ -9,6 +15,7 @@ use crate::{
     AliveToken, BusConfig, BusError, Calls, Endpoint, Publisher,
     cache::{self, HistoryQuery},
     command::{self, Intake, PendingReply, Replies},
+    denial,
     liveness::InstanceToken,
     publisher::{Lanes, Outgoing, TopicPublishers},
     queue::Queue,
@@ -38,17 +45,40 @@ impl Bus {
     ///
     /// # Errors
     /// [`BusError::Open`] or [`BusError::Stop`] if an endpoint cannot be listened on; [`BusError::Unprotected`] if other
-    /// machines would reach one without a certificate; [`BusError::Key`] if the rig's name is not valid in a key;
+    /// machines would reach one without a certificate; [`BusError::NotDenied`] if a client that should not can command;
+    /// [`BusError::Key`] if the rig's name is not valid in a key;
     /// [`BusError::Thread`] if the system is out of threads.
     ///
     /// # Panics
     /// On a current-thread tokio runtime, as zenoh does.
     pub async fn open(config: &BusConfig, keys: Keys) -> Result<(Self, Calls), BusError> {
         config.check()?;
-        let session = zenoh::open(config.service(&keys)?).await.map_err(|source| {
-            let listen: Vec<_> = config.listen.iter().map(ToString::to_string).collect();
-            BusError::Open { listen: listen.join(", "), source }
-        })?;
+        let (bus, mut calls) = Self::listen(config, keys).await?;
+        if config.tls.is_none() {
+            return Ok((bus, calls));
+        }
+        let mut denied = denial::check(config, &bus.keys).await;
+        // Calls that come so early get no answer.
+        while let Ok(call) = calls.commands.try_recv() {
+            if call.is_by(denial::WHO) {
+                let who = "without the right to command".to_owned();
+                denied = Err(BusError::NotDenied { endpoint: texts(config), who });
+            }
+        }
+        if let Err(error) = denied {
+            bus.close().await?;
+            return Err(error);
+        }
+        Ok((bus, calls))
+    }
+
+    async fn listen(config: &BusConfig, keys: Keys) -> Result<(Self, Calls), BusError> {
+        let session = zenoh::open(config.service(&keys)?)
+            .await
+            .map_err(|source| BusError::Open { listen: texts(config), source })?;
+        for path in config.listen.iter().filter_map(Endpoint::unix_path) {
+            share(path).map_err(|source| BusError::Open { listen: texts(config), source: source.into() })?;
+        }
         // Stops first, and before anything can wait for a client.
         let (intake, calls) = command::channels();
         let stop_sockets = stop_sockets(config, &keys, &intake)?;
@@ -106,6 +136,16 @@ impl Bus {
         self.history_replies.finish().await;
         self.session.close().await.map_err(|source| BusError::Close { source })
     }
+}
+
+/// Lets the group connect; who may enter its folder is the administrator's choice.
+fn share(socket: &Path) -> io::Result<()> {
+    fs::set_permissions(socket, Permissions::from_mode(0o660))
+}
+
+fn texts(config: &BusConfig) -> String {
+    let listen: Vec<_> = config.listen.iter().map(ToString::to_string).collect();
+    listen.join(", ")
 }
 
 fn start<T: Send + 'static>(

@@ -12,7 +12,10 @@ use std::{
     net::{SocketAddr, ToSocketAddrs, UdpSocket},
     os::{
         linux::net::SocketAddrExt,
-        unix::net::{SocketAddr as UnixAddr, UnixDatagram},
+        unix::{
+            fs::PermissionsExt as _,
+            net::{SocketAddr as UnixAddr, UnixDatagram},
+        },
     },
     path::{Path, PathBuf},
     process,
@@ -199,9 +202,9 @@ fn place(endpoint: &Endpoint) -> Option<PathBuf> {
     })
 }
 
-/// Binds a path, also one that a service that was killed has left behind.
+/// Binds a path for the group, also one that a service that was killed has left behind.
 fn bind_unix(path: &Path) -> io::Result<UnixDatagram> {
-    match UnixDatagram::bind(path) {
+    let bound = match UnixDatagram::bind(path) {
         Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
             if UnixDatagram::unbound()?.connect(path).is_ok() {
                 return Err(error);
@@ -210,7 +213,9 @@ fn bind_unix(path: &Path) -> io::Result<UnixDatagram> {
             UnixDatagram::bind(path)
         }
         bound => bound,
-    }
+    }?;
+    fs::set_permissions(path, fs::Permissions::from_mode(0o660))?;
+    Ok(bound)
 }
 
 /// Sends a stop by datagram until it is answered; `None` if the endpoint has no place for datagrams.

@@ -3,7 +3,10 @@
 use std::{
     marker::PhantomData,
     mem,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
     time::Duration,
 };
 
@@ -26,6 +29,9 @@ use crate::{
 
 /// Time limit for the history; later replies are ignored.
 const HISTORY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Bytes that wait for the reader at most.
+const ARRIVED_BYTES_MAX: usize = 64 << 20;
 
 /// Messages from before the subscription that a subscriber gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +66,6 @@ pub struct Subscription<M> {
     /// Taken, while nobody speaks for the rig yet.
     undecided: Option<Sample>,
     unreadable: u64,
-    foreign: u64,
     _subscriber: AdvancedSubscriber<()>,
     _message: PhantomData<fn() -> M>,
 }
@@ -70,6 +75,8 @@ pub struct Subscription<M> {
 struct Reception {
     merge: Mutex<Merge<EntityGlobalId, Sample>>,
     arrived: Queue<Sample>,
+    /// Messages of others than the service.
+    foreign: AtomicU64,
 }
 
 impl<M: Published> Subscription<M> {
@@ -84,13 +91,16 @@ impl<M: Published> Subscription<M> {
         let reception = Arc::new(Reception {
             merge: Mutex::new(Merge::awaiting_history()),
             // Drop-oldest, counted; holds the whole history and as much again.
-            arrived: Queue::new(1_024.max(2 * Policy::of(M::TOPIC).history)),
+            arrived: Queue::bounded(
+                1_024.max(2 * Policy::of(M::TOPIC).history),
+                ARRIVED_BYTES_MAX,
+                |sample: &Sample| sample.payload().len(),
+            ),
+            foreign: AtomicU64::new(0),
         });
-        let receiver = Receiver(reception.clone());
-        let builder = session
-            .declare_subscriber(key.clone())
-            .callback(move |sample| receiver.0.hear(sample))
-            .advanced();
+        let receiver = Receiver(reception.clone(), trust.clone());
+        let builder =
+            session.declare_subscriber(key.clone()).callback(move |sample| receiver.hear(sample)).advanced();
         let recovery = RecoveryConfig::default().heartbeat();
         let subscriber = if history == History::None { builder } else { builder.recovery(recovery) }
             .await
@@ -102,7 +112,6 @@ impl<M: Published> Subscription<M> {
             trust,
             undecided: None,
             unreadable: 0,
-            foreign: 0,
             _subscriber: subscriber,
             _message: PhantomData,
         })
@@ -142,15 +151,7 @@ impl<M: Published> Subscription<M> {
             if is_own {
                 return sample;
             }
-            self.foreign += 1;
-            if self.foreign.is_power_of_two() {
-                let key = sample.as_ref().map(|sample| sample.key_expr().as_str());
-                tracing::warn!(
-                    key,
-                    foreign = self.foreign,
-                    "messages that are not the service's are dropped"
-                );
-            }
+            self.reception.drop_foreign();
         }
     }
 
@@ -160,7 +161,7 @@ impl<M: Published> Subscription<M> {
             missed: self.reception.merge.lock().unwrap_or_else(PoisonError::into_inner).missed(),
             overrun: self.reception.arrived.dropped(),
             unreadable: self.unreadable,
-            foreign: self.foreign,
+            foreign: self.reception.foreign.load(Ordering::Relaxed),
         }
     }
 }
@@ -211,6 +212,14 @@ impl Reception {
         merge.join(past, |sample| self.keep(sample));
     }
 
+    /// Counts a message of another than the service; one line each time the count doubles, to limit the log.
+    fn drop_foreign(&self) {
+        let foreign = self.foreign.fetch_add(1, Ordering::Relaxed) + 1;
+        if foreign.is_power_of_two() {
+            tracing::warn!(foreign, "messages that are not the service's are dropped");
+        }
+    }
+
     fn keep(&self, sample: Sample) {
         // The queue counts dropped messages for `Losses`.
         let _dropped = self.arrived.push(sample);
@@ -218,7 +227,19 @@ impl Reception {
 }
 
 /// Zenoh's handle, which it drops when the session ends.
-struct Receiver(Arc<Reception>);
+struct Receiver(Arc<Reception>, Trust);
+
+impl Receiver {
+    /// Takes a live message; what is known to be another's is not kept.
+    fn hear(&self, sample: Sample) {
+        let source = sample.source_info().map(|source| source.source_id().zid());
+        if source.is_none_or(|source| self.1.has(&source) == Some(false)) {
+            self.0.drop_foreign();
+        } else {
+            self.0.hear(sample);
+        }
+    }
+}
 
 impl Drop for Receiver {
     fn drop(&mut self) {

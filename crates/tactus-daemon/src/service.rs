@@ -23,11 +23,11 @@ use std::thread;
 use std::time::Duration;
 
 use clap::Parser;
-use tactus_bus::{Bus, BusConfig, BusError, Calls};
+use tactus_bus::{Bus, BusConfig, BusError, Calls, TlsConfig};
 use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
+use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles, TlsSection};
 use tactus_runner::covering_file::CoveringFile;
-use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles};
 use tactus_runner::embedded::Truth;
 use tactus_runner::{crashed, devices, logging};
 use tactus_schema::key::Keys;
@@ -121,7 +121,7 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
         listen: config.bus.listen.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         connect: config.bus.connect.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         guests: config.bus.guests.clone(),
-        tls: None,
+        tls: config.bus.tls.clone().map(certificates),
     };
     let recordings = config.recordings.clone();
     let closing = tokio::task::spawn_blocking(move || crashed::close_all(&recordings));
@@ -178,6 +178,11 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     bus.close().await?;
     info!("closed");
     closed
+}
+
+fn certificates(tls: TlsSection) -> TlsConfig {
+    let TlsSection { authority, certificate, key, commanders, readers, check_certificate, check_key } = tls;
+    TlsConfig { authority, certificate, key, commanders, readers, check: check_certificate.zip(check_key) }
 }
 
 async fn frames_flow(engine: &Engine) {

@@ -57,6 +57,33 @@ pub struct BusSection {
     /// Names of rigs whose services connect to this one.
     #[serde(default)]
     pub guests: Vec<String>,
+    /// Certificates for endpoints beyond this machine.
+    #[serde(default)]
+    pub tls: Option<TlsSection>,
+}
+
+/// `[bus.tls]`: PEM files, relative to the configuration's folder, and the common names of clients' certificates.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TlsSection {
+    /// Authority that signs the certificates of service and clients.
+    pub authority: PathBuf,
+    /// The service's certificate.
+    pub certificate: PathBuf,
+    /// Its private key.
+    pub key: PathBuf,
+    /// Who may command.
+    #[serde(default)]
+    pub commanders: Vec<String>,
+    /// Who may only read and stop.
+    #[serde(default)]
+    pub readers: Vec<String>,
+    /// Certificate of a reader, with which the service checks at its start that a reader cannot command.
+    #[serde(default)]
+    pub check_certificate: Option<PathBuf>,
+    /// Its private key.
+    #[serde(default)]
+    pub check_key: Option<PathBuf>,
 }
 
 /// `[log]`.
@@ -122,7 +149,7 @@ struct RawConfig {
 
 impl Default for BusSection {
     fn default() -> Self {
-        Self { listen: loopback(), connect: Vec::new(), guests: Vec::new() }
+        Self { listen: loopback(), connect: Vec::new(), guests: Vec::new(), tls: None }
     }
 }
 
@@ -149,7 +176,23 @@ impl Config {
             return Err(ConfigError::Experiments { path: path.to_owned(), folder });
         }
         let state = std::env::var_os("STATE_DIRECTORY").map(PathBuf::from).unwrap_or_default();
-        Ok(Self { rig, experiments, recordings: state.join(raw.recordings), bus: raw.bus, log: raw.log })
+        let bus = raw.bus.beside(folder);
+        Ok(Self { rig, experiments, recordings: state.join(raw.recordings), bus, log: raw.log })
+    }
+}
+
+impl BusSection {
+    /// With the paths of certificates relative to a folder.
+    fn beside(self, folder: &Path) -> Self {
+        let tls = self.tls.map(|tls| TlsSection {
+            authority: folder.join(tls.authority),
+            certificate: folder.join(tls.certificate),
+            key: folder.join(tls.key),
+            check_certificate: tls.check_certificate.map(|file| folder.join(file)),
+            check_key: tls.check_key.map(|file| folder.join(file)),
+            ..tls
+        });
+        Self { tls, ..self }
     }
 }
 

@@ -147,14 +147,38 @@ function show(view) {
   showRun(view.run);
 }
 
-async function command(name, answer, patience_s) {
+/** The token of commands: in the address once, then kept by this window. */
+function token() {
+  if (location.hash.length > 1) {
+    sessionStorage.setItem("token", location.hash.slice(1));
+    history.replaceState(null, "", location.pathname);
+  }
+  return sessionStorage.getItem("token") ?? "";
+}
+
+async function command(name, answer, patience_s, takeOver = "") {
   answer.textContent = `${name} ...`;
+  const headers = { "x-tactus-token": token() };
+  if (takeOver) headers["x-take-over"] = takeOver.replace(/[^\x20-\x7e]/g, "?");
   try {
-    const reply = await fetch(name, { method: "POST", signal: AbortSignal.timeout(1000 * patience_s) });
+    const reply = await fetch(name, { method: "POST", headers, signal: AbortSignal.timeout(1000 * patience_s) });
     answer.textContent = reply.ok ? `${name}: done` : `${name.toUpperCase()} FAILED: ${await reply.text()}`;
+    if (reply.status === 423) askToTakeOver(name, answer, patience_s);
   } catch {
     answer.textContent = `${name.toUpperCase()} FAILED: the dashboard does not answer`;
   }
+}
+
+/** Another client holds the lease: whoever takes it over says why. */
+function askToTakeOver(name, answer, patience_s) {
+  at("holder").textContent = answer.textContent;
+  at("reason").value = "";
+  at("taken").onclose = () => {
+    const reason = at("reason").value.trim();
+    if (at("taken").returnValue === "yes" && reason) command(name, answer, patience_s, reason);
+    at("taken").returnValue = "no";
+  };
+  at("taken").showModal();
 }
 
 function stop() {
@@ -172,6 +196,7 @@ at("sure").addEventListener("close", () => {
 });
 at("tare").addEventListener("click", () => { zero = null; });
 document.addEventListener("keydown", (event) => {
+  if (event.target.tagName === "INPUT") return;
   const isPlain = !event.repeat && !event.ctrlKey && !event.metaKey && !event.altKey;
   if (event.key.toLowerCase() === "s" && isPlain) stop();
 });
@@ -205,3 +230,4 @@ setInterval(() => {
   open();
 }, 1000);
 open();
+token();

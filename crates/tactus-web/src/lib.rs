@@ -7,18 +7,24 @@
 //! |---|---|
 //! | `GET /` | the page; its script and style have their own paths |
 //! | `GET /live` | server-sent events, each with the whole view as JSON, at most 20 per second |
-//! | `POST /stop`, `/pause`, `/resume`, `/reset` | sends the command of that name to the service |
+//! | `POST /stop` | stops the rig, whether the service is ready or not |
+//! | `POST /pause`, `/resume`, `/reset` | sends the command of that name to the service: needs the header `x-tactus-token`; `x-take-over` has the reason to take over the lease |
 //!
-//! A slow browser misses views and delays nothing. Requests from pages of other sites are refused.
+//! A slow browser misses views and delays nothing. Requests from pages of other sites are refused. Connections that ask nothing are
+//! closed to make room, so that a stop always finds a place.
 
 mod guard;
 mod live;
+mod server;
 mod site;
+mod token;
 mod view;
 
 use std::io::{self, IsTerminal};
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use anyhow::Context;
 use clap::Parser;
@@ -30,24 +36,29 @@ use tracing::{error, info};
 use tracing_subscriber::EnvFilter;
 
 use live::Live;
+use token::Token;
 
 /// The dashboard of Tactus.
 #[derive(Debug, Parser)]
 #[command(name = "tactus-web", version, about)]
 struct Options {
-    /// Address of the service.
-    #[arg(long, env = "TACTUS_ENDPOINT", default_value = "tcp/127.0.0.1:7447")]
+    /// Address of the service. Default: the socket of the installed service if it has one, else loopback.
+    #[arg(long, env = "TACTUS_ENDPOINT", default_value_t = Endpoint::of_this_machine())]
     endpoint: Endpoint,
     /// Name of the rig, if several are served.
     #[arg(long, env = "TACTUS_RIG")]
     rig: Option<String>,
-    /// Address of the page. Whoever reaches it can stop, pause, resume and reset; the default is reachable from this
-    /// machine only.
+    /// Address of the page. Whoever reaches it can look and stop; pause, resume and reset want the token. The default is
+    /// reachable from this machine only.
     #[arg(long, env = "TACTUS_WEB_LISTEN", default_value = "127.0.0.1:7480")]
     listen: SocketAddr,
     /// Host name that browsers of other machines use for the page, for example behind a proxy; several with commas.
     #[arg(long, env = "TACTUS_WEB_HOST", value_name = "NAME", value_delimiter = ',')]
     host: Vec<String>,
+    /// File for the token of commands, new at each start, which its group may read. Default: `token` in systemd's runtime
+    /// directory; without one the token is printed as a part of the page's address.
+    #[arg(long, env = "TACTUS_WEB_TOKEN_FILE", value_name = "FILE")]
+    token_file: Option<PathBuf>,
 }
 
 /// Runs `tactus-web` with the process's arguments.
@@ -77,14 +88,21 @@ fn run(options: Options) -> anyhow::Result<()> {
             format!("cannot listen on {}: choose another address with --listen", options.listen)
         })?;
         let address = listener.local_addr().context("cannot read the listening address")?;
+        let token = Token::new().context("cannot make a token")?;
+        let folder = std::env::var_os("RUNTIME_DIRECTORY").map(|folder| PathBuf::from(folder).join("token"));
+        if let Some(file) = options.token_file.or(folder) {
+            token.write(&file).with_context(|| file.display().to_string())?;
+            info!("http://{address}/#TOKEN: the token is in {}", file.display());
+        } else {
+            info!("http://{address}/{}", token.fragment());
+        }
         let live = Live::start(options.endpoint, options.rig);
-        let site = site::site(live, guard::Hosts::new(address, options.host));
+        let site = site::site(live, guard::Hosts::new(address, options.host), Arc::new(token));
         let mut terminated = signal(SignalKind::terminate()).context("SIGTERM")?;
-        info!("http://{address}");
         // Without systemd this does nothing.
         let _told = sd_notify::notify(&[NotifyState::Ready]);
         tokio::select! {
-            served = axum::serve(listener, site) => served.context("the server ended"),
+            () = server::serve(listener, site) => Ok(()),
             _ = terminated.recv() => Ok(()),
             interrupted = tokio::signal::ctrl_c() => interrupted.context("SIGINT"),
         }

@@ -18,6 +18,7 @@ use tokio::time::{Instant, sleep_until};
 
 use crate::guard::{Hosts, guard};
 use crate::live::{Live, NotDone};
+use crate::token::Token;
 
 /// Shortest time between two views sent to one page.
 const PERIOD: Duration = Duration::from_millis(50);
@@ -34,14 +35,18 @@ const SCRIPT: &str = include_str!("../page/script.js");
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+/// Carries the token of commands.
+const TOKEN: HeaderName = HeaderName::from_static("x-tactus-token");
+
 #[derive(Clone)]
 struct Shared {
     live: Live,
+    token: Arc<Token>,
     pages: Arc<Semaphore>,
 }
 
 /// The whole site.
-pub(crate) fn site(live: Live, hosts: Arc<Hosts>) -> Router {
+pub(crate) fn site(live: Live, hosts: Arc<Hosts>, token: Arc<Token>) -> Router {
     let file = |kind: &'static str, text: &'static str| {
         get(move || async move { ([(header::CONTENT_TYPE, kind)], text) })
     };
@@ -52,7 +57,7 @@ pub(crate) fn site(live: Live, hosts: Arc<Hosts>) -> Router {
         .route("/live", get(live_views))
         .route("/stop", post(stop))
         .route("/{command}", post(command))
-        .with_state(Shared { live, pages: Arc::new(Semaphore::new(PAGES_MAX)) })
+        .with_state(Shared { live, token, pages: Arc::new(Semaphore::new(PAGES_MAX)) })
         .layer(from_fn_with_state(hosts, guard))
         .layer(map_response(with_policy))
 }
@@ -66,7 +71,7 @@ async fn with_policy(mut response: Response) -> Response {
     response
 }
 
-async fn live_views(State(Shared { live, pages }): State<Shared>) -> Response {
+async fn live_views(State(Shared { live, pages, .. }): State<Shared>) -> Response {
     let Ok(page) = pages.try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, format!("{PAGES_MAX} pages are open already"))
             .into_response();
@@ -94,9 +99,9 @@ async fn stop(State(Shared { live, .. }): State<Shared>) -> Response {
     }
 }
 
-/// A command that wants the lease: 423 if another client holds it.
+/// A command that wants the lease: 401 without the token, 423 if another client holds the lease.
 async fn command(
-    State(Shared { live, .. }): State<Shared>,
+    State(Shared { live, token, .. }): State<Shared>,
     Path(name): Path<String>,
     headers: HeaderMap,
 ) -> Response {
@@ -106,6 +111,11 @@ async fn command(
         "reset" => Command::Reset,
         _ => return StatusCode::NOT_FOUND.into_response(),
     };
+    if !headers.get(TOKEN).is_some_and(|given| token.is(given.as_bytes())) {
+        let error =
+            "this page has no token: open the address with the token that tactus-web names at its start";
+        return (StatusCode::UNAUTHORIZED, error).into_response();
+    }
     let take_over = headers.get(TAKE_OVER).and_then(|reason| reason.to_str().ok());
     match live.command(command, take_over).await {
         Ok(()) => StatusCode::NO_CONTENT.into_response(),

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use tactus_bus::{Credentials, Endpoint};
 
 use crate::commands;
 use crate::exit::{Exit, in_words};
@@ -23,21 +24,32 @@ struct Cli {
 /// Arguments of every command.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Common {
-    /// Address of the service.
+    /// Address of the service: tcp/HOST:PORT, tls/HOST:PORT or unixsock-stream/PATH. Default: the socket of the installed service if it
+    /// has one, else loopback.
     #[arg(
         long,
         global = true,
         value_name = "ENDPOINT",
-        default_value = "tcp/127.0.0.1:7447",
+        default_value_t = Endpoint::of_this_machine().to_string(),
         env = "TACTUS_ENDPOINT"
     )]
     pub(crate) endpoint: String,
+    /// Folder with authority.pem, client.pem and client.key, for a service at tls/HOST:PORT.
+    #[arg(long, global = true, value_name = "DIR", env = "TACTUS_CERTIFICATES")]
+    pub(crate) certificates: Option<PathBuf>,
     /// Name of the rig, if several are served; for `stage check` and `devices`, its file.
     #[arg(long, global = true, value_name = "NAME", env = "TACTUS_RIG")]
     pub(crate) rig: Option<String>,
     /// Print one JSON object to standard output.
     #[arg(long, global = true)]
     pub(crate) json: bool,
+}
+
+impl Common {
+    /// The certificates of the command line, for `tls/` endpoints.
+    pub(crate) fn credentials(&self) -> Credentials {
+        self.certificates.as_deref().map(Credentials::in_folder).unwrap_or_default()
+    }
 }
 
 #[derive(Debug, Subcommand)]

@@ -61,7 +61,7 @@ pub(crate) async fn release(held: HeldLease) {
 /// The service, or `None` if nothing listens at the endpoint.
 pub(crate) async fn find(common: &Common) -> anyhow::Result<Option<Client>> {
     let endpoint = endpoint(common)?;
-    match Client::connect(&endpoint, common.rig.as_deref()).await {
+    match Client::connect_as(&endpoint, common.rig.as_deref(), &common.credentials()).await {
         Ok(client) => Ok(Some(client)),
         Err(BusError::NoService { .. }) => Ok(None),
         Err(error @ BusError::RigName { .. }) => Err(Failure::new(Exit::Usage, error).into()),

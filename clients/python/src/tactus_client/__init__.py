@@ -10,15 +10,17 @@ The messages are those of ``tactus.v1``, under the same names: see ``tactus_clie
 """
 
 from tactus_client import messages
-from tactus_client.client import Client, connect
+from tactus_client.client import Client, connect, stop
 from tactus_client.errors import NoAnswer, NoRig, NoService, Refused, TactusError
 from tactus_client.frames import Frame, FrameStream, Missing
+from tactus_client.lease import Lease
 from tactus_client.stream import Stream
 
 __all__ = [
     "Client",
     "Frame",
     "FrameStream",
+    "Lease",
     "Missing",
     "NoAnswer",
     "NoRig",
@@ -28,4 +30,5 @@ __all__ = [
     "TactusError",
     "connect",
     "messages",
+    "stop",
 ]

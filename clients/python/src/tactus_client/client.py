@@ -12,44 +12,73 @@ import zenoh
 from tactus_client import messages
 from tactus_client.errors import NoAnswer, NoRig, NoService, Refused
 from tactus_client.frames import FrameStream
+from tactus_client.lease import Lease
+from tactus_client.services import Services
+from tactus_client.stopping import stop_by_datagram
 from tactus_client.stream import Stream, past_samples
 
 #: How long to wait for a machine that does not answer at all.
 REACH_TIMEOUT_S = 2.0
-#: How long to wait for rigs to announce themselves.
-ROLL_CALL_TIMEOUT_S = 3.0
 #: Number of events that may wait to be read: twice what the service keeps.
 EVENT_CAPACITY = 131_072
 
 
 def connect(endpoint: str = "tcp/127.0.0.1:7447", rig: str | None = None) -> Client:
-    """Connects to the service at ``endpoint``, ``tcp/HOST:PORT``.
+    """Connects to the service at ``endpoint``, ``tcp/HOST:PORT`` or ``unixsock-stream/PATH``.
 
-    Without ``rig`` it takes the rig that is ready there.
+    Without ``rig`` it takes the rig of the service that listens there or, if that is a router, the only rig that is ready.
 
     Raises ``NoService`` at once if nothing listens there, ``NoRig`` if no rig is ready, or if several are ready and
     none was named, and ``ValueError`` if the endpoint or the rig's name is not valid.
     """
-    if rig is not None and not re.fullmatch(r"[A-Za-z0-9_-]+", rig):
-        # With a wildcard, a command would go to every rig on the bus.
-        raise ValueError(f"rig name {rig!r}: letters, digits, '-' and '_' only")
+    _check_rig_name(rig)
     _reach(endpoint)
     try:
         session = zenoh.open(_config(endpoint))
     except zenoh.ZError as error:
         raise NoService(f"the program at {endpoint} does not answer as a Tactus service: {error}") from error
     try:
-        return Client(session, rig or _the_only_rig(session, endpoint))
+        services = Services(session)
+        rig = rig or _the_rig(services, endpoint)
+        if services.is_ambiguous(rig):
+            raise NoRig(f"several programs at {endpoint} say that they are the service of rig {rig}; connect to the service itself")
+        return Client(session, rig, services, endpoint)
     except BaseException:
         session.close()
         raise
 
 
+def stop(endpoint: str = "tcp/127.0.0.1:7447", rig: str | None = None, *, reason: str = "", abort: bool = False, timeout_s: float = 5.0):
+    """Stops every rig that the service at ``endpoint`` reaches, or the one of that name; the fastest way to stop.
+
+    It needs no connection where the service is on this machine. Returns the ``CommandReply`` of a service. Raises
+    ``NoAnswer`` if none answered: then nothing is known.
+    """
+    _check_rig_name(rig)
+    request = messages.CommandRequest(who=_who(), reason=reason, abort=abort)
+    answer = stop_by_datagram(endpoint, rig, request, timeout_s)
+    if answer is not None:
+        return _done(answer)
+    _reach(endpoint)
+    session = zenoh.open(_config(endpoint))
+    try:
+        key = f"tactus/{rig}/cmd/stop" if rig else "tactus/stop"
+        replies = _get(session, key, request, timeout_s)
+        # The stop is on its way; only now it is asked who speaks for which rig.
+        services = Services(session)
+        return _done(_answer(replies, services, rig, key, timeout_s))
+    finally:
+        session.close()
+
+
 class Client:
     """A connection to one rig's service; made by ``connect``. Close it, or use it in a ``with`` statement."""
 
-    def __init__(self, session, rig: str):
+    def __init__(self, session, rig: str, services: Services, endpoint: str):
         self._session = session
+        self._services = services
+        self._endpoint = endpoint
+        self._lease: Lease | None = None
         self.rig = rig
 
     def frames(self, history: int | None = None) -> FrameStream:
@@ -59,20 +88,30 @@ class Client:
         """
         info = self.sensor_info()
         shape = (info.rows, info.cols) if info else None
-        return FrameStream(self._session, self._key("sensor/frame"), history, shape)
+        return FrameStream(self._session, self._key("sensor/frame"), history, shape, self._believes)
 
     def events(self, history: int | None = None) -> Stream:
         """Events of runs (``RunEvent``), past ones first, as in ``frames``. The service keeps the last 65,536."""
-        return Stream(self._session, self._key("run/event"), messages.RunEvent, history, EVENT_CAPACITY)
+        return Stream(self._session, self._key("run/event"), messages.RunEvent, history, EVENT_CAPACITY, self._believes)
 
     def states(self) -> Stream:
         """States of the run (``RunState``): the present one, then each new one."""
-        return Stream(self._session, self._key("run/state"), messages.RunState, 1, 1_024)
+        return Stream(self._session, self._key("run/state"), messages.RunState, 1, 1_024, self._believes)
 
     def sensor_info(self):
         """The sensor's last description of itself (``SensorInfo``); None if no sensor has connected yet."""
         samples = past_samples(self._session, self._key("sensor/info"), 1)
+        samples = [sample for sample in samples if sample.source_info and self._believes(str(sample.source_info.source_id.zid))]
         return messages.SensorInfo.FromString(samples[-1].payload.to_bytes()) if samples else None
+
+    def lease(self, take_over: str | None = None) -> Lease:
+        """Takes the lease for several commands, in a ``with`` statement, and keeps it.
+
+        Run, pause, resume and reset want it, and take it for themselves if the client does not have it. With a reason
+        it is taken from whoever has it. Raises ``Refused`` if another client has it, ``NoAnswer``.
+        """
+        self._lease = Lease(self._command, _who(), take_over)
+        return self._lease
 
     def status(self, timeout_s: float = 5.0):
         """What the service is doing, as a ``CommandReply``. Raises ``NoAnswer``, ``Refused``."""
@@ -84,30 +123,30 @@ class Client:
         The answer comes after the dry run, before anything moves. Follow the run with ``events`` or ``states``. Raises
         ``Refused`` with the reason, or ``NoAnswer``.
         """
-        request = messages.RunRequest(
-            experiment=experiment, parameters_json=json.dumps(parameters), seed=seed, who=_who()
-        )
-        return self._command("run", request, timeout_s)
+        fields = {"experiment": experiment, "parameters_json": json.dumps(parameters), "seed": seed}
+        return self._holding("run", messages.RunRequest, fields, timeout_s)
 
     def pause(self, reason: str = "", timeout_s: float = 5.0):
         """Holds the run after its present step. Raises ``Refused``, ``NoAnswer``."""
-        return self._command("pause", messages.CommandRequest(who=_who(), reason=reason), timeout_s)
+        return self._holding("pause", messages.CommandRequest, {"reason": reason}, timeout_s)
 
     def resume(self, reason: str = "", covering_mm: float | None = None, timeout_s: float = 5.0):
         """Continues a run that is held. ``covering_mm`` confirms the covering that the run waits for, once it is in place.
 
         Raises ``Refused``, ``NoAnswer``.
         """
-        request = messages.CommandRequest(who=_who(), reason=reason, covering_mm=covering_mm)
-        return self._command("resume", request, timeout_s)
+        fields = {"reason": reason, "covering_mm": covering_mm}
+        return self._holding("resume", messages.CommandRequest, fields, timeout_s)
 
     def stop(self, reason: str = "", abort: bool = False, timeout_s: float = 5.0):
-        """Stops motion now, retracts, ends the run; has priority over all else. Raises ``NoAnswer``, ``Refused``."""
-        return self._command("stop", messages.CommandRequest(who=_who(), reason=reason, abort=abort), timeout_s)
+        """Stops motion now, retracts, ends the run; wants no lease. Raises ``NoAnswer``, ``Refused``."""
+        request = messages.CommandRequest(who=_who(), reason=reason, abort=abort)
+        answer = stop_by_datagram(self._endpoint, self.rig, request, timeout_s)
+        return _done(answer) if answer is not None else self._command("stop", request, timeout_s)
 
     def reset(self, timeout_s: float = 120.0):
         """Clears the stage's alarm, homes it, lets runs start. Refused in a run. Raises ``Refused``, ``NoAnswer``."""
-        return self._command("reset", messages.CommandRequest(who=_who()), timeout_s)
+        return self._holding("reset", messages.CommandRequest, {}, timeout_s)
 
     def close(self) -> None:
         """Closes the connection; streams end."""
@@ -122,36 +161,73 @@ class Client:
     def _key(self, suffix: str) -> str:
         return f"tactus/{self.rig}/{suffix}"
 
+    def _believes(self, instance: str) -> bool | None:
+        return self._services.believes(self.rig, instance)
+
+    def _holding(self, command: str, message_class, fields: dict, timeout_s: float):
+        """Sends a command with the lease, which is taken for it if the client does not have it."""
+        held = self._lease
+        if held is not None and held.is_held:
+            return self._command(command, message_class(who=_who(), lease=held.secret, **fields), timeout_s)
+        with Lease(self._command, _who(), None) as taken:
+            return self._command(command, message_class(who=_who(), lease=taken.secret, **fields), timeout_s)
+
     def _command(self, command: str, request, timeout_s: float):
         key = self._key(f"cmd/{command}")
-        replies = self._session.get(
-            key,
-            payload=request.SerializeToString(),
-            encoding=messages.encoding(type(request)),
-            consolidation=zenoh.ConsolidationMode.NONE,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.REAL_TIME if command == "stop" else zenoh.Priority.INTERACTIVE_HIGH,
-            express=True,
-            timeout=timeout_s,
-        )
-        for reply in replies:
-            # Errors come from zenoh itself: a timeout, or a service that went away.
-            if reply.ok is not None:
-                answer = messages.CommandReply.FromString(reply.ok.payload.to_bytes())
-                if not answer.ok:
-                    raise Refused(answer)
+        replies = _get(self._session, key, request, timeout_s)
+        return _done(_answer(replies, self._services, self.rig, key, timeout_s))
+
+
+def _get(session, key: str, request, timeout_s: float):
+    return session.get(
+        key,
+        payload=request.SerializeToString(),
+        encoding=messages.encoding(type(request)),
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        congestion_control=zenoh.CongestionControl.BLOCK,
+        priority=zenoh.Priority.REAL_TIME if key.endswith("/stop") else zenoh.Priority.INTERACTIVE_HIGH,
+        express=True,
+        timeout=timeout_s,
+    )
+
+
+def _answer(replies, services: Services, rig: str | None, key: str, timeout_s: float):
+    """The first answer of a session that speaks for its rig."""
+    for reply in replies:
+        # Errors come from zenoh itself: a timeout, or a service that went away.
+        if reply.ok is not None and reply.replier_id is not None:
+            answer = messages.CommandReply.FromString(reply.ok.payload.to_bytes())
+            if services.believes(rig or answer.rig, str(reply.replier_id.zid)):
                 return answer
-        raise NoAnswer(f"no answer to {key} (waited at most {timeout_s} s): the rig's service is gone or busy")
+    raise NoAnswer(f"no answer to {key} (waited at most {timeout_s} s): the rig's service is gone or busy")
+
+
+def _done(answer):
+    if not answer.ok:
+        raise Refused(answer)
+    return answer
+
+
+def _check_rig_name(rig: str | None) -> None:
+    if rig is not None and not re.fullmatch(r"[A-Za-z0-9_-]+", rig):
+        # With a wildcard, a command would go to every rig on the bus.
+        raise ValueError(f"rig name {rig!r}: letters, digits, '-' and '_' only")
 
 
 def _reach(endpoint: str) -> None:
     """Tests with a plain connection whether anything listens. zenoh would need seconds for this."""
+    unix = re.fullmatch(r"unixsock-stream/(/[A-Za-z0-9._/-]+)", endpoint)
     match = re.fullmatch(r"tcp/(?:\[([0-9A-Fa-f:.%]+)\]|([^:\[\]/?#;]+)):(\d+)", endpoint)
-    if not match:
+    if not unix and not match:
         raise ValueError(f"endpoint {endpoint!r} should read tcp/HOST:PORT, such as tcp/127.0.0.1:7447")
-    host, port = match[1] or match[2], int(match[3])
     try:
-        socket.create_connection((host, port), REACH_TIMEOUT_S).close()
+        if unix:
+            with socket.socket(socket.AF_UNIX) as probe:
+                probe.settimeout(REACH_TIMEOUT_S)
+                probe.connect(unix[1])
+        else:
+            socket.create_connection((match[1] or match[2], int(match[3])), REACH_TIMEOUT_S).close()
     except (OSError, OverflowError) as error:
         raise NoService(f"no service at {endpoint}: start tactusd, or name another endpoint ({error})") from error
 
@@ -171,9 +247,9 @@ def _config(endpoint: str):
     return config
 
 
-def _the_only_rig(session, endpoint: str) -> str:
-    replies = session.liveliness().get("tactus/*/alive", timeout=ROLL_CALL_TIMEOUT_S)
-    rigs = sorted({str(reply.ok.key_expr).split("/")[1] for reply in replies if reply.ok is not None})
+def _the_rig(services: Services, endpoint: str) -> str:
+    own = services.own_rigs()
+    rigs = own if len(own) == 1 else services.rigs()
     if not rigs:
         raise NoRig(f"a bus listens at {endpoint}, but no rig is ready on it; its service may still be starting")
     if len(rigs) > 1:

@@ -113,10 +113,10 @@ class FrameStream(Stream):
     #: Frames that may wait to be read: 5 minutes at 30 Hz.
     CAPACITY = 9_000
 
-    def __init__(self, session, key: str, history: int | None, shape: tuple | None):
+    def __init__(self, session, key: str, history: int | None, shape: tuple | None, believes):
         self._shape = shape
         self.tally = Tally()
-        super().__init__(session, key, messages.Frame, history, self.CAPACITY)
+        super().__init__(session, key, messages.Frame, history, self.CAPACITY, believes)
 
     def receive(self, timeout_s: float | None = None) -> Frame | None:
         """The next frame; None once the stream is closed, or after ``timeout_s`` seconds without one."""

@@ -14,6 +14,8 @@ from tactus_client.merge import Merge, Numbered
 
 #: How long to wait for past messages. Those that arrive later are not used.
 PAST_TIMEOUT_S = 10.0
+#: Time between two looks at whether a service has announced itself.
+ANNOUNCED_S = 0.05
 
 
 class Stream:
@@ -23,8 +25,12 @@ class Stream:
     If there are more, the oldest is dropped and counted in ``overrun``.
     """
 
-    def __init__(self, session, key: str, message_class, history: int | None, capacity: int):
-        """``history``: the number of past messages to start with; None for all that the service keeps."""
+    def __init__(self, session, key: str, message_class, history: int | None, capacity: int, believes):
+        """``history``: the number of past messages to start with; None for all that the service keeps.
+
+        ``believes`` tells whether a session speaks for the rig; None while none does.
+        """
+        self._believes = believes
         self._message_class = message_class
         self._encoding = messages.encoding(message_class)
         self._capacity = capacity
@@ -36,6 +42,8 @@ class Stream:
         self.overrun = 0
         #: Messages that did not have the topic's type.
         self.unreadable = 0
+        #: Messages that were not from the rig's service.
+        self.foreign = 0
         self._subscriber = zenoh.ext.declare_advanced_subscriber(
             session,
             key,
@@ -52,12 +60,16 @@ class Stream:
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             with self._changed:
-                while not self._arrived:
+                while not self._arrived or (is_own := self._is_own(self._arrived[0])) is None:
                     left_s = None if deadline is None else deadline - time.monotonic()
                     if self._closed or (left_s is not None and left_s <= 0):
                         return None
-                    self._changed.wait(left_s)
+                    # A service that has just come back may be heard before it has announced itself.
+                    self._changed.wait(left_s if not self._arrived else ANNOUNCED_S)
                 sample = self._arrived.popleft()
+            if not is_own:
+                self.foreign += 1
+                continue
             message = self._decode(sample)
             if message is not None:
                 return message
@@ -81,6 +93,10 @@ class Stream:
 
     def __exit__(self, *_):
         self.close()
+
+    def _is_own(self, sample) -> bool | None:
+        source = sample.source_info
+        return False if source is None else self._believes(str(source.source_id.zid))
 
     def _decode(self, sample):
         try:

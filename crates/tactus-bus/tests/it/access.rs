@@ -1,6 +1,6 @@
 //! What a stranger on the bus cannot do: command by reading, and pass for the service.
 
-use std::time::Duration;
+use std::{os::unix::fs::PermissionsExt as _, time::Duration};
 
 use crate::lab::{Service, event, frame, open, raw_session, router};
 use prost::Message as _;
@@ -246,6 +246,10 @@ async fn a_unix_socket_serves_as_well() {
     let endpoint: Endpoint = format!("unixsock-stream/{}/bus.sock", folder.path().display()).parse().unwrap();
     let config = BusConfig { listen: vec![endpoint.clone()], ..BusConfig::default() };
     let (bus, calls) = Bus::open(&config, Keys::new("bench")).await.unwrap();
+    for socket in ["bus.sock", "bus.sock.stop"] {
+        let mode = std::fs::metadata(folder.path().join(socket)).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o660, "{socket}: the group's, in a folder that only the group enters");
+    }
     let mut service = Service { bus, calls, endpoint };
     let _token = service.bus.declare_alive().await.unwrap();
     let client = Client::connect(&service.endpoint, None).await.unwrap();

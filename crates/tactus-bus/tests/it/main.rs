@@ -7,4 +7,6 @@ mod lab;
 mod liveliness;
 mod stalled;
 mod stop;
+#[cfg(feature = "tls")]
+mod tls;
 mod wire;

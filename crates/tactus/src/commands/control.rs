@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use tactus_bus::Credentials;
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 
@@ -36,13 +35,13 @@ pub(crate) fn stop(common: &Common, args: &StopArgs) -> anyhow::Result<Exit> {
         abort: args.abort,
         ..Default::default()
     };
-    let answers = connection::runtime()?.block_on(tactus_bus::stop(
-        &endpoint,
-        common.rig.as_deref(),
-        &request,
-        &Credentials::default(),
-        PATIENCE,
-    ))?;
+    let runtime = connection::runtime()?;
+    let rig = common.rig.as_deref();
+    let answers =
+        runtime.block_on(tactus_bus::stop(&endpoint, rig, &request, &common.credentials(), PATIENCE));
+    // A connection that is still being made keeps nobody waiting.
+    runtime.shutdown_background();
+    let answers = answers?;
     if let Some(refusal) = answers.iter().find(|reply| !reply.ok) {
         return Err(Failure::new(Exit::of_reply(refusal.exit_code), &refusal.error).into());
     }

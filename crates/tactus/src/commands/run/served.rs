@@ -39,7 +39,13 @@ pub(super) async fn run(
         who: args.who.clone(),
         lease: held.secret(),
     };
-    let reply = connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await?;
+    let reply = match connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await {
+        Ok(reply) => reply,
+        Err(refusal) => {
+            connection::release(held).await;
+            return Err(refusal);
+        }
+    };
     let accepted = reply.state.context("the service's answer has no state; is it of another version?")?;
 
     let progress = RunProgress::new(common.json);
