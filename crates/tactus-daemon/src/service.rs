@@ -8,7 +8,7 @@
 //! | run | the order of one run, until its recording is closed |
 //! | health | once a second |
 //! | watchdog | half of systemd's limit |
-//! | main | SIGTERM or SIGINT |
+//! | main | a signal that ends the service |
 
 mod commands;
 mod health;
@@ -23,11 +23,12 @@ use clap::Parser;
 use tactus_bus::{Bus, BusConfig, BusError, Calls};
 use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
-use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles};
+use tactus_log::LogFormat;
+use tactus_runner::config::{Config, ConfigError, RigFiles};
+use tactus_runner::devices;
 use tactus_runner::embedded::Truth;
-use tactus_runner::{devices, logging};
+use tactus_runner::signals::EndingSignals;
 use tactus_schema::key::Keys;
-use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::timeout;
 use tracing::{error, info, warn};
 
@@ -74,12 +75,12 @@ pub(crate) fn main() -> ExitCode {
     let config = match Config::load(&options.config) {
         Ok(config) => config,
         Err(error) => {
-            logging::start(options.log.unwrap_or_default(), "info");
+            let _log = tactus_log::start(options.log.unwrap_or_default(), "info");
             error!("{error}");
             return ExitCode::from(2);
         }
     };
-    logging::start(options.log.unwrap_or(config.log.format), &config.log.filter);
+    let _log = tactus_log::start(options.log.unwrap_or(config.log.format), &config.log.filter);
     let config = Config { recordings: options.recordings.unwrap_or(config.recordings), ..config };
     match start(config) {
         Ok(()) => ExitCode::SUCCESS,
@@ -102,8 +103,8 @@ fn start(config: Config) -> Result<(), ServiceError> {
 
 async fn serve(config: Config) -> Result<(), ServiceError> {
     let system = |what| move |source| ServiceError::System { what, source };
-    let mut terminate = signal(SignalKind::terminate()).map_err(system("SIGTERM"))?;
-    let mut interrupt = signal(SignalKind::interrupt()).map_err(system("SIGINT"))?;
+    // Before a device is opened, so that no signal leaves the tip where it is.
+    let mut signals = EndingSignals::listen().map_err(system("signals"))?;
 
     let clock = Clock::real();
     let RigFiles { rig, codec, .. } = config.rig.clone();
@@ -136,8 +137,7 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
     let mut alive = None;
     let signalled = tokio::select! {
         biased;
-        _ = terminate.recv() => "SIGTERM",
-        _ = interrupt.recv() => "SIGINT",
+        ending = signals.next() => ending.name,
         never = async {
             frames_flow(&engine).await;
             alive = Some(bus.declare_alive().await);

@@ -3,11 +3,12 @@
 mod steps;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use tactus_device::StageError;
 use tactus_model::Covering;
-use tactus_plan::{Arguments, Limits, RigView, Script};
+use tactus_plan::{Arguments, Evaluate, Limits, RigView, Script};
 use tactus_schema::table::Phase;
 use tactus_schema::{MonoTime, Rig, pb};
 use tokio::time::timeout;
@@ -38,6 +39,8 @@ pub struct RunOrder {
     pub who: String,
     /// Bounds of the script's steps, time and memory.
     pub limits: Limits,
+    /// Where the script is evaluated.
+    pub evaluator: Arc<dyn Evaluate>,
     /// Prediction of the dry run, if there was one.
     pub planned: Option<Planned>,
     /// Names and versions of the software and the devices.

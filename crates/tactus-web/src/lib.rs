@@ -16,7 +16,6 @@ mod live;
 mod site;
 mod view;
 
-use std::io::{self, IsTerminal};
 use std::net::SocketAddr;
 use std::process::ExitCode;
 
@@ -24,10 +23,10 @@ use anyhow::Context;
 use clap::Parser;
 use sd_notify::NotifyState;
 use tactus_bus::Endpoint;
+use tactus_log::LogFormat;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
-use tracing_subscriber::EnvFilter;
 
 use live::Live;
 
@@ -53,9 +52,7 @@ struct Options {
 /// Runs `tactus-web` with the process's arguments.
 pub fn main() -> ExitCode {
     let options = Options::parse();
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,zenoh=error"));
-    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
-    lines.with_ansi(io::stderr().is_terminal()).init();
+    let _log = tactus_log::start(LogFormat::Text, "info,zenoh=error");
     match run(options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

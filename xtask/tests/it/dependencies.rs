@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 26] = [
+const ROWS: [&str; 27] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -20,6 +20,7 @@ const ROWS: [&str; 26] = [
     "tactus-record",
     "tactus-report",
     "tactus-bus",
+    "tactus-log",
     "tactus-hidden",
     "tactus-virtual",
     "tactus-usbip",

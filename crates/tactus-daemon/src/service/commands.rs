@@ -4,14 +4,16 @@ use std::fmt;
 use std::sync::Arc;
 
 use tactus_bus::{CommandCall, Publisher, Request};
-use tactus_engine::{Engine, ResetError, StopOrder};
-use tactus_plan::{Arguments, Script};
+use tactus_engine::{Engine, ResetError, RunOrder, StopOrder};
+use tactus_plan::{Arguments, Evaluate, Script};
 use tactus_runner::config::Config;
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::recorder::ThreadRecorder;
+use tactus_runner::script_process::ScriptProcesses;
+use tactus_runner::twin::DryRun;
 use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
-use tactus_schema::{MonoTime, pb};
+use tactus_schema::{MonoTime, Rig, WallTime, pb};
 use tokio::sync::mpsc;
 use tracing::{info, warn};
 
@@ -30,6 +32,7 @@ pub(super) struct CommandDesk {
     engine: Engine,
     config: Config,
     publisher: Publisher,
+    evaluator: Arc<dyn Evaluate>,
 }
 
 /// Why a command was not done.
@@ -40,7 +43,8 @@ struct Refusal {
 
 impl CommandDesk {
     pub(super) fn new(engine: Engine, config: Config, publisher: Publisher) -> Self {
-        Self { engine, config, publisher }
+        let evaluator = Arc::new(ScriptProcesses::of_this_program());
+        Self { engine, config, publisher, evaluator }
     }
 
     pub(super) async fn answer_stops(self: Arc<Self>, mut stops: mpsc::Receiver<CommandCall>) {
@@ -111,23 +115,25 @@ impl CommandDesk {
         let script = self.script(&request)?;
         let arguments = Arguments::from_json(&request.parameters_json).map_err(Refusal::usage)?;
         let who = if request.who.is_empty() { "unknown".into() } else { request.who };
-        let request = RunRequest { script, arguments, seed: request.seed, who };
+        let evaluator = Arc::clone(&self.evaluator);
+        let request = RunRequest { script, arguments, seed: request.seed, who, evaluator };
         let rig = self.engine.rig();
         let now = self.engine.clock().now().wall;
-        let mut order = order::order(request, &rig, now).map_err(Refusal::usage)?;
-
-        let twin_order = order.clone();
         let twin_rig = rig.clone();
-        let plan = tokio::task::spawn_blocking(move || twin::dry_run(&twin_rig, twin_order))
-            .await
-            .map_err(Refusal::failed)?
-            .map_err(Refusal::failed)?;
+        info!(who = request.who, "the dry run begins");
+        let prepare = move || {
+            let prepared = prepare(request, &twin_rig, now, &|| claim.check().is_err());
+            (claim, prepared)
+        };
+        let (claim, prepared) = tokio::task::spawn_blocking(prepare).await.map_err(Refusal::failed)?;
+        // What a stop has broken off is told as stopped, not as impossible.
+        claim.check().map_err(Refusal::failed)?;
+        let (mut order, plan) = prepared?;
         if !plan.is_possible() {
             let refused = plan.outcome.exit_status == pb::ExitStatus::Refused;
             let exit_code = if refused { exit::REFUSED } else { exit::FAILED };
             return Err(Refusal { exit_code, error: plan.outcome.message });
         }
-        claim.check().map_err(Refusal::failed)?;
         order.planned = Some(plan.promise());
         let texts = self.config.rig.texts.all();
         let (recording, path) =
@@ -167,6 +173,18 @@ impl CommandDesk {
             health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()))),
         }
     }
+}
+
+/// Checks the parameters and makes the dry run, until `stopped`.
+fn prepare(
+    request: RunRequest,
+    rig: &Rig,
+    now: WallTime,
+    stopped: &dyn Fn() -> bool,
+) -> Result<(RunOrder, DryRun), Refusal> {
+    let order = order::order(request, rig, now, stopped).map_err(Refusal::usage)?;
+    let plan = twin::dry_run(rig, order.clone(), stopped).map_err(Refusal::failed)?;
+    Ok((order, plan))
 }
 
 impl Refusal {
