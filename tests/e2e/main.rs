@@ -1,5 +1,6 @@
 //! The real programs, as people use them.
 
+mod awake;
 mod bad_input;
 mod calibrate;
 mod design;

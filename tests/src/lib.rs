@@ -91,7 +91,8 @@ pub struct Process {
 }
 
 impl Process {
-    /// Starts one of our binaries. Its lines are those of standard output and standard error.
+    /// Starts one of our binaries. Its lines are those of standard output and standard error. Programs in the folder `bin` of
+    /// `folder` stand before those of the system.
     ///
     /// # Panics
     /// If it cannot be started.
@@ -124,6 +125,7 @@ impl Process {
             .args(args)
             .current_dir(folder)
             .env("RUST_LOG", "info,zenoh=error")
+            .env("PATH", format!("{}:{}", folder.join("bin").display(), env!("PATH")))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(stderr)

@@ -1,5 +1,6 @@
 //! `tactusd`: the lab service. [`service`] composes it of the bus, the engine and `tactus-runner`.
 
+mod inhibitor;
 mod notify;
 mod service;
 

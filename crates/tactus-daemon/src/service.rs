@@ -7,7 +7,8 @@
 //! | commands | `cmd/run`, `cmd/pause`, `cmd/resume`, `cmd/reset`, `cmd/status` |
 //! | run | the order of one run, until its recording is closed |
 //! | health | once a second |
-//! | watchdog | half of systemd's limit |
+//! | watchdog | an eighth of systemd's limit |
+//! | inhibitor | the beginning and the end of a run |
 //! | main | a signal that ends the service |
 
 mod commands;
@@ -32,7 +33,7 @@ use tactus_schema::key::Keys;
 use tokio::time::timeout;
 use tracing::{error, info, warn};
 
-use crate::notify;
+use crate::{inhibitor, notify};
 use commands::CommandDesk;
 use publish::BusPublisher;
 
@@ -132,6 +133,7 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
         tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
         tokio::spawn(health::publish(engine.clone(), bus.publisher())),
         tokio::spawn(notify::feed_watchdog(engine.clone())),
+        tokio::spawn(inhibitor::keep_awake(engine.clone())),
     ];
 
     let mut alive = None;
