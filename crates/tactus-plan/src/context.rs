@@ -186,7 +186,7 @@ impl EvaluationContext {
         let bytes = line.len();
         if bytes > LOG_LINE_MAX_BYTES {
             line.truncate(line.floor_char_boundary(LOG_LINE_MAX_BYTES));
-            line.push_str(&format!(" ... (a line of {bytes} bytes)"));
+            line = format!("{line} ... (a line of {bytes} bytes)");
         }
         let logged = self.log_bytes.get() + line.len();
         if logged > self.job.limits.log_bytes {

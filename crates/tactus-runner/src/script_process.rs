@@ -98,13 +98,13 @@ impl ScriptProcesses {
         ScriptProcess::start(&mut program, script, limits)
     }
 
-    fn converse(&self, task: Task, host: &mut dyn Host) -> Result<Answer, ScriptError> {
+    fn converse(&self, task: &Task, host: &mut dyn Host) -> Result<Answer, ScriptError> {
         let (script, limits) = (task.name.clone(), task.limits.clone());
         let broken = |problem: String| ScriptError::Evaluator { script: script.clone(), problem };
         let mut process = self
             .start(&script, limits)
             .map_err(|error| broken(format!("no process for the script: {error}")))?;
-        let mut next = process.send(&task, host);
+        let mut next = process.send(task, host);
         loop {
             next = match next.and_then(|()| process.receive(host)) {
                 Ok(Answer::Call(call)) => {
@@ -130,7 +130,7 @@ impl Evaluate for ScriptProcesses {
         host: &mut dyn Host,
     ) -> Result<Outcome, ScriptError> {
         let task = Task::new(script, arguments, rig, limits, Purpose::Run { seed });
-        match self.converse(task, host)? {
+        match self.converse(&task, host)? {
             Answer::Ended(ended) => ended,
             Answer::Call(_) | Answer::Resolved(_) => Err(out_of_turn(script)),
         }
@@ -145,7 +145,7 @@ impl Evaluate for ScriptProcesses {
         stopped: &dyn Fn() -> bool,
     ) -> Result<Arguments, ScriptError> {
         let task = Task::new(script, arguments, rig, limits, Purpose::Resolve);
-        match self.converse(task, &mut Unasked(stopped))? {
+        match self.converse(&task, &mut Unasked(stopped))? {
             Answer::Resolved(resolved) => resolved,
             Answer::Call(_) | Answer::Ended(_) => Err(out_of_turn(script)),
         }
@@ -198,11 +198,9 @@ enum End {
 
 impl From<io::Error> for End {
     fn from(error: io::Error) -> Self {
-        match error.kind() {
-            // The reading end is closed when the process ends.
-            io::ErrorKind::BrokenPipe | io::ErrorKind::UnexpectedEof => Self::Gone,
-            _ => Self::Garbled(error.to_string()),
-        }
+        // The pipes are closed when the process ends.
+        let gone = [io::ErrorKind::BrokenPipe, io::ErrorKind::UnexpectedEof];
+        if gone.contains(&error.kind()) { Self::Gone } else { Self::Garbled(error.to_string()) }
     }
 }
 
@@ -241,8 +239,11 @@ impl ScriptProcess {
         let frame = frame::of(message).map_err(End::Garbled)?;
         let mut left = frame.as_slice();
         while !left.is_empty() {
-            left = self.to.write_some(left, POLL)?;
-            check(host, deadline)?;
+            let rest = self.to.write_some(left, POLL)?;
+            if rest.len() == left.len() {
+                check(host, deadline)?;
+            }
+            left = rest;
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use serde::Serialize;
 
-/// A pipe that is ready takes this much without waiting: PIPE_BUF of pipe(7).
+/// A pipe that is ready takes this much without waiting: `PIPE_BUF` of pipe(7).
 const PIECE_BYTES: usize = 4096;
 
 /// The frame of a message.
@@ -83,7 +83,7 @@ impl FrameReader {
 
     /// One read. Both sides wait for each other's messages, so nothing follows a whole frame.
     fn read_ready(&mut self) -> io::Result<Option<Vec<u8>>> {
-        let mut piece = [0; 1 << 16];
+        let mut piece = [0; 1 << 13];
         let read = match self.pipe.read(&mut piece) {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(read) => read,
