@@ -1,5 +1,6 @@
 //! The real programs, as people use them.
 
+mod awake;
 mod bad_input;
 mod calibrate;
 mod design;
@@ -7,8 +8,11 @@ mod devices;
 mod discover;
 mod embedded;
 mod link;
+mod scripts;
 mod service;
+mod signals;
 mod simulate;
 mod stage;
 mod truth;
+mod unread;
 mod web;

@@ -32,21 +32,12 @@ fn events(recording: &Path) -> Vec<Event> {
 }
 
 fn recording(lab: &ServiceUnderTest) -> PathBuf {
-    let runs: Vec<_> =
-        fs::read_dir(lab.folder.path().join("runs")).unwrap().map(|run| run.unwrap().path()).collect();
-    assert_eq!(runs.len(), 1, "{runs:?}");
-    runs[0].join("recording.mcap")
+    lab.recording()
 }
 
 /// Waits until the live frames show a press.
 fn wait_until_pressing(lab: &ServiceUnderTest) {
-    let mut viewer = lab.start_tactus(&["watch", "--json"]);
-    viewer.wait_until(|line| {
-        let frame: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
-        let counts = frame["counts"].as_array().unwrap();
-        // At rest an element reads about 100 counts; a press of 0.2 mm adds 200.
-        counts.iter().any(|count| count.as_f64().unwrap() > 250.0)
-    });
+    lab.wait_until_pressing();
 }
 
 /// The service's state.
@@ -58,9 +49,7 @@ fn status(lab: &ServiceUnderTest) -> Value {
 
 /// True position of the tip, from the virtual stage.
 fn truth(lab: &mut ServiceUnderTest) -> Value {
-    lab.mock.type_line("truth");
-    let line = lab.mock.wait_until(|line| line.starts_with('{'));
-    serde_json::from_str(&line).unwrap()
+    lab.truth()
 }
 
 #[test]

@@ -5,7 +5,7 @@
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
 
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, PipeReader, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
@@ -13,6 +13,7 @@ use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -85,29 +86,58 @@ pub struct Process {
     stdin: ChildStdin,
     lines: Receiver<String>,
     seen: Vec<String>,
+    /// The reading end of standard error, if nobody reads it.
+    _unread: Option<PipeReader>,
 }
 
 impl Process {
-    /// Starts one of our binaries. Its lines are those of standard output and standard error.
+    /// Starts one of our binaries. Its lines are those of standard output and standard error. Programs in the folder `bin` of
+    /// `folder` stand before those of the system.
     ///
     /// # Panics
     /// If it cannot be started.
     pub fn start(name: &str, folder: &Path, args: &[&str]) -> Self {
+        Self::start_with(name, folder, args, Stdio::piped(), None)
+    }
+
+    /// As [`Self::start`], with a standard error that is full and that nobody reads.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start_unread(name: &str, folder: &Path, args: &[&str]) -> Self {
+        let (reader, mut writer) = std::io::pipe().expect("a pipe");
+        let flags = fcntl_getfl(&writer).expect("a pipe has flags");
+        fcntl_setfl(&writer, flags | OFlags::NONBLOCK).expect("a pipe can refuse to wait");
+        while writer.write(&[b'.'; 4096]).is_ok() {}
+        while writer.write(b".").is_ok() {}
+        fcntl_setfl(&writer, flags).expect("a pipe can wait");
+        Self::start_with(name, folder, args, writer.into(), Some(reader))
+    }
+
+    fn start_with(
+        name: &str,
+        folder: &Path,
+        args: &[&str],
+        stderr: Stdio,
+        unread: Option<PipeReader>,
+    ) -> Self {
         let mut child = Command::new(binary(name))
             .args(args)
             .current_dir(folder)
             .env("RUST_LOG", "info,zenoh=error")
+            .env("PATH", format!("{}:{}", folder.join("bin").display(), env!("PATH")))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
+            .stderr(stderr)
             .spawn()
             .expect("the binary starts");
         let (told, lines) = mpsc::channel();
         let stdin = child.stdin.take().expect("stdin is piped");
-        let streams: [Box<dyn std::io::Read + Send>; 2] = [
-            Box::new(child.stdout.take().expect("stdout is piped")),
-            Box::new(child.stderr.take().expect("stderr is piped")),
-        ];
+        let stdout = child.stdout.take().expect("stdout is piped");
+        let mut streams: Vec<Box<dyn std::io::Read + Send>> = vec![Box::new(stdout)];
+        if let Some(stderr) = child.stderr.take() {
+            streams.push(Box::new(stderr));
+        }
         for stream in streams {
             let told = told.clone();
             thread::spawn(move || {
@@ -115,7 +145,7 @@ impl Process {
                 lines.map(|line| told.send(line)).take_while(Result::is_ok).for_each(drop);
             });
         }
-        Self { name: name.to_owned(), child, stdin, lines, seen: Vec::new() }
+        Self { name: name.to_owned(), child, stdin, lines, seen: Vec::new(), _unread: unread }
     }
 
     /// Waits for a line that contains `text`, and returns it.
@@ -152,6 +182,11 @@ impl Process {
         writeln!(self.stdin, "{line}")
             .and_then(|()| self.stdin.flush())
             .expect("the process reads its input");
+    }
+
+    /// Its process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
     }
 
     /// Sends a signal.
@@ -223,6 +258,32 @@ impl ServiceUnderTest {
     /// # Panics
     /// If one of them does not start.
     pub fn start_only(change: impl Fn(String) -> String) -> Self {
+        let mut lab = Self::start_with(change, Process::start);
+        lab.daemon.wait_for("ready");
+        lab
+    }
+
+    /// As [`Self::start`], with a service whose standard error is full and that nobody reads.
+    ///
+    /// # Panics
+    /// If one of them does not start.
+    pub fn start_unread(change: impl Fn(String) -> String) -> Self {
+        let lab = Self::start_with(change, Process::start_unread);
+        let deadline = Instant::now() + DEADLINE;
+        // It cannot say that it is ready. Each attempt waits for an answer by itself.
+        loop {
+            let reset = lab.tactus(&["reset"]);
+            if reset.code == Some(0) {
+                return lab;
+            }
+            assert!(Instant::now() < deadline, "{reset:?}");
+        }
+    }
+
+    fn start_with(
+        change: impl Fn(String) -> String,
+        start: impl Fn(&str, &Path, &[&str]) -> Process,
+    ) -> Self {
         let folder = TempDir::new().expect("a folder");
         let rig = fs::read_to_string(repository("config/rigs/pty.toml")).expect("the shipped rig");
         fs::write(folder.path().join("rig.toml"), change(rig)).expect("a writable folder");
@@ -235,8 +296,7 @@ impl ServiceUnderTest {
             &["rig", "--config", "rig.toml", "--link-dir", "mock"],
         );
         mock.wait_for("stage");
-        let mut daemon = Process::start("tactusd", folder.path(), &["--config", "tactusd.toml"]);
-        daemon.wait_for("ready");
+        let daemon = start("tactusd", folder.path(), &["--config", "tactusd.toml"]);
         Self { mock, daemon, endpoint, folder }
     }
 
@@ -248,6 +308,43 @@ impl ServiceUnderTest {
     /// Starts `tactus` against the service.
     pub fn start_tactus(&self, args: &[&str]) -> Process {
         Process::start("tactus", self.folder.path(), &[&["--endpoint", &self.endpoint], args].concat())
+    }
+
+    /// Waits until the live frames show a press.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn wait_until_pressing(&self) {
+        let mut viewer = self.start_tactus(&["watch", "--json"]);
+        viewer.wait_until(|line| {
+            let frame: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
+            let counts = frame["counts"].as_array().expect("a frame has counts");
+            // At rest an element reads about 100 counts; a press of 0.2 mm adds 200.
+            counts.iter().any(|count| count.as_f64().is_some_and(|count| count > 250.0))
+        });
+    }
+
+    /// What is true of the virtual rig now.
+    ///
+    /// # Panics
+    /// If the virtual rig does not answer.
+    pub fn truth(&mut self) -> Value {
+        self.mock.type_line("truth");
+        let line = self.mock.wait_until(|line| line.starts_with('{'));
+        serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error}: {line}"))
+    }
+
+    /// The recording of the only run.
+    ///
+    /// # Panics
+    /// If there is not exactly one.
+    pub fn recording(&self) -> PathBuf {
+        let runs: Vec<_> = fs::read_dir(self.folder.path().join("runs"))
+            .expect("a folder of recordings")
+            .map(|run| run.expect("an entry").path())
+            .collect();
+        assert_eq!(runs.len(), 1, "{runs:?}");
+        runs[0].join("recording.mcap")
     }
 
     /// Writes an experiment script into the folder, and returns its path.

@@ -1,11 +1,15 @@
-//! Notifications for systemd: ready, alive, stopping. Without systemd nothing happens.
+//! Notifications for systemd: ready, alive, stopping. Without systemd nobody is notified.
 
 use std::time::Duration;
 
 use sd_notify::NotifyState;
-use tactus_engine::{Engine, Pulse};
-use tokio::time::{Instant, interval_at};
-use tracing::{error, warn};
+use tactus_engine::{Engine, StopOrder};
+use tactus_schema::MonoTime;
+use tokio::time::{MissedTickBehavior, interval};
+use tracing::{error, info, warn};
+
+/// The watchdog's limit where systemd sets none.
+const LIMIT: Duration = Duration::from_secs(2);
 
 /// Frames flow: the service is ready.
 pub(crate) fn ready(rig: &str) {
@@ -17,22 +21,98 @@ pub(crate) fn stopping() {
     tell(&[NotifyState::Stopping]);
 }
 
-/// Feeds the watchdog while acquisition and the safety supervisor make progress.
+/// Feeds the watchdog while every part of the service makes progress. If one hangs, the stage is stopped; if it still hangs
+/// an eighth of the limit later, systemd is asked to end the service.
 pub(crate) async fn feed_watchdog(engine: Engine) {
-    let Some(limit) = sd_notify::watchdog_enabled() else { return };
-    let pulse = engine.pulse();
-    let mut fed = Pulse::default();
-    // Half the limit, as sd_watchdog_enabled(3) advises. The first check is after one period: before it there is no progress to see.
-    let period = (limit / 2).max(Duration::from_millis(1));
-    let mut tick = interval_at(Instant::now() + period, period);
+    let systemd = sd_notify::watchdog_enabled();
+    let limit = systemd.unwrap_or(LIMIT);
+    let mut watch = Watch::new(engine.clock().now().mono, limit / 2);
+    let mut tick = interval((limit / 8).max(Duration::from_millis(1)));
+    tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         tick.tick().await;
-        let now = *pulse.borrow();
-        if engine.is_acquiring() && now.supervised > fed.supervised {
+        match watch.judge(Progress::of(&engine), engine.clock().now().mono) {
+            Verdict::Alive => {}
+            Verdict::Recovered => info!("every part of the service goes on again"),
+            Verdict::Hangs(part) => {
+                error!("{part} does not go on: the stage is stopped");
+                let reason = format!("{part} does not go on");
+                engine.stop(StopOrder { by: "watchdog".into(), reason, abort: false });
+                continue;
+            }
+            Verdict::StillHangs(_) => {
+                if systemd.is_some() {
+                    tell(&[NotifyState::WatchdogTrigger]);
+                }
+                continue;
+            }
+        }
+        if systemd.is_some() {
             tell(&[NotifyState::Watchdog]);
-            fed = now;
-        } else {
-            error!("acquisition does not go on: the watchdog is not fed");
+        }
+    }
+}
+
+/// When each part of the service last made progress; `None` for a part that has nothing to do.
+#[derive(Debug, Clone, Copy)]
+struct Progress {
+    /// Acquisition with the safety supervisor.
+    acquisition: Option<MonoTime>,
+    /// The stage's driver.
+    stage: Option<MonoTime>,
+    /// The recorder's thread.
+    recorder: Option<MonoTime>,
+}
+
+impl Progress {
+    fn of(engine: &Engine) -> Self {
+        let pulse = *engine.pulse().borrow();
+        // A task that has ended makes no progress any more, whenever it last did.
+        let acquisition = if engine.is_acquiring() { pulse.supervised } else { MonoTime::default() };
+        Self { acquisition: Some(acquisition), stage: None, recorder: None }
+    }
+}
+
+/// Judges the parts' progress.
+#[derive(Debug)]
+struct Watch {
+    /// Nothing counts as progress before.
+    start: MonoTime,
+    /// A part without progress for longer hangs.
+    patience: Duration,
+    hangs: bool,
+}
+
+/// What is known of the parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    /// All of them make progress.
+    Alive,
+    /// They do so again.
+    Recovered,
+    /// This part hangs since the last look.
+    Hangs(&'static str),
+    /// This part hangs still.
+    StillHangs(&'static str),
+}
+
+impl Watch {
+    fn new(start: MonoTime, patience: Duration) -> Self {
+        Self { start, patience, hangs: false }
+    }
+
+    fn judge(&mut self, progress: Progress, now: MonoTime) -> Verdict {
+        let Progress { acquisition, stage, recorder } = progress;
+        let parts = [("acquisition", acquisition), ("the stage's driver", stage), ("the recorder", recorder)];
+        let hanging = parts
+            .into_iter()
+            .find(|(_, last)| last.is_some_and(|last| now.since(last.max(self.start)) > self.patience));
+        let hung = std::mem::replace(&mut self.hangs, hanging.is_some());
+        match (hanging, hung) {
+            (None, false) => Verdict::Alive,
+            (None, true) => Verdict::Recovered,
+            (Some((part, _)), false) => Verdict::Hangs(part),
+            (Some((part, _)), true) => Verdict::StillHangs(part),
         }
     }
 }
@@ -42,3 +122,7 @@ fn tell(states: &[NotifyState<'_>]) {
         warn!(%error, "systemd could not be notified");
     }
 }
+
+#[cfg(test)]
+#[path = "notify_tests.rs"]
+mod tests;

@@ -8,8 +8,9 @@
 //! | run | the order of one run, until its recording is closed |
 //! | health | once a second |
 //! | closing of crashed runs (once, at the start) | the disk |
-//! | watchdog | half of systemd's limit |
-//! | main | SIGTERM or SIGINT |
+//! | watchdog | an eighth of systemd's limit |
+//! | inhibitor | the beginning and the end of a run |
+//! | main | a signal that ends the service |
 
 mod commands;
 mod health;
@@ -26,17 +27,18 @@ use clap::Parser;
 use tactus_bus::{Bus, BusConfig, BusError, Calls, TlsConfig};
 use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
-use tactus_runner::config::{Config, ConfigError, LogFormat, RigFiles, TlsSection};
+use tactus_log::LogFormat;
+use tactus_runner::config::{Config, ConfigError, RigFiles, TlsSection};
 use tactus_runner::covering_file::CoveringFile;
 use tactus_runner::embedded::Truth;
-use tactus_runner::{crashed, devices, logging};
+use tactus_runner::signals::EndingSignals;
+use tactus_runner::{crashed, devices};
 use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
-use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::timeout;
 use tracing::{error, info};
 
-use crate::notify;
+use crate::{inhibitor, notify};
 use commands::CommandDesk;
 use publish::BusPublisher;
 
@@ -79,12 +81,12 @@ pub(crate) fn main() -> ExitCode {
     let config = match Config::load(&options.config) {
         Ok(config) => config,
         Err(error) => {
-            logging::start(options.log.unwrap_or_default(), "info");
+            let _log = tactus_log::start(options.log.unwrap_or_default(), "info");
             error!("{error}");
             return ExitCode::from(2);
         }
     };
-    logging::start(options.log.unwrap_or(config.log.format), &config.log.filter);
+    let _log = tactus_log::start(options.log.unwrap_or(config.log.format), &config.log.filter);
     let config = Config { recordings: options.recordings.unwrap_or(config.recordings), ..config };
     match start(config) {
         Ok(()) => ExitCode::SUCCESS,
@@ -107,8 +109,8 @@ fn start(config: Config) -> Result<(), ServiceError> {
 
 async fn serve(config: Config) -> Result<(), ServiceError> {
     let system = |what| move |source| ServiceError::System { what, source };
-    let mut terminate = signal(SignalKind::terminate()).map_err(system("SIGTERM"))?;
-    let mut interrupt = signal(SignalKind::interrupt()).map_err(system("SIGINT"))?;
+    // Before a device is opened, so that no signal leaves the tip where it is.
+    let mut signals = EndingSignals::listen().map_err(system("signals"))?;
 
     let clock = Clock::real();
     let RigFiles { rig, codec, .. } = config.rig.clone();
@@ -150,13 +152,13 @@ async fn serve(config: Config) -> Result<(), ServiceError> {
         tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
         tokio::spawn(health::publish(engine.clone(), bus.publisher())),
         tokio::spawn(notify::feed_watchdog(engine.clone())),
+        tokio::spawn(inhibitor::keep_awake(engine.clone())),
     ];
 
     let mut alive = None;
     let signalled = tokio::select! {
         biased;
-        _ = terminate.recv() => "SIGTERM",
-        _ = interrupt.recv() => "SIGINT",
+        ending = signals.next() => ending.name,
         never = async {
             frames_flow(&engine).await;
             if closing.await.is_err() {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use tactus_device::StageError;
 use tactus_model::Covering;
-use tactus_plan::{Arguments, Limits, RigView, Script};
+use tactus_plan::{Arguments, Evaluate, Limits, RigView, Script};
 use tactus_safety::{Denied, Fault, Violation};
 use tactus_schema::table::Phase;
 use tactus_schema::{MonoTime, Rig, pb};
@@ -44,6 +44,8 @@ pub struct RunOrder {
     pub who: String,
     /// Bounds of the script's steps, time and memory.
     pub limits: Limits,
+    /// Where the script is evaluated.
+    pub evaluator: Arc<dyn Evaluate>,
     /// Prediction of the dry run, if there was one.
     pub planned: Option<Planned>,
     /// Names and versions of the software and the devices.

@@ -1,5 +1,6 @@
 //! The script's thread, and the channel by which it asks the run for one step at a time.
 
+use std::sync::Arc;
 use std::sync::mpsc as blocking;
 use std::thread;
 
@@ -26,7 +27,7 @@ pub(crate) enum Requests {
     Blocking(blocking::Receiver<Request>),
 }
 
-/// Starts the script on a thread of its own.
+/// Has the order's evaluator run the script. A thread of its own performs the conversation.
 pub(crate) fn start(
     order: &RunOrder,
     rig: RigView,
@@ -42,17 +43,15 @@ pub(crate) fn start(
     };
     let (script, arguments, seed, limits) =
         (order.script.clone(), order.arguments.clone(), order.seed, order.limits.clone());
-    thread::Builder::new().name("script".into()).stack_size(STACK_BYTES).spawn(move || {
+    let evaluator = Arc::clone(&order.evaluator);
+    thread::Builder::new().name("script".into()).spawn(move || {
         let mut host = RunHost { send, control };
-        let outcome = tactus_plan::execute(&script, &arguments, &rig, seed, &limits, &mut host);
+        let outcome = evaluator.execute(&script, &arguments, &rig, seed, &limits, &mut host);
         // If the run is gone, nobody needs the result.
         let _told = (host.send)(Request::Ended(outcome));
     })?;
     Ok(requests)
 }
-
-/// Stack size for the evaluator's deepest allowed recursion.
-const STACK_BYTES: usize = 16 << 20;
 
 impl Requests {
     /// The next request; `None` if the script's thread died.

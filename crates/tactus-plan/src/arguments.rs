@@ -2,17 +2,19 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::{Parameter, RigView, Script, ScriptError};
+use crate::script::resolve;
+use crate::{Limits, Parameter, RigView, Script, ScriptError, json_text};
 
 /// Values by parameter name: those that differ from the defaults, or all of them once resolved.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Arguments(BTreeMap<String, Given>);
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 enum Given {
-    Json(Value),
+    Json(#[serde(with = "json_text")] Value),
     /// As typed by a person; the parameter's type decides how it is parsed.
     Text(String),
 }
@@ -55,7 +57,7 @@ impl Arguments {
     /// [`ScriptError::Argument`] names a parameter that does not exist (and those that do), or whose value has
     /// the wrong type or is out of range; other errors if the script's top level fails.
     pub fn resolve(&self, script: &Script, rig: &RigView) -> Result<Self, ScriptError> {
-        script.resolve(rig, self)
+        resolve(script, self, rig, &Limits::default(), &|| false)
     }
 
     /// A JSON object with the values in the order of their names.

@@ -11,7 +11,9 @@ use starlark::eval::Evaluator;
 
 use crate::evaluate::{Evaluated, Job, Purpose};
 use crate::script_rng::ScriptRng;
-use crate::{Call, Exceeded, Location, Parameter, Refusal, Reply, ScriptError, Step, sandbox};
+use crate::{
+    Call, Exceeded, LOG_LINE_MAX_BYTES, Location, Parameter, Refusal, Reply, ScriptError, Step, sandbox,
+};
 
 /// Message from the script's thread to the caller's.
 #[derive(Debug)]
@@ -99,6 +101,7 @@ pub(crate) struct EvaluationContext {
     pub(crate) values: RefCell<Vec<(String, Value)>>,
     pub(crate) rng: RefCell<ScriptRng>,
     pub(crate) steps: Cell<u64>,
+    log_bytes: Cell<usize>,
 }
 
 thread_local! {
@@ -129,6 +132,7 @@ impl EvaluationContext {
             values: RefCell::default(),
             rng: RefCell::new(ScriptRng::seeded(seed)),
             steps: Cell::new(0),
+            log_bytes: Cell::new(0),
         }
     }
 
@@ -175,6 +179,21 @@ impl EvaluationContext {
     /// An error if there is an argument for a parameter that was not declared.
     pub(crate) fn check_arguments(&self) -> Result<(), Halt> {
         self.job.arguments.check_names(&self.parameters.borrow()).map_err(Halt::Argument)
+    }
+
+    /// A line for the run's events, cut if it is too long.
+    pub(crate) fn log_line(&self, mut line: String) -> Result<String, Halt> {
+        let bytes = line.len();
+        if bytes > LOG_LINE_MAX_BYTES {
+            line.truncate(line.floor_char_boundary(LOG_LINE_MAX_BYTES));
+            line = format!("{line} ... (a line of {bytes} bytes)");
+        }
+        let logged = self.log_bytes.get() + line.len();
+        if logged > self.job.limits.log_bytes {
+            return Err(Exceeded::Log(self.job.limits.log_bytes).into());
+        }
+        self.log_bytes.set(logged);
+        Ok(line)
     }
 
     /// Has the host perform a step.

@@ -1,9 +1,11 @@
 //! Errors of a script.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{Exceeded, Location, Refusal};
 
 /// Why a script was refused or ended early. The text begins with the script's line where there is one.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum ScriptError {
     /// Not Starlark, or something that experiment scripts may not use.
     #[error("{at}: {problem}")]
@@ -36,11 +38,12 @@ pub enum ScriptError {
     /// The script exceeded a limit.
     #[error("{at}: {exceeded}")]
     Limit {
-        /// The line in execution.
+        /// The line in execution; that of the last step if the process ended.
         at: Location,
         /// Which limit, with its value.
         exceeded: Exceeded,
-        /// The calls that led to the line, with the text of each line; empty if the thread had to be left behind.
+        /// The calls that led to the line, with the text of each line; empty if the thread had to be left behind or the
+        /// process ended.
         call_stack: String,
     },
     /// A parameter does not exist or cannot have the given value.

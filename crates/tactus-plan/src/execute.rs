@@ -5,26 +5,28 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::context::{Message, Stop, Watch};
 use crate::evaluate::{self, Evaluated, Job, Purpose};
-use crate::{Arguments, Exceeded, Host, Limits, Location, Refusal, RigView, Script, ScriptError};
+use crate::{Arguments, Exceeded, Host, Limits, Location, Refusal, RigView, Script, ScriptError, json_text};
 
-/// Stack of the script's thread: enough for the allowed call depth and nesting in a build without optimisation. Only the
+/// Stack of a script's thread: enough for the allowed call depth and nesting in a build without optimisation. Only the
 /// used part takes memory.
-const STACK_BYTES: usize = 64 << 20;
+pub const STACK_BYTES: usize = 64 << 20;
 /// Interval at which the host is asked whether to stop while the script computes.
 const POLL: Duration = Duration::from_millis(20);
 /// Longest time that a script which must end may take until its next check.
 const GRACE: Duration = Duration::from_secs(1);
 
 /// Outcome of a script that ended by itself.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Values of all parameters.
     pub arguments: Arguments,
     /// What `run` returned, as JSON; null where JSON has no form for it.
+    #[serde(with = "json_text")]
     pub result: Value,
     /// Steps performed, `log` included.
     pub steps: u64,

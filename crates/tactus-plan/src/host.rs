@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use crate::Step;
 
 /// Performs the steps of a script: the run engine on a rig, or a test.
@@ -17,7 +19,7 @@ pub trait Host {
 }
 
 /// A step and the line of the script that asks for it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Call {
     /// What to do, not yet checked against the envelope.
     pub step: Step,
@@ -26,7 +28,7 @@ pub struct Call {
 }
 
 /// A line of a script, displayed as `corners.star:12`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Location {
     /// The script's name, without the suffix.
     pub script: String,
@@ -41,7 +43,7 @@ impl fmt::Display for Location {
 }
 
 /// The result of a step.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Reply {
     /// Done, without a result.
     Done,
@@ -61,7 +63,7 @@ pub enum Reply {
 }
 
 /// The mean over some frames; one number per element, row-major.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct MeanReading {
     /// Raw counts, averaged.
     pub mean_counts: Vec<f64>,
@@ -74,7 +76,7 @@ pub struct MeanReading {
 }
 
 /// Why a step was not performed. The text is for a person and is displayed after the script's line.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum Refusal {
     /// The step leaves the rig's envelope; nothing moved.
     #[error("{0}")]

@@ -37,34 +37,37 @@
 //! | functions under way ([`Limits::call_depth`]) | at each call |
 //! | memory of values ([`Limits::heap_bytes`]) | before each statement and each `+`, `*`, `%`, `\|`; inside a comprehension once in a thousand turns |
 //! | texts of 64 KiB, lists of 100,000 values, whole numbers of 64 bits | as operands or results of `+`, `*`, `%`, `\|`, `range`, `zip`, `str`, `log` |
-//! | steps ([`Limits::steps`]) | at each step |
+//! | steps ([`Limits::steps`]), text of the `log` lines ([`Limits::log_bytes`]) | at each step |
 //! | computing time between two steps ([`Limits::think`]), and [`Host::cancelled`] | before each statement, once in a thousand turns |
 //!
 //! Operations that can make a value much larger than their operands and that cannot be measured beforehand
 //! (`*=`, `%=`, `.extend`, `.format`, `.join`, `.replace`) are refused when the script is parsed.
 //!
-//! # What is not bounded
+//! # What only a process of its own bounds
 //!
-//! The evaluator is a library in the caller's process. It does not withstand an attacker who knows its internals.
-//! A script runs on its own thread. If it is stuck inside a single operation, such as a comparison of deeply shared
-//! values, it is left behind one second after its time is over: the caller continues, and that thread computes until
-//! the operation or the process ends. Three cases are not bounded, each inside one operation:
+//! The evaluator is a library, and [`InThisProcess`] runs it in the caller's process. It does not withstand an attacker who
+//! knows its internals. A script that is stuck inside a single operation, such as a comparison of deeply shared values, is
+//! left behind one second after its time is over: the caller continues, and the script's thread computes until the
+//! operation or the process ends. Three cases are not bounded, each inside one operation:
 //!
 //! - a comprehension that copies a long list can exceed the memory bound by some hundred copies;
 //! - an error message that quotes a deeply shared value can take any amount of memory;
 //! - an error message that quotes a value nested some hundred thousand deep can overflow the stack, which ends the
 //!   process.
 //!
-//! Only a separate process with limits by the operating system would prevent these. [`Call`] and [`Reply`] are plain
-//! data, so the host can be at the other end of a pipe.
+//! The service and the command line therefore evaluate each script in a process of its own (`tactus_runner::script_process`),
+//! which the system bounds by [`Limits::process_bytes`] and [`Limits::processor`], and which is killed when its run is
+//! stopped. What goes there and back ([`Call`], [`Reply`], [`ScriptError`] and the others) is plain data.
 
 mod arguments;
 mod builtins;
 mod context;
 mod error;
 mod evaluate;
+mod evaluator;
 mod execute;
 mod host;
+mod json_text;
 mod limits;
 mod parameter;
 mod rig_view;
@@ -76,9 +79,10 @@ mod step;
 pub use arguments::Arguments;
 pub use builtins::reference;
 pub use error::ScriptError;
-pub use execute::{Outcome, execute};
+pub use evaluator::{Evaluate, InThisProcess};
+pub use execute::{Outcome, STACK_BYTES, execute};
 pub use host::{Call, Host, Location, MeanReading, Refusal, Reply};
-pub use limits::{Exceeded, Limits};
+pub use limits::{Exceeded, LOG_LINE_MAX_BYTES, Limits};
 pub use parameter::{Parameter, ParameterType};
 pub use rig_view::{ElementView, RigView};
 pub use script::Script;

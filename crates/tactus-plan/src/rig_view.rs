@@ -1,11 +1,12 @@
 //! What a script sees of the rig.
 
+use serde::{Deserialize, Serialize};
 use tactus_schema::Rig;
 
 /// The rig as a script sees it, under the name `rig`. Positions are in the sensor frame.
 ///
 /// It is the rig when the run starts: `covering(...)` does not change it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigView {
     /// Name of the rig.
     pub name: String,
@@ -50,7 +51,7 @@ pub struct RigView {
 }
 
 /// One element as a script sees it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ElementView {
     /// Index in a reading.
     pub index: usize,

@@ -88,15 +88,7 @@ impl Script {
     /// # Errors
     /// [`ScriptError`] if the top level fails.
     pub fn parameters(&self, rig: &RigView) -> Result<Vec<Parameter>, ScriptError> {
-        Ok(self.declare(rig, &Arguments::default())?.parameters)
-    }
-
-    pub(crate) fn resolve(&self, rig: &RigView, arguments: &Arguments) -> Result<Arguments, ScriptError> {
-        Ok(self.declare(rig, arguments)?.values)
-    }
-
-    fn declare(&self, rig: &RigView, arguments: &Arguments) -> Result<Evaluated, ScriptError> {
-        converse(self, arguments, rig, &Limits::default(), Purpose::Declare, &mut NoHost)
+        Ok(declare(self, &Arguments::default(), rig, &Limits::default(), &|| false)?.parameters)
     }
 
     pub(crate) fn ast(&self) -> &AstModule {
@@ -118,16 +110,37 @@ impl fmt::Debug for Script {
     }
 }
 
-/// The host of an evaluation without steps.
-struct NoHost;
+/// The values that a script would see; evaluates its top level only.
+pub(crate) fn resolve(
+    script: &Script,
+    arguments: &Arguments,
+    rig: &RigView,
+    limits: &Limits,
+    stopped: &dyn Fn() -> bool,
+) -> Result<Arguments, ScriptError> {
+    Ok(declare(script, arguments, rig, limits, stopped)?.values)
+}
 
-impl Host for NoHost {
+fn declare(
+    script: &Script,
+    arguments: &Arguments,
+    rig: &RigView,
+    limits: &Limits,
+    stopped: &dyn Fn() -> bool,
+) -> Result<Evaluated, ScriptError> {
+    converse(script, arguments, rig, limits, Purpose::Declare, &mut NoHost(stopped))
+}
+
+/// The host of an evaluation without steps.
+struct NoHost<'a>(&'a dyn Fn() -> bool);
+
+impl Host for NoHost<'_> {
     fn perform(&mut self, _call: &Call) -> Result<Reply, Refusal> {
         Err(Refusal::Failed("nothing is performed while parameters are declared".into()))
     }
 
     fn cancelled(&self) -> bool {
-        false
+        self.0()
     }
 }
 

@@ -1,8 +1,10 @@
 //! The steps that a script can ask for.
 
+use serde::{Deserialize, Serialize};
+
 /// One step of a script. Positions are in the sensor frame (the rig's registration maps them to the robot frame),
 /// heights are above the covering's nominal surface, depths below it; all in mm.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Step {
     /// Travel to a position and height: first up, then sideways, last down.
     Move {
@@ -37,7 +39,7 @@ pub enum Step {
     },
     /// Write a line into the run's events.
     Log {
-        /// Text for the run log, as the script gives it.
+        /// Text for the run log, at most 4 KiB.
         message: String,
     },
     /// Have another covering put in place. A simulated rig changes it itself; a real one asks and waits.
@@ -48,7 +50,7 @@ pub enum Step {
 }
 
 /// A position in the plane, sensor frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Position {
     /// Along a row of elements.
     pub x_mm: f64,
@@ -57,7 +59,7 @@ pub struct Position {
 }
 
 /// One contact at one position: approach, load through the depths with a dwell at each, unload, retract.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Press {
     /// Position of the contact.
     pub at: Position,

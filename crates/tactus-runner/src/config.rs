@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use tactus_device::{LinkFileError, SensorCodec};
+use tactus_log::LogFormat;
 use tactus_schema::{Rig, RigError};
 
 use crate::order::Texts;
@@ -96,17 +97,6 @@ pub struct LogSection {
     /// Filter in the form of `RUST_LOG`, which has precedence.
     #[serde(default = "info")]
     pub filter: String,
-}
-
-/// The form of a log line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum LogFormat {
-    /// One readable line per entry; without times under journald, which has its own.
-    #[default]
-    Text,
-    /// One JSON object per entry.
-    Json,
 }
 
 /// Why a configuration cannot be used.

@@ -127,12 +127,14 @@ pub fn run(
             Pace::Real => Clock::real(),
         }
     });
-    let mut order = order::order(request, rig, clock.now().wall)?;
+    // Nothing stops the preparation but the end of the program: nothing moves yet.
+    let never = || false;
+    let mut order = order::order(request, rig, clock.now().wall, &never)?;
     let hidden = match truth {
         Some(truth) => truth.behind(rig, order.seed)?,
         None => Truth::of_rig(rig, order.seed),
     };
-    let plan = twin::dry_run(rig, order.clone())?;
+    let plan = twin::dry_run(rig, order.clone(), &never)?;
     if !plan.is_possible() {
         return Err(EmbeddedError::NotPossible(Box::new(plan)));
     }

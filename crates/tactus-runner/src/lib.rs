@@ -8,10 +8,11 @@
 //! | [`devices`] | transports, drivers and virtual devices of a rig |
 //! | [`recorder`] | writes the recording for the engine |
 //! | [`crashed`] | closes the recordings of runs whose service died |
+//! | [`script_process`] | evaluates each script in a process of its own |
+//! | [`signals`] | the signals that end a program, in order |
 //! | [`twin`] | the dry run on a simulated twin |
 //! | [`embedded`] | one run in this process, without a service |
 //! | [`stage_check`] | a check of a rig's stage alone: its identity, and whether it moves as it reports |
-//! | [`logging`] | logs for terminals, the journal and machines |
 
 pub mod config;
 pub mod covering_file;
@@ -19,9 +20,10 @@ pub mod crashed;
 pub mod devices;
 pub mod embedded;
 pub mod experiments;
-pub mod logging;
 pub mod order;
 pub mod recorder;
+pub mod script_process;
+pub mod signals;
 pub mod stage_check;
 pub mod twin;
 

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use jiff::Timestamp;
 use tactus_engine::RunOrder;
-use tactus_plan::{Arguments, Limits, RigView, Script, ScriptError};
+use tactus_plan::{Arguments, Evaluate, Limits, RigView, Script, ScriptError};
 use tactus_record::{Header, RecordError, Recording, space, sync_folder_of};
 use tactus_schema::{Rig, WallTime};
 
@@ -20,6 +21,8 @@ pub struct RunRequest {
     pub seed: Option<u64>,
     /// The person or program that requests the run.
     pub who: String,
+    /// Where the script is evaluated.
+    pub evaluator: Arc<dyn Evaluate>,
 }
 
 /// Texts of the rig's files for a recording.
@@ -31,13 +34,20 @@ pub struct Texts<'a> {
     pub link_toml: Option<&'a str>,
 }
 
-/// Makes the order, with a new run id, and checks the parameters.
+/// Makes the order, with a new run id, and checks the parameters. Blocks while the script's top level is evaluated; ends
+/// early once `stopped` is true.
 ///
 /// # Errors
 /// [`ScriptError`] names the parameter or the script's line.
-pub fn order(request: RunRequest, rig: &Rig, at: WallTime) -> Result<RunOrder, ScriptError> {
-    let RunRequest { script, arguments, seed, who } = request;
-    let arguments = arguments.resolve(&script, &RigView::of(rig))?;
+pub fn order(
+    request: RunRequest,
+    rig: &Rig,
+    at: WallTime,
+    stopped: &dyn Fn() -> bool,
+) -> Result<RunOrder, ScriptError> {
+    let RunRequest { script, arguments, seed, who, evaluator } = request;
+    let limits = Limits::default();
+    let arguments = evaluator.resolve(&script, &arguments, &RigView::of(rig), &limits, stopped)?;
     let seed = seed.unwrap_or_else(|| mix(at.ns().unsigned_abs()));
     let run_id =
         format!("{}-{}-{:04x}", timestamp(at), script.name(), mix(at.ns().unsigned_abs() ^ seed) & 0xffff);
@@ -51,7 +61,8 @@ pub fn order(request: RunRequest, rig: &Rig, at: WallTime) -> Result<RunOrder, S
         arguments,
         seed,
         who,
-        limits: Limits::default(),
+        limits,
+        evaluator,
         planned: None,
         versions,
         recording: String::new(),

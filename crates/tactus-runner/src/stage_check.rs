@@ -17,6 +17,7 @@ use tactus_virtual::{RigControl, Truth, VirtualRig};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout};
 
+use crate::signals::EndingSignals;
 use crate::{devices, virtual_time};
 
 /// Distance that each axis moves.
@@ -120,7 +121,7 @@ impl CheckedMove {
 type Ended = Result<[f64; 3], StageError>;
 
 /// Checks the stage of a rig; `home` homes it first. An embedded stage is virtual and runs in virtual time; `started` is
-/// called with its control. Blocks until the end. An interrupt (Ctrl-C) stops the stage and ends the check.
+/// called with its control. Blocks until the end. A signal that would end the program stops the stage and ends the check.
 ///
 /// # Errors
 /// [`StageCheckError`] if there was no check at all; its result is the [`StageCheck`].
@@ -130,11 +131,13 @@ pub fn run(rig: &Rig, home: bool, started: impl FnOnce(&RigControl)) -> Result<S
     };
     if service.stage.transport != Transport::Embedded {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
-        return Ok(runtime.block_on(async {
+        return runtime.block_on(async {
+            // Before the stage is opened, so that no signal leaves it moving.
+            let signals = EndingSignals::listen()?;
             let subject = Subject { rig, service, clock: Clock::real() };
             let (stage, reports) = devices::open_stage(rig, service, || None, subject.clock);
-            check_until_interrupted(stage, reports, subject, home).await
-        }));
+            Ok(check_until_interrupted(stage, reports, subject, home, signals).await)
+        });
     }
     let runtime = virtual_time::runtime()?;
     Ok(runtime.block_on(async {
@@ -157,12 +160,13 @@ struct Subject<'a> {
     clock: Clock,
 }
 
-/// Ctrl-C stops the stage; the check then ends with the move that was stopped.
+/// A signal stops the stage; the check then ends with the move that was stopped.
 async fn check_until_interrupted(
     stage: Arc<DrivenStage>,
     reports: mpsc::Receiver<StageState>,
     subject: Subject<'_>,
     home: bool,
+    mut signals: EndingSignals,
 ) -> StageCheck {
     let interrupted = AtomicBool::new(false);
     let checked = check(&stage, reports, subject, home, &interrupted);
@@ -170,7 +174,7 @@ async fn check_until_interrupted(
     loop {
         tokio::select! {
             biased;
-            Ok(()) = tokio::signal::ctrl_c() => {
+            _ = signals.next() => {
                 // First the flag, then the stop: the check reads the flag after each order to move.
                 interrupted.store(true, Ordering::SeqCst);
                 stage.stop();

@@ -1,10 +1,11 @@
 //! The dry run: the same engine and drivers on a simulated twin of the rig, in virtual time.
 
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
 use tactus_device::{Clock, SensorCodec};
-use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, Unpublished};
+use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, StopOrder, Unpublished};
 use tactus_schema::rig::Transport;
 use tactus_schema::{Frame, Rig, TimeStamp, pb};
 use tactus_virtual::{Truth, twin_of};
@@ -16,6 +17,9 @@ use crate::virtual_time;
 
 /// No experiment lasts longer.
 const LONGEST: Duration = Duration::from_hours(72);
+
+/// How often a dry run asks whether it shall stop.
+const POLL: Duration = Duration::from_millis(20);
 
 /// What an experiment will do, as found by a dry run.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,33 +66,51 @@ impl DryRun {
     }
 }
 
-/// Runs an experiment on the rig's twin. Blocks until it is computed.
+/// Runs an experiment on the rig's twin. Blocks until it is computed, or until `stopped`, which is asked every 20 ms, is
+/// true: the [`DryRun`] is then stopped, and so not possible.
 ///
 /// # Errors
 /// [`TwinError`] if there was no dry run. A refused step is no error: the [`DryRun`] is then not possible.
-pub fn dry_run(rig: &Rig, mut order: RunOrder) -> Result<DryRun, TwinError> {
+pub fn dry_run(rig: &Rig, mut order: RunOrder, stopped: &dyn Fn() -> bool) -> Result<DryRun, TwinError> {
     let mut twin = twin_of(rig);
     order.resets = true;
     if let Some(service) = &mut twin.service {
         service.sensor.transport = Transport::Embedded;
         service.stage.transport = Transport::Embedded;
     }
+    // One message: the twin's engine. The channel ends with the thread.
+    let (started, engines) = sync_channel(1);
     // A separate runtime on a separate thread: the caller may be in another runtime.
-    thread::Builder::new()
-        .name("twin".into())
-        .spawn(move || {
-            // The twin's log entries are no events of the service.
-            tracing::subscriber::with_default(NoSubscriber::new(), || {
-                let runtime = virtual_time::runtime()?;
-                let outcome = runtime.block_on(run(twin, order))?;
-                Ok(DryRun { outcome })
-            })
-        })?
-        .join()
-        .map_err(|_| TwinError::Panicked)?
+    let thread = thread::Builder::new().name("twin".into()).spawn(move || {
+        // The twin's log entries are no events of the service.
+        tracing::subscriber::with_default(NoSubscriber::new(), || {
+            let runtime = virtual_time::runtime()?;
+            let outcome = runtime.block_on(run(twin, order, &started))?;
+            Ok(DryRun { outcome })
+        })
+    })?;
+    stop_when_asked(&engines, stopped);
+    thread.join().map_err(|_| TwinError::Panicked)?
 }
 
-async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
+/// Returns when the twin's thread has ended. Stops its engine as soon as that is wished, also while a script computes.
+fn stop_when_asked(engines: &Receiver<Engine>, stopped: &dyn Fn() -> bool) {
+    let mut twin: Option<Engine> = None;
+    loop {
+        match engines.recv_timeout(POLL) {
+            Ok(engine) => twin = Some(engine),
+            Err(RecvTimeoutError::Disconnected) => return,
+            Err(RecvTimeoutError::Timeout) => {
+                if let Some(twin) = twin.as_ref().filter(|_| stopped()) {
+                    let reason = "the dry run was stopped".into();
+                    twin.stop(StopOrder { by: "the service".into(), reason, abort: false });
+                }
+            }
+        }
+    }
+}
+
+async fn run(twin: Rig, order: RunOrder, started: &SyncSender<Engine>) -> Result<RunOutcome, TwinError> {
     let clock = Clock::paused();
     let Some(service) = twin.service.clone() else {
         return Err(tactus_engine::EngineError::NoService { rig: twin.name }.into());
@@ -97,6 +119,8 @@ async fn run(twin: Rig, order: RunOrder) -> Result<RunOutcome, TwinError> {
     let codec = SensorCodec::default();
     let opened = devices::open(&twin, &service, codec, || Truth::of_rig(&twin, order.seed), clock);
     let engine = Engine::start(twin, opened.devices, clock, std::sync::Arc::new(Unpublished))?;
+    // There is room: this is the only message. The receiver waits for the thread's end.
+    let _told = started.try_send(engine.clone());
     match timeout(LONGEST, engine.run(order, Box::new(Unrecorded))).await {
         Ok(Ok(outcome)) => Ok(outcome),
         Ok(Err(busy)) => unreachable!("a new engine has no other run: {busy}"),

@@ -3,9 +3,10 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use tactus_device::{Clock, SensorCodec};
-use tactus_plan::{Arguments, Script};
+use tactus_plan::{Arguments, InThisProcess, Script};
 use tactus_runner::config::RigFiles;
 use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, Truth};
 use tactus_runner::order::RunRequest;
@@ -18,7 +19,13 @@ use tempfile::TempDir;
 fn run(script: Script, arguments: Arguments, rig_toml: &str) -> Result<(Finished, TempDir), EmbeddedError> {
     let folder = TempDir::new().unwrap();
     let rig = RigFiles::of(rig_toml, Path::new("rig.toml")).unwrap();
-    let request = RunRequest { script, arguments, seed: Some(1), who: "test".into() };
+    let request = RunRequest {
+        script,
+        arguments,
+        seed: Some(1),
+        who: "test".into(),
+        evaluator: Arc::new(InThisProcess),
+    };
     let finished = embedded::run(&rig, None, request, folder.path(), Pace::Virtual, |_, _| {})?;
     Ok((finished, folder))
 }

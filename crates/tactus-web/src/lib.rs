@@ -20,7 +20,6 @@ mod site;
 mod token;
 mod view;
 
-use std::io::{self, IsTerminal};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,10 +29,10 @@ use anyhow::Context;
 use clap::Parser;
 use sd_notify::NotifyState;
 use tactus_bus::Endpoint;
+use tactus_log::LogFormat;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
-use tracing_subscriber::EnvFilter;
 
 use live::Live;
 use token::Token;
@@ -64,9 +63,7 @@ struct Options {
 /// Runs `tactus-web` with the process's arguments.
 pub fn main() -> ExitCode {
     let options = Options::parse();
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,zenoh=error"));
-    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
-    lines.with_ansi(io::stderr().is_terminal()).init();
+    let _log = tactus_log::start(LogFormat::Text, "info,zenoh=error");
     match run(options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

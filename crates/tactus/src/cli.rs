@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use tactus_bus::{Credentials, Endpoint};
+use tactus_log::LogFormat;
 
 use crate::commands;
 use crate::exit::{Exit, in_words};
@@ -508,10 +509,7 @@ pub(crate) struct ValidateArgs {
 pub fn main() -> ExitCode {
     let Cli { common, command } = Cli::parse();
     // At the terminal only warnings matter; scripts log through the service.
-    tactus_runner::logging::start(
-        tactus_runner::config::LogFormat::Text,
-        "warn,zenoh=error,zenoh_transport=error",
-    );
+    let _log = tactus_log::start(LogFormat::Text, "warn,zenoh=error,zenoh_transport=error");
     match dispatch(&common, command) {
         Ok(exit) => exit.into(),
         Err(error) => {

@@ -6,6 +6,7 @@ mod cli;
 mod commands;
 mod connection;
 mod exit;
+mod interrupt;
 mod output;
 mod progress;
 mod sha256;

@@ -1,6 +1,11 @@
 //! Progress bars for runs and for computations.
 
-use std::time::Instant;
+use std::io::{self, Write as _};
+use std::mem;
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use tactus_schema::pb::{RunPhase, RunState};
@@ -9,50 +14,128 @@ use crate::output::duration;
 
 /// Progress bar of a run on standard error: presses, frames, losses, time left. Hidden with `--json` and without a
 /// terminal.
+///
+/// A thread of its own draws, because a terminal may be held (Ctrl-S): whoever shows or says something never waits.
 #[derive(Debug)]
-pub(crate) struct RunProgress(ProgressBar);
+pub(crate) struct RunProgress {
+    next: Arc<Next>,
+    /// Ends with the drawing thread.
+    drawing: Mutex<Receiver<()>>,
+}
+
+/// What is to be drawn next.
+#[derive(Debug, Default)]
+struct Next {
+    order: Mutex<DrawingOrder>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct DrawingOrder {
+    /// The latest state only.
+    state: Option<RunState>,
+    /// At most [`LINES_MAX`]; more are dropped.
+    lines: Vec<String>,
+    is_over: bool,
+}
+
+/// Lines that wait for a terminal.
+const LINES_MAX: usize = 16;
+
+/// Longest wait for a terminal at the end of a run.
+const LAST_DRAWING: Duration = Duration::from_millis(200);
 
 impl RunProgress {
     pub(crate) fn new(silent: bool) -> Self {
-        let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = ProgressBar::with_draw_target(None, target);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/dim} {pos}/{len} presses  {msg}") {
-            bar.set_style(style);
-        }
-        Self(bar)
+        let next = Arc::<Next>::default();
+        let (ended, drawing) = channel();
+        let to_draw = Arc::clone(&next);
+        // Without a thread nothing is drawn, but the run goes on.
+        let _spawned = thread::Builder::new().name("progress".into()).spawn(move || {
+            draw(&to_draw, silent);
+            drop(ended);
+        });
+        Self { next, drawing: Mutex::new(drawing) }
     }
 
     /// Shows the state of the run.
     pub(crate) fn show(&self, state: &RunState) {
-        self.0.set_length(state.presses_planned.into());
-        self.0.set_position(state.presses.into());
-        let left = if state.remaining_s >= 0.0 {
-            format!("  {} left", duration(state.remaining_s))
-        } else {
-            String::new()
-        };
-        let lost =
-            if state.frames_lost > 0 { format!(", {} LOST", state.frames_lost) } else { String::new() };
-        let frames = format!("{} frames{lost}", state.frames);
-        self.0.set_message(match state.phase() {
-            RunPhase::Preparing => "preparing".into(),
-            RunPhase::Paused => state.message.clone(),
-            RunPhase::Stopping => format!("{frames}  retracting"),
-            RunPhase::Unspecified | RunPhase::Idle | RunPhase::Running | RunPhase::Finished => {
-                format!("{frames}{left}")
+        self.next.change(|order| order.state = Some(state.clone()));
+    }
+
+    /// Prints a line above the bar.
+    pub(crate) fn say(&self, line: &str) {
+        self.next.change(|order| {
+            if order.lines.len() < LINES_MAX {
+                order.lines.push(line.to_owned());
             }
         });
     }
 
     /// Removes the bar.
     pub(crate) fn clear(&self) {
-        self.0.finish_and_clear();
+        self.next.change(|order| order.is_over = true);
+        let drawing = self.drawing.lock().unwrap_or_else(PoisonError::into_inner);
+        // Either the thread ends, or the terminal is held and keeps the bar.
+        let _ended = drawing.recv_timeout(LAST_DRAWING);
+    }
+}
+
+impl Next {
+    fn change(&self, change: impl FnOnce(&mut DrawingOrder)) {
+        change(&mut self.order.lock().unwrap_or_else(PoisonError::into_inner));
+        self.changed.notify_one();
     }
 
-    /// Prints a line above the bar.
-    pub(crate) fn say(&self, line: &str) {
-        self.0.suspend(|| eprintln!("{line}"));
+    /// Waits for something to draw.
+    fn take(&self) -> DrawingOrder {
+        let order = self.order.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_empty =
+            |order: &mut DrawingOrder| order.state.is_none() && order.lines.is_empty() && !order.is_over;
+        mem::take(&mut *self.changed.wait_while(order, is_empty).unwrap_or_else(PoisonError::into_inner))
     }
+}
+
+/// Draws until the run is over.
+fn draw(next: &Next, silent: bool) {
+    let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let bar = ProgressBar::with_draw_target(None, target);
+    if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/dim} {pos}/{len} presses  {msg}") {
+        bar.set_style(style);
+    }
+    loop {
+        let DrawingOrder { state, lines, is_over } = next.take();
+        for line in lines {
+            // A terminal that is gone shows nothing.
+            let _gone = bar.suspend(|| writeln!(io::stderr(), "{line}"));
+        }
+        if is_over {
+            return bar.finish_and_clear();
+        }
+        if let Some(state) = state {
+            show(&bar, &state);
+        }
+    }
+}
+
+fn show(bar: &ProgressBar, state: &RunState) {
+    bar.set_length(state.presses_planned.into());
+    bar.set_position(state.presses.into());
+    let left = if state.remaining_s >= 0.0 {
+        format!("  {} left", duration(state.remaining_s))
+    } else {
+        String::new()
+    };
+    let lost = if state.frames_lost > 0 { format!(", {} LOST", state.frames_lost) } else { String::new() };
+    let frames = format!("{} frames{lost}", state.frames);
+    bar.set_message(match state.phase() {
+        RunPhase::Preparing => "preparing".into(),
+        RunPhase::Paused => state.message.clone(),
+        RunPhase::Stopping => format!("{frames}  retracting"),
+        RunPhase::Unspecified | RunPhase::Idle | RunPhase::Running | RunPhase::Finished => {
+            format!("{frames}{left}")
+        }
+    });
 }
 
 /// Progress bar of a computation: share done, current step, time left. Hidden where [`RunProgress`] is.

@@ -1,7 +1,7 @@
 //! The command line, and what `rig` and `usb` share.
 
 use std::fs;
-use std::io::{self, BufRead, IsTerminal, Write};
+use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
 use std::thread;
 
@@ -9,6 +9,7 @@ use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 use serde_json::json;
 use tactus_device::SensorCodec;
+use tactus_log::LogFormat;
 use tactus_model::Array;
 use tactus_schema::Rig;
 use tactus_virtual::cable::{self, Port};
@@ -143,7 +144,7 @@ impl Cli {
 
 /// Runs on a runtime of one thread, with the log on standard error.
 fn in_runtime(serving: impl Future<Output = Result<()>>) -> Result<()> {
-    tracing_subscriber::fmt().with_writer(io::stderr).with_ansi(io::stderr().is_terminal()).init();
+    let _log = tactus_log::start(LogFormat::Text, "info");
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(serving)
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
 /// The rows of ARCHITECTURE.md, top to bottom.
-const ROWS: [&str; 27] = [
+const ROWS: [&str; 28] = [
     "tactus-model",
     "tactus-solid",
     "tactus-scene",
@@ -21,6 +21,7 @@ const ROWS: [&str; 27] = [
     "tactus-record",
     "tactus-report",
     "tactus-bus",
+    "tactus-log",
     "tactus-hidden",
     "tactus-virtual",
     "tactus-usbip",

@@ -6,14 +6,16 @@ use std::io::{self, Read as _};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tactus_bus::{CommandCall, Publisher, Request};
-use tactus_engine::{Engine, ResetError, ResumeError, StopOrder};
-use tactus_plan::{Arguments, Script};
+use tactus_engine::{Engine, ResetError, ResumeError, RunOrder, StopOrder};
+use tactus_plan::{Arguments, Evaluate, Script};
 use tactus_runner::config::Config;
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::recorder::ThreadRecorder;
+use tactus_runner::script_process::ScriptProcesses;
+use tactus_runner::twin::DryRun;
 use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
-use tactus_schema::{MonoTime, pb};
+use tactus_schema::{MonoTime, Rig, WallTime, pb};
 use tokio::sync::mpsc;
 use tracing::{info, warn};
 
@@ -34,6 +36,7 @@ pub(super) struct CommandDesk {
     config: Config,
     publisher: Publisher,
     lease: Mutex<Lease>,
+    evaluator: Arc<dyn Evaluate>,
 }
 
 /// Why a command was not done.
@@ -44,7 +47,8 @@ struct Refusal {
 
 impl CommandDesk {
     pub(super) fn new(engine: Engine, config: Config, publisher: Publisher) -> Self {
-        Self { engine, config, publisher, lease: Mutex::default() }
+        let evaluator = Arc::new(ScriptProcesses::of_this_program());
+        Self { engine, config, publisher, lease: Mutex::default(), evaluator }
     }
 
     /// Stops want neither a lease nor a free task: this blocks a thread of its own.
@@ -196,23 +200,25 @@ impl CommandDesk {
         }
         let script = self.script(&request)?;
         let arguments = Arguments::from_json(&request.parameters_json).map_err(Refusal::usage)?;
-        let request = RunRequest { script, arguments, seed: request.seed, who: request.who };
+        let evaluator = Arc::clone(&self.evaluator);
+        let request = RunRequest { script, arguments, seed: request.seed, who: request.who, evaluator };
         let rig = self.engine.rig();
         let now = self.engine.clock().now().wall;
-        let mut order = order::order(request, &rig, now).map_err(Refusal::usage)?;
-
-        let twin_order = order.clone();
         let twin_rig = rig.clone();
-        let plan = tokio::task::spawn_blocking(move || twin::dry_run(&twin_rig, twin_order))
-            .await
-            .map_err(Refusal::failed)?
-            .map_err(Refusal::failed)?;
+        info!(who = request.who, "the dry run begins");
+        let prepare = move || {
+            let prepared = prepare(request, &twin_rig, now, &|| claim.check().is_err());
+            (claim, prepared)
+        };
+        let (claim, prepared) = tokio::task::spawn_blocking(prepare).await.map_err(Refusal::failed)?;
+        // What a stop has broken off is told as stopped, not as impossible.
+        claim.check().map_err(Refusal::failed)?;
+        let (mut order, plan) = prepared?;
         if !plan.is_possible() {
             let refused = plan.outcome.exit_status == pb::ExitStatus::Refused;
             let exit_code = if refused { exit::REFUSED } else { exit::FAILED };
             return Err(Refusal { exit_code, error: plan.outcome.message });
         }
-        claim.check().map_err(Refusal::failed)?;
         // Somebody may have taken it over during the dry run.
         self.want_lease(&lease)?;
         order.planned = Some(plan.promise());
@@ -268,6 +274,18 @@ fn new_secret() -> Result<Secret, Refusal> {
     let read = File::open("/dev/urandom").and_then(|mut random| random.read_exact(&mut bytes));
     read.map(|()| Secret(bytes))
         .map_err(|error: io::Error| Refusal::failed(format!("the system gives no random numbers: {error}")))
+}
+
+/// Checks the parameters and makes the dry run, until `stopped`.
+fn prepare(
+    request: RunRequest,
+    rig: &Rig,
+    now: WallTime,
+    stopped: &dyn Fn() -> bool,
+) -> Result<(RunOrder, DryRun), Refusal> {
+    let order = order::order(request, rig, now, stopped).map_err(Refusal::usage)?;
+    let plan = twin::dry_run(rig, order.clone(), stopped).map_err(Refusal::failed)?;
+    Ok((order, plan))
 }
 
 impl Refusal {

@@ -7,7 +7,7 @@ use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use tactus_device::{Clock, Sensor, SensorEvent, HomingPermit, Permit, Stage, StageError};
 use tactus_engine::{Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
-use tactus_plan::{Arguments, Limits, RigView, Script};
+use tactus_plan::{Arguments, InThisProcess, Limits, RigView, Script};
 use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp, pb};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
@@ -227,6 +227,7 @@ impl Bench {
             seed: 1,
             who: "test".into(),
             limits: Limits::default(),
+            evaluator: Arc::new(InThisProcess),
             planned: None,
             versions: std::collections::BTreeMap::new(),
             recording: String::new(),

@@ -111,5 +111,9 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
 
 fn check_size(what: &'static str, size: u64) -> Result<(), Halt> {
     let limit = SEQUENCE_MAX as u64;
-    if size > limit { Err(Exceeded::Size { what, size, unit: "values", limit }.into()) } else { Ok(()) }
+    if size > limit {
+        Err(Exceeded::Size { what: what.into(), size, unit: "values".into(), limit }.into())
+    } else {
+        Ok(())
+    }
 }

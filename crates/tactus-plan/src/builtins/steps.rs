@@ -97,12 +97,14 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         perform(Step::Covering { thickness_mm: positive("thickness_mm", thickness_mm.0)? }, eval)
     }
 
-    /// Writes a line into the run's events. Values are separated by spaces, numbers rounded to a millionth.
+    /// Writes a line into the run's events. Values are separated by spaces, numbers rounded to a millionth. Only 4 KiB of a
+    /// line are kept.
     fn log<'v>(
         #[starlark(args)] values: UnpackTuple<Value<'v>>,
         eval: &mut Evaluator<'v, '_, '_>,
     ) -> starlark::Result<Value<'v>> {
-        perform(Step::Log { message: line_of(values)? }, eval)
+        let message = context::current()?.log_line(line_of(values)?)?;
+        perform(Step::Log { message }, eval)
     }
 
     /// Ends the run as failed, with the values as its message.

@@ -89,7 +89,11 @@ fn check_size(like: Value<'_>, size: u64) -> Result<(), Halt> {
         STRING_TYPE => ("a text", "bytes", TEXT_MAX_BYTES as u64),
         _ => ("a list", "values", SEQUENCE_MAX as u64),
     };
-    if size > limit { Err(Exceeded::Size { what, size, unit, limit }.into()) } else { Ok(()) }
+    if size > limit {
+        Err(Exceeded::Size { what: what.into(), size, unit: unit.into(), limit }.into())
+    } else {
+        Ok(())
+    }
 }
 
 /// Checks that a whole number fits 64 bits: repeated multiplication would let it grow without a bound.

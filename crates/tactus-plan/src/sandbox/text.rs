@@ -110,7 +110,7 @@ fn push_measured<T: AsRef<str>>(
     let size = out.len() + length;
     if size > TEXT_MAX_BYTES {
         let (size, limit) = (size as u64, TEXT_MAX_BYTES as u64);
-        return Err(Exceeded::Size { what: "a text", size, unit: "bytes", limit });
+        return Err(Exceeded::Size { what: "a text".into(), size, unit: "bytes".into(), limit });
     }
     out.push_str(text().as_ref());
     Ok(())

@@ -1,10 +1,13 @@
 //! `plan`: shows what an experiment would do, by a dry run on the rig's simulated twin.
 
+use std::sync::Arc;
+
 use serde_json::json;
 use tactus_plan::{Parameter, RigView};
 use tactus_runner::config;
 use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_runner::order::{self, RunRequest};
+use tactus_runner::script_process::ScriptProcesses;
 use tactus_runner::twin::{self, DryRun};
 use tactus_schema::{Rig, WallTime};
 
@@ -31,11 +34,13 @@ pub(crate) fn plan(common: &Common, args: &PlanArgs) -> anyhow::Result<Exit> {
         arguments,
         seed: Some(args.experiment.seed.unwrap_or(SEED)),
         who: "plan".into(),
+        evaluator: Arc::new(ScriptProcesses::of_this_program()),
     };
-    let order =
-        order::order(request, &rig, WallTime::default()).map_err(|error| Failure::new(Exit::Usage, error))?;
+    let never = || false;
+    let order = order::order(request, &rig, WallTime::default(), &never)
+        .map_err(|error| Failure::new(Exit::Usage, error))?;
     let values: serde_json::Value = serde_json::from_str(&order.arguments.to_json())?;
-    let plan = twin::dry_run(&rig, order)?;
+    let plan = twin::dry_run(&rig, order, &never)?;
     if common.json {
         println!("{}", to_json(&name, &rig, &parameters, &values, &plan));
     } else {

@@ -13,7 +13,7 @@ use tactus_schema::pb;
 use crate::cli::{Common, ExperimentArgs, RunArgs};
 use crate::connection;
 use crate::exit::{Exit, Failure, in_words};
-use crate::output::{duration, print_fields};
+use crate::output::{duration, print_fields, say};
 
 /// How a run ended.
 pub(super) struct RunSummary {
@@ -35,7 +35,7 @@ pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
     let summary = execute(common, args)?;
     let report = if args.no_report { None } else { make_report(&summary, &args.out) };
     if common.json {
-        println!("{}", to_json(&summary, report.as_deref()));
+        say(&to_json(&summary, report.as_deref()).to_string());
     } else {
         print(&summary, report.as_deref());
     }

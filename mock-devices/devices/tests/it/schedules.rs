@@ -14,6 +14,8 @@ use tactus_virtual::schedule::Schedule;
 use tactus_virtual::{RigControl, VirtualRig};
 use tokio::time::{sleep, timeout};
 
+use crate::permits::{homing, permit};
+
 const SIM: &str = include_str!("../../../../config/rigs/sim.toml");
 
 const ZABER: &str = "protocol = \"zaber-ascii\"
@@ -52,7 +54,7 @@ async fn play(lines: &str, seed: u64) -> Vec<String> {
     let mut log = vec![schedule.to_string()];
     // It answers, unless a fault is in the way.
     sleep(Duration::from_secs(1)).await;
-    log.push(format!("home {:?}", stage.home().await));
+    log.push(format!("home {:?}", stage.home(homing()).await));
     for _ in 0..25 {
         let order = order(&stage, &control, &mut rng).await;
         assert!(
@@ -69,7 +71,7 @@ async fn play(lines: &str, seed: u64) -> Vec<String> {
 /// Gives one order, checks its result against the true tip, and tells both.
 async fn order(stage: &Arc<DrivenStage>, control: &RigControl, rng: &mut ChaCha8Rng) -> String {
     let told = match rng.random_range(0..10) {
-        0 => format!("home {:?}", stage.home().await),
+        0 => format!("home {:?}", stage.home(homing()).await),
         1 => format!("clear {:?}", stage.clear_alarm().await),
         2 => {
             stage.stop();
@@ -88,7 +90,7 @@ async fn order(stage: &Arc<DrivenStage>, control: &RigControl, rng: &mut ChaCha8
             let [x_mm, y_mm] =
                 if z_mm > 1.0 { [20.0, 15.0] } else { [position_mm(stage)[0], position_mm(stage)[1]] };
             let position_mm = [x_mm, y_mm, to_z_mm];
-            let moved = stage.move_to(Target { position_mm, speed_mm_per_s });
+            let moved = stage.move_to(permit(Target { position_mm, speed_mm_per_s }));
             let stops_after = Duration::from_millis(rng.random_range(1..20_000));
             let result = match timeout(stops_after, moved).await {
                 Ok(result) => result,

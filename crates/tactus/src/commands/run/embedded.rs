@@ -2,22 +2,24 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use tactus_engine::{Engine, StopOrder};
+use tactus_engine::Engine;
 use tactus_plan::{Arguments, Script};
 use tactus_runner::config;
 use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, TruthError, TruthFile};
 use tactus_runner::order::RunRequest;
-use tactus_schema::pb::{self, RunPhase};
-use tokio::signal::unix::{SignalKind, signal};
+use tactus_runner::script_process::ScriptProcesses;
+use tactus_schema::pb::{self, RunPhase, RunState};
+use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::RunSummary;
 use crate::cli::{Common, RunArgs};
-use crate::connection;
 use crate::exit::{Exit, Failure};
+use crate::interrupt::{self, StopsRun};
 use crate::progress::RunProgress;
 
 /// How often the progress is drawn.
@@ -47,17 +49,27 @@ pub(super) fn run(
         let hidden = hidden.unwrap_or_default();
         println!("SIMULATED: running on the embedded simulated rig {:?} ({why}; {time}{hidden})", rig.name);
     }
-    let request = RunRequest { script, arguments, seed: args.experiment.seed, who: args.who.clone() };
+    let request = RunRequest {
+        script,
+        arguments,
+        seed: args.experiment.seed,
+        who: args.who.clone(),
+        evaluator: Arc::new(ScriptProcesses::of_this_program()),
+    };
     let simulated = rig.simulated;
-    let silent = common.json;
-    let mut attending = None;
+    let progress = Arc::new(RunProgress::new(common.json));
+    interrupt::listen()?;
+    let (mut attending, mut stops_run) = (None, None);
     let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, |engine, _| {
-        attending = attend(engine.clone(), silent);
+        stops_run = Some(StopsRun::new(engine.clone(), Arc::clone(&progress)));
+        attending = attend(engine, &progress);
     });
+    drop(stops_run);
     if let Some(attending) = attending {
-        // The thread ends with the run and removes the bar. A panic in it has printed its own message.
+        // The thread ends with the run. A panic in it has printed its own message.
         drop(attending.join());
     }
+    progress.clear();
     let Finished { outcome, recording } = done.map_err(|error| match error {
         EmbeddedError::NotPossible(plan) => {
             let refused = plan.outcome.exit_status == pb::ExitStatus::Refused;
@@ -101,30 +113,27 @@ fn wrong_truth(path: &Path, error: &TruthError) -> anyhow::Error {
     Failure::new(Exit::Usage, format!("{}: {error}", path.display())).into()
 }
 
-/// Starts a thread that shows the progress and stops the run at Ctrl-C. The run may occupy the calling thread.
-fn attend(engine: Engine, silent: bool) -> Option<JoinHandle<()>> {
+/// Shows the progress of a run on a thread of its own until it is finished. The run may occupy the calling thread.
+fn attend(engine: &Engine, progress: &Arc<RunProgress>) -> Option<JoinHandle<()>> {
+    let (state, progress) = (engine.state(), Arc::clone(progress));
     // Without a thread there is no progress, but the run goes on.
-    let spawned = thread::Builder::new().name("progress".into()).spawn(move || {
-        if let Ok(runtime) = connection::runtime() {
-            runtime.block_on(follow(&engine, &RunProgress::new(silent)));
+    let spawned = thread::Builder::new().name("attend".into()).spawn(move || {
+        if let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() {
+            runtime.block_on(follow(state, &progress));
         }
     });
     spawned.ok()
 }
 
-async fn follow(engine: &Engine, progress: &RunProgress) {
-    let Ok(mut interrupts) = signal(SignalKind::interrupt()) else { return };
+async fn follow(state: watch::Receiver<RunState>, progress: &RunProgress) {
     let mut redraw = interval(REDRAW);
     redraw.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let (state, mut ended) = (engine.state(), engine.state());
+    let mut ended = state.clone();
     loop {
         tokio::select! {
             biased;
-            Some(()) = interrupts.recv() => {
-                progress.say("Ctrl-C: stopping and retracting");
-                engine.stop(StopOrder { by: "cli".into(), reason: "Ctrl-C".into(), abort: false });
-            }
-            _ = ended.wait_for(|state| state.phase() == RunPhase::Finished) => return progress.clear(),
+            // The engine's end ends it, too.
+            _ = ended.wait_for(|state| state.phase() == RunPhase::Finished) => return,
             _ = redraw.tick() => {
                 let now = state.borrow().clone();
                 progress.show(&now);
