@@ -246,8 +246,10 @@ fn keeps_packets_whole(fault: SensorFault) -> bool {
         | SensorFault::ClockWrap
         | SensorFault::Stuck(_)
         | SensorFault::Saturate(_)
+        | SensorFault::Freeze(_)
+        | SensorFault::Zeros(_)
         | SensorFault::Clear => true,
-        SensorFault::Link(_) => false,
+        SensorFault::Link(_) | SensorFault::Wire(..) => false,
     }
 }
 

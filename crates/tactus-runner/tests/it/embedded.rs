@@ -1,5 +1,5 @@
 //! The embedded rig: production drivers and engine against virtual devices, in virtual time.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,0 +1,4 @@
+//! Runs without hardware: the embedded rig, and the service's core under random faults.
+
+mod embedded;
+mod schedules;
