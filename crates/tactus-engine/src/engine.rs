@@ -356,7 +356,8 @@ impl Engine {
     pub fn pause(&self, by: &str) -> bool {
         let claimed = self.shared.control.borrow().claimed;
         self.shared.control.send_if_modified(|control| {
-            let holds = control.claimed && control.ending.is_none() && control.paused.is_none();
+            let goes_on = control.ending.as_ref().is_none_or(Ending::is_silence);
+            let holds = control.claimed && goes_on && control.paused.is_none();
             if holds {
                 control.paused = Some(by.to_owned());
             }
@@ -493,8 +494,11 @@ impl Shared {
     /// after which the run might have continued.
     pub(crate) fn end(&self, ending: Ending) {
         self.control.send_modify(|control| {
-            control.paused = None;
-            control.wanted_covering_mm = None;
+            // A run goes on after a silence, and a pause holds.
+            if !ending.is_silence() {
+                control.paused = None;
+                control.wanted_covering_mm = None;
+            }
             if control.ending.as_ref().is_none_or(Ending::is_silence) {
                 control.ending = Some(ending);
             }
