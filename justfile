@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: systemd-boot vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
+nightly: systemd-boot tls vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -41,6 +41,10 @@ test:
 # The programs, with the features that the tests use, so that nothing is built twice. CI says in TACTUS_BUILT that they are there.
 build:
     test -n "${TACTUS_BUILT:-}" || cargo test --workspace --no-run --quiet
+
+# The bus with TLS: clients with and without certificates. Some 15 more crates are built for it.
+tls:
+    cargo test -p tactus-bus --features tls --test it tls::
 
 # Formatting.
 fmt:
@@ -86,7 +90,8 @@ systemd:
 
 # The programs as a lab gets them, in target/dist.
 programs:
-    cargo build --profile dist --package tactus --package tactus-daemon --package tactus-web --package tactus-mock
+    cargo build --profile dist --package tactus --package tactus-daemon --package tactus-web --package tactus-mock \
+        --features tactus/tls,tactus-daemon/tls
 
 # The Debian package, target/package/tactus.deb.
 package: programs (package-of "target/dist")

@@ -8,12 +8,14 @@ import sys
 
 # A file is a licence text if its name begins with one of these, in any case.
 BEGINNINGS = ("license", "licence", "copying", "copyright", "notice", "unlicense")
+# Of the packaged programs: `just programs`.
+FEATURES = "tactus/tls,tactus-daemon/tls"
 CODE = {".rs", ".c", ".h", ".py", ".sh"}
 
 
 def metadata():
     host = subprocess.run(["rustc", "--print", "host-tuple"], check=True, capture_output=True, text=True).stdout.strip()
-    command = ["cargo", "metadata", "--format-version=1", "--locked", f"--filter-platform={host}"]
+    command = ["cargo", "metadata", "--format-version=1", "--locked", f"--filter-platform={host}", "--features", FEATURES]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 

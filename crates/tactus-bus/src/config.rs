@@ -90,6 +90,12 @@ impl BusConfig {
                     reason: "tls/ needs the certificates of [bus.tls]",
                 });
             }
+            if endpoint.is_tls() && !cfg!(feature = "tls") {
+                return Err(BusError::Unprotected {
+                    endpoint: endpoint.to_string(),
+                    reason: "this program was built without the feature `tls`",
+                });
+            }
             if !endpoint.is_loopback() && !endpoint.is_tls() {
                 return Err(BusError::Unprotected {
                     endpoint: endpoint.to_string(),

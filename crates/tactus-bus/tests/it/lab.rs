@@ -77,6 +77,17 @@ pub(crate) async fn router() -> (zenoh::Session, Endpoint) {
     }
 }
 
+/// A client of a router, which may take its time on a busy machine.
+pub(crate) async fn connected(endpoint: &Endpoint, rig: &str) -> Client {
+    loop {
+        match Client::connect(endpoint, Some(rig)).await {
+            Ok(client) => return client,
+            Err(BusError::Session { .. }) => {}
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
 /// Returns once the service has processed the client's earlier declarations: declarations and commands of one session keep
 /// their order.
 pub(crate) async fn settled(client: &Client, calls: &mut Calls) {

@@ -1,5 +1,7 @@
 //! Beyond this machine: clients with and without certificates.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::{path::PathBuf, time::Duration};
 
 use crate::lab::free_endpoint;
