@@ -1,10 +1,13 @@
 //! Programs whose log nobody reads: a full pipe, a terminal that is held.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
+use std::path::Path;
+use std::time::Instant;
+
 use rustix::process::Signal;
-use tactus_e2e::{Process, ServiceUnderTest};
+use tactus_e2e::{DEADLINE, Process, ServiceUnderTest};
 use tactus_record::{Entry, Message};
-use tactus_schema::pb::run_event::Event;
+use tactus_schema::pb::{Phase, run_event::Event};
 use tempfile::TempDir;
 
 /// Logs more than any pipe holds, then holds a press.
@@ -15,13 +18,21 @@ const LOG_AND_HOLD: &str = "def run(rig):
     press(5.0, 5.0, depths_mm = [0.3], dwell_s = 600.0)
 ";
 
-fn is_retracted(recording: &std::path::Path) -> bool {
-    tactus_record::read(recording).unwrap().any(|entry| match entry.unwrap() {
-        Entry::Message { message: Message::Event(event), .. } => {
-            matches!(event.event, Some(Event::Cleanup(cleanup)) if cleanup.retracted)
-        }
-        Entry::Message { .. } | Entry::Run(_) | Entry::Attachment(_) => false,
+/// The events of a recording, which may still be written.
+fn events(recording: &Path) -> impl Iterator<Item = Event> {
+    tactus_record::read(recording).into_iter().flatten().map_while(Result::ok).filter_map(|entry| match entry
+    {
+        Entry::Message { message: Message::Event(event), .. } => event.event,
+        Entry::Message { .. } | Entry::Run(_) | Entry::Attachment(_) => None,
     })
+}
+
+fn is_retracted(recording: &Path) -> bool {
+    events(recording).any(|event| matches!(event, Event::Cleanup(cleanup) if cleanup.retracted))
+}
+
+fn holds(recording: &Path) -> bool {
+    events(recording).any(|event| matches!(event, Event::PhaseChanged(now) if now.phase() == Phase::Hold))
 }
 
 #[test]
@@ -55,11 +66,38 @@ fn a_service_whose_log_nobody_reads_sees_its_sensor_go() {
 }
 
 #[test]
-fn an_embedded_run_whose_output_nobody_reads_ends_and_stops() {
+fn an_embedded_run_whose_output_nobody_reads_is_done_all_the_same() {
     let folder = TempDir::new().unwrap();
     let long = "def run(rig):\n    for _ in range(200):\n        log('x' * 4000)\n    wait(600.0)\n";
     std::fs::write(folder.path().join("long.star"), long).unwrap();
-    let args = ["--json", "run", "long.star", "--embedded", "--no-report"];
-    let (code, said) = Process::start_unread("tactus", folder.path(), &args).wait();
-    assert_eq!(code, Some(0), "{said}");
+    for start in [Process::start_unread, Process::start_at_held_terminal] {
+        // At a terminal it also draws a progress bar.
+        let (code, said) =
+            start("tactus", folder.path(), &["run", "long.star", "--embedded", "--no-report"]).wait();
+        assert_eq!(code, Some(0), "{said}");
+        assert!(said.contains("ended      done"), "{said}");
+    }
+}
+
+#[test]
+fn an_embedded_run_at_a_held_terminal_stops_when_that_is_closed() {
+    let folder = TempDir::new().unwrap();
+    let hold = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 600.0)\n";
+    std::fs::write(folder.path().join("hold.star"), hold).unwrap();
+    let args = ["run", "hold.star", "--embedded", "--real-time", "--no-report"];
+    let run = Process::start_at_held_terminal("tactus", folder.path(), &args);
+    let deadline = Instant::now() + DEADLINE;
+    // It can say nothing; what it records is the sign that it presses.
+    let recording = loop {
+        let run = std::fs::read_dir(folder.path().join("runs")).ok().and_then(|mut runs| runs.next());
+        let recording = run.map(|run| run.unwrap().path().join("recording.mcap"));
+        if let Some(recording) = recording.filter(|path| holds(path)) {
+            break recording;
+        }
+        assert!(Instant::now() < deadline, "it does not press");
+    };
+    run.signal(Signal::HUP);
+    let (code, said) = run.wait();
+    assert_eq!(code, Some(1), "{said}");
+    assert!(is_retracted(&recording));
 }

@@ -4,17 +4,19 @@
 //! answer or an exit, with a deadline that only a hang can reach.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
 
-use std::fs;
-use std::io::{BufRead, BufReader, PipeReader, Write};
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
 use rustix::process::{Pid, Signal, kill_process};
+use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -87,7 +89,7 @@ pub struct Process {
     lines: Receiver<String>,
     seen: Vec<String>,
     /// The reading end of standard error, if nobody reads it.
-    _unread: Option<PipeReader>,
+    _unread: Option<OwnedFd>,
 }
 
 impl Process {
@@ -105,22 +107,34 @@ impl Process {
     /// # Panics
     /// If it cannot be started.
     pub fn start_unread(name: &str, folder: &Path, args: &[&str]) -> Self {
-        let (reader, mut writer) = std::io::pipe().expect("a pipe");
-        let flags = fcntl_getfl(&writer).expect("a pipe has flags");
-        fcntl_setfl(&writer, flags | OFlags::NONBLOCK).expect("a pipe can refuse to wait");
-        while writer.write(&[b'.'; 4096]).is_ok() {}
-        while writer.write(b".").is_ok() {}
-        fcntl_setfl(&writer, flags).expect("a pipe can wait");
-        Self::start_with(name, folder, args, writer.into(), Some(reader))
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        Self::start_full(name, folder, args, OwnedFd::from(writer).into(), reader.into())
     }
 
-    fn start_with(
-        name: &str,
-        folder: &Path,
-        args: &[&str],
-        stderr: Stdio,
-        unread: Option<PipeReader>,
-    ) -> Self {
+    /// As [`Self::start_unread`], at a terminal that is held, as by Ctrl-S.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start_at_held_terminal(name: &str, folder: &Path, args: &[&str]) -> Self {
+        let keyboard = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
+        unlockpt(&keyboard).expect("a pseudo-terminal of ours");
+        let path = ptsname(&keyboard, Vec::new()).expect("a pseudo-terminal has a path");
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+        let terminal = open(path.as_c_str(), flags, Mode::empty()).expect("a terminal");
+        Self::start_full(name, folder, args, terminal.into(), keyboard)
+    }
+
+    /// Starts with a standard error that is filled up before.
+    fn start_full(name: &str, folder: &Path, args: &[&str], mut stderr: File, unread: OwnedFd) -> Self {
+        let flags = fcntl_getfl(&stderr).expect("an output has flags");
+        fcntl_setfl(&stderr, flags | OFlags::NONBLOCK).expect("an output can refuse to wait");
+        while stderr.write(&[b'.'; 4096]).is_ok() {}
+        while stderr.write(b".").is_ok() {}
+        fcntl_setfl(&stderr, flags).expect("an output can wait");
+        Self::start_with(name, folder, args, stderr.into(), Some(unread))
+    }
+
+    fn start_with(name: &str, folder: &Path, args: &[&str], stderr: Stdio, unread: Option<OwnedFd>) -> Self {
         let mut child = Command::new(binary(name))
             .args(args)
             .current_dir(folder)

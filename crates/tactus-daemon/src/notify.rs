@@ -76,8 +76,9 @@ impl Progress {
 /// Judges the parts' progress.
 #[derive(Debug)]
 struct Watch {
-    /// Nothing counts as progress before.
+    /// Nobody counts as hanging before this and the patience after it.
     start: MonoTime,
+    looked: MonoTime,
     /// A part without progress for longer hangs.
     patience: Duration,
     hangs: bool,
@@ -98,10 +99,15 @@ enum Verdict {
 
 impl Watch {
     fn new(start: MonoTime, patience: Duration) -> Self {
-        Self { start, patience, hangs: false }
+        Self { start, looked: start, patience, hangs: false }
     }
 
     fn judge(&mut self, progress: Progress, now: MonoTime) -> Verdict {
+        if now.since(self.looked) > self.patience / 2 {
+            // This look is late itself: the machine gave nobody time, and the parts have had none since.
+            self.start = now;
+        }
+        self.looked = now;
         let Progress { acquisition, stage, recorder } = progress;
         let parts = [("acquisition", acquisition), ("the stage's driver", stage), ("the recorder", recorder)];
         let hanging = parts

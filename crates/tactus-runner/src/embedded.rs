@@ -99,7 +99,8 @@ pub fn truth(rig: &Rig) -> Option<Truth> {
 /// With `truth`, the devices use that file's sensor instead of the rig file's. It is hidden from the dry run and the
 /// recording: the recording then contains the rig's description, but not its file.
 ///
-/// `started` is called with the engine and the order just before the run begins.
+/// `stopped` ends the preparation; it is asked every 20 ms until the dry run is over. `started` is called with the engine and
+/// the order just before the run begins; from then on [`Engine::stop`] ends it.
 ///
 /// # Errors
 /// [`EmbeddedError`] if there was no run at all; how a run ended is in [`Finished`].
@@ -109,6 +110,7 @@ pub fn run(
     request: RunRequest,
     folder: &Path,
     pace: Pace,
+    stopped: &dyn Fn() -> bool,
     started: impl FnOnce(&Engine, &RunOrder),
 ) -> Result<Finished, EmbeddedError> {
     let Some(service) = rig.service.clone() else {
@@ -127,14 +129,12 @@ pub fn run(
             Pace::Real => Clock::real(),
         }
     });
-    // Nothing stops the preparation but the end of the program: nothing moves yet.
-    let never = || false;
-    let mut order = order::order(request, rig, clock.now().wall, &never)?;
+    let mut order = order::order(request, rig, clock.now().wall, stopped)?;
     let hidden = match truth {
         Some(truth) => truth.behind(rig, order.seed)?,
         None => Truth::of_rig(rig, order.seed),
     };
-    let plan = twin::dry_run(rig, order.clone(), &never)?;
+    let plan = twin::dry_run(rig, order.clone(), stopped)?;
     if !plan.is_possible() {
         return Err(EmbeddedError::NotPossible(Box::new(plan)));
     }
@@ -151,10 +151,12 @@ pub fn run(
     runtime.block_on(async {
         let opened = devices::open(rig, &service, codec.clone(), || hidden, clock);
         let engine = Engine::start(rig.clone(), opened.devices, clock, Arc::new(Unpublished))?;
-        started(&engine, &order);
-        match engine.run(order, record).await {
-            Ok(outcome) => Ok(Finished { outcome, recording: path }),
+        // Claimed before anybody can stop it: a stop of an engine without a run would not last.
+        let claim = match engine.claim() {
+            Ok(claim) => claim,
             Err(busy) => unreachable!("a new engine has no other run: {busy}"),
-        }
+        };
+        started(&engine, &order);
+        Ok(Finished { outcome: claim.run(order, record).await, recording: path })
     })
 }

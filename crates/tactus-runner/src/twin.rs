@@ -102,8 +102,8 @@ fn stop_when_asked(engines: &Receiver<Engine>, stopped: &dyn Fn() -> bool) {
             Err(RecvTimeoutError::Disconnected) => return,
             Err(RecvTimeoutError::Timeout) => {
                 if let Some(twin) = twin.as_ref().filter(|_| stopped()) {
-                    let reason = "the dry run was stopped".into();
-                    twin.stop(StopOrder { by: "the service".into(), reason, abort: false });
+                    let order = StopOrder { by: "request".into(), reason: String::new(), abort: false };
+                    twin.stop(order);
                 }
             }
         }

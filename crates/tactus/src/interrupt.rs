@@ -6,29 +6,75 @@ use std::thread;
 
 use anyhow::Context;
 use tactus_engine::{Engine, StopOrder};
-use tactus_runner::signals::EndingSignals;
+use tactus_runner::signals::{Ending, EndingSignals};
 
 use crate::progress::RunProgress;
 
-/// The run that this process makes now. Signals belong to the process, and so does this.
-static RUNNING: Mutex<Option<Running>> = Mutex::new(None);
+/// The run that this process prepares or makes now. Signals belong to the process, and so does this.
+static RUN: Mutex<Option<Run>> = Mutex::new(None);
 
-struct Running {
-    engine: Engine,
+struct Run {
     progress: Arc<RunProgress>,
+    /// The signal that came during the preparation.
+    came: Option<Ending>,
+    /// Its engine, once it has begun.
+    engine: Option<Engine>,
 }
 
-fn running() -> MutexGuard<'static, Option<Running>> {
-    RUNNING.lock().unwrap_or_else(PoisonError::into_inner)
+impl Run {
+    fn stop(&self) {
+        if let (Some(engine), Some(ending)) = (&self.engine, self.came) {
+            engine.stop(StopOrder { by: "signal".into(), reason: ending.name.into(), abort: false });
+            self.progress.say(&format!("{}: stopping and retracting", ending.name));
+        }
+    }
 }
 
-/// Listens from here on, on a thread of its own: a run in virtual time occupies the thread that makes it.
-///
-/// # Errors
-/// If the system gives no runtime, handler or thread.
-pub(crate) fn listen() -> anyhow::Result<()> {
-    static ONCE: Once = Once::new();
-    if ONCE.is_completed() {
+fn run() -> MutexGuard<'static, Option<Run>> {
+    RUN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// While it lives, signals stop a run instead of ending the program.
+#[must_use = "signals end the program once this is dropped"]
+#[derive(Debug)]
+pub(crate) struct StopsRun(());
+
+impl StopsRun {
+    /// Listens from here on.
+    ///
+    /// # Errors
+    /// If the system gives no runtime, handler or thread.
+    pub(crate) fn prepare(progress: Arc<RunProgress>) -> anyhow::Result<Self> {
+        *run() = Some(Run { progress, came: None, engine: None });
+        let stops = Self(());
+        listen()?;
+        Ok(stops)
+    }
+
+    /// True once a signal came.
+    pub(crate) fn is_asked() -> bool {
+        run().as_ref().is_some_and(|run| run.came.is_some())
+    }
+
+    /// The run begins: from here on a signal stops its engine, also one that came before.
+    pub(crate) fn begin(engine: Engine) {
+        if let Some(run) = &mut *run() {
+            run.engine = Some(engine);
+            run.stop();
+        }
+    }
+}
+
+impl Drop for StopsRun {
+    fn drop(&mut self) {
+        *run() = None;
+    }
+}
+
+/// Starts the thread that listens, once for all runs: a run in virtual time occupies the thread that makes it.
+fn listen() -> anyhow::Result<()> {
+    static LISTENING: Once = Once::new();
+    if LISTENING.is_completed() {
         return Ok(());
     }
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -40,11 +86,10 @@ pub(crate) fn listen() -> anyhow::Result<()> {
         runtime.block_on(async {
             loop {
                 let ending = signals.next().await;
-                match &*running() {
-                    Some(Running { engine, progress }) => {
-                        let (by, reason) = ("signal".into(), ending.name.into());
-                        engine.stop(StopOrder { by, reason, abort: false });
-                        progress.say(&format!("{}: stopping and retracting", ending.name));
+                match &mut *run() {
+                    Some(run) => {
+                        run.came = Some(ending);
+                        run.stop();
                     }
                     None => process::exit(ending.exit_code()),
                 }
@@ -52,24 +97,6 @@ pub(crate) fn listen() -> anyhow::Result<()> {
         })
     };
     thread::Builder::new().name("signals".into()).spawn(listening)?;
-    ONCE.call_once(|| {});
+    LISTENING.call_once(|| {});
     Ok(())
-}
-
-/// While it lives, signals stop a run instead of ending the program.
-#[must_use]
-#[derive(Debug)]
-pub(crate) struct StopsRun(());
-
-impl StopsRun {
-    pub(crate) fn new(engine: Engine, progress: Arc<RunProgress>) -> Self {
-        *running() = Some(Running { engine, progress });
-        Self(())
-    }
-}
-
-impl Drop for StopsRun {
-    fn drop(&mut self) {
-        *running() = None;
-    }
 }

@@ -26,7 +26,7 @@ fn run(script: Script, arguments: Arguments, rig_toml: &str) -> Result<(Finished
         who: "test".into(),
         evaluator: Arc::new(InThisProcess),
     };
-    let finished = embedded::run(&rig, None, request, folder.path(), Pace::Virtual, |_, _| {})?;
+    let finished = embedded::run(&rig, None, request, folder.path(), Pace::Virtual, &|| false, |_, _| {})?;
     Ok((finished, folder))
 }
 

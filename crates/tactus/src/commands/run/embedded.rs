@@ -19,7 +19,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::RunSummary;
 use crate::cli::{Common, RunArgs};
 use crate::exit::{Exit, Failure};
-use crate::interrupt::{self, StopsRun};
+use crate::interrupt::StopsRun;
 use crate::progress::RunProgress;
 
 /// How often the progress is drawn.
@@ -58,10 +58,11 @@ pub(super) fn run(
     };
     let simulated = rig.simulated;
     let progress = Arc::new(RunProgress::new(common.json));
-    interrupt::listen()?;
-    let (mut attending, mut stops_run) = (None, None);
-    let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, |engine, _| {
-        stops_run = Some(StopsRun::new(engine.clone(), Arc::clone(&progress)));
+    let stops_run = StopsRun::prepare(Arc::clone(&progress))?;
+    let mut attending = None;
+    let stopped = StopsRun::is_asked;
+    let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, &stopped, |engine, _| {
+        StopsRun::begin(engine.clone());
         attending = attend(engine, &progress);
     });
     drop(stops_run);
