@@ -7,6 +7,7 @@
 //! | [`order`] | turns a request into a checked order with its run id and recording |
 //! | [`devices`] | transports, drivers and virtual devices of a rig |
 //! | [`recorder`] | writes the recording for the engine |
+//! | [`continuation`] | what an earlier run confirmed, for a run that goes on with it |
 //! | [`crashed`] | closes the recordings of runs whose service died |
 //! | [`twin`] | the dry run on a simulated twin |
 //! | [`embedded`] | one run in this process, without a service |
@@ -14,6 +15,7 @@
 //! | [`logging`] | logs for terminals, the journal and machines |
 
 pub mod config;
+pub mod continuation;
 pub mod crashed;
 pub mod devices;
 pub mod embedded;
