@@ -49,6 +49,8 @@ pub struct Header<'a> {
     pub started: WallTime,
     /// True if no physical sensor is read.
     pub simulated: bool,
+    /// Id of the earlier run that this one goes on with, if it does.
+    pub continues: Option<&'a str>,
 }
 
 /// An experiment's script.
@@ -77,6 +79,8 @@ pub struct RunMetadata {
     pub simulated: bool,
     /// When it began.
     pub started: WallTime,
+    /// Id of the earlier run that it goes on with, if it does.
+    pub continues: Option<String>,
 }
 
 /// A file attached to the recording.
@@ -102,6 +106,7 @@ impl Header<'_> {
             script: self.script.name.into(),
             simulated: self.simulated,
             started: self.started,
+            continues: self.continues.map(str::to_owned),
         }
     }
 
@@ -137,6 +142,7 @@ impl RunMetadata {
             field("simulated", self.simulated.to_string()),
             field("started_wall_ns", self.started.ns().to_string()),
         ]);
+        metadata.extend(self.continues.clone().map(|run_id| field("continues", run_id)));
         metadata.insert(CHECKSUM.into(), checksum(&metadata));
         mcap::records::Metadata { name: METADATA_NAME.into(), metadata }
     }
@@ -158,6 +164,7 @@ impl RunMetadata {
             script: field("script")?,
             simulated: field("simulated")?.parse().map_err(|_| "simulated")?,
             started: WallTime::from_ns(field("started_wall_ns")?.parse().map_err(|_| "started_wall_ns")?),
+            continues: field("continues").ok(),
         })
     }
 }

@@ -26,6 +26,8 @@ pub struct Info {
     pub who: String,
     /// True if no physical sensor was read.
     pub simulated: bool,
+    /// Id of the earlier run that it goes on with, if it does.
+    pub continues: Option<String>,
     /// When it began, RFC 3339, UTC.
     pub started: String,
     /// From the first message to the last.
@@ -125,6 +127,7 @@ impl Counts {
             rig: run.rig,
             who: run.who,
             simulated: run.simulated,
+            continues: run.continues,
             started: rfc3339(run.started),
             duration_s: tally.duration().as_secs_f64(),
             exit_status: tally.exit_status().map(pb::ExitStatus::word),
@@ -156,6 +159,9 @@ impl fmt::Display for Info {
         writeln!(f, "experiment   {}", self.experiment)?;
         writeln!(f, "rig          {}", self.rig)?;
         writeln!(f, "who          {}", self.who)?;
+        if let Some(earlier) = &self.continues {
+            writeln!(f, "continues    {earlier}")?;
+        }
         writeln!(f, "started      {}", self.started)?;
         writeln!(f, "duration     {:.1} s", self.duration_s)?;
         let colon = if self.message.is_empty() { "" } else { ": " };

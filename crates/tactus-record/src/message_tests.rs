@@ -22,6 +22,7 @@ fn every_kind_of_the_list_is_written_to_its_channel_and_read_back() {
         parameters_json: "{}",
         started: WallTime::from_ns(1),
         simulated: true,
+        continues: None,
     };
     let mut writer = ChannelWriter::new(&header).unwrap();
     let at = TimeStamp { mono: MonoTime::from_ns(1), wall: WallTime::from_ns(2) };

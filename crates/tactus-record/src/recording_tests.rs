@@ -90,6 +90,7 @@ fn with_header<T>(use_it: impl FnOnce(&Header<'_>) -> T) -> T {
         parameters_json: "{}",
         started: WallTime::from_ns(1),
         simulated: true,
+        continues: None,
     })
 }
 

@@ -12,7 +12,7 @@ use rustix::{
     io::Errno,
 };
 
-use crate::RecordError;
+use crate::{RecordError, space::free_bytes};
 
 /// The reserve grows by this much at a time.
 const RESERVE_STEP_BYTES: u64 = 1024 * 1024;
@@ -54,6 +54,12 @@ pub trait SyncHandle: Send {
     /// # Errors
     /// The system's, or that the recording is not where it was any more.
     fn sync(&mut self) -> Result<(), RecordError>;
+
+    /// Free space, of which the reserve is no part.
+    ///
+    /// # Errors
+    /// The system's.
+    fn free_bytes(&self) -> io::Result<u64>;
 }
 
 /// A file, locked while it is open.
@@ -163,6 +169,16 @@ impl SyncHandle for FileSync {
         self.place.check()?;
         let Self { place: Place { path, .. }, file } = self;
         file.sync_data().map_err(|source| RecordError::Io { action: "sync", path: path.clone(), source })
+    }
+
+    fn free_bytes(&self) -> io::Result<u64> {
+        free_bytes(
+            self.place
+                .path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty())
+                .unwrap_or(Path::new(".")),
+        )
     }
 }
 

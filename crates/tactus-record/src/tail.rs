@@ -23,7 +23,7 @@ const FOOTER_BYTES: u64 = 9 + 20 + 8;
 /// # Errors
 /// If the file cannot be read, or is no MCAP file.
 pub fn run_has_ended(path: &Path) -> Result<bool, RecordError> {
-    if has_end_mark(path).map_err(|source| io_error(path, source))? {
+    if has_end_mark(path)? {
         return Ok(true);
     }
     let mut tally = crate::Tally::default();
@@ -35,14 +35,21 @@ pub fn run_has_ended(path: &Path) -> Result<bool, RecordError> {
     Ok(tally.finished().is_some())
 }
 
-fn has_end_mark(path: &Path) -> std::io::Result<bool> {
+/// True if the file ends as a recording that its service closed.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn has_end_mark(path: &Path) -> Result<bool, RecordError> {
+    let end = last_bytes(path).map_err(|source| io_error(path, source))?;
+    Ok(end.starts_with(&[op::FOOTER, 20, 0, 0, 0, 0, 0, 0, 0]) && end.ends_with(mcap::MAGIC))
+}
+
+/// The bytes that a footer and the end mark take; fewer of a shorter file.
+fn last_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut file = File::open(path)?;
     let bytes = file.metadata()?.len();
-    if bytes < FOOTER_BYTES {
-        return Ok(false);
-    }
-    file.seek(SeekFrom::Start(bytes - FOOTER_BYTES))?;
+    file.seek(SeekFrom::Start(bytes.saturating_sub(FOOTER_BYTES)))?;
     let mut end = Vec::new();
-    file.read_to_end(&mut end)?;
-    Ok(end.starts_with(&[op::FOOTER, 20, 0, 0, 0, 0, 0, 0, 0]) && end.ends_with(mcap::MAGIC))
+    file.take(FOOTER_BYTES).read_to_end(&mut end)?;
+    Ok(end)
 }

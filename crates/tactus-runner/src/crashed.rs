@@ -86,6 +86,9 @@ fn tell(crashed: &Crashed) {
 /// Closes one recording; `None` if it has its end, or if a process is writing it.
 fn close(path: &Path) -> Result<Option<Crashed>, CloseError> {
     let error = |action| move |source| CloseError::Io { action, path: path.to_owned(), source };
+    if tail::has_end_mark(path)? {
+        return Ok(None);
+    }
     // For writing, so that a lock over a network is exclusive; nothing is written.
     let file = OpenOptions::new().read(true).write(true).open(path).map_err(error("open"))?;
     match file.try_lock() {

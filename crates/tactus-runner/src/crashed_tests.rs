@@ -25,6 +25,7 @@ fn begin(folder: &Path, run_id: &str) -> (PathBuf, Recording) {
         parameters_json: "{}",
         started: WallTime::from_ns(1),
         simulated: true,
+        continues: None,
     };
     let recording = Recording::create(&path, &header).unwrap();
     (path, recording)

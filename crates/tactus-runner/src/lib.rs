@@ -7,6 +7,7 @@
 //! | [`order`] | turns a request into a checked order with its run id and recording |
 //! | [`devices`] | transports, drivers and virtual devices of a rig |
 //! | [`recorder`] | writes the recording for the engine |
+//! | [`continuation`] | what an earlier run confirmed, for a run that goes on with it |
 //! | [`crashed`] | closes the recordings of runs whose service died |
 //! | [`script_process`] | evaluates each script in a process of its own |
 //! | [`signals`] | the signals that end a program, in order |
@@ -15,6 +16,7 @@
 //! | [`stage_check`] | a check of a rig's stage alone: its identity, and whether it moves as it reports |
 
 pub mod config;
+pub mod continuation;
 pub mod covering_file;
 pub mod crashed;
 pub mod devices;

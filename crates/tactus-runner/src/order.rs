@@ -109,6 +109,7 @@ pub fn recording(
             parameters_json: &order.arguments.to_json(),
             started,
             simulated: rig.simulated,
+            continues: None,
         },
     );
     if created.is_err() {

@@ -10,7 +10,7 @@
 
 mod backlog;
 
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -34,6 +34,9 @@ const SYNC_EVERY: Duration = Duration::from_secs(2);
 
 /// Data that are older than this and not durable are an alarm.
 const UNSYNCED_MAX: Duration = Duration::from_secs(5);
+
+/// Less free space during a run is an alarm.
+const FREE_ALARM_BYTES: u64 = 32 * 1024 * 1024;
 
 /// The longest that the end of a run waits for the disk.
 const FINISH_PATIENCE: Duration = Duration::from_secs(10);
@@ -69,8 +72,15 @@ struct Readings {
     waiting_bytes: AtomicU64,
     /// Everything up to this time of the run is durable.
     synced_ns: AtomicI64,
-    /// The first failure of one of the recorder's threads.
-    failure: Mutex<Option<String>>,
+    failure: Notice,
+    alarm: Notice,
+}
+
+/// A text from one thread to another, which locks nothing as long as there is none.
+#[derive(Debug, Default)]
+struct Notice {
+    is_given: AtomicBool,
+    text: Mutex<Option<String>>,
 }
 
 impl Default for Readings {
@@ -80,7 +90,8 @@ impl Default for Readings {
             oldest_ns: AtomicI64::new(NEVER),
             waiting_bytes: AtomicU64::new(0),
             synced_ns: AtomicI64::new(NEVER),
-            failure: Mutex::default(),
+            failure: Notice::default(),
+            alarm: Notice::default(),
         }
     }
 }
@@ -164,16 +175,23 @@ impl Gauge {
 
     /// The failure of the recorder, if it has failed.
     pub fn failure(&self) -> Option<String> {
-        self.0.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.0.failure.text()
+    }
+
+    /// What people should know of the recorder since the last call: it is late, or the disk is slow or nearly full. The
+    /// log has it, too.
+    pub fn take_alarm(&self) -> Option<String> {
+        self.0.alarm.take()
+    }
+
+    fn alarm(&self, text: String) {
+        warn!("{text}");
+        self.0.alarm.give(text);
     }
 
     fn fail(&self, failure: &RecordError) {
         error!(%failure, "the recording fails");
-        self.0
-            .failure
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get_or_insert_with(|| failure.to_string());
+        self.0.failure.give(failure.to_string());
     }
 
     fn show(&self, backlog: &Backlog) {
@@ -184,13 +202,32 @@ impl Gauge {
     fn reset(&self) {
         self.0.written.store(0, Ordering::Relaxed);
         self.clear();
-        *self.0.failure.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        self.0.failure.take();
+        self.0.alarm.take();
     }
 
     fn clear(&self) {
         self.0.oldest_ns.store(NEVER, Ordering::Relaxed);
         self.0.waiting_bytes.store(0, Ordering::Relaxed);
         self.0.synced_ns.store(NEVER, Ordering::Relaxed);
+    }
+}
+
+impl Notice {
+    /// Gives a text, unless one is there.
+    fn give(&self, text: String) {
+        self.text.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
+        self.is_given.store(true, Ordering::Release);
+    }
+
+    fn text(&self) -> Option<String> {
+        let is_given = self.is_given.load(Ordering::Acquire);
+        is_given.then(|| self.text.lock().unwrap_or_else(PoisonError::into_inner).clone()).flatten()
+    }
+
+    fn take(&self) -> Option<String> {
+        let is_given = self.is_given.swap(false, Ordering::AcqRel);
+        is_given.then(|| self.text.lock().unwrap_or_else(PoisonError::into_inner).take()).flatten()
     }
 }
 
@@ -250,8 +287,10 @@ impl ThreadRecorder {
         match verdict {
             Verdict::KeepsUp => Ok(()),
             Verdict::Alarm(age) => {
-                let backlog_s = age.as_secs_f64();
-                warn!(backlog_s, messages = self.backlog.messages(), path = self.path, "the disk is late");
+                let (path, messages, age_s) = (&self.path, self.backlog.messages(), age.as_secs_f64());
+                self.gauge.alarm(format!(
+                    "the disk is late: {messages} messages wait for {path} since {age_s:.2} s"
+                ));
                 Ok(())
             }
             Verdict::TooLate(age) => Err(self.late(age)),
@@ -420,10 +459,10 @@ impl<S: Storage> Writer<S> {
         if self.sync_to.try_send(self.at).is_err() {
             let unsynced = self.gauge.unsynced(self.at).unwrap_or_default();
             if unsynced > UNSYNCED_MAX {
-                warn!(
-                    unsynced_s = unsynced.as_secs_f64(),
-                    "the disk is slow: a loss of power would cost these seconds"
-                );
+                let unsynced_s = unsynced.as_secs_f64();
+                self.gauge.alarm(format!(
+                    "the disk is slow: a loss of power would cost the last {unsynced_s:.1} s"
+                ));
             }
         }
     }
@@ -431,10 +470,17 @@ impl<S: Storage> Writer<S> {
 
 /// The sync thread. Its failure fails the run.
 fn sync_all(mut sync: Box<dyn SyncHandle>, wishes: &Receiver<MonoTime>, gauge: &Gauge) {
+    let mut nearly_full = false;
     for at in wishes {
         match sync.sync() {
             Ok(()) => gauge.0.synced_ns.store(at.ns(), Ordering::Relaxed),
             Err(failure) => return gauge.fail(&failure),
+        }
+        // Only an alarm: whether the disk is full, the next write will tell.
+        let free_bytes = sync.free_bytes().unwrap_or(u64::MAX);
+        if free_bytes < FREE_ALARM_BYTES && !std::mem::replace(&mut nearly_full, true) {
+            let free_mib = free_bytes / (1024 * 1024);
+            gauge.alarm(format!("the disk of the recordings is nearly full: {free_mib} MiB are free"));
         }
     }
 }

@@ -26,6 +26,7 @@ struct HangingDisk {
 enum SyncKind {
     Works,
     Hangs,
+    NearlyFull,
 }
 
 /// The other end of a [`HangingDisk`].
@@ -40,11 +41,15 @@ struct Sync(SyncKind);
 impl SyncHandle for Sync {
     fn sync(&mut self) -> Result<(), RecordError> {
         match self.0 {
-            SyncKind::Works => Ok(()),
+            SyncKind::Works | SyncKind::NearlyFull => Ok(()),
             SyncKind::Hangs => loop {
                 std::thread::park();
             },
         }
+    }
+
+    fn free_bytes(&self) -> io::Result<u64> {
+        Ok(if matches!(self.0, SyncKind::NearlyFull) { 20 * 1024 * 1024 } else { u64::MAX })
     }
 }
 
@@ -97,6 +102,7 @@ fn with_header<T>(use_it: impl FnOnce(&Header<'_>) -> T) -> T {
         parameters_json: "{}",
         started: WallTime::from_ns(1),
         simulated: true,
+        continues: None,
     })
 }
 
@@ -126,6 +132,9 @@ fn a_disk_that_hangs_never_delays_the_engine_alarms_and_fails_the_run_after_a_se
     let backlog = gauge.backlog(now);
     assert!(backlog > Duration::from_secs(1) && backlog < Duration::from_millis(1050), "{backlog:?}");
     assert!(gauge.waiting_bytes() > 1000);
+    let alarm = gauge.take_alarm().unwrap();
+    assert!(alarm.contains("the disk is late") && alarm.contains("since 0.5"), "{alarm}");
+    assert_eq!(gauge.take_alarm(), None);
     let text = error.to_string();
     let waiting = seq + 1 - gauge.written();
     assert!(waiting >= 30 && text.contains(&format!("with {waiting} frames")), "{text}");
@@ -191,6 +200,8 @@ fn a_disk_that_is_slow_to_sync_delays_nothing() {
     }
     let unsynced = gauge.unsynced(MonoTime::from_ns(10_000_000_000)).unwrap();
     assert_eq!(unsynced, Duration::from_secs(10), "nothing is durable, and it shows");
+    let alarm = gauge.take_alarm().unwrap();
+    assert!(alarm.contains("a loss of power would cost the last"), "{alarm}");
     recorder.finish_within(Duration::from_mins(1)).unwrap();
 }
 
@@ -254,4 +265,23 @@ fn what_was_recorded_is_made_durable_during_the_run() {
     }
     recorder.finish_within(Duration::from_mins(1)).unwrap();
     assert_eq!(info(&path).unwrap().frames, 300);
+}
+
+#[test]
+fn a_disk_that_is_nearly_full_is_an_alarm_before_it_is_full() {
+    let (disk, control) = hanging(SyncKind::NearlyFull);
+    for _ in 0..1000 {
+        control.permits.send(()).unwrap();
+    }
+    let gauge = Gauge::default();
+    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
+    let alarm = (0..).find_map(|seq| {
+        recorder.frame(&frame(seq)).unwrap();
+        while gauge.written() <= seq {
+            std::thread::yield_now();
+        }
+        gauge.take_alarm()
+    });
+    assert_eq!(alarm.unwrap(), "the disk of the recordings is nearly full: 20 MiB are free");
+    recorder.finish_within(Duration::from_mins(1)).unwrap();
 }

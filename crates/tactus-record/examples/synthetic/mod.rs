@@ -130,6 +130,7 @@ impl Run {
             parameters_json: r#"{"dwell_s":0.25}"#,
             started: WallTime::from_ns(STARTED_NS),
             simulated: true,
+            continues: None,
         })
     }
 

@@ -8,9 +8,10 @@ use std::sync::Arc;
 use tactus_device::{Clock, SensorCodec};
 use tactus_plan::{Arguments, InThisProcess, Script};
 use tactus_runner::config::RigFiles;
+use tactus_runner::continuation::{self, ContinuationError};
 use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, SIMULATED_RIG, Truth};
 use tactus_runner::order::RunRequest;
-use tactus_runner::{devices, experiments};
+use tactus_runner::{crashed, devices, experiments};
 use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
 use tactus_schema::rig::ElementFault;
@@ -107,4 +108,57 @@ axes.z = { device = 2, axis = 1, um_per_microstep = 0.047625, direction = -1, or
     assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
     assert_eq!((outcome.presses, outcome.dwells, outcome.frames_lost), (2, 4, 0));
     assert!((outcome.travel_mm[2][0] + 0.6).abs() < 1e-3, "{:?}", outcome.travel_mm);
+}
+
+/// Presses in a row.
+const PRESSES: &str = r#"
+COUNT = param("count", default = 3, doc = "How many presses", unit = "", min = 1)
+
+def run(rig):
+    tare()
+    for i in range(COUNT):
+        press(5.0 + i, 5.0, depths_mm = [0.2, 0.4])
+"#;
+
+#[test]
+fn a_run_that_ended_early_is_continued_with_what_it_confirmed() {
+    let script = Script::parse("presses", PRESSES).unwrap();
+    let mut arguments = Arguments::default();
+    arguments.set("count=4").unwrap();
+    let (Finished { outcome, recording }, folder) = run(script, arguments, SIMULATED_RIG).unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
+    let continued = |run_id: &str| continuation::of_run(folder.path(), run_id, "ada".into());
+    assert!(matches!(continued(&outcome.run_id), Err(ContinuationError::Done { .. })));
+    for strange in ["none", "", "..", "a/b"] {
+        assert!(matches!(continued(strange), Err(ContinuationError::Unknown { .. })), "{strange}");
+    }
+
+    // The service died before the last quarter.
+    let bytes = std::fs::read(&recording).unwrap();
+    let summary = mcap_summary_start(&bytes);
+    std::fs::write(&recording, &bytes[..summary * 3 / 4]).unwrap();
+    assert!(matches!(continued(&outcome.run_id), Err(ContinuationError::Open { .. })));
+    assert_eq!(crashed::close_all(folder.path()).len(), 1);
+    let continuation = continued(&outcome.run_id).unwrap();
+    assert_eq!(continuation.request.seed, Some(1));
+    assert_eq!(continuation.request.script.source(), PRESSES);
+    assert_eq!(continuation.request.arguments.to_json(), r#"{"count":4}"#);
+    let confirmed = continuation.confirmed;
+    assert!((1..4).contains(&confirmed.len()), "{}", confirmed.len());
+    let dwells: Vec<_> = tactus_record::confirmed_presses(&recording).unwrap();
+    for (nth, (done, recorded)) in confirmed.iter().zip(&dwells).enumerate() {
+        assert_eq!((done.at_mm, done.depths_mm.as_slice()), ([5.0 + nth as f64, 5.0], &[0.2, 0.4][..]));
+        for (reading, dwell) in done.readings.iter().zip(&recorded.dwells) {
+            let close = |a: &f64, b: &f32| (a - f64::from(*b)).abs() < 1e-3;
+            assert!(reading.mean_counts.iter().zip(&dwell.mean_counts).all(|(a, b)| close(a, b)));
+            assert!(reading.signal.len() == 48 && reading.rms.iter().any(|rms| *rms > 0.1));
+            assert!(reading.signal.iter().any(|signal| *signal > 20.0), "{:?}", reading.signal);
+        }
+    }
+}
+
+/// Where the data of a recording end, as its footer tells.
+fn mcap_summary_start(bytes: &[u8]) -> usize {
+    let footer = bytes.len() - 8 - 20;
+    usize::try_from(u64::from_le_bytes(bytes[footer..footer + 8].try_into().unwrap())).unwrap()
 }
