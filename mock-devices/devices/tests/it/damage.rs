@@ -67,6 +67,7 @@ enum Damage {
 
 /// What came of one damage.
 #[derive(Debug, Clone, Copy, Default)]
+#[expect(clippy::struct_field_names, reason = "the unit is the last word")]
 struct Cost {
     /// Deeper than the deepest order.
     over_mm: f64,
@@ -203,7 +204,7 @@ impl<S: Session> Lab<S> {
         let actions = self.session.start(now);
         self.act(actions);
         self.run(Duration::from_secs(2));
-        assert!(self.command(|session, now| session.home(now)), "homing");
+        assert!(self.command(S::home), "homing");
         assert!(self.go(z_mm, 20.0), "the way there");
     }
 
