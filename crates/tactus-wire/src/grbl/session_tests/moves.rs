@@ -416,3 +416,25 @@ fn a_probing_that_someone_else_made_is_passed_over() {
     );
     assert_eq!(session.unknown_lines(), 0);
 }
+
+#[test]
+fn a_stage_that_stands_elsewhere_than_it_arrived_is_told_once() {
+    fed("1032 > ?
+        1040 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+        1040 = Idle 1.000 1.000 5.050
+        1132 > ?
+        1140 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+        1140 = Idle 1.000 1.000 5.050
+        1150 * move 1 1 4.9 at 10
+        1150 = not at 1.000 1.000 5.000 but at 1.000 1.000 5.050
+        1160 * move 1 1 6 at 10
+        1160 > Z.95");
+    fed("960 * look
+        960 > ?
+        965 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+        965 = Idle 1.000 1.000 5.050
+        965 > ?
+        970 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+        970 = Idle 1.000 1.000 5.050
+        970 = not at 1.000 1.000 5.000 but at 1.000 1.000 5.050");
+}
