@@ -51,8 +51,8 @@ const PRESS: [Leg; 9] = [
     (2.0, 20.0),
 ];
 
-/// The same in three moves.
-const SHORT_PRESS: [Leg; 3] = [(0.0, 1.0), (-0.1, 1.0), (2.0, 20.0)];
+/// One step down, and up again.
+const SHORT_PRESS: [Leg; 2] = [(0.0, 1.0), (0.2, 20.0)];
 
 /// From the safe height down to the approach height, at the rig file's travel speed and at its greatest load speed.
 const APPROACH: [Leg; 1] = [(0.3, 20.0)];
