@@ -69,7 +69,7 @@ impl Wire {
         if bytes.is_empty() {
             return;
         }
-        let bytes = self.damage(bytes.to_vec(), now);
+        let bytes = self.damage(bytes.to_vec());
         let is_during = |until: Option<Instant>| until.filter(|until| now < *until);
         if is_during(self.armed.lost_until).is_some() {
             return;
@@ -93,7 +93,7 @@ impl Wire {
         self.outbox.take_due(now)
     }
 
-    fn damage(&mut self, mut bytes: Vec<u8>, _now: Instant) -> Vec<u8> {
+    fn damage(&mut self, mut bytes: Vec<u8>) -> Vec<u8> {
         let Self { rng, armed, .. } = self;
         let dropped = std::mem::take(&mut armed.drop_bytes);
         armed.drop_bytes = dropped.saturating_sub(bytes.len());

@@ -44,17 +44,17 @@ fn each_fault_hits_the_next_bytes_once() {
 #[test]
 fn bytes_are_lost_held_or_slow_for_a_time() {
     let second = Duration::from_secs(1);
-    for fault in [WireFault::Lose(second), WireFault::Hold(second), WireFault::Drip(second)] {
+    for (fault, arrivals) in [
+        (WireFault::Lose(second), (0, 0)),
+        (WireFault::Hold(second), (0, 5)),
+        (WireFault::Drip(second), (3, 2)),
+    ] {
         let (mut wire, now) = wire();
         wire.arm(fault, now);
         wire.push(LINE, now);
         let soon = wire.take_due(now + Duration::from_millis(2));
         let later = wire.take_due(now + second);
-        match fault {
-            WireFault::Lose(_) => assert_eq!((soon, later), (Vec::new(), Vec::new())),
-            WireFault::Hold(_) => assert_eq!((soon, later), (Vec::new(), LINE.to_vec())),
-            _ => assert_eq!((soon, later), (LINE[..3].to_vec(), LINE[3..].to_vec())),
-        }
+        assert_eq!((soon.len(), later.len()), arrivals, "{fault:?}");
         wire.push(LINE, now + second);
         assert_eq!(wire.take_due(now + second), LINE, "{fault:?}");
     }

@@ -17,7 +17,7 @@ use super::{Stage, StageError, grbl_config, zaber_config};
 use crate::transport::Connect;
 use crate::{Clock, DeviceError, ErrorKind};
 
-/// Reports that may wait for the reader: twelve seconds of motion.
+/// Reports that may wait for the reader: five seconds of motion.
 const REPORTS_MAX: usize = 256;
 
 /// Commands that may wait for the driver.

@@ -56,7 +56,7 @@ fn z_homes_upwards_and_the_rig_file_says_where_the_others_home() {
     let Ok(StageProtocol::Grbl(GrblAxes { axes: [x, y, z], .. })) = stage(lines) else { panic!() };
     assert_eq!((x.home, y.home, z.home), (Some(AxisEnd::Low), None, Some(AxisEnd::High)));
     let down = stage("protocol = \"grbl\"\naxes.z.home = \"low\"").unwrap_err();
-    assert!(down.to_string().contains("into the sensor"), "{down}");
+    assert!(down.contains("into the sensor"), "{down}");
 }
 
 #[test]

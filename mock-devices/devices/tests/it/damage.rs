@@ -51,8 +51,8 @@ const PRESS: [Leg; 9] = [
     (2.0, 20.0),
 ];
 
-/// The same in three moves.
-const SHORT_PRESS: [Leg; 3] = [(0.0, 1.0), (-0.1, 1.0), (2.0, 20.0)];
+/// One step down, and up again.
+const SHORT_PRESS: [Leg; 2] = [(0.0, 1.0), (0.2, 20.0)];
 
 /// From the safe height down to the approach height, at the rig file's travel speed and at its greatest load speed.
 const APPROACH: [Leg; 1] = [(0.3, 20.0)];
@@ -67,6 +67,7 @@ enum Damage {
 
 /// What came of one damage.
 #[derive(Debug, Clone, Copy, Default)]
+#[expect(clippy::struct_field_names, reason = "the unit is the last word")]
 struct Cost {
     /// Deeper than the deepest order.
     over_mm: f64,
@@ -203,7 +204,7 @@ impl<S: Session> Lab<S> {
         let actions = self.session.start(now);
         self.act(actions);
         self.run(Duration::from_secs(2));
-        assert!(self.command(|session, now| session.home(now)), "homing");
+        assert!(self.command(S::home), "homing");
         assert!(self.go(z_mm, 20.0), "the way there");
     }
 

@@ -81,7 +81,7 @@ async fn order(stage: &Arc<DrivenStage>, control: &RigControl, rng: &mut ChaCha8
             sleep(Duration::from_millis(rng.random_range(1..1500))).await;
             "wait".to_owned()
         }
-        4 => told_true("look", control, None, stage.look().await),
+        4 => told_true("look", control, None, &stage.look().await),
         _ => {
             let [_, _, z_mm] = position_mm(stage);
             // Down in steps, up in one way.
@@ -92,14 +92,11 @@ async fn order(stage: &Arc<DrivenStage>, control: &RigControl, rng: &mut ChaCha8
             let position_mm = [x_mm, y_mm, to_z_mm];
             let moved = stage.move_to(permit(Target { position_mm, speed_mm_per_s }));
             let stops_after = Duration::from_millis(rng.random_range(1..20_000));
-            let result = match timeout(stops_after, moved).await {
-                Ok(result) => result,
-                Err(_) => {
-                    stage.stop();
-                    return format!("move to {position_mm:?} was stopped after {stops_after:?}");
-                }
+            let Ok(result) = timeout(stops_after, moved).await else {
+                stage.stop();
+                return format!("move to {position_mm:?} was stopped after {stops_after:?}");
             };
-            told_true("move", control, Some(position_mm), result)
+            told_true("move", control, Some(position_mm), &result)
         }
     };
     format!("{told} at {:?}", control.tip_mm())
@@ -110,9 +107,9 @@ fn told_true(
     what: &str,
     control: &RigControl,
     target_mm: Option<[f64; 3]>,
-    result: Result<[f64; 3], StageError>,
+    result: &Result<[f64; 3], StageError>,
 ) -> String {
-    if let Ok(told_mm) = &result {
+    if let Ok(told_mm) = result {
         let tip_mm = control.tip_mm();
         let is_near = |at_mm: [f64; 3]| tip_mm.iter().zip(at_mm).all(|(tip, at)| (tip - at).abs() <= 0.012);
         assert!(is_near(*told_mm), "{what}: told {told_mm:?}, and the tip is at {tip_mm:?}");

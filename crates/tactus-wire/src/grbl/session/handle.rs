@@ -342,6 +342,7 @@ impl Session {
             return self.done(Err(Failure::refused("?", reason)));
         }
         self.phase = Phase::Ready;
+        let checked = checked.and_then(|()| self.displaced().map_or(Ok(()), Err));
         match (checked, wanted) {
             (Err(failure), _) => self.done(Err(failure)),
             (Ok(()), Wanted::Move { target_mm, speed_mm_per_s }) => {

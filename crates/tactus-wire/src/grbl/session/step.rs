@@ -103,6 +103,10 @@ impl Session {
 
     /// Begins a move, once it is known from where, and at what feed.
     pub(super) fn begin_move(&mut self, now: Duration, target_mm: [f64; 3], speed_mm_per_s: f64) {
+        if let Some(failure) = self.displaced() {
+            self.phase = Phase::Ready;
+            return self.done(Err(failure));
+        }
         let Some(base_mm) = self.base_mm() else {
             return self.begin_look(now, Wanted::Move { target_mm, speed_mm_per_s });
         };
@@ -117,6 +121,18 @@ impl Session {
         self.send_line(travel.line());
         self.poll.defer(now);
         self.phase = Phase::Moving(travel);
+    }
+
+    /// The failure of a stage that stands elsewhere than the last move ended, by two reports. It is told once: after it, the
+    /// stage is where it says that it is.
+    pub(super) fn displaced(&mut self) -> Option<Failure> {
+        let (position_mm, tolerance_mm) = (self.position_mm, self.config.tolerance_mm);
+        let target_mm = self.config.to_stage(self.parsed_mm.filter(|_| self.is_steady)?);
+        if distance_mm(target_mm, position_mm) <= tolerance_mm {
+            return None;
+        }
+        self.parsed_mm = None;
+        Some(Failure::NotThere { target_mm, position_mm })
     }
 
     /// Where an increment is counted from, in the controller's coordinates: where its parser stands, if the report agrees,

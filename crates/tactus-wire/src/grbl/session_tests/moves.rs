@@ -117,14 +117,14 @@ fn idle_elsewhere_is_not_there_and_what_the_controller_holds_is_discarded() {
 #[test]
 fn an_overdue_move_is_stopped_and_told() {
     // 10 mm at 10 mm/s: twice one second and two more after it was sent at 954 ms.
-    let stuck: String = (1010..4950)
+    let stuck: Vec<String> = (1010..4950)
         .step_by(90)
         .map(|ms| {
             format!("{ms} < <Run|MPos:1.400,1.000,5.000|FS:600,0>\n{ms} = Moving 1.400 1.000 5.000\n...\n")
         })
         .collect();
     moving(&format!(
-        "{stuck}4954 > !
+        "{}4954 > !
         4960 < <Hold:0|MPos:1.400,1.000,5.000|FS:0,0>
         4960 = Hold 1.400 1.000 5.000
         4960 > ?
@@ -135,7 +135,8 @@ fn an_overdue_move_is_stopped_and_told() {
         4970 > ?
         4980 < <Idle|MPos:1.400,1.000,5.000|FS:0,0>
         4980 = Idle 1.400 1.000 5.000
-        4980 = overdue after 4000 ms at 1.400 1.000 5.000"
+        4980 = overdue after 4000 ms at 1.400 1.000 5.000",
+        stuck.concat()
     ));
 }
 
@@ -154,7 +155,7 @@ fn motion_and_arrival_show_that_a_line_was_accepted_whose_ok_was_lost() {
 
 #[test]
 fn a_line_that_gets_lost_with_its_ok_is_an_overdue_move() {
-    let stands: String = (970..2990)
+    let stands: Vec<String> = (970..2990)
         .step_by(90)
         .map(|ms| {
             format!("...\n{ms} < <Idle|MPos:1.000,1.000,5.000|FS:0,0>\n{ms} = Idle 1.000 1.000 5.000\n")
@@ -163,9 +164,10 @@ fn a_line_that_gets_lost_with_its_ok_is_an_overdue_move() {
     fed(&format!(
         "960 * move 1 1 5.1 at 10
         960 > Z.1
-        {stands}...
+        {}...
         2980 > !
-        ..."
+        ...",
+        stands.concat()
     ));
 }
 
@@ -413,4 +415,26 @@ fn a_probing_that_someone_else_made_is_passed_over() {
         960 > Z1",
     );
     assert_eq!(session.unknown_lines(), 0);
+}
+
+#[test]
+fn a_stage_that_stands_elsewhere_than_it_arrived_is_told_once() {
+    fed("1032 > ?
+        1040 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+        1040 = Idle 1.000 1.000 5.050
+        1132 > ?
+        1140 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+        1140 = Idle 1.000 1.000 5.050
+        1150 * move 1 1 4.9 at 10
+        1150 = not at 1.000 1.000 5.000 but at 1.000 1.000 5.050
+        1160 * move 1 1 6 at 10
+        1160 > Z.95");
+    fed("960 * look
+        960 > ?
+        965 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+        965 = Idle 1.000 1.000 5.050
+        965 > ?
+        970 < <Idle|MPos:1.000,1.000,5.050|FS:0,0>
+        970 = Idle 1.000 1.000 5.050
+        970 = not at 1.000 1.000 5.000 but at 1.000 1.000 5.050");
 }

@@ -20,11 +20,10 @@ impl Session {
                 travel.set_out = true;
                 self.at_once = true;
             }
-            Phase::Homing { .. } if !was_round => self.at_once = true,
+            Phase::Homing { .. } | Phase::Looking { .. } if !was_round => self.at_once = true,
             Phase::Moving(_) => self.judge(now),
             Phase::Homing { .. } => self.conclude_homing(),
             Phase::Clearing => self.conclude_clearing(),
-            Phase::Looking { .. } if !was_round => self.at_once = true,
             Phase::Looking { .. } => self.conclude_look(),
             Phase::Stopping(_) => self.conclude_stop(),
         }
@@ -105,7 +104,7 @@ impl Session {
         let Phase::Looking { target_mm } = core::mem::replace(&mut self.phase, Phase::Ready) else { return };
         let (position_mm, tolerance_mm, moves) = (self.position_mm(), self.config.tolerance_mm, self.moves());
         let elsewhere = target_mm.filter(|target_mm| distance_mm(*target_mm, position_mm) > tolerance_mm);
-        let result = self.check_alarm().and_then(|()| self.check_homed()).and_then(|()| match elsewhere {
+        let result = self.check_alarm().and_then(|()| self.check_homed()).and(match elsewhere {
             _ if moves => Err(Failure::NotIdle { position_mm }),
             Some(target_mm) => Err(Failure::NotThere { target_mm, position_mm }),
             None => Ok(position_mm),
