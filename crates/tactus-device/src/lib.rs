@@ -21,8 +21,6 @@ pub use clock::Clock;
 pub use error::{DeviceError, ErrorKind};
 pub use inventory::{Access, FoundDevice, Holder, inventory};
 pub use sensor::{ArrayExpectation, LinkFile, LinkFileError, Sensor, SensorCodec, SensorDriver, SensorEvent};
-pub use stage::{
-    Connection, DrivenStage, Stage, StageError, StageOptions, grbl_config, zaber_config,
-};
+pub use stage::{Connection, DrivenStage, Stage, StageError, StageOptions, grbl_config, zaber_config};
 pub use tactus_safety::{HomingPermit, Permit, Target};
 pub use tactus_wire::stage::{Controller, Setting};

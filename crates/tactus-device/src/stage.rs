@@ -32,7 +32,6 @@ pub trait Stage: Send + Sync {
     /// position moves nothing; it becomes a [`look`](Self::look). There is one move at a time.
     fn move_to(&self, permit: Permit) -> BoxFuture<'_, Result<[f64; 3], StageError>>;
 
-
     /// Asks the controller where it stands now, and returns that position in mm. Moves nothing.
     ///
     /// It fails if the controller does not answer, is in alarm, is not homed or is not idle. The result never comes from an
@@ -82,7 +81,9 @@ pub enum StageError {
     #[error("the stage's position is not known: `tactus reset` homes it")]
     Unhomed,
     /// The stage was asked where it stands, and is not idle.
-    #[error("the stage was asked where it stands, and is not idle at {position_mm:?} mm: something else commands it")]
+    #[error(
+        "the stage was asked where it stands, and is not idle at {position_mm:?} mm: something else commands it"
+    )]
     NotIdle { position_mm: [f64; 3] },
     /// The controller is idle, but not at the target.
     #[error("the stage says it has arrived at {target_mm:?} mm, but stands at {position_mm:?} mm")]
@@ -102,7 +103,9 @@ pub enum StageError {
     #[error(transparent)]
     Void(#[from] Void),
     /// Nobody watched the stage for 100 ms.
-    #[error("the stage was stopped at {position_mm:?} mm: the frames and the stage were not watched for 0.1 s")]
+    #[error(
+        "the stage was stopped at {position_mm:?} mm: the frames and the stage were not watched for 0.1 s"
+    )]
     Unwatched { position_mm: [f64; 3] },
     /// The link or the device failed.
     #[error(transparent)]

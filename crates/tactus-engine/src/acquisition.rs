@@ -92,7 +92,10 @@ impl Mailbox {
     }
 
     /// Has something done, in the order of the calls, without waiting for it.
-    pub(crate) async fn tell(&self, what: impl FnOnce(&mut Acquisition) + Send + 'static) -> Result<(), Gone> {
+    pub(crate) async fn tell(
+        &self,
+        what: impl FnOnce(&mut Acquisition) + Send + 'static,
+    ) -> Result<(), Gone> {
         self.0.send(Box::new(what)).await.map_err(|_| Gone)
     }
 }
@@ -259,6 +262,10 @@ impl Acquisition {
         self.stop_for(violation.as_ref());
         self.shared.stage.watch();
         self.shared.pulse.send_modify(|pulse| pulse.supervised = now);
+        self.record(|sink| sink.check(now));
+        if let Some(alarm) = self.recording.as_mut().and_then(|recording| recording.sink.alarm()) {
+            self.emit(pb::run_event::Event::Log(pb::Log { message: alarm }));
+        }
         self.tell_violation(violation);
     }
 
@@ -376,12 +383,13 @@ impl Acquisition {
         self.shared.publish.state(&self.shared.state.borrow());
     }
 
-    /// Writes to the recording of the run in progress. A failure ends the run.
+    /// Writes to the recording of the run in progress. The first failure ends the run; what comes after it is still offered,
+    /// because the recording counts what it cannot keep.
     fn record(&mut self, write: impl FnOnce(&mut dyn Record) -> Result<(), RecordFailure>) {
-        let Some(recording) = self.recording.as_mut().filter(|recording| recording.failure.is_none()) else {
-            return;
-        };
-        if let Err(failure) = write(recording.sink.as_mut()) {
+        let Some(recording) = self.recording.as_mut() else { return };
+        if let Err(failure) = write(recording.sink.as_mut())
+            && recording.failure.is_none()
+        {
             error!(%failure, "the run fails");
             let ending = Ending::RecordFailed(failure.to_string());
             recording.failure = Some(failure);

@@ -44,7 +44,19 @@ impl Window {
     /// A window that averages at least one frame, and every frame that arrives before `until`.
     pub(crate) fn open(from: MonoTime, until: MonoTime) -> (Self, oneshot::Receiver<Average>) {
         let (done, average) = oneshot::channel();
-        (Self { from, until, moments: Vec::new(), frames: 0, lost: 0, is_disturbed: false, span: [from; 2], done }, average)
+        (
+            Self {
+                from,
+                until,
+                moments: Vec::new(),
+                frames: 0,
+                lost: 0,
+                is_disturbed: false,
+                span: [from; 2],
+                done,
+            },
+            average,
+        )
     }
 
     /// The stage did not stand idle.

@@ -140,7 +140,9 @@ pub enum EngineError {
     )]
     NoService { rig: String },
     /// The covering that was last in place is not known.
-    #[error("the covering that was last confirmed cannot be read: {why}; see which one is in place, then remove the file")]
+    #[error(
+        "the covering that was last confirmed cannot be read: {why}; see which one is in place, then remove the file"
+    )]
     Covering { why: String },
 }
 
@@ -185,7 +187,9 @@ pub enum ResumeError {
     #[error("no run is paused")]
     NotPaused,
     /// The run waits for another covering, and its thickness was not confirmed.
-    #[error("the run waits for the {wanted_mm} mm covering: once it is in place, `tactus resume --covering {wanted_mm}`")]
+    #[error(
+        "the run waits for the {wanted_mm} mm covering: once it is in place, `tactus resume --covering {wanted_mm}`"
+    )]
     CoveringNotConfirmed {
         /// Thickness of the covering that the script asked for.
         wanted_mm: f64,
@@ -245,13 +249,8 @@ impl Engine {
             acquisition: mailbox,
             permits: supervisor.revocation(),
         });
-        let acquiring = acquire(
-            Arc::clone(&shared),
-            supervisor,
-            questions,
-            devices.sensor,
-            devices.stage_reports,
-        );
+        let acquiring =
+            acquire(Arc::clone(&shared), supervisor, questions, devices.sensor, devices.stage_reports);
         Ok(Self { shared, acquisition: Arc::new(AcquisitionTask(tokio::spawn(acquiring))) })
     }
 
@@ -334,10 +333,13 @@ impl Engine {
                     Err(ResetError::NotReady("a defect of Tactus; see the log".into()))
                 }
             };
-            shared.acquisition.ask(|live| {
-                live.supervisor.end();
-                live.refresh_state();
-            }).await?;
+            shared
+                .acquisition
+                .ask(|live| {
+                    live.supervisor.end();
+                    live.refresh_state();
+                })
+                .await?;
             drop(claim);
             done
         });
@@ -457,7 +459,11 @@ fn covering_in_place(rig: &Rig, memory: Option<&dyn CoveringMemory>) -> Result<C
     let kept_mm = memory.map_or(Ok(None), CoveringMemory::recall);
     let kept_mm = kept_mm.map_err(|error| EngineError::Covering { why: error.to_string() })?;
     if let Some(kept_mm) = kept_mm.filter(|kept_mm| (kept_mm - in_file_mm).abs() > SAME_COVERING_MM) {
-        tracing::warn!(kept_mm, in_file_mm, "the last run and the rig file name different coverings: the thinner counts");
+        tracing::warn!(
+            kept_mm,
+            in_file_mm,
+            "the last run and the rig file name different coverings: the thinner counts"
+        );
     }
     Ok(Covering { thickness_mm: kept_mm.map_or(in_file_mm, |kept_mm| kept_mm.min(in_file_mm)) })
 }

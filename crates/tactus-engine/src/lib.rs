@@ -15,8 +15,8 @@ mod run;
 mod script;
 
 pub use engine::{
-    Busy, ChangeCovering, Claim, CoveringMemory, Devices, Engine, EngineError, Pulse, ResetError, ResumeError, StopOrder,
-    Stopped,
+    Busy, ChangeCovering, Claim, CoveringMemory, Devices, Engine, EngineError, Pulse, ResetError,
+    ResumeError, StopOrder, Stopped,
 };
 pub use envelope::{Bounds, Outside};
 pub use outlet::{Publish, Record, RecordFailure, Unpublished};

@@ -57,23 +57,30 @@ impl Shared {
         self.go([to_mm[0], to_mm[1], z_mm], speed_mm_per_s).await.map(drop)
     }
 
-    /// Goes to a height at one place, up or down; near the covering in small confirmed steps.
+    /// Goes to a height at one place, up or down: down to the safe height in one move, from there no faster than a load, and
+    /// near the covering in small confirmed steps.
     pub(crate) async fn descend(
         &self,
         at_mm: [f64; 2],
         to_z_mm: f64,
         speed_mm_per_s: f64,
     ) -> Result<(), Broken> {
-        let near_mm = self.service.motion.approach_height_mm;
+        let motion = &self.service.motion;
+        let down_mm_per_s = speed_mm_per_s.min(self.service.envelope.load_speed_max_mm_per_s);
         let mut z_mm = self.position_mm()[2];
-        if z_mm > near_mm + SAME_HEIGHT_MM && to_z_mm < z_mm {
-            z_mm = self.go([at_mm[0], at_mm[1], to_z_mm.max(near_mm)], speed_mm_per_s).await?[2];
+        for (stop_mm, speed_mm_per_s) in
+            [(motion.safe_height_mm, speed_mm_per_s), (motion.approach_height_mm, down_mm_per_s)]
+        {
+            if z_mm > stop_mm + SAME_HEIGHT_MM && to_z_mm < z_mm {
+                z_mm = self.go([at_mm[0], at_mm[1], to_z_mm.max(stop_mm)], speed_mm_per_s).await?[2];
+            }
         }
         while (z_mm - to_z_mm).abs() > SAME_HEIGHT_MM {
-            let next_mm = if to_z_mm < z_mm { z_mm - confirmed_step_mm(z_mm - to_z_mm) } else { to_z_mm };
-            let down_max_mm_per_s = self.service.envelope.load_speed_max_mm_per_s;
-            let speed_mm_per_s =
-                if next_mm < z_mm { speed_mm_per_s.min(down_max_mm_per_s) } else { speed_mm_per_s };
+            let (next_mm, speed_mm_per_s) = if to_z_mm < z_mm {
+                (z_mm - confirmed_step_mm(z_mm - to_z_mm), down_mm_per_s)
+            } else {
+                (to_z_mm, speed_mm_per_s)
+            };
             let reached_mm = self.go([at_mm[0], at_mm[1], next_mm], speed_mm_per_s).await?[2];
             if next_mm <= to_z_mm + SAME_HEIGHT_MM {
                 return Ok(());

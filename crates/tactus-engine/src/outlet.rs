@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use tactus_schema::{Frame, TimeStamp, pb};
+use tactus_schema::{Frame, MonoTime, TimeStamp, pb};
 
 /// A recording in progress. An error fails the run.
 pub trait Record: Send {
@@ -31,7 +31,22 @@ pub trait Record: Send {
     /// # Errors
     /// As [`Record::sensor_info`].
     fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure>;
-    /// Closes the recording; returns once everything is on disk.
+    /// Looks at the time, because messages may fail to come. Called about thirty times a second.
+    ///
+    /// # Errors
+    /// As [`Record::sensor_info`].
+    fn check(&mut self, now: MonoTime) -> Result<(), RecordFailure> {
+        let _now = now;
+        Ok(())
+    }
+
+    /// A warning for who watches the run, each once.
+    fn alarm(&mut self) -> Option<String> {
+        None
+    }
+
+    /// Closes the recording; returns once everything is on disk. It is called after a failure, too, and its error then has the
+    /// final counts.
     ///
     /// # Errors
     /// If earlier data could not be stored.

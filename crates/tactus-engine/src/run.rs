@@ -275,7 +275,8 @@ impl Run {
     async fn take_reference(&mut self) -> Result<(), Broken> {
         let reference = self.whole_average(REFERENCE).await?;
         self.zero_counts.clone_from(&reference.mean_counts);
-        let set = self.shared.acquisition.ask(move |live| live.supervisor.set_reference(&reference.mean_counts));
+        let set =
+            self.shared.acquisition.ask(move |live| live.supervisor.set_reference(&reference.mean_counts));
         match set.await? {
             Ok(()) => Ok(()),
             Err(violation) => self.refused(violation.rule(), violation.to_string()).await,
@@ -425,7 +426,8 @@ impl Run {
 
     async fn set_phase(&mut self, phase: Phase, press: i32) {
         if self.phase.replace((phase, press)) != Some((phase, press)) {
-            self.emit(Event::PhaseChanged(pb::PhaseChanged { phase: pb::Phase::from(phase).into(), press })).await;
+            self.emit(Event::PhaseChanged(pb::PhaseChanged { phase: pb::Phase::from(phase).into(), press }))
+                .await;
         }
     }
 
@@ -494,7 +496,11 @@ impl Shared {
     async fn latch_not_retracted(&self, why: String) {
         error!("THE TIP IS NOT RETRACTED: {why}");
         let told = self.acquisition.tell(move |live| {
-            live.emit_safety(pb::SafetyVerdict::Stopped, "retract", &format!("THE TIP IS NOT RETRACTED: {why}"));
+            live.emit_safety(
+                pb::SafetyVerdict::Stopped,
+                "retract",
+                &format!("THE TIP IS NOT RETRACTED: {why}"),
+            );
             live.supervisor.latch(Fault::NotRetracted(why));
         });
         if let Err(gone) = told.await {
@@ -516,7 +522,8 @@ impl Shared {
                 format!("it was not closed within {CLOSE_PATIENCE:?}: does the disk hang?").into(),
             )),
         };
-        failure.map_or(closed, Err)
+        // The error of the end has the final counts.
+        closed.and_then(|()| failure.map_or(Ok(()), Err))
     }
 
     /// Withdraws a silence as the reason to end once frames arrive again, and has the supervisor check again.

@@ -1,8 +1,9 @@
 //! What an earlier run confirmed, for a run that goes on with it.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use tactus_plan::{Arguments, MeanReading, Script, ScriptError};
+use tactus_plan::{Arguments, Evaluate, MeanReading, Script, ScriptError};
 use tactus_record::{ConfirmedPress, Entry, Message, RecordError, confirmed_presses, read};
 use tactus_schema::pb::{self, run_event::Event};
 use tactus_schema::{Frame, MonoTime};
@@ -65,7 +66,12 @@ pub enum ContinuationError {
 ///
 /// # Errors
 /// [`ContinuationError`] if there is no such run, if it is not over, or if nothing of it is left to do.
-pub fn of_run(folder: &Path, run_id: &str, who: String) -> Result<Continuation, ContinuationError> {
+pub fn of_run(
+    folder: &Path,
+    run_id: &str,
+    who: String,
+    evaluator: Arc<dyn Evaluate>,
+) -> Result<Continuation, ContinuationError> {
     let unknown = || ContinuationError::Unknown { run_id: run_id.to_owned(), folder: folder.to_owned() };
     let is_name = !run_id.is_empty() && run_id.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     let path = folder.join(run_id).join("recording.mcap");
@@ -87,6 +93,7 @@ pub fn of_run(folder: &Path, run_id: &str, who: String) -> Result<Continuation, 
         arguments: Arguments::from_json(&start.parameters.ok_or_else(|| lacks("parameters"))?)?,
         seed: Some(start.seed.ok_or_else(|| lacks("seed"))?),
         who,
+        evaluator,
     };
     let presses = confirmed_presses(&path)?;
     let confirmed = readings(&path, &presses, &start.zeros)?;

@@ -39,7 +39,9 @@ impl CoveringMemory for CoveringFile {
         let text = match fs::read_to_string(&self.path) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(io::Error::new(error.kind(), format!("{}: {error}", self.path.display()))),
+            Err(error) => {
+                return Err(io::Error::new(error.kind(), format!("{}: {error}", self.path.display())));
+            }
         };
         let content: Content = toml::from_str(&text).map_err(|error| self.invalid(error))?;
         if content.schema != SCHEMA || !(content.thickness_mm > 0.0 && content.thickness_mm.is_finite()) {

@@ -48,7 +48,10 @@ pub fn open(
             Arc::new(move |thickness_mm| control.set_covering_mm(thickness_mm));
         change
     });
-    OpenedRig { devices: Devices { sensor, stage, stage_reports, change_covering, covering_memory: None }, control }
+    OpenedRig {
+        devices: Devices { sensor, stage, stage_reports, change_covering, covering_memory: None },
+        control,
+    }
 }
 
 /// Starts the driver of a rig's stage alone; `embedded` connects to a virtual stage.

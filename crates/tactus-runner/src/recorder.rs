@@ -372,6 +372,14 @@ impl Record for ThreadRecorder {
         self.queue(Entry::Safety(event.clone()), MonoTime::from_ns(event.t_mono_ns))
     }
 
+    fn check(&mut self, now: MonoTime) -> Result<(), RecordFailure> {
+        Self::check(self, now)
+    }
+
+    fn alarm(&mut self) -> Option<String> {
+        self.gauge.take_alarm()
+    }
+
     fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
         self.finish_within(FINISH_PATIENCE)
     }

@@ -325,7 +325,10 @@ impl Checking<'_> {
     async fn go(&self, position_mm: [f64; 3], speed_mm_per_s: f64) -> Result<Ended, String> {
         // The order comes before the check of the flag, so that a stop in between comes after the order.
         let to = Target { position_mm, speed_mm_per_s };
-        let permit = self.supervisor().permit(to, self.subject.clock.now().mono).map_err(|denied| denied.to_string())?;
+        let permit = self
+            .supervisor()
+            .permit(to, self.subject.clock.now().mono)
+            .map_err(|denied| denied.to_string())?;
         let order = self.stage.move_to(permit);
         self.check_interrupted()?;
         Ok(order.await)

@@ -48,7 +48,8 @@ struct Repeated {
 
 impl Contact {
     pub(crate) fn new(rig: &Rig) -> Self {
-        let mut sensitivities: Vec<_> = rig.sensitivity_counts_per_mm.iter().map(|counts| counts.abs()).collect();
+        let mut sensitivities: Vec<_> =
+            rig.sensitivity_counts_per_mm.iter().map(|counts| counts.abs()).collect();
         sensitivities.sort_by(f64::total_cmp);
         Self {
             registration: rig.registration,
@@ -91,11 +92,18 @@ impl Contact {
         let is_deep = depth_mm >= FELT_DEPTH_SHARE * limits.depth_max_mm;
         let is_unfelt = is_over_array && is_standing && is_deep && rise_counts < least_counts;
         self.unfelt_frames = if is_unfelt { self.unfelt_frames + 1 } else { 0 };
-        (self.unfelt_frames >= UNFELT_FRAMES).then_some(Violation::NoResponse { rise_counts, least_counts, depth_mm })
+        (self.unfelt_frames >= UNFELT_FRAMES).then_some(Violation::NoResponse {
+            rise_counts,
+            least_counts,
+            depth_mm,
+        })
     }
 
     fn is_over_array(&self, at_mm: [f64; 2]) -> bool {
         let at_mm = self.registration.to_sensor(at_mm);
-        at_mm.iter().zip(self.extent_mm).all(|(at_mm, [least_mm, greatest_mm])| (least_mm..=greatest_mm).contains(at_mm))
+        at_mm
+            .iter()
+            .zip(self.extent_mm)
+            .all(|(at_mm, [least_mm, greatest_mm])| (least_mm..=greatest_mm).contains(at_mm))
     }
 }

@@ -43,7 +43,8 @@ struct Expected {
 impl Elements {
     pub(crate) fn new(rig: &Rig, limits: &Limits) -> Self {
         let unwatched = limits.envelope.unwatched_elements.clone();
-        let baseline = |(element, counts): (usize, &f64)| Some(*counts).filter(|_| !unwatched.contains(&element));
+        let baseline =
+            |(element, counts): (usize, &f64)| Some(*counts).filter(|_| !unwatched.contains(&element));
         Self {
             rig: Expected {
                 baseline_counts: rig.baseline_counts.iter().enumerate().map(baseline).collect(),
@@ -160,7 +161,13 @@ impl Elements {
         against_tare.or_else(|| self.over(reference, 0.0, limits, "the run's first zero"))
     }
 
-    fn over(&self, zero: &Zero, band_counts: f64, limits: &Limits, against: &'static str) -> Option<Violation> {
+    fn over(
+        &self,
+        zero: &Zero,
+        band_counts: f64,
+        limits: &Limits,
+        against: &'static str,
+    ) -> Option<Violation> {
         let envelope = &limits.envelope;
         let limit_counts = envelope.element_max_counts + band_counts;
         let mut sum_counts = 0.0;
@@ -172,7 +179,11 @@ impl Elements {
             sum_counts += (rise_counts - band_counts).max(0.0);
         }
         let limit_counts = envelope.sum_max_counts;
-        (sum_counts > limit_counts).then_some(Violation::SumForce { rise_counts: sum_counts, limit_counts, against })
+        (sum_counts > limit_counts).then_some(Violation::SumForce {
+            rise_counts: sum_counts,
+            limit_counts,
+            against,
+        })
     }
 
     /// Rises of the elements that were read both now and for the zero.

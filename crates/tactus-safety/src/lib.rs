@@ -14,6 +14,6 @@ mod permit;
 mod supervisor;
 
 pub use fault::{Fault, Violation};
-pub use limits::{STEP_DOWN_MAX_MM, SAME_HEIGHT_MM};
+pub use limits::{SAME_HEIGHT_MM, STEP_DOWN_MAX_MM};
 pub use permit::{Denied, HomingPermit, Permit, Revocation, Target, Void};
 pub use supervisor::Supervisor;

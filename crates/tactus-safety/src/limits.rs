@@ -83,9 +83,13 @@ impl Limits {
         if is_deep && step_mm > STEP_DOWN_MAX_MM + 1e-6 {
             return Err(Denied::TooFarDown { step_mm, limit_mm: STEP_DOWN_MAX_MM });
         }
-        let is_load = is_deep && step_mm > 0.0;
-        let limit_mm_per_s =
-            if is_load { envelope.load_speed_max_mm_per_s } else { envelope.speed_max_mm_per_s };
+        // Below the safe height a damaged command must not carry the tip far before a report shows it.
+        let is_low = z_mm < motion.safe_height_mm - motion.tolerance_mm;
+        let limit_mm_per_s = if is_low && step_mm > SAME_HEIGHT_MM {
+            envelope.load_speed_max_mm_per_s
+        } else {
+            envelope.speed_max_mm_per_s
+        };
         check_speed(to.speed_mm_per_s, limit_mm_per_s)
     }
 }

@@ -53,9 +53,11 @@ impl Supervisor {
     /// A supervisor for a stage alone, as for a check of the stage by hand. It permits no step down below the safe height;
     /// above it x and y are free, because homing may end outside the envelope.
     pub fn without_sensor(rig: &Rig, service: &Service) -> Self {
-        let mut supervisor = Self { fault: None, is_active: true, has_sensor: false, ..Self::new(rig, service) };
+        let mut supervisor =
+            Self { fault: None, is_active: true, has_sensor: false, ..Self::new(rig, service) };
         let envelope = &mut supervisor.limits.envelope;
-        (envelope.x_mm, envelope.y_mm) = ([f64::NEG_INFINITY, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]);
+        (envelope.x_mm, envelope.y_mm) =
+            ([f64::NEG_INFINITY, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]);
         supervisor
     }
 
@@ -303,7 +305,9 @@ impl Supervisor {
 /// True if a report with this status tells the position.
 fn is_placed(status: StageStatus) -> bool {
     match status {
-        StageStatus::Unspecified | StageStatus::Disconnected | StageStatus::Unhomed | StageStatus::Homing => false,
+        StageStatus::Unspecified | StageStatus::Disconnected | StageStatus::Unhomed | StageStatus::Homing => {
+            false
+        }
         StageStatus::Idle | StageStatus::Moving | StageStatus::Hold | StageStatus::Alarm => true,
     }
 }

@@ -260,7 +260,8 @@ fn whatever_stops_voids_every_permit_that_was_given_before() {
 
 #[test]
 fn a_step_down_wants_frames_a_zero_small_steps_and_a_straight_way() {
-    let denied = |supervisor: &mut Supervisor, to: Target, ms: i64| supervisor.permit(to, at_ms(ms)).unwrap_err();
+    let denied =
+        |supervisor: &mut Supervisor, to: Target, ms: i64| supervisor.permit(to, at_ms(ms)).unwrap_err();
     let mut supervisor = ready(0.3);
     assert!(matches!(denied(&mut supervisor, to(0.2), 1101), Denied::NoFreshFrame { .. }));
     assert!(matches!(denied(&mut supervisor, to(0.19), 1010), Denied::TooFarDown { .. }));

@@ -31,7 +31,8 @@ impl Run {
             step,
             what: describe(&call.step),
             at: call.at.to_string(),
-        })).await;
+        }))
+        .await;
         let reply = self.act(&call.step).await?;
         self.emit(Event::StepDone(pb::StepDone { step })).await;
         Ok(reply)
@@ -119,7 +120,8 @@ impl Run {
             }
             repeats += 1;
             warn!(press = index, %broken, "press broken off; it will be repeated");
-            self.emit(Event::PressRepeated(pb::PressRepeated { press: index, reason: broken.to_string() })).await;
+            self.emit(Event::PressRepeated(pb::PressRepeated { press: index, reason: broken.to_string() }))
+                .await;
             self.recover().await?;
         }
     }
@@ -227,7 +229,8 @@ impl Run {
         self.emit(Event::ReadDone(pb::ReadDone {
             frames: average.frames,
             mean_counts: as_f32(&average.mean_counts),
-        })).await;
+        }))
+        .await;
         Ok(Reply::Reading(self.reading(average)))
     }
 
@@ -236,9 +239,12 @@ impl Run {
         self.emit(Event::TareDone(pb::TareDone {
             frames: average.frames,
             baseline_counts: as_f32(&average.mean_counts),
-        })).await;
+        }))
+        .await;
         let counts = average.mean_counts.clone();
-        if let Err(violation) = self.shared.acquisition.ask(move |live| live.supervisor.set_tare(&counts)).await? {
+        if let Err(violation) =
+            self.shared.acquisition.ask(move |live| live.supervisor.set_tare(&counts)).await?
+        {
             self.refused(violation.rule(), violation.to_string()).await?;
         }
         self.zero_counts.clone_from(&average.mean_counts);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use tactus_device::{Clock, Sensor, SensorEvent, HomingPermit, Permit, Stage, StageError};
+use tactus_device::{Clock, HomingPermit, Permit, Sensor, SensorEvent, Stage, StageError};
 use tactus_engine::{Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
 use tactus_plan::{Arguments, InThisProcess, Limits, RigView, Script};
 use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp, pb};
@@ -212,7 +212,13 @@ impl Bench {
             pending: None,
         };
         let state = stage.state();
-        let devices = Devices { sensor: Box::new(sensor), stage, stage_reports, change_covering: None, covering_memory: None };
+        let devices = Devices {
+            sensor: Box::new(sensor),
+            stage,
+            stage_reports,
+            change_covering: None,
+            covering_memory: None,
+        };
         let engine = Engine::start(rig, devices, clock, Arc::new(Unpublished)).unwrap();
         Self { engine, trouble, deepest_mm, stage: state }
     }

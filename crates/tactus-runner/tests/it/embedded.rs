@@ -127,7 +127,8 @@ fn a_run_that_ended_early_is_continued_with_what_it_confirmed() {
     arguments.set("count=4").unwrap();
     let (Finished { outcome, recording }, folder) = run(script, arguments, SIMULATED_RIG).unwrap();
     assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
-    let continued = |run_id: &str| continuation::of_run(folder.path(), run_id, "ada".into());
+    let continued =
+        |run_id: &str| continuation::of_run(folder.path(), run_id, "ada".into(), Arc::new(InThisProcess));
     assert!(matches!(continued(&outcome.run_id), Err(ContinuationError::Done { .. })));
     for strange in ["none", "", "..", "a/b"] {
         assert!(matches!(continued(strange), Err(ContinuationError::Unknown { .. })), "{strange}");

@@ -34,7 +34,7 @@ const SCHEDULES: u64 = 24;
 /// How far the tip may pass the limit: the tolerance of a move, and the stage's step.
 const TOLERANCE_MM: f64 = 0.007;
 
-/// How much farther a damaged command may carry it (docs/decisions/0020-a-damaged-byte-costs-little.md): the way in the time
+/// How much farther a damaged command may carry it (docs/decisions/0020-a-damaged-byte.md): the way in the time
 /// until a report shows it, at the greatest speed of a step down in these scripts.
 const DAMAGE_MM: f64 = 0.31;
 
@@ -76,7 +76,8 @@ impl Record for Witness {
             let [x_mm, y_mm] = self.rig.registration.to_robot([dwell.x_mm, dwell.y_mm]);
             let tip_mm = self.control.tip_mm();
             let told_mm = [x_mm, y_mm, -dwell.depth_mm];
-            let away_mm = tip_mm.iter().zip(told_mm).map(|(tip, told)| (tip - told).powi(2)).sum::<f64>().sqrt();
+            let away_mm =
+                tip_mm.iter().zip(told_mm).map(|(tip, told)| (tip - told).powi(2)).sum::<f64>().sqrt();
             if away_mm > 2.0 * TOLERANCE_MM || self.control.is_moving() {
                 let broken = format!("a dwell at {told_mm:?} is told, and the tip is at {tip_mm:?}");
                 self.broken.lock().unwrap().push(broken);
@@ -115,11 +116,13 @@ fn script(rng: &mut ChaCha8Rng) -> (String, u32) {
             }
             _ => {
                 presses += 1;
-                let depths: Vec<_> =
-                    (0..rng.random_range(1..4)).map(|_| format!("{:.3}", rng.random_range(0.05..0.7))).collect();
+                let depths: Vec<_> = (0..rng.random_range(1..4))
+                    .map(|_| format!("{:.3}", rng.random_range(0.05..0.7)))
+                    .collect();
                 let speed: f64 = rng.random_range(0.2..1.0);
                 let depths = depths.join(", ");
-                writeln!(text, "    press({x_mm:.3}, {y_mm:.3}, [{depths}], speed_mm_per_s = {speed:.2})").unwrap();
+                writeln!(text, "    press({x_mm:.3}, {y_mm:.3}, [{depths}], speed_mm_per_s = {speed:.2})")
+                    .unwrap();
             }
         }
     }
@@ -155,7 +158,8 @@ async fn play(seed: u64) -> Played {
     let control = opened.control.unwrap();
     let engine = Engine::start(rig.clone(), opened.devices, clock, Arc::new(Unpublished)).unwrap();
 
-    let schedule = Schedule::random(seed, Duration::from_secs(60), rng.random_range(0..5), rig.array.elements());
+    let schedule =
+        Schedule::random(seed, Duration::from_secs(60), rng.random_range(0..5), rig.array.elements());
     let faults = (control.clone(), schedule.script().unwrap());
     tokio::spawn(async move { faults.0.play(&faults.1).await });
     if rng.random() {
@@ -193,7 +197,9 @@ async fn play(seed: u64) -> Played {
     let may_be_damaged = schedule.faults.iter().any(|(_, line)| line.starts_with("to-stage"));
     let limit_mm = if may_be_damaged { limit_mm + DAMAGE_MM } else { limit_mm };
     if control.deepest_mm() > limit_mm {
-        played.broken.push(format!("the tip was {:.3} mm deep; the limit is {limit_mm:.3} mm", control.deepest_mm()));
+        played
+            .broken
+            .push(format!("the tip was {:.3} mm deep; the limit is {limit_mm:.3} mm", control.deepest_mm()));
     }
     played.broken.append(&mut broken.lock().unwrap());
     for event in events.lock().unwrap().iter() {

@@ -160,15 +160,8 @@ impl RawRig {
             baseline_counts: &baseline_counts,
             sensitivity_counts_per_mm: &sensitivity_counts_per_mm,
         };
-        let service = service::check(
-            &array,
-            rest,
-            self.envelope,
-            self.motion,
-            self.policy,
-            self.sensor,
-            self.stage,
-        )?;
+        let service =
+            service::check(&array, rest, self.envelope, self.motion, self.policy, self.sensor, self.stage)?;
         let rig = Rig {
             name: self.name,
             simulated: self.simulated,

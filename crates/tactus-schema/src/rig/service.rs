@@ -152,12 +152,7 @@ impl RawEnvelope {
             let problem = format!("{element} is no element: there are {}, from 0", array.elements());
             return Err(wrong(field("unwatched_elements"), problem));
         }
-        check_headroom(
-            array,
-            rest,
-            element_max_counts + baseline_band_counts,
-            &self.unwatched_elements,
-        )?;
+        check_headroom(array, rest, element_max_counts + baseline_band_counts, &self.unwatched_elements)?;
         Ok(Envelope {
             x_mm: range(field("x_mm"), self.x_mm)?,
             y_mm: range(field("y_mm"), self.y_mm)?,
@@ -184,7 +179,8 @@ fn check_headroom(
 ) -> Result<(), WrongField> {
     let full_scale_counts = array.full_scale_counts();
     let pairs = rest.baseline_counts.iter().zip(rest.sensitivity_counts_per_mm).enumerate();
-    for (element, (baseline_counts, sensitivity)) in pairs.filter(|(element, _)| !unwatched.contains(element)) {
+    for (element, (baseline_counts, sensitivity)) in pairs.filter(|(element, _)| !unwatched.contains(element))
+    {
         let room_counts = if *sensitivity >= 0.0 {
             FULL_SCALE_SHARE_MAX * full_scale_counts - baseline_counts
         } else if *baseline_counts > 0.0 {

@@ -6,9 +6,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use tactus_device::{
-    Clock, Connection, DrivenStage, ErrorKind, Stage, StageError, StageOptions, Target,
-};
+use tactus_device::{Clock, Connection, DrivenStage, ErrorKind, Stage, StageError, StageOptions, Target};
 use tactus_schema::Rig;
 use tactus_schema::pb::StageStatus;
 use tactus_schema::rig::StageProtocol;

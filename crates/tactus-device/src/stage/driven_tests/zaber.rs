@@ -9,7 +9,7 @@ use tactus_wire::zaber::{Flag, Header, HostCommand, HostCommandDecoder, Message}
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use tokio::time::{Instant, sleep};
 
-use super::{homing, permit, OPTIONS, drain, until};
+use super::{OPTIONS, drain, homing, permit, until};
 use crate::transport::memory::pair;
 use crate::{Clock, Connection, DrivenStage, ErrorKind, Stage, StageError, Target};
 
