@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: systemd-boot tls vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
+nightly: (fault-schedules "2000") (simulate-faults "2000") mutants systemd-boot tls vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -295,6 +295,14 @@ fuzz seconds="600":
 # So many schedules of faults against a virtual stage and its driver, each from its seed; TACTUS_SEED=7 plays one again.
 simulate-faults schedules="2000":
     TACTUS_SCHEDULES={{ schedules }} cargo test --package tactus-virtual --test it schedules
+
+# So many schedules of faults against the service's core, its drivers and virtual devices; TACTUS_SEED=7 plays one again.
+fault-schedules schedules="200":
+    TACTUS_SCHEDULES={{ schedules }} cargo test --package tactus-runner --test it schedules
+
+# Plants defects, one at a time: the tests must find each.
+mutants word="":
+    python3 tests/mutants/run.py "{{ word }}"
 
 # A bare Debian 12 with cargo, gcc and git: both of the README's commands in it, timed. As root; the first time some 20 minutes.
 bare:

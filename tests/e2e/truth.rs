@@ -127,6 +127,11 @@ fn varied(seed: u64) -> String {
     put(&["simulation", "registration_error", "origin_mm"], origin);
     put(&["simulation", "registration_error", "rotation_deg"], within(-0.5, 0.5).into());
     for (kind, value) in faults(&mut rng) {
+        if kind == "stuck" {
+            // Its reading lies far from the baseline, so the rig file has to say that it is faulty.
+            let stuck = value.as_array().unwrap().iter().map(|entry| entry["element"].clone()).collect();
+            rig["envelope"].as_table_mut().unwrap().insert("unwatched_elements".into(), toml::Value::Array(stuck));
+        }
         rig["simulation"].as_table_mut().unwrap().insert(kind.into(), value);
     }
     toml::to_string(&rig).unwrap()

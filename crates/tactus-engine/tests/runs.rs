@@ -3,11 +3,13 @@
 
 mod rig;
 
+use std::sync::{Arc, Mutex};
+
 use pb::ExitStatus;
 use pb::Phase::{Approach, Hold, Idle, Load, Retract, Unload};
 use pb::run_event::Event;
 use rig::{Bench, Memory};
-use tactus_engine::{Fault, ResumeError, RunOrder, StopOrder};
+use tactus_engine::{CoveringMemory, Fault, ResumeError, RunOrder, StopOrder};
 use tactus_schema::pb::{self, RunPhase, StageStatus};
 
 const PRESS: &str = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2, 0.4])\n";
@@ -405,4 +407,109 @@ async fn a_run_before_the_reset_moves_nothing_unless_its_order_stands_for_one() 
     let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
     assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
     assert_eq!(bench.engine.fault(), None);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_panic_of_the_sensors_driver_stops_retracts_and_is_a_fault() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let run = start(&bench, HOLD, &memory);
+    until_deep(&mut bench, 0.3).await;
+    bench.trouble.lock().unwrap().panics = true;
+    let outcome = run.await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Failed, "{outcome:?}");
+    assert!(outcome.message.contains("defect"), "{}", outcome.message);
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+    assert!(matches!(bench.engine.fault(), Some(Fault::Defect(_))), "{:?}", bench.engine.fault());
+    assert!(*memory.finished.lock().unwrap());
+    assert!(bench.engine.is_acquiring(), "the supervision goes on");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_panic_of_the_run_leaves_the_tip_up_and_the_recording_closed() {
+    let bench = Bench::with_covering(|rig| rig, Some(Arc::new(|_| panic!("for a test"))), None);
+    let memory = Memory::default();
+    let script = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2])\n    covering(0.5)\n";
+    let outcome = bench.engine.run(bench.order(script), memory.sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Failed, "{outcome:?}");
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+    assert!(*memory.finished.lock().unwrap());
+    assert!(matches!(memory.kinds().last(), Some(Event::Finished(_))));
+    assert!(matches!(bench.engine.fault(), Some(Fault::Defect(_))), "{:?}", bench.engine.fault());
+    bench.engine.reset().await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_broken_rule_is_a_fault_until_a_reset() {
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    bench.trouble.lock().unwrap().push_counts = 2500.0;
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Refused);
+    bench.trouble.lock().unwrap().push_counts = 0.0;
+    let order = RunOrder { resets: false, ..bench.order(PRESS) };
+    let refused = bench.engine.run(order, Memory::default().sink()).await.unwrap();
+    assert_eq!(refused.exit_status, ExitStatus::Refused);
+    assert!(refused.message.contains("a safety rule was broken"), "{}", refused.message);
+    bench.engine.reset().await.unwrap();
+    let order = RunOrder { resets: false, ..bench.order(PRESS) };
+    let done = bench.engine.run(order, Memory::default().sink()).await.unwrap();
+    assert_eq!(done.exit_status, ExitStatus::Done, "{done:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn zeros_far_from_the_baseline_refuse_the_run_and_cannot_ratchet() {
+    let bench = Bench::start(|rig| rig);
+    bench.trouble.lock().unwrap().push_counts = 501.0;
+    let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Refused, "{outcome:?}");
+    assert!(outcome.message.contains("baseline_band_counts"), "{}", outcome.message);
+    assert!(*bench.deepest_mm.lock().unwrap() < 0.0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_dwell_in_which_the_stage_lost_its_place_is_not_told_as_done() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let run = start(&bench, HOLD, &memory);
+    until_deep(&mut bench, 0.3).await;
+    tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+    bench.trouble.lock().unwrap().epoch += 1;
+    let outcome = run.await.unwrap();
+    assert_eq!((outcome.exit_status, outcome.dwells), (ExitStatus::Failed, 0), "{outcome:?}");
+    assert!(outcome.message.contains("did not stand still"), "{}", outcome.message);
+    assert!(!memory.kinds().iter().any(|kind| matches!(kind, Event::DwellDone(_))));
+}
+
+/// Remembers in memory.
+#[derive(Default)]
+struct Note(Mutex<Option<f64>>);
+
+impl CoveringMemory for Note {
+    fn recall(&self) -> std::io::Result<Option<f64>> {
+        Ok(*self.0.lock().unwrap())
+    }
+
+    fn remember(&self, thickness_mm: f64) -> std::io::Result<()> {
+        *self.0.lock().unwrap() = Some(thickness_mm);
+        Ok(())
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_confirmed_covering_outlives_the_engine_and_the_thinner_one_counts() {
+    let note = Arc::new(Note::default());
+    let bench = || Bench::with_covering(|rig| rig, None, Some(note.clone()));
+    for (thickness_mm, after_restart_mm) in [(0.5, 0.5), (2.54, 1.016)] {
+        let first = bench();
+        let script = format!("def run(rig):\n    covering({thickness_mm})\n");
+        let run = start(&first, &script, &Memory::default());
+        until_phase(&first, RunPhase::Paused).await;
+        first.engine.resume("test", Some(thickness_mm)).unwrap();
+        assert_eq!(run.await.unwrap().exit_status, ExitStatus::Done);
+        drop(first);
+        assert_eq!(note.recall().unwrap(), Some(thickness_mm));
+        let restarted_mm = bench().engine.rig().covering.thickness_mm;
+        assert!((restarted_mm - after_restart_mm).abs() < 1e-12, "{restarted_mm}");
+    }
 }

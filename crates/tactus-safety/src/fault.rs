@@ -55,7 +55,8 @@ pub enum Violation {
     /// A reading without load lies far from the rig's baseline.
     #[error(
         "element {element} reads {counts:.0} counts without load; the rig file says {baseline_counts:.0} +- {band_counts:.0} \
-         (envelope.baseline_band_counts)"
+         (envelope.baseline_band_counts): is something on the sensor? If the element is faulty, list it in \
+         envelope.unwatched_elements"
     )]
     Zero { element: usize, counts: f64, baseline_counts: f64, band_counts: f64 },
 }

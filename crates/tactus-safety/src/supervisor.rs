@@ -251,8 +251,9 @@ impl Supervisor {
 
     /// Reports a violation only once: later ones occur while the first is handled.
     fn trip(&mut self, violation: Option<Violation>) -> Option<Violation> {
-        let is_tripped = matches!(self.fault, Some(Fault::Tripped(_)));
-        let fresh = violation.filter(|_| !is_tripped)?;
+        let is_handled =
+            matches!(self.fault, Some(Fault::Tripped(_) | Fault::NotRetracted(_) | Fault::Defect(_)));
+        let fresh = violation.filter(|_| !is_handled)?;
         self.permits.revoke();
         self.fault = Some(Fault::Tripped(fresh.clone()));
         Some(fresh)

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fake::{Fault, Shared};
-use tactus_safety::Supervisor;
+use tactus_safety::{Supervisor, Void};
 use tactus_schema::pb::{StageState, StageStatus};
 use tactus_schema::rig::{GrblAxes, StageProtocol};
 use tactus_schema::{MonoTime, Rig};
@@ -361,4 +361,35 @@ async fn a_rig_that_makes_no_stage_is_told() {
     let Connection::Seeking(Some(error)) = why else { panic!() };
     assert_eq!(error.kind, ErrorKind::Protocol);
     assert!(error.what.contains("x and y are the same axis"), "{error}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stage_that_is_not_watched_any_more_is_stopped() {
+    let (stage, shared) = homed().await;
+    stage.watch();
+    let moving = begin(&stage, to(11.0, 10.0), Duration::from_millis(70)).await;
+    assert_eq!(shared.first_heard("!"), None);
+    stage.watch();
+    let watched = Instant::now();
+    let result = moving.await.unwrap();
+    assert!(matches!(result, Err(StageError::Unwatched { .. })), "{result:?}");
+    assert_eq!(shared.first_heard("!"), Some(watched + Duration::from_millis(80)));
+    // It stands, and goes on with a new permit.
+    stage.watch();
+    assert_eq!(stage.look().await.unwrap()[1], 1.0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn without_a_valid_permit_no_byte_is_sent() {
+    let (stage, shared) = homed().await;
+    let heard = shared.count("$H");
+    let old = supervisor().permit_homing(MonoTime::default()).unwrap();
+    assert!(matches!(stage.home(old).await, Err(StageError::Void(Void::Expired))));
+
+    let mut supervisor = supervisor();
+    let revoked =
+        supervisor.permit_homing(MonoTime::default().after(Duration::from_secs(1_000_000))).unwrap();
+    supervisor.revocation().revoke();
+    assert!(matches!(stage.home(revoked).await, Err(StageError::Void(Void::Revoked))));
+    assert_eq!(shared.count("$H"), heard);
 }

@@ -6,7 +6,9 @@ use std::time::Duration;
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use tactus_device::{Clock, HomingPermit, Permit, Sensor, SensorEvent, Stage, StageError};
-use tactus_engine::{Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
+use tactus_engine::{
+    ChangeCovering, CoveringMemory, Devices, Engine, Record, RecordFailure, RunOrder, Unpublished,
+};
 use tactus_plan::{Arguments, InThisProcess, Limits, RigView, Script};
 use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp, pb};
 use tokio::sync::{mpsc, watch};
@@ -19,6 +21,10 @@ pub(crate) struct Trouble {
     pub(crate) lose: u32,
     /// No frame comes.
     pub(crate) silent: bool,
+    /// Epoch of the stage's position.
+    pub(crate) epoch: u32,
+    /// The driver panics instead of giving a frame.
+    pub(crate) panics: bool,
     /// Counts on top of all elements.
     pub(crate) push_counts: f32,
 }
@@ -53,6 +59,10 @@ impl Sensor for FakeSensor {
                 self.tick.tick().await;
                 let mut trouble = self.trouble.lock().unwrap();
                 self.seq += 1;
+                if std::mem::take(&mut trouble.panics) {
+                    drop(trouble);
+                    panic!("a driver that panics, for a test");
+                }
                 if trouble.silent {
                     trouble.lose += 1;
                     continue;
@@ -94,6 +104,7 @@ struct FakeStage {
     reports: mpsc::Sender<pb::StageState>,
     stops: watch::Sender<u64>,
     deepest_mm: Arc<Mutex<f64>>,
+    trouble: Arc<Mutex<Trouble>>,
     clock: Clock,
 }
 
@@ -111,6 +122,7 @@ impl FakeStage {
             y_mm,
             z_mm,
             status: status.into(),
+            epoch: self.trouble.lock().unwrap().epoch,
             simulated: true,
             ..Default::default()
         };
@@ -169,7 +181,12 @@ impl Stage for FakeStage {
     }
 
     fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
-        async { Ok(self.position_mm()) }.boxed()
+        async {
+            let at_mm = self.position_mm();
+            self.report(at_mm, pb::StageStatus::Idle).await;
+            Ok(at_mm)
+        }
+        .boxed()
     }
 
     fn stop(&self) {
@@ -185,6 +202,15 @@ impl Stage for FakeStage {
 
 impl Bench {
     pub(crate) fn start(change: impl Fn(String) -> String) -> Self {
+        Self::with_covering(change, None, None)
+    }
+
+    /// With who changes the covering, and who remembers it.
+    pub(crate) fn with_covering(
+        change: impl Fn(String) -> String,
+        change_covering: Option<ChangeCovering>,
+        covering_memory: Option<Arc<dyn CoveringMemory>>,
+    ) -> Self {
         let rig = change(include_str!("../../../../config/rigs/sim.toml").to_owned());
         let rig = Rig::from_toml(&rig).unwrap();
         let clock = Clock::paused();
@@ -192,7 +218,9 @@ impl Bench {
             pb::StageState { z_mm: 10.0, status: pb::StageStatus::Unhomed.into(), ..Default::default() };
         let (reports, stage_reports) = mpsc::channel(256);
         let deepest_mm = Arc::new(Mutex::new(f64::NEG_INFINITY));
+        let trouble = Arc::new(Mutex::new(Trouble::default()));
         let stage = Arc::new(FakeStage {
+            trouble: Arc::clone(&trouble),
             state: watch::Sender::new(unhomed),
             reports,
             stops: watch::Sender::default(),
@@ -201,7 +229,6 @@ impl Bench {
         });
         let mut tick = interval(Duration::from_secs_f64(1.0 / 30.0));
         tick.set_missed_tick_behavior(MissedTickBehavior::Burst);
-        let trouble = Arc::new(Mutex::new(Trouble::default()));
         let sensor = FakeSensor {
             trouble: Arc::clone(&trouble),
             stage: stage.state(),
@@ -216,8 +243,8 @@ impl Bench {
             sensor: Box::new(sensor),
             stage,
             stage_reports,
-            change_covering: None,
-            covering_memory: None,
+            change_covering,
+            covering_memory,
         };
         let engine = Engine::start(rig, devices, clock, Arc::new(Unpublished)).unwrap();
         Self { engine, trouble, deepest_mm, stage: state }
