@@ -130,7 +130,10 @@ fn varied(seed: u64) -> String {
         if kind == "stuck" {
             // Its reading lies far from the baseline, so the rig file has to say that it is faulty.
             let stuck = value.as_array().unwrap().iter().map(|entry| entry["element"].clone()).collect();
-            rig["envelope"].as_table_mut().unwrap().insert("unwatched_elements".into(), toml::Value::Array(stuck));
+            rig["envelope"]
+                .as_table_mut()
+                .unwrap()
+                .insert("unwatched_elements".into(), toml::Value::Array(stuck));
         }
         rig["simulation"].as_table_mut().unwrap().insert(kind.into(), value);
     }

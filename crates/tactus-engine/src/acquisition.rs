@@ -118,13 +118,14 @@ pub(crate) async fn acquire(
         let next = AssertUnwindSafe(sensor.next()).catch_unwind();
         let handled = tokio::select! {
             biased;
-            event = next, if has_sensor => match event {
-                Ok(event) => acquisition.attempt("a frame was handled", |this| this.on_sensor(event)),
-                Err(_) => {
+            event = next, if has_sensor => {
+                if let Ok(event) = event {
+                    acquisition.attempt("a frame was handled", |this| this.on_sensor(event))
+                } else {
                     has_sensor = false;
                     Err("the sensor was read")
                 }
-            },
+            }
             Some(report) = reports.recv() => {
                 acquisition.attempt("a stage report was handled", |this| this.on_report(&report))
             }

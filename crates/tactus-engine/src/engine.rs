@@ -473,7 +473,15 @@ impl From<Broken> for ResetError {
         match broken {
             Broken::Ended(_) => Self::Stopped(Stopped { reason: broken.to_string() }),
             Broken::Stage(error) => Self::Stage(error),
-            _ => Self::NotReady(broken.to_string()),
+            Broken::Outside(_)
+            | Broken::Denied(_)
+            | Broken::Gone(_)
+            | Broken::FramesLost(_)
+            | Broken::Disturbed
+            | Broken::SensorSilent(_)
+            | Broken::StageSilent(_)
+            | Broken::Script(_)
+            | Broken::Refused(_) => Self::NotReady(broken.to_string()),
         }
     }
 }

@@ -102,16 +102,21 @@ impl Shared {
                 Ok([_, _, z_mm]) => return Ok(z_mm),
                 Err(error) => error,
             };
-            match &error {
-                Broken::Stage(StageError::Stopped { .. } | StageError::Void(_)) => stops += 1,
+            if matches!(
+                error,
                 Broken::Gone(_)
-                | Broken::Denied(Denied::Fault(_))
-                | Broken::Stage(StageError::Unhomed | StageError::Alarm { .. }) => return Err(error),
-                Broken::Denied(Denied::NoStage) | Broken::Stage(StageError::Device(_)) => {
-                    troubles += 1;
-                    self.stage_returns().await;
-                }
-                _ => troubles += 1,
+                    | Broken::Denied(Denied::Fault(_))
+                    | Broken::Stage(StageError::Unhomed | StageError::Alarm { .. })
+            ) {
+                return Err(error);
+            }
+            if matches!(error, Broken::Stage(StageError::Stopped { .. } | StageError::Void(_))) {
+                stops += 1;
+            } else {
+                troubles += 1;
+            }
+            if matches!(error, Broken::Denied(Denied::NoStage) | Broken::Stage(StageError::Device(_))) {
+                self.stage_returns().await;
             }
             if troubles > TROUBLES_MAX || stops > STOPS_MAX {
                 return Err(error);
@@ -149,11 +154,11 @@ impl Shared {
                 Ok(()) => return Ok(()),
                 Err(error) => error,
             };
-            let is_silence = match &error {
-                Broken::Ended(ending) => ending.is_silence(),
-                Broken::Stage(StageError::Unwatched { .. } | StageError::Void(_)) | Broken::Denied(_) => true,
-                _ => false,
-            };
+            let is_silence = matches!(&error, Broken::Ended(ending) if ending.is_silence())
+                || matches!(
+                    error,
+                    Broken::Denied(_) | Broken::Stage(StageError::Unwatched { .. } | StageError::Void(_))
+                );
             if !is_silence || tries == HOMINGS_MAX {
                 return Err(error);
             }

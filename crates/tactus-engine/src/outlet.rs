@@ -35,8 +35,7 @@ pub trait Record: Send {
     ///
     /// # Errors
     /// As [`Record::sensor_info`].
-    fn check(&mut self, now: MonoTime) -> Result<(), RecordFailure> {
-        let _now = now;
+    fn check(&mut self, _now: MonoTime) -> Result<(), RecordFailure> {
         Ok(())
     }
 

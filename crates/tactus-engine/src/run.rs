@@ -16,7 +16,7 @@ use tokio::task::{JoinError, spawn_blocking};
 use tokio::time::timeout;
 use tracing::{error, info};
 
-use crate::acquisition::Gone;
+use crate::acquisition::{Acquisition, Gone};
 use crate::engine::{Shared, StopOrder};
 use crate::envelope::{Bounds, Outside};
 use crate::outlet::{Record, RecordFailure};
@@ -380,7 +380,7 @@ impl Run {
             state.elapsed_s = duration_s;
             state.remaining_s = 0.0;
         });
-        if let Err(gone) = self.shared.acquisition.ask(|live| live.refresh_state()).await {
+        if let Err(gone) = self.shared.acquisition.ask(Acquisition::refresh_state).await {
             error!("{gone}");
         }
         RunOutcome {
@@ -510,7 +510,7 @@ impl Shared {
 
     /// Closes the recording on a thread of its own: a disk that hangs holds up nothing else.
     async fn close_recording(&self) -> Result<(), RecordFailure> {
-        let recording = match self.acquisition.ask(|live| live.take_recording()).await {
+        let recording = match self.acquisition.ask(Acquisition::take_recording).await {
             Ok(recording) => recording,
             Err(gone) => return Err(RecordFailure(gone.into())),
         };

@@ -239,13 +239,8 @@ impl Bench {
             pending: None,
         };
         let state = stage.state();
-        let devices = Devices {
-            sensor: Box::new(sensor),
-            stage,
-            stage_reports,
-            change_covering,
-            covering_memory,
-        };
+        let devices =
+            Devices { sensor: Box::new(sensor), stage, stage_reports, change_covering, covering_memory };
         let engine = Engine::start(rig, devices, clock, Arc::new(Unpublished)).unwrap();
         Self { engine, trouble, deepest_mm, stage: state }
     }
