@@ -427,10 +427,11 @@ async fn a_panic_of_the_sensors_driver_stops_retracts_and_is_a_fault() {
 
 #[tokio::test(start_paused = true)]
 async fn a_panic_of_the_run_leaves_the_tip_up_and_the_recording_closed() {
-    let bench = Bench::with_covering(|rig| rig, Some(Arc::new(|_| panic!("for a test"))), None);
+    let bench = Bench::start(|rig| rig);
+    bench.trouble.lock().unwrap().look_panics = true;
     let memory = Memory::default();
-    let script = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2])\n    covering(0.5)\n";
-    let outcome = bench.engine.run(bench.order(script), memory.sink()).await.unwrap();
+    let outcome = bench.engine.run(bench.order(PRESS), memory.sink()).await.unwrap();
+    assert!(*bench.deepest_mm.lock().unwrap() > 0.19, "it panicked in contact");
     assert_eq!(outcome.exit_status, ExitStatus::Failed, "{outcome:?}");
     assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
     assert!(*memory.finished.lock().unwrap());
@@ -499,7 +500,7 @@ impl CoveringMemory for Note {
 #[tokio::test(start_paused = true)]
 async fn a_confirmed_covering_outlives_the_engine_and_the_thinner_one_counts() {
     let note = Arc::new(Note::default());
-    let bench = || Bench::with_covering(|rig| rig, None, Some(note.clone()));
+    let bench = || Bench::with_covering_memory(|rig| rig, Some(note.clone()));
     for (thickness_mm, after_restart_mm) in [(0.5, 0.5), (2.54, 1.016)] {
         let first = bench();
         let script = format!("def run(rig):\n    covering({thickness_mm})\n");

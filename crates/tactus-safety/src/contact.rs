@@ -33,12 +33,12 @@ pub(crate) struct Contact {
     /// Of the array's median element.
     sensitivity_counts_per_mm: f64,
     /// The frame that has been repeated, with the height of the tip at its first arrival.
-    repeated: Option<Repeated>,
+    repeated: Repeated,
     /// Frames without a response since the tip stands deep.
     unfelt_frames: u32,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Repeated {
     counts: Vec<f32>,
     z_mm: f64,
@@ -55,7 +55,7 @@ impl Contact {
             registration: rig.registration,
             extent_mm: rig.array.extent_mm(),
             sensitivity_counts_per_mm: sensitivities.get(sensitivities.len() / 2).copied().unwrap_or(0.0),
-            repeated: None,
+            repeated: Repeated::default(),
             unfelt_frames: 0,
         }
     }
@@ -74,11 +74,13 @@ impl Contact {
         elements: &Elements,
         limits: &Limits,
     ) -> Option<Violation> {
-        let is_new = self.repeated.as_ref().is_none_or(|repeated| repeated.counts[..] != frame.counts[..]);
         let is_over_array = self.is_over_array([x_mm, y_mm]);
-        if is_new || z_mm >= 0.0 || !is_over_array {
-            self.repeated = Some(Repeated { counts: frame.counts.to_vec(), z_mm, frames: 0 });
-        } else if let Some(repeated) = &mut self.repeated {
+        let repeated = &mut self.repeated;
+        if repeated.counts[..] != frame.counts[..] || z_mm >= 0.0 || !is_over_array {
+            repeated.counts.clear();
+            repeated.counts.extend_from_slice(&frame.counts);
+            (repeated.z_mm, repeated.frames) = (z_mm, 0);
+        } else {
             let way_mm = (z_mm - repeated.z_mm).abs();
             // A frame that was taken before the tip moved is no evidence.
             repeated.frames += u32::from(way_mm > FROZEN_WAY_MM);

@@ -6,9 +6,7 @@ use std::time::Duration;
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use tactus_device::{Clock, HomingPermit, Permit, Sensor, SensorEvent, Stage, StageError};
-use tactus_engine::{
-    ChangeCovering, CoveringMemory, Devices, Engine, Record, RecordFailure, RunOrder, Unpublished,
-};
+use tactus_engine::{CoveringMemory, Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
 use tactus_plan::{Arguments, InThisProcess, Limits, RigView, Script};
 use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp, pb};
 use tokio::sync::{mpsc, watch};
@@ -21,6 +19,8 @@ pub(crate) struct Trouble {
     pub(crate) lose: u32,
     /// No frame comes.
     pub(crate) silent: bool,
+    /// The next question to the stage below the surface panics.
+    pub(crate) look_panics: bool,
     /// Epoch of the stage's position.
     pub(crate) epoch: u32,
     /// The driver panics instead of giving a frame.
@@ -183,6 +183,8 @@ impl Stage for FakeStage {
     fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
         async {
             let at_mm = self.position_mm();
+            let panics = at_mm[2] < 0.0 && std::mem::take(&mut self.trouble.lock().unwrap().look_panics);
+            assert!(!panics, "a stage that panics, for a test");
             self.report(at_mm, pb::StageStatus::Idle).await;
             Ok(at_mm)
         }
@@ -202,13 +204,12 @@ impl Stage for FakeStage {
 
 impl Bench {
     pub(crate) fn start(change: impl Fn(String) -> String) -> Self {
-        Self::with_covering(change, None, None)
+        Self::with_covering_memory(change, None)
     }
 
-    /// With who changes the covering, and who remembers it.
-    pub(crate) fn with_covering(
+    /// With who remembers the covering.
+    pub(crate) fn with_covering_memory(
         change: impl Fn(String) -> String,
-        change_covering: Option<ChangeCovering>,
         covering_memory: Option<Arc<dyn CoveringMemory>>,
     ) -> Self {
         let rig = change(include_str!("../../../../config/rigs/sim.toml").to_owned());
@@ -239,8 +240,13 @@ impl Bench {
             pending: None,
         };
         let state = stage.state();
-        let devices =
-            Devices { sensor: Box::new(sensor), stage, stage_reports, change_covering, covering_memory };
+        let devices = Devices {
+            sensor: Box::new(sensor),
+            stage,
+            stage_reports,
+            change_covering: None,
+            covering_memory,
+        };
         let engine = Engine::start(rig, devices, clock, Arc::new(Unpublished)).unwrap();
         Self { engine, trouble, deepest_mm, stage: state }
     }
