@@ -165,11 +165,11 @@ class Process:
                 return line
             seen.append(line)
 
-    def ask(self, line):
-        """Types a line, and returns the next line of output."""
+    def ask(self, line, answers=lambda _: True):
+        """Types a line, and returns the next line of output that answers it: log lines may stand in between."""
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
-        return self.wait_for(lambda _: True)
+        return self.wait_for(answers)
 
     def wait(self):
         """Waits for its end; returns its exit status and all lines that were not read yet."""

@@ -48,6 +48,8 @@ fn is_in_progress(phase: RunPhase) -> bool {
 fn take() -> io::Result<Child> {
     Command::new(PROGRAM)
         .args(ARGUMENTS)
+        // systemd takes notifications from the service itself only.
+        .env_remove("NOTIFY_SOCKET")
         // Its input ends with this process, however that ends.
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
