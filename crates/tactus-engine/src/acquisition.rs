@@ -11,7 +11,7 @@ use tactus_safety::{Fault, Supervisor, Violation};
 use tactus_schema::rig::OnGap;
 use tactus_schema::{Frame, MonoTime, pb};
 use tokio::sync::{mpsc, oneshot};
-use tokio::time::MissedTickBehavior;
+use tokio::time::{MissedTickBehavior, timeout};
 use tracing::{error, info, warn};
 
 use crate::average::{Average, Window};
@@ -22,8 +22,14 @@ use crate::run::Ending;
 /// Longest time between two looks at the clock. The stage's driver stops a stage that is unwatched for 80 ms.
 const TICK_MAX: Duration = Duration::from_millis(33);
 
+/// Shortest time between two looks, however fast the sensor is.
+const TICK_MIN: Duration = Duration::from_millis(10);
+
 /// Supervisor ticks between two publications of the run's state.
 const TICKS_PER_STATE: u64 = 15;
+
+/// Longest time until a question is answered: whoever asks must not hang with the task.
+const ANSWER_MAX: Duration = Duration::from_secs(2);
 
 /// Questions that may wait for the task. Who asks then waits for room.
 const QUESTIONS_MAX: usize = 64;
@@ -67,7 +73,9 @@ pub(crate) struct Questions(mpsc::Receiver<Question>);
 
 /// The acquisition task is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the acquisition task has ended; this is a defect of Tactus: restart the service")]
+#[error(
+    "the acquisition task does not answer; this is a defect of Tactus: see the log, and restart the service"
+)]
 pub(crate) struct Gone;
 
 /// A new mailbox.
@@ -88,7 +96,7 @@ impl Mailbox {
             let _unasked = answer.send(question(acquisition));
         })
         .await?;
-        answered.await.map_err(|_| Gone)
+        timeout(ANSWER_MAX, answered).await.map_err(|_| Gone)?.map_err(|_| Gone)
     }
 
     /// Has something done, in the order of the calls, without waiting for it.
@@ -108,7 +116,7 @@ pub(crate) async fn acquire(
     mut sensor: Box<dyn Sensor>,
     mut reports: mpsc::Receiver<pb::StageState>,
 ) {
-    let mut tick = tokio::time::interval(shared.sample_period().min(TICK_MAX));
+    let mut tick = tokio::time::interval(shared.sample_period().clamp(TICK_MIN, TICK_MAX));
     tick.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut ticks = 0_u64;
     let mut acquisition = Acquisition::new(shared, supervisor);
@@ -123,6 +131,7 @@ pub(crate) async fn acquire(
                     acquisition.attempt("a frame was handled", |this| this.on_sensor(event))
                 } else {
                     has_sensor = false;
+                    acquisition.shared.pulse.send_modify(|pulse| pulse.sensor_connected = false);
                     Err("the sensor was read")
                 }
             }
@@ -170,7 +179,10 @@ impl Acquisition {
 
     /// After a panic: stops, and lets nothing but the way up follow.
     fn defect(&mut self, when: &str) {
-        self.shared.stop_motion();
+        // Once: the tip must be able to rise although it happens at each frame.
+        if !matches!(self.supervisor.fault(), Some(Fault::Defect(_))) {
+            self.shared.stop_motion();
+        }
         error!("a panic while {when}: the stage is stopped; this is a defect of Tactus");
         let why = format!("a panic while {when}");
         self.shared.end(Ending::Defect(why.clone()));
@@ -237,12 +249,15 @@ impl Acquisition {
 
     fn on_connected(&mut self, info: &pb::SensorInfo) {
         info!(link = info.link, transport = info.transport, simulated = info.simulated, "sensor connected");
-        self.supervisor.on_connected();
+        let violation = self.supervisor.on_connected();
+        self.stop_for(violation.as_ref());
+        self.window.iter_mut().for_each(Window::disturb);
         let now = self.shared.clock.now();
         self.record(|sink| sink.sensor_info(info, now));
         self.sensor_info = Some(info.clone());
         self.clock_offset_s = None;
         self.shared.pulse.send_modify(|pulse| pulse.sensor_connected = true);
+        self.tell_violation(violation);
         self.shared.publish.sensor_info(info);
     }
 

@@ -277,7 +277,11 @@ impl Engine {
             }
             free
         });
-        if taken { Ok(Claim(Arc::clone(&self.shared))) } else { Err(Busy { run_id: self.run_id() }) }
+        if taken {
+            Ok(Claim(Arc::clone(&self.shared), Arc::clone(&self.acquisition)))
+        } else {
+            Err(Busy { run_id: self.run_id() })
+        }
     }
 
     /// Executes an experiment. Returns after the tip is retracted, however the run ended.
@@ -438,6 +442,15 @@ async fn reset(shared: Arc<Shared>) -> Result<(), ResetError> {
     let not_ready = |why: Broken| ResetError::NotReady(why.to_string());
     let now = shared.clock.now().mono;
     shared.acquisition.ask(move |live| live.supervisor.begin_reset(now)).await?;
+    if shared.stage.state().borrow().status() == pb::StageStatus::Idle {
+        // A tip that is too deep, or under a sensor that is silent, breaks a rule at once: up first, which is always permitted.
+        shared.retract().await?;
+        shared.control.send_modify(|control| {
+            control.ending.take_if(|ending| matches!(ending, Ending::Safety(_)));
+        });
+        let now = shared.clock.now().mono;
+        shared.acquisition.ask(move |live| live.supervisor.begin_reset(now)).await?;
+    }
     shared.wait_for_stage().await.map_err(not_ready)?;
     shared.wait_for_sensor().await.map_err(not_ready)?;
     let status = shared.stage.state().borrow().status();
@@ -527,7 +540,11 @@ impl Shared {
 
 /// The exclusive right to run. Dropping it gives it back.
 #[must_use = "the right is given back when this is dropped"]
-pub struct Claim(Arc<Shared>);
+pub struct Claim(
+    Arc<Shared>,
+    #[expect(dead_code, reason = "a run keeps the acquisition alive, whoever drops the engine")]
+    Arc<AcquisitionTask>,
+);
 
 impl fmt::Debug for Claim {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

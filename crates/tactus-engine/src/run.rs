@@ -133,7 +133,7 @@ pub(crate) enum Broken {
 impl Ending {
     /// True for a silence of the sensor: the run may continue once frames arrive again.
     pub(crate) fn is_silence(&self) -> bool {
-        matches!(self, Self::Safety(Violation::Silence { .. }))
+        matches!(self, Self::Safety(violation) if violation.is_silence())
     }
 }
 
@@ -504,7 +504,9 @@ impl Shared {
             live.supervisor.latch(Fault::NotRetracted(why));
         });
         if let Err(gone) = told.await {
+            // Nobody else can tell it now.
             error!("{gone}");
+            self.fault.send_replace(Some(Fault::NotRetracted(gone.to_string())));
         }
     }
 

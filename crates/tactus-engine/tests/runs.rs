@@ -514,3 +514,13 @@ async fn a_confirmed_covering_outlives_the_engine_and_the_thinner_one_counts() {
         assert!((restarted_mm - after_restart_mm).abs() < 1e-12, "{restarted_mm}");
     }
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_reset_raises_a_tip_that_breaks_a_rule_where_it_stands() {
+    let bench = Bench::start(|rig| rig);
+    bench.engine.reset().await.unwrap();
+    bench.place([25.0, 20.0, -0.9]).await;
+    assert_eq!(bench.engine.reset().await.map_err(|error| error.to_string()), Ok(()));
+    assert_eq!(bench.engine.fault(), None);
+    assert!(height_mm(&bench) > 1.9);
+}

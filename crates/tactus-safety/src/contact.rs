@@ -1,10 +1,11 @@
 //! Whether the array responds to the tip: it must not be frozen, and a deep tip must be felt.
 
 use tactus_model::Registration;
+use tactus_schema::rig::Service;
 use tactus_schema::{Frame, Rig};
 
 use crate::Violation;
-use crate::force::Elements;
+use crate::force::{Elements, has_sign};
 use crate::limits::{Limits, STEP_DOWN_MAX_MM};
 
 /// Frames with the old counts, received after the tip has moved, after which the array counts as frozen.
@@ -27,6 +28,8 @@ const UNFELT_FRAMES: u32 = 4;
 /// Watches the response to the tip.
 #[derive(Debug)]
 pub(crate) struct Contact {
+    /// False where the elements are components of a field: they are nowhere then, and nothing is expected of them.
+    is_array_of_places: bool,
     registration: Registration,
     /// Outline of the array, sensor frame: least and greatest x, and y.
     extent_mm: [[f64; 2]; 2],
@@ -47,11 +50,12 @@ struct Repeated {
 }
 
 impl Contact {
-    pub(crate) fn new(rig: &Rig) -> Self {
+    pub(crate) fn new(rig: &Rig, service: &Service) -> Self {
         let mut sensitivities: Vec<_> =
             rig.sensitivity_counts_per_mm.iter().map(|counts| counts.abs()).collect();
         sensitivities.sort_by(f64::total_cmp);
         Self {
+            is_array_of_places: !has_sign(service),
             registration: rig.registration,
             extent_mm: rig.array.extent_mm(),
             sensitivity_counts_per_mm: sensitivities.get(sensitivities.len() / 2).copied().unwrap_or(0.0),
@@ -84,7 +88,11 @@ impl Contact {
             let way_mm = (z_mm - repeated.z_mm).abs();
             // A frame that was taken before the tip moved is no evidence.
             repeated.frames += u32::from(way_mm > FROZEN_WAY_MM);
-            if repeated.frames >= FROZEN_FRAMES {
+            // An array that has felt nothing yet is another matter.
+            let felt_counts = FELT_RISE_SHARE * self.sensitivity_counts_per_mm * FROZEN_WAY_MM;
+            let is_felt =
+                elements.greatest_rise_counts().is_some_and(|rise_counts| rise_counts >= felt_counts);
+            if repeated.frames >= FROZEN_FRAMES && is_felt {
                 return Some(Violation::Frozen { frames: repeated.frames, way_mm });
             }
         }
@@ -103,9 +111,10 @@ impl Contact {
 
     fn is_over_array(&self, at_mm: [f64; 2]) -> bool {
         let at_mm = self.registration.to_sensor(at_mm);
-        at_mm
-            .iter()
-            .zip(self.extent_mm)
-            .all(|(at_mm, [least_mm, greatest_mm])| (least_mm..=greatest_mm).contains(at_mm))
+        self.is_array_of_places
+            && at_mm
+                .iter()
+                .zip(self.extent_mm)
+                .all(|(at_mm, [least_mm, greatest_mm])| (least_mm..=greatest_mm).contains(at_mm))
     }
 }

@@ -30,6 +30,9 @@ pub enum Violation {
         /// `None` while the stage is homing for the first time.
         z_mm: Option<f64>,
     },
+    /// The sensor connected anew in a run.
+    #[error("the sensor connected anew: the zeros that were taken before do not hold any more")]
+    Reconnected,
     /// An element that was read for the run's first zero is no longer read, so a load on it would not be seen.
     #[error(
         "element {element} was not read for {silent_s:.3} s with the tip at {}; at most {limit_s:.3} s are allowed",
@@ -62,12 +65,18 @@ pub enum Violation {
 }
 
 impl Violation {
+    /// True for a silence of the sensor, which its return may end.
+    pub fn is_silence(&self) -> bool {
+        matches!(self, Self::Silence { .. } | Self::Reconnected)
+    }
+
     /// Short name of the rule, for the safety event.
     pub fn rule(&self) -> &'static str {
         match self {
             Self::ElementForce { .. } => "element-force",
             Self::SumForce { .. } => "sum-force",
             Self::Silence { .. } => "silence",
+            Self::Reconnected => "reconnected",
             Self::ElementSilence { .. } => "element-silence",
             Self::Depth { .. } => "depth",
             Self::Frozen { .. } => "frozen",
@@ -105,4 +114,17 @@ pub enum Fault {
     /// A task of the service failed while it was responsible for the tip.
     #[error("a task of the service failed: {0}")]
     Defect(String),
+}
+
+impl Fault {
+    /// Which of two faults is told: the one of the higher rank, else the earlier one.
+    pub(crate) fn rank(&self) -> u8 {
+        match self {
+            Self::Started | Self::Unfinished | Self::Alarm | Self::Unhomed => 0,
+            Self::Tripped(violation) if violation.is_silence() => 0,
+            Self::Tripped(_) => 1,
+            Self::Defect(_) => 2,
+            Self::NotRetracted(_) => 3,
+        }
+    }
 }

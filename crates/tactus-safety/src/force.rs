@@ -1,5 +1,6 @@
 //! Loads on the elements: zeros, and rises above them.
 
+use tactus_schema::rig::{SensorProtocol, Service};
 use tactus_schema::{Frame, MonoTime, Rig};
 
 use crate::Violation;
@@ -37,18 +38,27 @@ struct Expected {
     band_counts: f64,
     /// Direction of the reading when the element is pressed.
     signs: Vec<f64>,
+    /// A press may take any element either way.
+    is_signed: bool,
     unwatched: Vec<usize>,
 }
 
+/// True for sensors whose readings are components of a field, not pressures of places.
+pub(crate) fn has_sign(service: &Service) -> bool {
+    service.sensor.protocol == SensorProtocol::AnySkin
+}
+
 impl Elements {
-    pub(crate) fn new(rig: &Rig, limits: &Limits) -> Self {
-        let unwatched = limits.envelope.unwatched_elements.clone();
+    pub(crate) fn new(rig: &Rig, service: &Service) -> Self {
+        let envelope = &service.envelope;
+        let unwatched = envelope.unwatched_elements.clone();
         let baseline =
             |(element, counts): (usize, &f64)| Some(*counts).filter(|_| !unwatched.contains(&element));
         Self {
             rig: Expected {
                 baseline_counts: rig.baseline_counts.iter().enumerate().map(baseline).collect(),
-                band_counts: limits.envelope.baseline_band_counts,
+                band_counts: envelope.baseline_band_counts,
+                is_signed: has_sign(service),
                 signs: rig.sensitivity_counts_per_mm.iter().map(|counts| counts.signum()).collect(),
                 unwatched,
             },
@@ -65,8 +75,9 @@ impl Elements {
         self.last_frame
     }
 
+    /// True if any element has a zero: without one the array is blind.
     pub(crate) fn has_zero(&self) -> bool {
-        self.reference.is_some()
+        self.reference.as_ref().is_some_and(|zero| zero.iter().any(Option::is_some))
     }
 
     /// Discards the zeros: until new ones are taken, loads are held against the rig file's baseline.
@@ -191,7 +202,8 @@ impl Elements {
         let pairs = self.states.iter().zip(zero).zip(&self.rig.signs).enumerate();
         pairs.filter_map(|(element, ((state, zero), sign))| {
             let zero = zero.filter(|_| state.is_read)?;
-            Some((element, (state.counts - zero) * sign))
+            let rise_counts = state.counts - zero;
+            Some((element, if self.rig.is_signed { rise_counts.abs() } else { rise_counts * sign }))
         })
     }
 

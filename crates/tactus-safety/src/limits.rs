@@ -15,6 +15,10 @@ pub const SAME_HEIGHT_MM: f64 = 0.0003;
 /// Sample periods without a frame after which a tip near the covering is stopped.
 const SILENT_PERIODS_MAX: f64 = 3.0;
 
+/// Shortest of the supervisor's times. Links deliver in batches of up to 16 ms and timers are coarse, so that three periods of a
+/// sensor of more than 100 Hz are no silence.
+const SHORTEST_S: f64 = 0.03;
+
 /// What the supervisor holds motion and readings against.
 #[derive(Debug, Clone)]
 pub(crate) struct Limits {
@@ -36,7 +40,12 @@ impl Limits {
 
     /// Longest time without a frame near the covering.
     pub(crate) fn silence_max_s(&self) -> f64 {
-        SILENT_PERIODS_MAX * self.sample_period_s
+        (SILENT_PERIODS_MAX * self.sample_period_s).max(SHORTEST_S)
+    }
+
+    /// How long a permit down is valid: a sample period.
+    pub(crate) fn permit_s(&self) -> f64 {
+        self.sample_period_s.max(SHORTEST_S)
     }
 
     /// True at heights at which only small steps go down and silence counts.

@@ -9,7 +9,7 @@ use tactus_schema::{Frame, MonoTime, Rig, pb};
 
 use crate::contact::Contact;
 use crate::force::Elements;
-use crate::limits::Limits;
+use crate::limits::{Limits, STEP_DOWN_MAX_MM};
 use crate::{Denied, Fault, HomingPermit, Permit, Revocation, Target, Violation};
 
 /// Watches one rig. The caller stops the stage whenever a method returns a [`Violation`].
@@ -23,6 +23,8 @@ pub struct Supervisor {
     report: Option<pb::StageState>,
     /// The last known height of the tip.
     z_mm: Option<f64>,
+    /// The last known height when the last frame arrived.
+    z_at_frame_mm: Option<f64>,
     /// What a reset must clear; [`Self::fault`] adds what the stage reports.
     fault: Option<Fault>,
     /// True while somebody may move the stage: loads count then at any height.
@@ -37,12 +39,13 @@ impl Supervisor {
     pub fn new(rig: &Rig, service: &Service) -> Self {
         let limits = Limits::new(rig, service);
         Self {
-            elements: Elements::new(rig, &limits),
-            contact: Contact::new(rig),
+            elements: Elements::new(rig, service),
+            contact: Contact::new(rig, service),
             limits,
             permits: Revocation::default(),
             report: None,
             z_mm: None,
+            z_at_frame_mm: None,
             fault: Some(Fault::Started),
             is_active: false,
             is_resetting: false,
@@ -69,7 +72,7 @@ impl Supervisor {
     /// The fault that forbids motion, other than the way up.
     pub fn fault(&self) -> Option<Fault> {
         let status = self.status();
-        if status == StageStatus::Alarm {
+        if status == StageStatus::Alarm && !matches!(self.fault, Some(Fault::NotRetracted(_))) {
             return Some(Fault::Alarm);
         }
         self.fault.clone().or((status == StageStatus::Unhomed).then_some(Fault::Unhomed))
@@ -80,6 +83,7 @@ impl Supervisor {
     /// Checks a frame.
     pub fn on_frame(&mut self, frame: &Frame) -> Option<Violation> {
         self.elements.take(frame);
+        self.z_at_frame_mm = self.z_mm;
         let position_mm = self.position_mm();
         let is_near = self.z_mm.is_some_and(|z_mm| self.limits.is_near(z_mm));
         let is_standing = self.status() == StageStatus::Idle;
@@ -91,9 +95,11 @@ impl Supervisor {
     }
 
     /// The sensor connected anew: its zeros do not hold any more, and nothing goes down before new ones are taken.
-    pub fn on_connected(&mut self) {
+    pub fn on_connected(&mut self) -> Option<Violation> {
+        let had_zero = self.elements.has_zero();
         self.elements.forget_zeros();
         self.permits.revoke();
+        self.trip((self.is_active && had_zero).then_some(Violation::Reconnected))
     }
 
     /// Checks a report of the stage. If the stage does not know its position, the last known height is kept.
@@ -145,8 +151,11 @@ impl Supervisor {
         if self.has_sensor || to.position_mm[2] < safe_mm {
             self.check_frame(now)?;
         }
-        if self.limits.is_near(to.position_mm[2]) && !self.elements.has_zero() {
-            return Err(Denied::NoZero);
+        if self.limits.is_near(to.position_mm[2]) {
+            if !self.elements.has_zero() {
+                return Err(Denied::NoZero);
+            }
+            self.check_way_since_frame(to.position_mm[2], now)?;
         }
         Ok(self.permits.permit(to, Some(self.expiry(now))))
     }
@@ -204,10 +213,10 @@ impl Supervisor {
         Ok(())
     }
 
-    /// Latches a fault until the next reset. An earlier one is kept, because it is the cause.
+    /// Latches a fault until the next reset. An earlier one is kept, because it is the cause, unless this one is worse.
     pub fn latch(&mut self, fault: Fault) {
         self.permits.revoke();
-        if self.is_silent() || self.fault.is_none() {
+        if self.fault.as_ref().is_none_or(|known| known.rank() < fault.rank() || self.is_silent()) {
             self.fault = Some(fault);
         }
     }
@@ -242,6 +251,13 @@ impl Supervisor {
         self.elements.has_zero()
     }
 
+    /// A person works at the rig with the tip up: loads on the array are theirs, and nothing is permitted. [`Self::begin_run`]
+    /// ends it.
+    pub fn rest(&mut self) {
+        self.is_active = false;
+        self.permits.revoke();
+    }
+
     /// Another covering is in place.
     pub fn set_covering(&mut self, covering: Covering) {
         self.limits.depth_max_mm = self.limits.envelope.depth_max_mm(covering);
@@ -251,9 +267,13 @@ impl Supervisor {
 
     /// Reports a violation only once: later ones occur while the first is handled.
     fn trip(&mut self, violation: Option<Violation>) -> Option<Violation> {
-        let is_handled =
-            matches!(self.fault, Some(Fault::Tripped(_) | Fault::NotRetracted(_) | Fault::Defect(_)));
-        let fresh = violation.filter(|_| !is_handled)?;
+        // What comes while a silence is handled may be worse than it.
+        let is_handled = |violation: &Violation| match &self.fault {
+            Some(Fault::Tripped(known)) => !known.is_silence() || violation.is_silence(),
+            Some(Fault::NotRetracted(_) | Fault::Defect(_)) => true,
+            None | Some(Fault::Started | Fault::Unfinished | Fault::Alarm | Fault::Unhomed) => false,
+        };
+        let fresh = violation.filter(|violation| !is_handled(violation))?;
         self.permits.revoke();
         self.fault = Some(Fault::Tripped(fresh.clone()));
         Some(fresh)
@@ -261,7 +281,7 @@ impl Supervisor {
 
     /// The fault is a silence of the sensor, which its return may end.
     fn is_silent(&self) -> bool {
-        matches!(self.fault, Some(Fault::Tripped(Violation::Silence { .. })))
+        matches!(&self.fault, Some(Fault::Tripped(violation)) if violation.is_silence())
     }
 
     fn check_fault(&self) -> Result<(), Denied> {
@@ -274,8 +294,19 @@ impl Supervisor {
         if age_s <= limit_s { Ok(()) } else { Err(Denied::NoFreshFrame { age_s, limit_s }) }
     }
 
+    /// Near the covering the tip goes at most two steps beyond what the last frame has shown, however slow the sensor is.
+    fn check_way_since_frame(&self, to_z_mm: f64, now: MonoTime) -> Result<(), Denied> {
+        let from_z_mm =
+            self.z_at_frame_mm.map_or(f64::INFINITY, |z_mm| z_mm.min(self.limits.motion.approach_height_mm));
+        if from_z_mm - to_z_mm <= 2.0 * STEP_DOWN_MAX_MM + self.limits.motion.tolerance_mm {
+            return Ok(());
+        }
+        let age_s = Limits::silence_s(now, self.elements.last_frame());
+        Err(Denied::NoFreshFrame { age_s, limit_s: 0.0 })
+    }
+
     fn expiry(&self, now: MonoTime) -> MonoTime {
-        now.after(Duration::from_secs_f64(self.limits.sample_period_s))
+        now.after(Duration::from_secs_f64(self.limits.permit_s()))
     }
 
     fn status(&self) -> StageStatus {

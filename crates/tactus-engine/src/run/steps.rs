@@ -4,14 +4,14 @@ use std::time::Duration;
 
 use tactus_model::Covering;
 use tactus_plan::{Call, MeanReading, Position, Press, Reply, Step};
-use tactus_safety::{Denied, Violation};
+use tactus_safety::Denied;
 use tactus_schema::pb::{self, run_event::Event};
 use tactus_schema::rig::OnGap;
 use tactus_schema::table::Phase;
 use tokio::time::{sleep, timeout};
 use tracing::{info, warn};
 
-use super::{Broken, Ending, Run};
+use super::{Broken, Run};
 use crate::average::Average;
 
 /// Repetitions of one press before the run fails.
@@ -19,6 +19,9 @@ const REPEATS_MAX: u32 = 3;
 
 /// Sample periods to wait for an average beyond its end.
 const LATE_PERIODS_MAX: u32 = 5;
+
+/// Least of that time, for fast sensors: links deliver in batches.
+const LATE_MIN: Duration = Duration::from_millis(100);
 
 impl Run {
     /// Checks a step against the envelope and performs it.
@@ -203,12 +206,10 @@ impl Run {
     fn may_repeat(&self, broken: &Broken) -> bool {
         let lost = matches!(
             broken,
-            Broken::FramesLost(_)
-                | Broken::SensorSilent(_)
-                | Broken::Denied(Denied::NoZero)
-                | Broken::Ended(Ending::Safety(Violation::Silence { .. }))
+            Broken::FramesLost(_) | Broken::SensorSilent(_) | Broken::Denied(Denied::NoZero)
         );
-        lost && self.shared.service.policy.on_gap == OnGap::Repeat
+        let is_silence = matches!(broken, Broken::Ended(ending) if ending.is_silence());
+        (lost || is_silence) && self.shared.service.policy.on_gap == OnGap::Repeat
     }
 
     /// After frames were lost: raises the tip, and goes on once the sensor is back.
@@ -273,7 +274,11 @@ impl Run {
                 control.paused = Some("the script".into());
                 control.wanted_covering_mm = Some(thickness_mm);
             });
+            self.shared.acquisition.ask(|live| live.supervisor.rest()).await?;
             self.pause("the script".into(), &ask).await?;
+            // Under another covering the array reads otherwise without a load.
+            self.shared.acquisition.ask(|live| live.supervisor.begin_run()).await?;
+            self.take_reference().await?;
         }
         if let Some(memory) = &self.shared.covering_memory {
             memory.remember(thickness_mm).map_err(|error| {
@@ -314,7 +319,7 @@ impl Run {
         let now = self.shared.clock.now().mono;
         let until = now.after(duration);
         let average = self.shared.acquisition.ask(move |live| live.average(now, until)).await?;
-        let patience = duration + self.shared.sample_period() * LATE_PERIODS_MAX;
+        let patience = duration + (self.shared.sample_period() * LATE_PERIODS_MAX).max(LATE_MIN);
         match self.shared.unless_ended(timeout(patience, average)).await? {
             Ok(Ok(average)) => Ok(average),
             Ok(Err(_)) | Err(_) => Err(Broken::SensorSilent(patience.as_secs_f64())),

@@ -34,6 +34,7 @@ pub(crate) struct Bench {
     pub(crate) trouble: Arc<Mutex<Trouble>>,
     pub(crate) deepest_mm: Arc<Mutex<f64>>,
     pub(crate) stage: watch::Receiver<pb::StageState>,
+    hand: Arc<FakeStage>,
 }
 
 struct FakeSensor {
@@ -240,6 +241,7 @@ impl Bench {
             pending: None,
         };
         let state = stage.state();
+        let hand = Arc::clone(&stage);
         let devices = Devices {
             sensor: Box::new(sensor),
             stage,
@@ -248,7 +250,12 @@ impl Bench {
             covering_memory,
         };
         let engine = Engine::start(rig, devices, clock, Arc::new(Unpublished)).unwrap();
-        Self { engine, trouble, deepest_mm, stage: state }
+        Self { engine, trouble, deepest_mm, stage: state, hand }
+    }
+
+    /// Puts the tip somewhere by hand.
+    pub(crate) async fn place(&self, at_mm: [f64; 3]) {
+        self.hand.report(at_mm, pb::StageStatus::Idle).await;
     }
 
     pub(crate) fn order(&self, source: &str) -> RunOrder {
