@@ -135,7 +135,10 @@ impl Process {
     }
 
     fn start_with(name: &str, folder: &Path, args: &[&str], stderr: Stdio, unread: Option<OwnedFd>) -> Self {
-        let mut child = Command::new(binary(name))
+        // Whoever runs the tests may ignore signals, as `nohup` does.
+        let mut child = Command::new("env")
+            .args(["--default-signal=HUP,INT,QUIT,TERM"])
+            .arg(binary(name))
             .args(args)
             .current_dir(folder)
             .env("RUST_LOG", "info,zenoh=error")

@@ -164,6 +164,10 @@ impl Shared {
             }
             tracing::warn!(%error, "homing was broken off: it begins anew");
             self.stand_still().await;
+            if self.stage.state().borrow().status() == StageStatus::Alarm {
+                // A homing that is stopped leaves some controllers in alarm.
+                self.stage.clear_alarm().await?;
+            }
             self.await_the_sensors_return().await?;
         }
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, IsTerminal, Write, stdout};
+use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -98,7 +98,8 @@ async fn listen(
     let mut terminated = signal(SignalKind::terminate()).context("cannot wait for signals")?;
     let connect = devices::physical(transport).context("an embedded device has no link")?;
     let mut stream = connect.connect().await?;
-    eprintln!("listening to {connect}; Ctrl-C stops");
+    // At once: log lines may come in between.
+    stderr().write_all(format!("listening to {connect}; Ctrl-C stops\n").as_bytes())?;
     // A time beyond the clock's range means no limit.
     let deadline = seconds.and_then(|seconds| Instant::now().checked_add(seconds));
     let mut redraw = interval(REDRAW);
