@@ -19,7 +19,7 @@ DEVICE = "crates/tactus-device/src/stage/"
 # Name, file, what stands there once, what is planted instead, the package whose tests must find it.
 MUTANTS = [
     ("elements that fall cancel the load", SAFETY + "force.rs", "(rise_counts - band_counts).max(0.0)", "rise_counts - band_counts", "tactus-safety"),
-    ("the sign of an element is ignored", SAFETY + "force.rs", "(state.counts - zero) * sign", "(state.counts - zero) * sign.abs()", "tactus-safety"),
+    ("the sign of an element is ignored", SAFETY + "force.rs", "{ rise_counts * sign }", "{ rise_counts * sign.abs() }", "tactus-safety"),
     ("a tare lifts the limit", SAFETY + "force.rs", "against_tare.or_else(|| self.over(reference, 0.0, limits, \"the run's first zero\"))", "against_tare", "tactus-safety"),
     ("a zero may be anywhere", SAFETY + "force.rs", "(counts - baseline_counts).abs() > self.rig.band_counts", "(counts - baseline_counts).abs() < 0.0", "tactus-safety"),
     ("no limit before the first zero", SAFETY + "force.rs", "return self.over(&self.rig.baseline_counts, band_counts, limits, \"the rig's baseline\");", "let _ = band_counts; return None;", "tactus-safety"),
@@ -29,7 +29,7 @@ MUTANTS = [
     ("a trip leaves permits valid", SAFETY + "supervisor.rs", "self.permits.revoke();\n        self.fault = Some(Fault::Tripped", "self.fault = Some(Fault::Tripped", "tactus-safety"),
     ("a fault permits the way down", SAFETY + "supervisor.rs", "self.check_fault()?;\n        self.limits", "self.limits", "tactus-safety"),
     ("no frame is needed to go down", SAFETY + "supervisor.rs", "if age_s <= limit_s {", "if age_s <= limit_s || true {", "tactus-safety"),
-    ("no zero is needed to go down", SAFETY + "supervisor.rs", "&& !self.elements.has_zero()", "&& false", "tactus-safety"),
+    ("no zero is needed to go down", SAFETY + "supervisor.rs", "if !self.elements.has_zero() {", "if false {", "tactus-safety"),
     ("homing is not watched", SAFETY + "supervisor.rs", "let is_homing = self.status() == StageStatus::Homing;", "let is_homing = false;", "tactus-safety"),
     ("the depth's sign is wrong", SAFETY + "limits.rs", "if -z_mm > self.depth_max_mm", "if z_mm > self.depth_max_mm", "tactus-safety"),
     ("steps down may be long", SAFETY + "limits.rs", "if is_deep && step_mm", "if false && step_mm", "tactus-safety"),
