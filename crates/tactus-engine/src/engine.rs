@@ -256,7 +256,7 @@ impl Engine {
 
     /// The rig, with the covering that is in place now.
     pub fn rig(&self) -> Rig {
-        Rig { covering: *self.shared.covering.borrow(), ..self.shared.rig.clone() }
+        self.shared.rig_in_place()
     }
 
     /// The clock of all times of this engine.
@@ -327,7 +327,8 @@ impl Engine {
         let shared = Arc::clone(&self.shared);
         // A task of its own: it ends properly even if the caller gives up, and its panic is not the caller's.
         let resetting = tokio::spawn(async move {
-            let task = tokio::spawn(reset(Arc::clone(&shared)));
+            let steps = Arc::clone(&shared);
+            let task = tokio::spawn(async move { steps.reset().await });
             let done = match task.await {
                 Ok(done) => done,
                 Err(panic) => {
@@ -437,35 +438,6 @@ impl Engine {
     }
 }
 
-/// The steps of a reset.
-async fn reset(shared: Arc<Shared>) -> Result<(), ResetError> {
-    let not_ready = |why: Broken| ResetError::NotReady(why.to_string());
-    let now = shared.clock.now().mono;
-    shared.acquisition.ask(move |live| live.supervisor.begin_reset(now)).await?;
-    if shared.stage.state().borrow().status() == pb::StageStatus::Idle {
-        // A tip that is too deep, or under a sensor that is silent, breaks a rule at once: up first, which is always permitted.
-        shared.retract().await?;
-        shared.control.send_modify(|control| {
-            control.ending.take_if(|ending| matches!(ending, Ending::Safety(_)));
-        });
-        let now = shared.clock.now().mono;
-        shared.acquisition.ask(move |live| live.supervisor.begin_reset(now)).await?;
-    }
-    shared.wait_for_stage().await.map_err(not_ready)?;
-    shared.wait_for_sensor().await.map_err(not_ready)?;
-    let status = shared.stage.state().borrow().status();
-    if status == pb::StageStatus::Alarm {
-        shared.stage.clear_alarm().await?;
-    }
-    shared.home().await.map_err(ResetError::from)?;
-    shared.retract().await?;
-    shared.wait_for_sensor().await.map_err(not_ready)?;
-    shared.check_ended().map_err(ResetError::from)?;
-    let now = shared.clock.now().mono;
-    let finished = shared.acquisition.ask(move |live| live.supervisor.finish_reset(now)).await?;
-    finished.map_err(|denied| ResetError::NotReady(denied.to_string()))
-}
-
 /// The covering of the rig file or the one that was last confirmed, whichever is thinner: the limit of depth follows it.
 fn covering_in_place(rig: &Rig, memory: Option<&dyn CoveringMemory>) -> Result<Covering, EngineError> {
     let in_file_mm = rig.covering.thickness_mm;
@@ -506,6 +478,16 @@ impl From<Gone> for ResetError {
 }
 
 impl Shared {
+    /// The rig, with the covering that is in place now.
+    pub(crate) fn rig_in_place(&self) -> Rig {
+        Rig { covering: *self.covering.borrow(), ..self.rig.clone() }
+    }
+
+    /// Status of the stage, as last reported.
+    pub(crate) fn status(&self) -> pb::StageStatus {
+        self.stage.state().borrow().status()
+    }
+
     /// Stops motion now and voids all permits. Never waits.
     pub(crate) fn stop_motion(&self) {
         self.permits.revoke();

@@ -11,8 +11,10 @@ mod engine;
 mod envelope;
 mod motion;
 mod outlet;
+mod reset;
 mod run;
 mod script;
+mod waiting;
 
 pub use engine::{
     Busy, ChangeCovering, Claim, CoveringMemory, Devices, Engine, EngineError, Pulse, ResetError,

@@ -129,7 +129,7 @@ impl Shared {
     async fn rise(&self) -> Result<[f64; 3], Broken> {
         let motion = &self.service.motion;
         let [x_mm, y_mm, z_mm] = self.position_mm();
-        if z_mm >= motion.safe_height_mm - motion.tolerance_mm && self.is_idle() {
+        if z_mm >= motion.safe_height_mm - motion.tolerance_mm && self.status() == StageStatus::Idle {
             // The stage is asked: the position may be an old one.
             let reached_mm = self.stage.look().await?;
             if reached_mm[2] >= motion.safe_height_mm - motion.tolerance_mm {
@@ -164,7 +164,7 @@ impl Shared {
             }
             tracing::warn!(%error, "homing was broken off: it begins anew");
             self.stand_still().await;
-            if self.stage.state().borrow().status() == StageStatus::Alarm {
+            if self.status() == StageStatus::Alarm {
                 // A homing that is stopped leaves some controllers in alarm.
                 self.stage.clear_alarm().await?;
             }
@@ -222,10 +222,6 @@ impl Shared {
             return Err(StageError::NotThere { target_mm, position_mm }.into());
         }
         Ok(self.stage.state().borrow().epoch)
-    }
-
-    fn is_idle(&self) -> bool {
-        self.stage.state().borrow().status() == StageStatus::Idle
     }
 
     /// Waits until the stage answers again, as long as the rig's policy allows.

@@ -1,26 +1,27 @@
 //! One run: from the first check to the closed recording.
 
+mod broken;
 mod steps;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tactus_device::StageError;
-use tactus_model::Covering;
 use tactus_plan::{Arguments, Evaluate, Limits, RigView, Script};
-use tactus_safety::{Denied, Fault, Violation};
+use tactus_safety::Fault;
 use tactus_schema::table::Phase;
-use tactus_schema::{MonoTime, Rig, pb};
+use tactus_schema::{MonoTime, pb};
 use tokio::task::{JoinError, spawn_blocking};
 use tokio::time::timeout;
 use tracing::{error, info};
 
-use crate::acquisition::{Acquisition, Gone};
-use crate::engine::{Shared, StopOrder};
-use crate::envelope::{Bounds, Outside};
+use crate::acquisition::Acquisition;
+use crate::engine::Shared;
+use crate::envelope::Bounds;
 use crate::outlet::{Record, RecordFailure};
 use crate::script::{self, Request};
+pub(crate) use broken::{Broken, Ending};
+use broken::{refusal, verdict};
 use pb::run_event::Event;
 
 /// Averaging time of the run's reference zero.
@@ -93,72 +94,11 @@ pub struct RunOutcome {
     pub travel_mm: [[f64; 2]; 3],
 }
 
-/// Why a run was asked to end before its script did.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Ending {
-    Stop(StopOrder),
-    Safety(Violation),
-    FramesLost(u64),
-    RecordFailed(String),
-    Defect(String),
-}
-
-/// Why a step was not done.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum Broken {
-    #[error("{}", describe(.0))]
-    Ended(Ending),
-    #[error(transparent)]
-    Outside(#[from] Outside),
-    #[error(transparent)]
-    Stage(#[from] StageError),
-    #[error(transparent)]
-    Denied(#[from] Denied),
-    #[error(transparent)]
-    Gone(#[from] Gone),
-    #[error("{0} frames were lost during a dwell")]
-    FramesLost(u64),
-    #[error("the stage did not stand still in its place throughout a dwell")]
-    Disturbed,
-    #[error("no frame from the sensor for {0:.1} s: is it plugged in and switched on?")]
-    SensorSilent(f64),
-    #[error("no answer from the stage for {0:.1} s: is it plugged in and switched on?")]
-    StageSilent(f64),
-    #[error("{0}")]
-    Script(String),
-    #[error("{0}")]
-    Refused(String),
-}
-
-impl Ending {
-    /// True for a silence of the sensor: the run may continue once frames arrive again.
-    pub(crate) fn is_silence(&self) -> bool {
-        matches!(self, Self::Safety(violation) if violation.is_silence())
-    }
-}
-
-fn describe(ending: &Ending) -> String {
-    match ending {
-        Ending::Stop(order) => {
-            let how = if order.abort { "aborted" } else { "stopped" };
-            let why = if order.reason.is_empty() { String::new() } else { format!(": {}", order.reason) };
-            format!("{how} by {}{why}", order.by)
-        }
-        Ending::Safety(violation) => format!("safety stop: {violation}"),
-        Ending::FramesLost(lost) => {
-            format!("{lost} frames were lost, and the rig's policy.on_gap is \"fail\"")
-        }
-        Ending::RecordFailed(failure) => failure.clone(),
-        Ending::Defect(what) => format!("stopped by a defect of Tactus: {what}"),
-    }
-}
-
 /// A run in progress.
 pub(crate) struct Run {
     shared: Arc<Shared>,
     order: RunOrder,
     bounds: Bounds,
-    covering: Covering,
     started: MonoTime,
     /// The run has begun to move.
     is_prepared: bool,
@@ -196,7 +136,6 @@ impl Run {
         let covering = *shared.covering.borrow();
         Self {
             bounds: Bounds::new(rig, &shared.service.envelope, &shared.service.motion, covering),
-            covering,
             started: shared.clock.now().mono,
             is_prepared: false,
             steps: 0,
@@ -252,23 +191,10 @@ impl Run {
         self.shared.wait_for_sensor().await?;
         self.is_prepared = true;
         if self.order.resets {
-            self.reset().await?;
+            self.shared.reset_for_run().await?;
         }
         self.shared.retract().await?;
         self.take_reference().await
-    }
-
-    /// Does what a reset does, as far as it is necessary: homes a stage that does not know where it is.
-    async fn reset(&self) -> Result<(), Broken> {
-        let now = self.shared.clock.now().mono;
-        self.shared.acquisition.ask(move |live| live.supervisor.begin_reset(now)).await?;
-        if self.shared.stage.state().borrow().status() == pb::StageStatus::Unhomed {
-            info!("homing the stage");
-            self.shared.home().await?;
-        }
-        self.shared.retract().await?;
-        let now = self.shared.clock.now().mono;
-        Ok(self.shared.acquisition.ask(move |live| live.supervisor.finish_reset(now)).await??)
     }
 
     /// Takes the run's first zero, with the tip up.
@@ -284,7 +210,7 @@ impl Run {
     }
 
     async fn run_script(&mut self) -> Result<(), Broken> {
-        let view = RigView::of(&Rig { covering: self.covering, ..self.shared.rig.clone() });
+        let view = RigView::of(&self.shared.rig_in_place());
         let mut requests =
             script::start(&self.order, view, self.shared.control.subscribe(), self.shared.clock.is_virtual())
                 .map_err(|error| Broken::Script(format!("no thread for the script: {error}")))?;
@@ -415,7 +341,7 @@ impl Run {
             seed: self.order.seed,
             script_sha256: self.order.script.sha256().to_owned(),
             parameters_json: self.order.arguments.to_json(),
-            covering_mm: self.covering.thickness_mm,
+            covering_mm: self.shared.covering.borrow().thickness_mm,
             indenter: rig.indenter.clone(),
             presses_planned: planned.presses,
             dwells_planned: planned.dwells,
@@ -527,109 +453,4 @@ impl Shared {
         // The error of the end has the final counts.
         closed.and_then(|()| failure.map_or(Ok(()), Err))
     }
-
-    /// Withdraws a silence as the reason to end once frames arrive again, and has the supervisor check again.
-    pub(crate) async fn await_the_sensors_return(&self) -> Result<(), Broken> {
-        self.control.send_modify(|control| {
-            control.ending.take_if(|ending| ending.is_silence());
-        });
-        self.wait_for_sensor().await?;
-        let now = self.clock.now().mono;
-        Ok(self.acquisition.ask(move |live| live.supervisor.forgive_silence(now)).await?)
-    }
-
-    /// Waits until frames arrive, as long as the rig's policy allows.
-    pub(crate) async fn wait_for_sensor(&self) -> Result<(), Broken> {
-        let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
-        let since = self.clock.now().mono;
-        let mut pulse = self.pulse.subscribe();
-        let flowing = pulse.wait_for(|pulse| pulse.sensor_connected && pulse.last_frame > since);
-        match self.unless_ended(timeout(patience, flowing)).await? {
-            Ok(_) => Ok(()),
-            Err(_) => Err(Broken::SensorSilent(patience.as_secs_f64())),
-        }
-    }
-
-    /// Waits until the stage answers, as long as the rig's policy allows. Other problems show at the first move.
-    pub(crate) async fn wait_for_stage(&self) -> Result<(), Broken> {
-        let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
-        let mut state = self.stage.state();
-        let answering = state.wait_for(|report| {
-            !matches!(report.status(), pb::StageStatus::Unspecified | pb::StageStatus::Disconnected)
-        });
-        match self.unless_ended(timeout(patience, answering)).await? {
-            Ok(_) => Ok(()),
-            Err(_) => Err(Broken::StageSilent(patience.as_secs_f64())),
-        }
-    }
-
-    /// An error if the run was asked to end.
-    pub(crate) fn check_ended(&self) -> Result<(), Broken> {
-        self.control.borrow().ending.clone().map_or(Ok(()), |ending| Err(Broken::Ended(ending)))
-    }
-
-    /// The result of `future`, unless the run is asked to end first.
-    pub(crate) async fn unless_ended<T>(&self, future: impl Future<Output = T>) -> Result<T, Broken> {
-        let mut control = self.control.subscribe();
-        tokio::select! {
-            biased;
-            // Waiting cannot fail because the sender lives in `self`; otherwise the future decides.
-            Ok(control) = control.wait_for(|control| control.ending.is_some()) => {
-                let ending = control.ending.clone();
-                drop(control);
-                match ending {
-                    Some(ending) => Err(Broken::Ended(ending)),
-                    None => unreachable!("waited for an ending"),
-                }
-            }
-            value = future => Ok(value),
-        }
-    }
-}
-
-fn refusal(broken: &Broken) -> tactus_plan::Refusal {
-    use tactus_plan::Refusal;
-    match broken {
-        Broken::Ended(_) => Refusal::Stopped(broken.to_string()),
-        Broken::Outside(outside) => Refusal::Outside(outside.to_string()),
-        Broken::Stage(_)
-        | Broken::Denied(_)
-        | Broken::Gone(_)
-        | Broken::FramesLost(_)
-        | Broken::Disturbed
-        | Broken::SensorSilent(_)
-        | Broken::StageSilent(_)
-        | Broken::Script(_)
-        | Broken::Refused(_) => Refusal::Failed(broken.to_string()),
-    }
-}
-
-fn verdict(result: &Result<(), Broken>, frames_lost: u64) -> (pb::ExitStatus, String) {
-    use pb::ExitStatus;
-    let Err(broken) = result else {
-        return match frames_lost {
-            0 => (ExitStatus::Done, String::new()),
-            lost => (
-                ExitStatus::Degraded,
-                format!("{lost} frames were lost; the dwells they touched were repeated"),
-            ),
-        };
-    };
-    let status = match broken {
-        Broken::Ended(Ending::Stop(order)) if order.abort => ExitStatus::Aborted,
-        Broken::Ended(Ending::Stop(_)) => ExitStatus::Stopped,
-        Broken::Ended(ending) if ending.is_silence() => ExitStatus::Failed,
-        Broken::Ended(Ending::Safety(_)) | Broken::Outside(_) | Broken::Refused(_) | Broken::Denied(_) => {
-            ExitStatus::Refused
-        }
-        Broken::Ended(Ending::FramesLost(_) | Ending::RecordFailed(_) | Ending::Defect(_))
-        | Broken::Stage(_)
-        | Broken::Gone(_)
-        | Broken::Disturbed
-        | Broken::FramesLost(_)
-        | Broken::SensorSilent(_)
-        | Broken::StageSilent(_)
-        | Broken::Script(_) => ExitStatus::Failed,
-    };
-    (status, broken.to_string())
 }

@@ -85,6 +85,17 @@ fn hanging(sync: SyncKind) -> (HangingDisk, DiskControl) {
     (disk, DiskControl { waits: waiting, permits, bytes })
 }
 
+/// A recorder with 17 frames: 16 fill a chunk, the next one closes it, and the disk hangs.
+fn stuck_after_a_chunk(gauge: &Gauge) -> (ThreadRecorder, DiskControl) {
+    let (disk, control) = hanging(SyncKind::Works);
+    control.permits.send(()).unwrap();
+    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
+    control.waits.recv().unwrap();
+    (0..=16).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
+    control.waits.recv().unwrap();
+    (recorder, control)
+}
+
 fn begin<S: Storage>(path: &Path, storage: S) -> Recording<S> {
     with_header(|header| Recording::begin(path.to_owned(), storage, header)).unwrap()
 }
@@ -118,14 +129,8 @@ fn path() -> PathBuf {
 
 #[test]
 fn a_disk_that_hangs_never_delays_the_engine_alarms_and_fails_the_run_after_a_second() {
-    let (disk, control) = hanging(SyncKind::Works);
-    control.permits.send(()).unwrap();
     let gauge = Gauge::default();
-    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
-    control.waits.recv().unwrap();
-    // 16 frames fill a chunk; the next one closes it, and the disk hangs.
-    (0..=16).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
-    control.waits.recv().unwrap();
+    let (mut recorder, _control) = stuck_after_a_chunk(&gauge);
     let failed = (17..).find_map(|seq| recorder.frame(&frame(seq)).err().map(|error| (seq, error)));
     let (seq, error) = failed.unwrap();
     let now = MonoTime::from_ns(i64::try_from(seq).unwrap() * 33_333_333);
@@ -149,12 +154,7 @@ fn a_disk_that_hangs_never_delays_the_engine_alarms_and_fails_the_run_after_a_se
 
 #[test]
 fn a_disk_that_comes_back_in_time_loses_nothing() {
-    let (disk, control) = hanging(SyncKind::Works);
-    control.permits.send(()).unwrap();
-    let mut recorder = ThreadRecorder::start(begin(&path(), disk)).unwrap();
-    control.waits.recv().unwrap();
-    (0..=16).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
-    control.waits.recv().unwrap();
+    let (mut recorder, control) = stuck_after_a_chunk(&Gauge::default());
     // 0.8 s of backlog.
     (17..=38).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
     for _ in 0..10 {
@@ -170,13 +170,8 @@ fn a_disk_that_comes_back_in_time_loses_nothing() {
 
 #[test]
 fn a_silence_of_the_devices_does_not_hide_a_disk_that_hangs() {
-    let (disk, control) = hanging(SyncKind::Works);
-    control.permits.send(()).unwrap();
     let gauge = Gauge::default();
-    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
-    control.waits.recv().unwrap();
-    (0..=16).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
-    control.waits.recv().unwrap();
+    let (mut recorder, _control) = stuck_after_a_chunk(&gauge);
     recorder.frame(&frame(17)).unwrap();
     let oldest = frame(gauge.written()).received.mono;
     recorder.check(oldest.after(Duration::from_millis(900))).unwrap();

@@ -85,12 +85,12 @@ impl Supervisor {
         self.elements.take(frame);
         self.z_at_frame_mm = self.z_mm;
         let position_mm = self.position_mm();
-        let is_near = self.z_mm.is_some_and(|z_mm| self.limits.is_near(z_mm));
         let is_standing = self.status() == StageStatus::Idle;
         let response = position_mm
             .and_then(|at_mm| self.contact.take(frame, at_mm, is_standing, &self.elements, &self.limits))
             .filter(|_| self.is_active);
-        let overload = self.elements.overload(&self.limits).filter(|_| self.is_active || is_near);
+        let is_watched = self.is_active || self.is_near();
+        let overload = is_watched.then(|| self.elements.overload(&self.limits)).flatten();
         self.trip(overload.or(response))
     }
 
@@ -117,8 +117,7 @@ impl Supervisor {
     /// Checks the time since the last frame: near the covering, and while the stage is homing, frames must not cease.
     pub fn on_time(&mut self, now: MonoTime) -> Option<Violation> {
         let is_homing = self.status() == StageStatus::Homing;
-        let is_near = self.z_mm.is_some_and(|z_mm| self.limits.is_near(z_mm));
-        if !self.has_sensor || !(is_near || is_homing) {
+        if !self.has_sensor || !(self.is_near() || is_homing) {
             return None;
         }
         let (limit_s, z_mm) = (self.limits.silence_max_s(), self.z_mm);
@@ -282,6 +281,10 @@ impl Supervisor {
     /// The fault is a silence of the sensor, which its return may end.
     fn is_silent(&self) -> bool {
         matches!(&self.fault, Some(Fault::Tripped(violation)) if violation.is_silence())
+    }
+
+    fn is_near(&self) -> bool {
+        self.z_mm.is_some_and(|z_mm| self.limits.is_near(z_mm))
     }
 
     fn check_fault(&self) -> Result<(), Denied> {

@@ -259,7 +259,7 @@ impl Run {
     /// Has another covering put in place. A person confirms it by its value; the confirmed one outlives the run.
     async fn change_covering(&mut self, thickness_mm: f64) -> Result<Reply, Broken> {
         let covering = Covering { thickness_mm };
-        if covering == self.covering {
+        if covering == *self.shared.covering.borrow() {
             return Ok(Reply::Done);
         }
         self.shared.retract().await?;
@@ -285,7 +285,6 @@ impl Run {
                 Broken::Refused(format!("the covering in place cannot be stored: {error}; see the disk"))
             })?;
         }
-        self.covering = covering;
         self.bounds = self.bounds.clone().under(covering);
         let set = self.shared.acquisition.ask(move |live| {
             live.supervisor.set_covering(covering);
