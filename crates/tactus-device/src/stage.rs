@@ -3,13 +3,14 @@
 mod driven;
 mod driver;
 mod grbl;
+mod guard;
 mod stop;
 mod zaber;
 
 use futures_util::future::BoxFuture;
 use tactus_safety::{HomingPermit, Permit, Void};
-use tactus_schema::pb;
 use tactus_schema::rig::{GrblAxes, ZaberAxes};
+use tactus_schema::{MonoTime, pb};
 use tactus_wire::stage::Direction;
 use tokio::sync::watch;
 
@@ -45,6 +46,9 @@ pub trait Stage: Send + Sync {
     /// Says that somebody still watches the stage. A stage that was watched once and is not watched for 100 ms while it
     /// moves is stopped; its command ends with [`StageError::Unwatched`].
     fn watch(&self);
+
+    /// When the driver last gave a sign of life. It gives one at least every quarter of a second, with a stage or without.
+    fn driven(&self) -> MonoTime;
 
     /// Clears an alarm, so that the stage accepts moves again. Its position is suspect until it is homed.
     fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>>;

@@ -4,6 +4,7 @@
 //! without opening any other device. One read of a USB interface or human interface device gives one packet.
 
 use std::fmt;
+use std::io::Write;
 
 use futures_util::future::BoxFuture;
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -23,9 +24,12 @@ pub mod unbuilt;
 pub mod usb;
 
 /// A stream of bytes to and from a device.
-pub trait ByteStream: AsyncRead + AsyncWrite + Unpin + Send {}
-
-impl<T: AsyncRead + AsyncWrite + Unpin + Send> ByteStream for T {}
+pub trait ByteStream: AsyncRead + AsyncWrite + Unpin + Send {
+    /// A second way to write to the device, for another thread, which never blocks; `None` if there is none.
+    fn second_writer(&self) -> Option<Box<dyn Write + Send>> {
+        None
+    }
+}
 
 /// Opens a device, as often as needed. Its text form is the link's name in messages.
 pub trait Connect: fmt::Display + Send + Sync {

@@ -277,7 +277,11 @@ impl Acquisition {
         let violation = self.supervisor.on_time(now);
         self.stop_for(violation.as_ref());
         self.shared.stage.watch();
-        self.shared.pulse.send_modify(|pulse| pulse.supervised = now);
+        let stage_driven = self.shared.stage.driven();
+        self.shared.pulse.send_modify(|pulse| {
+            pulse.supervised = now;
+            pulse.stage_driven = stage_driven;
+        });
         self.record(|sink| sink.check(now));
         if let Some(alarm) = self.recording.as_mut().and_then(|recording| recording.sink.alarm()) {
             self.emit(pb::run_event::Event::Log(pb::Log { message: alarm }));

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use tactus_device::{StageError, Target};
-use tactus_safety::{Denied, Permit, SAME_HEIGHT_MM, STEP_DOWN_MAX_MM};
+use tactus_safety::{Denied, Permit, SAME_HEIGHT_MM, STEP_DOWN_MAX_MM, Void};
 use tactus_schema::pb::StageStatus;
 use tokio::time::{sleep, timeout};
 
@@ -194,7 +194,7 @@ impl Shared {
             self.check_ended()?;
             match moved {
                 // Nothing was sent. With a fast sensor and a slow computer permits are often too old.
-                Err(StageError::Void(_)) if self.clock.now().mono < deadline => {}
+                Err(StageError::Void(Void::Expired)) if self.clock.now().mono < deadline => {}
                 Err(StageError::Unwatched { .. }) if tries < UNWATCHED_MAX => {}
                 moved => return Ok(moved?),
             }

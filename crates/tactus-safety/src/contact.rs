@@ -1,6 +1,6 @@
 //! Whether the array responds to the tip: it must not be frozen, and a deep tip must be felt.
 
-use tactus_model::Registration;
+use tactus_model::{Covering, Psf, Registration};
 use tactus_schema::rig::Service;
 use tactus_schema::{Frame, Rig};
 
@@ -28,13 +28,18 @@ const UNFELT_FRAMES: u32 = 4;
 /// Watches the response to the tip.
 #[derive(Debug)]
 pub(crate) struct Contact {
-    /// False where the elements are components of a field: they are nowhere then, and nothing is expected of them.
-    is_array_of_places: bool,
+    /// False where the rig file says so, and where the elements are components of a field: they are nowhere then.
+    expects_response: bool,
     registration: Registration,
     /// Outline of the array, sensor frame: least and greatest x, and y.
     extent_mm: [[f64; 2]; 2],
-    /// Of the array's median element.
+    /// Of the array's median element, under the reference covering.
     sensitivity_counts_per_mm: f64,
+    /// Spread under a covering, and under the reference covering.
+    psf: Psf,
+    reference_sigma_mm: f64,
+    /// Least expected rise, for each mm of depth, under the covering in place.
+    felt_counts_per_mm: f64,
     /// The frame that has been repeated, with the height of the tip at its first arrival.
     repeated: Repeated,
     /// Frames without a response since the tip stands deep.
@@ -54,14 +59,26 @@ impl Contact {
         let mut sensitivities: Vec<_> =
             rig.sensitivity_counts_per_mm.iter().map(|counts| counts.abs()).collect();
         sensitivities.sort_by(f64::total_cmp);
-        Self {
-            is_array_of_places: !has_sign(service),
+        let mut contact = Self {
+            expects_response: service.envelope.expects_response && !has_sign(service),
             registration: rig.registration,
             extent_mm: rig.array.extent_mm(),
             sensitivity_counts_per_mm: sensitivities.get(sensitivities.len() / 2).copied().unwrap_or(0.0),
+            psf: rig.psf,
+            reference_sigma_mm: rig.psf.sigma_mm(rig.sensitivity_reference.covering),
+            felt_counts_per_mm: 0.0,
             repeated: Repeated::default(),
             unfelt_frames: 0,
-        }
+        };
+        contact.set_covering(rig.covering);
+        contact
+    }
+
+    /// Sets the covering in place. A thicker one spreads a press over a greater area: the peak of a spread of unit volume
+    /// falls with the square of its width. Under a thinner one no more is expected than under the reference covering.
+    pub(crate) fn set_covering(&mut self, covering: Covering) {
+        let spread = (self.reference_sigma_mm / self.psf.sigma_mm(covering)).powi(2).min(1.0);
+        self.felt_counts_per_mm = FELT_RISE_SHARE * self.sensitivity_counts_per_mm * spread;
     }
 
     /// The tip is about to move: a frame may show that before the stage reports it.
@@ -89,7 +106,7 @@ impl Contact {
             // A frame that was taken before the tip moved is no evidence.
             repeated.frames += u32::from(way_mm > FROZEN_WAY_MM);
             // An array that has felt nothing yet is another matter.
-            let felt_counts = FELT_RISE_SHARE * self.sensitivity_counts_per_mm * FROZEN_WAY_MM;
+            let felt_counts = self.felt_counts_per_mm * FROZEN_WAY_MM;
             let is_felt =
                 elements.greatest_rise_counts().is_some_and(|rise_counts| rise_counts >= felt_counts);
             if repeated.frames >= FROZEN_FRAMES && is_felt {
@@ -98,7 +115,7 @@ impl Contact {
         }
         let depth_mm = -z_mm;
         let rise_counts = elements.greatest_rise_counts()?;
-        let least_counts = FELT_RISE_SHARE * self.sensitivity_counts_per_mm * depth_mm;
+        let least_counts = self.felt_counts_per_mm * depth_mm;
         let is_deep = depth_mm >= FELT_DEPTH_SHARE * limits.depth_max_mm;
         let is_unfelt = is_over_array && is_standing && is_deep && rise_counts < least_counts;
         self.unfelt_frames = if is_unfelt { self.unfelt_frames + 1 } else { 0 };
@@ -111,7 +128,7 @@ impl Contact {
 
     fn is_over_array(&self, at_mm: [f64; 2]) -> bool {
         let at_mm = self.registration.to_sensor(at_mm);
-        self.is_array_of_places
+        self.expects_response
             && at_mm
                 .iter()
                 .zip(self.extent_mm)

@@ -52,7 +52,7 @@ pub enum Violation {
     /// The tip is deep in the covering and no element responds.
     #[error(
         "no element rose by more than {rise_counts:.0} counts with the tip {depth_mm:.3} mm deep over the array; at least \
-         {least_counts:.0} are expected: is the covering in place, and its surface at z = 0?"
+         {least_counts:.0} are expected: is the covering in place, and its surface at z = 0? (envelope.expects_response)"
     )]
     NoResponse { rise_counts: f64, least_counts: f64, depth_mm: f64 },
     /// A reading without load lies far from the rig's baseline.
@@ -62,6 +62,11 @@ pub enum Violation {
          envelope.unwatched_elements"
     )]
     Zero { element: usize, counts: f64, baseline_counts: f64, band_counts: f64 },
+    /// An element is not read, so it has no zero, and a load on it would not be seen.
+    #[error(
+        "element {element} is not read: see to it; if it is faulty, list it in envelope.unwatched_elements"
+    )]
+    Unread { element: usize },
 }
 
 impl Violation {
@@ -82,6 +87,7 @@ impl Violation {
             Self::Frozen { .. } => "frozen",
             Self::NoResponse { .. } => "no-response",
             Self::Zero { .. } => "zero",
+            Self::Unread { .. } => "unread",
         }
     }
 }

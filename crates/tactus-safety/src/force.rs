@@ -110,18 +110,25 @@ impl Elements {
     /// Sets the run's first zero, which is the tare, too.
     ///
     /// # Errors
-    /// [`Violation::Zero`] if an element reads far from its baseline. The zeros are unchanged then.
+    /// [`Violation::Zero`] if an element reads far from its baseline, [`Violation::Unread`] if one is not read. The zeros are
+    /// unchanged then.
     pub(crate) fn set_reference(&mut self, counts: &[f64], limits: &Limits) -> Result<(), Violation> {
         let zero = self.checked_zero(counts, limits)?;
+        let is_unread = |element: &usize| {
+            zero.get(*element).is_none_or(Option::is_none) && !self.rig.unwatched.contains(element)
+        };
+        if let Some(element) = (0..zero.len()).find(is_unread) {
+            return Err(Violation::Unread { element });
+        }
         self.tare = Some(zero.clone());
         self.reference = Some(zero);
         Ok(())
     }
 
-    /// Sets the script's new zero.
+    /// Sets the script's new zero. An element that is not read at the time keeps the limit above the run's first zero.
     ///
     /// # Errors
-    /// As [`Self::set_reference`].
+    /// [`Violation::Zero`] if an element reads far from its baseline. The tare is unchanged then.
     pub(crate) fn set_tare(&mut self, counts: &[f64], limits: &Limits) -> Result<(), Violation> {
         self.tare = Some(self.checked_zero(counts, limits)?);
         Ok(())
@@ -141,8 +148,7 @@ impl Elements {
         Ok(zero)
     }
 
-    /// An element that has been silent for long is known not to be read: it has no zero and no limit, and its silence
-    /// does not stop motion.
+    /// An element that has been silent for long has no zero.
     fn zero(&self, element: usize, counts: &[f64], limits: &Limits) -> Option<f64> {
         let was_read = self.states.get(element).is_none_or(|state| {
             let silent_s = Limits::silence_s(self.last_frame.unwrap_or_default(), state.last_read);

@@ -15,6 +15,10 @@ pub const SAME_HEIGHT_MM: f64 = 0.0003;
 /// Sample periods without a frame after which a tip near the covering is stopped.
 const SILENT_PERIODS_MAX: f64 = 3.0;
 
+/// Greatest age of the report that a step down starts from. Drivers ask a standing stage every 0.1 s, and again 0.25 s after
+/// a question that was not answered.
+pub(crate) const REPORT_AGE_MAX_S: f64 = 0.5;
+
 /// Shortest of the supervisor's times. Links deliver in batches of up to 16 ms and timers are coarse, so that three periods of a
 /// sensor of more than 100 Hz are no silence.
 const SHORTEST_S: f64 = 0.03;

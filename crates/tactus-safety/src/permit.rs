@@ -49,8 +49,8 @@ pub enum Void {
     /// The time between the permit and the command was too long.
     #[error("the permit to move is too old: the computer was too slow")]
     Expired,
-    /// Something was stopped after the permit was given.
-    #[error("a stop came between the permit to move and the move")]
+    /// Something was stopped, moved or permitted after the permit was given.
+    #[error("a stop, or another motion, came between the permit to move and the move")]
     Revoked,
 }
 
@@ -64,6 +64,9 @@ pub enum Denied {
     /// The supervisor has seen no recent frame.
     #[error("the last frame is {age_s:.3} s old; a step down needs one of the last {limit_s:.3} s")]
     NoFreshFrame { age_s: f64, limit_s: f64 },
+    /// The last report of the stage is old.
+    #[error("the stage's last report is {age_s:.3} s old; a step down needs one of the last {limit_s:.3} s")]
+    NoFreshReport { age_s: f64, limit_s: f64 },
     /// Elements have no zero since the sensor connected, so a load would not be seen.
     #[error("no zero was taken since the sensor connected")]
     NoZero,
@@ -99,7 +102,7 @@ pub enum Denied {
 impl Denied {
     /// True if a later try may be permitted without anything else changing: the next frame or report may cure it.
     pub fn may_pass(&self) -> bool {
-        matches!(self, Self::NoFreshFrame { .. } | Self::NotStanding { .. })
+        matches!(self, Self::NoFreshFrame { .. } | Self::NoFreshReport { .. } | Self::NotStanding { .. })
     }
 }
 
@@ -117,11 +120,15 @@ impl Revocation {
         Terms { expires, revocation: self.clone(), revocations: self.count() }
     }
 
+    /// A permit. It voids all others: there is one motion at a time, from where the stage stands now.
     pub(crate) fn permit(&self, target: Target, expires: Option<MonoTime>) -> Permit {
+        self.revoke();
         Permit { target, terms: self.terms(expires) }
     }
 
+    /// A permit to home. It voids all others.
     pub(crate) fn homing_permit(&self, expires: MonoTime) -> HomingPermit {
+        self.revoke();
         HomingPermit { terms: self.terms(Some(expires)) }
     }
 }

@@ -9,7 +9,7 @@ use tactus_schema::{Frame, MonoTime, Rig, pb};
 
 use crate::contact::Contact;
 use crate::force::Elements;
-use crate::limits::{Limits, STEP_DOWN_MAX_MM};
+use crate::limits::{Limits, REPORT_AGE_MAX_S, STEP_DOWN_MAX_MM};
 use crate::{Denied, Fault, HomingPermit, Permit, Revocation, Target, Violation};
 
 /// Watches one rig. The caller stops the stage whenever a method returns a [`Violation`].
@@ -104,7 +104,14 @@ impl Supervisor {
 
     /// Checks a report of the stage. If the stage does not know its position, the last known height is kept.
     pub fn on_report(&mut self, report: &pb::StageState) -> Option<Violation> {
+        let stood_mm = self.standing_mm().ok();
         self.report = Some(*report);
+        if let Some(stood_mm) = stood_mm
+            && !self.stands_at(stood_mm)
+        {
+            // A permit is for the way from where the stage stood. One that is in use is not checked again.
+            self.permits.revoke();
+        }
         if !is_placed(report.status()) {
             return None;
         }
@@ -147,6 +154,7 @@ impl Supervisor {
         self.check_fault()?;
         self.limits.check_way(from_mm, to)?;
         let safe_mm = self.limits.motion.safe_height_mm - self.limits.motion.tolerance_mm;
+        self.check_report(now)?;
         if self.has_sensor || to.position_mm[2] < safe_mm {
             self.check_frame(now)?;
         }
@@ -232,7 +240,8 @@ impl Supervisor {
     /// limit step by step.
     ///
     /// # Errors
-    /// [`Violation::Zero`] if an element reads far from its baseline: it may be loaded, or the array may be another one.
+    /// [`Violation::Zero`] if an element reads far from its baseline: it may be loaded, or the array may be another one;
+    /// [`Violation::Unread`] if one is not read.
     pub fn set_reference(&mut self, counts: &[f64]) -> Result<(), Violation> {
         self.elements.set_reference(counts, &self.limits)
     }
@@ -260,6 +269,7 @@ impl Supervisor {
     /// Another covering is in place.
     pub fn set_covering(&mut self, covering: Covering) {
         self.limits.depth_max_mm = self.limits.envelope.depth_max_mm(covering);
+        self.contact.set_covering(covering);
     }
 
     // --- how ----------------------------------------------------------------------------------------------------------
@@ -297,6 +307,12 @@ impl Supervisor {
         if age_s <= limit_s { Ok(()) } else { Err(Denied::NoFreshFrame { age_s, limit_s }) }
     }
 
+    fn check_report(&self, now: MonoTime) -> Result<(), Denied> {
+        let reported = self.report.map(|report| MonoTime::from_ns(report.t_mono_ns));
+        let (age_s, limit_s) = (Limits::silence_s(now, reported), REPORT_AGE_MAX_S);
+        if age_s <= limit_s { Ok(()) } else { Err(Denied::NoFreshReport { age_s, limit_s }) }
+    }
+
     /// Near the covering the tip goes at most two steps beyond what the last frame has shown, however slow the sensor is.
     fn check_way_since_frame(&self, to_z_mm: f64, now: MonoTime) -> Result<(), Denied> {
         let from_z_mm =
@@ -329,6 +345,14 @@ impl Supervisor {
                 Err(Denied::NotStanding { status: status.as_str_name() })
             }
         }
+    }
+
+    /// True if the stage stands within tolerance of a place.
+    fn stands_at(&self, [x_mm, y_mm, z_mm]: [f64; 3]) -> bool {
+        self.standing_mm().is_ok_and(|[here_x_mm, here_y_mm, here_z_mm]| {
+            let away_mm = (here_x_mm - x_mm).hypot(here_y_mm - y_mm).hypot(here_z_mm - z_mm);
+            away_mm <= self.limits.motion.tolerance_mm
+        })
     }
 
     fn position_mm(&self) -> Option<[f64; 3]> {

@@ -47,7 +47,8 @@ fn frame(ms: i64, counts: &[f32]) -> Frame {
 }
 
 fn at_height(z_mm: f64) -> pb::StageState {
-    pb::StageState { z_mm, status: StageStatus::Idle.into(), ..Default::default() }
+    let t_mono_ns = at_ms(1000).ns();
+    pb::StageState { z_mm, t_mono_ns, status: StageStatus::Idle.into(), ..Default::default() }
 }
 
 #[test]
@@ -151,7 +152,7 @@ fn what_was_not_read_neither_trips_nor_hides_a_load() {
 
 #[test]
 fn an_element_that_falls_silent_near_the_covering_is_a_stop() {
-    let mut supervisor = supervisor();
+    let mut supervisor = changed(|rig| rig.replace("[motion]", "unwatched_elements = [2]\n[motion]"));
     assert_eq!(supervisor.on_frame(&partly_read(0, &[100.0; 4], &[2])), None);
     supervisor.set_reference(&[100.0; 4]).unwrap();
     assert_eq!(supervisor.on_report(&at_height(-0.2)), None);
@@ -165,19 +166,29 @@ fn an_element_that_falls_silent_near_the_covering_is_a_stop() {
 }
 
 #[test]
-fn an_element_that_was_never_read_stops_nothing_until_it_has_a_zero() {
+fn an_element_that_is_not_read_at_the_zero_is_named_by_the_rig_file_or_the_run_is_refused() {
     let mut supervisor = supervisor();
     assert_eq!(supervisor.on_frame(&partly_read(0, &[0.0, 100.0], &[0])), None);
-    supervisor.set_reference(&[0.0, 100.0]).unwrap();
-    assert_eq!(supervisor.on_report(&at_height(-0.2)), None);
-    assert_eq!(supervisor.on_frame(&frame(2000, &[3000.0, 100.0])), None, "its zero was never read");
-    supervisor.set_tare(&[500.0, 100.0]).unwrap();
-    assert_eq!(supervisor.on_frame(&frame(2033, &[2400.0, 100.0])), None);
-    let violation = supervisor.on_frame(&frame(2067, &[2501.0, 100.0])).unwrap();
-    assert!(
-        matches!(violation, Violation::ElementForce { element: 0, against: "the tare", .. }),
-        "{violation}"
-    );
+    let refused = supervisor.set_reference(&[0.0, 100.0]).unwrap_err();
+    assert_eq!(refused, Violation::Unread { element: 0 });
+    assert!(!supervisor.has_zero());
+
+    let mut known = changed(|rig| rig.replace("[motion]", "unwatched_elements = [0]\n[motion]"));
+    assert_eq!(known.on_frame(&partly_read(0, &[0.0, 100.0], &[0])), None);
+    known.set_reference(&[0.0, 100.0]).unwrap();
+    assert_eq!(known.on_frame(&frame(33, &[3000.0, 100.0])), None, "nobody watches it");
+}
+
+#[test]
+fn an_element_that_is_not_read_at_a_tare_keeps_its_limit_above_the_first_zero() {
+    let mut supervisor = supervisor();
+    supervisor.set_reference(&[100.0; 2]).unwrap();
+    assert_eq!(supervisor.on_frame(&partly_read(0, &[100.0; 2], &[])), None);
+    assert_eq!(supervisor.on_frame(&partly_read(2000, &[0.0, 100.0], &[0])), None);
+    supervisor.set_tare(&[0.0, 100.0]).unwrap();
+    assert_eq!(supervisor.on_frame(&frame(2033, &[2000.0, 100.0])), None);
+    let violation = supervisor.on_frame(&frame(2067, &[2101.0, 100.0])).unwrap();
+    assert!(matches!(violation, Violation::ElementForce { element: 0, .. }), "{violation}");
 }
 
 #[test]
@@ -257,6 +268,29 @@ fn whatever_stops_voids_every_permit_that_was_given_before() {
     let homing = supervisor.permit_homing(at_ms(1034)).unwrap();
     supervisor.on_connected();
     assert_eq!(homing.check(at_ms(1034)), Err(Void::Revoked));
+}
+
+#[test]
+fn a_permit_is_void_once_another_is_given_or_the_stage_has_moved() {
+    let mut supervisor = ready(0.1);
+    let first = supervisor.permit(to(2.0), at_ms(1010)).unwrap();
+    let second = supervisor.permit(to(2.0), at_ms(1010)).unwrap();
+    assert_eq!(first.check(at_ms(1010)), Err(Void::Revoked));
+    assert_eq!(supervisor.on_report(&standing(0.1004)), None);
+    assert_eq!(second.check(at_ms(1010)), Ok(()), "within tolerance it stands where it stood");
+    let aside = pb::StageState { x_mm: 25.1, ..standing(0.1) };
+    assert_eq!(supervisor.on_report(&aside), None);
+    assert_eq!(second.check(at_ms(1010)), Err(Void::Revoked));
+}
+
+#[test]
+fn an_old_report_of_the_stage_permits_the_way_up_only() {
+    let mut supervisor = ready(0.1);
+    assert_eq!(supervisor.on_frame(&frame(1500, &[100.0; 48])), None);
+    supervisor.permit(to(0.0), at_ms(1500)).unwrap();
+    let denied = supervisor.permit(to(0.0), at_ms(1501)).unwrap_err();
+    assert!(denied.may_pass() && matches!(denied, Denied::NoFreshReport { .. }), "{denied}");
+    supervisor.permit(to(2.0), at_ms(1501)).unwrap();
 }
 
 #[test]
@@ -381,6 +415,26 @@ fn a_deep_tip_that_no_element_feels_is_a_stop_over_the_array_only() {
     let mut beside = ready(2.0);
     assert_eq!(beside.on_report(&pb::StageState { x_mm: 12.0, y_mm: 12.0, ..at_height(-0.4) }), None);
     assert_eq!([1033, 1067, 1100, 1133].map(|ms| at(&mut beside, ms)), [None, None, None, None]);
+}
+
+#[test]
+fn under_a_thicker_covering_less_is_expected_and_a_rig_may_expect_nothing() {
+    let at = |supervisor: &mut Supervisor, ms: i64| {
+        #[expect(clippy::cast_precision_loss, reason = "a small number that makes frames differ")]
+        supervisor.on_frame(&frame(ms, &[110.0 + (ms % 7) as f32; 48]))
+    };
+    // The spread under 20 mm is 12.16 mm instead of 2.725: a twentieth of 1,000 counts per mm becomes 2.5.
+    let mut thick = ready(-0.4);
+    thick.set_covering(Covering { thickness_mm: 20.0 });
+    let mut violations: Vec<_> = [1033, 1067, 1100, 1133].map(|ms| at(&mut thick, ms)).into();
+    assert_eq!(thick.on_report(&standing(-3.5)), None);
+    violations.extend([1167, 1200, 1233, 1267].map(|ms| at(&mut thick, ms)));
+    assert!(violations.iter().all(Option::is_none), "{violations:?}");
+
+    let mut silent = changed(|rig| rig.replace("[motion]", "expects_response = false\n[motion]"));
+    silent.set_reference(&[100.0; 48]).unwrap();
+    assert_eq!(silent.on_report(&standing(-0.4)), None);
+    assert_eq!([1033, 1067, 1100, 1133].map(|ms| at(&mut silent, ms)), [None, None, None, None]);
 }
 
 #[test]

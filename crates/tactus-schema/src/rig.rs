@@ -101,6 +101,8 @@ pub struct Envelope {
     pub baseline_band_counts: f64,
     /// Elements that are known to be faulty: they have no limits and no zero. The others must see the load.
     pub unwatched_elements: Vec<usize>,
+    /// True if a deep tip over the array must be felt, and a moving one change the frames. Without the key it must.
+    pub expects_response: bool,
 }
 
 impl Envelope {

@@ -3,9 +3,8 @@
 use std::io;
 use std::time::Duration;
 
-use tactus_device::transport::ByteStream;
 use tactus_device::transport::memory::MemoryPort;
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until, timeout};
 
@@ -14,6 +13,11 @@ use crate::terminal::TerminalPort;
 
 /// How long a device's output waits for a host that does not read. Then bytes are lost, as in an overrun serial port.
 const OVERRUN: Duration = Duration::from_millis(20);
+
+/// The device's side of a stream of bytes.
+pub trait ByteStream: AsyncRead + AsyncWrite + Unpin + Send {}
+
+impl<T: AsyncRead + AsyncWrite + Unpin + Send> ByteStream for T {}
 
 /// A device as a state machine of bytes and times; it neither waits nor reads a clock.
 ///

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use tactus_safety::{HomingPermit, Permit};
-use tactus_schema::pb;
 use tactus_schema::rig::StageProtocol;
+use tactus_schema::{MonoTime, pb};
 use tactus_wire::stage::{Controller, Session};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
 
 use super::driver::{CommandRequest, Driver, Progress, StageCommand};
+use super::guard::{Guard, Heartbeat};
 use super::stop::StopSwitch;
 use super::{Stage, StageError, grbl_config, zaber_config};
 use crate::transport::Connect;
@@ -30,6 +31,7 @@ pub struct DrivenStage {
     requests: mpsc::Sender<CommandRequest>,
     stop: Arc<StopSwitch>,
     watched: watch::Sender<Option<Instant>>,
+    heartbeat: Heartbeat,
     state: watch::Receiver<pb::StageState>,
     connection: watch::Receiver<Connection>,
 }
@@ -113,6 +115,8 @@ impl DrivenStage {
         let stop = Arc::new(StopSwitch::default());
         let (watched, is_watched) = watch::channel(None);
         let device = format!("stage on {connect}");
+        let guard = Guard::new(clock);
+        let heartbeat = guard.heartbeat();
         let driver = Driver {
             connect: connect.into(),
             begin: Box::new(move || begin().map_err(|error| error.to_string())),
@@ -124,10 +128,14 @@ impl DrivenStage {
             reports,
             latest,
             connection: connected,
+            guard,
             progress: Progress::default(),
         };
         tokio::spawn(driver.run());
-        (Arc::new(Self { device, requests: sender, stop, watched, state, connection }), all_reports)
+        (
+            Arc::new(Self { device, requests: sender, stop, watched, heartbeat, state, connection }),
+            all_reports,
+        )
     }
 
     fn command(&self, command: StageCommand) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
@@ -166,6 +174,10 @@ impl Stage for DrivenStage {
 
     fn watch(&self) {
         self.watched.send_replace(Some(Instant::now()));
+    }
+
+    fn driven(&self) -> MonoTime {
+        self.heartbeat.last()
     }
 
     fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>> {

@@ -2,6 +2,8 @@
 
 #[path = "driven_tests/grbl.rs"]
 mod fake;
+#[path = "driven_tests/hang.rs"]
+mod hang;
 #[path = "driven_tests/zaber.rs"]
 mod zaber;
 
@@ -392,4 +394,25 @@ async fn without_a_valid_permit_no_byte_is_sent() {
     supervisor.revocation().revoke();
     assert!(matches!(stage.home(revoked).await, Err(StageError::Void(Void::Revoked))));
     assert_eq!(shared.count("$H"), heard);
+}
+
+/// Leave to move from where the stage stands now, which lasts a sample period.
+async fn short_permit(stage: &Arc<DrivenStage>, target: Target) -> Permit {
+    stage.look().await.unwrap();
+    let report = *stage.state().borrow();
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.on_report(&report), None);
+    supervisor.permit(target, MonoTime::from_ns(report.t_mono_ns)).unwrap()
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_permit_that_expires_while_the_speed_is_read_back_moves_nothing() {
+    let (stage, shared) = homed().await;
+    shared.set(Fault::TellsSlowly);
+    let result = stage.move_to(short_permit(&stage, to(2.0, 10.0)).await).await;
+    assert!(matches!(result, Err(StageError::Void(Void::Expired))), "{result:?}");
+    assert_eq!((shared.count("X"), shared.first_heard("!")), (0, None));
+    // The speed is known now.
+    let reached = stage.move_to(short_permit(&stage, to(2.0, 10.0)).await).await.unwrap();
+    assert_eq!((reached[0], shared.count("$G")), (2.0, 1));
 }

@@ -1,8 +1,11 @@
 //! The driver of all stages: it runs a session over a link.
 
 use std::collections::VecDeque;
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
+
+use futures_util::FutureExt;
 
 use tactus_safety::{HomingPermit, Permit, Void};
 use tactus_schema::{MonoTime, TimeStamp, pb};
@@ -12,6 +15,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::{Instant, sleep, sleep_until};
 
 use super::driven::{Connection, StageOptions};
+use super::guard::{Guard, SIGN_OF_LIFE};
 use super::stop::StopSwitch;
 use crate::backoff::Backoff;
 use crate::link::{Link, LinkEvent, since_start};
@@ -55,6 +59,7 @@ pub(super) struct Driver<S> {
     pub(super) reports: mpsc::Sender<pb::StageState>,
     pub(super) latest: watch::Sender<pb::StageState>,
     pub(super) connection: watch::Sender<Connection>,
+    pub(super) guard: Guard,
     pub(super) progress: Progress,
 }
 
@@ -63,10 +68,8 @@ pub(super) struct Driver<S> {
 pub(super) struct Progress {
     /// The stage answers.
     connected: bool,
-    /// Receives the result of the command under way.
-    active: Option<Reply>,
-    /// The command under way was stopped because nobody watched it.
-    is_abandoned: bool,
+    /// The command under way.
+    active: Option<Active>,
     /// Reports that found no room yet. The device is not read meanwhile, so there are few.
     waiting: VecDeque<pb::StageState>,
     /// See [`pb::StageState::epoch`].
@@ -75,8 +78,38 @@ pub(super) struct Progress {
     logged: Option<ErrorKind>,
 }
 
+/// The command under way.
+struct Active {
+    reply: Reply,
+    /// Leave to move, until the first byte that sets the stage in motion.
+    leave: Option<Leave>,
+    /// Why that byte was not sent.
+    void: Option<Void>,
+    /// It was stopped because nobody watched it.
+    is_abandoned: bool,
+}
+
+/// Why not all actions were carried out.
+enum Unsent {
+    /// The permit to move was void.
+    Withheld,
+    /// The link or the session failed.
+    Failed(DeviceError),
+}
+
+/// Leave to move, or to home.
+enum Leave {
+    Home(HomingPermit),
+    Move(Permit),
+    /// The stage has set out: only a stop ends it now.
+    Used,
+}
+
 /// The stage was dropped, so the task ends.
 struct Unused;
+
+/// How often a driver without a command gives a sign of life.
+const SIGN_OF_LIFE_IDLE: Duration = Duration::from_millis(250);
 
 impl<S: Session + Send> Driver<S>
 where
@@ -88,12 +121,18 @@ where
             let connect = Arc::clone(&self.connect);
             let ended = match self.meanwhile(connect.connect()).await {
                 Ok(Ok(stream)) => {
-                    let link = Link::new(stream, self.clock, self.device());
-                    self.run_session(link, &mut backoff).await
+                    self.guard.open(stream.second_writer());
+                    let mut link = Link::new(stream, self.clock, self.device());
+                    let session = self.run_session(&mut link, &mut backoff);
+                    match AssertUnwindSafe(session).catch_unwind().await {
+                        Ok(ended) => ended,
+                        Err(_) => Ok(self.panicked(&mut link).await),
+                    }
                 }
                 Ok(Err(error)) => Ok(error),
                 Err(Unused) => return,
             };
+            self.guard.open(None);
             let Ok(error) = ended else { return };
             self.lost(error);
             if self.meanwhile(sleep(backoff.pause())).await.is_err() {
@@ -106,6 +145,7 @@ where
     async fn meanwhile<T>(&mut self, awaited: impl Future<Output = T>) -> Result<T, Unused> {
         tokio::pin!(awaited);
         loop {
+            self.guard.sign_of_life();
             tokio::select! {
                 biased;
                 () = self.stop.pressed() => {}
@@ -115,12 +155,13 @@ where
                     None => return Err(Unused),
                 },
                 result = &mut awaited => return Ok(result),
+                () = sleep(SIGN_OF_LIFE_IDLE) => {}
             }
         }
     }
 
     /// Runs a session over an open link until it fails; returns why.
-    async fn run_session(&mut self, mut link: Link, backoff: &mut Backoff) -> Result<DeviceError, Unused> {
+    async fn run_session(&mut self, link: &mut Link, backoff: &mut Backoff) -> Result<DeviceError, Unused> {
         let mut session = match (self.begin)() {
             Ok(session) => session,
             Err(why) => return Ok(DeviceError::new(self.device(), ErrorKind::Protocol, why)),
@@ -128,24 +169,32 @@ where
         let mut now = self.clock.now();
         let mut actions = session.start(since_start(now));
         loop {
-            if let Err(error) = self.carry_out(now, actions, &mut link, backoff).await {
-                return Ok(error);
+            match self.carry_out(now, actions, link, backoff).await {
+                Ok(()) => {}
+                Err(Unsent::Withheld) => {
+                    actions = session.withhold(since_start(now));
+                    continue;
+                }
+                Err(Unsent::Failed(error)) => return Ok(error),
             }
+            self.guard.sign_of_life();
             let Progress { connected, ref active, ref waiting, .. } = self.progress;
             // During a stop, commands wait. Otherwise they are started or refused.
             let refuses_requests = !connected || (active.is_some() && !session.is_stopping());
             let takes_requests = refuses_requests || session.is_ready();
             let has_room = waiting.is_empty();
+            let is_watched = active.as_ref().is_some_and(|active| !active.is_abandoned);
+            let is_guarded = active.is_some() && self.guard.is_guarding();
+            let sign_of_life = if is_guarded { SIGN_OF_LIFE } else { SIGN_OF_LIFE_IDLE };
             actions = tokio::select! {
                 biased;
                 () = self.stop.pressed() => {
                     now = self.clock.now();
                     session.stop(since_start(now))
                 }
-                () = unwatched(&mut self.watched), if active.is_some() && !self.progress.is_abandoned => {
+                () = unwatched(&mut self.watched), if is_watched => {
                     tracing::error!(device = self.device(), "nobody watches the stage: it is stopped");
-                    self.progress.is_abandoned = true;
-                    now = self.clock.now();
+                    now = self.abandon();
                     session.stop(since_start(now))
                 }
                 () = room(&self.reports), if !has_room => {
@@ -168,8 +217,32 @@ where
                     }
                     Err(error) => return Ok(error),
                 },
+                () = sleep(sign_of_life) => Vec::new(),
             };
+            if self.guard.has_fired() {
+                now = self.abandon();
+                actions.extend(session.stop(since_start(now)));
+            }
         }
+    }
+
+    /// Notes that the command under way is stopped because nobody watched it.
+    fn abandon(&mut self) -> TimeStamp {
+        if let Some(active) = &mut self.progress.active {
+            active.is_abandoned = true;
+        }
+        self.clock.now()
+    }
+
+    /// After a panic of the session: stops what it did, and has the link opened anew.
+    async fn panicked(&mut self, link: &mut Link) -> DeviceError {
+        if let Some(halt) = self.guard.halt()
+            && let Err(error) = link.send(&halt).await
+        {
+            tracing::error!(%error, "the stop cannot be written");
+        }
+        let what = "its driver panicked, and the stage was stopped; this is a defect of Tactus: see the log";
+        DeviceError::new(self.device(), ErrorKind::Protocol, what)
     }
 
     /// Begins a command, or answers why not.
@@ -185,17 +258,20 @@ where
         } else if let Err(void) = command.check(now.mono) {
             void.into()
         } else {
-            self.progress.active = Some(reply);
             let now = since_start(now);
-            return match command {
-                StageCommand::Home(_) => session.home(now),
+            let (leave, actions) = match command {
+                StageCommand::Home(permit) => (Some(Leave::Home(permit)), session.home(now)),
                 StageCommand::MoveTo(permit) => {
                     let target = permit.target();
-                    session.move_to(now, target.position_mm, target.speed_mm_per_s)
+                    let actions = session.move_to(now, target.position_mm, target.speed_mm_per_s);
+                    (Some(Leave::Move(permit)), actions)
                 }
-                StageCommand::Look => session.look(now),
-                StageCommand::ClearAlarm => session.clear_alarm(now),
+                StageCommand::Look => (None, session.look(now)),
+                StageCommand::ClearAlarm => (None, session.clear_alarm(now)),
             };
+            self.progress.active = Some(Active { reply, leave, void: None, is_abandoned: false });
+            self.guard.begin(session.halt());
+            return actions;
         };
         answer(reply, Err(refusal));
         Vec::new()
@@ -207,10 +283,19 @@ where
         actions: Vec<Action<S::Error>>,
         link: &mut Link,
         backoff: &mut Backoff,
-    ) -> Result<(), DeviceError> {
+    ) -> Result<(), Unsent> {
+        let mut is_withheld = false;
         for action in actions {
             match action {
                 Action::Send(bytes) => link.send(&bytes).await?,
+                // Checked now: since the command began, the controller may have been asked this and that.
+                Action::Move(bytes) => match self.check_leave() {
+                    Ok(()) => link.send(&bytes).await?,
+                    Err(void) => {
+                        tracing::debug!(device = self.device(), %void, "a motion is withheld");
+                        is_withheld = true;
+                    }
+                },
                 Action::Connected(controller) => {
                     tracing::info!(
                         device = self.device(),
@@ -229,15 +314,33 @@ where
                     tracing::warn!(device = self.device(), why, "the stage's position is suspect");
                 }
                 Action::Done(result) => {
-                    let is_abandoned = std::mem::take(&mut self.progress.is_abandoned);
-                    if let Some(reply) = self.progress.active.take() {
-                        answer(reply, result.map_err(|failure| stage_error(failure, is_abandoned)));
+                    self.guard.end();
+                    if let Some(active) = self.progress.active.take() {
+                        let result = result.map_err(|failure| stage_error(failure, &active));
+                        answer(active.reply, result);
                     }
                 }
-                Action::Failed(error) => return Err(self.describe(&error)),
+                Action::Failed(error) => return Err(self.describe(&error).into()),
             }
         }
-        Ok(())
+        if is_withheld { Err(Unsent::Withheld) } else { Ok(()) }
+    }
+
+    /// Checks, just before the first byte that sets the stage in motion, that the command still may.
+    fn check_leave(&mut self) -> Result<(), Void> {
+        let now = self.clock.now().mono;
+        let Some(active) = &mut self.progress.active else { return Err(Void::Revoked) };
+        let checked = match &active.leave {
+            Some(Leave::Home(permit)) => permit.check(now),
+            Some(Leave::Move(permit)) => permit.check(now),
+            Some(Leave::Used) => return Ok(()),
+            None => Err(Void::Revoked),
+        };
+        match checked {
+            Ok(()) => active.leave = Some(Leave::Used),
+            Err(void) => active.void = Some(void),
+        }
+        checked
     }
 
     fn report(&mut self, now: TimeStamp, report: Report) {
@@ -306,8 +409,7 @@ where
             self.progress.logged = Some(error.kind);
         }
         self.progress.connected = false;
-        self.progress.is_abandoned = false;
-        if let Some(reply) = self.progress.active.take() {
+        if let Some(Active { reply, .. }) = self.progress.active.take() {
             answer(reply, Err(DeviceError::new(&error.device, error.kind, &error.what).into()));
         }
         self.connection.send_replace(Connection::Seeking(Some(Arc::new(error))));
@@ -361,9 +463,10 @@ fn is_doubtful(status: pb::StageStatus) -> bool {
     }
 }
 
-fn stage_error(failure: Failure, is_abandoned: bool) -> StageError {
+fn stage_error(failure: Failure, active: &Active) -> StageError {
     match failure {
-        Failure::Stopped { position_mm } if is_abandoned => StageError::Unwatched { position_mm },
+        Failure::Stopped { position_mm } if active.is_abandoned => StageError::Unwatched { position_mm },
+        Failure::Withheld => active.void.unwrap_or(Void::Revoked).into(),
         Failure::Stopped { position_mm } => StageError::Stopped { position_mm },
         Failure::Refused { command, reason } => StageError::Refused { command, reason },
         Failure::Alarm(alarm) => StageError::Alarm {
@@ -381,6 +484,12 @@ fn stage_error(failure: Failure, is_abandoned: bool) -> StageError {
         Failure::Overdue { target_mm, position_mm, waited } => {
             StageError::Overdue { target_mm, position_mm, waited_s: waited.as_secs_f64() }
         }
+    }
+}
+
+impl From<DeviceError> for Unsent {
+    fn from(error: DeviceError) -> Self {
+        Self::Failed(error)
     }
 }
 

@@ -84,6 +84,8 @@ impl MemoryConnector {
     }
 }
 
+impl ByteStream for DuplexStream {}
+
 impl Connect for MemoryConnector {
     fn connect(&self) -> BoxFuture<'_, Result<Box<dyn ByteStream>, DeviceError>> {
         async { self.open() }.boxed()

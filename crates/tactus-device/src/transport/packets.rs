@@ -193,6 +193,8 @@ impl PacketStream {
     }
 }
 
+impl ByteStream for PacketStream {}
+
 impl AsyncRead for PacketStream {
     fn poll_read(
         mut self: Pin<&mut Self>,

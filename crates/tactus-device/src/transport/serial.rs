@@ -1,14 +1,14 @@
 //! A serial port, USB serial device or pseudo-terminal, found by its path or by its USB identity.
 
 use std::fmt;
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use serialport::{SerialPortInfo, SerialPortType};
 use tactus_schema::rig::SerialPort;
-use tokio_serial::SerialPortBuilderExt;
+use tokio_serial::{SerialPort as _, SerialPortBuilderExt, SerialStream};
 
 use super::identity::{Candidate, the_one};
 use super::{ByteStream, Connect};
@@ -76,6 +76,14 @@ impl SerialConnector {
             SerialPort::Usb(_) => format!("{what} ({path}: {error})"),
         };
         DeviceError::from_io(self, kind, what, error.into())
+    }
+}
+
+impl ByteStream for SerialStream {
+    fn second_writer(&self) -> Option<Box<dyn Write + Send>> {
+        let cloned =
+            self.try_clone().inspect_err(|error| tracing::warn!(%error, "no second way to the port"));
+        Some(cloned.ok()? as Box<dyn Write + Send>)
     }
 }
 

@@ -1,7 +1,9 @@
 //! A serial server: a device behind a TCP port.
 
 use std::fmt;
-use std::io;
+use std::fs::File;
+use std::io::{self, Write};
+use std::os::fd::AsFd;
 use std::time::Duration;
 
 use futures_util::FutureExt;
@@ -47,6 +49,14 @@ impl TcpConnector {
             (ErrorKind::Absent, "there is no such server: is it switched on, and are host and port right?")
         };
         DeviceError::from_io(self, kind, format!("{what} ({error})"), error)
+    }
+}
+
+impl ByteStream for TcpStream {
+    fn second_writer(&self) -> Option<Box<dyn Write + Send>> {
+        let cloned = self.as_fd().try_clone_to_owned();
+        let cloned = cloned.inspect_err(|error| tracing::warn!(%error, "no second way to the server"));
+        Some(Box::new(File::from(cloned.ok()?)))
     }
 }
 

@@ -8,6 +8,7 @@ use tactus_safety::Denied;
 use tactus_schema::pb::{self, run_event::Event};
 use tactus_schema::rig::OnGap;
 use tactus_schema::table::Phase;
+use tokio::task::spawn_blocking;
 use tokio::time::{sleep, timeout};
 use tracing::{info, warn};
 
@@ -22,6 +23,9 @@ const LATE_PERIODS_MAX: u32 = 5;
 
 /// Least of that time, for fast sensors: links deliver in batches.
 const LATE_MIN: Duration = Duration::from_millis(100);
+
+/// Longest time to store which covering is in place.
+const REMEMBER_PATIENCE: Duration = Duration::from_secs(10);
 
 impl Run {
     /// Checks a step against the envelope and performs it.
@@ -225,6 +229,18 @@ impl Run {
         Ok(())
     }
 
+    /// As [`Self::recover`], and goes back to where the tip was.
+    async fn recover_in_place(&mut self) -> Result<(), Broken> {
+        let motion = self.shared.service.motion.clone();
+        let [x_mm, y_mm, z_mm] = self.shared.position_mm();
+        if z_mm >= motion.safe_height_mm - motion.tolerance_mm {
+            return self.shared.await_the_sensors_return().await;
+        }
+        // In a box, because it may take an average itself.
+        Box::pin(self.recover()).await?;
+        self.shared.travel([x_mm, y_mm], z_mm, motion.load_speed_mm_per_s).await
+    }
+
     async fn read(&mut self, duration_s: f64) -> Result<Reply, Broken> {
         let average = self.whole_average(Duration::from_secs_f64(duration_s)).await?;
         self.emit(Event::ReadDone(pb::ReadDone {
@@ -280,11 +296,7 @@ impl Run {
             self.shared.acquisition.ask(|live| live.supervisor.begin_run()).await?;
             self.take_reference().await?;
         }
-        if let Some(memory) = &self.shared.covering_memory {
-            memory.remember(thickness_mm).map_err(|error| {
-                Broken::Refused(format!("the covering in place cannot be stored: {error}; see the disk"))
-            })?;
-        }
+        self.remember_covering(thickness_mm).await?;
         self.bounds = self.bounds.clone().under(covering);
         let set = self.shared.acquisition.ask(move |live| {
             live.supervisor.set_covering(covering);
@@ -295,7 +307,22 @@ impl Run {
         Ok(Reply::Done)
     }
 
-    /// An average outside a press. Repeated if frames were lost and the rig's policy says so.
+    /// Has the covering in place remembered. The disk is waited for on a thread of its own.
+    async fn remember_covering(&self, thickness_mm: f64) -> Result<(), Broken> {
+        let Some(memory) = self.shared.covering_memory.clone() else { return Ok(()) };
+        let storing = spawn_blocking(move || memory.remember(thickness_mm));
+        let stored = match timeout(REMEMBER_PATIENCE, storing).await {
+            Ok(Ok(stored)) => stored,
+            Ok(Err(panic)) => Err(panic.into()),
+            Err(late) => Err(late.into()),
+        };
+        stored.map_err(|error| {
+            Broken::Refused(format!("the covering in place cannot be stored: {error}; see the disk"))
+        })
+    }
+
+    /// An average outside a press. Repeated if frames were lost and the rig's policy says so: below the safe height the tip is
+    /// raised first, and goes back to its place for the repetition.
     pub(super) async fn whole_average(&mut self, duration: Duration) -> Result<Average, Broken> {
         let mut repeats = 0;
         loop {
@@ -309,7 +336,7 @@ impl Run {
             }
             repeats += 1;
             warn!(%broken, "average broken off; it will be repeated");
-            self.shared.await_the_sensors_return().await?;
+            self.recover_in_place().await?;
         }
     }
 

@@ -8,7 +8,7 @@ use futures_util::future::BoxFuture;
 use tactus_device::{Clock, HomingPermit, Permit, Sensor, SensorEvent, Stage, StageError};
 use tactus_engine::{CoveringMemory, Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
 use tactus_plan::{Arguments, InThisProcess, Limits, RigView, Script};
-use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp, pb};
+use tactus_schema::{Frame, FrameFlags, MonoTime, Rig, TimeStamp, pb};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
@@ -131,6 +131,21 @@ impl FakeStage {
         self.reports.send(state).await.unwrap();
     }
 
+    /// Like a stage that is asked where it is ten times a second.
+    async fn repeat_reports(self: Arc<Self>) {
+        loop {
+            sleep(Duration::from_millis(100)).await;
+            let now = self.clock.now();
+            self.state.send_modify(|state| {
+                (state.t_mono_ns, state.t_wall_ns) = (now.mono.ns(), now.wall.ns());
+            });
+            let state = *self.state.borrow();
+            if self.reports.send(state).await.is_err() {
+                return;
+            }
+        }
+    }
+
     fn position_mm(&self) -> [f64; 3] {
         let state = self.state.borrow();
         [state.x_mm, state.y_mm, state.z_mm]
@@ -198,6 +213,10 @@ impl Stage for FakeStage {
 
     fn watch(&self) {}
 
+    fn driven(&self) -> MonoTime {
+        self.clock.now().mono
+    }
+
     fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>> {
         async { Ok(()) }.boxed()
     }
@@ -241,6 +260,7 @@ impl Bench {
             pending: None,
         };
         let state = stage.state();
+        tokio::spawn(Arc::clone(&stage).repeat_reports());
         let hand = Arc::clone(&stage);
         let devices = Devices {
             sensor: Box::new(sensor),

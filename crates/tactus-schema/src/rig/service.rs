@@ -25,6 +25,7 @@ pub(super) struct RawEnvelope {
     baseline_band_counts: Option<f64>,
     #[serde(default)]
     unwatched_elements: Vec<usize>,
+    expects_response: Option<bool>,
 }
 
 /// `envelope.baseline_band_counts` where the file does not say it, as a share of `envelope.element_max_counts`.
@@ -165,6 +166,7 @@ impl RawEnvelope {
             depth_max_mm: positive(field("depth_max_mm"), depth_max_mm)?,
             baseline_band_counts,
             unwatched_elements: self.unwatched_elements,
+            expects_response: self.expects_response.unwrap_or(true),
         })
     }
 }

@@ -12,7 +12,7 @@ use phase::{Phase, Purpose, Wanted};
 use super::feed::Feed;
 use super::poll::StatusPoll;
 use super::settings::Settings;
-use super::{Config, ConfigError, FEED_HOLD, MachineState, Response, alarm_meaning};
+use super::{Config, ConfigError, FEED_HOLD, MachineState, Response, SOFT_RESET, alarm_meaning};
 use crate::lines::Lines;
 use crate::stage::{self, Alarm, Cause, Failure, Session as _};
 
@@ -164,7 +164,7 @@ impl stage::Session for Session {
         // `?` is not answered during homing.
         self.poll.reset();
         self.phase = Phase::Homing { deadline: now + HOMING_TIMEOUT, accepted: None };
-        self.send_line("$H");
+        self.send_motion("$H");
         self.report();
         self.finish(now)
     }
@@ -239,6 +239,21 @@ impl stage::Session for Session {
             Phase::Resetting { .. } | Phase::Over => {}
         }
         self.finish(now)
+    }
+
+    /// The controller has got nothing, so it needs no hold, and the confirmed feed stays.
+    fn withhold(&mut self, now: Duration) -> Vec<Action> {
+        if matches!(self.phase, Phase::Moving(_) | Phase::Homing { .. }) {
+            self.phase = Phase::Ready;
+            self.report();
+            self.done(Err(Failure::Withheld));
+        }
+        self.finish(now)
+    }
+
+    /// Homing can only be ended by a reset.
+    fn halt(&self) -> Vec<u8> {
+        vec![if matches!(self.phase, Phase::Homing { .. }) { SOFT_RESET } else { FEED_HOLD }]
     }
 
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {

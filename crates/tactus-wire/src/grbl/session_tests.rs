@@ -167,7 +167,7 @@ fn command(session: &mut Session, now: Duration, text: &str) -> Vec<Action> {
 fn describe(now: Duration, action: &Action) -> String {
     let place = |[x, y, z]: [f64; 3]| format!("{x:.3} {y:.3} {z:.3}");
     let text = match action {
-        Action::Send(bytes) => {
+        Action::Send(bytes) | Action::Move(bytes) => {
             format!("> {}", String::from_utf8_lossy(bytes).trim_end().replace('\x18', "^X"))
         }
         Action::Connected(controller) => format!("= connected {}", controller.identity),
@@ -182,6 +182,7 @@ fn describe(now: Duration, action: &Action) -> String {
             Failure::Refused { reason, .. } => format!("= refused {reason}"),
             Failure::Alarm(alarm) => format!("= alarm {}", alarm.name()),
             Failure::Unhomed => "= unhomed".to_owned(),
+            Failure::Withheld => "= withheld".to_owned(),
             Failure::NotIdle { position_mm } => format!("= not idle at {}", place(*position_mm)),
             Failure::Interrupted { .. } => "= interrupted".to_owned(),
             Failure::NotThere { target_mm, position_mm } => {

@@ -9,6 +9,9 @@ use super::AxisName;
 pub enum Action<E> {
     /// Write these bytes.
     Send(Vec<u8>),
+    /// Write these bytes, which set the stage in motion, if that is still permitted. If not, call
+    /// [`Session::withhold`](super::Session::withhold) after the other actions.
+    Move(Vec<u8>),
     /// The controller answered and matches the configuration. From here on, commands are accepted.
     Connected(Controller),
     /// Position and status; at each report of the controller, and at each other change of status.
@@ -92,6 +95,8 @@ pub enum Failure {
         /// Position of the stage.
         position_mm: [f64; 3],
     },
+    /// [`Session::withhold`](super::Session::withhold) ended it.
+    Withheld,
     /// The controller refused the command or did not confirm it, or it is impossible.
     Refused {
         /// What the controller refused, as text for a person.
@@ -175,7 +180,9 @@ impl Failure {
             Self::Stopped { .. } => Self::Stopped { position_mm },
             Self::Overdue { target_mm, waited, .. } => Self::Overdue { target_mm, position_mm, waited },
             Self::Interrupted { axis, meaning, .. } => Self::Interrupted { axis, meaning, position_mm },
-            Self::Refused { .. } | Self::Alarm(_) | Self::Unhomed | Self::NotIdle { .. } => self,
+            Self::Withheld | Self::Refused { .. } | Self::Alarm(_) | Self::Unhomed | Self::NotIdle { .. } => {
+                self
+            }
             Self::NotThere { target_mm, .. } => Self::NotThere { target_mm, position_mm },
             Self::Astray { target_mm, .. } => Self::Astray { target_mm, position_mm },
         }

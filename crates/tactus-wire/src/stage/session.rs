@@ -62,6 +62,14 @@ pub trait Session {
     /// Stops motion now. The first action sends the stop, without waiting for an answer.
     fn stop(&mut self, now: Duration) -> Vec<Action<Self::Error>>;
 
+    /// The bytes of the last [`Action::Move`] were not written: the command ends with
+    /// [`Failure::Withheld`](super::Failure::Withheld).
+    fn withhold(&mut self, now: Duration) -> Vec<Action<Self::Error>>;
+
+    /// Bytes that stop what the command under way does. They are for whoever cannot call [`stop`](Self::stop) because the
+    /// session does not go on.
+    fn halt(&self) -> Vec<u8>;
+
     /// Takes the bytes of one read.
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action<Self::Error>>;
 

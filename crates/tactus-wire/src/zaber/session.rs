@@ -16,7 +16,7 @@ use phase::{ActiveMove, Phase};
 use request::{Pending, Request, SlotRequest};
 
 use super::path::axis_move;
-use super::{Config, ConfigError, Decoder, Flag};
+use super::{Config, ConfigError, Decoder, Flag, HostCommand};
 use crate::stage::{
     self, Alarm, ArrivalCheck, AxisName, Cause, Course, Failure, Session as _, Setting, Shape, distance_mm,
 };
@@ -328,9 +328,9 @@ impl stage::Session for Session {
         match &self.phase {
             Phase::Over => {}
             Phase::Greeting => self.send_stop("stop"),
-            Phase::Ready => self.halt(now, None),
+            Phase::Ready => self.halt_all(now, None),
             Phase::Moving(_) | Phase::Homing { .. } | Phase::Clearing | Phase::Looking { .. } => {
-                self.halt(now, Some(stopped));
+                self.halt_all(now, Some(stopped));
             }
             Phase::Stopping(stop) => {
                 let text = stop.text();
@@ -338,6 +338,18 @@ impl stage::Session for Session {
             }
         }
         self.finish(now)
+    }
+
+    /// Another axis may have set out already, so all are stopped.
+    fn withhold(&mut self, now: Duration) -> Vec<Action> {
+        if matches!(self.phase, Phase::Moving(_) | Phase::Homing { .. }) {
+            self.halt_all(now, Some(Failure::Withheld));
+        }
+        self.finish(now)
+    }
+
+    fn halt(&self) -> Vec<u8> {
+        HostCommand { device: 0, axis: 0, id: None, text: "stop".to_owned() }.encode(self.config.checksums)
     }
 
     fn receive(&mut self, now: Duration, bytes: &[u8]) -> Vec<Action> {

@@ -174,7 +174,7 @@ impl Play {
     fn act(&mut self, actions: Vec<Action>) {
         for action in actions {
             let text = match action {
-                Action::Send(bytes) => {
+                Action::Send(bytes) | Action::Move(bytes) => {
                     let text = format!("> {}", String::from_utf8_lossy(&bytes).trim_end());
                     self.under_way.push((self.now + LATENCY, true, bytes));
                     text

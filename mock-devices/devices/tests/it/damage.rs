@@ -111,7 +111,7 @@ impl<S: Session> Lab<S> {
     fn act(&mut self, actions: Vec<Action<S::Error>>) {
         for action in actions {
             match action {
-                Action::Send(bytes) => {
+                Action::Send(bytes) | Action::Move(bytes) => {
                     let bytes = self.damaged(bytes);
                     self.stage.receive(&bytes, self.now);
                 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep};
 
 use crate::transport::memory::MemoryPort;
 
@@ -24,6 +24,8 @@ pub(super) enum Fault {
     Resets,
     /// Says nothing more.
     FallsSilent,
+    /// Takes a tenth of a second to tell its modes.
+    TellsSlowly,
 }
 
 /// What the test and the controller share.
@@ -104,6 +106,9 @@ pub(super) async fn serve(mut stream: DuplexStream, shared: &Shared) {
                     String::new()
                 }
             };
+            if reply.starts_with("[GC:") && shared.0.lock().unwrap().fault == Fault::TellsSlowly {
+                sleep(Duration::from_millis(100)).await;
+            }
             if stream.write_all(reply.as_bytes()).await.is_err() {
                 return;
             }
@@ -165,7 +170,7 @@ impl State {
         }
         self.set_out = Instant::now();
         match self.fault {
-            Fault::None | Fault::NeverIdle => {}
+            Fault::None | Fault::NeverIdle | Fault::TellsSlowly => {}
             Fault::StopsShort => self.to_mm[0] -= 1.0,
             Fault::HardLimit => {
                 self.locked = true;

@@ -118,7 +118,7 @@ impl Session {
             return self.set_feed(now, target_mm, speed_mm_per_s, feed, 1);
         }
         self.parsed_mm = None;
-        self.send_line(travel.line());
+        self.send_motion(travel.line());
         self.poll.defer(now);
         self.phase = Phase::Moving(travel);
     }
@@ -274,6 +274,11 @@ impl Session {
 
     pub(super) fn send_line(&mut self, line: &str) {
         self.actions.push(Action::Send(format!("{line}\n").into_bytes()));
+    }
+
+    /// Sends a line that sets the stage in motion.
+    pub(super) fn send_motion(&mut self, line: &str) {
+        self.actions.push(Action::Move(format!("{line}\n").into_bytes()));
     }
 
     fn status(&self) -> Status {

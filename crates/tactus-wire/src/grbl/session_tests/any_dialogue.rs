@@ -104,7 +104,7 @@ impl Play {
                 let actions = command(&mut self.session, self.now, text);
                 let moves = actions
                     .iter()
-                    .any(|a| matches!(a, Action::Send(b) if matches!(b[..], [b'X'..=b'Z', ..])));
+                    .any(|a| matches!(a, Action::Move(b) if matches!(b[..], [b'X'..=b'Z', ..])));
                 assert!(!moves || self.known, "a move on a stage that is not homed");
                 actions
             }
@@ -132,7 +132,7 @@ impl Play {
                     Status::Moving | Status::Hold => {}
                 },
                 Action::Failed(_) => assert_eq!(self.session.deadline(), None),
-                Action::Send(bytes) => {
+                Action::Send(bytes) | Action::Move(bytes) => {
                     let writes = bytes.contains(&b'=') || bytes.contains(&b'~');
                     assert!(!writes, "a setting is written, or a hold given up: {bytes:?}");
                 }

@@ -38,7 +38,7 @@ impl Session {
         self.report();
         // Its motion was started by someone who is gone, perhaps by this host before the link broke.
         if self.moves() {
-            self.halt(now, None);
+            self.halt_all(now, None);
         }
     }
 
@@ -50,7 +50,7 @@ impl Session {
         let Phase::Moving(travel) = &mut self.phase else { return };
         let target_mm = travel.arrival.target_mm();
         if travel.course.strays(now, position_mm, self.config.tolerance_mm) {
-            return self.halt(now, Some(Failure::Astray { target_mm, position_mm }));
+            return self.halt_all(now, Some(Failure::Astray { target_mm, position_mm }));
         }
         let result = match travel.arrival.judge(now, !moves, position_mm, self.config.tolerance_mm) {
             Judgement::Underway => return,

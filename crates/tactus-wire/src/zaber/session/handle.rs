@@ -115,7 +115,7 @@ impl Session {
                 let name =
                     self.axes.get(request.slot).map(|state| state.name.to_string()).unwrap_or_default();
                 let failure = Failure::Refused { command, reason: format!("{name}: {rejection}") };
-                self.halt(now, Some(failure));
+                self.halt_all(now, Some(failure));
             }
             // The warnings show what is still wrong.
             Request::Clear | Request::Enable => {
@@ -189,14 +189,17 @@ impl Session {
                 format!("{name} no longer knows where it is: it was restarted, or pushed while it stood");
             self.actions.push(Action::Suspect { why });
             if let Phase::Moving(_) = self.phase {
-                self.halt(now, Some(Failure::Unhomed));
+                self.halt_all(now, Some(Failure::Unhomed));
                 return false;
             }
         }
         let is_command = matches!(&self.phase, Phase::Moving(_) | Phase::Homing { .. });
         if is_command && is_ours && is_others {
             let position_mm = self.position_mm();
-            self.halt(now, Some(Failure::Interrupted { axis: name, meaning: flag.meaning(), position_mm }));
+            self.halt_all(
+                now,
+                Some(Failure::Interrupted { axis: name, meaning: flag.meaning(), position_mm }),
+            );
             return false;
         }
         true
@@ -214,9 +217,9 @@ impl Session {
                 self.at_once = true;
             }
             Phase::Moving(_) | Phase::Homing { .. } | Phase::Looking { .. } => {
-                self.halt(now, Some(Failure::Alarm(alarm)));
+                self.halt_all(now, Some(Failure::Alarm(alarm)));
             }
-            Phase::Greeting | Phase::Ready | Phase::Clearing | Phase::Over => self.halt(now, None),
+            Phase::Greeting | Phase::Ready | Phase::Clearing | Phase::Over => self.halt_all(now, None),
         }
         self.report();
     }

@@ -50,7 +50,7 @@ impl Session {
     }
 
     /// Stops all axes. The command under way then ends with `failure`.
-    pub(super) fn halt(&mut self, now: Duration, failure: Option<Failure>) {
+    pub(super) fn halt_all(&mut self, now: Duration, failure: Option<Failure>) {
         self.queue.clear();
         self.pending = None;
         self.round_ended = Some(now);
@@ -95,10 +95,10 @@ impl Session {
             Phase::Moving(travel) => {
                 let (target_mm, position_mm) = (travel.arrival.target_mm(), self.position_mm());
                 let waited = travel.arrival.waited(now);
-                self.halt(now, Some(Failure::Overdue { target_mm, position_mm, waited }));
+                self.halt_all(now, Some(Failure::Overdue { target_mm, position_mm, waited }));
             }
             Phase::Homing { .. } => {
-                self.halt(now, Some(Failure::refused("home", "the reference was not found in time")));
+                self.halt_all(now, Some(Failure::refused("home", "the reference was not found in time")));
             }
             Phase::Stopping(stop) => self.stop_overdue(now, &stop),
             Phase::Greeting | Phase::Ready | Phase::Clearing | Phase::Looking { .. } | Phase::Over => {}
@@ -130,8 +130,10 @@ impl Session {
         let Some(pending) = self.pending else { return };
         let SlotRequest { slot, request } = pending.request;
         if request.moves() {
-            return self
-                .halt(now, Some(Failure::refused(&request.text(), "no answer came; the stage was stopped")));
+            return self.halt_all(
+                now,
+                Some(Failure::refused(&request.text(), "no answer came; the stage was stopped")),
+            );
         }
         if pending.is_silent(now) {
             let device = self.device_of(slot);
@@ -246,7 +248,12 @@ impl Session {
     fn send_request(&mut self, SlotRequest { slot, request }: SlotRequest, id: u8) {
         let Some(state) = self.axes.get(slot) else { return };
         let axis = if request.is_of_device() { 0 } else { state.axis.number };
-        self.send(&HostCommand { device: state.axis.device, axis, id: Some(id), text: request.text() });
+        let command = HostCommand { device: state.axis.device, axis, id: Some(id), text: request.text() };
+        if request.moves() {
+            self.actions.push(Action::Move(command.encode(self.config.checksums)));
+        } else {
+            self.send(&command);
+        }
     }
 
     fn send(&mut self, command: &HostCommand) {

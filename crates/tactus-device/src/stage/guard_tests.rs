@@ -1,0 +1,47 @@
+use std::io;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use super::*;
+
+/// A device that hands on what is written to it.
+struct Device(Sender<Vec<u8>>);
+
+impl Write for Device {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.send(bytes.to_vec()).map_err(io::Error::other)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn device() -> (Option<Box<dyn Write + Send>>, Receiver<Vec<u8>>) {
+    let (sender, written) = channel();
+    (Some(Box::new(Device(sender))), written)
+}
+
+#[test]
+fn a_driver_that_gives_no_sign_of_life_in_a_command_is_stopped_for() {
+    let (writer, written) = device();
+    let mut guard = Guard::new(Clock::real());
+    guard.open(writer);
+    guard.begin(b"!".to_vec());
+    assert_eq!(written.recv().unwrap(), b"!");
+    assert!(guard.has_fired());
+}
+
+#[test]
+fn a_command_that_has_ended_is_not_stopped() {
+    let (first, first_written) = device();
+    let (second, second_written) = device();
+    let mut guard = Guard::new(Clock::real());
+    guard.open(first);
+    guard.begin(b"!".to_vec());
+    guard.end();
+    guard.open(second);
+    guard.begin(b"\x18".to_vec());
+    assert_eq!(second_written.recv().unwrap(), b"\x18");
+    assert!(first_written.recv().is_err(), "nothing, until the device was closed");
+}
