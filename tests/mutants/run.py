@@ -28,7 +28,7 @@ MUTANTS = [
     ("a trip does not latch", SAFETY + "supervisor.rs", "self.fault = Some(Fault::Tripped(fresh.clone()));", "", "tactus-safety"),
     ("a trip leaves permits valid", SAFETY + "supervisor.rs", "self.permits.revoke();\n        self.fault = Some(Fault::Tripped", "self.fault = Some(Fault::Tripped", "tactus-safety"),
     ("a fault permits the way down", SAFETY + "supervisor.rs", "self.check_fault()?;\n        self.limits", "self.limits", "tactus-safety"),
-    ("no frame is needed to go down", SAFETY + "supervisor.rs", "if age_s <= limit_s {", "if age_s <= limit_s || true {", "tactus-safety"),
+    ("no frame is needed to go down", SAFETY + "supervisor.rs", "if age_s <= limit_s { Ok(()) } else { Err(Denied::NoFreshFrame", "if age_s <= limit_s || true { Ok(()) } else { Err(Denied::NoFreshFrame", "tactus-safety"),
     ("no zero is needed to go down", SAFETY + "supervisor.rs", "if !self.elements.has_zero() {", "if false {", "tactus-safety"),
     ("homing is not watched", SAFETY + "supervisor.rs", "let is_homing = self.status() == StageStatus::Homing;", "let is_homing = false;", "tactus-safety"),
     ("the depth's sign is wrong", SAFETY + "limits.rs", "if -z_mm > self.depth_max_mm", "if z_mm > self.depth_max_mm", "tactus-safety"),
@@ -44,7 +44,15 @@ MUTANTS = [
     ("a dwell does not ask the stage", ENGINE + "run/steps.rs", "if average.is_disturbed || !is_same {", "if false && (average.is_disturbed || !is_same) {", "tactus-engine"),
     ("a panic of the run leaves the tip", ENGINE + "run.rs", "let retracted = run.end(&result).await;\n    run.conclude(&result, retracted).await\n}", "run.conclude(&result, Ok(0.0)).await\n}", "tactus-engine"),
     ("the driver does not check permits", DEVICE + "driver.rs", "command.check(now.mono)", "Ok::<(), Void>(())", "tactus-device"),
-    ("an unwatched stage moves on", DEVICE + "driver.rs", "if active.is_some() && !self.progress.is_abandoned", "if false && active.is_some()", "tactus-device"),
+    ("an unwatched stage moves on", DEVICE + "driver.rs", "unwatched(&mut self.watched), if is_watched", "unwatched(&mut self.watched), if false && is_watched", "tactus-device"),
+    ("a permit is not checked at the byte that moves", DEVICE + "driver.rs", "match self.check_leave() {", "match self.check_leave().or(Ok::<(), Void>(())) {", "tactus-device"),
+    ("nobody guards the driver", DEVICE + "guard.rs", "if silent >= HANG_MAX {", "if false && silent >= HANG_MAX {", "tactus-device"),
+    ("a panic of the driver leaves the stage moving", DEVICE + "driver.rs", "&& let Err(error) = link.send(&halt).await", "&& let Err(error) = link.send(&halt[..0]).await", "tactus-device"),
+    ("a permit outlives the next", SAFETY + "permit.rs", "        self.revoke();\n        Permit {", "        Permit {", "tactus-safety"),
+    ("a permit outlives the place", SAFETY + "supervisor.rs", "&& !self.stands_at(stood_mm)", "&& false", "tactus-safety"),
+    ("an old report of the stage is believed", SAFETY + "supervisor.rs", "self.check_report(now)?;", "", "tactus-safety"),
+    ("an element that is not read has no limit", SAFETY + "force.rs", "if let Some(element) = (0..zero.len()).find(is_unread) {", "if let Some(element) = (0..0).find(is_unread) {", "tactus-safety"),
+    ("a thick covering must be felt like a thin one", SAFETY + "contact.rs", ".powi(2).min(1.0)", ".powi(2).clamp(1.0, 1.0)", "tactus-safety"),
 ]
 
 

@@ -3,6 +3,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::*;
 
+/// A guard that has not written by then never does.
+const LONGEST: Duration = Duration::from_mins(1);
+
 /// A device that hands on what is written to it.
 struct Device(Sender<Vec<u8>>);
 
@@ -28,7 +31,7 @@ fn a_driver_that_gives_no_sign_of_life_in_a_command_is_stopped_for() {
     let mut guard = Guard::new(Clock::real());
     guard.open(writer);
     guard.begin(b"!".to_vec());
-    assert_eq!(written.recv().unwrap(), b"!");
+    assert_eq!(written.recv_timeout(LONGEST).unwrap(), b"!");
     assert!(guard.has_fired());
 }
 
@@ -42,6 +45,6 @@ fn a_command_that_has_ended_is_not_stopped() {
     guard.end();
     guard.open(second);
     guard.begin(b"\x18".to_vec());
-    assert_eq!(second_written.recv().unwrap(), b"\x18");
+    assert_eq!(second_written.recv_timeout(LONGEST).unwrap(), b"\x18");
     assert!(first_written.recv().is_err(), "nothing, until the device was closed");
 }

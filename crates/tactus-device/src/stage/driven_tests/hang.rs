@@ -146,7 +146,9 @@ async fn a_driver_that_hangs_in_a_move_is_stopped_for_by_the_guard() {
     until(&stage, StageStatus::Moving).await;
     let (release, released) = channel::<()>();
     *next.trouble.lock().unwrap() = Some(Trouble::Hang(released));
-    let written = tokio::task::spawn_blocking(move || guarded.recv().unwrap()).await.unwrap();
+    let written = tokio::task::spawn_blocking(move || guarded.recv_timeout(Duration::from_mins(1)).unwrap())
+        .await
+        .unwrap();
     assert_eq!(written, b"!");
     drop(release);
     // Alive again, the driver stops the move itself.
