@@ -61,8 +61,12 @@ for program in tactus tactusd tactus-web tactus-mock; do
         fail "$program has another version"
     ! readelf --sections "$root/usr/bin/$program" | grep -q '\.debug_info' || fail "$program is not stripped"
 done
+notices=$root/usr/share/doc/tactus/third-party-licences.txt
 for crate in zenoh libusb1-sys zstd-sys tokio; do
-    grep -q "^# .*\b$crate " "$root/usr/share/doc/tactus/third-party-licences.txt" || fail "the licence of $crate is missing"
+    grep -q "^# .*\b$crate " "$notices" || fail "the licence of $crate is missing"
+done
+for part in "relink the programs" "Copyright © 2001 Johannes Erdfelt" "GNU LESSER GENERAL PUBLIC LICENSE" "END OF TERMS AND CONDITIONS"; do
+    awk '/^# / { is_libusb = /^# libusb1-sys / } is_libusb' "$notices" | grep "$part" > /dev/null || fail "libusb's licence lacks: $part"
 done
 for script in postinst prerm postrm; do sh -n "$root/DEBIAN/$script" || fail "$script does not parse"; done
 bash -n "$root/usr/share/bash-completion/completions/tactus" || fail "bash's completions do not parse"

@@ -1,8 +1,8 @@
-//! Time of one image: every array, tool and way, and several numbers of elements and triangles.
+//! Time of one image: every array, tool and method, and several numbers of elements and triangles.
 
 use anyhow::Result;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, measurement::WallTime};
-use tactus_bench::{Painter, Tool, Way, even, fine_sphere, model, poses};
+use tactus_bench::{Method, Painter, Tool, even, fine_sphere, model, poses};
 use tactus_model::{Array, ForwardModel, Indenter};
 
 fn main() -> Result<()> {
@@ -14,11 +14,11 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The ways for a tool; `raster` needs a mesh.
-fn ways(tool: Tool) -> &'static [Way] {
+/// The methods for a tool; `raster` needs a mesh.
+fn methods(tool: Tool) -> &'static [Method] {
     match tool {
-        Tool::H => &[Way::PressTable, Way::Raster, Way::Exact],
-        Tool::Cylinder => &[Way::PressTable, Way::Exact],
+        Tool::H => &[Method::PressTable, Method::Raster, Method::Exact],
+        Tool::Cylinder => &[Method::PressTable, Method::Exact],
     }
 }
 
@@ -28,8 +28,8 @@ fn arrays(criterion: &mut Criterion) -> Result<()> {
         let mut group = criterion.benchmark_group(format!("{tool:?}").to_lowercase());
         for array in Array::shipped() {
             let model = model(array.clone())?;
-            for way in ways(tool) {
-                press(&mut group, array.name(), *way, &model, &tool.indenter())?;
+            for method in methods(tool) {
+                press(&mut group, array.name(), *method, &model, &tool.indenter())?;
             }
         }
         group.finish();
@@ -42,8 +42,8 @@ fn elements(criterion: &mut Criterion) -> Result<()> {
     let mut group = criterion.benchmark_group("elements");
     for fineness in [1, 2, 4] {
         let model = even(fineness)?;
-        for way in ways(Tool::H) {
-            press(&mut group, model.array().elements(), *way, &model, &Tool::H.indenter())?;
+        for method in methods(Tool::H) {
+            press(&mut group, model.array().elements(), *method, &model, &Tool::H.indenter())?;
         }
     }
     group.finish();
@@ -56,8 +56,8 @@ fn triangles(criterion: &mut Criterion) -> Result<()> {
     group.sample_size(10);
     let model = even(1)?;
     for triangles in [500, 2_000, 8_000, 32_000] {
-        for way in ways(Tool::H) {
-            press(&mut group, triangles, *way, &model, &fine_sphere(triangles)?)?;
+        for method in methods(Tool::H) {
+            press(&mut group, triangles, *method, &model, &fine_sphere(triangles)?)?;
         }
     }
     group.finish();
@@ -67,14 +67,14 @@ fn triangles(criterion: &mut Criterion) -> Result<()> {
 fn press(
     group: &mut BenchmarkGroup<'_, WallTime>,
     size: impl std::fmt::Display,
-    way: Way,
+    method: Method,
     model: &ForwardModel,
     indenter: &Indenter,
 ) -> Result<()> {
-    let mut painter = Painter::new(way, model, indenter)?;
+    let mut painter = Painter::new(method, model, indenter)?;
     let mut image = vec![0.0; model.array().elements()];
     let mut poses = poses(model.array(), 1024).into_iter().cycle();
-    let id = BenchmarkId::new(format!("{way:?}").to_lowercase(), size);
+    let id = BenchmarkId::new(format!("{method:?}").to_lowercase(), size);
     group.bench_function(id, |bencher| {
         bencher.iter(|| poses.next().map(|pose| painter.image(&pose, &mut image)));
     });

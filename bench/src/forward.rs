@@ -1,13 +1,13 @@
-//! Images per second along one way, and their error.
+//! Images per second by one method, and their error.
 
-use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, anyhow};
+use anyhow::Result;
+use rayon::ThreadPoolBuilder;
 use tactus_model::Array;
 
 use crate::clock::paint;
-use crate::{Painter, Tool, Way, model, poses};
+use crate::{Method, Painter, Tool, model, poses};
 
 /// Poses of a throughput run: too many for a branch predictor to learn.
 const POSES: u32 = 4096;
@@ -19,8 +19,8 @@ pub struct Forward {
     pub array: Array,
     /// Tool that presses.
     pub tool: Tool,
-    /// Way from pose to image.
-    pub way: Way,
+    /// Method from pose to image.
+    pub method: Method,
     /// Number of threads.
     pub threads: usize,
     /// Time to prepare everything that does not depend on the pose.
@@ -36,11 +36,11 @@ impl Forward {
     /// Makes images for `time`, and compares `compared` images with the exact ones.
     ///
     /// # Errors
-    /// If the way does not exist for this array.
+    /// If the method does not exist for this array.
     pub fn measure(
         array: &Array,
         tool: Tool,
-        way: Way,
+        method: Method,
         threads: usize,
         time: Duration,
         compared: u32,
@@ -48,13 +48,13 @@ impl Forward {
         let model = model(array.clone())?;
         let indenter = tool.indenter();
         let started = Instant::now();
-        let painter = Painter::new(way, &model, &indenter)?;
+        let painter = Painter::new(method, &model, &indenter)?;
         let ready_s = started.elapsed().as_secs_f64();
-        let exact = Painter::new(Way::Exact, &model, &indenter)?;
+        let exact = Painter::new(Method::Exact, &model, &indenter)?;
         Ok(Self {
             array: array.clone(),
             tool,
-            way,
+            method,
             threads,
             ready_s,
             images_per_s: images_per_s(&painter, array, threads, time)?,
@@ -71,10 +71,8 @@ fn images_per_s(painter: &Painter, array: &Array, threads: usize, time: Duration
         let (images, took) = paint(&mut painter, &poses, &mut image, time)?;
         Ok(images as f64 / took.as_secs_f64())
     };
-    thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().map(|worker| worker.join().map_err(|_| anyhow!("a thread panicked"))?).sum()
-    })
+    let pool = ThreadPoolBuilder::new().num_threads(threads.max(1)).build()?;
+    pool.broadcast(|_| work()).into_iter().sum()
 }
 
 fn error(mut painter: Painter, mut exact: Painter, array: &Array, compared: u32) -> Result<Option<f64>> {

@@ -7,7 +7,7 @@ use anyhow::Result;
 use tactus_model::Indenter;
 use tactus_solid::fem::Bricks;
 
-use crate::{Fem, Painter, Tool, Way, even, fine_sphere, per_image_s};
+use crate::{Fem, Method, Painter, Tool, even, fine_sphere, per_image_s};
 
 /// Rows and columns against those of the `DigiTacts` array: 48, 192 and 768 elements.
 const FINENESSES: [u32; 3] = [1, 2, 4];
@@ -35,15 +35,15 @@ impl Growth {
     /// If an image cannot be made.
     pub fn measure() -> Result<Vec<Self>> {
         let mut growths = Vec::new();
-        for way in [Way::PressTable, Way::Raster, Way::Exact] {
-            growths.push(Self::with_elements(Tool::H, way)?);
+        for method in [Method::PressTable, Method::Raster, Method::Exact] {
+            growths.push(Self::with_elements(Tool::H, method)?);
         }
-        for way in [Way::PressTable, Way::Exact] {
-            growths.push(Self::with_elements(Tool::Cylinder, way)?);
+        for method in [Method::PressTable, Method::Exact] {
+            growths.push(Self::with_elements(Tool::Cylinder, method)?);
         }
-        growths.extend(Self::with_triangles(Way::PressTable)?);
-        for way in [Way::Raster, Way::Exact] {
-            let [_, image] = Self::with_triangles(way)?;
+        growths.extend(Self::with_triangles(Method::PressTable)?);
+        for method in [Method::Raster, Method::Exact] {
+            let [_, image] = Self::with_triangles(method)?;
             growths.push(image);
         }
         for (how, slabs) in SLABS {
@@ -63,31 +63,31 @@ impl Growth {
         along / logs.clone().map(|[size, _]| product(size, size - mean_size)).sum::<f64>()
     }
 
-    fn with_elements(tool: Tool, way: Way) -> Result<Self> {
+    fn with_elements(tool: Tool, method: Method) -> Result<Self> {
         let indenter = tool.indenter();
         let point = |fineness: &u32| {
             let model = even(*fineness)?;
-            let mut painter = Painter::new(way, &model, &indenter)?;
+            let mut painter = Painter::new(method, &model, &indenter)?;
             Ok([model.array().elements() as f64, per_image_s(&mut painter, model.array())?])
         };
         let points = FINENESSES.iter().map(point).collect::<Result<_>>()?;
-        Ok(Self { what: format!("image, {tool:?}, {way:?}").to_lowercase(), size_of: "elements", points })
+        Ok(Self { what: format!("image, {tool:?}, {method:?}").to_lowercase(), size_of: "elements", points })
     }
 
     /// Growth of the preparation before the first pose, and of an image.
-    fn with_triangles(way: Way) -> Result<[Self; 2]> {
+    fn with_triangles(method: Method) -> Result<[Self; 2]> {
         let model = even(1)?;
         let (mut ready, mut image) = (Vec::new(), Vec::new());
         for triangles in TRIANGLES {
             let indenter = fine_sphere(triangles)?;
             let started = Instant::now();
-            let mut painter = Painter::new(way, &model, &indenter)?;
+            let mut painter = Painter::new(method, &model, &indenter)?;
             let size = of_mesh(&indenter);
             ready.push([size, started.elapsed().as_secs_f64()]);
             image.push([size, per_image_s(&mut painter, model.array())?]);
         }
         let named = |what: &str, points| {
-            let what = format!("{what}, sphere, {way:?}").to_lowercase();
+            let what = format!("{what}, sphere, {method:?}").to_lowercase();
             Self { what, size_of: "triangles", points }
         };
         Ok([named("preparation", ready), named("image", image)])

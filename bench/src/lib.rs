@@ -1,7 +1,7 @@
 //! Speed, accuracy and growth of the models, and their distance from the machine's limits.
 //!
 //! The measurements of the forward model (`tactus-bench --help` and the criterion benchmark) use the same [`Tool`]s at the
-//! same [`Pose`]s on the same arrays, along each [`Way`] from pose to image. [`Fem`] is the finite element model of the
+//! same [`Pose`]s on the same arrays, with each [`Method`] from pose to image. [`Fem`] is the finite element model of the
 //! covering. [`evidence`] measures something else: how well `tactus discover` finds and names hidden physics.
 
 pub mod evidence;
@@ -13,9 +13,9 @@ mod fem;
 mod forward;
 mod growth;
 mod limits;
+mod method;
 mod models;
 mod press;
-mod way;
 
 pub use acuity::Acuity;
 pub use calibration::{Calibration, Sweep};
@@ -23,7 +23,7 @@ pub use clock::per_image_s;
 pub use fem::Fem;
 pub use forward::Forward;
 pub use growth::Growth;
-pub use limits::{Kernel, Limits};
+pub use limits::{Kernel, MachineLimits};
+pub use method::{Method, Painter};
 pub use models::{even, model};
 pub use press::{COVERING, DEPTH_MAX_MM, Pose, Tool, fine_sphere, poses};
-pub use way::{Painter, Way};

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use tactus_model::Array;
 
-use crate::{Painter, Tool, Way, model, per_image_s, poses};
+use crate::{Method, Painter, Tool, model, per_image_s, poses};
 
 /// Rates of one core, and the work of the kernels.
 ///
@@ -19,9 +19,9 @@ use crate::{Painter, Tool, Way, model, per_image_s, poses};
 /// bytes = 64 C (4 x 4 nodes) + 20 (centre, response) + 4 (the count)
 /// ```
 ///
-/// There is no such formula for the exact way, which spends its time in `erfc` and `exp`.
+/// There is no such formula for the exact method, which spends its time in `erfc` and `exp`.
 #[derive(Debug, Clone)]
-pub struct Limits {
+pub struct MachineLimits {
     /// Single-precision operations, where a multiplication and an addition count as two, with the vector width and the
     /// instructions that this program is compiled for.
     pub flops_per_s: f64,
@@ -49,7 +49,7 @@ pub struct Kernel {
 /// Numbers that fill half of the first cache, half of the second cache, and more than any cache.
 const PLACES: [usize; 3] = [4 << 10, 128 << 10, 64 << 20];
 
-impl Limits {
+impl MachineLimits {
     /// Measures the machine and the kernels.
     ///
     /// # Errors
@@ -67,7 +67,7 @@ impl Limits {
 
 impl Kernel {
     fn of_press_table(array: &Array, tool: Tool) -> Result<Self> {
-        let mut painter = Painter::new(Way::PressTable, &model(array.clone())?, &tool.indenter())?;
+        let mut painter = Painter::new(Method::PressTable, &model(array.clone())?, &tool.indenter())?;
         let channels = match tool {
             Tool::H => 3.0,
             Tool::Cylinder => 1.0,

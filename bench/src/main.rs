@@ -10,8 +10,8 @@ use clap::{Parser, Subcommand};
 use evidence_command::EvidenceArgs;
 use serde_json::json;
 use tactus_bench::{
-    Acuity, COVERING, Calibration, Fem, Forward, Growth, Kernel, Limits, Painter, Pose, Sweep, Tool, Way,
-    model, poses,
+    Acuity, COVERING, Calibration, Fem, Forward, Growth, Kernel, MachineLimits, Method, Painter, Pose, Sweep,
+    Tool, model, poses,
 };
 use tactus_calibrate::acuity::Grid;
 use tactus_model::Array;
@@ -27,7 +27,7 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Part {
-    /// Images per second over many poses, and the greatest error against the exact way.
+    /// Images per second over many poses, and the greatest error against the exact method.
     Forward {
         /// Array: `digitacts`, `fingertip` or `tekscan-5027`.
         #[arg(long, value_parser = shipped, default_value = "digitacts")]
@@ -35,16 +35,16 @@ enum Part {
         /// Tool.
         #[arg(long, value_enum, default_value = "h")]
         tool: Tool,
-        /// Way from pose to image.
+        /// Method from pose to image.
         #[arg(long = "path", value_enum, default_value = "press-table")]
-        way: Way,
+        method: Method,
         /// Number of threads.
         #[arg(long, default_value_t = 1)]
         threads: usize,
         /// Time of the measurement in s.
         #[arg(long, default_value_t = 1.0)]
         seconds: f64,
-        /// Number of images to compare with the exact way.
+        /// Number of images to compare with the exact method.
         #[arg(long, default_value_t = 200)]
         compared: u32,
         /// Print one JSON object instead of a line of text.
@@ -59,9 +59,9 @@ enum Part {
         /// Tool.
         #[arg(long, value_enum, default_value = "h")]
         tool: Tool,
-        /// Way from pose to image.
+        /// Method from pose to image.
         #[arg(long = "path", value_enum, default_value = "press-table")]
-        way: Way,
+        method: Method,
     },
     /// Time of both panels of Fig. 6 with 25 x 25 cells, and its growth.
     Acuity {
@@ -106,11 +106,11 @@ enum Part {
 
 fn main() -> Result<()> {
     match Args::parse().part {
-        Part::Forward { array, tool, way, threads, seconds, compared, json } => {
+        Part::Forward { array, tool, method, threads, seconds, compared, json } => {
             let time = Duration::try_from_secs_f64(seconds)?;
-            forward(&Forward::measure(&array, tool, way, threads, time, compared)?, json);
+            forward(&Forward::measure(&array, tool, method, threads, time, compared)?, json);
         }
-        Part::Scene { array, tool, way } => scene(array, tool, way)?,
+        Part::Scene { array, tool, method } => scene(array, tool, method)?,
         Part::Calibrate { files, json } => calibrate(&Calibration::measure(&files, 5)?, json),
         Part::Acuity { json } => acuity(json)?,
         Part::Fem { across, layers, poisson_ratio, full, json } => {
@@ -118,7 +118,7 @@ fn main() -> Result<()> {
             fem(&Fem::measure(if full { bricks.integrated_in_full() } else { bricks }), json);
         }
         Part::Growth => growth(&Growth::measure()?),
-        Part::Limits => limits(&Limits::measure()?),
+        Part::Limits => limits(&MachineLimits::measure()?),
         Part::Evidence(args) => args.run()?,
     }
     Ok(())
@@ -130,12 +130,12 @@ fn shipped(name: &str) -> Result<Array, String> {
 }
 
 fn forward(measured: &Forward, as_json: bool) {
-    let Forward { array, tool, way, threads, ready_s, images_per_s, error } = measured;
+    let Forward { array, tool, method, threads, ready_s, images_per_s, error } = measured;
     let (rows, cols) = (array.rows(), array.cols());
-    let [tool, way] = [format!("{tool:?}"), format!("{way:?}")].map(|name| name.to_lowercase());
+    let [tool, method] = [format!("{tool:?}"), format!("{method:?}")].map(|name| name.to_lowercase());
     if as_json {
         let line = json!({
-            "array": array.name(), "rows": rows, "cols": cols, "tool": tool, "path": way, "threads": threads,
+            "array": array.name(), "rows": rows, "cols": cols, "tool": tool, "path": method, "threads": threads,
             "ready_s": ready_s, "images_per_s": images_per_s, "error": error,
             "version": env!("CARGO_PKG_VERSION"),
         });
@@ -143,18 +143,18 @@ fn forward(measured: &Forward, as_json: bool) {
     } else {
         let within = error.map(|error| format!(", within {error:.1e} of the peak")).unwrap_or_default();
         println!(
-            "{} ({rows} x {cols}), {tool}, {way}, {threads} threads: {images_per_s:.0} images/s, ready in {:.1} ms{within}",
+            "{} ({rows} x {cols}), {tool}, {method}, {threads} threads: {images_per_s:.0} images/s, ready in {:.1} ms{within}",
             array.name(),
             ready_s * 1e3
         );
     }
 }
 
-fn scene(array: Array, tool: Tool, way: Way) -> Result<()> {
+fn scene(array: Array, tool: Tool, method: Method) -> Result<()> {
     const POSES: u32 = 64;
     let model = model(array)?;
     let array = model.array();
-    let mut painter = Painter::new(way, &model, &tool.indenter())?;
+    let mut painter = Painter::new(method, &model, &tool.indenter())?;
     let mut images = Vec::new();
     let mut image = vec![0.0; array.elements()];
     let poses = poses(array, POSES);
@@ -244,8 +244,8 @@ fn growth(growths: &[Growth]) {
     }
 }
 
-fn limits(limits: &Limits) {
-    let Limits { flops_per_s, bytes_per_s: [first, second, memory], kernels } = limits;
+fn limits(limits: &MachineLimits) {
+    let MachineLimits { flops_per_s, bytes_per_s: [first, second, memory], kernels } = limits;
     println!("one core, as compiled: {:.1} Gflop/s single precision", flops_per_s / 1e9);
     println!(
         "reading: {:.0} GB/s first cache, {:.0} second, {:.1} memory",

@@ -111,7 +111,7 @@ impl Process {
         Self::start_full(name, folder, args, OwnedFd::from(writer).into(), reader.into())
     }
 
-    /// As [`Self::start_unread`], at a terminal that is held, as by Ctrl-S.
+    /// As [`Self::start_unread`], at a terminal whose output is held, as Ctrl-S does.
     ///
     /// # Panics
     /// If it cannot be started.

@@ -45,20 +45,20 @@ pub struct Ablation {
 /// # Errors
 /// If a label or a report cannot be read.
 pub fn ablations(sets: &[Planned], places: &Places) -> Result<Vec<Ablation>> {
-    let mut ways = vec![("tactus".to_owned(), places.clone())];
+    let mut methods = vec![("tactus".to_owned(), places.clone())];
     let peers = places.work.join("peers");
     if peers.exists() {
         let at = |path: &Path| path.display().to_string();
         for entry in fs::read_dir(&peers).with_context(|| at(&peers))? {
             let path = entry.with_context(|| at(&peers))?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            ways.push((name, Places { work: path, sealed: places.sealed.clone() }));
+            methods.push((name, Places { work: path, sealed: places.sealed.clone() }));
         }
     }
-    ways[1..].sort_by(|one, other| one.0.cmp(&other.0));
-    let is_done = |set: &&Planned| ways.iter().all(|(_, places)| places.ran(&set.id).exists());
+    methods[1..].sort_by(|one, other| one.0.cmp(&other.0));
+    let is_done = |set: &&Planned| methods.iter().all(|(_, places)| places.ran(&set.id).exists());
     let common: Vec<Planned> = sets.iter().filter(is_done).cloned().collect();
-    ways.into_iter().map(|(method, places)| Ok(Ablation::new(method, &read(&common, &places)?))).collect()
+    methods.into_iter().map(|(method, places)| Ok(Ablation::new(method, &read(&common, &places)?))).collect()
 }
 
 impl Ablation {

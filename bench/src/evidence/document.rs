@@ -72,7 +72,7 @@ pub fn document(scores: &Scores, ablations: &[Ablation], costs: Option<&Costs>) 
         names(f, scores)?;
         several(f, scores)?;
         outside(f, scores)?;
-        ways(f, ablations)?;
+        methods(f, ablations)?;
         costs.map_or(Ok(()), |costs| time(f, costs))
     })
     .to_string()
@@ -308,7 +308,7 @@ fn outside(f: &mut fmt::Formatter<'_>, scores: &Scores) -> fmt::Result {
     Ok(())
 }
 
-fn ways(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
+fn methods(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
     if ablations.len() < 2 {
         return Ok(());
     }
@@ -316,28 +316,28 @@ fn ways(f: &mut fmt::Formatter<'_>, ablations: &[Ablation]) -> fmt::Result {
         f,
         "\n## Other methods on the same sets\n\n| method | false alarms | named exactly | in the reported set | a wrong name | both of two named | outside: unexplained | outside: any effect named | shrink: median, fifth percentile (sets) | the same on presses deeper than any fitted | s for each set |\n|---|---|---|---|---|---|---|---|---|---|---|"
     )?;
-    for way in ablations {
+    for method in ablations {
         writeln!(
             f,
             "| {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} of {} | {} | {} | {:.1} |",
-            way.method,
-            way.false_alarms.hits,
-            way.false_alarms.of,
-            way.exact.hits,
-            way.exact.of,
-            way.in_set.hits,
-            way.in_set.of,
-            way.wrong.hits,
-            way.wrong.of,
-            way.pairs.hits,
-            way.pairs.of,
-            way.unexplained.hits,
-            way.unexplained.of,
-            way.outside_named.hits,
-            way.outside_named.of,
-            shrunk(&way.shrink),
-            shrunk(&way.deeper_shrink),
-            way.seconds.unwrap_or(f64::NAN),
+            method.method,
+            method.false_alarms.hits,
+            method.false_alarms.of,
+            method.exact.hits,
+            method.exact.of,
+            method.in_set.hits,
+            method.in_set.of,
+            method.wrong.hits,
+            method.wrong.of,
+            method.pairs.hits,
+            method.pairs.of,
+            method.unexplained.hits,
+            method.unexplained.of,
+            method.outside_named.hits,
+            method.outside_named.of,
+            shrunk(&method.shrink),
+            shrunk(&method.deeper_shrink),
+            method.seconds.unwrap_or(f64::NAN),
         )?;
     }
     Ok(())

@@ -123,7 +123,7 @@ fn matches(effects: &[&str], named: &[Named]) -> bool {
 
 /// The part of `report.json` that is read.
 #[derive(Debug, Deserialize)]
-struct Report {
+struct DiscoveryReport {
     split: Split,
     base: Level,
     rounds: Vec<Round>,
@@ -175,11 +175,11 @@ fn one(set: &Planned, places: &Places) -> Result<Outcome> {
     let label: Label = parsed(&places.label(&set.id))?;
     let ran: Ran = parsed(&places.ran(&set.id))?;
     let report = places.report(&set.id);
-    let report: Option<Report> = report.exists().then(|| parsed(&report)).transpose()?;
+    let report: Option<DiscoveryReport> = report.exists().then(|| parsed(&report)).transpose()?;
     Ok(outcome(set, &label, &ran, report))
 }
 
-fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<Report>) -> Outcome {
+fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryReport>) -> Outcome {
     let truth = |dosed: &tactus_sets::PhysicsLabel| Truth {
         physics: dosed.id.clone(),
         effect: dosed.effect.clone(),
@@ -215,7 +215,7 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<Report>) -> O
 
 /// Relative standard error of the gap, `sqrt(2 (1 + phi^2) / (n (1 - phi^2))) / (chi2 - 1)`: that of a mean of the squares of `n`
 /// correlated readings.
-fn gap_error(report: &Report, elements: f64, phi: f64) -> f64 {
+fn gap_error(report: &DiscoveryReport, elements: f64, phi: f64) -> f64 {
     let Split { frames, train_presses, heldout_presses } = report.split;
     let share = heldout_presses as f64 / (train_presses + heldout_presses) as f64;
     let readings = frames as f64 * share * elements;

@@ -5,11 +5,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, ensure};
+use rayon::ThreadPoolBuilder;
+use rayon::iter::{ParallelBridge, ParallelIterator};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -110,27 +110,22 @@ pub fn run(
         open.push(set);
     }
     let started = Instant::now();
-    let next = AtomicUsize::new(0);
     let done = Mutex::new(0_usize);
-    let work = || -> Result<()> {
-        while let Some(set) = open.get(next.fetch_add(1, Ordering::Relaxed)) {
-            one(set, places, workflow, &program)?;
-            let mut done = done.lock().map_err(|_| anyhow!("a worker panicked"))?;
-            *done += 1;
-            let per_set_s = started.elapsed().as_secs_f64() / *done as f64;
-            progress(Progress {
-                id: &set.id,
-                done: sets.len() - open.len() + *done,
-                total: sets.len(),
-                left_s: per_set_s * (open.len() - *done) as f64,
-            });
-        }
+    let work = |set: &&Planned| -> Result<()> {
+        one(set, places, workflow, &program)?;
+        let mut done = done.lock().map_err(|_| anyhow!("a worker panicked"))?;
+        *done += 1;
+        let per_set_s = started.elapsed().as_secs_f64() / *done as f64;
+        progress(Progress {
+            id: &set.id,
+            done: sets.len() - open.len() + *done,
+            total: sets.len(),
+            left_s: per_set_s * (open.len() - *done) as f64,
+        });
         Ok(())
     };
-    thread::scope(|scope| {
-        let workers: Vec<_> = (0..workflow.jobs.max(1)).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().try_for_each(|worker| worker.join().map_err(|_| anyhow!("a worker panicked"))?)
-    })
+    let pool = ThreadPoolBuilder::new().num_threads(workflow.jobs.max(1)).build()?;
+    pool.install(|| open.iter().par_bridge().try_for_each(work))
 }
 
 fn is_done(set: &Planned, places: &Places, program: &str, wants_tables: bool) -> Result<bool> {

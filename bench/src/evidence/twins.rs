@@ -106,7 +106,7 @@ pub const BUDGET_MIN: f64 = 6.0;
 const RIG: &str = include_str!("../../../config/rigs/sim.toml");
 
 #[derive(Debug, Deserialize)]
-struct Report {
+struct DiscoveryReport {
     active: Vec<Chosen>,
 }
 
@@ -149,7 +149,7 @@ impl Twins {
         let mut discover = Command::new(tactus);
         discover.args(["--json", "discover", "--active", "--budget-min"]).arg(BUDGET_MIN.to_string());
         on_rig(discover.arg(summary.recording).arg("--out").arg(&out))?;
-        let report: Report = parsed(&out.join("report.json"))?;
+        let report: DiscoveryReport = parsed(&out.join("report.json"))?;
         Ok(Decision { twins: self, chosen: report.active })
     }
 }

@@ -1,6 +1,6 @@
 use super::{KeptMessages, wanted};
 
-/// The numbers found after so many messages, of which the last `capacity` are kept.
+/// The numbers found after this many messages, of which the last `capacity` are kept.
 fn check(published: u32, capacity: usize, numbers: Option<&str>, limit: Option<&str>) -> Vec<u32> {
     let mut kept = KeptMessages::new(capacity);
     for number in 0..published {

@@ -140,7 +140,7 @@ impl Replies {
 
 /// The queue of replies.
 pub(crate) fn answers() -> Arc<Queue<PendingReply>> {
-    // Drop-oldest: a client that sends so many commands at once loses the first replies.
+    // Drop-oldest: a client that sends this many commands at once loses the first replies.
     Arc::new(Queue::new(WAITING_ANSWERS))
 }
 

@@ -122,7 +122,7 @@ impl BusConfig {
             ("transport/link/tx/queue/size/interactive_low", json!(16)),
             ("transport/link/tx/queue/size/data_high", json!(16)),
             ("transport/link/tx/queue/size/data", json!(16)),
-            // In microseconds: a client whose link stays full for so long while a reply waits is disconnected. Until then it
+            // In microseconds: a client whose link stays full for this time while a reply waits is disconnected. Until then it
             // blocks a thread and finally, for the same time, zenoh's only sending thread and so all clients. Zenoh's
             // default is 5 s.
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(100_000)),

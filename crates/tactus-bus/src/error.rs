@@ -6,7 +6,7 @@ use std::{error::Error, io, time::Duration};
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message says what each field is")]
 pub enum BusError {
-    /// An endpoint that is none of the forms of [`crate::Endpoint`].
+    /// An endpoint in a form that [`crate::Endpoint`] does not have.
     #[error("endpoint {endpoint:?}: {reason}; it should read tcp/HOST:PORT, such as tcp/127.0.0.1:7447")]
     Endpoint { endpoint: String, reason: &'static str },
     /// An endpoint that other machines reach without a certificate.

@@ -15,7 +15,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Exit code of a client that does not hold the lease.
 const EXIT_NOT_NOW: u32 = 5;
 
-/// The answer to a client that wants the lease.
+/// The answer to a client that asks for the lease.
 #[derive(Debug)]
 pub enum Hold {
     /// The client has it.

@@ -46,7 +46,7 @@ pub(crate) struct InstanceToken {
 pub struct Alive {
     rig: String,
     known: watch::Receiver<Known>,
-    /// The state told last.
+    /// The state that was reported last.
     told: bool,
 }
 

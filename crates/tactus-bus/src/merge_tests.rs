@@ -9,7 +9,7 @@ fn messages(publisher: char, numbers: impl IntoIterator<Item = u32>) -> Vec<Numb
     numbers.into_iter().map(|number| message(publisher, number)).collect()
 }
 
-/// What comes out if `before` arrives before the past does, and `after` after it.
+/// The merged messages if `before` arrives before the history, and `after` after it.
 fn check(
     before: Vec<Numbered<char, (char, u32)>>,
     past: Vec<Numbered<char, (char, u32)>>,

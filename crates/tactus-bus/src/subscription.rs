@@ -230,7 +230,7 @@ impl Reception {
 struct Receiver(Arc<Reception>, Trust);
 
 impl Receiver {
-    /// Takes a live message; what is known to be another's is not kept.
+    /// Takes a live message. A message that is known to come from another session is dropped.
     fn hear(&self, sample: Sample) {
         let source = sample.source_info().map(|source| source.source_id().zid());
         if source.is_none_or(|source| self.1.has(&source) == Some(false)) {

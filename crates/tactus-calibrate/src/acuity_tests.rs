@@ -23,7 +23,7 @@ fn step_apart(sensor: DiscretisingSensor, offset: f64) -> Option<f64> {
     apart.find(|apart| sensor.reading([offset - 0.5 * apart, offset + 0.5 * apart]) != together)
 }
 
-/// Irregular spreads and force steps, and others that make exact ties: half-integer steps under hardly any spread, odd
+/// Irregular spreads and force steps, and others that make exact ties: half-integer steps under nearly no spread, odd
 /// steps at an edge.
 fn awkward() -> impl Iterator<Item = DiscretisingSensor> {
     let sigmas = [0.001, 0.02, 0.05, 0.11, 0.24, 0.313, 0.5, 0.955, 1.36, 3.0, 10.0];

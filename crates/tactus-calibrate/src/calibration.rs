@@ -10,9 +10,9 @@ use crate::{
     ThicknessFit,
     faults::examine,
     order::median,
+    placement::{coverings_mm, same_covering},
     registration::{SensorPose, register},
     response::respond,
-    setting::{coverings_mm, same_covering},
     spread::spreads,
     thickness::against_thickness,
 };

@@ -47,7 +47,7 @@ pub struct Design {
     /// The spread under which a point is located best, the least if there are several; searched from 0.05 to 1 pitches in
     /// steps of 0.01.
     pub best_for_locating: Acuity,
-    /// The spread under which two points are told apart best; searched likewise.
+    /// The spread under which two points are distinguished best; searched likewise.
     pub best_for_two_points: Acuity,
     /// Thickness that gives the least wanted spread by Eq. 4; negative if the sensor's own spread is already wider, `None`
     /// if the spread does not depend on thickness.
@@ -60,12 +60,12 @@ pub struct Design {
     pub curve: Vec<Covered>,
 }
 
-/// How well positions are told apart under a spread.
+/// How well positions are distinguished under a spread.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Acuity {
     /// Spread, in pitches.
     pub sigma: f64,
-    /// Distinct readings of a point that moves across one element: an upper bound of the positions that can be told apart.
+    /// Distinct readings of a point that moves across one element: an upper bound of the positions that can be distinguished.
     pub locations: usize,
     /// Separation at which two points first read differently from one of twice the force, mean over two hundred
     /// positions in an element; `None` if that never happens at one of them.
@@ -224,7 +224,7 @@ impl Wanted {
     }
 }
 
-/// Separation; infinite if two points are never told apart.
+/// Separation; infinite if two points are never distinguished.
 fn apart_mm(acuity: &Acuity) -> f64 {
     acuity.separation_mm.unwrap_or(f64::INFINITY)
 }

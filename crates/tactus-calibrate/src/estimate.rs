@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// 0.975 quantile of the standard normal distribution: a 95 % interval reaches so many standard errors each way.
+/// 0.975 quantile of the standard normal distribution: a 95 % interval reaches this many standard errors each way.
 const Z_95: f64 = 1.959_963_984_540_054;
 
 /// An estimated number with its standard error; both in the same unit.

@@ -18,9 +18,9 @@ use tactus_model::{Contact, Covering};
 
 use crate::{
     order::{median, quantile},
+    placement::{Declared, across, goes_across},
     readings::{Readings, distinct_places},
     registration::SensorPose,
-    setting::{Declared, across, goes_across},
 };
 
 /// An element is noisy if its noise is more than this many times the median.
@@ -122,10 +122,10 @@ pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &SensorPo
             faults.push(fault(FaultKind::Noisy { rms_counts: noise }, evidence));
             continue;
         }
-        match trials.verdict(element, noise) {
-            Verdict::Unknown => not_judged.push(element),
-            Verdict::Sound => {}
-            Verdict::Faulty(kind, evidence) => faults.push(fault(kind, evidence)),
+        match trials.health(element, noise) {
+            ElementHealth::Unknown => not_judged.push(element),
+            ElementHealth::Sound => {}
+            ElementHealth::Faulty(kind, evidence) => faults.push(fault(kind, evidence)),
         }
     }
     Health { faults, not_judged }
@@ -141,7 +141,7 @@ fn stuck(readings: &Readings, element: usize, typical_noise: f64) -> Option<f32>
 /// The deepest dwell of every press: predicted indentations and measured rises.
 struct Trials {
     /// Predicted indentation by press and element.
-    felt: Vec<Vec<f64>>,
+    predicted: Vec<Vec<f64>>,
     /// Measured rise by press and element, in counts.
     rises: Vec<Vec<f64>>,
     /// Standard deviation of a rise in units of one frame's noise.
@@ -157,7 +157,7 @@ struct Trials {
     across: bool,
 }
 
-enum Verdict {
+enum ElementHealth {
     Unknown,
     Sound,
     Faulty(FaultKind, String),
@@ -166,7 +166,7 @@ enum Verdict {
 impl Trials {
     fn of(declared: &Declared, readings: &Readings, place: &SensorPose) -> Self {
         let mut trials = Self {
-            felt: Vec::new(),
+            predicted: Vec::new(),
             rises: Vec::new(),
             spread: Vec::new(),
             places_mm: Vec::new(),
@@ -181,21 +181,21 @@ impl Trials {
         for press in across(declared, readings) {
             let Some((dwell, indenter)) = press.deepest().zip(declared.indenter(press)) else { continue };
             let Some(variance) = press.rise(dwell, 0).map(|[_, variance]| variance) else { continue };
-            let contact = place.setting.contact(press, dwell, indenter);
-            let mut felt = vec![0.0; readings.elements];
+            let contact = place.placement.contact(press, dwell, indenter);
+            let mut predicted = vec![0.0; readings.elements];
             let covering = Covering { thickness_mm: press.covering_mm };
-            model.indentation(&contact, covering, &mut felt);
+            model.indentation(&contact, covering, &mut predicted);
             let centred = Contact { position_mm: centre_mm, ..contact };
             model.indentation(&centred, covering, &mut at_centre);
             if at_centre[0] > 0.0 {
-                for (reach, felt) in trials.reach.iter_mut().zip(&felt) {
-                    *reach = reach.max(felt / at_centre[0]);
+                for (reach, predicted) in trials.reach.iter_mut().zip(&predicted) {
+                    *reach = reach.max(predicted / at_centre[0]);
                 }
             }
             let rises =
                 (0..readings.elements).filter_map(|element| press.rise(dwell, element)).map(|[rise, _]| rise);
             trials.rises.push(rises.collect());
-            trials.felt.push(felt);
+            trials.predicted.push(predicted);
             trials.spread.push(variance.sqrt());
             trials.places_mm.push(press.place_mm);
         }
@@ -213,11 +213,11 @@ impl Trials {
         trials
     }
 
-    fn verdict(&self, element: usize, noise: f64) -> Verdict {
+    fn health(&self, element: usize, noise: f64) -> ElementHealth {
         let [share, deviations] = DEAD;
         // If no element rises, the presses are too light to judge by, or every element is dead.
         if self.reach[element] < PRESSED || self.clearest < deviations {
-            return Verdict::Unknown;
+            return ElementHealth::Unknown;
         }
         let [rise, spread] = self.greatest(element);
         if rise < share * self.strong_rise && rise < deviations * noise * spread {
@@ -225,10 +225,10 @@ impl Trials {
                 "rose by {rise:.1} counts at most under presses that raised others by {:.0}",
                 self.strong_rise
             );
-            return Verdict::Faulty(FaultKind::Dead, evidence);
+            return ElementHealth::Faulty(FaultKind::Dead, evidence);
         }
         if !self.across || distinct(&self.places_mm) < WIRING_PLACES_LEAST {
-            return Verdict::Sound;
+            return ElementHealth::Sound;
         }
         let own = self.likeness(element, element);
         let best = (0..self.reach.len())
@@ -244,9 +244,9 @@ impl Trials {
                      ({own:.4})",
                     self.rises.len()
                 );
-                Verdict::Faulty(FaultKind::CrossWired { answers_for: other }, evidence)
+                ElementHealth::Faulty(FaultKind::CrossWired { answers_for: other }, evidence)
             }
-            _ => Verdict::Sound,
+            _ => ElementHealth::Sound,
         }
     }
 
@@ -259,13 +259,13 @@ impl Trials {
 
     /// Cosine between the readings of one element and the prediction for another, whatever the sign of the sensitivity.
     fn likeness(&self, element: usize, other: usize) -> f64 {
-        let (mut both, mut read, mut felt) = (0.0, 0.0, 0.0);
-        for (rises, felts) in self.rises.iter().zip(&self.felt) {
-            both += rises[element] * felts[other];
+        let (mut both, mut read, mut predicted) = (0.0, 0.0, 0.0);
+        for (rises, predictions) in self.rises.iter().zip(&self.predicted) {
+            both += rises[element] * predictions[other];
             read += rises[element] * rises[element];
-            felt += felts[other] * felts[other];
+            predicted += predictions[other] * predictions[other];
         }
-        if read > 0.0 && felt > 0.0 { (both / (read * felt).sqrt()).abs() } else { 0.0 }
+        if read > 0.0 && predicted > 0.0 { (both / (read * predicted).sqrt()).abs() } else { 0.0 }
     }
 }
 

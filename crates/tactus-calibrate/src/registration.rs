@@ -24,8 +24,8 @@ use crate::{
     Estimate,
     least_squares::{Fit, Normal, Observation, minimise},
     order::median,
+    placement::{Declared, Placement, across, goes_across},
     readings::{Dwell, MeasuredPress, Readings, distinct_places, number_of},
-    setting::{Declared, Setting, across, goes_across},
 };
 
 /// Distinct places needed to fit the sensor's pose.
@@ -85,7 +85,7 @@ impl RegistrationFit {
 /// The sensor's pose in the robot's frame with its errors, as later steps use it.
 #[derive(Debug, Clone)]
 pub(crate) struct SensorPose {
-    pub(crate) setting: Setting,
+    pub(crate) placement: Placement,
     pub(crate) sigma_mm: f64,
     /// Outlying presses: index of the run, index in it.
     pub(crate) contradicting: Vec<(usize, i32)>,
@@ -98,7 +98,7 @@ impl SensorPose {
     pub(crate) fn declared(declared: &Declared, covering_mm: f64) -> Self {
         let covariance = DMatrix::zeros(Self::UNCERTAIN, Self::UNCERTAIN);
         Self {
-            setting: declared.setting(),
+            placement: declared.placement(),
             sigma_mm: declared.sigma_mm(covering_mm),
             contradicting: Vec::new(),
             covariance,
@@ -117,9 +117,9 @@ impl SensorPose {
     pub(crate) fn moved(&self, parameter: usize, by: f64) -> Self {
         let mut moved = self.clone();
         match parameter {
-            0 | 1 => moved.setting.registration.origin_mm[parameter] += by,
-            2 => moved.setting.registration.rotation_deg += by,
-            3 => moved.setting.surface_mm += by,
+            0 | 1 => moved.placement.registration.origin_mm[parameter] += by,
+            2 => moved.placement.registration.rotation_deg += by,
+            3 => moved.placement.surface_mm += by,
             _ => moved.sigma_mm += by,
         }
         moved
@@ -224,7 +224,7 @@ impl<'a> Problem<'a> {
         let mut free = vec![true; start.len()];
         free[ROTATION] = goes_across(declared, presses.iter().copied());
         free[SCALE] = false;
-        // With two depths a shifted surface cannot be told from a curved response.
+        // Two depths do not distinguish a shifted surface from a curved response.
         free[SURFACE] = depths.len() >= 3;
         free[CURVATURE] = depths.len() >= 2;
         Ok(Self { declared, presses, elements, start, free })
@@ -270,7 +270,7 @@ impl<'a> Problem<'a> {
 
     /// Calls `take` for every element in every press with the press's index, the noise and the observations.
     fn each(&self, parameters: &[f64], mut take: impl FnMut(usize, f64, &[Observation])) -> Option<()> {
-        let (model, setting) = (self.model(parameters)?, setting(parameters));
+        let (model, placement) = (self.model(parameters)?, placement(parameters));
         for (index, press) in self.presses.iter().enumerate() {
             let (indenter, covering) =
                 (self.declared.indenter(press)?, Covering { thickness_mm: press.covering_mm });
@@ -278,15 +278,15 @@ impl<'a> Problem<'a> {
                 .dwells
                 .iter()
                 .map(|dwell| {
-                    let contact = setting.contact(press, dwell, indenter);
-                    (dwell, model.gradient(&contact, covering), Slopes::of(&setting, contact.position_mm))
+                    let contact = placement.contact(press, dwell, indenter);
+                    (dwell, model.gradient(&contact, covering), Slopes::of(&placement, contact.position_mm))
                 })
                 .collect();
             for (place, (element, noise)) in self.elements.iter().enumerate() {
-                let readings = dwells.iter().filter_map(|(dwell, gradient, by_setting)| {
+                let readings = dwells.iter().filter_map(|(dwell, gradient, by_placement)| {
                     let [rise, _] = press.rise(dwell, *element)?;
                     let (predicted, slopes) =
-                        Self::predict(parameters, gradient, by_setting, place, *element);
+                        Self::predict(parameters, gradient, by_placement, place, *element);
                     Some(Observation {
                         residual: rise - predicted,
                         slopes: slopes.to_vec(),
@@ -302,7 +302,7 @@ impl<'a> Problem<'a> {
     fn predict(
         parameters: &[f64],
         gradient: &Gradient,
-        by_setting: &Slopes,
+        by_placement: &Slopes,
         place: usize,
         element: usize,
     ) -> (f64, [(usize, f64); SHARED + 1]) {
@@ -313,10 +313,10 @@ impl<'a> Problem<'a> {
         let along = |[x, y]: [f64; 2]| per_v * (by_x[element] * x + by_y[element] * y);
         let turned = -per_v * gradient.by_rotation_deg[element];
         let slopes = [
-            (X, along(by_setting.origin[0])),
-            (Y, along(by_setting.origin[1])),
-            (ROTATION, along(by_setting.rotation_deg) + turned),
-            (SCALE, along(by_setting.scale)),
+            (X, along(by_placement.origin[0])),
+            (Y, along(by_placement.origin[1])),
+            (ROTATION, along(by_placement.rotation_deg) + turned),
+            (SCALE, along(by_placement.scale)),
             (SURFACE, per_v * gradient.by_depth_mm[element]),
             (SIGMA, per_v * gradient.by_sigma_intercept_mm[element]),
             (CURVATURE, sensitivity * v * v),
@@ -336,7 +336,7 @@ fn place(fit: &Fit, contradicting: Vec<(usize, i32)>) -> SensorPose {
         fit.inflation() * fit.covariance[(order[row], order[column])]
     });
     SensorPose {
-        setting: setting(&fit.parameters),
+        placement: placement(&fit.parameters),
         sigma_mm: fit.parameters[SIGMA],
         contradicting,
         covariance,
@@ -347,8 +347,8 @@ fn rest_frames(press: &MeasuredPress) -> usize {
     press.rest.as_ref().map_or(1, |rest| rest.frames)
 }
 
-fn setting(parameters: &[f64]) -> Setting {
-    Setting {
+fn placement(parameters: &[f64]) -> Placement {
+    Placement {
         registration: Registration {
             origin_mm: [parameters[X], parameters[Y]],
             rotation_deg: parameters[ROTATION],
@@ -375,7 +375,7 @@ fn taking_part(readings: &Readings, sound: &[bool], presses: &[&MeasuredPress]) 
         .collect()
 }
 
-/// Derivatives of a position on the sensor, x and y, by the parameters of the setting.
+/// Derivatives of a position on the sensor, x and y, by the parameters of the placement.
 struct Slopes {
     origin: [[f64; 2]; 2],
     rotation_deg: [f64; 2],
@@ -383,14 +383,14 @@ struct Slopes {
 }
 
 impl Slopes {
-    fn of(setting: &Setting, [x, y]: [f64; 2]) -> Self {
-        let (sin, cos) = setting.registration.rotation_deg.to_radians().sin_cos();
-        let [s, c] = [sin, cos].map(|part| part / setting.scale);
+    fn of(placement: &Placement, [x, y]: [f64; 2]) -> Self {
+        let (sin, cos) = placement.registration.rotation_deg.to_radians().sin_cos();
+        let [s, c] = [sin, cos].map(|part| part / placement.scale);
         let turn = 1.0_f64.to_radians();
         Self {
             origin: [[-c, s], [-s, -c]],
             rotation_deg: [y * turn, -x * turn],
-            scale: [-x / setting.scale, -y / setting.scale],
+            scale: [-x / placement.scale, -y / placement.scale],
         }
     }
 }

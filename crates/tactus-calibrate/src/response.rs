@@ -25,9 +25,9 @@ use tactus_model::Covering;
 
 use crate::{
     Estimate, Health,
+    placement::Declared,
     readings::{MeasuredPress, Readings},
     registration::SensorPose,
-    setting::Declared,
 };
 
 use fit::{CentrePress, FittedForm, HeldOutError, fit, heldout};
@@ -118,7 +118,7 @@ pub struct ElementResponse {
 }
 
 impl ElementResponse {
-    /// True if the slope at the surface cannot be told from 0, or the curvature soon dominates it: then the two numbers are
+    /// True if the slope at the surface cannot be distinguished from 0, or the curvature soon dominates it: then the two numbers are
     /// meaningful only together.
     pub fn begins_flat(&self) -> bool {
         let deepest_mm = self.points.iter().map(|[u_mm, _]| u_mm.abs()).fold(0.0, f64::max);
@@ -307,24 +307,31 @@ fn groups(
 ) -> Vec<CentrePress> {
     let mut near: Vec<Vec<CentrePress>> = vec![Vec::new(); readings.elements];
     let Ok(model) = declared.unit_model(chosen_at.sigma_mm) else { return Vec::new() };
-    let Ok(felt_by) = declared.unit_model(place.sigma_mm) else { return Vec::new() };
+    let Ok(prediction_model) = declared.unit_model(place.sigma_mm) else { return Vec::new() };
     let centre_mm = declared.array().centre_mm(0).unwrap_or_default();
-    let mut felt = vec![0.0; readings.elements];
-    let mut felt_at_centre = felt.clone();
+    let mut predicted = vec![0.0; readings.elements];
+    let mut predicted_at_centre = predicted.clone();
     let trusted = |press: &&MeasuredPress| declared.is_reference(press) && chosen_at.admits(press);
     for press in readings.presses.iter().filter(trusted) {
         let (Some(indenter), Some(deepest)) = (declared.indenter(press), press.deepest()) else { continue };
         let covering = Covering { thickness_mm: press.covering_mm };
-        let mut contact = chosen_at.setting.contact(press, deepest, indenter);
-        model.indentation(&contact, covering, &mut felt);
+        let mut contact = chosen_at.placement.contact(press, deepest, indenter);
+        model.indentation(&contact, covering, &mut predicted);
         contact.position_mm = centre_mm;
-        model.indentation(&contact, covering, &mut felt_at_centre);
+        model.indentation(&contact, covering, &mut predicted_at_centre);
         for (element, groups) in near.iter_mut().enumerate() {
             let (Some(signal), Some(noise)) = (signal_of(element), readings.noise_rms_counts[element]) else {
                 continue;
             };
-            if felt[signal] > NEAR * felt_at_centre[0] {
-                groups.extend(CentrePress::of(declared, &felt_by, place, press, [element, signal], noise));
+            if predicted[signal] > NEAR * predicted_at_centre[0] {
+                groups.extend(CentrePress::of(
+                    declared,
+                    &prediction_model,
+                    place,
+                    press,
+                    [element, signal],
+                    noise,
+                ));
             }
         }
     }

@@ -20,10 +20,10 @@ use tactus_model::{Contact, Covering, effect};
 use crate::{
     Estimate,
     order::median,
+    placement::{Declared, coverings_mm, same_covering},
     readings::{Dwell, MeasuredPress, Readings, distinct_places},
     registration::SensorPose,
     response::{Gains, inverted},
-    setting::{Declared, coverings_mm, same_covering},
 };
 
 /// Dwells whose depths differ by less are fitted together.
@@ -210,7 +210,7 @@ impl<'a> SigmaSearch<'a> {
             let norm_mm = norm(&measured);
             if norm_mm > 0.0 {
                 scale(&mut measured, 1.0 / norm_mm);
-                let contact = place.setting.contact(press, dwell, indenter);
+                let contact = place.placement.contact(press, dwell, indenter);
                 search.images.push(PressImage { contact, place_mm: press.place_mm, measured, norm_mm });
             }
         }
@@ -237,7 +237,7 @@ impl<'a> SigmaSearch<'a> {
         let variance = squares * count / (count - 1.0) / (curvature * curvature);
         let fit = SpreadFit {
             covering_mm: group.covering_mm,
-            depth_mm: self.place.setting.surface_mm - group.height_mm,
+            depth_mm: self.place.placement.surface_mm - group.height_mm,
             run: group.presses.first().map(|(press, _)| readings.runs[press.run].clone()).unwrap_or_default(),
             presses: slopes.len(),
             left_out: self.left_out,
@@ -283,15 +283,15 @@ impl<'a> SigmaSearch<'a> {
         // Two images at slightly different sigmas give the image between them and its slope, both to some 1e-8.
         let step_mm = STEP_SHARE * sigma_mm;
         let [less, more] = [sigma_mm - step_mm, sigma_mm + step_mm].map(|sigma_mm| {
-            let mut felt = vec![0.0; self.declared.array().elements()];
+            let mut predicted = vec![0.0; self.declared.array().elements()];
             let press = effect::Load {
                 weight: 1.0,
                 contact: contact.clone(),
                 lean: [0.0; 2],
                 sigma_mm: [sigma_mm; 2],
             };
-            self.declared.model.indentation_of(&press, self.covering, &mut felt);
-            felt
+            self.declared.model.indentation_of(&press, self.covering, &mut predicted);
+            predicted
         });
         let elements = || self.gains.elements.iter().map(|(element, _)| *element);
         let mut modelled: Vec<f64> =
@@ -339,7 +339,7 @@ impl<'a> SigmaSearch<'a> {
                 *along = (self.slope(sigma_mm, image, &contact).by_sigma - slope.by_sigma) / STEP_MM;
             }
             for parameter in 0..3 {
-                let moved = self.place.moved(parameter, STEP_MM).setting.on_sensor(image.place_mm);
+                let moved = self.place.moved(parameter, STEP_MM).placement.on_sensor(image.place_mm);
                 for axis in 0..2 {
                     by_place[parameter] +=
                         along[axis] * (moved[axis] - image.contact.position_mm[axis]) / STEP_MM;

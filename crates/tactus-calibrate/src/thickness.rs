@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use crate::{Estimate, setting::same_covering, spread::Spreads};
+use crate::{Estimate, placement::same_covering, spread::Spreads};
 
 /// A scatter whose p-value is below this is not taken as random.
 pub(crate) const IMPLAUSIBLE: f64 = 1e-3;

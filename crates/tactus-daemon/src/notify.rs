@@ -32,15 +32,15 @@ pub(crate) async fn feed_watchdog(engine: Engine) {
     loop {
         tick.tick().await;
         match watch.judge(Progress::of(&engine), engine.clock().now().mono) {
-            Verdict::Alive => {}
-            Verdict::Recovered => info!("every part of the service goes on again"),
-            Verdict::Hangs(part) => {
+            Liveness::Alive => {}
+            Liveness::Recovered => info!("every part of the service goes on again"),
+            Liveness::Hangs(part) => {
                 error!("{part} does not go on: the stage is stopped");
                 let reason = format!("{part} does not go on");
                 engine.stop(StopOrder { by: "watchdog".into(), reason, abort: false });
                 continue;
             }
-            Verdict::StillHangs(_) => {
+            Liveness::StillHangs(_) => {
                 if systemd.is_some() {
                     tell(&[NotifyState::WatchdogTrigger]);
                 }
@@ -86,7 +86,7 @@ struct Watch {
 
 /// What is known of the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Verdict {
+enum Liveness {
     /// All of them make progress.
     Alive,
     /// They do so again.
@@ -102,7 +102,7 @@ impl Watch {
         Self { start, looked: start, patience, hangs: false }
     }
 
-    fn judge(&mut self, progress: Progress, now: MonoTime) -> Verdict {
+    fn judge(&mut self, progress: Progress, now: MonoTime) -> Liveness {
         if now.since(self.looked) > self.patience / 2 {
             // This look is late itself: the machine gave nobody time, and the parts have had none since.
             self.start = now;
@@ -115,10 +115,10 @@ impl Watch {
             .find(|(_, last)| last.is_some_and(|last| now.since(last.max(self.start)) > self.patience));
         let hung = std::mem::replace(&mut self.hangs, hanging.is_some());
         match (hanging, hung) {
-            (None, false) => Verdict::Alive,
-            (None, true) => Verdict::Recovered,
-            (Some((part, _)), false) => Verdict::Hangs(part),
-            (Some((part, _)), true) => Verdict::StillHangs(part),
+            (None, false) => Liveness::Alive,
+            (None, true) => Liveness::Recovered,
+            (Some((part, _)), false) => Liveness::Hangs(part),
+            (Some((part, _)), true) => Liveness::StillHangs(part),
         }
     }
 }

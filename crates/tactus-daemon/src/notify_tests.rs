@@ -11,7 +11,7 @@ fn everything_at(ms: i64) -> Progress {
 }
 
 /// The verdicts of looks at these times.
-fn verdicts(watch: &mut Watch, progress: Progress, looks_ms: &[i64]) -> Vec<Verdict> {
+fn verdicts(watch: &mut Watch, progress: Progress, looks_ms: &[i64]) -> Vec<Liveness> {
     looks_ms.iter().map(|ms| watch.judge(progress, at_ms(*ms))).collect()
 }
 
@@ -25,10 +25,10 @@ fn each_part_that_hangs_alone_is_named_and_forgiven_only_by_progress() {
     ] {
         let mut watch = Watch::new(at_ms(0), PATIENCE);
         let looks = [250, 500, 750, 1_000, 1_250, 1_500];
-        let mut wanted = vec![Verdict::Alive; 4];
-        wanted.extend([Verdict::Hangs(part), Verdict::StillHangs(part)]);
+        let mut wanted = vec![Liveness::Alive; 4];
+        wanted.extend([Liveness::Hangs(part), Liveness::StillHangs(part)]);
         assert_eq!(verdicts(&mut watch, progress, &looks), wanted);
-        let wanted = [Verdict::Recovered, Verdict::Alive];
+        let wanted = [Liveness::Recovered, Liveness::Alive];
         assert_eq!(verdicts(&mut watch, everything_at(1_700), &[1_750, 2_000]), wanted);
     }
 }
@@ -37,7 +37,7 @@ fn each_part_that_hangs_alone_is_named_and_forgiven_only_by_progress() {
 fn a_part_with_nothing_to_do_does_not_hang() {
     let mut watch = Watch::new(at_ms(0), PATIENCE);
     let idle = Progress { stage: None, recorder: None, ..everything_at(1_500) };
-    assert_eq!(verdicts(&mut watch, idle, &[500, 1_000, 1_500]), [Verdict::Alive; 3]);
+    assert_eq!(verdicts(&mut watch, idle, &[500, 1_000, 1_500]), [Liveness::Alive; 3]);
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn a_look_that_is_late_itself_accuses_nobody() {
     // As after a pause of the whole process: nobody had time for progress.
     let mut watch = Watch::new(at_ms(0), PATIENCE);
     let looks = [250, 10_000, 10_250, 10_500, 10_750, 11_000, 11_250];
-    let mut wanted = vec![Verdict::Alive; 6];
-    wanted.push(Verdict::Hangs("acquisition"));
+    let mut wanted = vec![Liveness::Alive; 6];
+    wanted.push(Liveness::Hangs("acquisition"));
     assert_eq!(verdicts(&mut watch, everything_at(240), &looks), wanted);
 }

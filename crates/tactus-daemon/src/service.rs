@@ -28,7 +28,7 @@ use tactus_bus::{Bus, BusConfig, BusError, Calls, TlsConfig};
 use tactus_device::Clock;
 use tactus_engine::{Engine, EngineError, StopOrder};
 use tactus_log::LogFormat;
-use tactus_runner::config::{Config, ConfigError, RigFiles, TlsSection};
+use tactus_runner::config::{ConfigError, RigFiles, ServiceConfig, TlsSection};
 use tactus_runner::covering_file::CoveringFile;
 use tactus_runner::embedded::Truth;
 use tactus_runner::signals::EndingSignals;
@@ -78,7 +78,7 @@ enum ServiceError {
 /// Runs `tactusd` with the process's arguments.
 pub(crate) fn main() -> ExitCode {
     let options = Options::parse();
-    let config = match Config::load(&options.config) {
+    let config = match ServiceConfig::load(&options.config) {
         Ok(config) => config,
         Err(error) => {
             let _log = tactus_log::start(options.log.unwrap_or_default(), "info");
@@ -87,7 +87,7 @@ pub(crate) fn main() -> ExitCode {
         }
     };
     let _log = tactus_log::start(options.log.unwrap_or(config.log.format), &config.log.filter);
-    let config = Config { recordings: options.recordings.unwrap_or(config.recordings), ..config };
+    let config = ServiceConfig { recordings: options.recordings.unwrap_or(config.recordings), ..config };
     match start(config) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -97,7 +97,7 @@ pub(crate) fn main() -> ExitCode {
     }
 }
 
-fn start(config: Config) -> Result<(), ServiceError> {
+fn start(config: ServiceConfig) -> Result<(), ServiceError> {
     let system = |what| move |source| ServiceError::System { what, source };
     let runtime =
         tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(system("runtime"))?;
@@ -107,7 +107,7 @@ fn start(config: Config) -> Result<(), ServiceError> {
     served
 }
 
-async fn serve(config: Config) -> Result<(), ServiceError> {
+async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     let system = |what| move |source| ServiceError::System { what, source };
     // Before a device is opened, so that no signal leaves the tip where it is.
     let mut signals = EndingSignals::listen().map_err(system("signals"))?;

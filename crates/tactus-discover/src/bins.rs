@@ -24,7 +24,7 @@ const STRETCH_S: f64 = 10.0;
 /// Near the surface, a frame at which the speed of the stage changes by more is ignored: the stage does not start or stop at
 /// once, and between two of its reports the position of the tip is not known.
 const TURN_MM_PER_S: f64 = 1.2;
-/// One press in so many is held out.
+/// One press in this many is held out.
 const HELDOUT_ONE_IN: usize = 3;
 
 /// Bins in order of time, run by run.

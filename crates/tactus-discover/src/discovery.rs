@@ -87,9 +87,9 @@ pub struct Split {
     pub train_presses: usize,
     /// Number of held-out presses.
     pub heldout_presses: usize,
-    /// Greatest depths of which every press was held out.
+    /// Greatest depths at which every press was held out.
     pub heldout_depths_mm: Vec<f64>,
-    /// Covering thicknesses of which every press was held out.
+    /// Covering thicknesses under which every press was held out.
     pub heldout_coverings_mm: Vec<f64>,
 }
 

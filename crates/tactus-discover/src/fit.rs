@@ -98,7 +98,7 @@ impl<'a> Problem<'a> {
         let slow: Vec<f64> = train.iter().enumerate().map(slow).collect();
         let clear = |(bin, weight): (usize, &f64)| if bins.is_clear(frames, bin) { *weight } else { 0.0 };
         let slow_and_clear = slow.iter().enumerate().map(clear).collect();
-        // A single element that is quieter than most cannot be told from rounding.
+        // A single element that is quieter than most cannot be distinguished from rounding.
         let element_weight =
             noise.by_element_counts.iter().map(|rms| rms.max(0.7 * noise.rms_counts).powi(-2)).collect();
         let mut coverings_mm = frames.covering_mm.clone();

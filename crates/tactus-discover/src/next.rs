@@ -64,16 +64,16 @@ const PROPOSALS_MAX: usize = 3;
 /// Assumed size of an effect that was not shown, as a share of the experiment's largest signal.
 const SMALL_SHARE: f64 = 0.02;
 
-/// Data and noise on which proposals are based.
+/// Plans the next experiments from the data and their noise.
 #[derive(Clone, Copy)]
-pub(crate) struct Setting<'a> {
+pub(crate) struct Planner<'a> {
     pub(crate) known: &'a Known,
     /// The data. No design goes deeper or loads faster than they do.
     pub(crate) frames: &'a Frames,
     pub(crate) noise: &'a Noise,
 }
 
-impl Setting<'_> {
+impl Planner<'_> {
     /// For each pair, the experiments that distinguish it: first the one with the greatest share, then shorter ones.
     pub(crate) fn propose(self, pairs: &[Pair]) -> Result<Vec<NextExperiment>, DiscoverError> {
         if pairs.is_empty() {

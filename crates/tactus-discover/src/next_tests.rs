@@ -67,12 +67,12 @@ fn twins(known: &Known, [right, wrong]: [(&'static str, &[(&str, f64)]); 2]) -> 
 /// How well each of the named designs distinguishes twins.
 fn separations<const N: usize>(of: [(&'static str, &[(&str, f64)]); 2], names: [&str; N]) -> [f64; N] {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise };
+    let planner = Planner { known: &known, frames: &frames, noise: &noise };
     let pair = twins(&known, of);
     let designs = DesignSpace::of(&known, &frames).designs();
     names.map(|name| {
         let design = designs.iter().find(|design| design.name == name).unwrap();
-        setting.separation(design, &pair).unwrap().z
+        planner.separation(design, &pair).unwrap().z
     })
 }
 
@@ -122,7 +122,7 @@ fn lost_motion_and_hysteresis_are_distinguished_by_reversals() {
 #[test]
 fn the_greatest_share_comes_first_and_experiments_with_less_are_shorter() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise };
+    let planner = Planner { known: &known, frames: &frames, noise: &noise };
     let pair = twins(
         &known,
         [
@@ -135,9 +135,9 @@ fn the_greatest_share_comes_first_and_experiments_with_less_are_shorter() {
         let design = designs.iter().find(|design| {
             (design.experiment, &design.parameters) == (proposal.experiment, &proposal.parameters)
         });
-        setting.separation(design.unwrap(), &pair).unwrap().share
+        planner.separation(design.unwrap(), &pair).unwrap().share
     };
-    let proposals = setting.propose(std::slice::from_ref(&pair)).unwrap();
+    let proposals = planner.propose(std::slice::from_ref(&pair)).unwrap();
     assert!(!proposals.is_empty() && proposals.len() <= PROPOSALS_MAX);
     assert_eq!(proposals[0].separates, ["imprint", "relaxation"]);
     let shares: Vec<f64> = proposals.iter().map(share).collect();
@@ -148,7 +148,7 @@ fn the_greatest_share_comes_first_and_experiments_with_less_are_shorter() {
     let greatest = of_all
         .iter()
         .filter(|design| shown_by.contains(&design.name))
-        .map(|design| setting.separation(design, &pair).unwrap().share)
+        .map(|design| planner.separation(design, &pair).unwrap().share)
         .fold(0.0, f64::max);
     assert!((shares[0] - greatest).abs() < 1e-12, "{shares:?} of {greatest}");
 }
@@ -156,18 +156,18 @@ fn the_greatest_share_comes_first_and_experiments_with_less_are_shorter() {
 #[test]
 fn nothing_is_proposed_between_an_explanation_and_itself() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise };
+    let planner = Planner { known: &known, frames: &frames, noise: &noise };
     let one = explanation(&known, "relaxation", &[("relaxed_share", 0.1)]);
     let pair = Pair { of: [one.clone(), one], without: Parameters::declared(&known, 1), gain: 100.0 };
-    assert_eq!(setting.propose(&[pair]).unwrap(), []);
+    assert_eq!(planner.propose(&[pair]).unwrap(), []);
 }
 
 #[test]
 fn an_effect_that_the_data_cannot_show_gets_an_experiment_of_its_own() {
     let (known, frames, noise) = (known(), measured(), noise());
-    let setting = Setting { known: &known, frames: &frames, noise: &noise };
+    let planner = Planner { known: &known, frames: &frames, noise: &noise };
     let not_shown = [NotShown { effect: "relaxation", reason: "no depth was held".into() }];
-    let proposals = setting.show(&not_shown, &Parameters::declared(&known, 1)).unwrap();
+    let proposals = planner.show(&not_shown, &Parameters::declared(&known, 1)).unwrap();
     let [one] = &proposals[..] else { panic!("one proposal: {proposals:?}") };
     assert_eq!(
         (one.experiment, one.separates.clone()),

@@ -16,8 +16,8 @@ fn sum(one: &[Vec<f64>], other: &[Vec<f64>]) -> Vec<Vec<f64>> {
     one.iter().zip(other).map(of).collect()
 }
 
-/// Mean square of what the best interpolation leaves of the held-out readings, their noise included: the mean of the process
-/// given the fitted readings, its covariance and the noise's being known.
+/// Mean square of the held-out readings' residuals, noise included, after the best interpolation: the mean of the process given
+/// the fitted readings, with known covariance and noise.
 fn kriging(readings: &[Vec<f64>], heldout: &[bool]) -> f64 {
     let which = |held: bool| (0..readings.len()).filter(|frame| heldout[*frame] == held).collect::<Vec<_>>();
     let (fitted, held) = (which(false), which(true));

@@ -8,7 +8,7 @@ use crate::discovery::{
 };
 use crate::fit::Fitted;
 use crate::locate::Located;
-use crate::next::{Explanation, Pair, Setting};
+use crate::next::{Explanation, Pair, Planner};
 use crate::noise::Noise;
 use crate::predictor::{Parameters, Predictor, Term};
 use crate::prepare::Prepared;
@@ -115,9 +115,9 @@ pub(crate) fn conclude(
             gain: without.cost - grown.cost,
         }));
     }
-    let setting = Setting { known, frames, noise: &prepared.noise };
-    let mut next_experiments = setting.propose(&pairs)?;
-    next_experiments.extend(setting.show(&not_shown, &grown.parameters)?);
+    let planner = Planner { known, frames, noise: &prepared.noise };
+    let mut next_experiments = planner.propose(&pairs)?;
+    next_experiments.extend(planner.show(&not_shown, &grown.parameters)?);
 
     let elements = of_base.elements_rms_counts.iter().zip(&of_grown.elements_rms_counts);
     Ok(Discovery {

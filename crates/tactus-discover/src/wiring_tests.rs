@@ -5,7 +5,7 @@ use tactus_model::Effect;
 use crate::Verdict;
 use crate::fixtures::{ELEMENTS, found, known, measured, processes};
 
-/// The paper's two faulty elements, which answer for a neighbour each, beside effects that are in the way of seeing them.
+/// The paper's two faulty elements, which answer for a neighbour each, beside effects that hide them.
 #[test]
 fn both_of_the_papers_faulty_elements_are_found_beside_other_effects() {
     let known = known();

@@ -11,7 +11,7 @@ use tracing_subscriber::fmt::MakeWriter;
 
 use crate::LogFormat;
 
-/// Longest line, in bytes; the rest is cut off and its length told.
+/// Longest line in bytes. The rest is cut off; the line then ends with its length.
 pub const LINE_MAX_BYTES: usize = 8 << 10;
 
 /// Most bytes that wait for the reader. A line that does not fit is dropped and counted.

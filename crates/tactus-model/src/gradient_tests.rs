@@ -18,7 +18,7 @@ fn model(psf: Psf) -> ForwardModel {
     ForwardModel::new(Array::digitacts(), psf, response).unwrap()
 }
 
-/// A wedge with a slanting underside, so that a mesh's every kind of slice is there.
+/// A wedge with a slanting underside, which has every kind of slice of a mesh.
 fn wedge() -> Indenter {
     let corners = [[-2.0, -1.0, 0.0], [2.0, -1.0, 1.0], [2.0, 1.5, 1.0], [-2.0, 1.5, 0.0]];
     Indenter::Mesh(Arc::new(Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).unwrap()))
@@ -45,7 +45,7 @@ fn image(psf: Psf, contact: &Contact, covering: Covering) -> Vec<f64> {
     counts
 }
 
-/// Central differences: `change` makes the image with a parameter changed by so much.
+/// Central differences: `change` makes the image with a parameter changed by its argument.
 fn assert_derivative(name: &str, got: &[f64], step: f64, change: impl Fn(f64) -> Vec<f64>) {
     let (up, down) = (change(step), change(-step));
     let peak = got.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));

@@ -21,7 +21,7 @@ pub struct Images {
 type Key = [u64; 14];
 
 impl Images {
-    /// A cache of at most so many images. It is cleared when full.
+    /// A cache of at most this many images. It is cleared when full.
     pub fn new(most: usize) -> Self {
         Self { held: Mutex::new(HashMap::new()), most }
     }

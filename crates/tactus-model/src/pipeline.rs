@@ -49,7 +49,7 @@ pub struct Pipeline {
     pressed: Pressed,
     table: Option<PressTable>,
     images: Option<Arc<Images>>,
-    felt_mm: Vec<f64>,
+    signal_mm: Vec<f64>,
     counts: Vec<f64>,
 }
 
@@ -120,7 +120,7 @@ impl Pipeline {
             },
             table: None,
             images: None,
-            felt_mm: vec![0.0; elements],
+            signal_mm: vec![0.0; elements],
             counts: vec![0.0; elements],
             indenter,
             model,
@@ -150,15 +150,15 @@ impl Pipeline {
         let ready = Ready { table: self.table.as_ref(), images: self.images.as_deref() };
         self.pressed.press(&tip, &self.indenter, base, &self.stages, ready);
 
-        for (felt, reached) in self.felt_mm.iter_mut().zip(&self.pressed.reached_mm) {
-            *felt = self.stiffness * reached;
+        for (signal, reached) in self.signal_mm.iter_mut().zip(&self.pressed.reached_mm) {
+            *signal = self.stiffness * reached;
         }
         for effect in &mut self.stages.covering {
-            effect.signal(now, &self.pressed.contact, &mut self.felt_mm);
+            effect.signal(now, &self.pressed.contact, &mut self.signal_mm);
         }
-        self.counts.copy_from_slice(&self.felt_mm);
+        self.counts.copy_from_slice(&self.signal_mm);
         for effect in &self.stages.element {
-            effect.signal(base, &self.felt_mm, &mut self.counts);
+            effect.signal(base, &self.signal_mm, &mut self.counts);
         }
         self.model.respond(&mut self.counts);
         for effect in &self.stages.element {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// Longest line of `log`; the rest is cut off, and its length told.
+/// Longest line of `log` in bytes. The rest is cut off; the line then ends with its length.
 pub const LOG_LINE_MAX_BYTES: usize = 4 << 10;
 
 /// Bounds of one evaluation of a script. `Default` suffices for any experiment. The crate's documentation tells when each

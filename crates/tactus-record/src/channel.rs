@@ -26,7 +26,7 @@ pub(crate) const CHUNK_BYTES: u64 = 256 * 1024;
 /// Name of a protobuf schema's and message's encoding in MCAP.
 pub(crate) const PROTOBUF: &str = "protobuf";
 
-/// Encodes the messages of one run as an MCAP stream, of which it gives out whole records only.
+/// Encodes the messages of one run as an MCAP stream. It gives out whole records only.
 pub(crate) struct ChannelWriter {
     mcap: mcap::Writer<NoSeek<Spool>>,
     closed: Spool,

@@ -32,7 +32,7 @@ impl Unpacker {
         Self { mcap: LinearReader::new_with_options(options) }
     }
 
-    /// The records of a chunk, of which `body` is everything but kind and length. All of them, or the reason why not.
+    /// All records of a chunk, or why they cannot be read. `body` is the chunk without its kind and length.
     pub(crate) fn unpack(&mut self, body: &[u8]) -> Result<Vec<InnerRecord>, String> {
         let records = self.records(body);
         if records.is_err() {

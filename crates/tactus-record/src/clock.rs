@@ -60,7 +60,7 @@ pub struct EpochClock {
     pub delay_p99_ns: i64,
 }
 
-/// Why a connection's ticks say nothing of sampling times; frames are then dated by their arrival.
+/// Why a connection's ticks cannot give sampling times. Its frames are then dated by their arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NoClock {
     /// The device has no clock, or its tick length is unknown.

@@ -109,7 +109,7 @@ pub enum RowsError {
     /// No run may be in two files.
     #[error("{} holds run {run:?}, which was taken already", path.display())]
     RunTwice { path: PathBuf, run: String },
-    /// The stage never said where it was.
+    /// The recording has no position of the stage.
     #[error("{}: no position of the stage was recorded", path.display())]
     NoStage { path: PathBuf },
 }

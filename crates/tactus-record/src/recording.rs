@@ -25,8 +25,8 @@ use crate::{
 /// Each call returns once the message is in the current chunk. A chunk reaches the system when it spans half a second of
 /// message time, so a killed process loses at most that. A [`SyncHandle`] makes it durable.
 ///
-/// If the storage fails, every later call fails, too, and the caller fails the run. What is written nevertheless is kept in
-/// memory as long as the reserve has room for it. [`Recording::finish`] then writes it into the reserve, with the event that
+/// If the storage fails, every later call fails, too, and the caller fails the run. Messages that are written after that
+/// are kept in memory as long as the reserve has room for them. [`Recording::finish`] then writes them into the reserve, with the event that
 /// the run failed, and says what is missing.
 ///
 /// If the recording is dropped unfinished, its file ends with the last chunk, as after a kill.

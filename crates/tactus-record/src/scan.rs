@@ -2,7 +2,7 @@
 //!
 //! After damage the scan looks, byte by byte, for the next record. Lengths that agree with each other make a record
 //! plausible; chunks and attachments must have the right checksum, too. A chunk, attachment or metadata record whose own kind
-//! or length is broken is found by what is in it. Nothing from a chunk with a wrong checksum is given: no message is better
+//! or length is broken is found by its contents. A chunk with a wrong checksum gives no messages: no message is better
 //! than a wrong one.
 
 use std::{
@@ -211,7 +211,7 @@ impl<R: Read> Scan<R> {
         Ok(taken)
     }
 
-    /// Uses a record from within a chunk, whose checksum was right. What is wrong with it was so when it was written.
+    /// Uses a record from within a chunk, whose checksum was right. Whatever is wrong with it was written that way.
     fn inner(&mut self, opcode: u8, body: &[u8]) {
         if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
             return;
@@ -541,7 +541,7 @@ impl<R: Read> Ahead<R> {
         }
     }
 
-    /// Reads on until so many bytes are in memory; false if the file ends before.
+    /// Reads on until this many bytes are in memory; false if the file ends before.
     fn fill(&mut self, bytes: usize) -> io::Result<bool> {
         while self.bytes().len() < bytes {
             if self.ended {

@@ -55,7 +55,7 @@ pub trait SyncHandle: Send {
     /// The system's, or that the recording is not where it was any more.
     fn sync(&mut self) -> Result<(), RecordError>;
 
-    /// Free space, of which the reserve is no part.
+    /// Free space, without the reserve.
     ///
     /// # Errors
     /// The system's.
@@ -207,7 +207,7 @@ fn lock(file: &File) -> io::Result<()> {
     }
 }
 
-/// Makes durable that the file has this name.
+/// Makes the file's name durable: syncs its folder.
 ///
 /// # Errors
 /// The system's.

@@ -27,13 +27,13 @@ pub(crate) fn duration(seconds: f64) -> String {
     if hours > 0.0 { format!("{hours} h {minutes} min") } else { format!("{minutes} min {} s", whole % 60.0) }
 }
 
-/// A number with at most so many decimals, without trailing zeros: `1.016`, `2.54`, `20`.
+/// A number with at most this many decimals, without trailing zeros: `1.016`, `2.54`, `20`.
 pub(crate) fn short(value: f64, decimals: usize) -> String {
     let text = number(value, decimals);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// A number with so many significant digits.
+/// A number with this many significant digits.
 pub(crate) fn digits(value: f64, digits: u32) -> String {
     number(value, decimals(value.abs(), digits))
 }

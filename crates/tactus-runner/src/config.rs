@@ -12,7 +12,7 @@ use crate::order::Texts;
 
 /// The checked configuration, with the rig that it names.
 #[derive(Debug, Clone)]
-pub struct Config {
+pub struct ServiceConfig {
     /// The rig file, with the files that it names.
     pub rig: RigFiles,
     /// Folder of experiment scripts, searched before the built-in ones.
@@ -149,7 +149,7 @@ impl Default for LogSection {
     }
 }
 
-impl Config {
+impl ServiceConfig {
     /// Reads and checks the file, the rig file that it names, and the files that the rig file names. Paths are relative to
     /// the configuration's folder, except `recordings`: that is relative to systemd's state directory if there is one, else
     /// to the working directory.
@@ -190,7 +190,7 @@ impl RigFiles {
     /// A rig that a service can use, from the text of its file. The path of a description of frames is relative to `path`.
     ///
     /// # Errors
-    /// As [`Config::load`].
+    /// As [`ServiceConfig::load`].
     pub fn of(text: &str, path: &Path) -> Result<Self, ConfigError> {
         let rig =
             Rig::from_toml(text).map_err(|source| ConfigError::Rig { path: path.to_owned(), source })?;
@@ -218,7 +218,7 @@ impl RigTexts {
 /// Reads a rig file that a service can use, and the description of its sensor's frames if it names one.
 ///
 /// # Errors
-/// As [`Config::load`].
+/// As [`ServiceConfig::load`].
 pub fn load_rig(path: &Path) -> Result<RigFiles, ConfigError> {
     RigFiles::of(&read(path)?, path)
 }

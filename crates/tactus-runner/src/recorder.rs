@@ -21,12 +21,12 @@ use tactus_record::{RecordError, Recording, Storage, SyncHandle};
 use tactus_schema::{Frame, MonoTime, TimeStamp, pb};
 use tracing::{error, warn};
 
-use backlog::{Backlog, Verdict};
+use backlog::{Backlog, Lag};
 
 /// Capacity of the queue to the disk, in messages. The backlog's age fails a run earlier, except at rates beyond 4 kHz.
 const QUEUE: usize = 4096;
 
-/// Without messages for so long, the current chunk is closed.
+/// Without messages for this time, the current chunk is closed.
 const IDLE: Duration = Duration::from_millis(250);
 
 /// What was written is made durable at least this often, in time of the run: with the disk's time for it, within five seconds.
@@ -259,7 +259,7 @@ impl ThreadRecorder {
         // The result of one recording.
         let (end, ended) = sync_channel(1);
         let sync = recording.sync_handle().map_err(std::io::Error::other)?;
-        // One wish at a time: a second one while the disk is busy would say nothing new.
+        // One request at a time: a second one while the disk is busy would change nothing.
         let (sync_to, wishes) = sync_channel(1);
         let of_sync = gauge.clone();
         thread::Builder::new()
@@ -282,18 +282,18 @@ impl ThreadRecorder {
         if let Some(failure) = self.gauge.failure() {
             return Err(RecordFailure(Box::new(QueueError::Failed(failure))));
         }
-        let verdict = self.backlog.check(self.gauge.written(), now);
+        let lag = self.backlog.check(self.gauge.written(), now);
         self.gauge.show(&self.backlog);
-        match verdict {
-            Verdict::KeepsUp => Ok(()),
-            Verdict::Alarm(age) => {
+        match lag {
+            Lag::KeepsUp => Ok(()),
+            Lag::Alarm(age) => {
                 let (path, messages, age_s) = (&self.path, self.backlog.messages(), age.as_secs_f64());
                 self.gauge.alarm(format!(
                     "the disk is late: {messages} messages wait for {path} since {age_s:.2} s"
                 ));
                 Ok(())
             }
-            Verdict::TooLate(age) => Err(self.late(age)),
+            Lag::TooLate(age) => Err(self.late(age)),
         }
     }
 
@@ -414,7 +414,7 @@ struct Writer<S> {
     recording: Recording<S>,
     gauge: Gauge,
     sync_to: SyncSender<MonoTime>,
-    /// Time of the run at which a sync was last wished for.
+    /// Time of the run at which a sync was last requested.
     wished: Option<MonoTime>,
     at: MonoTime,
 }

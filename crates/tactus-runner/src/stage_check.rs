@@ -12,7 +12,7 @@ use tactus_device::{Clock, Connection, Controller, DrivenStage, SensorCodec, Sta
 use tactus_safety::Supervisor;
 use tactus_schema::Rig;
 use tactus_schema::pb::{StageState, StageStatus};
-use tactus_schema::rig::{Service, StageProtocol, Transport};
+use tactus_schema::rig::{Service, Transport};
 use tactus_virtual::{RigControl, Truth, VirtualRig};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout};
@@ -252,7 +252,7 @@ impl Checking<'_> {
         }
         self.rise().await?;
         for axis in 0..3 {
-            if self.has_axis(axis) {
+            if self.subject.service.stage.protocol.has_axis(axis) {
                 self.there_and_back(axis).await?;
             }
         }
@@ -351,13 +351,6 @@ impl Checking<'_> {
         let state = self.stage.state();
         let report = state.borrow();
         [report.x_mm, report.y_mm, report.z_mm]
-    }
-
-    fn has_axis(&self, axis: usize) -> bool {
-        match &self.subject.service.stage.protocol {
-            StageProtocol::Grbl(_) => true,
-            StageProtocol::Zaber(zaber) => zaber.axes.get(axis).is_some_and(Option::is_some),
-        }
     }
 }
 

@@ -93,7 +93,7 @@ pub fn dry_run(rig: &Rig, mut order: RunOrder, stopped: &dyn Fn() -> bool) -> Re
     thread.join().map_err(|_| TwinError::Panicked)?
 }
 
-/// Returns when the twin's thread has ended. Stops its engine as soon as that is wished, also while a script computes.
+/// Returns when the twin's thread has ended. Once `stopped` is true, it stops the twin's engine, even while a script computes.
 fn stop_when_asked(engines: &Receiver<Engine>, stopped: &dyn Fn() -> bool) {
     let mut twin: Option<Engine> = None;
     loop {

@@ -239,7 +239,7 @@ impl Facet {
         }
     }
 
-    /// Draws into a cell of which some samples may be covered.
+    /// Draws into a cell in which some samples may be covered.
     fn cover(&self, cell: [u16; 2], depths_mm: &mut [f32; SAMPLES]) {
         let [xs, ys] = samples(cell);
         let here_mm = self.depths_mm(cell, [xs, ys]);
@@ -253,7 +253,7 @@ impl Facet {
 
     /// The sides' numbers for the points of a cell.
     ///
-    /// All are integers, as are the sums made of them: exact in `f32` below 2^24, and beyond it far from a side.
+    /// They and their sums are integers. Up to 2^24 an `f32` holds them exactly; greater ones are far from a side.
     fn within(&self, cell: [u16; 2]) -> [[f32; 3]; 3] {
         let [col, row] = cell.map(i32::from);
         // Cut towards zero, so that the neighbour's are the negatives.

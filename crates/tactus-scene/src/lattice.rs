@@ -81,8 +81,8 @@ impl Axis {
         Ok(Self { origin_mm: least_mm, cells, shares_mm: shares_mm.collect(), reaches })
     }
 
-    /// For each column (or row): of which cells of a window something arrives, counted from the window's first,
-    /// and how much of each, in mm.
+    /// For each column (or row): which cells of a window reach it, counted from the window's first, and the share of
+    /// each, in mm.
     pub(crate) fn shares_mm(
         &self,
         first: usize,

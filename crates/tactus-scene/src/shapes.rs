@@ -1,5 +1,5 @@
-//! Generated tools in the tool's frame: z up, the lowest point at z = 0, and the middle of their extent at x = y = 0. All
-//! lengths in mm.
+//! Generated tools in the tool's frame: z is up, the lowest point is at z = 0, and the middle of the extent is at
+//! x = y = 0. All lengths are in mm.
 
 use tactus_model::Mesh;
 
@@ -26,7 +26,7 @@ pub enum Scene {
 pub const SCENES: [Scene; 3] = [Scene::H, Scene::Wrench, Scene::Spaceship];
 
 impl Scene {
-    /// Its name, in lower case: `h`, `wrench` or `spaceship`.
+    /// `h`, `wrench` or `spaceship`.
     pub fn name(self) -> &'static str {
         match self {
             Self::H => "h",
@@ -35,12 +35,12 @@ impl Scene {
         }
     }
 
-    /// The scene of a name.
+    /// The scene with this name, in lower case.
     pub fn named(name: &str) -> Option<Self> {
         SCENES.into_iter().find(|scene| scene.name() == name)
     }
 
-    /// Its tool, all sides of it.
+    /// The closed surface of its tool.
     pub fn surface(self) -> Surface {
         match self {
             Self::H => h(),
@@ -49,7 +49,7 @@ impl Scene {
         }
     }
 
-    /// Its tool as a mesh.
+    /// Its tool, as the model takes it.
     #[expect(
         clippy::missing_panics_doc,
         clippy::expect_used,
@@ -61,15 +61,15 @@ impl Scene {
     }
 }
 
-/// The block letter H as the paper's indenter (Fig. 9): 8 by 10, strokes 2 wide and along y, 10 tall.
+/// The block letter H, the paper's indenter (Fig. 9): 8 by 10, strokes 2 wide and along y, 10 tall.
 pub fn h() -> Surface {
     let right = [[2.0, -1.0], [2.0, -5.0], [4.0, -5.0], [4.0, 5.0], [2.0, 5.0], [2.0, 1.0]];
     let left = right.map(|[x, y]| [-x, -y]);
     extrude(&[right, left].concat(), &[], [0.0, 10.0]).placed()
 }
 
-/// A small wrench lying along y, 15 long and 2 tall: a jaw aslant by 15 degrees above, a ring with a hexagonal
-/// hole below.
+/// A small wrench along y, 15 long and 2 tall: a jaw, slanted by 15 degrees, at the end with greater y, and a ring with a
+/// hexagonal hole at the other end.
 pub fn wrench() -> Surface {
     const HANDLE: f64 = 0.9;
     const RING: f64 = 2.6;
@@ -79,7 +79,7 @@ pub fn wrench() -> Surface {
     let ring = [0.0, -4.9];
     let head = [0.0, 4.3];
 
-    // Where the handle meets the ring and the head, and the slot the head's rim, as angles at their centres.
+    // Angles at which the handle meets the ring and the head, and the slot meets the head's rim.
     let at_ring_deg = libm::asin(HANDLE / RING).to_degrees();
     let at_head_deg = libm::asin(HANDLE / HEAD).to_degrees();
     let at_slot_deg = libm::asin(SLOT / HEAD).to_degrees();
@@ -100,9 +100,9 @@ pub fn wrench() -> Surface {
     extrude(&outer, &hexagon, [0.0, 2.0]).placed()
 }
 
-/// A small starship of our own, 14 long and 10 wide: a flattened hull on a keel, low swept wings with an
-/// engine at either tip, and canards behind the bow, which points along y. Keel, engines, hull and wings
-/// stand at different heights above the plane.
+/// A small starship, 14 long and 10 wide: a flattened hull on a keel, low swept wings with an engine at either tip, and
+/// canards behind the bow, which points along y. The lowest points of keel, engines, hull and wings are at different
+/// heights.
 pub fn spaceship() -> Surface {
     // Profiles are radii along the axis, stern to bow.
     let hull = [
@@ -142,7 +142,7 @@ pub fn spaceship() -> Surface {
         along_y(&hull, 28).map(|[x, y, z]| [x, y, 0.55 * z]),
         ellipsoid([0.7, 2.2, 0.6]).moved([0.0, -0.8, -0.7]),
         ellipsoid([0.6, 1.3, 0.5]).moved([0.0, 2.8, 0.6]),
-        // The outline stands on the plane x = 0.
+        // The outline lies in the plane x = 0.
         extrude(&fin, &[], [-0.12, 0.12]).map(|[x, y, z]| [z, x, y]),
     ];
     let parts = parts.into_iter().chain(both_wings).chain(both_canards).chain(both_engines);

@@ -1,19 +1,19 @@
-//! A finite element model of the covering: layers of bricks on a rigid base, solved exactly, wave by wave.
+//! A finite element model of the covering: layers of bricks on a rigid base, solved exactly in the Fourier domain.
 //!
 //! The covering is a slab of `across x across x layers` trilinear 8-node bricks. Its bottom is bonded to the base,
-//! its top is free, and a vertical force of 1 N presses on the node at the middle of the top, or evenly on a disc
-//! about it. What comes out is what the elements of a sensor would measure: the vertical reaction force at every
-//! node of the bottom (paper, Fig. 3).
+//! its top is free, and a vertical force of 1 N acts on the node in the middle of the top, or evenly on a disc around
+//! it. The result is what the elements of a sensor would measure: the vertical reaction force at every node of the
+//! bottom (paper, Fig. 3).
 //!
-//! The slab's sides stand on rollers: they may slide, but not move outwards. Seen in a mirror at each side, the
-//! slab goes on for ever, with a load every `across` bricks. So the problem is periodic, all bricks are alike, and a
-//! wave of nodal displacements along the slab meets no other wave: a discrete Fourier transform along x and y leaves
-//! for each wave a chain of `layers` equal 6 x 6 matrices. Going down, each layer's upper node is eliminated and its
-//! load is handed on to the node below; what is left at the fixed bottom is the reaction. Nothing is approximated on
-//! this way: up to rounding the result is that of assembling the slab's equations and eliminating all unknowns. A
-//! slab of 100 x 100 x 10 bricks, some 300,000 of them, takes about half a millisecond.
+//! The slab's sides are on rollers: they may slide, but not move outwards. This is the same as an endless slab with a
+//! load every `across` bricks, because each side acts as a mirror. The problem is therefore periodic, all bricks are
+//! equal, and waves of nodal displacements do not affect each other. A discrete Fourier transform along x and y leaves
+//! a chain of `layers` equal 6 x 6 matrices for each wave. From the top down, each layer's upper node is eliminated, and
+//! its load is passed to the node below. The load that arrives at the fixed bottom is the reaction. This is no
+//! approximation: up to rounding, the result is that of assembling the slab's equations and eliminating all unknowns.
+//! A slab of 100 x 100 x 10 bricks, with some 300,000 unknowns, takes about half a millisecond.
 //!
-//! Free sides, as the paper's may have been, would change no force of that slab by more than 0.4 % of the peak.
+//! Free sides, which the paper may have used, would change no force of that slab by more than 0.4 % of the peak.
 //!
 //! The strain energy of a brick, with the strain `e`, its trace `t` and the mean of `t` over the brick, `t0`, is
 //!
@@ -21,8 +21,8 @@
 //! W = integral over the brick of [ mu (e:e - t^2/3) + K t0^2/2 ],    K/mu = 2 (1 + nu) / (3 (1 - 2 nu))
 //! ```
 //!
-//! Taking the mean of the change of volume (mean dilatation, B-bar) keeps the bricks from locking as Poisson's ratio
-//! `nu` nears 0.5; the deviatoric part is integrated in full. Forces depend neither on the modulus nor on the size.
+//! The mean of the volume change (mean dilatation, B-bar) prevents the bricks from locking as Poisson's ratio `nu`
+//! nears 0.5. The deviatoric part is integrated in full. Forces depend neither on the modulus nor on the size.
 //!
 //! ```
 //! use tactus_solid::fem::Bricks;
@@ -88,14 +88,14 @@ pub enum BricksError {
     /// Poisson's ratio is out of range.
     #[error("Poisson's ratio must be in [0, 0.5), not {0}; for an incompressible covering take 0.4999")]
     PoissonRatio(f64),
-    /// The disc is not one, or hangs over the slab's sides.
+    /// The disc's diameter is negative, or greater than the slab's width.
     #[error("a disc on these bricks must have a diameter from 0 to {width_mm} mm, not {diameter_mm}")]
     Disc { diameter_mm: f64, width_mm: f64 },
 }
 
 impl Bricks {
-    /// A slab of cubes: `across x across` bricks in `layers` layers, each with a side in mm, of a Poisson's ratio
-    /// in `[0, 0.5)`.
+    /// A slab of cubes with sides of `side_mm`: `across x across` bricks in `layers` layers. Poisson's ratio must be in
+    /// `[0, 0.5)`.
     ///
     /// # Errors
     /// [`BricksError`] names the number that is out of range.
@@ -103,7 +103,7 @@ impl Bricks {
         Self::new(across, layers, [side_mm, side_mm], poisson_ratio)
     }
 
-    /// As [`cubes`](Self::cubes), of bricks that are flat or tall: `[width_mm, height_mm]`.
+    /// As [`cubes`](Self::cubes), with bricks of any width and height.
     ///
     /// # Errors
     /// [`BricksError`] names the number that is out of range.
@@ -129,9 +129,9 @@ impl Bricks {
         Ok(Self { across, layers, width_mm, height_mm, poisson_ratio, mean_dilatation: true })
     }
 
-    /// With the change of volume taken at every point of a brick (`t` instead of `t0` in `W`), as plain bricks do: the
-    /// C3D8 of `CalculiX`, and perhaps those of the paper. For comparison only, as they lock near a Poisson's ratio of
-    /// 0.5: with 10 layers at 0.49, the force below the load comes out half as high again.
+    /// Takes the volume change at every point of a brick (`t` instead of `t0` in `W`), as plain bricks do: the C3D8 of
+    /// `CalculiX`, and perhaps those of the paper. This is for comparison only, because such bricks lock near a Poisson's
+    /// ratio of 0.5: with 10 layers at 0.49, the force below the load is 1.5 times the true one.
     #[must_use]
     pub fn integrated_in_full(mut self) -> Self {
         self.mean_dilatation = false;
@@ -159,11 +159,11 @@ impl Bricks {
         self.under(&Even { nodes, values: vec![1.0; nodes * nodes] })
     }
 
-    /// Reaction at the base to 1 N spread evenly over a disc about the middle of the top. The bricks' shape functions
+    /// Reaction at the base to 1 N spread evenly over a disc around the middle of the top. The bricks' shape functions
     /// distribute the pressure to the nodes; for a diameter of 0 this is [`under_point`](Self::under_point).
     ///
     /// # Errors
-    /// [`BricksError::Disc`] if the disc hangs over the slab's sides.
+    /// [`BricksError::Disc`] if the diameter is negative or greater than the slab's width.
     pub fn under_disc(&self, diameter_mm: f64) -> Result<Reaction, BricksError> {
         let width_mm = f64::from(self.across) * self.width_mm;
         if !(0.0..=width_mm).contains(&diameter_mm) {
@@ -174,35 +174,35 @@ impl Bricks {
         }
         let radius = diameter_mm / 2.0 / self.width_mm;
         let half = self.half();
-        // A mirror image's disc reaches over to the nodes at the sides.
+        // At a side, the mirror image's disc adds the same force again.
         let discs = |steps: usize| if steps == half { 2.0 } else { 1.0 };
         let force = |x: usize, y: usize| discs(x) * discs(y) * force_of_disc(radius, [x as f64, y as f64]);
         let load = Even::new(half + 1, force);
         Ok(self.under(&load.transformed()))
     }
 
-    /// How much of a load wave arrives at the base: the factor between the vertical forces on the nodes of the top
-    /// and those on the nodes of the bottom, if both vary as `cos(x . wave)` from node to node. `wave` is in
-    /// radians per brick, from `-pi` to `pi`. Even loads arrive in full: `transfer([0.0, 0.0]) = 1`.
+    /// Share of a load wave that arrives at the base: the ratio of the vertical forces on the bottom nodes to those on
+    /// the top nodes, if both vary as `cos(x . wave)` from node to node. `wave` is in radians per brick, from `-pi` to
+    /// `pi`. An even load arrives completely: `transfer([0.0, 0.0]) = 1`.
     ///
-    /// In fine meshes it tends to that of the elastic [`Layer`](crate::layered::Layer::transfer), with the square of
-    /// the brick's side.
+    /// In finer meshes it converges to that of the elastic [`Layer`](crate::layered::Layer::transfer); the error is
+    /// proportional to the square of the brick's side.
     pub fn transfer(&self, wave: [f64; 2]) -> f64 {
         arriving(&self.layer_stiffness(wave), self.layers)
     }
 
     /// Stiffness of one layer of bricks against a wave, in shear moduli times brick widths.
     ///
-    /// Unknowns are the displacements `(u, v, w)` of the upper node and of the lower node, with z down. Sideways
-    /// displacements run a quarter of a wave behind, `-i u`, which makes the matrix real. Along x and y the
-    /// integrals of shape functions and their slopes are then numbers; along z they are 2 x 2 matrices.
+    /// Unknowns are the displacements `(u, v, w)` of the upper node and of the lower node, with z down. Horizontal
+    /// displacements lag by a quarter of a wave (`-i u`), which makes the matrix real. The integrals of shape functions
+    /// and their slopes are then numbers along x and y, and 2 x 2 matrices along z.
     fn layer_stiffness(&self, wave: [f64; 2]) -> [[f64; 6]; 6] {
         let height = self.height_mm / self.width_mm;
         let bulk = 2.0 * (1.0 + self.poisson_ratio) / (3.0 * (1.0 - 2.0 * self.poisson_ratio));
         // The factors of t0 t0 and of t t.
         let (mean, point) = if self.mean_dilatation { (bulk, -2.0 / 3.0) } else { (0.0, bulk - 2.0 / 3.0) };
 
-        // Shape by shape, slope by slope, slope by shape.
+        // Integrals of shape times shape, slope times slope, slope times shape.
         let [mx, my] = wave.map(|wave| (2.0 + cos(wave)) / 3.0);
         let [sx, sy] = wave.map(|wave| 2.0 * (1.0 - cos(wave)));
         let [gx, gy] = wave.map(sin);
@@ -253,7 +253,7 @@ impl Bricks {
     fn under(&self, load: &Even) -> Reaction {
         let step = 2.0 * PI / f64::from(self.across);
         let transfer = |x: usize, y: usize| self.transfer([x, y].map(|waves| step * waves as f64));
-        // x and y are alike.
+        // x and y are interchangeable.
         let transfer = Even::new(load.nodes, |x, y| if x < y { 0.0 } else { transfer(x, y) });
         let nodes = f64::from(self.across * self.across);
         let waves = Even::new(load.nodes, |x, y| transfer.at(x.max(y), x.min(y)) * load.at(x, y) / nodes);
@@ -265,14 +265,14 @@ impl Bricks {
     }
 }
 
-/// What arrives at the fixed bottom of a chain of equal layers of a load of 1 on the top node's `w`.
+/// Vertical force at the fixed bottom of a chain of equal layers, under a vertical force of 1 on the top node.
 ///
-/// Gauss elimination down the chain: a node's equations hold what the layers above it make of its stiffness and of
-/// the load.
+/// This is Gauss elimination down the chain: the equations of a node include the stiffness and the load that the layers
+/// above it contribute.
 fn arriving(layer: &[[f64; 6]; 6], layers: u32) -> f64 {
     let (mut stiffness, mut load) = ([[0.0; 3]; 3], [0.0, 0.0, 1.0]);
     for _ in 0..layers {
-        // The upper node's equations, then the lower node's; the load stands last.
+        // The upper node's equations, then the lower node's; the last column is the load.
         let mut rows = [[0.0; 7]; 6];
         for (row, layer) in rows.iter_mut().zip(layer) {
             row[..6].copy_from_slice(layer);

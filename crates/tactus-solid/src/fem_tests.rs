@@ -182,12 +182,12 @@ fn the_stated_accuracy_of_the_papers_meshes_holds() {
             let reaction = Bricks::cubes(10 * layers, layers, 1.0 / f64::from(layers), poisson_ratio)
                 .unwrap()
                 .under_point();
-            let imprint = bonded(poisson_ratio).under_point();
+            let pressure = bonded(poisson_ratio).under_point();
             let off = (0..=3 * layers).map(|steps| {
-                let solved = imprint.pressure_per_mm2(f64::from(steps) / f64::from(layers));
+                let solved = pressure.pressure_per_mm2(f64::from(steps) / f64::from(layers));
                 (reaction.pressure_per_mm2([steps, 0]) - solved).abs()
             });
-            let worst = off.fold(0.0, f64::max) / imprint.pressure_per_mm2(0.0);
+            let worst = off.fold(0.0, f64::max) / pressure.pressure_per_mm2(0.0);
             assert!((0.95 * stated..stated).contains(&worst), "{layers}, nu {poisson_ratio}: {worst}");
         }
     }

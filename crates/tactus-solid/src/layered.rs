@@ -106,13 +106,13 @@ impl Layer {
     }
 
     /// Pressure at the base under 1 N at a point.
-    pub fn under_point(&self) -> Imprint {
+    pub fn under_point(&self) -> BasePressure {
         self.under_disc(0.0)
     }
 
     /// Pressure at the base under 1 N spread evenly over a disc of this diameter.
-    pub fn under_disc(&self, diameter_mm: f64) -> Imprint {
-        Imprint { layer: *self, radius: diameter_mm.abs() / 2.0 / self.thickness_mm }
+    pub fn under_disc(&self, diameter_mm: f64) -> BasePressure {
+        BasePressure { layer: *self, radius: diameter_mm.abs() / 2.0 / self.thickness_mm }
     }
 
     /// Standard deviation of the Gaussian that fits the pressure under a point best, in mm.
@@ -131,13 +131,13 @@ impl Layer {
 
 /// The pressure at the base under a unit force, about the force's axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Imprint {
+pub struct BasePressure {
     layer: Layer,
     /// Of the disc, in thicknesses.
     radius: f64,
 }
 
-impl Imprint {
+impl BasePressure {
     /// `p(r)`: pressure at a distance from the load's axis, in N/mm^2 for each N.
     ///
     /// Accurate to about 1e-11 of the pressure below the load.

@@ -23,9 +23,9 @@ const SOLVED: [(f64, [f64; 7]); 3] = [
 #[test]
 fn the_pressure_is_that_of_the_boundary_conditions_solved() {
     for (poisson_ratio, solved) in SOLVED {
-        let imprint = bonded(poisson_ratio).under_point();
+        let pressure = bonded(poisson_ratio).under_point();
         for (distance, solved) in AT.into_iter().zip(solved) {
-            let found = imprint.pressure_per_mm2(distance);
+            let found = pressure.pressure_per_mm2(distance);
             assert!(
                 (found - solved).abs() < 0.6e-5,
                 "nu {poisson_ratio}, r {distance}: {found} for {solved}"
@@ -59,26 +59,26 @@ fn the_transfer_is_the_stated_quotient() {
 #[test]
 fn all_of_the_force_arrives() {
     for layer in [bonded(0.3), bonded(0.49), bonded(0.5), sliding()] {
-        for imprint in [layer.under_point(), layer.under_disc(1.5)] {
-            let all = imprint.force_within(39.0);
+        for pressure in [layer.under_point(), layer.under_disc(1.5)] {
+            let all = pressure.force_within(39.0);
             assert!((all - 1.0).abs() < 1e-11, "{layer:?}: {all}");
         }
     }
     // A rectangle gets more than the circle in it, and less than the circle around it.
-    let imprint = bonded(0.45).under_disc(1.5);
-    let force = imprint.force_on([[-6.0, 8.0], [-7.0, 6.0]]);
-    let [inner, outer] = [6.0, 8.0_f64.hypot(7.0)].map(|distance_mm| imprint.force_within(distance_mm));
+    let pressure = bonded(0.45).under_disc(1.5);
+    let force = pressure.force_on([[-6.0, 8.0], [-7.0, 6.0]]);
+    let [inner, outer] = [6.0, 8.0_f64.hypot(7.0)].map(|distance_mm| pressure.force_within(distance_mm));
     assert!(inner < force && force < outer && outer - inner < 1e-2, "{inner} < {force} < {outer}");
 }
 
 #[test]
 fn the_force_on_a_rectangle_is_the_integral_of_the_pressure() {
     let layer = Layer::new(1.016, 0.45, BaseContact::Bonded).unwrap();
-    for imprint in [layer.under_point(), layer.under_disc(1.0)] {
+    for pressure in [layer.under_point(), layer.under_disc(1.0)] {
         for [x, y] in [[[-0.9, 0.9], [-0.9, 0.9]], [[1.1, 2.9], [-0.9, 0.9]], [[-0.3, 1.5], [0.2, 2.0]]] {
-            let column = |x: f64| integrate(y, 0.5, |y| imprint.pressure_per_mm2(x.hypot(y)));
+            let column = |x: f64| integrate(y, 0.5, |y| pressure.pressure_per_mm2(x.hypot(y)));
             let direct = integrate(x, 0.5, column);
-            let found = imprint.force_on([x, y]);
+            let found = pressure.force_on([x, y]);
             assert!((found - direct).abs() < 1e-10, "{x:?} {y:?}: {found} for {direct}");
         }
     }
@@ -86,13 +86,13 @@ fn the_force_on_a_rectangle_is_the_integral_of_the_pressure() {
 
 #[test]
 fn mirrored_rectangles_get_equal_forces() {
-    let imprint = bonded(0.45).under_disc(1.0);
+    let pressure = bonded(0.45).under_disc(1.0);
     let [x, y] = [[0.2, 2.0], [-0.4, 1.4]];
-    let force = imprint.force_on([x, y]);
+    let force = pressure.force_on([x, y]);
     for other in [[x.map(|x| -x), y], [x, y.map(|y| -y)], [y, x]] {
         let [[a, b], [c, d]] = other;
         let other = [[a.min(b), a.max(b)], [c.min(d), c.max(d)]];
-        assert!((imprint.force_on(other) - force).abs() < 1e-12);
+        assert!((pressure.force_on(other) - force).abs() < 1e-12);
     }
 }
 

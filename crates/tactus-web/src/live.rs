@@ -101,7 +101,7 @@ impl Live {
         answers.map_err(in_words)?.iter().try_for_each(done)
     }
 
-    /// Sends a command that wants the lease, which is held for it; with a reason it is taken over.
+    /// Sends a command that needs the lease. Takes the lease for it; given a reason, takes it over if another client holds it.
     ///
     /// # Errors
     /// What keeps the rig from doing it.

@@ -91,7 +91,7 @@ fn views<H>(live: &Live, held: H) -> impl Stream<Item = Result<Event, Infallible
     })
 }
 
-/// A stop, which wants neither the token nor the lease.
+/// A stop, which needs neither the token nor the lease.
 async fn stop(State(Shared { live, .. }): State<Shared>) -> Response {
     match live.stop().await {
         Ok(()) => StatusCode::NO_CONTENT.into_response(),
@@ -99,7 +99,7 @@ async fn stop(State(Shared { live, .. }): State<Shared>) -> Response {
     }
 }
 
-/// A command that wants the lease: 401 without the token, 423 if another client holds the lease.
+/// A command that needs the lease: 401 without the token, 423 if another client holds the lease.
 async fn command(
     State(Shared { live, token, .. }): State<Shared>,
     Path(name): Path<String>,

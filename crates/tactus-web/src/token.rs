@@ -1,4 +1,4 @@
-//! The token that goes with each command, except a stop: who may command the rig is told it, whoever else reaches the page is not.
+//! The token of the page's address. Every command needs it, except a stop. Only those who may command the rig get it.
 
 use std::fmt::{self, Write as _};
 use std::fs::{self, File, OpenOptions};

@@ -48,7 +48,7 @@ pub trait Device: Send {
 
 /// A fault of the cable, or of the device at its end.
 #[derive(Debug, Clone, Copy)]
-pub enum InjectedFault<F> {
+pub enum CabledFault<F> {
     /// Of the cable.
     Cable(CableFault),
     /// Of the device.
@@ -116,7 +116,7 @@ impl Port {
 pub async fn run<D: Device>(
     mut device: D,
     mut port: Port,
-    mut faults: mpsc::Receiver<InjectedFault<D::Fault>>,
+    mut faults: mpsc::Receiver<CabledFault<D::Fault>>,
 ) -> io::Result<()> {
     let mut link = Link::Waiting;
     let mut buffer = [0; 1024];
@@ -149,12 +149,12 @@ pub async fn run<D: Device>(
                 link = Link::Waiting;
                 device.plugged_in(now);
             }
-            CableEvent::Fault(InjectedFault::Device(fault)) => device.fault(fault, now),
-            CableEvent::Fault(InjectedFault::Cable(CableFault::Disconnect(duration))) => {
+            CableEvent::Fault(CabledFault::Device(fault)) => device.fault(fault, now),
+            CableEvent::Fault(CabledFault::Cable(CableFault::Disconnect(duration))) => {
                 link = Link::Out(now + duration);
                 port.unplug();
             }
-            CableEvent::Fault(InjectedFault::Cable(CableFault::Renumber)) => {
+            CableEvent::Fault(CabledFault::Cable(CableFault::Renumber)) => {
                 link = Link::Out(now);
                 port.move_away()?;
             }
@@ -175,7 +175,7 @@ enum CableEvent<F> {
     Bytes(usize),
     Closed,
     Replugged,
-    Fault(InjectedFault<F>),
+    Fault(CabledFault<F>),
 }
 
 /// Waits for a host, its bytes, its end, or the time to plug in again. Cancel-safe.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 
-use crate::cable::InjectedFault;
-use crate::faults::{Fault, FaultError, FaultScript, RigFault, SensorFault, StageFault};
+use crate::cable::CabledFault;
+use crate::faults::{FaultError, FaultScript, InjectedFault, RigFault, SensorFault, StageFault};
 use crate::truth::Truth;
 use crate::world::SharedWorld;
 
@@ -21,17 +21,17 @@ const FAULTS_WAITING: usize = 64;
 pub struct RigControl {
     world: SharedWorld,
     started: Instant,
-    sensor: mpsc::Sender<InjectedFault<SensorFault>>,
-    stage: mpsc::Sender<InjectedFault<StageFault>>,
+    sensor: mpsc::Sender<CabledFault<SensorFault>>,
+    stage: mpsc::Sender<CabledFault<StageFault>>,
 }
 
 /// The receiving ends of the injected faults.
 #[derive(Debug)]
 pub struct FaultReceivers {
     /// For the sensor and its cable.
-    pub sensor: mpsc::Receiver<InjectedFault<SensorFault>>,
+    pub sensor: mpsc::Receiver<CabledFault<SensorFault>>,
     /// For the stage and its cable.
-    pub stage: mpsc::Receiver<InjectedFault<StageFault>>,
+    pub stage: mpsc::Receiver<CabledFault<StageFault>>,
 }
 
 impl RigControl {
@@ -45,24 +45,24 @@ impl RigControl {
     ///
     /// # Errors
     /// [`FaultError::Element`] for an element that the array does not have; [`FaultError::NotTaken`].
-    pub fn inject(&self, fault: Fault) -> Result<(), FaultError> {
+    pub fn inject(&self, fault: InjectedFault) -> Result<(), FaultError> {
         match fault {
-            Fault::Sensor(fault) => {
+            InjectedFault::Sensor(fault) => {
                 self.check_element(fault)?;
-                send(&self.sensor, InjectedFault::Device(fault))
+                send(&self.sensor, CabledFault::Device(fault))
             }
-            Fault::SensorCable(fault) => send(&self.sensor, InjectedFault::Cable(fault)),
-            Fault::Stage(fault) => send(&self.stage, InjectedFault::Device(fault)),
-            Fault::StageCable(fault) => send(&self.stage, InjectedFault::Cable(fault)),
-            Fault::Rig(RigFault::Covering { thickness_mm }) => {
+            InjectedFault::SensorCable(fault) => send(&self.sensor, CabledFault::Cable(fault)),
+            InjectedFault::Stage(fault) => send(&self.stage, CabledFault::Device(fault)),
+            InjectedFault::StageCable(fault) => send(&self.stage, CabledFault::Cable(fault)),
+            InjectedFault::Rig(RigFault::Covering { thickness_mm }) => {
                 self.set_covering_mm(thickness_mm);
                 Ok(())
             }
-            Fault::Rig(RigFault::Surface { z_mm }) => {
+            InjectedFault::Rig(RigFault::Surface { z_mm }) => {
                 self.world.lock().set_surface_mm(z_mm, Instant::now());
                 Ok(())
             }
-            Fault::Rig(RigFault::Stiffness(factor)) => {
+            InjectedFault::Rig(RigFault::Stiffness(factor)) => {
                 self.world.lock().set_stiffness(factor);
                 Ok(())
             }
@@ -146,6 +146,6 @@ impl RigControl {
     }
 }
 
-fn send<F>(faults: &mpsc::Sender<InjectedFault<F>>, fault: InjectedFault<F>) -> Result<(), FaultError> {
+fn send<F>(faults: &mpsc::Sender<CabledFault<F>>, fault: CabledFault<F>) -> Result<(), FaultError> {
     faults.try_send(fault).map_err(|_| FaultError::NotTaken)
 }

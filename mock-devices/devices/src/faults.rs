@@ -12,9 +12,9 @@ pub use parse::FaultError;
 pub use parse::duration;
 pub use script::{FaultScript, FaultScriptError, TimedFault};
 
-/// A fault, or a change that the service is not told of.
+/// A fault to inject, or a change that is hidden from the service.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Fault {
+pub enum InjectedFault {
     /// In the sensor, or between it and the host.
     Sensor(SensorFault),
     /// Of the sensor's cable, which also powers the sensor.
@@ -36,16 +36,16 @@ pub enum CableFault {
     Renumber,
 }
 
-/// A way of a device's link.
+/// Direction of bytes on a device's link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum LinkDirection {
     /// `to-stage`, `to-sensor`: what the host sends.
     FromHost,
     /// `from-stage`, `from-sensor`: what the device sends.
     FromDevice,
 }
 
-/// Faults of the bytes on one way of a link. A chunk is what is sent at once: a line, a frame, a query.
+/// Faults of the bytes in one direction of a link. A chunk is what is sent at once: a line, a frame, a query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WireFault {
     /// `lose 2s`: what is sent in this time is lost.
@@ -91,7 +91,7 @@ pub enum SensorFault {
     /// `zeros 60`: from the next time it is plugged in, every reading is higher by this many counts.
     Zeros(u16),
     /// Of the bytes on its link.
-    Wire(Way, WireFault),
+    Wire(LinkDirection, WireFault),
     /// `clear`: ends lasting faults.
     Clear,
 }
@@ -133,7 +133,7 @@ pub enum StageFault {
     /// `echo-garbage`: sends every line back, followed by garbage.
     EchoGarbage,
     /// Of the bytes on its link.
-    Wire(Way, WireFault),
+    Wire(LinkDirection, WireFault),
     /// `stall 2s`: the controller neither receives nor sends for this time; motion continues.
     Stall(Duration),
     /// `clear`: ends lasting faults.
@@ -167,7 +167,7 @@ pub enum ControllerFault {
     HomingFails,
 }
 
-/// Changes of the world that the service is not told of.
+/// Changes of the rig that are hidden from the service.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RigFault {
     /// `covering 2.54`: another covering, in mm.

@@ -16,7 +16,7 @@ use tactus_wire::weiss::{BOOT_MESSAGE, CommandError, ErrorCode, HostCommand, ack
 use tokio::time::Instant;
 
 use crate::cable::Device;
-use crate::faults::{SensorFault, Way};
+use crate::faults::{LinkDirection, SensorFault};
 use crate::outbox::Outbox;
 use crate::truth::RandomStream;
 use crate::wire::Wire;
@@ -292,8 +292,8 @@ impl Device for VirtualSensor {
             }
             SensorFault::Freeze(duration) => self.frozen_until = Some(now + duration),
             SensorFault::Zeros(counts) => self.next_zeros_counts = counts,
-            SensorFault::Wire(Way::FromHost, fault) => self.heard.arm(fault, now),
-            SensorFault::Wire(Way::FromDevice, fault) => self.said.arm(fault, now),
+            SensorFault::Wire(LinkDirection::FromHost, fault) => self.heard.arm(fault, now),
+            SensorFault::Wire(LinkDirection::FromDevice, fault) => self.said.arm(fault, now),
             SensorFault::Clear => {
                 self.overridden.clear();
                 self.frozen_until = None;

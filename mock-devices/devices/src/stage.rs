@@ -14,7 +14,7 @@ use tactus_schema::rig::StageProtocol;
 use tokio::time::Instant;
 
 use crate::cable::Device;
-use crate::faults::{ControllerFault, StageFault, Way};
+use crate::faults::{ControllerFault, LinkDirection, StageFault};
 use crate::truth::RandomStream;
 use crate::wire::Wire;
 use crate::world::SharedWorld;
@@ -175,8 +175,8 @@ impl Device for VirtualStage {
     fn fault(&mut self, fault: StageFault, now: Instant) {
         match fault {
             StageFault::Controller(fault) => self.controller.fault(fault, now),
-            StageFault::Wire(Way::FromHost, fault) => self.heard.arm(fault, now),
-            StageFault::Wire(Way::FromDevice, fault) => self.said.arm(fault, now),
+            StageFault::Wire(LinkDirection::FromHost, fault) => self.heard.arm(fault, now),
+            StageFault::Wire(LinkDirection::FromDevice, fault) => self.said.arm(fault, now),
             StageFault::EchoGarbage => self.echoes = true,
             StageFault::Stall(duration) => {
                 self.hung_until = Some(now + duration.max(Duration::from_millis(1)));

@@ -149,7 +149,7 @@ async fn take_care(host_side: OwnedFd, mut hosts: pipe::Receiver, has_host: Arc<
     }
 }
 
-/// Size of an inotify event of a watched file: four words, of which the second is the mask.
+/// Size of an inotify event of a watched file: four words; the second is the mask.
 const EVENT_BYTES: usize = 16;
 
 fn is_opening(event: &[u8; EVENT_BYTES]) -> bool {

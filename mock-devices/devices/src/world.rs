@@ -59,8 +59,8 @@ impl World {
         let by_axis = match &truth.stage_protocol {
             StageProtocol::Grbl(_) => None,
             // A missing axis stays at 0.
-            StageProtocol::Zaber(zaber) => Some(std::array::from_fn(|axis| {
-                let at_mm = if zaber.axes[axis].is_some() { tip_mm[axis] } else { 0.0 };
+            StageProtocol::Zaber(_) => Some(std::array::from_fn(|axis| {
+                let at_mm = if truth.stage_protocol.has_axis(axis) { tip_mm[axis] } else { 0.0 };
                 Motion::at_rest([0.0; 3], on_axis(axis, at_mm), acceleration_mm_per_s2)
             })),
         };

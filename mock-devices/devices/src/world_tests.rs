@@ -84,9 +84,9 @@ fn a_miswired_element_answers_for_its_neighbour() {
     let at = put(&mut world, down_mm, Instant::now());
     let gains = world.truth().model.response().sensitivity_counts_per_mm.clone();
     let image = world.image(at);
-    let felt = |element: usize| (image[element] - 100.0) / gains[element];
-    assert!((felt(18) - felt(19)).abs() < 1e-9, "18 gives the signal of 19 by its own gain");
-    assert!(felt(20) < 0.9 * felt(19));
+    let signal = |element: usize| (image[element] - 100.0) / gains[element];
+    assert!((signal(18) - signal(19)).abs() < 1e-9, "18 gives the signal of 19 by its own gain");
+    assert!(signal(20) < 0.9 * signal(19));
 }
 
 #[test]

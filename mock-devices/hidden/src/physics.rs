@@ -23,7 +23,7 @@ use tactus_model::{Path, Simulator};
 pub struct Definition {
     /// Unique.
     pub id: &'static str,
-    /// The effect of the library of which it is an instance; `None` if there is none.
+    /// The library's effect that it is an instance of; `None` if there is none.
     pub effect: Option<&'static str>,
     /// What it does: equation and source.
     pub about: &'static str,

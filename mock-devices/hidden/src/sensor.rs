@@ -31,19 +31,19 @@ pub struct HiddenSensor {
     longest_step_s: f64,
     last_s: Option<f64>,
     now: Option<Now>,
-    imprint: Option<Imprint>,
+    cached: Option<CachedImage>,
     counts: Vec<f64>,
 }
 
 /// The image of a cylinder, kept while only its depth changes.
 #[derive(Debug)]
-struct Imprint {
+struct CachedImage {
     point_mm: [f64; 2],
     tool: Tool,
     image: Kept,
 }
 
-impl Imprint {
+impl CachedImage {
     /// True if it was made for exactly this place and tool, to the bit.
     fn touches(&self, point_mm: [f64; 2], tool: &Tool) -> bool {
         let is_same = |one: [f64; 2], other: [f64; 2]| one.map(f64::to_bits) == other.map(f64::to_bits);
@@ -92,7 +92,7 @@ impl HiddenSensor {
             longest_step_s: if is_fine { FINE_STEP_S } else { f64::INFINITY },
             last_s: None,
             now: None,
-            imprint: None,
+            cached: None,
             stiffness: 1.0,
             counts: vec![0.0; elements],
         }
@@ -106,9 +106,9 @@ impl HiddenSensor {
     /// Rewires elements. Each entry is an element, the element whose indentation it gets, and the share of it.
     pub fn wire(&mut self, wiring: Vec<(usize, usize, f64)>) {
         self.hooks.push(PipelineHook::Covering(Box::new(move |_, indentation_mm| {
-            let felt_mm = indentation_mm.to_vec();
+            let before_mm = indentation_mm.to_vec();
             for (element, answers_for, share) in &wiring {
-                indentation_mm[*element] = share * felt_mm[*answers_for];
+                indentation_mm[*element] = share * before_mm[*answers_for];
             }
         })));
     }
@@ -116,7 +116,7 @@ impl HiddenSensor {
     /// Puts another covering in place, without history.
     pub fn set_covering(&mut self, covering: Covering) {
         self.base.covering = covering;
-        self.imprint = None;
+        self.cached = None;
         for (hook, dose) in self.hooks.iter_mut().zip(&self.doses) {
             if let PipelineHook::Covering(_) | PipelineHook::Tool(_) = hook {
                 *hook = (dose.physics.make)(&mut Knobs::new(dose, &self.base, self.run));
@@ -261,10 +261,10 @@ impl HiddenSensor {
         };
         // A cylinder cannot go deeper than the covering is thick.
         let depth_mm = depth_mm.min(self.base.covering.thickness_mm);
-        let kept = self.imprint.take().filter(|kept| kept.touches(point_mm, &tool));
-        let imprint =
-            kept.unwrap_or_else(|| Imprint { point_mm, tool, image: self.imprint_of(point_mm, &tool) });
-        match &imprint.image {
+        let kept = self.cached.take().filter(|kept| kept.touches(point_mm, &tool));
+        let cached =
+            kept.unwrap_or_else(|| CachedImage { point_mm, tool, image: self.image_of(point_mm, &tool) });
+        match &cached.image {
             Kept::Declared { depth_mm: of_depth_mm, indentation_mm } => {
                 for (value, image_mm) in self.counts.iter_mut().zip(indentation_mm) {
                     *value = image_mm * (depth_mm / of_depth_mm);
@@ -272,10 +272,10 @@ impl HiddenSensor {
             }
             Kept::Changed(face) => face.indentation(depth_mm, &mut self.counts),
         }
-        self.imprint = Some(imprint);
+        self.cached = Some(cached);
     }
 
-    fn imprint_of(&mut self, point_mm: [f64; 2], tool: &Tool) -> Kept {
+    fn image_of(&mut self, point_mm: [f64; 2], tool: &Tool) -> Kept {
         if *tool != self.tool() {
             return Kept::Changed(Face::new(&self.base.model, point_mm, tool));
         }

@@ -13,7 +13,7 @@ use tactus_log::LogFormat;
 use tactus_model::Array;
 use tactus_schema::Rig;
 use tactus_virtual::cable::{self, Port};
-use tactus_virtual::faults::{Fault, FaultScript};
+use tactus_virtual::faults::{FaultScript, InjectedFault};
 use tactus_virtual::{RigControl, Started, TerminalPort, Truth, TruthFile, simulation_of, start_devices};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
@@ -162,7 +162,9 @@ async fn serve(args: RigArgs) -> Result<()> {
     devices.spawn(cable::run(started.sensor, Port::Terminal(sensor_port), started.faults.sensor));
     devices.spawn(cable::run(started.stage, Port::Terminal(stage_port), started.faults.stage));
     until_terminated(termination, &mut devices, &control, &script, async |line| {
-        line.parse::<Fault>().and_then(|fault| control.inject(fault)).map_err(|error| error.to_string())
+        line.parse::<InjectedFault>()
+            .and_then(|fault| control.inject(fault))
+            .map_err(|error| error.to_string())
     })
     .await?;
     devices.shutdown().await;

@@ -3,11 +3,10 @@
 use std::fs;
 use std::io::{self, Write};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use serde_json::json;
 use tactus_hidden::{CATALOGUE, Definition};
 use tactus_sets::{Amount, Content, Label, NoiseKind, Plan, Recipe};
@@ -20,7 +19,7 @@ pub(crate) struct HiddenArgs {
 
 #[derive(Debug, Subcommand)]
 enum HiddenCommand {
-    /// Lists all physics: id, the library's effect of which it is an instance, what it does.
+    /// Lists all physics: id, the library's effect that it is an instance of, what it does.
     List {
         /// As JSON.
         #[arg(long)]
@@ -109,23 +108,7 @@ impl MakeArgs {
         for folder in [&self.out, &self.sealed] {
             fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         }
-        let next = AtomicUsize::new(0);
-        let work = || -> Result<()> {
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                if index >= self.count {
-                    return Ok(());
-                }
-                self.make(index)?;
-            }
-        };
-        let threads = thread::available_parallelism().map_or(1, usize::from).min(self.count.max(1));
-        thread::scope(|scope| {
-            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-            workers
-                .into_iter()
-                .try_for_each(|worker| worker.join().map_err(|_| anyhow!("a worker panicked"))?)
-        })
+        (0..self.count).into_par_iter().try_for_each(|index| self.make(index))
     }
 
     fn make(&self, index: usize) -> Result<()> {
@@ -166,7 +149,7 @@ impl MakeArgs {
     }
 }
 
-/// Warns if a separation was out of reach. Only the label says of which physics.
+/// Warns if a separation was out of reach. Only the label names the physics.
 fn warn_of_unreached(label: &Label) -> Result<()> {
     let mut err = io::stderr().lock();
     for _ in label.physics.iter().filter(|dosed| !dosed.reached) {

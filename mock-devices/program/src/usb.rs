@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 use tactus_device::SensorCodec;
 use tactus_usbip::{BackingDevice, FunctionKind, Identity, Order, Plug, PlugCommand, REPORT_BYTES_MAX, Vhci};
-use tactus_virtual::faults::{Fault, FaultError, LinkFault, SensorFault};
+use tactus_virtual::faults::{FaultError, InjectedFault, LinkFault, SensorFault};
 use tactus_virtual::{RigControl, Started};
 use tactus_wire::declared::{Format, RawFormat};
 use tokio::sync::{mpsc, oneshot};
@@ -87,9 +87,10 @@ impl UsbArgs {
             bail!("nothing to plug in: give --sensor, --stage or both");
         }
         let source = self.source_speaking()?;
-        let format = match source.codec() {
-            SensorCodec::Declared { format } => Some(Arc::clone(format)),
-            SensorCodec::WeissDsa { .. } | SensorCodec::SingleTact { .. } | SensorCodec::AnySkin => None,
+        let format = if let SensorCodec::Declared { format } = source.codec() {
+            Some(Arc::clone(format))
+        } else {
+            None
         };
         let vhci = Vhci::open()?;
         let termination = Termination::listen()?;
@@ -228,8 +229,8 @@ async fn execute(
         target.orders.send(order).await.map_err(|_| "the device has ended".to_owned())?;
         return outcome.await.map_err(ended)?.map_err(|error| format!("{device}: {error}"));
     }
-    let fault: Fault = line.parse().map_err(|error: FaultError| error.to_string())?;
-    if let Fault::Sensor(fault) = fault
+    let fault: InjectedFault = line.parse().map_err(|error: FaultError| error.to_string())?;
+    if let InjectedFault::Sensor(fault) = fault
         && sends_packets
         && !keeps_packets_whole(fault)
     {

@@ -41,7 +41,7 @@ pub struct Label {
 pub struct PhysicsLabel {
     /// Its id in the catalogue.
     pub id: String,
-    /// The library's effect of which it is an instance; `None` outside the library.
+    /// The library's effect that it is an instance of; `None` outside the library.
     pub effect: Option<String>,
     /// Strength of its dose.
     pub strength: f64,

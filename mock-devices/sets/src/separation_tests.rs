@@ -19,7 +19,7 @@ fn what_recalibration_takes_up_separates_nothing() {
 
 #[test]
 fn what_is_left_counts_in_standard_deviations() {
-    // The change is upright on a constant, and on this signal too.
+    // The change is orthogonal to a constant, and to this signal too.
     let clean = rows(|t| [(t / 2.0).floor(), 0.0]);
     let with = rows(|t| [(t / 2.0).floor() + 3.0 * sign(t), 3.0 * sign(t)]);
     let z = Separation::new(&clean, &with, &clean, 2, 2.0).z;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_virtual::cable::{Device, InjectedFault};
+use tactus_virtual::cable::{CabledFault, Device};
 use tactus_virtual::faults::{CableFault, SensorFault, StageFault};
 use tokio::sync::mpsc::Receiver;
 use tokio::time::Instant;
@@ -19,18 +19,18 @@ enum Backing {
 
 struct WithFaults<F> {
     device: Box<dyn Device<Fault = F>>,
-    faults: Receiver<InjectedFault<F>>,
+    faults: Receiver<CabledFault<F>>,
 }
 
 impl<F: Send> WithFaults<F> {
-    fn new(device: impl Device<Fault = F> + 'static, faults: Receiver<InjectedFault<F>>) -> Self {
+    fn new(device: impl Device<Fault = F> + 'static, faults: Receiver<CabledFault<F>>) -> Self {
         Self { device: Box::new(device), faults }
     }
 
     async fn next_cable_fault(&mut self) -> Option<CableFault> {
         match self.faults.recv().await {
-            Some(InjectedFault::Cable(fault)) => Some(fault),
-            Some(InjectedFault::Device(fault)) => {
+            Some(CabledFault::Cable(fault)) => Some(fault),
+            Some(CabledFault::Device(fault)) => {
                 self.device.fault(fault, Instant::now());
                 None
             }
@@ -44,7 +44,7 @@ impl BackingDevice {
     /// The tactile array.
     pub fn sensor(
         device: impl Device<Fault = SensorFault> + 'static,
-        faults: Receiver<InjectedFault<SensorFault>>,
+        faults: Receiver<CabledFault<SensorFault>>,
     ) -> Self {
         Self(Backing::Sensor(WithFaults::new(device, faults)))
     }
@@ -52,7 +52,7 @@ impl BackingDevice {
     /// The stage's controller.
     pub fn stage(
         device: impl Device<Fault = StageFault> + 'static,
-        faults: Receiver<InjectedFault<StageFault>>,
+        faults: Receiver<CabledFault<StageFault>>,
     ) -> Self {
         Self(Backing::Stage(WithFaults::new(device, faults)))
     }

@@ -60,7 +60,7 @@ async fn a_request_that_makes_no_sense_is_answered_and_goes_no_further() {
     let reply = client.command(Command::Run, &asked_by("test"), PATIENCE).await.unwrap();
     assert_eq!((reply.ok, reply.exit_code, reply.rig.as_str()), (false, 2, "bench"));
     assert!(reply.error.contains("tactus.v1.RunRequest"), "{}", reply.error);
-    // Bytes that are no message at all: field 1, claiming 127 bytes, of which one comes.
+    // Bytes that are no message: field 1 announces 127 bytes, and one follows.
     let session = raw_session(&service.endpoint).await;
     let replies = session.get("tactus/bench/cmd/pause").payload([0x0a, 0x7f, 0x00]).await.unwrap();
     let reply = replies.recv_async().await.unwrap();

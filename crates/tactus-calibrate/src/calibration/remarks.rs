@@ -4,8 +4,8 @@ use super::Calibration;
 use crate::{
     Declared, Health, Readings, RegistrationFit, ResponseFit, ResponseForm, ThicknessFit,
     faults::{FaultKind, WIRING_PLACES_LEAST},
+    placement::{across, goes_across},
     readings::{distinct_places, number_of},
-    setting::{across, goes_across},
     thickness::IMPLAUSIBLE,
 };
 

@@ -91,7 +91,7 @@ impl Segment {
         let column =
             |element: usize| (0..frames).map(move |frame| f64::from(self.counts[frame * elements + element]));
         let mut sound = vec![true; frames];
-        // With fewer frames an outlier cannot be told from noise.
+        // With fewer frames an outlier cannot be distinguished from noise.
         if frames >= 5 {
             for element in 0..elements {
                 let centre = median(column(element))?;

@@ -8,9 +8,9 @@ use crate::{
     Estimate,
     least_squares::{self, Normal, Observation, minimise},
     order::median,
+    placement::Declared,
     readings::MeasuredPress,
     registration::SensorPose,
-    setting::Declared,
 };
 
 /// Number of folds in which dwells are held out.
@@ -62,12 +62,12 @@ impl CentrePress {
         noise_counts: f64,
     ) -> Option<Self> {
         let (indenter, rest_frames) = (declared.indenter(press)?, press.rest.as_ref()?.frames);
-        let mut felt = vec![0.0; model.array().elements()];
+        let mut predicted = vec![0.0; model.array().elements()];
         let points = press.dwells.iter().filter_map(|dwell| {
-            let contact = place.setting.contact(press, dwell, indenter);
-            model.indentation(&contact, Covering { thickness_mm: press.covering_mm }, &mut felt);
+            let contact = place.placement.contact(press, dwell, indenter);
+            model.indentation(&contact, Covering { thickness_mm: press.covering_mm }, &mut predicted);
             let [rise_counts, _] = press.rise(dwell, element)?;
-            Some(CentreDwell { u_mm: felt[signal], rise_counts, frames: dwell.frames })
+            Some(CentreDwell { u_mm: predicted[signal], rise_counts, frames: dwell.frames })
         });
         let points = points.collect();
         Some(Self { element, points, noise_counts, rest_frames })

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tactus_bus::{CommandCall, Publisher, Request};
 use tactus_engine::{Engine, ResetError, ResumeError, RunOrder, StopOrder};
 use tactus_plan::{Arguments, Evaluate, Script};
-use tactus_runner::config::Config;
+use tactus_runner::config::ServiceConfig;
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::recorder::ThreadRecorder;
 use tactus_runner::script_process::ScriptProcesses;
@@ -33,7 +33,7 @@ mod exit {
 /// Answers commands for one engine.
 pub(super) struct CommandDesk {
     engine: Engine,
-    config: Config,
+    config: ServiceConfig,
     publisher: Publisher,
     lease: Mutex<Lease>,
     evaluator: Arc<dyn Evaluate>,
@@ -46,7 +46,7 @@ struct Refusal {
 }
 
 impl CommandDesk {
-    pub(super) fn new(engine: Engine, config: Config, publisher: Publisher) -> Self {
+    pub(super) fn new(engine: Engine, config: ServiceConfig, publisher: Publisher) -> Self {
         let evaluator = Arc::new(ScriptProcesses::of_this_program());
         Self { engine, config, publisher, lease: Mutex::default(), evaluator }
     }

@@ -28,7 +28,7 @@ fn answers_and_reports_of_the_stage_never_wait_for_each_other() {
 /// A bus at these endpoints, and the desk of the shipped simulated rig, which nobody has reset.
 async fn lab(listen: Vec<Endpoint>) -> (Bus, Calls, CommandDesk) {
     let config = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/tactusd.toml"));
-    let config = Config::load(config).unwrap();
+    let config = ServiceConfig::load(config).unwrap();
     let RigFiles { rig, codec, .. } = config.rig.clone();
     let bus_config = BusConfig { listen, ..BusConfig::default() };
     let (bus, calls) = Bus::open(&bus_config, Keys::new(rig.name.clone())).await.unwrap();

@@ -47,7 +47,7 @@ pub(crate) fn linear(effects: impl IntoIterator<Item = Effect>) -> Simulator {
 
 /// The signal of element 21 in mm under a tip at its centre that moves linearly from depth to depth (times in s, depths in
 /// mm). Without effects it is the depth.
-pub(crate) fn felt_mm<const N: usize>(effect: &Effect, depths: [(f64, f64); N]) -> [f64; N] {
+pub(crate) fn signals_mm<const N: usize>(effect: &Effect, depths: [(f64, f64); N]) -> [f64; N] {
     let one = linear([effect.clone()]);
     let mut pipeline = Pipeline::new(&one).unwrap();
     depths.map(|(t_s, depth_mm)| pipeline.step(Moment::at(t_s), &upon(&one, 21, depth_mm))[21] / 1000.0)
@@ -145,12 +145,12 @@ fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
             covering.slope(parameter, base, &contact, &before, &mut slope).then_some(slope)
         }
         Make::Element(make) => {
-            let (element, (_, felt), (_, mut signal)) = (make(values), history(1), history(2));
+            let (element, (_, input), (_, mut signal)) = (make(values), history(1), history(2));
             let Some(parameter) = by else {
-                element.signal(base, &felt, &mut signal);
+                element.signal(base, &input, &mut signal);
                 return Some(signal);
             };
-            element.slope(parameter, base, &felt, &signal, &mut slope).then_some(slope)
+            element.slope(parameter, base, &input, &signal, &mut slope).then_some(slope)
         }
         Make::Readout(make) => {
             let (mut readout, mut counts) = (make(values), Vec::new());

@@ -73,10 +73,10 @@ impl OnElement for Crosstalk {
     }
 }
 
-/// For every element the sum over some of the others; rows have so many columns.
+/// For every element the sum over some others; the first argument is the number of columns.
 type Sum = fn(usize, &[f64]) -> Vec<f64>;
 
-/// In the order of the shares.
+/// The sums, in the order of the effect's shares.
 const SUMS: [Sum; 5] = [
     |cols, values| of_near(cols, values, &[[0, -1], [0, 1], [-1, 0], [1, 0]]),
     |cols, values| of_near(cols, values, &[[-1, -1], [-1, 1], [1, -1], [1, 1]]),
@@ -85,7 +85,7 @@ const SUMS: [Sum; 5] = [
     of_columns,
 ];
 
-/// Sum over those that stand so many rows and columns away, as far as there are any.
+/// Sum over the existing elements at these offsets, in rows and columns.
 fn of_near(cols: usize, values: &[f64], places: &[[isize; 2]]) -> Vec<f64> {
     let rows = values.len() / cols;
     let at = |index: usize, [down, along]: [isize; 2]| {

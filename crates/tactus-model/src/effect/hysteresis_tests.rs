@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, felt_mm};
+use crate::effect::bench::{assert_slopes, effect, signals_mm};
 
 fn lossy(loss_share: f64, threshold_mm: f64) -> Effect {
     growing(loss_share, threshold_mm, 0.0)
@@ -28,16 +28,16 @@ fn what_is_held_is_a_threshold_behind_and_then_a_threshold_before() {
     let held = [0.0, 1.15 / 4.0, 0.95 / 4.0];
     let want = |loss: f64| [0.02, 0.5, 0.2].map(|u| u * (1.0 + loss)).into_iter().zip(held);
     let [a, b, c] = [0, 1, 2].map(|k| want(0.4).map(|(u, held)| u - 0.4 * held).nth(k).unwrap());
-    assert_near(felt_mm(&lossy(0.4, 0.4), depths), [a, b, c, 0.0]);
+    assert_near(signals_mm(&lossy(0.4, 0.4), depths), [a, b, c, 0.0]);
     // A negative share leaves a rest: of what is held, 0.05, 0.15, 0.25 and 0.1 mm.
-    let [.., rest] = felt_mm(&lossy(-0.4, 0.4), depths);
+    let [.., rest] = signals_mm(&lossy(-0.4, 0.4), depths);
     assert_near([rest], [0.4 * 0.55 / 4.0]);
 }
 
 #[test]
 fn a_growing_threshold_is_in_proportion_to_what_is_held() {
     // 0.5 mm is 1 + s/2 times what is held and a threshold of s/5.
-    let [_, up, down] = felt_mm(&growing(0.4, 0.2, 0.5), [(0.0, 0.0), (1.0, 0.5), (2.0, 0.02)]);
+    let [_, up, down] = signals_mm(&growing(0.4, 0.2, 0.5), [(0.0, 0.0), (1.0, 0.5), (2.0, 0.02)]);
     let shares = [0.125, 0.375, 0.625, 1.0];
     let held = shares.map(|s: f64| (0.5 - 0.2 * s) / (1.0 + 0.5 * s));
     assert_near([up], [0.5 - 0.4 * (held.iter().sum::<f64>() / 4.0 - 0.5)]);
@@ -51,7 +51,7 @@ fn the_same_way_gives_the_same_at_any_rate() {
     let one = lossy(0.4, 0.2);
     let at = |per_s: f64| {
         let mut k = 0.0;
-        felt_mm(
+        signals_mm(
             &one,
             depths.map(|depth_mm| {
                 k += 1.0;
@@ -65,11 +65,11 @@ fn the_same_way_gives_the_same_at_any_rate() {
 #[test]
 fn an_inner_loop_leads_back_to_the_outer_one() {
     let straight = [(0.0, 0.5), (1.0, 0.2)];
-    let [_, outer] = felt_mm(&lossy(0.4, 0.2), straight);
+    let [_, outer] = signals_mm(&lossy(0.4, 0.2), straight);
     let [.., inner] =
-        felt_mm(&lossy(0.4, 0.2), [(0.0, 0.5), (1.0, 0.35), (2.0, 0.42), (3.0, 0.35), (4.0, 0.2)]);
+        signals_mm(&lossy(0.4, 0.2), [(0.0, 0.5), (1.0, 0.35), (2.0, 0.42), (3.0, 0.35), (4.0, 0.2)]);
     assert_near([inner], [outer]);
-    let [first, _, again] = felt_mm(&lossy(0.4, 0.2), [(0.0, 0.5), (1.0, 0.2), (2.0, 0.5)]);
+    let [first, _, again] = signals_mm(&lossy(0.4, 0.2), [(0.0, 0.5), (1.0, 0.2), (2.0, 0.5)]);
     assert_near([again], [first]);
 }
 
@@ -82,9 +82,9 @@ fn a_loop_encloses_the_area_of_its_plays() {
         if (k / STEPS).is_multiple_of(2) { 0.1 + 0.4 * along } else { 0.5 - 0.4 * along }
     };
     let depths: [_; 4 * STEPS + 1] = std::array::from_fn(|k| (k as f64, depth_mm(k)));
-    let felt = felt_mm(&lossy(0.3, 0.1), depths);
+    let signals = signals_mm(&lossy(0.3, 0.1), depths);
     // Second time round, and past the first half so that the loop is closed.
-    let work = |k: usize| 0.5 * (felt[k] + felt[k + 1]) * (depths[k + 1].1 - depths[k].1);
+    let work = |k: usize| 0.5 * (signals[k] + signals[k + 1]) * (depths[k + 1].1 - depths[k].1);
     let area: f64 = (2 * STEPS..4 * STEPS).map(work).sum();
     let want =
         [0.0125, 0.0375, 0.0625, 0.1].map(|r: f64| 0.3 * 2.0 * r * (0.4 - 2.0 * r)).iter().sum::<f64>() / 4.0;

@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, felt_mm};
+use crate::effect::bench::{assert_slopes, effect, signals_mm};
 
 fn dented(recovery_s: f64) -> Effect {
     dented_for(recovery_s, 1.0)
@@ -16,7 +16,7 @@ fn assert_near<const N: usize>(got: [f64; N], want: [f64; N]) {
 
 #[test]
 fn a_dent_recovers_exponentially_and_adds_to_what_presses_less() {
-    let got = felt_mm(
+    let got = signals_mm(
         &dented(20.0),
         [(0.0, 0.5), (3.0, 0.5), (3.0, -1.0), (13.0, -1.0), (13.0, 0.01), (13.0, 0.2), (33.0, 0.0)],
     );
@@ -32,14 +32,14 @@ fn a_dent_recovers_exponentially_and_adds_to_what_presses_less() {
 fn a_slow_release_leaves_the_same_in_any_number_of_steps() {
     // Down at 0.05 mm/s with a recovery of 3 s: below 0.15 mm the signal falls faster than the dent recovers.
     let fine: [_; 101] = std::array::from_fn(|k| (k as f64 / 10.0, 0.5 - 0.05 * (k as f64 / 10.0)));
-    let [.., coarse] = felt_mm(&dented(3.0), [fine[0], fine[100]]);
-    let [.., fine] = felt_mm(&dented(3.0), fine);
+    let [.., coarse] = signals_mm(&dented(3.0), [fine[0], fine[100]]);
+    let [.., fine] = signals_mm(&dented(3.0), fine);
     assert_near([coarse, fine], [0.015 * (-1.0_f64).exp(); 2]);
 }
 
 #[test]
 fn three_dents_recover_in_equal_shares() {
-    let got = felt_mm(&dented_for(20.0, 4.0), [(0.0, 0.6), (0.0, -1.0), (7.0, -1.0), (90.0, -1.0)]);
+    let got = signals_mm(&dented_for(20.0, 4.0), [(0.0, 0.6), (0.0, -1.0), (7.0, -1.0), (90.0, -1.0)]);
     let left = |t_s: f64| 0.02 * [5.0, 20.0, 80.0].map(|tau_s: f64| (-t_s / tau_s).exp()).iter().sum::<f64>();
     assert_near(got, [0.6, left(0.0), left(7.0), left(90.0)]);
 }

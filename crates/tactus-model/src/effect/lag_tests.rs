@@ -1,6 +1,6 @@
 use super::*;
 
-/// Output after a straight input from 0 at 0 s with a slope of 2, in so many equal steps to 3 s.
+/// Output after a straight input from 0 at 0 s with a slope of 2, in this many equal steps to 3 s.
 fn ramp(steps: u32, tau_s: f64) -> Lag {
     let mut lag = Lag::new(tau_s);
     lag.begin(&[0.0], &[0.0]);

@@ -50,8 +50,8 @@ struct Miswired {
 }
 
 impl OnElement for Miswired {
-    fn signal(&self, _: BaseModel<'_>, felt_mm: &[f64], signal_mm: &mut [f64]) {
-        if let (Some(u), Some(other)) = (signal_mm.get_mut(self.element), felt_mm.get(self.answers_for)) {
+    fn signal(&self, _: BaseModel<'_>, input_mm: &[f64], signal_mm: &mut [f64]) {
+        if let (Some(u), Some(other)) = (signal_mm.get_mut(self.element), input_mm.get(self.answers_for)) {
             *u = self.own_share * *u + self.other_share * other;
         }
     }
@@ -60,13 +60,13 @@ impl OnElement for Miswired {
         &self,
         parameter: usize,
         _: BaseModel<'_>,
-        felt_mm: &[f64],
+        input_mm: &[f64],
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
         let of = match parameter {
             2 => before_mm.get(self.element),
-            3 => felt_mm.get(self.answers_for),
+            3 => input_mm.get(self.answers_for),
             _ => None,
         };
         let (Some(of), Some(_)) = (of, slope_mm.get(self.element)) else { return false };

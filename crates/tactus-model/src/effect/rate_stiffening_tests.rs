@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, felt_mm};
+use crate::effect::bench::{assert_slopes, effect, signals_mm};
 
 fn stiff(recovery_s: f64) -> Effect {
     effect(
@@ -22,18 +22,18 @@ fn factor(mm_per_s: f64) -> f64 {
 fn ten_times_the_speed_adds_a_step_and_no_speed_none() {
     for mm_per_s in [0.1, 1.0, 10.0] {
         // From above the surface; the speed is the same all the way.
-        let got = felt_mm(&stiff(1.0), [(0.0, -0.1), (0.3 / mm_per_s, 0.2), (0.6 / mm_per_s, 0.5)]);
+        let got = signals_mm(&stiff(1.0), [(0.0, -0.1), (0.3 / mm_per_s, 0.2), (0.6 / mm_per_s, 0.5)]);
         assert_near(got, [0.0, 0.2 * factor(mm_per_s), 0.5 * factor(mm_per_s)]);
     }
-    assert_near(felt_mm(&stiff(1.0), [(0.0, 0.5), (1.0, 0.5)]), [0.5, 0.5]);
+    assert_near(signals_mm(&stiff(1.0), [(0.0, 0.5), (1.0, 0.5)]), [0.5, 0.5]);
 }
 
 #[test]
 fn what_loading_did_dies_away_and_is_forgotten_in_the_air() {
-    let got = felt_mm(&stiff(2.0), [(0.0, 0.0), (0.25, 0.5), (1.25, 0.5), (2.25, 0.3), (3.25, -1.0)]);
+    let got = signals_mm(&stiff(2.0), [(0.0, 0.0), (0.25, 0.5), (1.25, 0.5), (2.25, 0.3), (3.25, -1.0)]);
     let after = |t_s: f64| factor(2.0 * (-t_s / 2.0_f64).exp());
     assert_near(got, [0.0, 0.5 * factor(2.0), 0.5 * after(1.0), 0.3 * after(2.0), 0.0]);
-    let [.., last] = felt_mm(&stiff(1e5), [(0.0, 0.0), (0.25, 0.5), (0.5, 0.0), (1.5, 0.1)]);
+    let [.., last] = signals_mm(&stiff(1e5), [(0.0, 0.0), (0.25, 0.5), (0.5, 0.0), (1.5, 0.1)]);
     assert_near([last], [0.1 * factor(0.1)]);
 }
 
@@ -41,7 +41,10 @@ fn what_loading_did_dies_away_and_is_forgotten_in_the_air() {
 fn a_press_in_more_steps_reads_the_same() {
     let at = |k: usize| if k < 30 { 0.5 * k as f64 / 30.0 } else { 0.5 };
     let fine: [_; 61] = std::array::from_fn(|k| (k as f64 / 30.0, at(k)));
-    assert_near([felt_mm(&stiff(0.7), fine)[60]], [felt_mm(&stiff(0.7), [fine[0], fine[30], fine[60]])[2]]);
+    assert_near(
+        [signals_mm(&stiff(0.7), fine)[60]],
+        [signals_mm(&stiff(0.7), [fine[0], fine[30], fine[60]])[2]],
+    );
 }
 
 #[test]

@@ -14,7 +14,7 @@
 //! | `recovery_ratio` | - | 1.5 | 1 to 1000 | speed of the recovery without contact, over that of the relaxation |
 //!
 //! While the tool touches, the result is not below 0, since a covering does not pull. After release the share
-//! `after_release` of the change still shows: 0 where the covering is no longer felt, so that the change shows only in the
+//! `after_release` of the change still shows: 0 where the covering is no longer touched, so that the change shows only in the
 //! next press; 1 in a linear solid. With a large `recovery_ratio` each press begins anew. A step to `u` and a hold give,
 //! with a ratio of 1, `u (1 - relaxed_share (1 - exp(-t / time_constant)))`: the response at first is the base model's.
 //!

@@ -1,6 +1,6 @@
 #![expect(clippy::float_cmp, reason = "these values are exact")]
 
-use crate::effect::bench::{assert_slopes, felt_mm, simulator, upon};
+use crate::effect::bench::{assert_slopes, signals_mm, simulator, upon};
 use crate::{Effect, Moment, Pipeline, Simulator, Trajectory};
 
 fn relaxing(time_constant_s: f64, spread_ratio: f64) -> Effect {
@@ -82,8 +82,8 @@ fn three_times_relax_in_equal_shares() {
         0.5 * (1.0 - 0.1 * [0.5, 2.0, 8.0].map(|tau_s: f64| -(-t_s / tau_s).exp_m1()).iter().sum::<f64>())
     };
     let times_s = [0.0, 0.3, 2.0, 20.0];
-    let felt = felt_mm(&relaxing(2.0, 4.0), times_s.map(|t_s| (t_s, 0.5)));
-    assert!(felt.iter().zip(times_s).all(|(got, t_s)| (got - at(t_s)).abs() < 1e-9), "{felt:?}");
+    let signals = signals_mm(&relaxing(2.0, 4.0), times_s.map(|t_s| (t_s, 0.5)));
+    assert!(signals.iter().zip(times_s).all(|(got, t_s)| (got - at(t_s)).abs() < 1e-9), "{signals:?}");
 }
 
 #[test]

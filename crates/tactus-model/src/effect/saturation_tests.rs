@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, felt_mm};
+use crate::effect::bench::{assert_slopes, effect, signals_mm};
 
 fn level(loss_at_1_mm: f64, knee: f64) -> Effect {
     effect("saturation", [("loss_at_1_mm", loss_at_1_mm), ("knee", knee)])
@@ -13,13 +13,13 @@ fn assert_near<const N: usize>(got: [f64; N], want: [f64; N], within: f64) {
 #[test]
 fn a_knee_of_one_is_the_hyperbola() {
     // Half is lost at 1 mm: u / (1 + u).
-    let got = felt_mm(&level(0.5, 1.0), [(0.0, 0.25), (0.0, 0.5), (0.0, 1.0)]);
+    let got = signals_mm(&level(0.5, 1.0), [(0.0, 0.25), (0.0, 0.5), (0.0, 1.0)]);
     assert_near(got, [0.2, 1.0 / 3.0, 0.5], 1e-12);
 }
 
 #[test]
 fn a_sharp_knee_is_a_kink_at_the_ceiling() {
-    let got = felt_mm(&level(0.6, 12.0), [(0.0, 0.1), (0.0, 0.3), (0.0, 0.6), (0.0, 1.0)]);
+    let got = signals_mm(&level(0.6, 12.0), [(0.0, 0.1), (0.0, 0.3), (0.0, 0.6), (0.0, 1.0)]);
     assert_near(got, [0.1, 0.3, 0.4, 0.4], 1e-3);
     let [least, ..] = got;
     assert!((least - 0.1).abs() < 1e-8, "small signals are as they were: {least}");
@@ -27,7 +27,7 @@ fn a_sharp_knee_is_a_kink_at_the_ceiling() {
 
 #[test]
 fn a_fit_can_start_from_none() {
-    let [none, some] = [0.0, 1e-6].map(|loss| felt_mm(&level(loss, 2.0), [(0.0, 0.5)]));
+    let [none, some] = [0.0, 1e-6].map(|loss| signals_mm(&level(loss, 2.0), [(0.0, 0.5)]));
     assert_near([(none[0] - some[0]) / 1e-6], [0.5_f64.powi(3)], 1e-5);
 }
 

@@ -93,12 +93,12 @@ impl OnReadout for ScanSkew {
 }
 
 impl ScanSkew {
-    /// How long ago an element was sampled that is so many rows and columns before the last.
+    /// How long ago an element was sampled that is this many rows and columns before the last.
     fn age_s(&self, [rows, columns]: [f64; 2]) -> f64 {
         rows * self.times_s[0] + columns * self.times_s[1]
     }
 
-    /// What an element had so long ago, and how fast that was changing.
+    /// An element's counts `age_s` ago, and how fast they changed.
     fn at(&self, element: usize, age_s: f64) -> (f64, f64) {
         let pairs = self.history.iter().zip(self.history.iter().skip(1));
         let Some((older, newer)) = pairs.rev().find(|(older, _)| age_s <= older.age_s) else {

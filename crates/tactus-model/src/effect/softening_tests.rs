@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, felt_mm};
+use crate::effect::bench::{assert_slopes, effect, signals_mm};
 
 fn soft(width_share: f64) -> Effect {
     effect("softening", [("softened_share", 0.2), ("width_share", width_share)])
@@ -11,14 +11,14 @@ fn a_first_loading_is_the_base_models_and_later_ones_are_weaker_up_to_where_it_w
     // erf(3/4), Abramowitz and Stegun, table 7.1.
     let weaker = 0.2 * (1.0 - 0.2 * 0.711_155_633_7);
     let want = [0.2, 0.4, weaker, 0.0, weaker, 0.4, 0.5];
-    for (got, want) in felt_mm(&soft(1.0), depths).iter().zip(want) {
+    for (got, want) in signals_mm(&soft(1.0), depths).iter().zip(want) {
         assert!((got - want).abs() < 1e-9, "{got} {want}");
     }
 }
 
 #[test]
 fn a_narrow_width_weakens_all_below_alike() {
-    let [.., got] = felt_mm(&soft(0.01), [(0.0, 0.5), (1.0, 0.4)]);
+    let [.., got] = signals_mm(&soft(0.01), [(0.0, 0.5), (1.0, 0.4)]);
     assert!((got - 0.8 * 0.4).abs() < 1e-9, "{got}");
 }
 

@@ -123,8 +123,8 @@ pub trait OnCovering: Debug + Send + Sync {
 /// An effect in the elements; without memory.
 pub trait OnElement: Debug + Send + Sync {
     /// Changes the elements' signals before their response: equivalent indentations in mm, row-major.
-    /// `felt_mm` is the signal that reached each element, before any effect of this stage.
-    fn signal(&self, _base: BaseModel<'_>, _felt_mm: &[f64], _signal_mm: &mut [f64]) {}
+    /// `input_mm` is the signal that reached each element, before any effect of this stage.
+    fn signal(&self, _base: BaseModel<'_>, _input_mm: &[f64], _signal_mm: &mut [f64]) {}
 
     /// Changes counts after the response.
     fn counts(&self, _base: BaseModel<'_>, _counts: &mut [f64]) {}
@@ -135,7 +135,7 @@ pub trait OnElement: Debug + Send + Sync {
         &self,
         _parameter: usize,
         _base: BaseModel<'_>,
-        _felt_mm: &[f64],
+        _input_mm: &[f64],
         _before_mm: &[f64],
         _slope_mm: &mut [f64],
     ) -> bool {

@@ -1,4 +1,4 @@
-//! The blurred penetration itself, before an element integrates it, as a cubic B-spline over the plane.
+//! The blurred penetration, before elements integrate it, as a cubic B-spline over the plane.
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,7 @@ use crate::contact::Slice;
 /// Evenly spaced nodes over a rectangle of the tool's frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
-    /// Where node (0, 0) stands.
+    /// Position of node (0, 0).
     pub(super) origin_mm: [f64; 2],
     /// Distance of neighbouring nodes.
     pub(super) step_mm: f64,
@@ -24,7 +24,7 @@ pub(super) struct Field {
 }
 
 impl Grid {
-    /// Places of the nodes along x and y.
+    /// Positions of the nodes along x and y.
     pub(super) fn places_mm(&self) -> [Vec<f64>; 2] {
         [0, 1].map(|axis| {
             (0..self.nodes[axis]).map(|node| self.origin_mm[axis] + self.step_mm * node as f64).collect()
@@ -41,7 +41,7 @@ impl Field {
             let Some(Slice { x_mm, .. }) = of_one_x.first() else { continue };
             let across: Vec<f64> = columns.iter().map(|x| density(x - x_mm, blur.sigma_mm)).collect();
             for (row, y) in values.chunks_exact_mut(columns.len()).zip(&rows) {
-                // By symmetry: what of a line arrives at a point is what of the point arrives at the line.
+                // The blur is symmetric: a line's share at a point is the point's share on the line.
                 let along: f64 =
                     of_one_x.iter().map(|slice| slice.weight_mm2 * blur.of_point(*y, slice.y_mm)).sum();
                 for (value, across) in row.iter_mut().zip(&across) {
@@ -52,7 +52,7 @@ impl Field {
         Self { grid, coefficients: spline(values, grid.nodes) }
     }
 
-    /// The spline's value at a place; 0 beyond the grid.
+    /// The spline's value at a position; 0 beyond the grid.
     pub(super) fn at(&self, place_mm: [f64; 2]) -> f64 {
         let [columns, rows] = self.grid.nodes;
         let [Some((column, across)), Some((row, along))] = [0, 1].map(|axis| {
@@ -70,7 +70,8 @@ impl Field {
     }
 }
 
-/// First of the four nodes about a place, given in steps, and their weights; none beyond the grid.
+/// The first of the four nodes around a position, in units of the distance between nodes, and the nodes' weights; `None`
+/// beyond the grid.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -85,8 +86,8 @@ fn taps(place: f64, nodes: usize) -> Option<(usize, [f64; 4])> {
     Some((place as usize - 1, [u * u * u / 6.0, inner(t), inner(u), t * t * t / 6.0]))
 }
 
-/// Coefficients of the cubic B-spline through values that vanish at the grid's border: along each axis the
-/// solution of `(c[i - 1] + 4 c[i] + c[i + 1]) / 6 = value[i]`.
+/// Coefficients of the cubic B-spline through values that vanish at the grid's border: the solution of
+/// `(c[i - 1] + 4 c[i] + c[i + 1]) / 6 = value[i]` along each axis.
 pub(super) fn spline(mut values: Vec<f64>, [columns, rows]: [usize; 2]) -> Vec<f64> {
     for row in 0..rows {
         solve(&mut values, row * columns, 1, columns);
@@ -97,7 +98,7 @@ pub(super) fn spline(mut values: Vec<f64>, [columns, rows]: [usize; 2]) -> Vec<f
     values
 }
 
-/// Gauss elimination of the three diagonals, in place, over every `step`th value.
+/// Solves the tridiagonal equations in place by Gauss elimination, for every `step`th value.
 fn solve(values: &mut [f64], first: usize, step: usize, count: usize) {
     let mut pivots = Vec::with_capacity(count);
     let (mut pivot, mut before) = (0.0, 0.0);

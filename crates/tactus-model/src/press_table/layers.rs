@@ -1,4 +1,4 @@
-//! The tables of a press table and how they are sampled.
+//! The tables inside a press table, and how they are sampled.
 
 use wide::{f32x4, f32x8};
 
@@ -8,14 +8,14 @@ use crate::blur::Blur;
 use crate::quadrature::{coarse, whole};
 use crate::{Contact, Indenter};
 
-/// Beyond so many standard deviations from the tool nothing is left of it.
+/// The tables end at this distance from the tool, in standard deviations of the blur. Beyond it the signal is negligible.
 const TAIL: f64 = 6.0;
-/// Nodes in a standard deviation.
+/// Nodes per standard deviation of the blur.
 const NODES_PER_SIGMA: f64 = 6.0;
-/// Pieces of the depth, before those that jumps of the touched area add.
+/// Even pieces of the depth range. Each depth at which the contact area jumps adds one more.
 const DEPTH_PIECES: u32 = 8;
 
-/// Tables over the tool's frame, one for each piece of the depth.
+/// Tables in the tool's frame, one for each piece of the depth range.
 #[derive(Debug, Clone)]
 pub(super) struct Layers {
     origin_mm: [f32; 2],
@@ -29,24 +29,24 @@ pub(super) struct Layers {
 /// Nodes of the rotation.
 #[derive(Debug, Clone, Copy)]
 enum Turns {
-    /// A round tool: one.
+    /// One node: a round tool.
     Round,
-    /// A tool above square elements: three over a quarter turn.
+    /// Three nodes over a quarter turn: any other tool above square elements.
     Square,
-    /// A tool above oblong elements: seven over half a turn.
+    /// Seven nodes over half a turn: any other tool above oblong elements.
     Oblong,
 }
 
 /// How the signal grows with depth.
 #[derive(Debug, Clone)]
 enum Depth {
-    /// A flat underside: in proportion, as the table of 1 mm says.
+    /// A flat underside: the signal is proportional to depth. The table holds the signal of 1 mm.
     Flat(Vec<f32>),
-    /// Otherwise: piece by piece.
+    /// Any other underside: one table for each piece of the depth range.
     Pieces(Vec<Piece>),
 }
 
-/// A cubic over one range of depth, by value and slope at both ends.
+/// One range of depth. The signal is a cubic, given by its value and slope at both ends.
 #[derive(Debug, Clone)]
 struct Piece {
     from_mm: f64,
@@ -75,7 +75,7 @@ impl Turns {
         }
     }
 
-    /// Weights of the nodes in the trigonometric polynomial through them, for a rotation by its sine and cosine.
+    /// Weights of the nodes in the trigonometric polynomial through them, at a rotation given by its sine and cosine.
     fn weights(self, [sin, cos]: [f64; 2], nodes: &[[f64; 2]]) -> [f64; 7] {
         let times = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a * d + b * c, b * d - a * c];
         let twice = times([sin, cos], [sin, cos]);
@@ -94,7 +94,7 @@ impl Turns {
         weights
     }
 
-    /// Sine and cosine of every node's share of the full circle.
+    /// Sines and cosines of angles that spread the nodes evenly over the full circle.
     fn circle(self) -> Vec<[f64; 2]> {
         let count = self.count();
         (0..count).map(|node| (std::f64::consts::TAU * node as f64 / count as f64).sin_cos().into()).collect()
@@ -135,7 +135,7 @@ impl Layers {
 
     /// Signal of every element, in units of the reference press, for a tool at a positive depth.
     ///
-    /// `axes`: for x and y where the tool stands, and the elements' centres.
+    /// The first argument has, for x and for y, the tool's position and the elements' centres, in mm.
     pub(super) fn sample(
         &self,
         [(tool_x, columns), (tool_y, rows)]: [(f64, &Vec<f32>); 2],
@@ -171,7 +171,7 @@ impl Layers {
         }
     }
 
-    /// Signals of all elements by `C` channels of a table; `N = 4 C` numbers are those of four neighbours.
+    /// Signals of all elements from the `C` channels of a table. Four neighbouring nodes have `N = 4 C` numbers.
     fn taps<const C: usize, const N: usize>(
         &self,
         table: &[f32],
@@ -187,7 +187,7 @@ impl Layers {
             for (values, centres_x) in row.chunks_mut(LANES).zip(place.columns.chunks(LANES)) {
                 let spots = self.spots(place, centres_x, dy);
                 for (lane, value) in values.iter_mut().enumerate() {
-                    // Beyond the table there is nothing.
+                    // The signal is 0 beyond the table.
                     *value = if spots.inside[lane] > 0.0 {
                         spots.sample::<C, N>(lane, table, self.nodes[0], &channels)
                     } else {
@@ -198,7 +198,7 @@ impl Layers {
         }
     }
 
-    /// Where some elements of a row fall among the nodes.
+    /// Positions of some elements of a row among the nodes.
     fn spots(&self, place: &TablePose<'_>, centres_x: &[f32], dy: f32) -> Spots {
         let [sin, cos] = place.turn;
         let mut dx = [0.0_f32; LANES];
@@ -219,13 +219,13 @@ impl Layers {
     }
 }
 
-/// Elements whose places are computed together.
+/// Number of elements whose positions are computed together.
 const LANES: usize = 8;
 
-/// Where elements fall among a table's nodes, if they do: the first of the 4 x 4 about each, and their weights,
-/// node by node.
+/// Positions of elements among a table's nodes: the first of the 4 x 4 nodes around each element, and the weights of
+/// these nodes.
 struct Spots {
-    /// 1 or 0.
+    /// 1 within the table, 0 beyond it.
     inside: [f32; LANES],
     column: [u32; LANES],
     row: [u32; LANES],
@@ -234,7 +234,7 @@ struct Spots {
 }
 
 impl Spots {
-    /// The spline at one spot. `channels`: the channels' weights, again and again.
+    /// The spline's value for one element. `channels` repeats the weights of the channels.
     #[inline]
     fn sample<const C: usize, const N: usize>(
         &self,
@@ -245,7 +245,7 @@ impl Spots {
     ) -> f32 {
         let [column, row] = [self.column[lane], self.row[lane]].map(|node| node as usize);
         let first = C * (row * columns + column);
-        // Each begins with four neighbours of a row, with all their channels.
+        // Each chunk begins with four neighbouring nodes of a row, each with all its channels.
         let mut rows = table.get(first..).unwrap_or_default().chunks_exact(C * columns);
         let mut sums = [f32x4::ZERO; C];
         for weights in &self.along {
@@ -265,20 +265,20 @@ impl Spots {
     }
 }
 
-/// Along one axis: the first of four nodes about each place, and the weights of a cubic B-spline there.
+/// A cubic B-spline along one axis: the first of the four nodes around each position, and the weights of these nodes.
 struct Spline {
-    /// All bits set or none.
+    /// All bits are set within the table, none beyond it.
     inside: f32x8,
     first: [u32; LANES],
     weights: [f32x8; 4],
 }
 
 impl Spline {
-    /// For places in steps between nodes.
+    /// For positions in units of the distance between nodes.
     #[inline]
     fn at(places: f32x8, nodes: usize) -> Self {
         const SIXTH: f32 = 1.0 / 6.0;
-        // From here on singles are whole numbers, and their last bits count.
+        // Adding 2^23 rounds an `f32` to a whole number, which its lowest bits then hold.
         const WHOLE: f32 = 8_388_608.0;
         let within = places.fast_max(f32x8::splat(1.5)).fast_min(f32x8::splat(nodes as f32 - 3.0));
         let shifted = within - 0.5 + WHOLE;
@@ -297,7 +297,7 @@ impl Spline {
     }
 }
 
-/// Where the tool stands, its turn as sine and cosine, and the elements' centres.
+/// The tool's position in mm, its rotation as sine and cosine, and the elements' centres in mm.
 struct TablePose<'a> {
     tool: [f32; 2],
     turn: [f32; 2],
@@ -305,21 +305,21 @@ struct TablePose<'a> {
     rows: &'a [f32],
 }
 
-/// Channels' weights: turns by depth.
+/// Weights of the channels: the weight of the rotation times that of the depth.
 fn weigh<const C: usize>(turns: &[f64; 7], by_depth: &[f64]) -> [f32; C] {
     std::array::from_fn(|channel| {
         single(turns[channel / by_depth.len()] * by_depth[channel % by_depth.len()])
     })
 }
 
-/// The piece that a depth falls in.
+/// The piece that contains a depth.
 fn piece_at(pieces: &[Piece], depth_mm: f64) -> &Piece {
     let place = pieces.partition_point(|piece| piece.to_mm < depth_mm);
     &pieces[place.min(pieces.len() - 1)]
 }
 
 impl Piece {
-    /// Hermite's weights of the values and slopes at both ends.
+    /// Weights of the values and slopes at both ends, by cubic Hermite interpolation.
     fn weights(&self, depth_mm: f64) -> [f64; 4] {
         let width_mm = self.to_mm - self.from_mm;
         let t = (depth_mm - self.from_mm) / width_mm;
@@ -328,7 +328,7 @@ impl Piece {
     }
 }
 
-/// Makes tables.
+/// Computes the tables of one tool.
 struct Maker<'a> {
     press: &'a Contact,
     sigma_mm: f64,
@@ -338,14 +338,14 @@ struct Maker<'a> {
     reference_mm2: f64,
 }
 
-/// What a table holds, at a depth.
+/// What a table contains, at a depth in mm.
 #[derive(Clone, Copy)]
 enum Channel {
     Value(f64),
     Slope(f64),
 }
 
-/// The spline coefficients of one channel, one table for each turn.
+/// The spline coefficients of one channel, one table for each rotation.
 type Tables = Vec<Vec<f64>>;
 
 impl Maker<'_> {
@@ -359,7 +359,7 @@ impl Maker<'_> {
         let even = (0..=DEPTH_PIECES).map(|end| depth_max_mm * f64::from(end) / f64::from(DEPTH_PIECES));
         let mut ends_mm: Vec<f64> = even.chain(jumps_mm.iter().copied()).collect();
         ends_mm.sort_by(f64::total_cmp);
-        // Ends that fall together would give a piece without width; slopes are taken well within one.
+        // Two equal ends would give a piece of zero width. Slopes are taken well inside a piece.
         let least_mm = 1e-6 * depth_max_mm;
         let aside_mm = 1e-3 * least_mm;
         ends_mm.dedup_by(|after, before| *after - *before < least_mm);
@@ -384,7 +384,7 @@ impl Maker<'_> {
         self.turns.nodes_rad().into_iter().map(|turn_rad| self.integrated(&field, turn_rad)).collect()
     }
 
-    /// The blurred penetration at a depth, or its slope by depth, on a grid twice as fine as the table's.
+    /// The blurred penetration at a depth, or its derivative by depth, on a grid twice as fine as the table's.
     fn field(&self, channel: Channel) -> Field {
         let blur = Blur { sigma_mm: self.sigma_mm };
         let at = |depth_mm| Contact { depth_mm, ..self.press.clone() };
@@ -396,8 +396,8 @@ impl Maker<'_> {
         Field::of(&slices, blur, Grid { step_mm: self.grid.step_mm / 2.0, nodes, ..self.grid })
     }
 
-    /// A field integrated over an element turned by `turn_rad` at every node, in units of the reference press,
-    /// as spline coefficients.
+    /// Integrates a field at every node over an element turned by `turn_rad`. The result is in units of the reference
+    /// press, as spline coefficients.
     fn integrated(&self, field: &Field, turn_rad: f64) -> Vec<f64> {
         let (sin, cos) = turn_rad.sin_cos();
         let along = |side: f64| coarse(-side / 2.0, side / 2.0, self.sigma_mm).collect::<Vec<_>>();
@@ -420,8 +420,8 @@ impl Maker<'_> {
     }
 }
 
-/// One table of several channels: node by node, in each node turn by turn, in each turn channel by channel; and
-/// one row of nodes more, so that a whole row follows every node.
+/// Puts several channels into one table, ordered by node, then by rotation, then by channel. A row of zeros is added, so
+/// that a whole row follows every node.
 fn interleave(channels: &[&Tables], columns: usize) -> Vec<f32> {
     let turns = channels.iter().map(|tables| tables.len()).min().unwrap_or(0);
     let order: Vec<&Vec<f64>> =
@@ -431,7 +431,7 @@ fn interleave(channels: &[&Tables], columns: usize) -> Vec<f32> {
     of_nodes.chain(std::iter::repeat_n(0.0, columns * order.len())).collect()
 }
 
-/// Depths below `depth_max_mm` at which the touched area jumps; `None` if the whole underside is flat.
+/// Depths below `depth_max_mm` at which the contact area jumps; `None` if the whole underside is flat.
 fn jumps_mm(indenter: &Indenter, depth_max_mm: f64) -> Option<Vec<f64>> {
     match indenter {
         Indenter::Cylinder { .. } | Indenter::Box { .. } => None,
@@ -443,7 +443,7 @@ fn jumps_mm(indenter: &Indenter, depth_max_mm: f64) -> Option<Vec<f64>> {
             let [_, _, [lowest, _]] = mesh.bounds_mm();
             let mut flat = true;
             let mut jumps = Vec::new();
-            // Upright sides press nothing by themselves.
+            // Vertical sides have no contact area.
             for corners in mesh.corners_mm().filter(|corners| twice_shadow_mm2(corners) != 0.0) {
                 let heights = corners.map(|[_, _, z]| z - lowest);
                 let (least, most) = (
@@ -462,7 +462,7 @@ fn jumps_mm(indenter: &Indenter, depth_max_mm: f64) -> Option<Vec<f64>> {
     }
 }
 
-/// Twice the area that a triangle covers, seen from below.
+/// Twice the signed area of a triangle, seen from below.
 fn twice_shadow_mm2([a, b, c]: &[[f64; 3]; 3]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }

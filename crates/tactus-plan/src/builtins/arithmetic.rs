@@ -45,7 +45,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         result("ln", x.0, finite("x", x.0)?.ln())
     }
 
-    /// A number rounded to so many digits after the point.
+    /// A number rounded to this many digits after the point.
     fn round(
         #[starlark(require = pos)] x: UnpackFloat,
         #[starlark(default = 0)] digits: i32,

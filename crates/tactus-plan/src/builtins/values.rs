@@ -64,7 +64,7 @@ pub(super) fn reading_value<'v>(reading: &MeanReading, heap: Heap<'v>) -> Value<
     ]))
 }
 
-/// A script's value as JSON. What JSON has no form for, and what is too much or too deep, is null.
+/// A script's value as JSON. A part that JSON cannot express, or that is too large or nested too deeply, is null.
 pub(crate) fn to_json(value: Value<'_>) -> Json {
     let mut left = JSON_SIZE_MAX;
     json(value, 0, &mut left)

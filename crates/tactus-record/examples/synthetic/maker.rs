@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rand_distr::{Distribution, Exp1, StandardNormal};
 use tactus_schema::{
     DeviceTick, Frame, FrameFlags, MonoTime, Rig, TimeStamp, WallTime,
     pb::{self, run_event::Event},
@@ -16,21 +18,13 @@ pub(super) struct Maker {
     knots: Vec<(f64, [f64; 3])>,
     events: Vec<(f64, Event)>,
     dwells: Vec<(f64, f64, i32, u32, [f64; 2], f64)>,
-    random: Random,
+    rng: ChaCha8Rng,
 }
 
 impl Maker {
     pub(super) fn new(plan: Plan) -> Self {
-        let random = Random(plan.seed | 1);
-        Self {
-            plan,
-            rig: rig(),
-            now_s: 0.0,
-            knots: Vec::new(),
-            events: Vec::new(),
-            dwells: Vec::new(),
-            random,
-        }
+        let rng = ChaCha8Rng::seed_from_u64(plan.seed);
+        Self { plan, rig: rig(), now_s: 0.0, knots: Vec::new(), events: Vec::new(), dwells: Vec::new(), rng }
     }
 
     pub(super) fn make(mut self) -> Run {
@@ -46,8 +40,7 @@ impl Maker {
         }
         self.phase(pb::Phase::Idle, -1);
         self.now_s += 0.5;
-        let gains: Vec<f64> =
-            (0..self.rig.array.elements()).map(|_| 1.0 + 0.08 * self.random.normal()).collect();
+        let gains: Vec<f64> = (0..self.rig.array.elements()).map(|_| 1.0 + 0.08 * self.normal()).collect();
         let (frames, sampled_s) = self.frames(&gains);
         let mut fed = vec![Fed::Info(self.info(), stamp(0.0))];
         fed.extend(frames.iter().cloned().map(Fed::Frame));
@@ -110,7 +103,8 @@ impl Maker {
             if sampled_s > self.now_s {
                 break;
             }
-            let delay_s = 0.002 + 0.0006 * -self.random.uniform().ln();
+            let wait: f64 = Exp1.sample(&mut self.rng);
+            let delay_s = 0.002 + 0.0006 * wait;
             if self.plan.lost.contains(&seq) {
                 lost_before += 1;
                 continue;
@@ -155,9 +149,13 @@ impl Maker {
                 let (dx, dy) = (x - centre[0], y - centre[1]);
                 let spread = (-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm)).exp();
                 let rise = 800.0 * gains[element] * (depth_mm + 0.5 * depth_mm * depth_mm) * spread;
-                (100.0 + rise + 2.0 * self.random.normal()).round() as f32
+                (100.0 + rise + 2.0 * self.normal()).round() as f32
             })
             .collect()
+    }
+
+    fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.rng)
     }
 
     fn stage(&self) -> Vec<Fed> {
@@ -270,20 +268,4 @@ pub(super) fn position(knots: &[(f64, [f64; 3])], at_s: f64) -> [f64; 3] {
 fn stamp(at_s: f64) -> TimeStamp {
     let ns = (at_s * 1e9).round() as i64;
     TimeStamp { mono: MonoTime::from_ns(ns), wall: WallTime::from_ns(STARTED_NS + ns) }
-}
-
-/// xorshift64*; good enough for noise in tests.
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        ((self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
-    }
 }

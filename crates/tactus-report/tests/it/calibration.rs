@@ -82,7 +82,7 @@ fn numbers_have_the_digits_of_their_errors() {
     ] {
         assert!(html.contains(row), "{row}");
     }
-    // 1.362476 pitches, of which the paper states 1.36.
+    // 1.362476 pitches; the paper states 1.36.
     assert!(html.contains("<td class=\"n\">1.362</td>"), "Eq. 4 is in the row");
     assert!(html.contains("(p-value if it holds: &lt; 0.001)"));
     assert!(

@@ -25,9 +25,9 @@ pub(super) struct Backlog {
     alarmed: bool,
 }
 
-/// What to do about a backlog.
+/// Whether a recorder keeps up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub(super) enum Lag {
     KeepsUp,
     /// It has become old: once, until it is worked off.
     Alarm(Duration),
@@ -43,22 +43,22 @@ impl Backlog {
     }
 
     /// Judges the backlog, when `written` messages in all have been written.
-    pub(super) fn check(&mut self, written: u64, now: MonoTime) -> Verdict {
+    pub(super) fn check(&mut self, written: u64, now: MonoTime) -> Lag {
         self.settle(written);
         let Some(oldest) = self.oldest() else {
             self.alarmed = false;
-            return Verdict::KeepsUp;
+            return Lag::KeepsUp;
         };
         // Messages are queued a little out of the order of their times: then it is zero.
         let age = now.since(oldest);
         if age > AGE_MAX || self.bytes > BYTES_MAX {
-            return Verdict::TooLate(age);
+            return Lag::TooLate(age);
         }
         if age < ALARM {
             self.alarmed &= age > ALARM / 2;
-            return Verdict::KeepsUp;
+            return Lag::KeepsUp;
         }
-        if std::mem::replace(&mut self.alarmed, true) { Verdict::KeepsUp } else { Verdict::Alarm(age) }
+        if std::mem::replace(&mut self.alarmed, true) { Lag::KeepsUp } else { Lag::Alarm(age) }
     }
 
     /// Removes what was written.

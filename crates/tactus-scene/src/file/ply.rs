@@ -104,7 +104,7 @@ struct Vertex([f64; 3]);
 /// Indices of the corners.
 struct Face(Vec<u32>);
 
-/// An element of which nothing is kept.
+/// An element that is skipped.
 struct Other;
 
 impl PropertyAccess for Vertex {

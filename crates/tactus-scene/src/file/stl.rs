@@ -34,7 +34,7 @@ fn announced(bytes: &[u8]) -> Option<usize> {
     usize::try_from(u32::from_le_bytes(*count)).ok()
 }
 
-/// A binary file; many have a header like that of a text, by which `stl_io` would take them for one.
+/// A binary file. Many have a header like that of a text file, which would mislead `stl_io`.
 fn binary(bytes: &[u8]) -> Result<Cow<'_, [u8]>, FileError> {
     at_most("triangles", (bytes.len() - HEAD_BYTES) / TRIANGLE_BYTES, TRIANGLES_MAX)?;
     let mut bytes = Cow::from(bytes);

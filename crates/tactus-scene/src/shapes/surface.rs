@@ -4,8 +4,8 @@ use super::outline::{polar, triangles};
 
 /// Triangles that enclose a solid, or several that may overlap; in mm.
 ///
-/// Seen from outside, the corners of every triangle run counter-clockwise: a solid's surface, of which a
-/// [`Mesh`](tactus_model::Mesh) needs no such order.
+/// Seen from outside, the corners of every triangle run counter-clockwise. A [`Mesh`](tactus_model::Mesh) does not need
+/// this order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
     vertices_mm: Vec<[f64; 3]>,

@@ -23,7 +23,7 @@ const POSES: [(Tool, [usize; 3]); 7] = [
     (Tool::Box, [60, 60, 30]),
 ];
 
-/// For poses that touch at least so many cells: the share that may differ by more than 1e-3 of the peak. Two poses in
+/// For poses that touch at least this many cells: the share that may differ by more than 1e-3 of the peak. Two poses in
 /// three are tilted, and most of those touch with an edge or a corner only.
 const SHARE_OVER_MAX: [(usize, f64); 4] = [(0, 1.0), (10, 1.0), (100, 0.25), (1000, 0.03)];
 
@@ -178,13 +178,13 @@ impl Tool {
             Self::Cylinder => revolved(&[[1.0, 0.0], [1.0, 5.0]], 16, 0.0),
             Self::Sphere => revolved(&(0..7).map(sphere).collect::<Vec<_>>(), 12, 0.0),
             Self::Cone => revolved(&[[1e-3, 0.0], [2.0, 2.0], [2.0, 5.0]], 16, 0.0),
-            // Four sides about the axis, of which a square's corners are 1.5 away.
+            // Four sides around the axis; the corners of the square are 1.5 away.
             Self::Box => revolved(&[[1.5, 0.0], [1.5, 4.0]], 4, TAU / 8.0),
         }
     }
 }
 
-/// A closed solid of rings of so many sides; `profile` gives the radius and height of each ring in mm, bottom to top.
+/// A closed solid of rings of this many sides; `profile` gives the radius and height of each ring in mm, bottom to top.
 fn revolved(profile: &[[f64; 2]], sides: u32, start_rad: f64) -> Mesh {
     let rings = u32::try_from(profile.len()).unwrap();
     let around = |[radius, z]: &[f64; 2]| {

@@ -24,6 +24,16 @@ pub enum StageProtocol {
     Zaber(ZaberAxes),
 }
 
+impl StageProtocol {
+    /// True if the controller moves this axis of the robot's frame: 0 is x, 1 is y, 2 is z.
+    pub fn has_axis(&self, axis: usize) -> bool {
+        match self {
+            Self::Grbl(_) => axis < 3,
+            Self::Zaber(zaber) => zaber.axes.get(axis).is_some_and(Option::is_some),
+        }
+    }
+}
+
 /// The axes of a Grbl controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GrblAxes {

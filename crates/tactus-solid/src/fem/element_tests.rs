@@ -1,4 +1,4 @@
-//! The plain way: a brick's stiffness by quadrature, the slab's equations assembled and eliminated.
+//! The plain method: a brick's stiffness by quadrature, and the slab's equations assembled and eliminated.
 
 /// Places of the corners; the first four are the upper ones, as z points down.
 pub(super) const CORNERS: [[usize; 3]; 8] =

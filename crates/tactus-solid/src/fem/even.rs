@@ -53,7 +53,7 @@ impl Even {
     }
 }
 
-/// How often a node so many steps from the middle is there in a period: on both sides, but for the ends.
+/// How often a period contains a node this many steps from the middle: twice, except the nodes in the middle and at the end.
 pub(super) fn times(steps: usize, half: usize) -> f64 {
     if steps == 0 || steps == half { 1.0 } else { 2.0 }
 }

@@ -39,13 +39,13 @@ impl Reaction {
             .collect()
     }
 
-    /// Pressure in N/mm^2 about the bottom's node that is so many bricks from the load's axis along x and y: its
-    /// force over the area of a brick. 0 beyond the slab.
+    /// Pressure in N/mm^2 at the bottom's node that is this many bricks from the load's axis along x and y: its force
+    /// divided by the area of a brick. 0 beyond the slab.
     ///
-    /// Off the pressure under the elastic layer that the bricks stand for, with Poisson's ratios of 0.3, 0.45 and
-    /// 0.49, by at most this share of the peak: 10, 10 and 15 % with 5 layers of cubes, 3.4, 4.0 and 9.0 % with 10,
-    /// 0.35, 0.38 and 0.40 % with 32. Most of it is right below the load, where the node forces of a coarse mesh
-    /// alternate; it falls with the square of the brick's side.
+    /// The greatest difference from the pressure under the elastic layer that the bricks represent, as a share of the
+    /// peak, for Poisson's ratios of 0.3, 0.45 and 0.49: 10, 10 and 15 % with 5 layers of cubes, 3.4, 4.0 and 9.0 % with
+    /// 10, 0.35, 0.38 and 0.40 % with 32. It is greatest right below the load, where the node forces of a coarse mesh
+    /// alternate, and falls with the square of the brick's side.
     pub fn pressure_per_mm2(&self, steps: [u32; 2]) -> f64 {
         let [x, y] = steps.map(|steps| steps as usize);
         if x.max(y) > self.bricks.half() { 0.0 } else { self.forces.at(x, y) / self.bricks.width_mm.powi(2) }

@@ -4,14 +4,14 @@ use super::{CONFIRMING_FRAMES, Decoder, DecoderStats};
 use crate::anyskin::{DecodedFrame, FRAME_BYTES, Magnetometer};
 use crate::pieces::cut;
 
-/// A frame that is told from others by its number.
+/// A frame that its number distinguishes from others.
 fn frame(number: u8) -> Vec<u8> {
     let mut magnetometers = [Magnetometer { temperature_c: 24.5, field_ut: [12.25, -310.0, 55.5] }; 5];
     magnetometers[2].field_ut[1] = f32::from(number);
     DecodedFrame { magnetometers }.encode()
 }
 
-/// A frame with what ends frames in its numbers.
+/// A frame whose numbers contain the bytes that end a frame.
 fn frame_with_ends(number: u8) -> Vec<u8> {
     let mut bytes = frame(number);
     bytes[8..10].copy_from_slice(b"\r\n");

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 pub use hint::Hint;
 
-use super::inspect::Verdict;
+use super::inspect::FrameCandidate;
 use super::sniff::find;
 use super::{Decoder, DecoderStats, Format, Framing};
 
@@ -99,16 +99,16 @@ impl CaptureReport {
                 continue;
             }
             match format.inspect(capture.get(at..).unwrap_or_default()) {
-                Verdict::BadLength { found, expected } => {
+                FrameCandidate::BadLength { found, expected } => {
                     self.first_bad_length.get_or_insert(Mismatch { at, expected, found });
                 }
-                Verdict::BadTrailer => {
+                FrameCandidate::BadTrailer => {
                     self.first_bad_trailer_at.get_or_insert(at);
                 }
-                Verdict::BadChecksum { found, expected } => {
+                FrameCandidate::BadChecksum { found, expected } => {
                     self.first_bad_checksum.get_or_insert(Mismatch { at, expected, found });
                 }
-                Verdict::NoHead | Verdict::Unfinished | Verdict::Good => {}
+                FrameCandidate::NoHead | FrameCandidate::Unfinished | FrameCandidate::Good => {}
             }
         }
     }

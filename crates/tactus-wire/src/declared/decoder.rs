@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::inspect::Verdict;
+use super::inspect::FrameCandidate;
 use super::{Format, Framing};
 use crate::unwrapper::{Advance, Unwrapper};
 
@@ -114,12 +114,12 @@ impl Decoder {
             self.skip_to_head();
             let rest = self.bytes.get(self.start..)?;
             match self.format.inspect(rest) {
-                Verdict::Unfinished => return None,
-                Verdict::NoHead => {}
-                Verdict::BadLength { .. } => self.stats.bad_lengths += 1,
-                Verdict::BadChecksum { .. } => self.stats.bad_checksums += 1,
-                Verdict::Good if self.is_believed(rest)? => return self.accept(),
-                Verdict::BadTrailer | Verdict::Good => self.stats.bad_ends += 1,
+                FrameCandidate::Unfinished => return None,
+                FrameCandidate::NoHead => {}
+                FrameCandidate::BadLength { .. } => self.stats.bad_lengths += 1,
+                FrameCandidate::BadChecksum { .. } => self.stats.bad_checksums += 1,
+                FrameCandidate::Good if self.is_believed(rest)? => return self.accept(),
+                FrameCandidate::BadTrailer | FrameCandidate::Good => self.stats.bad_ends += 1,
             }
             self.skip(match self.format.framing {
                 Framing::Stream => 1,

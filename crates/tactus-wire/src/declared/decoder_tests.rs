@@ -104,7 +104,7 @@ fn drain(decoder: &mut Decoder) -> Vec<Owned> {
     frames
 }
 
-/// What comes out if the stream arrives in pieces of these lengths, over and over.
+/// The decoder's output if the stream arrives in pieces of these lengths, repeated.
 fn decode(format: &Arc<Format>, stream: &[u8], pieces: &[usize]) -> (Vec<Owned>, DecoderStats) {
     let mut decoder = Decoder::new(Arc::clone(format));
     let mut frames = Vec::new();

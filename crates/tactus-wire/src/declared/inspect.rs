@@ -4,7 +4,7 @@ use super::Format;
 
 /// What begins at a place in a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub(super) enum FrameCandidate {
     /// No frame begins here.
     NoHead,
     /// A possible frame that has not arrived completely.
@@ -21,31 +21,31 @@ pub(super) enum Verdict {
 
 impl Format {
     /// What begins at the beginning of `bytes`.
-    pub(super) fn inspect(&self, bytes: &[u8]) -> Verdict {
+    pub(super) fn inspect(&self, bytes: &[u8]) -> FrameCandidate {
         if !begins_like(bytes, &self.head) {
-            return Verdict::NoHead;
+            return FrameCandidate::NoHead;
         }
         if let Some(length) = self.length {
             match length.field.read(bytes) {
                 Some(found) if found != length.value => {
-                    return Verdict::BadLength { found, expected: length.value };
+                    return FrameCandidate::BadLength { found, expected: length.value };
                 }
                 Some(_) | None => {}
             }
         }
-        let Some(frame) = bytes.get(..self.bytes) else { return Verdict::Unfinished };
+        let Some(frame) = bytes.get(..self.bytes) else { return FrameCandidate::Unfinished };
         if !frame.ends_with(&self.trailer) {
-            return Verdict::BadTrailer;
+            return FrameCandidate::BadTrailer;
         }
         if let Some(checksum) = &self.checksum {
             let covered = frame.get(checksum.from..checksum.to).unwrap_or_default();
             let expected = checksum.algorithm.of(covered).into();
             let found = checksum.field.read(frame).unwrap_or_default();
             if found != expected {
-                return Verdict::BadChecksum { found, expected };
+                return FrameCandidate::BadChecksum { found, expected };
             }
         }
-        Verdict::Good
+        FrameCandidate::Good
     }
 
     /// Whether `bytes` begin like a frame; `None` if they are too short to decide.

@@ -16,7 +16,7 @@ pub(crate) fn noise(seed: u32) -> impl FnMut() -> u8 {
     }
 }
 
-/// So many frames of a shipped description, at rest: counts with a little noise.
+/// Frames of a shipped description, at rest: counts with a little noise.
 fn recording(name: &str, frames: u32) -> Vec<u8> {
     let path = format!("{}/../../config/links/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let format =

@@ -5,7 +5,7 @@ pub(super) fn round_to_um(mm: f64) -> f64 {
     (mm * 1000.0).round() / 1000.0 + 0.0
 }
 
-/// A number with three decimals at most, without zeros that say nothing: `-.1`, `12`, `.005`.
+/// A number with at most three decimals, without redundant zeros: `-.1`, `12`, `.005`.
 pub(super) fn short(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

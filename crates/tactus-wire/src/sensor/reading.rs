@@ -27,7 +27,7 @@ pub enum LossEvidence {
     Counted {
         /// Readings that its count says are missing, modulo `wrap`.
         lost: u64,
-        /// The count starts again at 0 after so many frames.
+        /// The count starts again at 0 after this many frames.
         wrap: u64,
     },
 }

@@ -54,7 +54,7 @@ pub struct ChecksumError {
 }
 
 /// What begins at sync bytes.
-enum Candidate {
+enum PacketCandidate {
     /// No packet: the id or the length is impossible.
     Impossible,
     /// A possible packet that has not arrived completely.
@@ -106,12 +106,12 @@ impl Decoder {
             self.skip_to_sync();
             let outer_at = self.start;
             let (limit, verdict) = match self.inspect(outer_at) {
-                Candidate::Impossible => {
+                PacketCandidate::Impossible => {
                     self.skip(1);
                     continue;
                 }
-                Candidate::Unfinished => (self.bytes.len() + 1, None),
-                Candidate::Whole { end, verdict } => (end, Some(verdict)),
+                PacketCandidate::Unfinished => (self.bytes.len() + 1, None),
+                PacketCandidate::Whole { end, verdict } => (end, Some(verdict)),
             };
             if let Some(inner) = self.first_to_end_within(outer_at + 1, limit) {
                 self.skip(inner.start - outer_at);
@@ -143,33 +143,35 @@ impl Decoder {
         self.skip(skipped);
     }
 
-    fn inspect(&self, at: usize) -> Candidate {
-        let Some(rest) = self.bytes.get(at + SYNC.len()..) else { return Candidate::Unfinished };
+    fn inspect(&self, at: usize) -> PacketCandidate {
+        let Some(rest) = self.bytes.get(at + SYNC.len()..) else { return PacketCandidate::Unfinished };
         let Some(&[id, length_low, length_high]) = rest.first_chunk() else {
             // The header begins behind the last sync byte, because no id equals one.
             return if rest.first() == Some(&SYNC[0]) {
-                Candidate::Impossible
+                PacketCandidate::Impossible
             } else {
-                Candidate::Unfinished
+                PacketCandidate::Unfinished
             };
         };
         let length = usize::from(u16::from_le_bytes([length_low, length_high]));
         if id == SYNC[0] || length > self.max_payload_bytes {
-            return Candidate::Impossible;
+            return PacketCandidate::Impossible;
         }
         if length == 0 {
-            return Candidate::Whole { end: at + HEADER_BYTES, verdict: Ok(()) };
+            return PacketCandidate::Whole { end: at + HEADER_BYTES, verdict: Ok(()) };
         }
         let covered = HEADER_BYTES - SYNC.len() + length;
-        let Some((covered, tail)) = rest.split_at_checked(covered) else { return Candidate::Unfinished };
-        let Some(found) = self.checksum.read(tail) else { return Candidate::Unfinished };
+        let Some((covered, tail)) = rest.split_at_checked(covered) else {
+            return PacketCandidate::Unfinished;
+        };
+        let Some(found) = self.checksum.read(tail) else { return PacketCandidate::Unfinished };
         let expected = self.checksum.of(covered);
         let verdict = if expected == found {
             Ok(())
         } else {
             Err(ChecksumError { id, bytes: length, expected, found })
         };
-        Candidate::Whole { end: at + HEADER_BYTES + length + self.checksum.bytes(), verdict }
+        PacketCandidate::Whole { end: at + HEADER_BYTES + length + self.checksum.bytes(), verdict }
     }
 
     /// Of the packets with a correct checksum that begin at `from` or later and end before `limit`, the one that ends first.
@@ -177,7 +179,7 @@ impl Decoder {
         let mut first = None;
         while let Some(offset) = find_sync(self.bytes.get(from..limit.min(self.bytes.len()))?) {
             let at = from + offset;
-            if let Candidate::Whole { end, verdict: Ok(()) } = self.inspect(at)
+            if let PacketCandidate::Whole { end, verdict: Ok(()) } = self.inspect(at)
                 && end < limit
                 && end > at + HEADER_BYTES
             {

@@ -15,7 +15,7 @@ fn drain(decoder: &mut Decoder) -> Vec<Owned> {
     packets
 }
 
-/// What comes out if the stream arrives in pieces of these lengths, over and over.
+/// The decoder's output if the stream arrives in pieces of these lengths, repeated.
 fn decode(stream: &[u8], pieces: &[usize]) -> (Vec<Owned>, DecoderStats) {
     let mut decoder = Decoder::new();
     let mut packets = Vec::new();

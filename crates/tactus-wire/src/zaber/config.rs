@@ -53,7 +53,7 @@ pub enum ConfigError {
     /// A number is out of range.
     #[error("{name}: {field} is {value}, but must be {range}")]
     Range { name: AxisName, field: &'static str, value: f64, range: &'static str },
-    /// A number of the stage is not more than 0.
+    /// A number is not positive.
     #[error("{field} is {value}, but must be more than 0")]
     NotPositive { field: &'static str, value: f64 },
     /// Two axes of the stage use the same axis of a device.

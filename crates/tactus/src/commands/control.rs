@@ -63,7 +63,7 @@ pub(crate) fn reset(common: &Common, args: &LeaseArgs) -> anyhow::Result<Exit> {
     command(common, Command::Reset, args, None)
 }
 
-/// Sends a command that wants the lease.
+/// Sends a command that needs the lease.
 fn command(
     common: &Common,
     command: Command,

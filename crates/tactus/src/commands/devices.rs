@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use serde_json::{Value, json};
 use tactus_device::{Access, FoundDevice, inventory};
-use tactus_runner::config::{self, Config, RigFiles};
+use tactus_runner::config::{self, RigFiles, ServiceConfig};
 use tactus_schema::Rig;
 use tactus_schema::rig::{SerialPort, Transport};
 
@@ -55,7 +55,7 @@ impl Rigs {
             rigs.add(&config::load_rig(file)?.rig);
         }
         if let Some(config) = config {
-            rigs.add(&Config::load(config)?.rig.rig);
+            rigs.add(&ServiceConfig::load(config)?.rig.rig);
         }
         rigs.are_named = file.is_some() || config.is_some();
         if !rigs.are_named {

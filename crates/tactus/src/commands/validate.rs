@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use serde_json::json;
 use tactus_plan::RigView;
 use tactus_record::Completeness;
-use tactus_runner::config::{self, Config};
+use tactus_runner::config::{self, ServiceConfig};
 use tactus_runner::embedded::{HIDDEN_SCHEMA, SIMULATED_RIG, TruthFile};
 use tactus_runner::experiments;
 use tactus_schema::{Model, Rig, model, rig};
@@ -86,7 +86,9 @@ fn check_toml(file: &Path) -> anyhow::Result<String> {
             model::SCHEMA,
             declared::SCHEMA
         ),
-        None => Ok(format!("a service's configuration for rig {:?}", Config::load(file)?.rig.rig.name)),
+        None => {
+            Ok(format!("a service's configuration for rig {:?}", ServiceConfig::load(file)?.rig.rig.name))
+        }
     }
 }
 

@@ -1,10 +1,11 @@
-//! From a line to a [`Fault`].
+//! From a line to an [`InjectedFault`].
 
 use std::str::{FromStr, SplitWhitespace};
 use std::time::Duration;
 
 use super::{
-    CableFault, ControllerFault, Fault, LinkFault, RigFault, SensorFault, StageFault, Way, WireFault,
+    CableFault, ControllerFault, InjectedFault, LinkDirection, LinkFault, RigFault, SensorFault, StageFault,
+    WireFault,
 };
 
 const SENSOR_FAULTS: &str = "burst N, clear, clock-jump DURATION, clock-wrap, disconnect DURATION, drip DURATION, drop BYTES, \
@@ -51,7 +52,7 @@ pub enum FaultError {
     NotTaken,
 }
 
-impl FromStr for Fault {
+impl FromStr for InjectedFault {
     type Err = FaultError;
 
     fn from_str(line: &str) -> Result<Self, FaultError> {
@@ -67,10 +68,12 @@ impl FromStr for Fault {
                 Some(fault) => Self::StageCable(fault),
                 None => Self::Stage(stage(&mut arguments)?),
             },
-            "to-sensor" => Self::Sensor(SensorFault::Wire(Way::FromHost, wire(&mut arguments)?)),
-            "from-sensor" => Self::Sensor(SensorFault::Wire(Way::FromDevice, wire(&mut arguments)?)),
-            "to-stage" => Self::Stage(StageFault::Wire(Way::FromHost, wire(&mut arguments)?)),
-            "from-stage" => Self::Stage(StageFault::Wire(Way::FromDevice, wire(&mut arguments)?)),
+            "to-sensor" => Self::Sensor(SensorFault::Wire(LinkDirection::FromHost, wire(&mut arguments)?)),
+            "from-sensor" => {
+                Self::Sensor(SensorFault::Wire(LinkDirection::FromDevice, wire(&mut arguments)?))
+            }
+            "to-stage" => Self::Stage(StageFault::Wire(LinkDirection::FromHost, wire(&mut arguments)?)),
+            "from-stage" => Self::Stage(StageFault::Wire(LinkDirection::FromDevice, wire(&mut arguments)?)),
             "rig" => Self::Rig(rig(&mut arguments)?),
             found => return Err(FaultError::Device { found: found.to_owned() }),
         };

@@ -1,6 +1,6 @@
 use super::*;
 
-fn parse(line: &str) -> Result<Fault, FaultError> {
+fn parse(line: &str) -> Result<InjectedFault, FaultError> {
     line.parse()
 }
 
@@ -15,7 +15,7 @@ fn every_fault_has_its_line() {
         ("sensor saturate 7", S::Saturate(7)),
         ("  sensor   clear ", S::Clear),
     ] {
-        assert_eq!(parse(line), Ok(Fault::Sensor(fault)), "{line}");
+        assert_eq!(parse(line), Ok(InjectedFault::Sensor(fault)), "{line}");
     }
     for (line, fault) in [
         ("sensor stall 2s", L::Stall(two_seconds)),
@@ -31,14 +31,14 @@ fn every_fault_has_its_line() {
         ("sensor burst 10", L::Burst(10)),
         ("sensor wrong-count 47", L::WrongCount(47)),
     ] {
-        assert_eq!(parse(line), Ok(Fault::Sensor(S::Link(fault))), "{line}");
+        assert_eq!(parse(line), Ok(InjectedFault::Sensor(S::Link(fault))), "{line}");
     }
     for (line, fault) in [
         ("stage echo-garbage", T::EchoGarbage),
         ("stage stall 2s", T::Stall(two_seconds)),
         ("stage clear", T::Clear),
     ] {
-        assert_eq!(parse(line), Ok(Fault::Stage(fault)), "{line}");
+        assert_eq!(parse(line), Ok(InjectedFault::Stage(fault)), "{line}");
     }
     for (line, fault) in [
         ("stage alarm 1", C::Alarm(1)),
@@ -51,13 +51,13 @@ fn every_fault_has_its_line() {
         ("stage lost-steps 0.05", C::LostSteps { lost_mm: 0.05 }),
         ("stage homing-fails", C::HomingFails),
     ] {
-        assert_eq!(parse(line), Ok(Fault::Stage(T::Controller(fault))), "{line}");
+        assert_eq!(parse(line), Ok(InjectedFault::Stage(T::Controller(fault))), "{line}");
     }
     for (line, fault) in [
-        ("sensor disconnect 2000ms", Fault::SensorCable(CableFault::Disconnect(two_seconds))),
-        ("sensor renumber", Fault::SensorCable(CableFault::Renumber)),
-        ("stage disconnect 2s", Fault::StageCable(CableFault::Disconnect(two_seconds))),
-        ("stage renumber", Fault::StageCable(CableFault::Renumber)),
+        ("sensor disconnect 2000ms", InjectedFault::SensorCable(CableFault::Disconnect(two_seconds))),
+        ("sensor renumber", InjectedFault::SensorCable(CableFault::Renumber)),
+        ("stage disconnect 2s", InjectedFault::StageCable(CableFault::Disconnect(two_seconds))),
+        ("stage renumber", InjectedFault::StageCable(CableFault::Renumber)),
     ] {
         assert_eq!(parse(line), Ok(fault), "{line}");
     }
@@ -66,7 +66,7 @@ fn every_fault_has_its_line() {
         ("rig surface -0.1", R::Surface { z_mm: -0.1 }),
         ("rig stiffness 3", R::Stiffness(3.0)),
     ] {
-        assert_eq!(parse(line), Ok(Fault::Rig(fault)), "{line}");
+        assert_eq!(parse(line), Ok(InjectedFault::Rig(fault)), "{line}");
     }
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
-use super::{Fault, FaultError};
+use super::{FaultError, InjectedFault};
 
 /// Faults at set times after the rig's start, earliest first.
 ///
@@ -25,7 +25,7 @@ pub struct TimedFault {
     /// Time since the rig was switched on.
     pub at: Duration,
     /// The injected fault.
-    pub fault: Fault,
+    pub fault: InjectedFault,
 }
 
 /// Why a text is not a fault script. `index` counts the entries from 0.

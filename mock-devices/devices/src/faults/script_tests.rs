@@ -18,8 +18,11 @@ fn faults_come_in_order_of_time() {
     assert_eq!(
         script.faults,
         [
-            TimedFault { at: at(1.0), fault: Fault::Stage(StageFault::Controller(ControllerFault::Reset)) },
-            TimedFault { at: at(3.5), fault: Fault::Sensor(SensorFault::Link(LinkFault::Duplicate)) },
+            TimedFault {
+                at: at(1.0),
+                fault: InjectedFault::Stage(StageFault::Controller(ControllerFault::Reset))
+            },
+            TimedFault { at: at(3.5), fault: InjectedFault::Sensor(SensorFault::Link(LinkFault::Duplicate)) },
         ]
     );
     assert_eq!(FaultScript::from_toml(""), Ok(FaultScript::default()));

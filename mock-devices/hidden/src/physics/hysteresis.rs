@@ -73,7 +73,7 @@ pub(super) const BOUC_WEN: Definition = Definition {
     },
 };
 
-/// Bouc-Wen's law is integrated in so many steps of depth; it has no time in it.
+/// Bouc-Wen's law is integrated in this many steps of depth; it does not depend on time.
 const SMALL_STEPS: u32 = 16;
 
 /// Relays in `[0, 1]`, switching on above `a` and off below `b <= a`, as many as `exp(-(a - b)/kappa)`; all on is 1.

@@ -1,5 +1,5 @@
-//! The image of a cylinder's face that may lean, under a spread that may differ along x and y: by quadrature of the
-//! disc, independent of the base model's method.
+//! The image of a cylinder's face, which may lean, under a spread that may differ along x and y. It is computed by
+//! quadrature over the disc, independently of the base model's method.
 
 use std::f64::consts::{PI, TAU};
 

@@ -85,7 +85,7 @@ impl Session {
         }
     }
 
-    /// What was asked before the controller is taken for the rig's has been answered.
+    /// Handles the end of a query that precedes the controller's acceptance.
     fn handle_answered(&mut self, now: Duration, query: Query) {
         if query == Query::Build {
             return self.ask(now, Query::Settings, 1);

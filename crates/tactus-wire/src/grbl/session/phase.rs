@@ -52,18 +52,18 @@ pub(super) enum Purpose {
     Recover,
     /// To clear an alarm.
     Clear,
-    /// None, because nothing is reset: a command wants to know where the stage stands. So many `reports` have come.
+    /// Nothing is reset: a command needs the stage's position. `reports` is the number of reports so far.
     Look { wanted: Wanted, reports: u32 },
     /// To discard the commands that the controller holds. It stood still at `held_mm`; `None` if it may have been moving.
     Stop { failure: Option<Failure>, held_mm: Option<[f64; 3]> },
 }
 
-/// What a command wants to know the position for.
+/// Why a command needs the position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Wanted {
-    /// To tell it.
+    /// To report it.
     Position,
-    /// To tell whether it is this one.
+    /// To check whether it is this one.
     At([f64; 3]),
     /// To move from it.
     Move { target_mm: [f64; 3], speed_mm_per_s: f64 },
@@ -77,7 +77,7 @@ pub(super) struct Preparation {
     pub(super) feed: Feed,
     /// It is being set for this time.
     pub(super) tries: u32,
-    /// The controller was asked for its feed, and has told the right one.
+    /// The controller was asked for its feed, and has reported the right one.
     pub(super) asked: bool,
     pub(super) told: bool,
     pub(super) deadline: Duration,

@@ -123,8 +123,8 @@ impl Session {
         self.phase = Phase::Moving(travel);
     }
 
-    /// The failure of a stage that stands elsewhere than the last move ended, by two reports. It is told once: after it, the
-    /// stage is where it says that it is.
+    /// A failure if the stage, by two reports, does not stand where the last move ended. It is reported once: afterwards the
+    /// reported position is believed.
     pub(super) fn displaced(&mut self) -> Option<Failure> {
         let (position_mm, tolerance_mm) = (self.position_mm, self.config.tolerance_mm);
         let target_mm = self.config.to_stage(self.parsed_mm.filter(|_| self.is_steady)?);

@@ -31,14 +31,14 @@ const STATE_PERIOD: Duration = Duration::from_millis(100);
 const TICK_NS: u64 = 1000;
 
 /// Position of the tool over time.
-enum Motion {
+enum ToolPath {
     /// A closed curve over the array with varying depth.
     Circuit { centre_mm: [f64; 2], reach_mm: [f64; 2], depth_mm: f64 },
     /// A path, repeated.
     Repeat(Trajectory),
 }
 
-impl Motion {
+impl ToolPath {
     fn of(scene: &Scene, trajectory: Option<Trajectory>) -> Self {
         let [x, y] = scene.array().extent_mm();
         let depth_mm = scene.contact.depth_mm;
@@ -94,11 +94,11 @@ pub(super) fn publish(
         for copy in 0..args.copies {
             let name = if args.copies == 1 { name.to_owned() } else { format!("{name}-{}", copy + 1) };
             let endpoint = next(&first, copy)?;
-            let motion = Motion::of(scene, trajectory.map(series::read).transpose()?);
+            let path = ToolPath::of(scene, trajectory.map(series::read).transpose()?);
             let sensor = SimulatedSensor {
                 name: name.clone(),
                 scene: scene.clone(),
-                motion,
+                path,
                 rate_hz,
                 rng: ChaCha8Rng::seed_from_u64(args.seed.wrapping_add(u64::from(copy))),
                 clock,
@@ -166,7 +166,7 @@ async fn refuse(mut calls: mpsc::Receiver<CommandCall>) {
 struct SimulatedSensor {
     name: String,
     scene: Scene,
-    motion: Motion,
+    path: ToolPath,
     rate_hz: f64,
     rng: ChaCha8Rng,
     clock: Clock,
@@ -210,8 +210,8 @@ impl SimulatedSensor {
     }
 
     fn frame(&mut self, pipeline: &mut Pipeline, seq: u64, t_s: f64, lost_before: u32) -> Frame {
-        let motion = &self.motion;
-        let clean_counts = pipeline.step(Moment::at(t_s), &|t_s: f64| motion.at(t_s)).to_vec();
+        let path = &self.path;
+        let clean_counts = pipeline.step(Moment::at(t_s), &|t_s: f64| path.at(t_s)).to_vec();
         let full_scale_counts = self.scene.array().full_scale_counts();
         let mut flags = if seq == 0 { FrameFlags::NEW_EPOCH } else { FrameFlags::default() };
         if lost_before > 0 {
@@ -258,7 +258,7 @@ impl SimulatedSensor {
     }
 
     fn stage(&self, seq: u64, t_s: f64) -> pb::StageState {
-        let [x_mm, y_mm, z_mm] = self.motion.at(t_s);
+        let [x_mm, y_mm, z_mm] = self.path.at(t_s);
         let now = self.clock.now();
         pb::StageState {
             seq,

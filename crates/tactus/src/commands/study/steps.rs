@@ -16,7 +16,7 @@ use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
 use crate::sha256;
 
-/// Name of the form of `study.json`.
+/// Name of the format of `study.json`.
 const SCHEMA: &str = "tactus.study-steps/1";
 
 /// The completed steps; kept in `study.json`.
@@ -204,7 +204,7 @@ impl StudySteps {
         Ok(taken)
     }
 
-    /// Writes what was done; a study that is killed meanwhile finds the former list or this one.
+    /// Writes the completed steps. A study that is killed meanwhile leaves the former list or this one.
     fn keep(&self) -> anyhow::Result<()> {
         let beside: &Path = &self.path.with_extension("json.new");
         fs::write(beside, serde_json::to_string_pretty(self)?)

@@ -1,4 +1,4 @@
-//! The ways from a pose to an image.
+//! The methods from a pose to an image.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::{COVERING, DEPTH_MAX_MM, Pose};
 
 /// How an image is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Way {
+pub enum Method {
     /// [`PressTable`]: samples a table of the tool's blurred and integrated footprint, which is made once.
     PressTable,
     /// [`Renderer`]: draws the mesh into a depth map, then takes two matrix products; any attitude.
@@ -19,14 +19,14 @@ pub enum Way {
     Exact,
 }
 
-/// Makes images of one tool along one way, and owns the memory for it; each thread has its own.
+/// Makes images of one tool by one method, and owns the memory for it; each thread has its own.
 #[derive(Debug, Clone)]
 pub enum Painter {
-    /// See [`Way::PressTable`].
+    /// See [`Method::PressTable`].
     PressTable(PressTable),
-    /// See [`Way::Raster`].
+    /// See [`Method::Raster`].
     Raster(Renderer),
-    /// See [`Way::Exact`].
+    /// See [`Method::Exact`].
     Exact {
         /// The exact forward model.
         model: ForwardModel,
@@ -41,17 +41,17 @@ impl Painter {
     /// Prepares everything that does not depend on the pose.
     ///
     /// # Errors
-    /// If the blur is too fine for a press table, or if the way needs a mesh and the tool has none.
-    pub fn new(way: Way, model: &ForwardModel, indenter: &Indenter) -> Result<Self> {
-        Ok(match way {
-            Way::PressTable => Self::PressTable(PressTable::new(model, indenter, COVERING, DEPTH_MAX_MM)?),
-            Way::Raster => {
+    /// If the blur is too fine for a press table, or if the method needs a mesh and the tool has none.
+    pub fn new(method: Method, model: &ForwardModel, indenter: &Indenter) -> Result<Self> {
+        Ok(match method {
+            Method::PressTable => Self::PressTable(PressTable::new(model, indenter, COVERING, DEPTH_MAX_MM)?),
+            Method::Raster => {
                 let Indenter::Mesh(mesh) = indenter else {
-                    bail!("the way `raster` needs a mesh, not {indenter:?}")
+                    bail!("the method `raster` needs a mesh, not {indenter:?}")
                 };
                 Self::Raster(Renderer::new(model.clone(), COVERING, Arc::clone(mesh))?)
             }
-            Way::Exact => Self::Exact {
+            Method::Exact => Self::Exact {
                 model: model.clone(),
                 contact: Contact {
                     indenter: indenter.clone(),

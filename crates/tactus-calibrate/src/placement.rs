@@ -27,7 +27,7 @@ pub struct Declared {
 
 /// Where the sensor lies in the robot's frame, its surface included.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Setting {
+pub(crate) struct Placement {
     pub(crate) registration: Registration,
     /// Distances in the robot's frame divided by those in the sensor's frame.
     pub(crate) scale: f64,
@@ -56,8 +56,8 @@ impl Declared {
     }
 
     /// As declared, with the surface at z = 0.
-    pub(crate) fn setting(&self) -> Setting {
-        Setting { registration: self.registration, scale: 1.0, surface_mm: 0.0 }
+    pub(crate) fn placement(&self) -> Placement {
+        Placement { registration: self.registration, scale: 1.0, surface_mm: 0.0 }
     }
 
     /// The declared spread under a covering.
@@ -78,7 +78,7 @@ impl Declared {
     }
 }
 
-impl Setting {
+impl Placement {
     /// Converts a position from the robot's frame to the sensor's.
     pub(crate) fn on_sensor(&self, place_mm: [f64; 2]) -> [f64; 2] {
         self.registration.to_sensor(place_mm).map(|along| along / self.scale)
