@@ -1,4 +1,4 @@
-//! The run engine and the safety supervisor.
+//! The run engine.
 //!
 //! An [`Engine`] owns a rig's devices for the life of the service. The acquisition task passes each frame to the
 //! safety supervisor, then to the recording, then to the run's averages, then to the viewers. A run executes one
