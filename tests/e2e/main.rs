@@ -3,6 +3,7 @@
 mod awake;
 mod bad_input;
 mod calibrate;
+mod continued;
 mod design;
 mod devices;
 mod discover;

@@ -208,7 +208,7 @@ impl Drop for AcquisitionTask {
 }
 
 /// Coverings that differ by less, in mm, are the same.
-const SAME_COVERING_MM: f64 = 1e-6;
+pub(crate) const SAME_COVERING_MM: f64 = 1e-6;
 
 impl Engine {
     /// Starts acquiring.

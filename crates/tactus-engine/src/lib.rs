@@ -22,5 +22,5 @@ pub use engine::{
 };
 pub use envelope::{Bounds, Outside};
 pub use outlet::{Publish, Record, RecordFailure, Unpublished};
-pub use run::{Planned, RunOrder, RunOutcome};
+pub use run::{DoneStep, EarlierRun, Planned, RunOrder, RunOutcome};
 pub use tactus_safety::{Fault, Violation};

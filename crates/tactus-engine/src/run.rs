@@ -1,6 +1,7 @@
 //! One run: from the first check to the closed recording.
 
 mod broken;
+mod replay;
 mod steps;
 
 use std::collections::BTreeMap;
@@ -23,6 +24,9 @@ use crate::script::{self, Request};
 pub(crate) use broken::{Broken, Ending};
 use broken::{refusal, verdict};
 use pb::run_event::Event;
+use replay::Replay;
+pub use replay::{DoneStep, EarlierRun};
+use steps::as_f32;
 
 /// Averaging time of the run's reference zero.
 const REFERENCE: Duration = Duration::from_millis(300);
@@ -47,6 +51,8 @@ pub struct RunOrder {
     pub limits: Limits,
     /// Where the script is evaluated.
     pub evaluator: Arc<dyn Evaluate>,
+    /// The earlier run that this one goes on with. Script, arguments and seed are those of it.
+    pub earlier: Option<Arc<EarlierRun>>,
     /// Prediction of the dry run, if there was one.
     pub planned: Option<Planned>,
     /// Names and versions of the software and the devices.
@@ -102,6 +108,9 @@ pub(crate) struct Run {
     started: MonoTime,
     /// The run has begun to move.
     is_prepared: bool,
+    /// Until the first step that no earlier run has done.
+    replay: Option<Replay>,
+    taken_over: Option<pb::TakenOver>,
     steps: u64,
     next_press: i32,
     presses: u32,
@@ -138,8 +147,10 @@ impl Run {
             bounds: Bounds::new(rig, &shared.service.envelope, &shared.service.motion, covering),
             started: shared.clock.now().mono,
             is_prepared: false,
+            replay: order.earlier.clone().map(Replay::of),
+            taken_over: order.earlier.as_ref().map(|earlier| earlier.taken_over()),
             steps: 0,
-            next_press: 0,
+            next_press: order.earlier.as_ref().map_or(0, |earlier| earlier.next_press),
             presses: 0,
             dwells: 0,
             zero_counts: rig.baseline_counts.clone(),
@@ -200,6 +211,13 @@ impl Run {
     /// Takes the run's first zero, with the tip up.
     async fn take_reference(&mut self) -> Result<(), Broken> {
         let reference = self.whole_average(REFERENCE).await?;
+        self.emit(Event::ReferenceDone(pb::ReferenceDone {
+            frames: reference.frames,
+            mean_counts: as_f32(&reference.mean_counts),
+            from_mono_ns: reference.span[0].ns(),
+            to_mono_ns: reference.span[1].ns(),
+        }))
+        .await;
         self.zero_counts.clone_from(&reference.mean_counts);
         let set =
             self.shared.acquisition.ask(move |live| live.supervisor.set_reference(&reference.mean_counts));
@@ -210,10 +228,13 @@ impl Run {
     }
 
     async fn run_script(&mut self) -> Result<(), Broken> {
-        let view = RigView::of(&self.shared.rig_in_place());
-        let mut requests =
-            script::start(&self.order, view, self.shared.control.subscribe(), self.shared.clock.is_virtual())
-                .map_err(|error| Broken::Script(format!("no thread for the script: {error}")))?;
+        let mut requests = script::start(
+            &self.order,
+            self.view(),
+            self.shared.control.subscribe(),
+            self.shared.clock.is_virtual(),
+        )
+        .map_err(|error| Broken::Script(format!("no thread for the script: {error}")))?;
         let mut broken = None;
         while let Some(request) = requests.next().await {
             match request {
@@ -227,7 +248,15 @@ impl Run {
                     // The script waits for the answer. If its thread died, `next` returns `None`.
                     let _told = answer.send(reply);
                 }
-                Request::Ended(Ok(_)) => return broken.map_or(Ok(()), Err),
+                Request::Ended(Ok(_)) => {
+                    if let Some(broken) = broken {
+                        return Err(broken);
+                    }
+                    return match self.replay.as_ref().map_or(Ok(()), Replay::check_over) {
+                        Ok(()) => Ok(()),
+                        Err(difference) => self.refused("continue", difference).await,
+                    };
+                }
                 // The script's error repeats the cause, with the line.
                 Request::Ended(Err(error)) => {
                     self.shared.check_ended()?;
@@ -240,6 +269,15 @@ impl Run {
             }
         }
         Err(Broken::Script("the script's thread died; this is a defect of Tactus".into()))
+    }
+
+    /// The rig as the script sees it. A run that goes on with an earlier one begins with the rig of that one.
+    fn view(&self) -> RigView {
+        let mut rig = self.shared.rig_in_place();
+        if let Some(earlier) = &self.order.earlier {
+            rig.covering.thickness_mm = earlier.covering_mm;
+        }
+        RigView::of(&rig)
     }
 
     async fn refused(&self, rule: &'static str, message: String) -> Result<(), Broken> {
@@ -347,6 +385,7 @@ impl Run {
             dwells_planned: planned.dwells,
             duration_planned_s: planned.duration_s,
             versions: self.order.versions.clone(),
+            taken_over: self.taken_over.clone(),
         }
     }
 
@@ -380,6 +419,7 @@ impl Run {
             simulated: self.shared.rig.simulated,
             t_mono_ns: now.ns(),
             fault: self.shared.fault_text(),
+            taken_over: self.taken_over.clone(),
         });
         self.shared.publish.state(&self.shared.state.borrow());
     }

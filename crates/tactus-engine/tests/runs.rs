@@ -1,6 +1,7 @@
 //! A run from start to end, and everything that can end it, in virtual time.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
+mod continued;
 mod rig;
 
 use std::sync::{Arc, Mutex};

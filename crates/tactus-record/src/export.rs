@@ -25,6 +25,8 @@ pub struct ExportSummary {
     pub clocks: Vec<RunClocks>,
     /// Warnings for readers of the table, a sentence each.
     pub warnings: Vec<String>,
+    /// What was left out although nothing is wrong, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// The device clock of each connection of a run, as in the table's metadata.
@@ -52,7 +54,7 @@ pub fn export<P: AsRef<Path>>(recordings: &[P], out: impl Into<PathBuf>) -> Resu
     let [first, rest @ ..] = recordings else { return Err(RowsError::Nothing) };
     let first = Timeline::read(first)?;
     let mut table = TableWriter::create(&out, first.rig_json())?;
-    let mut sources = RowSources::default();
+    let mut sources = RowSources::of(recordings)?;
     let mut clocks = Vec::new();
     let mut add = |timeline: &Timeline| {
         clocks.push(RunClocks::of(timeline));
@@ -72,7 +74,7 @@ pub fn export<P: AsRef<Path>>(recordings: &[P], out: impl Into<PathBuf>) -> Resu
     );
     let rows = table.finish()?;
     let runs = source.runs.len() as u64;
-    Ok(ExportSummary { path: out, rows, runs, clocks, warnings: source.warnings })
+    Ok(ExportSummary { path: out, rows, runs, clocks, warnings: source.warnings, notes: source.notes })
 }
 
 impl RunClocks {

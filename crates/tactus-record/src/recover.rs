@@ -251,7 +251,7 @@ impl Found {
                         script: format!("{}.star", started.experiment),
                         simulated: started.simulated,
                         started: WallTime::from_ns(event.t_wall_ns),
-                        continues: None,
+                        continues: started.taken_over.as_ref().map(|taken| taken.run_id.clone()),
                     });
                 }
             }

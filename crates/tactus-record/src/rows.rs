@@ -1,17 +1,21 @@
 //! Measured rows from recordings and measurement tables.
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
     time::Duration,
 };
 
 use tactus_calibrate::{Readings, ReadingsBuilder};
-use tactus_schema::{Frame, MonoTime, Rig, table::RowView};
+use tactus_schema::{
+    Frame, MonoTime, Rig,
+    pb::{self, run_event::Event},
+    table::RowView,
+};
 
 use crate::{
     Completeness, Entry, Message, RowsError, Sampling, Timeline,
-    reader::{first_bytes, io_error, is_mcap, read_run},
+    reader::{first_bytes, io_error, is_mcap, read, read_run},
     table::{Checker, TableReader},
 };
 
@@ -27,6 +31,8 @@ pub struct Source {
     pub runs: Vec<RunSource>,
     /// Warnings for readers of the rows, a sentence each.
     pub warnings: Vec<String>,
+    /// What was left out although nothing is wrong, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Where the rows of one run came from.
@@ -47,6 +53,8 @@ pub struct RunSource {
 /// [`export`](crate::export()) writes. Each row is checked before `take` sees it. Memory holds no more than a few dozen
 /// bytes per frame of one recording, or one row group of one table.
 ///
+/// If a recording goes on with the run of another one here, the presses that it did again are left out of the other one.
+///
 /// # Errors
 /// If a file is neither, cannot be read, was made with another rig or holds a run of a file before; if a recording
 /// holds no stage position; or if a row breaks the table's contract. `take` has then seen the rows before it.
@@ -54,7 +62,7 @@ pub fn visit<P: AsRef<Path>>(
     paths: &[P],
     mut take: impl FnMut(&Rig, RowView<'_>),
 ) -> Result<Source, RowsError> {
-    let mut sources = RowSources::default();
+    let mut sources = RowSources::of(paths)?;
     let mut take = |rig: &Rig, row: RowView<'_>| {
         take(rig, row);
         Ok(())
@@ -92,9 +100,26 @@ pub(crate) struct RowSources {
     first: Option<(PathBuf, Rig)>,
     runs: Vec<RunSource>,
     warnings: Vec<String>,
+    notes: Vec<String>,
+    /// What later runs took over, by the run that they go on with.
+    taken_over: BTreeMap<String, pb::TakenOver>,
 }
 
 impl RowSources {
+    /// For these files. Recordings are read up to their start.
+    pub(crate) fn of<P: AsRef<Path>>(paths: &[P]) -> Result<Self, RowsError> {
+        let mut taken_over: BTreeMap<String, pb::TakenOver> = BTreeMap::new();
+        for path in paths.iter().map(AsRef::as_ref) {
+            let Some(taken) = taken_over_by(path)? else { continue };
+            match taken_over.get_mut(&taken.run_id) {
+                Some(known) if known.first_press <= taken.first_press => {}
+                Some(known) => *known = taken,
+                None => drop(taken_over.insert(taken.run_id.clone(), taken)),
+            }
+        }
+        Ok(Self { taken_over, ..Self::default() })
+    }
+
     /// Calls `take` for the rows of a recording.
     pub(crate) fn recording(
         &mut self,
@@ -115,6 +140,8 @@ impl RowSources {
             bad_elements: BTreeSet::new(),
             partly_read: 0,
             untold: 0,
+            done_again_from: self.taken_over.get(&run.run_id).map(|taken| taken.first_press),
+            done_again: 0,
         };
         let mut checker = Checker::new(timeline.rig());
         let mut index = 0;
@@ -129,6 +156,7 @@ impl RowSources {
             }
         }
         self.warnings.extend(frames.warnings());
+        self.notes.extend(frames.note());
         Ok(())
     }
 
@@ -152,9 +180,9 @@ impl RowSources {
 
     /// The rig of the first file, the runs and the warnings of all files.
     pub(crate) fn into_source(self) -> Result<Source, RowsError> {
-        let Self { first, runs, warnings } = self;
+        let Self { first, runs, warnings, notes, .. } = self;
         let (_, rig) = first.ok_or(RowsError::Nothing)?;
-        Ok(Source { rig, runs, warnings })
+        Ok(Source { rig, runs, warnings, notes })
     }
 
     fn same_rig(&mut self, path: &Path, rig: &Rig) -> Result<(), RowsError> {
@@ -181,6 +209,23 @@ fn permanent(rig: &Rig) -> Rig {
     Rig { covering: rig.sensitivity_reference.covering, indenter: String::new(), ..rig.clone() }
 }
 
+/// What the run of a recording took over from an earlier one; `None` of other files.
+fn taken_over_by(path: &Path) -> Result<Option<pb::TakenOver>, RowsError> {
+    if !is_mcap(&first_bytes(path)?) {
+        return Ok(None);
+    }
+    for entry in read(path)? {
+        if let Entry::Message { message: Message::Event(event), .. } =
+            entry.map_err(|source| io_error(path, source))?
+        {
+            // The start is the first event.
+            let Some(Event::Started(started)) = event.event else { break };
+            return Ok(started.taken_over);
+        }
+    }
+    Ok(None)
+}
+
 /// Turns the frames of one recording into rows.
 struct RowMaker<'a> {
     timeline: &'a Timeline,
@@ -194,6 +239,10 @@ struct RowMaker<'a> {
     partly_read: u64,
     /// Frames of which nobody knows what the stage did.
     untold: u64,
+    /// Presses from this index on were done again by the run that goes on with this one.
+    done_again_from: Option<i32>,
+    /// Frames of those.
+    done_again: u64,
 }
 
 impl RowMaker<'_> {
@@ -205,19 +254,21 @@ impl RowMaker<'_> {
             self.untold += 1;
             return Ok(None);
         }
+        let later = |last: MonoTime| sampling.time().max(last.after(Duration::from_nanos(1)));
+        let at = self.last.map_or(sampling.time(), later);
+        let (phase, press) = timeline.phase(at);
+        if self.done_again_from.is_some_and(|first| press >= first) {
+            self.done_again += 1;
+            return Ok(None);
+        }
+        self.moved += u64::from(at != sampling.time());
+        self.last = Some(at);
         self.by_arrival += u64::from(matches!(sampling, Sampling::Arrival(_)));
         self.bad_elements.extend(frame.bad_elements.iter());
         self.partly_read += u64::from(!frame.bad_elements.is_empty());
-        let mut at = sampling.time();
-        if let Some(last) = self.last.filter(|last| at <= *last) {
-            at = last.after(Duration::from_nanos(1));
-            self.moved += 1;
-        }
-        self.last = Some(at);
         let position_mm = timeline.position_mm(at);
         let position_mm =
             position_mm.ok_or_else(|| RowsError::NoStage { path: timeline.path().to_owned() })?;
-        let (phase, press) = timeline.phase(at);
         Ok(Some(RowView {
             run: &timeline.run().run_id,
             press,
@@ -229,6 +280,15 @@ impl RowMaker<'_> {
             temperature_c: None,
             counts: &frame.counts,
         }))
+    }
+
+    fn note(&self) -> Option<String> {
+        let Self { timeline, done_again, .. } = *self;
+        let first = self.done_again_from.filter(|_| done_again > 0)?;
+        Some(format!(
+            "run {}: {done_again} frames of presses from {first} on are left out: the run that goes on with it did them again",
+            timeline.run().run_id
+        ))
     }
 
     fn warnings(&self) -> Vec<String> {

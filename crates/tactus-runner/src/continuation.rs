@@ -1,41 +1,46 @@
-//! What an earlier run confirmed, for a run that goes on with it.
+//! What an earlier run has done, for a run that goes on with it.
+
+mod mean;
+mod recorded;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tactus_plan::{Arguments, Evaluate, MeanReading, Script, ScriptError};
-use tactus_record::{ConfirmedPress, Entry, Message, RecordError, confirmed_presses, read};
-use tactus_schema::pb::{self, run_event::Event};
-use tactus_schema::{Frame, MonoTime};
+use tactus_engine::EarlierRun;
+use tactus_plan::{Arguments, Evaluate, Script, ScriptError};
+use tactus_record::RecordError;
+use tactus_schema::{Rig, RigError, pb};
 
+use crate::crashed;
 use crate::order::RunRequest;
+use recorded::RecordedRun;
 
-/// The attachment with the parameters as the script saw them.
-const PARAMETERS_JSON: &str = "parameters.json";
+/// Longest id of a run that is looked for.
+const RUN_ID_MAX_BYTES: usize = 200;
+
+/// Most bytes that the readings of an earlier run may take in memory.
+const READINGS_MAX_BYTES: usize = 256 << 20;
 
 /// A request for the rest of an earlier run.
 #[derive(Debug, Clone)]
 pub struct Continuation {
-    /// Id of the earlier run.
-    pub run_id: String,
-    /// Its script, parameters and seed.
+    /// The earlier run's script, parameters and seed, and the steps that need not be done again.
     pub request: RunRequest,
-    /// The presses that need not be repeated, in order: the script's first ones.
-    pub confirmed: Vec<DonePress>,
+    /// True if the earlier run was simulated with a truth that its recording does not contain.
+    pub hides_truth: bool,
 }
 
-/// A press that was done to its end, with what the script was told.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DonePress {
-    /// Number of the script's step.
-    pub step: u64,
-    /// Where it was, sensor frame.
-    pub at_mm: [f64; 2],
-    /// Depths of its dwells, in order.
-    pub depths_mm: Vec<f64>,
-    /// The mean readings of its dwells, in order, made again from the recorded frames. Their signal is against the last zero
-    /// that was recorded before; without one it is empty.
-    pub readings: Vec<MeanReading>,
+/// Who wants to go on with which run.
+#[derive(Debug, Clone)]
+pub struct Wish<'a> {
+    /// Id of the earlier run.
+    pub run_id: &'a str,
+    /// The folder with the folders of runs; no other is looked at.
+    pub folder: &'a Path,
+    /// The person or program that requests the run.
+    pub who: String,
+    /// Where the script is evaluated.
+    pub evaluator: Arc<dyn Evaluate>,
 }
 
 /// Why a run cannot be continued.
@@ -48,187 +53,135 @@ pub enum ContinuationError {
     /// The recording cannot be read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// The recording has no end yet.
-    #[error("run {run_id} is not over, or its service died: the service closes such runs at its start")]
+    /// The recording has no end, and could not be closed.
+    #[error(
+        "run {run_id} is not over, or its recording could not be closed: wait for its end, or see the log and `tactus recover`"
+    )]
     Open { run_id: String },
     /// The run was done.
     #[error("run {run_id} is done: there is nothing to continue")]
     Done { run_id: String },
-    /// The recording lacks what the run was started with.
-    #[error("the recording of run {run_id} lacks its {what}: it cannot be continued")]
-    Lacks { run_id: String, what: &'static str },
+    /// The run was aborted.
+    #[error("run {run_id} was aborted: its data are not to be used, so start the experiment anew")]
+    Aborted { run_id: String },
+    /// The recording lacks something.
+    #[error("the recording of run {run_id} lacks {what}: it cannot be continued")]
+    Lacks { run_id: String, what: String },
+    /// The rig is another one than then.
+    #[error(
+        "run {run_id} was of another rig: `{field}` of the rig file has changed since. Restore it, or start the experiment anew"
+    )]
+    OtherRig { run_id: String, field: &'static str },
+    /// The rig in the recording is invalid.
+    #[error("the rig of run {run_id}: {source}")]
+    Rig { run_id: String, source: RigError },
     /// The recorded script or its parameters have an error.
     #[error(transparent)]
     Script(#[from] ScriptError),
+    /// The readings do not fit into memory.
+    #[error("the readings of run {run_id} take more than {} MiB: it cannot be continued", READINGS_MAX_BYTES >> 20)]
+    TooLong { run_id: String },
+    /// It was stopped.
+    #[error("stopped")]
+    Stopped,
 }
 
-/// Reads what is needed to go on with a run whose recording is below `folder`.
+/// Reads what is needed to go on with a run on `rig`. A recording whose program died is closed first. Blocks; ends early once
+/// `stopped` is true.
 ///
 /// # Errors
-/// [`ContinuationError`] if there is no such run, if it is not over, or if nothing of it is left to do.
+/// [`ContinuationError`] if there is no such run, if it is not over, if nothing of it is left to do, or if the rig is not
+/// described as then. Links, limits, motion and the covering may have changed.
 pub fn of_run(
-    folder: &Path,
-    run_id: &str,
-    who: String,
-    evaluator: Arc<dyn Evaluate>,
+    wish: Wish<'_>,
+    rig: &Rig,
+    stopped: &dyn Fn() -> bool,
 ) -> Result<Continuation, ContinuationError> {
-    let unknown = || ContinuationError::Unknown { run_id: run_id.to_owned(), folder: folder.to_owned() };
-    let is_name = !run_id.is_empty() && run_id.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
-    let path = folder.join(run_id).join("recording.mcap");
-    if !is_name || !path.is_file() {
-        return Err(unknown());
+    let mut runs = chain(&wish, rig, stopped)?;
+    let mut left_bytes = READINGS_MAX_BYTES;
+    for run in &mut runs {
+        run.read_means(&mut left_bytes, stopped)?;
     }
-    let lacks = |what| ContinuationError::Lacks { run_id: run_id.to_owned(), what };
-    let start = Start::read(&path)?;
-    match start.exit_status {
-        None => return Err(ContinuationError::Open { run_id: run_id.to_owned() }),
-        Some(pb::ExitStatus::Done | pb::ExitStatus::Degraded) => {
-            return Err(ContinuationError::Done { run_id: run_id.to_owned() });
-        }
-        Some(_) => {}
-    }
-    let (name, source) = start.script.ok_or_else(|| lacks("script"))?;
-    let request = RunRequest {
-        script: Script::parse(&name, &source)?,
-        arguments: Arguments::from_json(&start.parameters.ok_or_else(|| lacks("parameters"))?)?,
-        seed: Some(start.seed.ok_or_else(|| lacks("seed"))?),
-        who,
-        evaluator,
+    let (Some(last), Some(first)) = (runs.first(), runs.last()) else {
+        return Err(wish.unknown(wish.run_id));
     };
-    let presses = confirmed_presses(&path)?;
-    let confirmed = readings(&path, &presses, &start.zeros)?;
-    Ok(Continuation { run_id: run_id.to_owned(), request, confirmed })
+    let (name, source) = last.script.as_ref().ok_or_else(|| last.lacks("its script"))?;
+    let parameters = last.parameters.as_ref().ok_or_else(|| last.lacks("its parameters"))?;
+    let started = last.started()?;
+    let (script, arguments) = (Script::parse(name, source)?, Arguments::from_json(parameters)?);
+    let mut earlier = EarlierRun {
+        run_id: last.run_id.clone(),
+        covering_mm: first.started()?.covering_mm,
+        steps: Vec::new(),
+        next_press: 0,
+    };
+    for run in runs.iter().rev() {
+        run.add_to(&mut earlier)?;
+    }
+    let request = RunRequest {
+        script,
+        arguments,
+        seed: Some(started.seed),
+        who: wish.who,
+        evaluator: wish.evaluator,
+        earlier: Some(Arc::new(earlier)),
+    };
+    Ok(Continuation { request, hides_truth: last.hides_truth })
 }
 
-/// What a run was started with, and its zeros.
-#[derive(Default)]
-struct Start {
-    script_name: String,
-    script: Option<(String, String)>,
-    parameters: Option<String>,
-    seed: Option<u64>,
-    /// When each was taken.
-    zeros: Vec<(MonoTime, Vec<f32>)>,
-    exit_status: Option<pb::ExitStatus>,
+/// The run, which can be continued on `rig`; the one that it goes on with, and so on.
+fn chain(
+    wish: &Wish<'_>,
+    rig: &Rig,
+    stopped: &dyn Fn() -> bool,
+) -> Result<Vec<RecordedRun>, ContinuationError> {
+    let mut runs: Vec<RecordedRun> = Vec::new();
+    let mut next = Some(wish.run_id.to_owned());
+    while let Some(run_id) = next {
+        let path = wish.path_of(&run_id)?;
+        crashed::close_one(&path);
+        let run = RecordedRun::read(path, &run_id, stopped)?;
+        if runs.is_empty() {
+            run.check_ended()?;
+            run.check_rig(rig)?;
+        }
+        next = run.taken_over().map(|taken| taken.run_id.clone());
+        // No run begins before itself; a recording that says so is damaged.
+        if next.as_ref().is_some_and(|next| *next == run_id || runs.iter().any(|run| run.run_id == *next)) {
+            return Err(run.lacks("the run that it continues"));
+        }
+        runs.push(run);
+    }
+    Ok(runs)
 }
 
-impl Start {
-    fn read(path: &Path) -> Result<Self, RecordError> {
-        let mut start = Self::default();
-        for entry in read(path)? {
-            start.take(entry.map_err(|source| unread(path, source))?);
-        }
-        Ok(start)
+impl Wish<'_> {
+    /// The recording of a run. An id that is no plain name leads nowhere.
+    fn path_of(&self, run_id: &str) -> Result<PathBuf, ContinuationError> {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let is_name = !run_id.is_empty() && run_id.len() <= RUN_ID_MAX_BYTES && run_id.chars().all(is_plain);
+        let path = self.folder.join(run_id).join("recording.mcap");
+        if is_name && path.is_file() { Ok(path) } else { Err(self.unknown(run_id)) }
     }
 
-    fn take(&mut self, entry: Entry) {
-        match entry {
-            Entry::Run(run) => self.script_name = run.script,
-            Entry::Attachment(file) => {
-                let Ok(text) = String::from_utf8(file.data) else { return };
-                if file.name == self.script_name {
-                    let name = file.name.strip_suffix(".star").unwrap_or(&file.name).to_owned();
-                    self.script = Some((name, text));
-                } else if file.name == PARAMETERS_JSON {
-                    self.parameters = Some(text);
-                }
-            }
-            Entry::Message { message: Message::Event(event), .. } => match event.event {
-                Some(Event::Started(started)) => self.seed = Some(started.seed),
-                Some(Event::TareDone(tare)) => {
-                    self.zeros.push((MonoTime::from_ns(event.t_mono_ns), tare.baseline_counts));
-                }
-                Some(Event::Finished(finished)) => self.exit_status = Some(finished.exit_status()),
-                _ => {}
-            },
-            Entry::Message { .. } => {}
-        }
+    fn unknown(&self, run_id: &str) -> ContinuationError {
+        let run_id = run_id.chars().take(RUN_ID_MAX_BYTES).collect();
+        ContinuationError::Unknown { run_id, folder: self.folder.to_owned() }
     }
 }
 
-/// The presses with their readings, up to the first whose frames are not all there.
-fn readings(
-    path: &Path,
-    presses: &[ConfirmedPress],
-    zeros: &[(MonoTime, Vec<f32>)],
-) -> Result<Vec<DonePress>, RecordError> {
-    let mut averages: Vec<Average> =
-        presses.iter().flat_map(|press| &press.dwells).map(|dwell| Average::over(dwell, zeros)).collect();
-    averages.sort_by_key(|average| average.from);
-    let mut next = 0;
-    for entry in read(path)? {
-        let entry = entry.map_err(|source| unread(path, source))?;
-        let Entry::Message { message: Message::Frame(frame), .. } = entry else { continue };
-        while averages.get(next).is_some_and(|average| frame.received.mono > average.until) {
-            next += 1;
-        }
-        if let Some(average) = averages.get_mut(next).filter(|average| frame.received.mono >= average.from) {
-            average.add(&frame);
-        }
-    }
-    let mut averages = averages.into_iter();
-    let whole = presses.iter().map_while(|press| {
-        let readings: Option<Vec<MeanReading>> =
-            press.dwells.iter().map(|dwell| averages.next()?.reading(dwell.frames)).collect();
-        let first = press.dwells.first()?;
-        Some(DonePress {
-            step: press.step,
-            at_mm: [first.x_mm, first.y_mm],
-            depths_mm: press.dwells.iter().map(|dwell| dwell.depth_mm).collect(),
-            readings: readings?,
-        })
-    });
-    Ok(whole.collect())
-}
-
-/// The mean of a dwell, as the engine made it (Welford 1962).
-struct Average {
-    from: MonoTime,
-    until: MonoTime,
-    zero: Vec<f32>,
-    mean: Vec<f64>,
-    squares: Vec<f64>,
-    frames: u32,
-}
-
-impl Average {
-    fn over(dwell: &pb::DwellDone, zeros: &[(MonoTime, Vec<f32>)]) -> Self {
-        let from = MonoTime::from_ns(dwell.from_mono_ns);
-        let zero = zeros.iter().rev().find(|(at, _)| *at < from);
-        Self {
-            from,
-            until: MonoTime::from_ns(dwell.to_mono_ns),
-            zero: zero.map(|(_, counts)| counts.clone()).unwrap_or_default(),
-            mean: vec![0.0; dwell.mean_counts.len()],
-            squares: vec![0.0; dwell.mean_counts.len()],
-            frames: 0,
-        }
-    }
-
-    fn add(&mut self, frame: &Frame) {
-        self.frames += 1;
-        for ((mean, squares), count) in self.mean.iter_mut().zip(&mut self.squares).zip(frame.counts.iter()) {
-            let deviation = f64::from(*count) - *mean;
-            *mean += deviation / f64::from(self.frames);
-            *squares += deviation * (f64::from(*count) - *mean);
-        }
-    }
-
-    /// `None` if frames of the dwell are missing.
-    fn reading(self, frames: u32) -> Option<MeanReading> {
-        if self.frames != frames || frames == 0 {
-            return None;
-        }
-        let freedom = f64::from((frames - 1).max(1));
-        Some(MeanReading {
-            signal: self.mean.iter().zip(&self.zero).map(|(mean, zero)| mean - f64::from(*zero)).collect(),
-            rms: self.squares.iter().map(|squares| (squares / freedom).sqrt()).collect(),
-            mean_counts: self.mean,
-            frames,
+impl Continuation {
+    /// What who asks should know of the script: it is the recorded one, whatever has become of the file.
+    pub fn note(&self, present: Option<&Script>) -> Option<String> {
+        let script = &self.request.script;
+        let has_changed = present.is_some_and(|present| present.sha256() != script.sha256());
+        has_changed.then(|| {
+            format!("the script {:?} has changed since: the run goes on with the recorded one", script.name())
         })
     }
-}
 
-fn unread(path: &Path, source: std::io::Error) -> RecordError {
-    RecordError::Io { action: "read", path: path.to_owned(), source }
+    /// What the new run takes over.
+    pub fn taken_over(&self) -> pb::TakenOver {
+        self.request.earlier.as_ref().map(|earlier| earlier.taken_over()).unwrap_or_default()
+    }
 }

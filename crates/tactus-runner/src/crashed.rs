@@ -40,32 +40,33 @@ enum CloseError {
 ///
 /// The recording is replaced only once its closed copy is on disk. If this is interrupted, the next call does the rest.
 pub fn close_all(folder: &Path) -> Vec<Crashed> {
-    let mut closed = Vec::new();
     let runs = match fs::read_dir(folder) {
         Ok(runs) => runs,
         // Before the first run.
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return closed,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Vec::new(),
         Err(error) => {
             error!(folder = %folder.display(), %error, "the recordings were not checked for crashed runs");
-            return closed;
+            return Vec::new();
         }
     };
     let mut recordings: Vec<PathBuf> =
         runs.flatten().map(|run| run.path().join("recording.mcap")).filter(|path| path.is_file()).collect();
     recordings.sort();
-    for path in recordings {
-        match close(&path) {
-            Ok(None) => {}
-            Ok(Some(crashed)) => {
-                tell(&crashed);
-                closed.push(crashed);
-            }
-            Err(error) => {
-                error!(recording = %path.display(), %error, "a run without an end was not closed; `tactus recover` may do it");
-            }
+    recordings.iter().filter_map(|path| close_one(path)).collect()
+}
+
+/// Closes one recording as [`close_all`] does.
+pub(crate) fn close_one(path: &Path) -> Option<Crashed> {
+    match close(path) {
+        Ok(crashed) => {
+            crashed.iter().for_each(tell);
+            crashed
+        }
+        Err(error) => {
+            error!(recording = %path.display(), %error, "a run without an end was not closed; `tactus recover` may do it");
+            None
         }
     }
-    closed
 }
 
 fn tell(crashed: &Crashed) {

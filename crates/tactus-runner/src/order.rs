@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use jiff::Timestamp;
-use tactus_engine::RunOrder;
+use tactus_engine::{EarlierRun, RunOrder};
 use tactus_plan::{Arguments, Evaluate, Limits, RigView, Script, ScriptError};
 use tactus_record::{Header, RecordError, Recording, space, sync_folder_of};
 use tactus_schema::{Rig, WallTime};
@@ -23,6 +23,8 @@ pub struct RunRequest {
     pub who: String,
     /// Where the script is evaluated.
     pub evaluator: Arc<dyn Evaluate>,
+    /// The earlier run that it goes on with ([`crate::continuation`]).
+    pub earlier: Option<Arc<EarlierRun>>,
 }
 
 /// Texts of the rig's files for a recording.
@@ -45,9 +47,14 @@ pub fn order(
     at: WallTime,
     stopped: &dyn Fn() -> bool,
 ) -> Result<RunOrder, ScriptError> {
-    let RunRequest { script, arguments, seed, who, evaluator } = request;
+    let RunRequest { script, arguments, seed, who, evaluator, earlier } = request;
     let limits = Limits::default();
-    let arguments = evaluator.resolve(&script, &arguments, &RigView::of(rig), &limits, stopped)?;
+    // The earlier run's covering at its start: defaults may depend on it.
+    let mut rig = rig.clone();
+    if let Some(earlier) = &earlier {
+        rig.covering.thickness_mm = earlier.covering_mm;
+    }
+    let arguments = evaluator.resolve(&script, &arguments, &RigView::of(&rig), &limits, stopped)?;
     let seed = seed.unwrap_or_else(|| mix(at.ns().unsigned_abs()));
     let run_id =
         format!("{}-{}-{:04x}", timestamp(at), script.name(), mix(at.ns().unsigned_abs() ^ seed) & 0xffff);
@@ -63,6 +70,7 @@ pub fn order(
         who,
         limits,
         evaluator,
+        earlier,
         planned: None,
         versions,
         recording: String::new(),
@@ -109,7 +117,7 @@ pub fn recording(
             parameters_json: &order.arguments.to_json(),
             started,
             simulated: rig.simulated,
-            continues: None,
+            continues: order.earlier.as_ref().map(|earlier| earlier.run_id.as_str()),
         },
     );
     if created.is_err() {

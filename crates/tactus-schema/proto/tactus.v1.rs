@@ -78,7 +78,7 @@ pub struct RunEvent {
     pub t_mono_ns: i64,
     #[prost(int64, tag = "4")]
     pub t_wall_ns: i64,
-    #[prost(oneof = "run_event::Event", tags = "10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 40")]
+    #[prost(oneof = "run_event::Event", tags = "10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 40")]
     pub event: ::core::option::Option<run_event::Event>,
 }
 /// Nested message and enum types in `RunEvent`.
@@ -117,6 +117,8 @@ pub mod run_event {
         Cleanup(super::Cleanup),
         #[prost(message, tag = "25")]
         Finished(super::RunFinished),
+        #[prost(message, tag = "26")]
+        ReferenceDone(super::ReferenceDone),
         #[prost(message, tag = "40")]
         LeaseTaken(super::LeaseTaken),
     }
@@ -149,6 +151,21 @@ pub struct RunStarted {
     pub duration_planned_s: f64,
     #[prost(btree_map = "string, string", tag = "13")]
     pub versions: ::prost::alloc::collections::BTreeMap<::prost::alloc::string::String, ::prost::alloc::string::String>,
+    #[prost(message, optional, tag = "14")]
+    pub taken_over: ::core::option::Option<TakenOver>,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct TakenOver {
+    #[prost(string, tag = "1")]
+    pub run_id: ::prost::alloc::string::String,
+    #[prost(uint64, tag = "2")]
+    pub steps: u64,
+    #[prost(uint32, tag = "3")]
+    pub presses: u32,
+    #[prost(uint32, tag = "4")]
+    pub dwells: u32,
+    #[prost(int32, tag = "5")]
+    pub first_press: i32,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StepStarted {
@@ -158,11 +175,15 @@ pub struct StepStarted {
     pub what: ::prost::alloc::string::String,
     #[prost(string, tag = "3")]
     pub at: ::prost::alloc::string::String,
+    #[prost(string, tag = "4")]
+    pub step_json: ::prost::alloc::string::String,
 }
-#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
 pub struct StepDone {
     #[prost(uint64, tag = "1")]
     pub step: u64,
+    #[prost(double, optional, tag = "2")]
+    pub height_mm: ::core::option::Option<f64>,
 }
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct PhaseChanged {
@@ -198,6 +219,21 @@ pub struct ReadDone {
     pub frames: u32,
     #[prost(float, repeated, tag = "2")]
     pub mean_counts: ::prost::alloc::vec::Vec<f32>,
+    #[prost(int64, tag = "3")]
+    pub from_mono_ns: i64,
+    #[prost(int64, tag = "4")]
+    pub to_mono_ns: i64,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ReferenceDone {
+    #[prost(uint32, tag = "1")]
+    pub frames: u32,
+    #[prost(float, repeated, tag = "2")]
+    pub mean_counts: ::prost::alloc::vec::Vec<f32>,
+    #[prost(int64, tag = "3")]
+    pub from_mono_ns: i64,
+    #[prost(int64, tag = "4")]
+    pub to_mono_ns: i64,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct TareDone {
@@ -205,6 +241,10 @@ pub struct TareDone {
     pub frames: u32,
     #[prost(float, repeated, tag = "2")]
     pub baseline_counts: ::prost::alloc::vec::Vec<f32>,
+    #[prost(int64, tag = "3")]
+    pub from_mono_ns: i64,
+    #[prost(int64, tag = "4")]
+    pub to_mono_ns: i64,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Log {
@@ -324,6 +364,8 @@ pub struct RunState {
     pub t_mono_ns: i64,
     #[prost(string, tag = "17")]
     pub fault: ::prost::alloc::string::String,
+    #[prost(message, optional, tag = "18")]
+    pub taken_over: ::core::option::Option<TakenOver>,
 }
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct SafetyEvent {
@@ -383,6 +425,8 @@ pub struct RunRequest {
     pub who: ::prost::alloc::string::String,
     #[prost(bytes = "vec", tag = "6")]
     pub lease: ::prost::alloc::vec::Vec<u8>,
+    #[prost(string, tag = "7")]
+    pub continue_run: ::prost::alloc::string::String,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct CommandRequest {
@@ -437,6 +481,8 @@ pub struct CommandReply {
     pub health: ::core::option::Option<Health>,
     #[prost(message, optional, tag = "9")]
     pub lease: ::core::option::Option<Lease>,
+    #[prost(string, tag = "10")]
+    pub note: ::prost::alloc::string::String,
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]

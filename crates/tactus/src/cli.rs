@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use tactus_bus::{Credentials, Endpoint};
@@ -124,11 +125,40 @@ pub(crate) struct ExperimentArgs {
     pub(crate) seed: Option<u64>,
 }
 
+/// An experiment with its parameters and its seed, or the rest of an earlier run, which has all three.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RunSubject {
+    /// Name of an experiment, or path of a .star file.
+    #[arg(required_unless_present = "continue_run")]
+    pub(crate) experiment: Option<String>,
+    /// A script parameter, such as `depths_mm=[0.2,0.4]`; may be repeated.
+    #[arg(short = 'p', long = "param", value_name = "NAME=VALUE")]
+    pub(crate) parameters: Vec<String>,
+    /// Seed of the random order and, on a simulated rig, of its noise.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    /// Go on with an earlier run that ended early, from its last confirmed press, with its script, parameters and seed.
+    #[arg(
+        long = "continue",
+        id = "continue_run",
+        value_name = "RUN_ID",
+        value_parser = NonEmptyStringValueParser::new(),
+        conflicts_with_all = ["experiment", "parameters", "seed"]
+    )]
+    pub(crate) continue_run: Option<String>,
+}
+
+impl From<ExperimentArgs> for RunSubject {
+    fn from(ExperimentArgs { experiment, parameters, seed }: ExperimentArgs) -> Self {
+        Self { experiment: Some(experiment), parameters, seed, continue_run: None }
+    }
+}
+
 /// Arguments of `run`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RunArgs {
     #[command(flatten)]
-    pub(crate) experiment: ExperimentArgs,
+    pub(crate) subject: RunSubject,
     /// Use the embedded simulated rig even if a service is running.
     #[arg(long)]
     pub(crate) embedded: bool,
@@ -143,6 +173,7 @@ pub(crate) struct RunArgs {
     #[arg(long)]
     pub(crate) real_time: bool,
     /// Folder in which the run's folder is created: by the embedded rig for the recording, and for the report of a run on a service.
+    /// With --continue on the embedded rig, the folder with the earlier run's folder, too.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     pub(crate) out: PathBuf,
     /// Who runs it, for the recording.

@@ -119,8 +119,9 @@ fn draw(next: &Next, silent: bool) {
 }
 
 fn show(bar: &ProgressBar, state: &RunState) {
-    bar.set_length(state.presses_planned.into());
-    bar.set_position(state.presses.into());
+    let taken_over = state.taken_over.as_ref().map_or(0, |taken| u64::from(taken.presses));
+    bar.set_length(taken_over + u64::from(state.presses_planned));
+    bar.set_position(taken_over + u64::from(state.presses));
     let left = if state.remaining_s >= 0.0 {
         format!("  {} left", duration(state.remaining_s))
     } else {

@@ -3,12 +3,14 @@
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read as _};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tactus_bus::{CommandCall, Publisher, Request};
 use tactus_engine::{Engine, ResetError, ResumeError, RunOrder, StopOrder};
 use tactus_plan::{Arguments, Evaluate, Script};
 use tactus_runner::config::ServiceConfig;
+use tactus_runner::continuation::{self, ContinuationError, Wish};
 use tactus_runner::order::{self, RunRequest};
 use tactus_runner::recorder::ThreadRecorder;
 use tactus_runner::script_process::ScriptProcesses;
@@ -37,6 +39,29 @@ pub(super) struct CommandDesk {
     publisher: Publisher,
     lease: Mutex<Lease>,
     evaluator: Arc<dyn Evaluate>,
+}
+
+/// What a client wants to run.
+enum Wanted {
+    Experiment(RunRequest),
+    /// What is left of an earlier run.
+    Rest {
+        run_id: String,
+        who: String,
+        evaluator: Arc<dyn Evaluate>,
+        /// Folder of the recordings.
+        recordings: PathBuf,
+        /// Folder of scripts.
+        experiments: Option<PathBuf>,
+    },
+}
+
+/// A run that can begin.
+struct Prepared {
+    order: RunOrder,
+    plan: DryRun,
+    /// What who asks should know; may be empty.
+    note: String,
 }
 
 /// Why a command was not done.
@@ -75,8 +100,11 @@ impl CommandDesk {
                     // A dry run takes a while: other commands are answered meanwhile.
                     let desk = Arc::clone(&self);
                     tokio::spawn(async move {
-                        let done = desk.run(request).await;
-                        call.reply.reply(desk.reply(done));
+                        let reply = match desk.run(request).await {
+                            Ok(note) => pb::CommandReply { note, ..desk.reply(Ok(())) },
+                            Err(refusal) => desk.reply(Err(refusal)),
+                        };
+                        call.reply.reply(reply);
                     });
                 }
                 (Command::Reset, Request::Control(request)) => {
@@ -187,8 +215,8 @@ impl CommandDesk {
         })
     }
 
-    /// Checks the request, dry-runs it, and starts the run.
-    async fn run(&self, request: pb::RunRequest) -> Result<(), Refusal> {
+    /// Checks the request, dry-runs it, and starts the run. Returns what who asks should know besides.
+    async fn run(&self, request: pb::RunRequest) -> Result<String, Refusal> {
         self.want_lease(&request.lease)?;
         let lease = request.lease.clone();
         // From here on a stop ends this run, even before the dry run is over.
@@ -198,22 +226,18 @@ impl CommandDesk {
                 "{fault}: see that the tip is free to move, then `tactus reset`"
             )));
         }
-        let script = self.script(&request)?;
-        let arguments = Arguments::from_json(&request.parameters_json).map_err(Refusal::usage)?;
-        let evaluator = Arc::clone(&self.evaluator);
-        let request = RunRequest { script, arguments, seed: request.seed, who: request.who, evaluator };
+        let wanted = self.wanted(request)?;
         let rig = self.engine.rig();
         let now = self.engine.clock().now().wall;
         let twin_rig = rig.clone();
-        info!(who = request.who, "the dry run begins");
         let prepare = move || {
-            let prepared = prepare(request, &twin_rig, now, &|| claim.check().is_err());
+            let prepared = prepare(wanted, &twin_rig, now, &|| claim.check().is_err());
             (claim, prepared)
         };
         let (claim, prepared) = tokio::task::spawn_blocking(prepare).await.map_err(Refusal::failed)?;
         // What a stop has broken off is told as stopped, not as impossible.
         claim.check().map_err(Refusal::failed)?;
-        let (mut order, plan) = prepared?;
+        let Prepared { mut order, plan, note } = prepared?;
         if !plan.is_possible() {
             let refused = plan.outcome.exit_status == pb::ExitStatus::Refused;
             let exit_code = if refused { exit::REFUSED } else { exit::FAILED };
@@ -232,7 +256,30 @@ impl CommandDesk {
         let run_id = order.run_id.clone();
         tokio::spawn(claim.run(order, record));
         // The answer contains the state of this run, not of the previous one.
-        self.engine.state().wait_for(|state| state.run_id == run_id).await.map(drop).map_err(Refusal::failed)
+        self.engine.state().wait_for(|state| state.run_id == run_id).await.map_err(Refusal::failed)?;
+        Ok(note)
+    }
+
+    /// Checks the form of a request.
+    fn wanted(&self, request: pb::RunRequest) -> Result<Wanted, Refusal> {
+        let evaluator = Arc::clone(&self.evaluator);
+        let experiments = self.config.experiments.clone();
+        if request.continue_run.is_empty() {
+            let script = self.script(&request)?;
+            let arguments = Arguments::from_json(&request.parameters_json).map_err(Refusal::usage)?;
+            let pb::RunRequest { seed, who, .. } = request;
+            let request = RunRequest { script, arguments, seed, who, evaluator, earlier: None };
+            return Ok(Wanted::Experiment(request));
+        }
+        let pb::RunRequest { experiment, script, parameters_json, seed, who, continue_run: run_id, .. } =
+            request;
+        if !experiment.is_empty() || !script.is_empty() || !parameters_json.is_empty() || seed.is_some() {
+            let error =
+                "a run that goes on with an earlier one has its script, parameters and seed: leave them out";
+            return Err(Refusal::usage(error));
+        }
+        let recordings = self.config.recordings.clone();
+        Ok(Wanted::Rest { run_id, who, evaluator, recordings, experiments })
     }
 
     fn script(&self, request: &pb::RunRequest) -> Result<Script, Refusal> {
@@ -259,6 +306,7 @@ impl CommandDesk {
             stage: Some(self.engine.stage_state()),
             health: Some(health(&self.engine, &self.publisher, (0, MonoTime::default()))),
             lease: Some(told(&self.lease(), self.engine.clock().now().mono)),
+            note: String::new(),
         }
     }
 }
@@ -276,16 +324,49 @@ fn new_secret() -> Result<Secret, Refusal> {
         .map_err(|error: io::Error| Refusal::failed(format!("the system gives no random numbers: {error}")))
 }
 
-/// Checks the parameters and makes the dry run, until `stopped`.
+/// Reads the earlier run if there is one, checks the parameters and makes the dry run, until `stopped`.
 fn prepare(
-    request: RunRequest,
+    wanted: Wanted,
     rig: &Rig,
     now: WallTime,
     stopped: &dyn Fn() -> bool,
-) -> Result<(RunOrder, DryRun), Refusal> {
+) -> Result<Prepared, Refusal> {
+    let (request, note) = match wanted {
+        Wanted::Experiment(request) => (request, None),
+        Wanted::Rest { run_id, who, evaluator, recordings, experiments } => {
+            info!(who, run_id, "an earlier run is read, to go on with it");
+            let wish = Wish { run_id: &run_id, folder: &recordings, who, evaluator };
+            let continuation = continuation::of_run(wish, rig, stopped)?;
+            let present = experiments::named(continuation.request.script.name(), experiments.as_deref());
+            let note = continuation.note(present.as_ref().ok());
+            (continuation.request, note)
+        }
+    };
+    info!(who = request.who, "the dry run begins");
     let order = order::order(request, rig, now, stopped).map_err(Refusal::usage)?;
     let plan = twin::dry_run(rig, order.clone(), stopped).map_err(Refusal::failed)?;
-    Ok((order, plan))
+    if let Some(note) = &note {
+        info!("{note}");
+    }
+    Ok(Prepared { order, plan, note: note.unwrap_or_default() })
+}
+
+impl From<ContinuationError> for Refusal {
+    fn from(error: ContinuationError) -> Self {
+        match error {
+            ContinuationError::Unknown { .. }
+            | ContinuationError::Done { .. }
+            | ContinuationError::Aborted { .. }
+            | ContinuationError::Script(_) => Self::usage(error),
+            ContinuationError::OtherRig { .. } => Self::refused(error),
+            ContinuationError::Open { .. } => Self::not_now(error),
+            ContinuationError::Record(_)
+            | ContinuationError::Lacks { .. }
+            | ContinuationError::Rig { .. }
+            | ContinuationError::TooLong { .. }
+            | ContinuationError::Stopped => Self::failed(error),
+        }
+    }
 }
 
 impl Refusal {

@@ -31,6 +31,9 @@ impl Run {
     /// Checks a step against the envelope and performs it.
     pub(super) async fn perform(&mut self, call: &Call) -> Result<Reply, Broken> {
         self.hold_while_paused().await?;
+        if let Some(reply) = self.taken_over(call).await? {
+            return Ok(reply);
+        }
         self.bounds.check(&call.step)?;
         let step = self.steps;
         self.steps += 1;
@@ -38,10 +41,12 @@ impl Run {
             step,
             what: describe(&call.step),
             at: call.at.to_string(),
+            step_json: to_json(&call.step),
         }))
         .await;
         let reply = self.act(&call.step).await?;
-        self.emit(Event::StepDone(pb::StepDone { step })).await;
+        let height_mm = if let Reply::Position { height_mm, .. } = &reply { Some(*height_mm) } else { None };
+        self.emit(Event::StepDone(pb::StepDone { step, height_mm })).await;
         Ok(reply)
     }
 
@@ -93,7 +98,7 @@ impl Run {
         Ok(self.shared.control.borrow().resumed_by.clone())
     }
 
-    async fn go_to(
+    pub(super) async fn go_to(
         &mut self,
         to: Position,
         height_mm: Option<f64>,
@@ -246,16 +251,20 @@ impl Run {
         self.emit(Event::ReadDone(pb::ReadDone {
             frames: average.frames,
             mean_counts: as_f32(&average.mean_counts),
+            from_mono_ns: average.span[0].ns(),
+            to_mono_ns: average.span[1].ns(),
         }))
         .await;
         Ok(Reply::Reading(self.reading(average)))
     }
 
-    async fn tare(&mut self, duration_s: f64) -> Result<Reply, Broken> {
+    pub(super) async fn tare(&mut self, duration_s: f64) -> Result<Reply, Broken> {
         let average = self.whole_average(Duration::from_secs_f64(duration_s)).await?;
         self.emit(Event::TareDone(pb::TareDone {
             frames: average.frames,
             baseline_counts: as_f32(&average.mean_counts),
+            from_mono_ns: average.span[0].ns(),
+            to_mono_ns: average.span[1].ns(),
         }))
         .await;
         let counts = average.mean_counts.clone();
@@ -273,7 +282,7 @@ impl Run {
     }
 
     /// Has another covering put in place. A person confirms it by its value; the confirmed one outlives the run.
-    async fn change_covering(&mut self, thickness_mm: f64) -> Result<Reply, Broken> {
+    pub(super) async fn change_covering(&mut self, thickness_mm: f64) -> Result<Reply, Broken> {
         let covering = Covering { thickness_mm };
         if covering == *self.shared.covering.borrow() {
             return Ok(Reply::Done);
@@ -374,11 +383,17 @@ impl Run {
     clippy::cast_possible_truncation,
     reason = "messages carry single precision, far finer than a count"
 )]
-fn as_f32(values: &[f64]) -> Vec<f32> {
+pub(super) fn as_f32(values: &[f64]) -> Vec<f32> {
     values.iter().map(|value| *value as f32).collect()
 }
 
-fn describe(step: &Step) -> String {
+/// The step as a run that goes on with this one reads it.
+pub(super) fn to_json(step: &Step) -> String {
+    // It cannot fail: all keys are texts.
+    serde_json::to_string(step).unwrap_or_default()
+}
+
+pub(super) fn describe(step: &Step) -> String {
     match step {
         Step::Move { to, height_mm, .. } => match height_mm {
             Some(height_mm) => format!("move to ({:.3}, {:.3}) mm at {height_mm:.3} mm", to.x_mm, to.y_mm),

@@ -289,6 +289,7 @@ impl Bench {
             who: "test".into(),
             limits: Limits::default(),
             evaluator: Arc::new(InThisProcess),
+            earlier: None,
             planned: None,
             versions: std::collections::BTreeMap::new(),
             recording: String::new(),

@@ -44,7 +44,11 @@ pub(super) fn events(timeline: &Timeline, frames: &FrameStatistics) -> Vec<Logge
 fn describe(event: &Event) -> (&'static str, String) {
     match event {
         Event::Started(e) => {
-            ("started", format!("{} on {} by {}, seed {}", e.experiment, e.rig, e.who, e.seed))
+            let continues = e.taken_over.as_ref().map(|taken| {
+                format!(", continues {}: {} presses taken over", taken.run_id, taken.presses)
+            });
+            let continues = continues.unwrap_or_default();
+            ("started", format!("{} on {} by {}, seed {}{continues}", e.experiment, e.rig, e.who, e.seed))
         }
         Event::StepStarted(e) => ("step", format!("{}: {} ({})", e.step, e.what, e.at)),
         Event::StepDone(e) => ("step done", e.step.to_string()),
@@ -60,6 +64,7 @@ fn describe(event: &Event) -> (&'static str, String) {
             ),
         ),
         Event::ReadDone(e) => ("read", format!("{} frames", e.frames)),
+        Event::ReferenceDone(e) => ("reference", format!("{} frames", e.frames)),
         Event::TareDone(e) => ("tare", format!("{} frames", e.frames)),
         Event::Log(e) => ("log", e.message.clone()),
         Event::Gap(e) => (

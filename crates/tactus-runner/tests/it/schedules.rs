@@ -240,6 +240,7 @@ fn order(engine: &Engine, run: u32, text: &str) -> RunOrder {
         seed: 1,
         who: "test".into(),
         limits: Limits::default(),
+        earlier: None,
         planned: None,
         versions: BTreeMap::new(),
         recording: String::new(),

@@ -72,7 +72,13 @@ pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
     };
     let calibration = tactus_calibrate::calibrate(&declared, &readings)?;
     let simulated = rig.simulated || source.runs.iter().any(|run| run.simulated);
-    Ok(Calibrated { rig, simulated, runs: source.runs, notes: source.warnings, calibration })
+    Ok(Calibrated {
+        rig,
+        simulated,
+        runs: source.runs,
+        notes: [source.warnings, source.notes].concat(),
+        calibration,
+    })
 }
 
 /// Writes model, numbers and report; returns the files.

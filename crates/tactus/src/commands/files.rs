@@ -42,6 +42,9 @@ pub(crate) fn export(common: &Common, args: &ExportArgs) -> anyhow::Result<Exit>
         for warning in &summary.warnings {
             eprintln!("warning: {warning}");
         }
+        for note in &summary.notes {
+            eprintln!("note: {note}");
+        }
         print_fields(&[
             ("table", out.display().to_string()),
             ("rows", summary.rows.to_string()),

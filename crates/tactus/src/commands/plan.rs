@@ -20,7 +20,7 @@ use crate::output::{duration, print_fields, print_table};
 const SEED: u64 = 1;
 
 pub(crate) fn plan(common: &Common, args: &PlanArgs) -> anyhow::Result<Exit> {
-    let (script, arguments) = experiment(&args.experiment)?;
+    let (script, arguments) = experiment(&args.experiment.experiment, &args.experiment.parameters)?;
     let rig = match &args.rig_file {
         Some(path) => config::load_rig(path).map_err(|error| Failure::new(Exit::Usage, error))?.rig,
         None => Rig::from_toml(SIMULATED_RIG)?,
@@ -35,6 +35,7 @@ pub(crate) fn plan(common: &Common, args: &PlanArgs) -> anyhow::Result<Exit> {
         seed: Some(args.experiment.seed.unwrap_or(SEED)),
         who: "plan".into(),
         evaluator: Arc::new(ScriptProcesses::of_this_program()),
+        earlier: None,
     };
     let never = || false;
     let order = order::order(request, &rig, WallTime::default(), &never)

@@ -10,7 +10,7 @@ use serde_json::json;
 use tactus_plan::{Arguments, Script};
 use tactus_schema::pb;
 
-use crate::cli::{Common, ExperimentArgs, RunArgs};
+use crate::cli::{Common, RunArgs};
 use crate::connection;
 use crate::exit::{Exit, Failure, in_words};
 use crate::output::{duration, print_fields, say};
@@ -29,6 +29,19 @@ pub(super) struct RunSummary {
     pub(super) dwells: u32,
     pub(super) duration_s: f64,
     pub(super) recording: PathBuf,
+    /// What it took over from the earlier run that it goes on with. The counts above are without it.
+    pub(super) taken_over: Option<pb::TakenOver>,
+}
+
+/// What is to be run.
+enum Subject {
+    Experiment {
+        script: Script,
+        arguments: Arguments,
+        seed: Option<u64>,
+    },
+    /// The rest of the run with this id.
+    Rest(String),
 }
 
 pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
@@ -44,9 +57,9 @@ pub(crate) fn run(common: &Common, args: &RunArgs) -> anyhow::Result<Exit> {
 
 /// Runs the experiment, on the service if there is one, else embedded.
 pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<RunSummary> {
-    let (script, arguments) = experiment(&args.experiment)?;
+    let subject = Subject::of(args)?;
     if args.embedded || args.rig_file.is_some() {
-        return embedded::run(common, args, script, arguments, "as asked");
+        return embedded::run(common, args, subject, "as asked");
     }
     let runtime = connection::runtime()?;
     match runtime.block_on(connection::find(common))? {
@@ -57,17 +70,31 @@ pub(super) fn execute(common: &Common, args: &RunArgs) -> anyhow::Result<RunSumm
             );
             Err(Failure::new(Exit::Usage, error).into())
         }
-        Some(client) => runtime.block_on(served::run(client, common, args, &script, &arguments)),
-        None => embedded::run(common, args, script, arguments, &format!("no service at {}", common.endpoint)),
+        Some(client) => runtime.block_on(served::run(client, common, args, subject)),
+        None => embedded::run(common, args, subject, &format!("no service at {}", common.endpoint)),
+    }
+}
+
+impl Subject {
+    fn of(args: &RunArgs) -> anyhow::Result<Self> {
+        let subject = &args.subject;
+        match (&subject.continue_run, &subject.experiment) {
+            (Some(run_id), _) => Ok(Self::Rest(run_id.clone())),
+            (None, Some(name)) => {
+                let (script, arguments) = experiment(name, &subject.parameters)?;
+                Ok(Self::Experiment { script, arguments, seed: subject.seed })
+            }
+            (None, None) => Err(Failure::new(Exit::Usage, "name an experiment").into()),
+        }
     }
 }
 
 /// The script and its parameters from the command line.
-pub(super) fn experiment(args: &ExperimentArgs) -> anyhow::Result<(Script, Arguments)> {
-    let script = tactus_runner::experiments::find(&args.experiment, None)
-        .map_err(|error| Failure::new(Exit::Usage, error))?;
+pub(super) fn experiment(name: &str, parameters: &[String]) -> anyhow::Result<(Script, Arguments)> {
+    let script =
+        tactus_runner::experiments::find(name, None).map_err(|error| Failure::new(Exit::Usage, error))?;
     let mut arguments = Arguments::default();
-    for parameter in &args.parameters {
+    for parameter in parameters {
         arguments.set(parameter).map_err(|error| Failure::new(Exit::Usage, error))?;
     }
     Ok((script, arguments))
@@ -129,7 +156,16 @@ fn to_json(summary: &RunSummary, report: Option<&Path>) -> serde_json::Value {
         "duration_s": summary.duration_s,
         "recording": summary.recording,
         "report": report,
+        "continues": summary.taken_over.as_ref().map(|taken| &taken.run_id),
+        "presses_taken_over": summary.taken_over.as_ref().map(|taken| taken.presses),
+        "dwells_taken_over": summary.taken_over.as_ref().map(|taken| taken.dwells),
     })
+}
+
+/// The line that says what a run takes over; `planned` presses are left.
+fn taken_over_in_words(taken: &pb::TakenOver, planned: u32) -> String {
+    let pb::TakenOver { run_id, presses, .. } = taken;
+    format!("continues {run_id}, {presses} of {} presses taken over", presses.saturating_add(planned))
 }
 
 fn print(summary: &RunSummary, report: Option<&Path>) {
@@ -137,15 +173,26 @@ fn print(summary: &RunSummary, report: Option<&Path>) {
     let mut fields = vec![
         ("run", format!("{}{simulated}", summary.run_id)),
         ("ended", format!("{} {}", summary.exit_status.word(), summary.message).trim_end().to_owned()),
-        ("presses", format!("{}, {} dwells", summary.presses, summary.dwells)),
+        ("presses", presses_in_words(summary)),
         ("frames", format!("{}, {} lost", summary.frames, summary.frames_lost)),
         ("duration", duration(summary.duration_s)),
         ("recording", summary.recording.display().to_string()),
     ];
+    if let Some(taken) = &summary.taken_over {
+        fields.insert(1, ("continues", taken.run_id.clone()));
+    }
     if let Some(report) = report {
         fields.push(("report", report.display().to_string()));
     }
     print_fields(&fields);
+}
+
+fn presses_in_words(summary: &RunSummary) -> String {
+    let now = format!("{}, {} dwells", summary.presses, summary.dwells);
+    match &summary.taken_over {
+        Some(taken) => format!("{now}; {}, {} dwells taken over", taken.presses, taken.dwells),
+        None => now,
+    }
 }
 
 #[cfg(test)]

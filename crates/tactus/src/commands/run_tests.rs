@@ -33,6 +33,7 @@ fn a_service_cannot_choose_where_its_report_is_written() {
         dwells: 0,
         duration_s: 0.0,
         recording: bait.join("recording.mcap"),
+        taken_over: None,
     };
     assert_eq!(make_report(&summary, &out), None);
     assert_eq!(std::fs::read_to_string(bait.join("report.html")).unwrap(), "mine");

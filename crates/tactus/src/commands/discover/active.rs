@@ -11,7 +11,7 @@ use tactus_schema::Rig;
 use tactus_schema::pb::ExitStatus;
 
 use super::Discovered;
-use crate::cli::{Common, DiscoverArgs, ExperimentArgs, LeaseArgs, RunArgs};
+use crate::cli::{Common, DiscoverArgs, ExperimentArgs, LeaseArgs, RunArgs, RunSubject};
 use crate::commands::run::{RunSummary, execute};
 use crate::connection;
 use crate::exit::{Exit, Failure};
@@ -193,11 +193,11 @@ impl<'a> ExperimentRunner<'a> {
         }
         let parameters = chosen.parameters.iter().map(|(name, value)| format!("{name}={value}"));
         let args = RunArgs {
-            experiment: ExperimentArgs {
+            subject: RunSubject::from(ExperimentArgs {
                 experiment: chosen.experiment.into(),
                 parameters: parameters.collect(),
                 seed: Some(self.args.seed.wrapping_add(self.runs)),
-            },
+            }),
             embedded: self.embedded,
             rig_file: self.args.rig_file.clone(),
             truth: self.args.truth.clone(),

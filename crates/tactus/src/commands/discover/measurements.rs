@@ -50,7 +50,7 @@ impl Measurements {
         });
         let data = data.collect();
         let simulated = source.rig.simulated || source.runs.iter().any(|run| run.simulated);
-        let (rig, notes) = (source.rig, source.warnings);
+        let (rig, notes) = (source.rig, [source.warnings, source.notes].concat());
         Ok(Self { files: files.to_owned(), rig, simulated, data, notes, frames })
     }
 

@@ -7,16 +7,19 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use tactus_engine::Engine;
-use tactus_plan::{Arguments, Script};
+use tactus_plan::Evaluate;
 use tactus_runner::config;
+use tactus_runner::continuation::{self, ContinuationError, Wish};
 use tactus_runner::embedded::{self, EmbeddedError, Finished, Pace, TruthError, TruthFile};
+use tactus_runner::experiments;
 use tactus_runner::order::RunRequest;
 use tactus_runner::script_process::ScriptProcesses;
+use tactus_schema::Rig;
 use tactus_schema::pb::{self, RunPhase, RunState};
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::RunSummary;
+use super::{RunSummary, Subject, taken_over_in_words};
 use crate::cli::{Common, RunArgs};
 use crate::exit::{Exit, Failure};
 use crate::interrupt::StopsRun;
@@ -28,8 +31,7 @@ const REDRAW: Duration = Duration::from_millis(100);
 pub(super) fn run(
     common: &Common,
     args: &RunArgs,
-    script: Script,
-    arguments: Arguments,
+    subject: Subject,
     why: &str,
 ) -> anyhow::Result<RunSummary> {
     let files = match &args.rig_file {
@@ -49,20 +51,18 @@ pub(super) fn run(
         let hidden = hidden.unwrap_or_default();
         println!("SIMULATED: running on the embedded simulated rig {:?} ({why}; {time}{hidden})", rig.name);
     }
-    let request = RunRequest {
-        script,
-        arguments,
-        seed: args.experiment.seed,
-        who: args.who.clone(),
-        evaluator: Arc::new(ScriptProcesses::of_this_program()),
-    };
     let simulated = rig.simulated;
     let progress = Arc::new(RunProgress::new(common.json));
     let stops_run = StopsRun::prepare(Arc::clone(&progress))?;
     let mut attending = None;
     let stopped = StopsRun::is_asked;
-    let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, &stopped, |engine, _| {
+    let request = request(args, subject, rig, &stopped)?;
+    let taken_over = request.earlier.as_ref().map(|earlier| earlier.taken_over());
+    let done = embedded::run(&files, truth.as_ref(), request, &args.out, pace, &stopped, |engine, order| {
         StopsRun::begin(engine.clone());
+        if let Some(taken) = taken_over.as_ref().filter(|_| !common.json) {
+            progress.say(&taken_over_in_words(taken, order.planned.map_or(0, |planned| planned.presses)));
+        }
         attending = attend(engine, &progress);
     });
     drop(stops_run);
@@ -101,7 +101,57 @@ pub(super) fn run(
         dwells: outcome.dwells,
         duration_s: outcome.duration_s,
         recording: std::path::absolute(recording)?,
+        taken_over,
     })
+}
+
+/// The request for what is to be run. An earlier run is looked for where the new one will be.
+fn request(
+    args: &RunArgs,
+    subject: Subject,
+    rig: &Rig,
+    stopped: &dyn Fn() -> bool,
+) -> anyhow::Result<RunRequest> {
+    let evaluator: Arc<dyn Evaluate> = Arc::new(ScriptProcesses::of_this_program());
+    let who = args.who.clone();
+    let run_id = match subject {
+        Subject::Experiment { script, arguments, seed } => {
+            return Ok(RunRequest { script, arguments, seed, who, evaluator, earlier: None });
+        }
+        Subject::Rest(run_id) => run_id,
+    };
+    let wish = Wish { run_id: &run_id, folder: &args.out, who, evaluator };
+    let continuation = continuation::of_run(wish, rig, stopped).map_err(|error| {
+        let exit = match error {
+            ContinuationError::Unknown { .. }
+            | ContinuationError::Done { .. }
+            | ContinuationError::Aborted { .. }
+            | ContinuationError::Script(_) => Exit::Usage,
+            ContinuationError::OtherRig { .. } => Exit::Refused,
+            ContinuationError::Open { .. } => Exit::NotNow,
+            ContinuationError::Record(_)
+            | ContinuationError::Lacks { .. }
+            | ContinuationError::Rig { .. }
+            | ContinuationError::TooLong { .. }
+            | ContinuationError::Stopped => Exit::Failed,
+        };
+        Failure::new(exit, error)
+    })?;
+    let problem = match (continuation.hides_truth, args.truth.is_some()) {
+        (true, false) => Some("was simulated with a --truth: give the same file again"),
+        (false, true) => Some("was simulated without a --truth: leave it out"),
+        (true, true) | (false, false) => None,
+    };
+    if let Some(problem) = problem {
+        return Err(Failure::new(Exit::Usage, format!("run {run_id} {problem}")).into());
+    }
+    let name = continuation.request.script.name();
+    let in_this_folder = experiments::find(&format!("{name}.star"), None);
+    let present = in_this_folder.or_else(|_| experiments::named(name, None));
+    if let Some(note) = continuation.note(present.as_ref().ok()) {
+        eprintln!("tactus: {note}");
+    }
+    Ok(continuation.request)
 }
 
 fn read_truth(path: &Path) -> anyhow::Result<TruthFile> {

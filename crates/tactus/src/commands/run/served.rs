@@ -5,12 +5,11 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use tactus_bus::{Client, History};
-use tactus_plan::{Arguments, Script};
 use tactus_schema::key::Command;
 use tactus_schema::pb::{self, RunPhase, RunState};
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::RunSummary;
+use super::{RunSummary, Subject, taken_over_in_words};
 use crate::cli::{Common, RunArgs};
 use crate::connection::{self, PATIENCE};
 use crate::exit::in_words;
@@ -23,22 +22,14 @@ pub(super) async fn run(
     client: Client,
     common: &Common,
     args: &RunArgs,
-    script: &Script,
-    arguments: &Arguments,
+    subject: Subject,
 ) -> anyhow::Result<RunSummary> {
     if !common.json {
         println!("running on the service at {} (rig {:?})", client.endpoint(), client.rig());
     }
     let mut states = client.subscribe::<RunState>(History::Last).await?;
     let held = connection::hold(&client, &args.lease).await?;
-    let request = pb::RunRequest {
-        experiment: script.name().to_owned(),
-        script: script.source().to_owned(),
-        parameters_json: arguments.to_json(),
-        seed: args.experiment.seed,
-        who: args.who.clone(),
-        lease: held.secret(),
-    };
+    let request = pb::RunRequest { who: args.who.clone(), lease: held.secret(), ..request_of(subject) };
     let reply = match connection::ask(&client, Command::Run, &request, DRY_RUN_PATIENCE).await {
         Ok(reply) => reply,
         Err(refusal) => {
@@ -47,6 +38,12 @@ pub(super) async fn run(
         }
     };
     let accepted = reply.state.context("the service's answer has no state; is it of another version?")?;
+    if !reply.note.is_empty() {
+        eprintln!("tactus: {}", reply.note);
+    }
+    if let Some(taken) = accepted.taken_over.as_ref().filter(|_| !common.json) {
+        println!("{}", taken_over_in_words(taken, accepted.presses_planned));
+    }
 
     let progress = RunProgress::new(common.json);
     let mut alive = client.alive();
@@ -106,5 +103,20 @@ pub(super) async fn run(
         dwells: finished.dwells,
         duration_s: finished.elapsed_s,
         recording: PathBuf::from(finished.recording),
+        taken_over: finished.taken_over,
     })
+}
+
+/// The request without who asks.
+fn request_of(subject: Subject) -> pb::RunRequest {
+    match subject {
+        Subject::Experiment { script, arguments, seed } => pb::RunRequest {
+            experiment: script.name().to_owned(),
+            script: script.source().to_owned(),
+            parameters_json: arguments.to_json(),
+            seed,
+            ..Default::default()
+        },
+        Subject::Rest(run_id) => pb::RunRequest { continue_run: run_id, ..Default::default() },
+    }
 }

@@ -10,7 +10,7 @@ use tactus_report::figures::COVERINGS;
 use tactus_report::study::StudyRun;
 use tactus_schema::pb::ExitStatus;
 
-use crate::cli::{Common, ExperimentArgs, LeaseArgs, RunArgs, StudyArgs};
+use crate::cli::{Common, ExperimentArgs, LeaseArgs, RunArgs, RunSubject, StudyArgs};
 use crate::commands::run::execute;
 use crate::exit::{Exit, Failure};
 use crate::output::{duration, say};
@@ -154,11 +154,11 @@ impl StudySteps {
             // Suppresses the run's own first line.
             &Common { json: true, ..common.clone() },
             &RunArgs {
-                experiment: ExperimentArgs {
+                subject: RunSubject::from(ExperimentArgs {
                     experiment: step.experiment.into(),
                     parameters: step.parameters.clone(),
                     seed: Some(args.seed),
-                },
+                }),
                 embedded: args.embedded,
                 rig_file: rig_file.cloned(),
                 truth: args.truth.clone(),

@@ -1,0 +1,188 @@
+//! A run whose program died goes on from its last confirmed press.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use rustix::process::Signal;
+use tactus_e2e::{DEADLINE, Process, ServiceUnderTest, tactus};
+use tactus_record::{Entry, Message, confirmed_presses, rows};
+use tactus_schema::pb::{self, run_event::Event};
+use tempfile::TempDir;
+
+const PRESSES: &str = "def run(rig):\n    tare()\n    for i in range(5):\n        press(3.0 + 2.0 * i, 5.0, depths_mm = [0.2, 0.4], dwell_s = 2.0)\n";
+
+/// Waits until the recording on disk has the first dwell of a press after `confirmed` ones. The second dwell is under way then.
+fn wait_until_pressing(runs: &Path, confirmed: u64) -> PathBuf {
+    let deadline = Instant::now() + DEADLINE;
+    loop {
+        assert!(Instant::now() < deadline, "press {confirmed} was never recorded");
+        let Some(path) = recordings(runs).into_iter().next() else { continue };
+        let info = tactus(runs, &["--json", "record", "info", &path.display().to_string()]);
+        // Its first bytes may not be there yet.
+        if info.code == Some(3) && info.json()["presses"].as_u64() > Some(confirmed) {
+            return path;
+        }
+    }
+}
+
+/// Of the runs in a folder, in the order of their names, and so of their beginnings.
+fn recordings(runs: &Path) -> Vec<PathBuf> {
+    let folders = fs::read_dir(runs).into_iter().flatten().flatten();
+    let mut paths: Vec<_> =
+        folders.map(|run| run.path().join("recording.mcap")).filter(|path| path.is_file()).collect();
+    paths.sort();
+    paths
+}
+
+/// How a run was started.
+fn start_of(recording: &Path) -> pb::RunStarted {
+    let event = |entry: std::io::Result<Entry>| match entry.unwrap() {
+        Entry::Message { message: Message::Event(event), .. } => event.event,
+        Entry::Message { .. } | Entry::Run(_) | Entry::Attachment(_) => None,
+    };
+    match tactus_record::read(recording).unwrap().find_map(event) {
+        Some(Event::Started(started)) => started,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn id(recording: &Path) -> String {
+    recording.parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned()
+}
+
+/// Index and place of the confirmed presses.
+fn presses(recording: &Path) -> Vec<(i32, f64)> {
+    let presses = confirmed_presses(recording).unwrap();
+    presses.iter().map(|press| (press.press, press.dwells[0].x_mm)).collect()
+}
+
+/// Runs and presses of the rows of a table.
+fn presses_in(table: &Path) -> BTreeSet<(String, i32)> {
+    let mut presses = BTreeSet::new();
+    rows::visit(&[table], |_, row| {
+        if row.press >= 0 {
+            presses.insert((row.run.to_owned(), row.press));
+        }
+    })
+    .unwrap();
+    presses
+}
+
+/// Both runs together have each press of the script once, and count on.
+fn each_once(confirmed: &[(i32, f64)], rest: &[(i32, f64)]) {
+    let all = [confirmed, rest].concat();
+    assert_eq!(all.iter().map(|(_, x_mm)| *x_mm).collect::<Vec<_>>(), [3.0, 5.0, 7.0, 9.0, 11.0]);
+    assert!(all.is_sorted_by(|(press, _), (next, _)| press < next), "{all:?}");
+    assert_eq!(confirmed.last().map(|(press, _)| press + 1), rest.first().map(|(press, _)| *press));
+}
+
+#[test]
+fn after_kill_9_in_a_press_the_run_goes_on_and_each_press_is_in_the_table_once() {
+    let mut lab = ServiceUnderTest::start(|rig| rig);
+    let script = lab.script("five.star", PRESSES);
+    let _client = lab.start_tactus(&["run", &script, "--seed", "3"]);
+    let runs = lab.folder.path().join("runs");
+    let first = wait_until_pressing(&runs, 2);
+    let run_id = id(&first);
+    let busy = lab.tactus(&["run", "--continue", &run_id]);
+    assert_eq!(busy.code, Some(5), "one run at a time, and the lease is held: {busy:?}");
+    lab.daemon.signal(Signal::KILL);
+    assert!(lab.truth()["z_mm"].as_f64().unwrap() < 0.0, "the tip stands in contact");
+
+    lab.daemon = Process::start("tactusd", lab.folder.path(), &["--config", "tactusd.toml"]);
+    lab.daemon.wait_for("ready");
+    let confirmed = presses(&first);
+    assert!((2..5).contains(&confirmed.len()), "{confirmed:?}");
+    let refused = lab.tactus(&["run", "--continue", &run_id]);
+    assert_eq!(refused.code, Some(4), "nothing moves before a reset: {refused:?}");
+    assert_eq!(lab.tactus(&["reset"]).code, Some(0));
+    for strange in ["../runs", "none", &format!("../runs/{run_id}"), ""] {
+        let unknown = lab.tactus(&["run", "--continue", strange]);
+        assert_eq!(unknown.code, Some(2), "{strange}: {unknown:?}");
+    }
+    // The file has changed meanwhile.
+    lab.script("five.star", "def run(rig):\n    press(3.0, 5.0, depths_mm = [0.5])\n");
+    let done = lab.tactus(&["run", "--continue", &run_id, "--no-report"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let words = format!("continues {run_id}, {} of 5 presses taken over", confirmed.len());
+    assert!(done.out.contains(&words), "{done:?}");
+
+    let both = recordings(&runs);
+    assert_eq!((both.len(), &both[0]), (2, &first));
+    let rest = presses(&both[1]);
+    each_once(&confirmed, &rest);
+    let info = lab.tactus(&["--json", "record", "info", &both[1].display().to_string()]).json();
+    assert_eq!((&info["continues"], &info["presses"]), (&run_id.as_str().into(), &rest.len().into()));
+    let started = start_of(&both[1]);
+    let taken = started.taken_over.unwrap();
+    assert_eq!((started.seed, taken.presses as usize, taken.first_press), (3, confirmed.len(), rest[0].0));
+
+    let table = lab.folder.path().join("both.parquet");
+    let files = both
+        .iter()
+        .map(|path| path.display().to_string())
+        .chain(["--out".into(), table.display().to_string()]);
+    let args: Vec<_> = ["export".to_owned()].into_iter().chain(files).collect();
+    let exported = lab.tactus(&args.iter().map(String::as_str).collect::<Vec<_>>());
+    assert_eq!(exported.code, Some(0), "{exported:?}");
+    assert!(exported.err.contains("are left out"), "{exported:?}");
+    let of = |recording: &Path, presses: &[(i32, f64)]| -> Vec<_> {
+        presses.iter().map(|(press, _)| (id(recording), *press)).collect()
+    };
+    let of_both = [of(&both[0], &confirmed), of(&both[1], &rest)].concat();
+    assert_eq!(presses_in(&table), of_both.into_iter().collect());
+
+    // Nothing is left to do.
+    let over = lab.tactus(&["run", "--continue", &id(&both[1])]);
+    assert_eq!(over.code, Some(2), "{over:?}");
+    assert!(over.err.contains("nothing to continue"), "{over:?}");
+}
+
+#[test]
+fn a_killed_run_of_the_embedded_rig_goes_on_in_its_folder() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("five.star"), PRESSES).unwrap();
+    let nobody = ["--endpoint", "tcp/127.0.0.1:1"];
+    let embedded = Process::start(
+        "tactus",
+        folder.path(),
+        &[&nobody[..], &["run", "five.star", "--real-time"]].concat(),
+    );
+    let runs = folder.path().join("runs");
+    fs::create_dir(&runs).unwrap();
+    let first = wait_until_pressing(&runs, 1);
+    embedded.signal(Signal::KILL);
+    assert_eq!(embedded.wait().0, None);
+    let confirmed = presses(&first);
+    assert!((1..5).contains(&confirmed.len()), "{confirmed:?}");
+
+    fs::write(folder.path().join("five.star"), PRESSES.replace("0.4", "0.5")).unwrap();
+    let run_id = id(&first);
+    let go_on = |args: &[&str]| {
+        tactus(folder.path(), &[&nobody[..], &["--json", "run", "--continue", &run_id], args].concat())
+    };
+    for (args, says) in [
+        (&["five.star"][..], "cannot be used with"),
+        (&["--seed", "1"], "cannot be used with"),
+        (&["-p", "a=1"], "cannot be used with"),
+        (&["--out", "elsewhere"], "no run"),
+    ] {
+        let refused = go_on(args);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(format!("{refused:?}").contains(says), "{says}: {refused:?}");
+    }
+    let done = go_on(&["--no-report"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert!(done.err.contains("has changed since"), "{done:?}");
+    let summary = done.json();
+    let rest = presses(Path::new(summary["recording"].as_str().unwrap()));
+    each_once(&confirmed, &rest);
+    assert_eq!(
+        (&summary["presses"], &summary["presses_taken_over"], &summary["dwells_taken_over"]),
+        (&rest.len().into(), &confirmed.len().into(), &(2 * confirmed.len()).into())
+    );
+    assert_eq!(summary["continues"], run_id.as_str());
+}
