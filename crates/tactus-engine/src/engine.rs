@@ -92,6 +92,8 @@ pub struct Pulse {
     pub last_frame: MonoTime,
     /// Time of the supervisor's last check of the clock.
     pub supervised: MonoTime,
+    /// Time of the last sign of life of the stage's driver; the default where no driver gives any.
+    pub stage_driven: MonoTime,
     /// Least and greatest of (arrival of a frame - its device time) over the recent frames, in seconds. They estimate
     /// the device clock's offset and its uncertainty; `None` without a device clock.
     pub clock_offset_s: Option<[f64; 2]>,
