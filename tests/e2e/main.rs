@@ -2,18 +2,23 @@
 
 mod awake;
 mod bad_input;
+mod bench;
 mod calibrate;
 mod continued;
 mod design;
 mod devices;
 mod discover;
+mod disk;
 mod embedded;
+mod kill_trials;
 mod link;
 mod scripts;
 mod service;
 mod signals;
 mod simulate;
+mod soak;
 mod stage;
+mod stop_trials;
 mod truth;
 mod unread;
 mod web;

@@ -4,6 +4,8 @@
 //! answer or an exit, with a deadline that only a hang can reach.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test that cannot go on says why and fails")]
 
+mod tap;
+
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
@@ -19,6 +21,8 @@ use rustix::process::{Pid, Signal, kill_process};
 use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
 use serde_json::Value;
 use tempfile::TempDir;
+
+pub use tap::{Tap, Way};
 
 /// Only a hang takes this long.
 pub const DEADLINE: Duration = Duration::from_mins(2);

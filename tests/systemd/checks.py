@@ -122,7 +122,8 @@ def installation(lab, package):
     check.equal("udev reads the rules without a message", said, [])
 
     check.succeeds("tactus validate /etc/tactus/tactusd.toml", machine.run("tactus", "validate", "/etc/tactus/tactusd.toml"))
-    machine.must("useradd", "--create-home", "scientist")
+    machine.must("useradd", "--create-home", "--groups", "tactus", "scientist")
+    machine.must("useradd", "--create-home", "stranger")
     for name, text in (("hold.star", HOLD), ("press.star", PRESS)):
         (machine.root / "home/scientist" / name).write_text(text)
     lab.journal = Journal(machine, UNIT)
@@ -136,6 +137,18 @@ def installation(lab, package):
     check("nothing moves before a reset", done.returncode == 4 and "`tactus reset`" in done.stderr, "exit status 4", done)
     check.succeeds("tactus reset", lab.tactus("reset"))
     check.succeeds("a scientist runs an experiment", lab.tactus("--json", "run", "press.star"))
+
+    sockets = machine.must("stat", "--format=%n %U:%G %a", "/run/tactus/bus.sock", "/run/tactus/bus.sock.stop").splitlines()
+    wanted = [f"/run/tactus/bus.sock{end} tactus:tactus 660" for end in ("", ".stop")]
+    check.equal("the bus is for the group", sockets, wanted)
+    listening = machine.must("cat", "/proc/net/tcp", "/proc/net/tcp6")
+    check("and listens on no port", f":{7447:04X} " not in listening, "no port 7447", listening)
+    for command in ("status", "reset", "stop"):
+        done = machine.run("tactus", command, user="stranger")
+        check(f"who is not in the group is refused: tactus {command}", done.returncode != 0 and "ermission denied" in done.stderr,
+              "Permission denied", f"{done.returncode}: {done.stderr}")
+    done = machine.run("tactus", "run", "/home/scientist/press.star", user="stranger")
+    check("nor does a run of theirs begin elsewhere", done.returncode != 0 and "embedded" not in done.stdout, "an error", done)
 
 
 def sandbox(lab):
@@ -269,7 +282,10 @@ def dashboard(lab):
     check("it serves its page on loopback", "<title>Tactus</title>" in page.stdout, "the page", page.stdout + page.stderr)
     mode = machine.must("stat", "--format=%a %G", "/run/tactus-web/token").strip()
     check.equal("its token is for the group", mode, "640 tactus")
-    check("others do not see it", machine.run("cat", "/run/tactus-web/token", user="scientist").returncode != 0, "no permission", "a token")
+    check("others do not see it", machine.run("cat", "/run/tactus-web/token", user="stranger").returncode != 0, "no permission", "a token")
+    stop = ASK.replace("GET / ", "POST /stop ").replace("Host: localhost", "Host: localhost\\r\\nContent-Length: 0")
+    done = machine.run("bash", "-c", stop, user="stranger")
+    check("everybody can stop there: it reaches the bus", "204" in done.stdout, "204", done.stdout + done.stderr)
     before = lab.status()
     machine.must("systemctl", "kill", "--kill-whom=main", "--signal=KILL", unit)
     after = lab.frames_later(20)

@@ -17,7 +17,7 @@ PATIENCE_S = 10.0
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447")
+    parser.add_argument("--endpoint", help="default: the service of this machine")
     parser.add_argument("--rig", help="default: the one that is ready")
     length = parser.add_mutually_exclusive_group(required=True)
     length.add_argument("--frames", type=int, help="stop after this number of frames")

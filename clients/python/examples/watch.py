@@ -10,7 +10,7 @@ SHADES = " .:-=+*#%@"
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447")
+    parser.add_argument("--endpoint", help="default: the service of this machine")
     parser.add_argument("--rig", help="default: the one that is ready")
     options = parser.parse_args()
 

@@ -52,7 +52,7 @@ impl Client {
     /// the rig of the service that listens there or, if that is a router, to the only rig that is ready.
     ///
     /// # Errors
-    /// [`BusError::NoService`], [`BusError::Session`]; [`BusError::RigName`] for an invalid name;
+    /// [`BusError::NoService`], [`BusError::NotAllowed`], [`BusError::Session`]; [`BusError::RigName`] for an invalid name;
     /// without a name also [`BusError::NoRig`] and [`BusError::SeveralRigs`]; behind a router
     /// [`BusError::SeveralServices`].
     ///
@@ -77,9 +77,13 @@ impl Client {
         if let Some(rig) = rig {
             check_rig_name(rig)?;
         }
-        reach(endpoint)
-            .await
-            .map_err(|source| BusError::NoService { endpoint: endpoint.to_string(), source })?;
+        reach(endpoint).await.map_err(|source| {
+            let endpoint = endpoint.to_string();
+            match source.kind() {
+                io::ErrorKind::PermissionDenied => BusError::NotAllowed { endpoint, source },
+                _ => BusError::NoService { endpoint, source },
+            }
+        })?;
         let session = open(endpoint, credentials).await?;
         let roster = Roster::keep(&session).await?;
         let neighbours: Vec<ZenohId> = session.info().peers_zid().await.collect();

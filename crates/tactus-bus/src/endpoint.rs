@@ -4,7 +4,7 @@ use std::{fmt, net::IpAddr, path::Path, str::FromStr};
 
 use crate::BusError;
 
-/// Where the packaged service can listen for the members of its group.
+/// Where the packaged service listens for the members of its group.
 const INSTALLED: &str = "/run/tactus/bus.sock";
 
 /// A checked address on the bus, in zenoh's form: `tcp/HOST:PORT` or `tls/HOST:PORT`, with `[...]` around an IPv6 host, or

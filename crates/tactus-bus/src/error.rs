@@ -26,6 +26,11 @@ pub enum BusError {
     /// Nothing listens at the endpoint.
     #[error("no service at {endpoint}: start tactusd, or name another endpoint")]
     NoService { endpoint: String, source: io::Error },
+    /// A Unix socket that this user may not open.
+    #[error(
+        "this user may not reach the service at {endpoint}: its group may (the installed service's is `tactus`)"
+    )]
+    NotAllowed { endpoint: String, source: io::Error },
     /// The program that listens at the endpoint does not use the bus's protocol.
     #[error("the program at {endpoint} does not answer as a Tactus service")]
     Session { endpoint: String, source: Box<dyn Error + Send + Sync> },

@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use sd_notify::NotifyState;
 use tactus_engine::{Engine, StopOrder};
+use tactus_runner::recorder::Gauge;
 use tactus_schema::MonoTime;
+use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 use tracing::{error, info, warn};
 
@@ -22,16 +24,21 @@ pub(crate) fn stopping() {
 }
 
 /// Feeds the watchdog while every part of the service makes progress. If one hangs, the stage is stopped; if it still hangs
-/// an eighth of the limit later, systemd is asked to end the service.
-pub(crate) async fn feed_watchdog(engine: Engine) {
+/// an eighth of the limit later, systemd is asked to end the service. A disk that hangs is no part of the service: the run fails
+/// by it, and the service goes on.
+pub(crate) async fn feed_watchdog(engine: Engine, recorder: watch::Receiver<Gauge>) {
     let systemd = sd_notify::watchdog_enabled();
     let limit = systemd.unwrap_or(LIMIT);
     let mut watch = Watch::new(engine.clock().now().mono, limit / 2);
+    let mut recorded = Changes::default();
     let mut tick = interval((limit / 8).max(Duration::from_millis(1)));
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         tick.tick().await;
-        match watch.judge(Progress::of(&engine), engine.clock().now().mono) {
+        let now = engine.clock().now().mono;
+        let sign = recorder.borrow().sign_of_life();
+        let progress = Progress { recorder: recorded.look(sign, now), ..Progress::of(&engine) };
+        match watch.judge(progress, now) {
             Liveness::Alive => {}
             Liveness::Recovered => info!("every part of the service goes on again"),
             Liveness::Hangs(part) => {
@@ -69,7 +76,25 @@ impl Progress {
         let pulse = *engine.pulse().borrow();
         // A task that has ended makes no progress any more, whenever it last did.
         let acquisition = if engine.is_acquiring() { pulse.supervised } else { MonoTime::default() };
-        Self { acquisition: Some(acquisition), stage: None, recorder: None }
+        let stage = (pulse.stage_driven != MonoTime::default()).then_some(pulse.stage_driven);
+        Self { acquisition: Some(acquisition), stage, recorder: None }
+    }
+}
+
+/// When a number last changed, as far as looks at it tell.
+#[derive(Debug, Default)]
+struct Changes {
+    seen: Option<u64>,
+    at: MonoTime,
+}
+
+impl Changes {
+    /// The time of the last change; `None` while there is no number.
+    fn look(&mut self, number: Option<u64>, now: MonoTime) -> Option<MonoTime> {
+        if number != self.seen {
+            *self = Self { seen: number, at: now };
+        }
+        number.map(|_| self.at)
     }
 }
 

@@ -49,3 +49,41 @@ fn a_look_that_is_late_itself_accuses_nobody() {
     wanted.push(Liveness::Hangs("acquisition"));
     assert_eq!(verdicts(&mut watch, everything_at(240), &looks), wanted);
 }
+
+/// Judgements of looks four times a second, while the recorder shows this.
+fn of_recorder(signs: &[Option<u64>]) -> Vec<Liveness> {
+    let (mut watch, mut recorded) = (Watch::new(at_ms(0), PATIENCE), Changes::default());
+    let looks = signs.iter().zip(1..).map(|(sign, nth)| {
+        let now = at_ms(nth * 250);
+        let progress = Progress { recorder: recorded.look(*sign, now), ..everything_at(nth * 250) };
+        watch.judge(progress, now)
+    });
+    looks.collect()
+}
+
+#[test]
+fn a_recorder_that_beats_goes_on_and_one_that_does_not_hangs() {
+    let beating: Vec<_> = (0..20).map(Some).collect();
+    assert_eq!(of_recorder(&beating), [Liveness::Alive; 20]);
+    let stuck = [Some(7); 8];
+    let hangs = Liveness::Hangs("the recorder");
+    let still = Liveness::StillHangs("the recorder");
+    let mut wanted = vec![Liveness::Alive; 5];
+    wanted.extend([hangs, still, still]);
+    assert_eq!(of_recorder(&stuck), wanted);
+}
+
+#[test]
+fn a_recorder_that_waits_for_its_disk_for_a_minute_is_no_part_that_hangs() {
+    let mut signs = vec![Some(1), Some(2)];
+    signs.extend([None; 240]);
+    signs.extend([Some(3), Some(4)]);
+    assert!(of_recorder(&signs).iter().all(|verdict| *verdict == Liveness::Alive));
+}
+
+#[test]
+fn between_two_runs_no_recorder_is_waited_for() {
+    let mut signs = vec![Some(1), Some(2), None, None, None, None, None, None];
+    signs.extend([Some(1), Some(2)]);
+    assert!(of_recorder(&signs).iter().all(|verdict| *verdict == Liveness::Alive));
+}

@@ -151,7 +151,7 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     let tasks = [
         tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
         tokio::spawn(health::publish(engine.clone(), bus.publisher())),
-        tokio::spawn(notify::feed_watchdog(engine.clone())),
+        tokio::spawn(notify::feed_watchdog(engine.clone(), desk.recorder())),
         tokio::spawn(inhibitor::keep_awake(engine.clone())),
     ];
 

@@ -130,6 +130,38 @@ impl<S: Storage> Recording<S> {
         })
     }
 
+    /// The same recording with another storage around its own: for those who watch what the storage does.
+    pub fn map_storage<T: Storage>(self, around: impl FnOnce(S) -> T) -> Recording<T> {
+        let Self {
+            path,
+            storage,
+            writer,
+            tally,
+            sensor_infos,
+            run_id,
+            next_event,
+            last_at,
+            stored,
+            end_bytes,
+            unstored,
+            failure,
+        } = self;
+        Recording {
+            path,
+            storage: around(storage),
+            writer,
+            tally,
+            sensor_infos,
+            run_id,
+            next_event,
+            last_at,
+            stored,
+            end_bytes,
+            unstored,
+            failure,
+        }
+    }
+
     /// Where it is written.
     pub fn path(&self) -> &Path {
         &self.path

@@ -9,6 +9,7 @@
 //! A disk that is slow to sync delays only the last of them.
 
 mod backlog;
+mod life;
 
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
@@ -22,6 +23,7 @@ use tactus_schema::{Frame, MonoTime, TimeStamp, pb};
 use tracing::{error, warn};
 
 use backlog::{Backlog, Lag};
+use life::{Life, Living, Watched};
 
 /// Capacity of the queue to the disk, in messages. The backlog's age fails a run earlier, except at rates beyond 4 kHz.
 const QUEUE: usize = 4096;
@@ -74,6 +76,7 @@ struct Readings {
     synced_ns: AtomicI64,
     failure: Notice,
     alarm: Notice,
+    life: Life,
 }
 
 /// A text from one thread to another, which locks nothing as long as there is none.
@@ -92,6 +95,7 @@ impl Default for Readings {
             synced_ns: AtomicI64::new(NEVER),
             failure: Notice::default(),
             alarm: Notice::default(),
+            life: Life::default(),
         }
     }
 }
@@ -171,6 +175,12 @@ impl Gauge {
     /// Age of the oldest data that a loss of power would take; `None` if nothing is being recorded.
     pub fn unsynced(&self, now: MonoTime) -> Option<Duration> {
         age(&self.0.synced_ns, now)
+    }
+
+    /// A number that changes several times a second while the recorder's thread goes on. `None` if it is not expected to:
+    /// nothing is being recorded, or the thread waits for the disk, which only the backlog may judge.
+    pub fn sign_of_life(&self) -> Option<u64> {
+        self.0.life.sign()
     }
 
     /// The failure of the recorder, if it has failed.
@@ -265,9 +275,13 @@ impl ThreadRecorder {
         thread::Builder::new()
             .name("recorder-sync".into())
             .spawn(move || sync_all(sync, &wishes, &of_sync))?;
+        // From here on the thread has to show that it goes on.
+        let living = Living::begin(gauge.clone());
+        let recording = recording.map_storage(|storage| Watched::new(storage, gauge.clone()));
         let writer =
             Writer { recording, gauge: gauge.clone(), sync_to, wished: None, at: MonoTime::default() };
         thread::Builder::new().name("recorder".into()).spawn(move || {
+            let _living = living;
             // Nobody may wait for the result any more.
             let _told = end.send(writer.write_all(&queue));
         })?;
@@ -423,6 +437,7 @@ impl<S: Storage> Writer<S> {
     /// Writes until the queue ends. After a failure it takes what comes nevertheless: the recording keeps what it can.
     fn write_all(mut self, queue: &Receiver<Entry>) -> Result<(), RecordError> {
         loop {
+            self.gauge.0.life.beat();
             let written = match queue.recv_timeout(IDLE) {
                 Ok(entry) => {
                     let written = self.write(&entry);

@@ -9,6 +9,7 @@ use tactus_engine::Record;
 use tactus_record::{Header, RecordError, Recording, Script, Storage, SyncHandle, info};
 use tactus_schema::{Frame, MonoTime, Rig, WallTime, pb};
 
+use super::life::Living;
 use super::{Gauge, ThreadRecorder};
 
 const RIG_TOML: &str = include_str!("../../../config/rigs/sim.toml");
@@ -279,4 +280,36 @@ fn a_disk_that_is_nearly_full_is_an_alarm_before_it_is_full() {
     });
     assert_eq!(alarm.unwrap(), "the disk of the recordings is nearly full: 20 MiB are free");
     recorder.finish_within(Duration::from_mins(1)).unwrap();
+}
+
+#[test]
+fn a_recorder_shows_that_it_goes_on_but_not_while_it_waits_for_the_disk() {
+    let gauge = Gauge::default();
+    assert_eq!(gauge.sign_of_life(), None, "nothing is recorded");
+    let (recorder, control) = stuck_after_a_chunk(&gauge);
+    assert_eq!(gauge.sign_of_life(), None, "it waits for the disk");
+    (0..3).for_each(|_| control.permits.send(()).unwrap());
+    let mut signs = Vec::new();
+    // Without messages it beats four times a second.
+    while signs.len() < 3 {
+        signs.extend(gauge.sign_of_life().filter(|sign| signs.last() != Some(sign)));
+        std::thread::yield_now();
+    }
+    assert!(signs.is_sorted());
+    recorder.finish_within(Duration::from_mins(1)).unwrap();
+    // The thread ends a moment after it has said so.
+    while gauge.sign_of_life().is_some() {
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn a_recorder_that_hangs_in_its_own_code_shows_always_the_same() {
+    let gauge = Gauge::default();
+    let living = Living::begin(gauge.clone());
+    let sign = gauge.sign_of_life();
+    assert!(sign.is_some());
+    assert_eq!(gauge.sign_of_life(), sign);
+    drop(living);
+    assert_eq!(gauge.sign_of_life(), None);
 }

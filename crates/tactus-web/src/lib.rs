@@ -41,9 +41,9 @@ use token::Token;
 #[derive(Debug, Parser)]
 #[command(name = "tactus-web", version, about)]
 struct Options {
-    /// Address of the service. Default: the socket of the installed service if it has one, else loopback.
-    #[arg(long, env = "TACTUS_ENDPOINT", default_value_t = Endpoint::of_this_machine())]
-    endpoint: Endpoint,
+    /// Address of the service. Default: the socket of the installed service whenever it is there, else loopback.
+    #[arg(long, env = "TACTUS_ENDPOINT")]
+    endpoint: Option<Endpoint>,
     /// Name of the rig, if several are served.
     #[arg(long, env = "TACTUS_RIG")]
     rig: Option<String>,

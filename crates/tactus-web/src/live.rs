@@ -35,24 +35,39 @@ pub(crate) enum NotDone {
     Failed(String),
 }
 
+/// Which service.
+#[derive(Debug)]
+struct Service {
+    /// Without one it is looked for at each attempt: the service may start later than this program.
+    endpoint: Option<Endpoint>,
+    rig: Option<String>,
+}
+
+impl Service {
+    fn endpoint(&self) -> Endpoint {
+        self.endpoint.clone().unwrap_or_else(Endpoint::of_this_machine)
+    }
+}
+
 /// Connection to the rig, and its latest view.
 #[derive(Debug, Clone)]
 pub(crate) struct Live {
-    service: Arc<(Endpoint, Option<String>)>,
+    service: Arc<Service>,
     client: watch::Receiver<Option<Arc<Client>>>,
     view: watch::Receiver<View>,
 }
 
 impl Live {
     /// Connects, and reconnects whenever the connection is lost.
-    pub(crate) fn start(endpoint: Endpoint, rig: Option<String>) -> Self {
+    pub(crate) fn start(endpoint: Option<Endpoint>, rig: Option<String>) -> Self {
         let (to_client, client) = watch::channel(None);
-        let service = Arc::new((endpoint.clone(), rig.clone()));
-        let problem = format!("no service at {endpoint} yet");
+        let service = Arc::new(Service { endpoint, rig });
+        let problem = format!("no service at {} yet", service.endpoint());
         let (to_view, view) = watch::channel(View { problem, ..View::default() });
+        let own = Arc::clone(&service);
         tokio::spawn(async move {
             loop {
-                let problem = match Client::connect(&endpoint, rig.as_deref()).await {
+                let problem = match Client::connect(&own.endpoint(), own.rig.as_deref()).await {
                     Ok(client) => {
                         let client = Arc::new(client);
                         info!(rig = client.rig(), "connected");
@@ -94,10 +109,9 @@ impl Live {
         {
             return done(&reply);
         }
-        let (endpoint, rig) = &*self.service;
+        let (endpoint, rig) = (self.service.endpoint(), self.service.rig.as_deref());
         let answers =
-            tactus_bus::stop(endpoint, rig.as_deref(), &request, &Credentials::default(), STOP_PATIENCE)
-                .await;
+            tactus_bus::stop(&endpoint, rig, &request, &Credentials::default(), STOP_PATIENCE).await;
         answers.map_err(in_words)?.iter().try_for_each(done)
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import getpass
 import json
+import os
 import re
 import socket
 
@@ -17,14 +18,18 @@ from tactus_client.services import Services
 from tactus_client.stopping import stop_by_datagram
 from tactus_client.stream import Stream, past_samples
 
+#: Where the installed service of this machine listens for the members of its group.
+INSTALLED = "/run/tactus/bus.sock"
 #: How long to wait for a machine that does not answer at all.
 REACH_TIMEOUT_S = 2.0
 #: Number of events that may wait to be read: twice what the service keeps.
 EVENT_CAPACITY = 131_072
 
 
-def connect(endpoint: str = "tcp/127.0.0.1:7447", rig: str | None = None) -> Client:
+def connect(endpoint: str | None = None, rig: str | None = None) -> Client:
     """Connects to the service at ``endpoint``, ``tcp/HOST:PORT`` or ``unixsock-stream/PATH``.
+
+    Without one it is the socket of the installed service of this machine if there is one, else ``tcp/127.0.0.1:7447``.
 
     Without ``rig`` it takes the rig of the service that listens there or, if that is a router, the only rig that is ready.
 
@@ -32,6 +37,7 @@ def connect(endpoint: str = "tcp/127.0.0.1:7447", rig: str | None = None) -> Cli
     none was named, and ``ValueError`` if the endpoint or the rig's name is not valid.
     """
     _check_rig_name(rig)
+    endpoint = _of_this_machine() if endpoint is None else endpoint
     _reach(endpoint)
     try:
         session = zenoh.open(_config(endpoint))
@@ -48,13 +54,14 @@ def connect(endpoint: str = "tcp/127.0.0.1:7447", rig: str | None = None) -> Cli
         raise
 
 
-def stop(endpoint: str = "tcp/127.0.0.1:7447", rig: str | None = None, *, reason: str = "", abort: bool = False, timeout_s: float = 5.0):
+def stop(endpoint: str | None = None, rig: str | None = None, *, reason: str = "", abort: bool = False, timeout_s: float = 5.0):
     """Stops every rig that the service at ``endpoint`` reaches, or the one of that name; the fastest way to stop.
 
     It needs no connection where the service is on this machine. Returns the ``CommandReply`` of a service. Raises
     ``NoAnswer`` if none answered: then nothing is known.
     """
     _check_rig_name(rig)
+    endpoint = _of_this_machine() if endpoint is None else endpoint
     request = messages.CommandRequest(who=_who(), reason=reason, abort=abort)
     answer = stop_by_datagram(endpoint, rig, request, timeout_s)
     if answer is not None:
@@ -213,6 +220,10 @@ def _check_rig_name(rig: str | None) -> None:
     if rig is not None and not re.fullmatch(r"[A-Za-z0-9_-]+", rig):
         # With a wildcard, a command would go to every rig on the bus.
         raise ValueError(f"rig name {rig!r}: letters, digits, '-' and '_' only")
+
+
+def _of_this_machine() -> str:
+    return f"unixsock-stream/{INSTALLED}" if os.path.exists(INSTALLED) else "tcp/127.0.0.1:7447"
 
 
 def _reach(endpoint: str) -> None:

@@ -12,13 +12,13 @@ use tactus_plan::{Arguments, Evaluate, Script};
 use tactus_runner::config::ServiceConfig;
 use tactus_runner::continuation::{self, ContinuationError, Wish};
 use tactus_runner::order::{self, RunRequest};
-use tactus_runner::recorder::ThreadRecorder;
+use tactus_runner::recorder::{Gauge, ThreadRecorder};
 use tactus_runner::script_process::ScriptProcesses;
 use tactus_runner::twin::DryRun;
 use tactus_runner::{experiments, twin};
 use tactus_schema::key::Command;
 use tactus_schema::{MonoTime, Rig, WallTime, pb};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tracing::{info, warn};
 
 use super::health::health;
@@ -38,6 +38,8 @@ pub(super) struct CommandDesk {
     config: ServiceConfig,
     publisher: Publisher,
     lease: Mutex<Lease>,
+    /// Of the last run.
+    recorder: watch::Sender<Gauge>,
     evaluator: Arc<dyn Evaluate>,
 }
 
@@ -73,7 +75,13 @@ struct Refusal {
 impl CommandDesk {
     pub(super) fn new(engine: Engine, config: ServiceConfig, publisher: Publisher) -> Self {
         let evaluator = Arc::new(ScriptProcesses::of_this_program());
-        Self { engine, config, publisher, lease: Mutex::default(), evaluator }
+        let recorder = watch::Sender::default();
+        Self { engine, config, publisher, lease: Mutex::default(), recorder, evaluator }
+    }
+
+    /// What the recorder of the last run shows. Each run has a recorder of its own: an old one may still wait for its disk.
+    pub(super) fn recorder(&self) -> watch::Receiver<Gauge> {
+        self.recorder.subscribe()
     }
 
     /// Stops want neither a lease nor a free task: this blocks a thread of its own.
@@ -251,10 +259,12 @@ impl CommandDesk {
             order::recording(&order, &rig, texts, &self.config.recordings, now).map_err(Refusal::failed)?;
         let path = std::path::absolute(&path).unwrap_or(path);
         info!(run = order.run_id, recording = %path.display(), presses = plan.promise().presses, "run accepted");
-        let record = Box::new(ThreadRecorder::start(recording).map_err(Refusal::failed)?);
+        let gauge = Gauge::default();
+        let record = ThreadRecorder::start_with(recording, gauge.clone()).map_err(Refusal::failed)?;
+        self.recorder.send_replace(gauge);
         order.recording = path.display().to_string();
         let run_id = order.run_id.clone();
-        tokio::spawn(claim.run(order, record));
+        tokio::spawn(claim.run(order, Box::new(record)));
         // The answer contains the state of this run, not of the previous one.
         self.engine.state().wait_for(|state| state.run_id == run_id).await.map_err(Refusal::failed)?;
         Ok(note)
