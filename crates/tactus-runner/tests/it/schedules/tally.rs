@@ -21,10 +21,6 @@ impl Tally {
             self.add(group, name, number);
         }
     }
-
-    pub(super) fn of(&self, group: &'static str, name: &str) -> u64 {
-        self.0.get(&(group, name.to_owned())).copied().unwrap_or(0)
-    }
 }
 
 impl fmt::Display for Tally {
