@@ -15,6 +15,7 @@ use tokio::time::{MissedTickBehavior, timeout};
 use tracing::{error, info, warn};
 
 use crate::average::{Average, Window};
+use crate::clock_watch::ClockWatch;
 use crate::engine::{Pulse, Shared};
 use crate::outlet::{Record, RecordFailure};
 use crate::run::Ending;
@@ -43,7 +44,7 @@ pub(crate) struct Acquisition {
     recording: Option<Recording>,
     sensor_info: Option<pb::SensorInfo>,
     safety_seq: u64,
-    clock_offset_s: Option<[f64; 2]>,
+    clock: ClockWatch,
 }
 
 /// What the run in progress has received and lost.
@@ -168,7 +169,7 @@ impl Acquisition {
             recording: None,
             sensor_info: None,
             safety_seq: 0,
-            clock_offset_s: None,
+            clock: ClockWatch::default(),
         }
     }
 
@@ -223,7 +224,7 @@ impl Acquisition {
         self.record(|sink| sink.frame(frame));
         self.window = self.window.take().and_then(|window| window.take(frame));
         self.watch_clock(frame);
-        let clock_offset_s = self.clock_offset_s;
+        let clock_offset_s = self.clock.offset_s();
         self.shared.pulse.send_modify(|pulse| {
             *pulse = Pulse {
                 frames: pulse.frames + 1,
@@ -255,7 +256,7 @@ impl Acquisition {
         let now = self.shared.clock.now();
         self.record(|sink| sink.sensor_info(info, now));
         self.sensor_info = Some(info.clone());
-        self.clock_offset_s = None;
+        self.clock = ClockWatch::default();
         self.shared.pulse.send_modify(|pulse| pulse.sensor_connected = true);
         self.tell_violation(violation);
         self.shared.publish.sensor_info(info);
@@ -308,16 +309,11 @@ impl Acquisition {
         self.shared.stop_motion();
     }
 
-    /// Estimates the offset between the device's clock and the host's. A frame never arrives before it is sampled, so
-    /// the least difference is the best estimate and the spread is its uncertainty.
+    /// Compares the device's clock with the host's.
     fn watch_clock(&mut self, frame: &Frame) {
         let tick_ns = self.sensor_info.as_ref().map_or(0, |info| info.tick_ns);
         let Some(tick) = frame.device_tick.filter(|_| tick_ns > 0) else { return };
-        let offset_s = frame.received.mono.seconds() - tick.0 as f64 * tick_ns as f64 * 1e-9;
-        self.clock_offset_s = Some(match self.clock_offset_s {
-            Some([least_s, greatest_s]) => [least_s.min(offset_s), greatest_s.max(offset_s)],
-            None => [offset_s; 2],
-        });
+        self.clock.take(frame.received.mono, tick.0 as f64 * tick_ns as f64 * 1e-9);
     }
 
     // --- what is asked ------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@
 
 mod acquisition;
 mod average;
+mod clock_watch;
 mod engine;
 mod envelope;
 mod motion;

@@ -13,6 +13,7 @@
 //!   setting takes 100-220 ms; this host writes none.
 //! - With homing switched off, `$H` gives `error:5`. During `$H` one `<Home|...>` is sent, then nothing until `ok`, or
 //!   `ALARM:9` after about 24 s.
+//! - `G53` makes the coordinates of one line those of the machine frame, absolute, in `G91` too.
 //! - There is no heartbeat, and nothing has a checksum. The parser ignores `/`, and drops bytes above 0x7F as real-time
 //!   commands. `$G` prints the modes, and the feed as a whole number. A reset forgets both.
 //!
@@ -28,6 +29,7 @@ mod response;
 mod session;
 mod settings;
 mod status;
+mod work_frame;
 
 pub use config::{Axis, Config, ConfigError};
 pub use meaning::{alarm_meaning, error_meaning};

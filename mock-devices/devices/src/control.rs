@@ -134,6 +134,11 @@ impl RigControl {
         self.world.lock().image(Instant::now())
     }
 
+    /// Number of readings of the whole array that the sensor has taken since the rig was switched on.
+    pub fn samplings(&self) -> u64 {
+        self.world.lock().samplings()
+    }
+
     /// What the rig hides from the service.
     pub fn truth(&self) -> Arc<Truth> {
         Arc::clone(self.world.lock().truth())

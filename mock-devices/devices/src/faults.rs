@@ -82,6 +82,11 @@ pub enum SensorFault {
     },
     /// `clock-wrap`: the device's clock comes to within a second of its overflow.
     ClockWrap,
+    /// `clock-drift 50`: from now on the device's clock and its samplings run fast by this many millionths, at most 1000.
+    ClockDrift {
+        /// Negative is slow.
+        ppm: i16,
+    },
     /// `stuck 7`: the element keeps its present reading.
     Stuck(usize),
     /// `saturate 7`: the element reads full scale.
@@ -162,6 +167,12 @@ pub enum ControllerFault {
     LostSteps {
         /// Distance lost at the beginning of the move.
         lost_mm: f64,
+    },
+    /// `work-offset -2`: somebody has set the work frame's origin to this machine coordinate of the axis that is the rig's z, in
+    /// mm. It outlasts a reset. Zaber has no such frame.
+    WorkOffset {
+        /// Machine coordinate.
+        mm: f64,
     },
     /// `homing-fails`: the next homing finds no switch.
     HomingFails,

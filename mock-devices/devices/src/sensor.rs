@@ -6,6 +6,7 @@
 //! id `SIMULA`, the element's register `SIMULATED`. `declared` and `anyskin` have no such field.
 
 mod codec;
+mod crystal;
 mod link_faults;
 
 use std::collections::BTreeMap;
@@ -22,6 +23,7 @@ use crate::truth::RandomStream;
 use crate::wire::Wire;
 use crate::world::SharedWorld;
 use codec::{DeviceCodec, HostRequest, Register};
+use crystal::Crystal;
 use link_faults::LinkFaults;
 
 /// From power-up to the boot message. The real controller needs about 8 s; a shorter pause takes the driver through the
@@ -41,8 +43,11 @@ const BACKLOG: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct VirtualSensor {
     world: SharedWorld,
-    /// Zero of the device's clock.
     powered_up: Instant,
+    /// Runs since then; its samplings and its clock follow it.
+    crystal: Crystal,
+    /// Its drift, which outlasts a power failure.
+    drift_ppm: f64,
     clock_offset_ticks: i128,
     is_booting: bool,
     codec: DeviceCodec,
@@ -78,6 +83,8 @@ impl VirtualSensor {
         let mut sensor = Self {
             world,
             powered_up: now,
+            crystal: Crystal::started(now),
+            drift_ppm: 0.0,
             clock_offset_ticks: 0,
             is_booting: true,
             codec: DeviceCodec::of(codec),
@@ -98,6 +105,8 @@ impl VirtualSensor {
 
     fn power_up(&mut self, now: Instant) {
         self.powered_up = now;
+        self.crystal = Crystal::started(now);
+        self.crystal.drift(self.drift_ppm, now);
         self.clock_offset_ticks = 0;
         self.codec.power_up();
         self.outbox.clear();
@@ -123,7 +132,7 @@ impl VirtualSensor {
                 }
                 let counts = element.and_then(|element| self.counts.get(element).copied().or(Some(0)));
                 let (tick, rate_hz) = (self.tick(now), self.own_rate_hz());
-                let running = now.duration_since(self.powered_up);
+                let running = self.crystal.running(now);
                 self.link_faults
                     .frame(now, |_| codec::reply((address, id, asked), tick, running, rate_hz, counts))
             }
@@ -153,12 +162,12 @@ impl VirtualSensor {
     /// Number of the first sampling after `now`.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count from 0 on")]
     fn after(&self, now: Instant, rate_hz: f64) -> u64 {
-        (now.duration_since(self.powered_up).as_secs_f64() * rate_hz).floor() as u64 + 1
+        (self.crystal.running(now).as_secs_f64() * rate_hz).floor() as u64 + 1
     }
 
     /// Time of the next sampling, computed from the start of the grid, so that no rounding accumulates.
     fn instant(&self, acquisition: Acquisition) -> Instant {
-        self.powered_up + Duration::from_secs_f64(acquisition.next as f64 / acquisition.rate_hz)
+        self.crystal.instant(Duration::from_secs_f64(acquisition.next as f64 / acquisition.rate_hz))
     }
 
     fn take_frame(&mut self, at: Instant, run_length: bool, period: Duration) {
@@ -223,7 +232,7 @@ impl VirtualSensor {
 
     /// Reading of the device's clock, ticks; 0 if it has none.
     fn tick(&self, at: Instant) -> u64 {
-        let running = at.duration_since(self.powered_up);
+        let running = self.crystal.running(at);
         self.codec.clock().map_or(0, |clock| clock.shows(running, self.clock_offset_ticks))
     }
 
@@ -276,6 +285,10 @@ impl Device for VirtualSensor {
                 if let Some(clock) = self.codec.clock() {
                     self.clock_offset_ticks += clock.until_wrap(shown, WRAPS_AFTER);
                 }
+            }
+            SensorFault::ClockDrift { ppm } => {
+                self.drift_ppm = f64::from(ppm);
+                self.crystal.drift(self.drift_ppm, now);
             }
             SensorFault::Stuck(element) => {
                 let reading = self.reading(element, now);

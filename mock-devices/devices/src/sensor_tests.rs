@@ -243,3 +243,18 @@ fn an_older_controller_closes_its_packets_by_a_sum() {
     }
     assert_eq!((packets, decoder.stats().skipped_bytes), (31, 0));
 }
+
+#[test]
+fn a_drifting_clock_takes_its_samplings_along() {
+    for (ppm, frames) in [(1000, 3003), (-1000, 2997)] {
+        let mut bench = pushing(1);
+        bench.fault(SensorFault::ClockDrift { ppm });
+        let stamps = timestamps_ms(&bench.bytes(100_000));
+        assert_eq!(stamps.len(), frames, "{ppm}");
+        let steps_ms = stamps.windows(2).map(|pair| pair[1] - pair[0]);
+        assert!(
+            steps_ms.clone().all(|step_ms| step_ms == 33 || step_ms == 34),
+            "{ppm}: its own rate is even"
+        );
+    }
+}

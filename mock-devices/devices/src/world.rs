@@ -28,6 +28,8 @@ pub(crate) struct World {
     surface_mm: f64,
     deepest_mm: f64,
     noise: ChaCha8Rng,
+    /// Readings taken so far.
+    samplings: u64,
     sensor_model: Box<dyn SensorModel>,
     /// Zero of the sensor model's time (its first sampling), and the tip's path since.
     trail: Option<(Instant, Trail)>,
@@ -71,6 +73,7 @@ impl World {
             surface_mm: truth.surface_mm,
             deepest_mm: truth.surface_mm - tip_mm[2],
             noise: RandomStream::Noise.rng(truth.seed),
+            samplings: 0,
             sensor_model,
             trail: None,
             truth,
@@ -85,6 +88,7 @@ impl World {
     /// Writes one reading of all elements at `at` into `counts`, with noise, saturation and quantisation.
     pub(crate) fn sample(&mut self, at: Instant, counts: &mut Vec<u16>) {
         self.look(at);
+        self.samplings += 1;
         let Self { truth, noise, sensor_model, .. } = self;
         counts.clear();
         counts.extend(sensor_model.counts().iter().enumerate().map(|(element, clean)| {
@@ -104,6 +108,11 @@ impl World {
             let count = read.min(f64::from(u16::MAX)) as u16;
             count
         }));
+    }
+
+    /// Number of readings of all elements that were taken so far.
+    pub(crate) fn samplings(&self) -> u64 {
+        self.samplings
     }
 
     /// The image without noise, in counts, row-major.

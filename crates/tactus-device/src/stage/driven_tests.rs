@@ -96,7 +96,7 @@ async fn a_move_is_done_soon_after_the_stage_arrives() {
     let began = Instant::now();
     let reached = stage.move_to(permit(to(11.0, 10.0))).await.unwrap();
     assert_eq!(reached, [11.0, 1.0, 5.0]);
-    assert_eq!((shared.count("G91G21G94G1F600"), shared.count("$G"), shared.count("X10")), (1, 1, 1));
+    assert_eq!((shared.count("G91G21G94G1F600"), shared.count("$G"), shared.count("G53X11")), (1, 1, 1));
     // The way takes a second; the stage is asked every 20 ms.
     let took = began.elapsed();
     assert!((Duration::from_secs(1)..=Duration::from_millis(1020)).contains(&took), "{took:?}");

@@ -1,4 +1,5 @@
-//! Runs without hardware: the embedded rig, and the service's core under random faults.
+//! Runs without hardware: the embedded rig, and the service's core under random faults and for days.
 
+mod days;
 mod embedded;
 mod schedules;

@@ -6,12 +6,22 @@ use super::Config;
 use super::number::{round_to_um, short};
 use crate::stage::{ArrivalCheck, AxisName, Course, Judgement, Shape, distance_mm};
 
+/// How a line says where to go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// By the coordinates of every axis in the machine frame: shows whether reports and parser agree.
+    Absolute,
+    /// By how far.
+    Increments,
+}
+
 /// A move under way.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ActiveMove {
     arrival: ArrivalCheck,
     course: Course,
     line: String,
+    way: Way,
     /// Where the controller's parser stands after the line, in its coordinates.
     parsed_mm: [f64; 3],
     sent: Duration,
@@ -23,30 +33,38 @@ impl ActiveMove {
     /// A move that starts now from `base_mm`, in the controller's coordinates. The target is rounded to the three decimals
     /// that are sent. `None` if no axis moves.
     ///
-    /// The line has the axes that move, as increments, and nothing else: see `docs/decisions/0020-a-damaged-byte.md`.
+    /// By increments, the line has the axes that move, and nothing else: see `docs/decisions/0020-a-damaged-byte.md`.
     pub(super) fn new(
         now: Duration,
         config: &Config,
-        base_mm: [f64; 3],
-        target_mm: [f64; 3],
+        (base_mm, target_mm): ([f64; 3], [f64; 3]),
         speed_mm_per_s: f64,
+        way: Way,
     ) -> Option<Self> {
         let machine_mm = config.to_machine(target_mm).map(round_to_um);
-        let (mut line, mut parsed_mm) = (String::new(), base_mm);
+        let (mut words, mut parsed_mm) = (String::new(), base_mm);
+        let mut moves = false;
         for name in AxisName::ALL {
             let way_mm = round_to_um(name.of(machine_mm) - name.of(base_mm));
-            if way_mm != 0.0 {
-                line.push_str(name.of(["X", "Y", "Z"]));
-                line.push_str(&short(way_mm));
+            moves |= way_mm != 0.0;
+            if way_mm != 0.0 || way == Way::Absolute {
+                let number = match way {
+                    Way::Absolute => name.of(machine_mm),
+                    Way::Increments => way_mm,
+                };
+                words.push_str(name.of(["X", "Y", "Z"]));
+                words.push_str(&short(number));
                 name.set(&mut parsed_mm, name.of(base_mm) + way_mm);
             }
         }
+        let machine_frame = if way == Way::Absolute { "G53" } else { "" };
         let (from_mm, target_mm) = (config.to_stage(base_mm), config.to_stage(parsed_mm));
         let expected_s = distance_mm(from_mm, target_mm) / speed_mm_per_s;
-        (!line.is_empty()).then(|| Self {
+        moves.then(|| Self {
             arrival: ArrivalCheck::new(now, target_mm, expected_s),
             course: Course::new(now, from_mm, target_mm, speed_mm_per_s, Shape::Line),
-            line,
+            line: format!("{machine_frame}{words}"),
+            way,
             parsed_mm,
             sent: now,
             accepted: None,
@@ -56,6 +74,11 @@ impl ActiveMove {
     /// The line to send, without its end.
     pub(super) fn line(&self) -> &str {
         &self.line
+    }
+
+    /// True if its arrival shows that reports have no offset.
+    pub(super) fn is_absolute(&self) -> bool {
+        self.way == Way::Absolute
     }
 
     pub(super) fn arrival(&self) -> &ArrivalCheck {

@@ -12,6 +12,7 @@ use phase::{Phase, Purpose, Wanted};
 use super::feed::Feed;
 use super::poll::StatusPoll;
 use super::settings::Settings;
+use super::work_frame::WorkFrame;
 use super::{Config, ConfigError, FEED_HOLD, MachineState, Response, SOFT_RESET, alarm_meaning};
 use crate::lines::Lines;
 use crate::stage::{self, Alarm, Cause, Failure, Session as _};
@@ -33,7 +34,8 @@ const SPEED_MIN_MM_PER_S: f64 = 0.001 / 60.0;
 const SAME_PLACE_MM: f64 = 0.0005;
 
 /// The host's side of one connection to a controller; see [`stage::Session`]. The controller's coordinates are those of its
-/// work frame, which is the machine frame unless an offset is set.
+/// machine frame. A controller with another work frame (`G54`, `G92`) is refused, because nobody would know which of both the
+/// rig file means.
 ///
 /// The position counts as known from a successful homing until an alarm, a reset by others, or a stop that had to reset
 /// the controller in motion.
@@ -52,11 +54,13 @@ pub struct Session {
     /// As last reported since the last reset.
     state: Option<MachineState>,
     position_mm: [f64; 3],
-    work_offset_mm: Option<[f64; 3]>,
+    work_frame: WorkFrame,
     /// The feed that the controller has confirmed, with the modes of a move. A reset forgets both.
     feed: Option<Feed>,
     /// Where the controller's parser stands after the last move, in its coordinates.
     parsed_mm: Option<[f64; 3]>,
+    /// A move to absolute coordinates has arrived since homing, so that reports are known to have no offset.
+    is_proved: bool,
     /// Position of the last report, if it said that the stage stands.
     stood_mm: Option<[f64; 3]>,
     /// The last two reports agree on where it stands.
@@ -83,9 +87,10 @@ impl Session {
             settings: Settings::default(),
             state: None,
             position_mm: [0.0; 3],
-            work_offset_mm: None,
+            work_frame: WorkFrame::default(),
             feed: None,
             parsed_mm: None,
+            is_proved: false,
             stood_mm: None,
             is_steady: false,
             unknown_lines: 0,
@@ -160,6 +165,7 @@ impl stage::Session for Session {
             return self.finish(now);
         }
         self.homed = false;
+        self.is_proved = false;
         self.forget_modes();
         // `?` is not answered during homing.
         self.poll.reset();

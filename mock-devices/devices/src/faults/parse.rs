@@ -8,11 +8,11 @@ use super::{
     WireFault,
 };
 
-const SENSOR_FAULTS: &str = "burst N, clear, clock-jump DURATION, clock-wrap, disconnect DURATION, drip DURATION, drop BYTES, \
+const SENSOR_FAULTS: &str = "burst N, clear, clock-drift PPM, clock-jump DURATION, clock-wrap, disconnect DURATION, drip DURATION, drop BYTES, \
      drop-frames N, duplicate, flip-bits N, freeze DURATION, garbage BYTES, renumber, reorder, saturate ELEMENT, \
      stall DURATION, stuck ELEMENT, truncate, wrong-checksum, wrong-count N, zeros COUNTS";
 const STAGE_FAULTS: &str = "alarm N, clear, disconnect DURATION, echo-garbage, homing-fails, ignore-moves, lie MM, \
-     lost-steps MM, never-idle, refuse [ERROR], renumber, reset, stall DURATION";
+     lost-steps MM, never-idle, refuse [ERROR], renumber, reset, stall DURATION, work-offset MM";
 const WIRE_FAULTS: &str = "double BYTES, drip DURATION, drop BYTES, flip-bits N, garbage BYTES, hold DURATION, lose DURATION, \
      reorder, repeat, truncate";
 const RIG_FAULTS: &str = "covering MM, stiffness FACTOR, surface MM";
@@ -94,6 +94,7 @@ fn sensor(arguments: &mut Arguments<'_>) -> Result<SensorFault, FaultError> {
     Ok(match arguments.fault {
         "clock-jump" => SensorFault::ClockJump { ms: arguments.signed_ms()? },
         "clock-wrap" => SensorFault::ClockWrap,
+        "clock-drift" => SensorFault::ClockDrift { ppm: arguments.drift()? },
         "stuck" => SensorFault::Stuck(arguments.count()?),
         "saturate" => SensorFault::Saturate(arguments.count()?),
         "freeze" => SensorFault::Freeze(arguments.duration()?),
@@ -159,6 +160,7 @@ fn controller(arguments: &mut Arguments<'_>) -> Result<ControllerFault, FaultErr
             ControllerFault::LostSteps { lost_mm: arguments.positive("a positive length in mm")? }
         }
         "homing-fails" => ControllerFault::HomingFails,
+        "work-offset" => ControllerFault::WorkOffset { mm: arguments.number("a length in mm")? },
         _ => return Err(arguments.unknown("stage", STAGE_FAULTS)),
     })
 }
@@ -192,6 +194,12 @@ impl Arguments<'_> {
         self.argument("a duration such as 2s or -500ms", |word| {
             let ms = milliseconds(word)?;
             (-MAX_MS..=MAX_MS).contains(&ms).then_some(ms as i64)
+        })
+    }
+
+    fn drift(&mut self) -> Result<i16, FaultError> {
+        self.argument("a number from -1000 to 1000", |word| {
+            word.parse().ok().filter(|ppm| (-1000..=1000).contains(ppm))
         })
     }
 

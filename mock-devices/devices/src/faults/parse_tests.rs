@@ -11,6 +11,7 @@ fn every_fault_has_its_line() {
     for (line, fault) in [
         ("sensor clock-jump -500ms", S::ClockJump { ms: -500 }),
         ("sensor clock-wrap", S::ClockWrap),
+        ("sensor clock-drift -50", S::ClockDrift { ppm: -50 }),
         ("sensor stuck 7", S::Stuck(7)),
         ("sensor saturate 7", S::Saturate(7)),
         ("  sensor   clear ", S::Clear),
@@ -49,6 +50,7 @@ fn every_fault_has_its_line() {
         ("stage ignore-moves", C::IgnoreMoves),
         ("stage reset", C::Reset),
         ("stage lost-steps 0.05", C::LostSteps { lost_mm: 0.05 }),
+        ("stage work-offset -2", C::WorkOffset { mm: -2.0 }),
         ("stage homing-fails", C::HomingFails),
     ] {
         assert_eq!(parse(line), Ok(InjectedFault::Stage(T::Controller(fault))), "{line}");

@@ -1,8 +1,8 @@
 //! A controller that speaks `grbl`: its states, what time does to them, and its real-time commands.
 //!
 //! It reproduces the observed behaviour of Grbl 1.1, as far as a stage needs it: straight moves, jogs, hold and resume,
-//! reset, homing, limits, alarms, settings. Each move begins and ends at rest. Machine and work coordinates are the same;
-//! the rig file gives their directions in the robot frame. `$I` and a message after the banner say that it is simulated.
+//! reset, homing, limits, alarms, settings. Each move begins and ends at rest. Machine and work coordinates are the
+//! same, unless the fault `work-offset` sets them apart; the rig file gives their directions in the robot frame. `$I` and a message after the banner say that it is simulated.
 
 mod gcode;
 mod input;
@@ -96,6 +96,8 @@ struct Modal {
 #[derive(Debug, Default)]
 struct Defects {
     lie_z_mm: f64,
+    /// Origin of the work frame, in the machine frame.
+    work_offset_mm: Point,
     is_never_idle: bool,
     ignores_moves: bool,
     refuses_next: Option<u8>,
@@ -175,6 +177,10 @@ impl Controller for GrblController {
         match fault {
             ControllerFault::Alarm(code) => self.alarm(code, now),
             ControllerFault::Lie { z_mm } => self.defects.lie_z_mm = z_mm,
+            ControllerFault::WorkOffset { mm } => {
+                let axis = self.frame.axes[2].machine;
+                axis.set(&mut self.defects.work_offset_mm, mm);
+            }
             ControllerFault::NeverIdle => self.defects.is_never_idle = true,
             ControllerFault::Refuse(code) => self.defects.refuses_next = Some(code),
             ControllerFault::IgnoreMoves => self.defects.ignores_moves = true,
@@ -357,7 +363,8 @@ impl GrblController {
                 Mode::Homing { .. } => "Home",
                 Mode::Alarm { .. } => "Alarm",
             },
-            position_mm: self.frame.to_machine([x, y, z + self.defects.lie_z_mm]),
+            machine_mm: self.frame.to_machine([x, y, z + self.defects.lie_z_mm]),
+            work_offset_mm: self.defects.work_offset_mm,
             is_machine_position: self.settings.reports_machine_position(),
             buffers: self
                 .settings

@@ -235,6 +235,7 @@ impl Controller for ZaberController {
                     axis.lose_steps(&mut world, lost_mm);
                 }
             }
+            ControllerFault::WorkOffset { .. } => {}
             ControllerFault::HomingFails => self.fail_homing(true),
             ControllerFault::Reset => self.power_up(now),
         }

@@ -24,6 +24,11 @@ axes.y = { device = 1, axis = 2, um_per_microstep = 0.047625 }
 axes.z = { device = 2, axis = 1, um_per_microstep = 0.047625 }
 ";
 
+/// The travel of a large stage, and that of one whose homing is short: it is made anew for each damage, and Zaber's is watched as
+/// fast as the answers come.
+const LARGE: &str = "travel_mm = [[0.0, 60.0], [0.0, 50.0], [-6.0, 30.0]]";
+const SMALL: &str = "travel_mm = [[19.5, 20.5], [14.5, 15.5], [-1.0, 1.0]]";
+
 const TOLERANCE_MM: f64 = 0.005;
 
 /// Where the press is.
@@ -92,8 +97,10 @@ struct Lab<S> {
 }
 
 impl<S: Session> Lab<S> {
-    fn new(lines: &str, begin: impl Fn(&StageProtocol) -> S) -> Self {
-        let rig = Rig::from_toml(&SIM.replace("protocol = \"grbl\"\n", lines)).unwrap();
+    fn new(lines: &str, travel: &str, begin: impl Fn(&StageProtocol) -> S) -> Self {
+        assert!(SIM.contains(LARGE));
+        let toml = SIM.replace("protocol = \"grbl\"\n", lines).replace(LARGE, travel);
+        let rig = Rig::from_toml(&toml).unwrap();
         let protocol = rig.service.as_ref().unwrap().stage.protocol.clone();
         let now = Instant::now();
         let codec = SensorCodec::default();
@@ -249,14 +256,14 @@ fn every_damage<S: Session>(
 }
 
 fn grbl_lab() -> Lab<grbl::Session> {
-    Lab::new("protocol = \"grbl\"\n", |protocol| {
+    Lab::new("protocol = \"grbl\"\n", LARGE, |protocol| {
         let StageProtocol::Grbl(axes) = protocol else { unreachable!("the rig's stage is grbl") };
         grbl::Session::new(grbl_config(axes, TOLERANCE_MM)).unwrap()
     })
 }
 
 fn zaber_lab() -> Lab<zaber::Session> {
-    Lab::new(ZABER, |protocol| {
+    Lab::new(ZABER, SMALL, |protocol| {
         let StageProtocol::Zaber(axes) = protocol else { unreachable!("the rig's stage is zaber") };
         zaber::Session::new(zaber_config(axes, TOLERANCE_MM)).unwrap()
     })

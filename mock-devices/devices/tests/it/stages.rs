@@ -213,6 +213,67 @@ async fn a_stage_that_lies_is_not_there() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_stage_that_lied_before_it_was_homed_is_noticed_by_its_first_move() {
+    for lie_mm in [0.3, -0.3] {
+        // Zaber's moves are absolute.
+        for lines in STAGES {
+            let lab = ConnectedRig::new(lines);
+            lab.until(StageStatus::Unhomed).await;
+            lab.inject(&format!("stage lie {lie_mm}"));
+            lab.stage.home(homing()).await.unwrap();
+            let result = lab.go([20.0, 15.0, 25.0]).await;
+            let noticed = matches!(result, Err(StageError::NotThere { .. } | StageError::Astray { .. }));
+            assert!(noticed, "{lines}: {result:?}");
+            assert!(lab.go([20.0, 15.0, 5.0]).await.is_err(), "{lines}: it goes down");
+            assert!(lab.control.tip_mm()[2] > 5.0 - 0.002, "{lines}: {:?}", lab.control.tip_mm());
+        }
+    }
+}
+
+/// Somebody has set the work frame of a grbl controller: of the z that counts upwards, or downwards.
+fn with_work_frames() -> impl Iterator<Item = (&'static str, f64)> {
+    STAGES.into_iter().filter(|lines| lines.contains("grbl")).flat_map(|lines| [(lines, 2.0), (lines, -2.0)])
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_controller_with_another_work_frame_is_refused() {
+    for (lines, offset_mm) in with_work_frames() {
+        let lab = ConnectedRig::new(lines);
+        lab.inject(&format!("stage work-offset {offset_mm}"));
+        let mut connection = lab.stage.connection();
+        let lost = connection.wait_for(|now| matches!(now, Connection::Seeking(Some(_)))).await.unwrap();
+        let Connection::Seeking(Some(error)) = lost.clone() else { panic!() };
+        drop(lost);
+        assert_eq!(error.kind, ErrorKind::DeviceFault);
+        assert!(error.what.contains("work frame is offset by") && error.what.contains("2.000"), "{error}");
+        assert!(lab.stage.home(homing()).await.is_err());
+        lab.inject("stage clear");
+        lab.until(StageStatus::Unhomed).await;
+        lab.stage.home(homing()).await.unwrap();
+        near(lab.go(START_MM).await.unwrap(), START_MM);
+        near(lab.control.tip_mm(), START_MM);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_work_frame_that_is_set_later_moves_nothing_elsewhere_and_refuses_the_next_homing() {
+    for (lines, offset_mm) in with_work_frames() {
+        let lab = ConnectedRig::homed(lines).await;
+        lab.inject(&format!("stage work-offset {offset_mm}"));
+        for position_mm in [[20.0, 15.0, 0.3], [20.0, 15.0, -0.1], [20.0, 15.0, 2.0], [22.0, 15.0, 2.0]] {
+            near(lab.go(position_mm).await.unwrap(), position_mm);
+            near(lab.control.tip_mm(), position_mm);
+        }
+        assert!(lab.control.deepest_mm() < 0.102, "{}", lab.control.deepest_mm());
+        // A while later a report has told it.
+        sleep(Duration::from_secs(2)).await;
+        let refused = lab.stage.home(homing()).await.unwrap_err();
+        assert!(refused.to_string().contains("work frame is offset by"), "{refused}");
+        assert!(lab.go(START_MM).await.is_err());
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_stage_that_is_off_its_way_is_stopped_at_once() {
     for lines in STAGES {
         let lab = ConnectedRig::homed(lines).await;

@@ -148,7 +148,7 @@ impl State {
                 );
             }
             _ if self.locked => return "error:9\r\n".to_owned(),
-            _ if line.starts_with('G') => {
+            _ if line.starts_with("G91") => {
                 let feed = line.split_once('F').and_then(|(_, feed)| feed.parse().ok());
                 self.feed_mm_per_min = feed.unwrap();
             }
@@ -159,14 +159,16 @@ impl State {
 
     fn set_out(&mut self, line: &str) -> String {
         let word = |letter| {
-            let Some((_, rest)) = line.split_once(letter) else { return 0.0 };
+            let (_, rest) = line.split_once(letter)?;
             let end = rest.find(|c: char| c.is_ascii_uppercase()).unwrap_or(rest.len());
-            rest[..end].parse::<f64>().unwrap()
+            Some(rest[..end].parse::<f64>().unwrap())
         };
+        let is_absolute = line.starts_with("G53");
         self.from_mm = self.position_mm();
         self.to_mm = self.from_mm;
         for (place, letter) in self.to_mm.iter_mut().zip(['X', 'Y', 'Z']) {
-            *place += word(letter);
+            let from = if is_absolute { 0.0 } else { *place };
+            *place = word(letter).map_or(*place, |number| from + number);
         }
         self.set_out = Instant::now();
         match self.fault {

@@ -21,14 +21,28 @@ pub enum SessionError {
          controller's setting by its own tools; nothing was changed"
     )]
     Setting { number: u16, found: String, needed: String },
+    /// Somebody has left an offset of the work frame.
+    #[error(
+        "the controller's work frame is offset by {} mm (G54, G92), and it is not known which frame the rig file means: clear \
+         the offset (G10 L2 P1 X0 Y0 Z0, G92.1), and give the rig file's origins in machine coordinates; nothing was changed",
+        texts.join(" ")
+    )]
+    WorkFrame {
+        /// x, y and z of the controller, in mm, with three decimals.
+        texts: [String; 3],
+    },
 }
 
 impl SessionError {
+    pub(super) fn of_work_frame(offset_mm: [f64; 3]) -> Self {
+        Self::WorkFrame { texts: offset_mm.map(|mm| format!("{mm:.3}")) }
+    }
+
     pub(super) fn cause(&self) -> Cause {
         match self {
             Self::NoBanner { .. } | Self::Silent { .. } => Cause::Silent,
             Self::Refused { .. } => Cause::Protocol,
-            Self::Setting { .. } => Cause::Mismatch,
+            Self::Setting { .. } | Self::WorkFrame { .. } => Cause::Mismatch,
         }
     }
 }

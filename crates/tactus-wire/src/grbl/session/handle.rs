@@ -5,7 +5,7 @@ use core::time::Duration;
 use super::phase::{Phase, Purpose, Query, Wanted};
 use super::{Action, Failure, SAME_PLACE_MM, Session, SessionError, alarm};
 use crate::grbl::active_move::ActiveMove;
-use crate::grbl::{FEED_HOLD, MachineState, Position, Response, StatusReport, error_meaning};
+use crate::grbl::{FEED_HOLD, MachineState, Response, StatusReport, error_meaning};
 use crate::stage::{Controller, Judgement, distance_mm};
 
 /// Longest time for `$X`.
@@ -93,6 +93,9 @@ impl Session {
         if let Err(error) = self.settings.check(&self.config) {
             return self.fail(error);
         }
+        if let Some(offset_mm) = self.work_frame.foreign_mm() {
+            return self.fail(SessionError::of_work_frame(offset_mm));
+        }
         self.phase = Phase::Ready;
         let (identity, settings) = (self.identity.clone(), self.settings.list());
         self.actions.push(Action::Connected(Controller { identity, settings }));
@@ -166,6 +169,7 @@ impl Session {
     fn handle_banner(&mut self, now: Duration, banner: &str) {
         self.poll.reset();
         self.forget_modes();
+        self.work_frame.forget();
         self.state = None;
         banner.clone_into(&mut self.identity);
         let failure = match core::mem::replace(&mut self.phase, Phase::Ready) {
@@ -200,7 +204,7 @@ impl Session {
     fn handle_report(&mut self, now: Duration, report: &StatusReport) {
         let asked = self.poll.answered(now);
         self.state = Some(report.state);
-        let offset_moved = self.take_position(report);
+        self.position_mm = self.config.to_stage(self.work_frame.take(report));
         if asked.is_some() {
             self.take_stand();
         }
@@ -210,16 +214,8 @@ impl Session {
             // The alarm's own line was lost.
             return self.handle_alarm(0);
         }
-        if offset_moved {
-            self.homed = false;
-            self.forget_modes();
-        }
         let asked_since = |since: Duration| asked.is_some_and(|asked| asked >= since);
         match self.phase.clone() {
-            Phase::Moving(_) if offset_moved => {
-                self.report();
-                self.hold(now, Some(Failure::Unhomed));
-            }
             Phase::Moving(travel) => self.judge(now, asked, travel),
             Phase::Homing { accepted: Some(accepted), .. } if asked_since(accepted) => self.conclude_homing(),
             Phase::Holding { failure, since } if asked_since(since) => self.conclude_hold(now, failure),
@@ -234,21 +230,6 @@ impl Session {
             | Phase::Ready
             | Phase::Over => self.report(),
         }
-    }
-
-    /// Takes the position. True if the work frame has moved since an earlier report.
-    fn take_position(&mut self, report: &StatusReport) -> bool {
-        let before = self.work_offset_mm;
-        self.work_offset_mm = report.work_offset_mm.or(before);
-        let offset_mm = self.work_offset_mm.unwrap_or_default();
-        self.position_mm = self.config.to_stage(match report.position {
-            Position::Work(mm) => mm,
-            Position::Machine([x, y, z]) => {
-                let [offset_x, offset_y, offset_z] = offset_mm;
-                [x - offset_x, y - offset_y, z - offset_z]
-            }
-        });
-        before.is_some_and(|before| distance_mm(before, offset_mm) > SAME_PLACE_MM)
     }
 
     /// Notes whether this report and the last one agree on where the stage stands.
@@ -274,6 +255,7 @@ impl Session {
             }
             Judgement::Done => {
                 self.parsed_mm = Some(travel.parsed_mm());
+                self.is_proved |= travel.is_absolute();
                 self.phase = Phase::Ready;
                 self.report();
                 self.done(Ok(position_mm));
@@ -289,15 +271,17 @@ impl Session {
     fn conclude_homing(&mut self) {
         match self.state {
             // An `ok` may be a copy of an earlier one, and the stage not have set out. A second report comes only after homing.
-            Some(MachineState::Idle) if !self.is_steady => {
+            Some(MachineState::Idle) if !self.is_steady || self.work_frame.is_unknown() => {
                 self.poll.at_once();
                 self.report();
             }
             Some(MachineState::Idle) => {
-                self.homed = true;
                 self.phase = Phase::Ready;
+                let offset = self.work_frame.foreign_mm().map(SessionError::of_work_frame);
+                self.homed = offset.is_none();
                 self.report();
-                self.done(Ok(self.position_mm));
+                let refused = |error: SessionError| Err(Failure::refused("$H", &error.to_string()));
+                self.done(offset.map_or(Ok(self.position_mm), refused));
             }
             Some(MachineState::Alarm) => self.handle_alarm(0),
             _ => self.report(),

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use super::phase::{Phase, Preparation, Purpose, Query, Wanted};
 use super::{Action, Failure, Session, SessionError, alarm};
-use crate::grbl::active_move::ActiveMove;
+use crate::grbl::active_move::{ActiveMove, Way};
 use crate::grbl::feed::Feed;
 use crate::grbl::{FEED_HOLD, MachineState, SOFT_RESET, STATUS_QUERY};
 use crate::stage::{Report, Status, distance_mm};
@@ -110,7 +110,9 @@ impl Session {
         let Some(base_mm) = self.base_mm() else {
             return self.begin_look(now, Wanted::Move { target_mm, speed_mm_per_s });
         };
-        let Some(travel) = ActiveMove::new(now, &self.config, base_mm, target_mm, speed_mm_per_s) else {
+        let way = if self.is_proved { Way::Increments } else { Way::Absolute };
+        let Some(travel) = ActiveMove::new(now, &self.config, (base_mm, target_mm), speed_mm_per_s, way)
+        else {
             return self.begin_look(now, Wanted::At(target_mm));
         };
         let feed = Feed::of(speed_mm_per_s);
@@ -224,6 +226,9 @@ impl Session {
                 self.fail(SessionError::Silent { query: query.line() });
             }
             Phase::Asking { query, tries, .. } => self.ask(now, query, tries + 1),
+            Phase::Homing { accepted: Some(_), .. } if self.work_frame.is_unknown() => {
+                self.fail(SessionError::Silent { query: "in which frame its positions are (WCO)" });
+            }
             Phase::Homing { .. } => self.fail(SessionError::Silent { query: "that it is homed" }),
             Phase::Unlocking { .. } => self.fail(SessionError::Silent { query: "to $X" }),
             Phase::Holding { failure, .. } => self.reset(now, Purpose::Stop { failure, held_mm: None }, 1),

@@ -87,7 +87,7 @@ fn a_soft_limit_is_an_alarm_too() {
         950 > $G
         950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         950 < ok
-        950 > X899
+        950 > G53X900Y1Z5
         960 < ALARM:2
         960 = Alarm 2 1.000 1.000 5.000
         960 = alarm 2",
@@ -174,7 +174,7 @@ fn the_error_of_boot_is_no_answer_to_a_move() {
         950 > $G
         950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         950 < ok
-        950 > X1
+        950 > G53X2Y1Z5
         955 < error:7
         960 < Grbl 1.1h ['$' for help]
         960 = suspect: the controller was reset: Grbl 1.1h ['$' for help]
@@ -194,7 +194,7 @@ fn a_locked_controller_refuses_moves_until_it_is_reset_and_unlocked() {
         950 > $G
         950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         950 < ok
-        950 > X1
+        950 > G53X2Y1Z5
         955 < error:9
         955 > !
         955 > ?

@@ -104,7 +104,7 @@ impl Play {
                 let actions = command(&mut self.session, self.now, text);
                 let moves = actions
                     .iter()
-                    .any(|a| matches!(a, Action::Move(b) if matches!(b[..], [b'X'..=b'Z', ..])));
+                    .any(|a| matches!(a, Action::Move(b) if matches!(b[..], [b'X'..=b'Z', ..] | [b'G', b'5', b'3', ..])));
                 assert!(!moves || self.known, "a move on a stage that is not homed");
                 actions
             }

@@ -112,31 +112,86 @@ fn noise_and_echoes_are_counted_and_passed_over() {
 }
 
 #[test]
-fn positions_are_in_the_work_frame_once_it_is_told() {
+fn positions_are_those_of_the_machine_frame_in_either_frame() {
     homed(
         "1000 > ?
         1010 < <Idle|MPos:1.000,1.000,5.000|FS:0,0|WCO:0.000,0.000,0.000>
         1010 = Idle 1.000 1.000 5.000
         1100 > ?
         1110 < <Idle|MPos:1.000,1.000,5.000|FS:0,0|WCO:0.000,0.000,-2.000>
-        1110 = Unhomed 1.000 1.000 7.000",
+        1110 = Idle 1.000 1.000 5.000
+        1200 > ?
+        1210 < <Idle|WPos:1.000,1.000,7.000|FS:0,0>
+        1210 = Idle 1.000 1.000 5.000",
     );
 }
 
 #[test]
-fn a_work_frame_that_moves_under_a_move_stops_it() {
-    moving(
-        "1010 < <Run|MPos:2.000,1.000,5.000|FS:0,0|WCO:0.000,0.000,-2.000>
-        1010 = Moving 2.000 1.000 7.000
-        1010 > !
-        1010 > ?
-        1020 < <Hold:0|MPos:2.100,1.000,5.000|FS:0,0>
-        1020 = Hold 2.100 1.000 7.000
-        1020 > ^X
-        1030 < Grbl 1.1h ['$' for help]
-        1030 > ?
-        1040 < <Idle|MPos:2.100,1.000,5.000|FS:0,0>
-        1040 = Unhomed 2.100 1.000 7.000
-        1040 = unhomed",
+fn a_controller_with_another_work_frame_is_refused_before_anything_moves() {
+    check(
+        "0 * start
+        150 < Grbl 1.1h ['$' for help]
+        150 > ?
+        180 < <Alarm|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,-2.000>
+        180 > $I
+        180 < ok
+        180 > $$
+        180 < $20=1
+        180 < $22=1
+        180 < $23=3
+        180 < ok
+        180 = failed: the controller's work frame is offset by 0.000 0.000 -2.000 mm (G54, G92), and it is not known which frame \
+         the rig file means: clear the offset (G10 L2 P1 X0 Y0 Z0, G92.1), and give the rig file's origins in machine coordinates; \
+         nothing was changed",
+    );
+}
+
+#[test]
+fn homing_is_not_concluded_with_another_work_frame_or_with_one_that_is_not_known() {
+    homed(
+        "950 * home
+        950 > $H
+        950 = Homing 1.000 1.000 5.000
+        1300 < ok
+        1300 > ?
+        1310 < <Idle|MPos:1.000,1.000,5.000|FS:0,0|WCO:0.000,0.000,-2.000>
+        1310 = Homing 1.000 1.000 5.000
+        1310 > ?
+        1320 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
+        1320 = Unhomed 1.000 1.000 5.000
+        1320 = refused the controller's work frame is offset by 0.000 0.000 -2.000 mm (G54, G92), and it is not known which frame \
+         the rig file means: clear the offset (G10 L2 P1 X0 Y0 Z0, G92.1), and give the rig file's origins in machine coordinates; \
+         nothing was changed
+        1330 * move 1 1 4 at 1
+        1330 = unhomed",
+    );
+    check(
+        "0 * start
+        150 < Grbl 1.1h ['$' for help]
+        150 > ?
+        180 < <Alarm|WPos:0.000,0.000,0.000|FS:0,0>
+        180 > $I
+        180 < ok
+        180 > $$
+        180 < $20=1
+        180 < $22=1
+        180 < $23=3
+        180 < ok
+        180 = connected Grbl 1.1h ['$' for help]
+        180 = Unhomed 0.000 0.000 0.000
+        190 * home
+        190 > $H
+        190 = Homing 0.000 0.000 0.000
+        200 < ok
+        200 > ?
+        210 < <Idle|WPos:1.000,1.000,5.000|FS:0,0>
+        210 = Homing 1.000 1.000 5.000
+        210 > ?
+        220 < <Idle|WPos:1.000,1.000,5.000|FS:0,0>
+        220 = Homing 1.000 1.000 5.000
+        220 > ?
+        230 < <Idle|WPos:1.000,1.000,5.000|FS:0,0|WCO:0.000,0.000,0.000>
+        230 = Idle 1.000 1.000 5.000
+        230 = done 1.000 1.000 5.000",
     );
 }

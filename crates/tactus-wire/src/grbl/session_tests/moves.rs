@@ -29,7 +29,7 @@ fn a_report_asked_for_before_the_ok_proves_nothing() {
         1005 > $G
         1005 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F60 S0]
         1005 < ok
-        1005 > X.004
+        1005 > G53X1.004Y1Z5
         1010 < ok
         1030 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
         1030 = Idle 1.000 1.000 5.000
@@ -50,7 +50,7 @@ fn a_late_report_is_not_taken_for_the_answer_to_the_later_question() {
         1100 > $G
         1100 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F60 S0]
         1100 < ok
-        1100 > X.004
+        1100 > G53X1.004Y1Z5
         1100 > ?
         1110 < ok
         1200 > ?
@@ -75,7 +75,7 @@ fn idle_right_after_the_ok_is_not_yet_the_end() {
         950 > $G
         950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         950 < ok
-        950 > X1
+        950 > G53X2Y1Z5
         955 < ok
         955 > ?
         960 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
@@ -182,7 +182,7 @@ fn the_copy_of_an_ok_starts_nothing_and_ends_nothing() {
         952 < ok
         960 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F60 S0]
         960 < ok
-        960 > Z-.1
+        960 > G53X1Y1Z4.9
         961 < ok
         961 > ?
         966 < <Idle|MPos:1.000,1.000,5.000|FS:0,0>
@@ -330,7 +330,7 @@ fn a_refused_move_is_told_in_words() {
         950 > $G
         950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         950 < ok
-        950 > X1
+        950 > G53X2Y1Z5
         960 < error:9
         960 > !
         960 > ?
@@ -360,7 +360,7 @@ fn commands_that_cannot_be_done_are_refused_before_anything_is_sent() {
         953 > $G
         953 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         953 < ok
-        953 > X1
+        953 > G53X2Y1Z5
         954 * home
         954 = refused another command is under way",
     );
@@ -383,7 +383,48 @@ fn a_move_to_where_the_stage_stands_becomes_a_look() {
         961 > $G
         961 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F30 S0]
         961 < ok
-        961 > Z-.001",
+        961 > G53X1Y1Z4.999",
+    );
+}
+
+#[test]
+fn the_first_move_after_homing_is_absolute_until_one_has_arrived() {
+    // It goes up instead of down: where the reports say that it stands, it does not.
+    homed(
+        "920 * move 1 1 4 at 10
+        920 > G91G21G94G1F600
+        921 < ok
+        921 > $G
+        922 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        922 < ok
+        922 > G53X1Y1Z4
+        923 < ok
+        923 > ?
+        930 < <Run|MPos:1.000,1.000,5.010|FS:600,0>
+        930 = Moving 1.000 1.000 5.010
+        943 > ?
+        950 < <Run|MPos:1.000,1.000,5.200|FS:600,0>
+        950 = Moving 1.000 1.000 5.200
+        950 > !
+        950 > ?
+        960 < <Hold:0|MPos:1.000,1.000,5.200|FS:0,0>
+        960 = Hold 1.000 1.000 5.200
+        960 > ^X
+        970 < Grbl 1.1h ['$' for help]
+        970 > ?
+        980 < <Idle|MPos:1.000,1.000,5.200|FS:0,0>
+        980 = Idle 1.000 1.000 5.200
+        980 = astray at 1.000 1.000 5.200 on the way to 1.000 1.000 4.000
+        990 * move 1 1 4 at 10
+        990 > ?
+        995 < <Idle|MPos:1.000,1.000,5.200|FS:0,0>
+        995 = Idle 1.000 1.000 5.200
+        995 > G91G21G94G1F600
+        996 < ok
+        996 > $G
+        997 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
+        997 < ok
+        997 > G53X1Y1Z4",
     );
 }
 
@@ -396,7 +437,7 @@ fn a_target_is_rounded_to_the_three_decimals_that_the_controller_knows() {
         950 > $G
         950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         950 < ok
-        950 > X.5Z-5
+        950 > G53X1.5Y1Z0
         955 < ok
         955 > ?",
     );
@@ -412,7 +453,7 @@ fn a_probing_that_someone_else_made_is_passed_over() {
         960 > $G
         960 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         960 < ok
-        960 > Z1",
+        960 > G53X1Y1Z6",
     );
     assert_eq!(session.unknown_lines(), 0);
 }

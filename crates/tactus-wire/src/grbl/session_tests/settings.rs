@@ -140,7 +140,7 @@ fn positions_and_moves_are_in_the_stages_frame() {
             951 > $G
             952 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F60000 S0]
             952 < ok
-            952 > X1Y10Z-33.5
+            952 > G53X2Y11Z-28.5
             955 < ok
             955 > ?
             965 < <Run|MPos:1.250,3.500,-3.375|FS:60000,0>

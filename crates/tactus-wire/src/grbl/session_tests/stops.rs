@@ -30,7 +30,7 @@ fn stop_holds_then_flushes_at_a_stand_and_keeps_the_position() {
         1116 > $G
         1117 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         1117 < ok
-        1117 > Z1",
+        1117 > G53X1.52Y1Z6",
     );
 }
 
@@ -109,7 +109,7 @@ fn a_line_that_waits_in_the_controller_is_flushed_by_a_stop() {
         950 > $G
         950 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         950 < ok
-        950 > X1
+        950 > G53X2Y1Z5
         951 * stop
         951 > !
         951 > ?
@@ -185,7 +185,7 @@ fn stop_while_standing_leaves_the_stage_ready() {
         996 > $G
         997 < [GC:G1 G54 G17 G21 G91 G94 M5 M9 T0 F600 S0]
         997 < ok
-        997 > Z1",
+        997 > G53X1Y1Z6",
     );
 }
 

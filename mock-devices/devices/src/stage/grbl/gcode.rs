@@ -7,6 +7,8 @@ pub(super) struct Block {
     pub(super) motion: Option<MotionMode>,
     /// G90 (false) or G91 (true) in this line.
     pub(super) relative: Option<bool>,
+    /// G53: the axes are absolute machine coordinates.
+    pub(super) machine: bool,
     /// F in this line, mm/min.
     pub(super) feed_mm_per_min: Option<f64>,
     /// X, Y, Z in this line, mm.
@@ -98,8 +100,12 @@ impl Block {
             }
             900 => once(&mut self.relative, false, GrblError::MODAL_GROUP),
             910 => once(&mut self.relative, true, GrblError::MODAL_GROUP),
-            // XY plane, mm, machine coordinates, first work coordinates, mm per minute: the defaults.
-            170 | 210 | 530 | 540 | 940 => Ok(()),
+            530 => {
+                self.machine = true;
+                Ok(())
+            }
+            // XY plane, mm, first work coordinates, mm per minute: the defaults.
+            170 | 210 | 540 | 940 => Ok(()),
             _ => Err(GrblError::UNSUPPORTED),
         }
     }

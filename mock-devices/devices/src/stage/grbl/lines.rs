@@ -73,7 +73,7 @@ impl GrblController {
         }
         match statement {
             "" => return Ok(LineReply::Text(report::HELP.to_owned())),
-            "#" => return Ok(LineReply::Text(report::OFFSETS.to_owned())),
+            "#" => return Ok(LineReply::Text(report::offsets(self.defects.work_offset_mm))),
             "G" => return Ok(LineReply::Text(self.modal.line())),
             _ => {}
         }
@@ -162,8 +162,9 @@ impl GrblController {
     fn target(&self, block: &Block, relative: bool) -> Point {
         let from_mm = self.frame.to_machine(self.world.lock().motion.destination_mm());
         self.frame.to_stage(std::array::from_fn(|axis| match block.axes_mm[axis] {
+            Some(place_mm) if block.machine => place_mm,
             Some(way_mm) if relative => from_mm[axis] + way_mm,
-            Some(place_mm) => place_mm,
+            Some(place_mm) => place_mm + self.defects.work_offset_mm[axis],
             None => from_mm[axis],
         }))
     }

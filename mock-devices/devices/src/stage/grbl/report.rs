@@ -11,7 +11,6 @@ pub(super) const RESET_TO_CONTINUE: &str = "[MSG:Reset to continue]\r\n";
 pub(super) const HELP: &str = "[HLP:$$ $# $G $I $x=val $J=line $X $H ~ ! ? ctrl-x]\r\n";
 /// Build and options: variable speeds, planner blocks, receive buffer.
 pub(super) const BUILD: &str = "[VER:1.1h.20190830:simulated by Tactus]\r\n[OPT:V,15,128]\r\n";
-pub(super) const OFFSETS: &str = "[G54:0.000,0.000,0.000]\r\n[G92:0.000,0.000,0.000]\r\n[TLO:0.000]\r\n";
 
 /// Moves that the planner holds.
 pub(super) const PLANNER_BLOCKS: usize = 15;
@@ -19,6 +18,11 @@ pub(super) const PLANNER_BLOCKS: usize = 15;
 /// `error:n`.
 pub(super) fn error(error: GrblError) -> String {
     format!("error:{}\r\n", error.0)
+}
+
+/// What `$#` prints.
+pub(super) fn offsets(work_offset_mm: [f64; 3]) -> String {
+    format!("[G54:{}]\r\n[G92:0.000,0.000,0.000]\r\n[TLO:0.000]\r\n", triple(work_offset_mm))
 }
 
 /// `ALARM:n`.
@@ -30,7 +34,8 @@ pub(super) fn alarm(code: u8) -> String {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Status {
     pub(super) state: &'static str,
-    pub(super) position_mm: [f64; 3],
+    pub(super) machine_mm: [f64; 3],
+    pub(super) work_offset_mm: [f64; 3],
     pub(super) is_machine_position: bool,
     /// Pending moves and free receive bytes, if the settings ask for them.
     pub(super) buffers: Option<(usize, usize)>,
@@ -42,23 +47,30 @@ pub(super) struct Status {
 impl Status {
     /// The report's line.
     pub(super) fn line(&self) -> String {
-        // Negative zero would print a sign.
-        let [x, y, z] = self.position_mm.map(|mm| (mm * 1000.0).round() / 1000.0 + 0.0);
-        let frame = if self.is_machine_position { "MPos" } else { "WPos" };
+        let (frame, position_mm) = if self.is_machine_position {
+            ("MPos", self.machine_mm)
+        } else {
+            ("WPos", std::array::from_fn(|axis| self.machine_mm[axis] - self.work_offset_mm[axis]))
+        };
+        let position = triple(position_mm);
         let buffers = self.buffers.map_or(String::new(), |(moves, free_bytes)| {
             format!("|Bf:{},{}", PLANNER_BLOCKS.saturating_sub(moves), free_bytes.min(BUFFER_BYTES))
         });
         let feed_mm_per_min = self.speed_mm_per_s * 60.0;
         let now_and_then = match self.number % 10 {
-            0 => "|WCO:0.000,0.000,0.000",
-            1 => "|Ov:100,100,100",
-            _ => "",
+            0 => format!("|WCO:{}", triple(self.work_offset_mm)),
+            1 => "|Ov:100,100,100".to_owned(),
+            _ => String::new(),
         };
-        format!(
-            "<{}|{frame}:{x:.3},{y:.3},{z:.3}{buffers}|FS:{feed_mm_per_min:.0},0{now_and_then}>\r\n",
-            self.state
-        )
+        format!("<{}|{frame}:{position}{buffers}|FS:{feed_mm_per_min:.0},0{now_and_then}>\r\n", self.state)
     }
+}
+
+/// Three coordinates with three decimals.
+fn triple(mm: [f64; 3]) -> String {
+    // Negative zero would print a sign.
+    let [x, y, z] = mm.map(|mm| (mm * 1000.0).round() / 1000.0 + 0.0);
+    format!("{x:.3},{y:.3},{z:.3}")
 }
 
 #[cfg(test)]
