@@ -44,9 +44,10 @@ pub(super) fn events(timeline: &Timeline, frames: &FrameStatistics) -> Vec<Logge
 fn describe(event: &Event) -> (&'static str, String) {
     match event {
         Event::Started(e) => {
-            let continues = e.taken_over.as_ref().map(|taken| {
-                format!(", continues {}: {} presses taken over", taken.run_id, taken.presses)
-            });
+            let continues = e
+                .taken_over
+                .as_ref()
+                .map(|taken| format!(", continues {}: {} presses taken over", taken.run_id, taken.presses));
             let continues = continues.unwrap_or_default();
             ("started", format!("{} on {} by {}, seed {}{continues}", e.experiment, e.rig, e.who, e.seed))
         }
