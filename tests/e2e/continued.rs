@@ -1,6 +1,7 @@
 //! A run whose program died goes on from its last confirmed press.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
+use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,18 +15,12 @@ use tempfile::TempDir;
 
 const PRESSES: &str = "def run(rig):\n    tare()\n    for i in range(5):\n        press(3.0 + 2.0 * i, 5.0, depths_mm = [0.2, 0.4], dwell_s = 2.0)\n";
 
-/// Waits until the recording on disk has the first dwell of a press after `confirmed` ones. The second dwell is under way then.
-fn wait_until_pressing(runs: &Path, confirmed: u64) -> PathBuf {
-    let deadline = Instant::now() + DEADLINE;
-    loop {
-        assert!(Instant::now() < deadline, "press {confirmed} was never recorded");
-        let Some(path) = recordings(runs).into_iter().next() else { continue };
-        let info = tactus(runs, &["--json", "record", "info", &path.display().to_string()]);
-        // Its first bytes may not be there yet.
-        if info.code == Some(3) && info.json()["presses"].as_u64() > Some(confirmed) {
-            return path;
-        }
-    }
+/// The recording, once it has on disk the first dwell of a press after `confirmed` ones. The second dwell is under way then.
+fn in_press(runs: &Path, confirmed: usize) -> Option<PathBuf> {
+    let path = recordings(runs).into_iter().next()?;
+    // Its first bytes may not be there yet.
+    tactus_record::read(&path).ok()?;
+    (presses(&path).len() >= confirmed && is_pressing(&path)).then_some(path)
 }
 
 /// Of the runs in a folder, in the order of their names, and so of their beginnings.
@@ -37,13 +32,22 @@ fn recordings(runs: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// How a run was started.
-fn start_of(recording: &Path) -> pb::RunStarted {
-    let event = |entry: std::io::Result<Entry>| match entry.unwrap() {
+/// True if there is a dwell of a press that is not confirmed.
+fn is_pressing(recording: &Path) -> bool {
+    let confirmed = presses(recording).last().map_or(-1, |(press, _)| *press);
+    events(recording).any(|event| matches!(event, Event::DwellDone(dwell) if dwell.press > confirmed))
+}
+
+fn events(recording: &Path) -> impl Iterator<Item = Event> {
+    tactus_record::read(recording).unwrap().filter_map(|entry| match entry.unwrap() {
         Entry::Message { message: Message::Event(event), .. } => event.event,
         Entry::Message { .. } | Entry::Run(_) | Entry::Attachment(_) => None,
-    };
-    match tactus_record::read(recording).unwrap().find_map(event) {
+    })
+}
+
+/// How a run was started.
+fn start_of(recording: &Path) -> pb::RunStarted {
+    match events(recording).next() {
         Some(Event::Started(started)) => started,
         other => panic!("{other:?}"),
     }
@@ -85,7 +89,14 @@ fn after_kill_9_in_a_press_the_run_goes_on_and_each_press_is_in_the_table_once()
     let script = lab.script("five.star", PRESSES);
     let _client = lab.start_tactus(&["run", &script, "--seed", "3"]);
     let runs = lab.folder.path().join("runs");
-    let first = wait_until_pressing(&runs, 2);
+    let mut viewer = lab.start_tactus(&["watch", "--json"]);
+    // Two looks a second: the machine has better to do.
+    let frames = Cell::new(0);
+    viewer.wait_until(|_| {
+        frames.set(frames.get() + 1);
+        frames.get() % 15 == 0 && in_press(&runs, 2).is_some()
+    });
+    let first = in_press(&runs, 2).unwrap();
     let run_id = id(&first);
     let busy = lab.tactus(&["run", "--continue", &run_id]);
     assert_eq!(busy.code, Some(5), "one run at a time, and the lease is held: {busy:?}");
@@ -132,8 +143,11 @@ fn after_kill_9_in_a_press_the_run_goes_on_and_each_press_is_in_the_table_once()
     let of = |recording: &Path, presses: &[(i32, f64)]| -> Vec<_> {
         presses.iter().map(|(press, _)| (id(recording), *press)).collect()
     };
+    let of_table = presses_in(&table);
     let of_both = [of(&both[0], &confirmed), of(&both[1], &rest)].concat();
-    assert_eq!(presses_in(&table), of_both.into_iter().collect());
+    assert!(of_both.iter().all(|press| of_table.contains(press)), "{of_table:?}");
+    let indices: BTreeSet<i32> = of_table.iter().map(|(_, press)| *press).collect();
+    assert_eq!(indices.len(), of_table.len(), "a press is in one run only: {of_table:?}");
 
     // Nothing is left to do.
     let over = lab.tactus(&["run", "--continue", &id(&both[1])]);
@@ -152,8 +166,13 @@ fn a_killed_run_of_the_embedded_rig_goes_on_in_its_folder() {
         &[&nobody[..], &["run", "five.star", "--real-time"]].concat(),
     );
     let runs = folder.path().join("runs");
-    fs::create_dir(&runs).unwrap();
-    let first = wait_until_pressing(&runs, 1);
+    let deadline = Instant::now() + DEADLINE;
+    let first = loop {
+        if let Some(path) = in_press(&runs, 1) {
+            break path;
+        }
+        assert!(Instant::now() < deadline, "nothing was pressed");
+    };
     embedded.signal(Signal::KILL);
     assert_eq!(embedded.wait().0, None);
     let confirmed = presses(&first);

@@ -11,7 +11,7 @@ fn started(step: u64) -> Event {
 }
 
 fn done(step: u64) -> Event {
-    Event::StepDone(pb::StepDone { step })
+    Event::StepDone(pb::StepDone { step, ..Default::default() })
 }
 
 fn dwell(press: i32, dwell: u32) -> Event {

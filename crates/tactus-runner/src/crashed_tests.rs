@@ -45,7 +45,7 @@ fn fill(recording: &mut Recording, run_id: &str) {
             ..Default::default()
         }));
         if press < 2 {
-            events.push(Event::StepDone(pb::StepDone { step }));
+            events.push(Event::StepDone(pb::StepDone { step, ..Default::default() }));
         }
     }
     for seq in 0..60_u64 {

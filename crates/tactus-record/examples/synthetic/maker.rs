@@ -220,6 +220,7 @@ impl Maker {
             dwells_planned: self.plan.presses.iter().map(|press| press.depths_mm.len() as u32).sum(),
             duration_planned_s: 0.0,
             versions: [("tactus".to_owned(), "0.1.0".to_owned())].into(),
+            taken_over: None,
         }
     }
 

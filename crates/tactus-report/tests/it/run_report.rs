@@ -115,7 +115,7 @@ fn a_press_that_was_begun_again_does_not_count() {
 #[test]
 fn rises_are_against_the_last_tare() {
     let mut run = Plan::short(1).make();
-    let tare = pb::TareDone { frames: 30, baseline_counts: vec![150.0; 48] };
+    let tare = pb::TareDone { frames: 30, baseline_counts: vec![150.0; 48], ..Default::default() };
     let idle = events(&mut run).find(|event| matches!(event, Event::PhaseChanged(_))).unwrap();
     *idle = Event::TareDone(tare);
     let tared = report(&run).presses[0].dwells[0].total_counts();
