@@ -1,5 +1,6 @@
 //! A virtual rig with a tap on each of its lines, a service that restarts, and a client that commands it: for the tests that
 //! repeat one thing many times.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
 
 use std::env;
 use std::fs;
