@@ -208,6 +208,10 @@ impl Bench {
             assert!(Instant::now() < deadline, "nobody can command the service");
             self.stage.pass(AGAIN);
         }
+        // A report may pass before the driver has compared the controller's settings.
+        self.until("the stage is known", |reply| {
+            reply.health.as_ref().is_some_and(|health| health.stage_connected)
+        });
         if self.options.has_sensor {
             self.until("frames flow", |reply| reply.health.as_ref().is_some_and(|health| health.frames > 1));
         }
