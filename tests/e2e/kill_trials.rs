@@ -1,8 +1,16 @@
 //! kill -9 of the service at random instants of a real-time run, from homing to the closing of its recording.
 //!
 //! `TACTUS_TRIALS=200` says how many; `just kill-trials` plays them. `TACTUS_SEED` chooses other instants.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test that cannot go on fails; a measurement is printed"
+)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use rand::{RngExt, SeedableRng};
@@ -187,7 +195,7 @@ fn until(bench: &Bench, part: Part) -> Option<f64> {
 
 /// How much of what the sensor had sent at the kill the recording lacks, in ms; `None` if the run was over and the recording
 /// closed.
-fn left_behind(folder: &Path, recording: &PathBuf, sent_ms: u32, since_accepted: Duration) -> Option<u32> {
+fn left_behind(folder: &Path, recording: &Path, sent_ms: u32, since_accepted: Duration) -> Option<u32> {
     let mut last_ms = None;
     let mut is_over = false;
     for entry in tactus_record::read(recording).unwrap().map_while(Result::ok) {

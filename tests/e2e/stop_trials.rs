@@ -3,6 +3,14 @@
 //! `TACTUS_TRIALS=200` says how many trials each row has, and makes a row beyond 100 ms a failure; `just stop-trials` does so.
 //! Without it there is one trial of each surface under the first three conditions, and no time limit. `TACTUS_ROWS=contact`
 //! plays the rows with that text only.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test that cannot go on fails; a measurement is printed"
+)]
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};

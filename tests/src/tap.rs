@@ -57,11 +57,11 @@ impl Tap {
         let path = ptsname(&controller, Vec::new())?;
         symlink(Path::new(&*path.to_string_lossy()), link)?;
         let device = open(device, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
-        let (quit, _quit) = io::pipe()?;
+        let (quit, quitter) = io::pipe()?;
         thread::Builder::new()
             .name("tap".into())
             .spawn(move || pass_on(&controller, &device, &quit.into(), see))?;
-        Ok(Self { service_side, _quit })
+        Ok(Self { service_side, _quit: quitter })
     }
 
     /// What a device does when its last host has gone: it discards what nobody has read, and ends the host's exclusive lock.

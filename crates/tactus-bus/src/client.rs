@@ -79,9 +79,10 @@ impl Client {
         }
         reach(endpoint).await.map_err(|source| {
             let endpoint = endpoint.to_string();
-            match source.kind() {
-                io::ErrorKind::PermissionDenied => BusError::NotAllowed { endpoint, source },
-                _ => BusError::NoService { endpoint, source },
+            if source.kind() == io::ErrorKind::PermissionDenied {
+                BusError::NotAllowed { endpoint, source }
+            } else {
+                BusError::NoService { endpoint, source }
             }
         })?;
         let session = open(endpoint, credentials).await?;
