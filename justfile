@@ -274,23 +274,36 @@ gpu:
     cargo test -p tactus-scene --features gpu --test it gpu::
     cargo run --quiet -p tactus --features gpu -- simulate --scene wrench --roll-deg 10 --gpu
 
-# Every target of `fuzz/` for so many seconds, from nothing or from where the last time ended (target/fuzz/corpus). An input that makes
-# one panic is kept in target/fuzz/artifacts; the target's program takes it as its argument and shows the panic again.
-fuzz seconds="600":
+# Every target of `fuzz/` for so many seconds, two at a time, from shipped files and from where the last time ended (target/fuzz/corpus).
+# An input that makes one panic is kept in target/fuzz/artifacts; the target's program takes it as its argument and shows the panic again.
+# Names of targets run only those.
+fuzz seconds="600" *targets:
     #!/usr/bin/env bash
     set -euo pipefail
     # fuzz/.cargo/config.toml has the fuzzer's instruments.
     (cd fuzz && cargo build --quiet --release)
+    # In memory, for files that targets write thousands of times a second.
+    export TMPDIR=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
+    trap 'rm -rf "$TMPDIR"' EXIT
     fuzzed() {
+        local length=4096 seeds=fuzz/seeds/$1
+        case $1 in
+            declared) seeds="config/links" ;;
+            files) seeds="config/links config/rigs config/models" ;;
+            parquet) seeds="crates/tactus-record/tests/tables" length=16384 ;;
+            starlark) seeds="experiments" length=16384 ;;
+        esac
+        [ -d "${seeds%% *}" ] || seeds=
         mkdir -p target/fuzz/corpus/$1 target/fuzz/artifacts/$1
-        target/fuzz/*/release/$1 target/fuzz/corpus/$1 config/links config/rigs config/models -artifact_prefix=target/fuzz/artifacts/$1/ \
-            -max_total_time={{ seconds }} -max_len=4096 -print_final_stats=1 > target/fuzz/$1.log 2>&1 ||
+        target/fuzz/*/release/$1 target/fuzz/corpus/$1 $seeds -artifact_prefix=target/fuzz/artifacts/$1/ \
+            -max_total_time={{ seconds }} -max_len=$length -timeout=120 -print_final_stats=1 > target/fuzz/$1.log 2>&1 ||
             { cat target/fuzz/$1.log; return 1; }
         grep -E 'number_of_executed_units|DONE' target/fuzz/$1.log | sed "s/^/$1: /"
     }
-    for source in fuzz/fuzz_targets/*.rs; do
-        fuzzed "$(basename "$source" .rs)"
-    done
+    export -f fuzzed
+    targets="{{ targets }}"
+    [ -n "$targets" ] || targets=$(basename --suffix=.rs --multiple fuzz/fuzz_targets/*.rs)
+    printf '%s\n' $targets | xargs -P 2 -I{} bash -euo pipefail -c 'fuzzed {}'
 
 # So many schedules of faults against a virtual stage and its driver, each from its seed; TACTUS_SEED=7 plays one again.
 simulate-faults schedules="2000":

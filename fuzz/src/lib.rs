@@ -1,8 +1,16 @@
-//! Shared by the fuzz targets: turns a fuzzer's input into reads of a link and into events of a session.
+//! Shared by the fuzz targets: turns a fuzzer's input into reads of a link and into events of a session, into a damaged file, and
+//! counts what an input costs.
+
+mod edits;
+pub mod memory;
+mod scratch;
 
 use std::time::Duration;
 
 use tactus_wire::{sensor, stage};
+
+pub use edits::edited;
+pub use scratch::Scratch;
 
 /// Most bytes that arrive together.
 const ARRIVAL_MAX_BYTES: usize = 64;

@@ -55,7 +55,7 @@ impl Confirmed {
             // Of a step with lost events nobody knows whether it was done.
             self.step = None;
         }
-        self.next_event = event.seq + 1;
+        self.next_event = event.seq.saturating_add(1);
         match &event.event {
             Some(Event::StepStarted(started)) => {
                 self.step = Some((started.step, started.at.clone()));

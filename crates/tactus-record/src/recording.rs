@@ -189,7 +189,7 @@ impl<S: Storage> Recording<S> {
     /// If the storage failed, now or earlier.
     pub fn write<M: Timed>(&mut self, message: &M) -> Result<(), RecordError> {
         if M::KIND == MessageKind::Event {
-            self.next_event = message.seq() + 1;
+            self.next_event = message.seq().saturating_add(1);
         }
         self.put(message, message.seq(), message.at())
     }

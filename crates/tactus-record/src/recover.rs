@@ -175,7 +175,7 @@ impl Survey {
         // A step in the numbers tells that events may be lost.
         let step = if lost_chunks > 0 { 2 } else { 1 };
         Some(pb::RunEvent {
-            seq: self.last_event.map_or(0, |seq| seq + step),
+            seq: self.last_event.map_or(0, |seq| seq.saturating_add(step)),
             run_id: self.run.run_id.clone(),
             t_mono_ns: self.last_time.mono.ns(),
             t_wall_ns: self.last_time.wall.ns(),

@@ -41,10 +41,10 @@ impl Tally {
             lost_before.max(step.saturating_sub(1))
         });
         if self.last_seq.is_some() {
-            self.frames_unaccounted += lost - lost_before;
+            self.frames_unaccounted = self.frames_unaccounted.saturating_add(lost - lost_before);
         }
         self.last_seq = Some(frame.seq);
-        self.frames_lost += lost;
+        self.frames_lost = self.frames_lost.saturating_add(lost);
         self.gaps += u64::from(lost > 0);
         lost
     }

@@ -14,7 +14,8 @@ use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::TcpListener;
 use tokio::task::AbortHandle;
 use tokio::time::sleep;
 use tower_service::Service as _;
@@ -75,7 +76,11 @@ impl Connections {
 }
 
 /// Answers the requests of one connection.
-async fn answer(stream: TcpStream, site: Router, has_asked: Arc<AtomicBool>) {
+pub(crate) async fn answer(
+    stream: impl AsyncRead + AsyncWrite + Unpin,
+    site: Router,
+    has_asked: Arc<AtomicBool>,
+) {
     let service = service_fn(move |request: Request<Incoming>| {
         has_asked.store(true, Ordering::Relaxed);
         let mut site = site.clone();

@@ -76,7 +76,7 @@ impl TimelineBuilder {
     fn event(&mut self, event: pb::RunEvent) {
         let at = MonoTime::from_ns(event.t_mono_ns);
         let (next, since) = self.events.last().map_or((0, MonoTime::from_ns(i64::MIN)), |last| {
-            (last.seq + 1, MonoTime::from_ns(last.t_mono_ns))
+            (last.seq.saturating_add(1), MonoTime::from_ns(last.t_mono_ns))
         });
         if event.seq > next {
             self.untold.push((since, MonoTime::from_ns(i64::MAX)));

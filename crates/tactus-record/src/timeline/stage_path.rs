@@ -27,7 +27,7 @@ pub(super) fn position_mm(reports: &[StageReport], at: MonoTime) -> Option<[f64;
     };
     let (earlier, later) = (next.checked_sub(2).and_then(|index| reports.get(index)), reports.get(next + 1));
     // Times in s after the first of the two.
-    let since_s = |time: MonoTime| (time.ns() - one.at.ns()) as f64 * 1e-9;
+    let since_s = |time: MonoTime| seconds_from(one.at, time);
     let (at_s, two_s) = (since_s(at), since_s(two.at));
     let along = |axis: usize| {
         let (x_1, x_2) = (one.position_mm[axis], two.position_mm[axis]);
@@ -59,8 +59,13 @@ fn speed(
         return Some(0.0);
     }
     let beside = beside.filter(|beside| !beside.stands || other.stands)?;
-    let by_s = (beside.at.ns() - report.at.ns()) as f64 * 1e-9;
+    let by_s = seconds_from(report.at, beside.at);
     Some((beside.position_mm[axis] - report.position_mm[axis]) / by_s)
+}
+
+/// From one time to another, negative if that is earlier.
+fn seconds_from(from: MonoTime, to: MonoTime) -> f64 {
+    (i128::from(to.ns()) - i128::from(from.ns())) as f64 * 1e-9
 }
 
 #[cfg(test)]

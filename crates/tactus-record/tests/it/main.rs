@@ -2,6 +2,7 @@
 
 mod damage;
 mod export;
+mod extremes;
 mod round_trip;
 mod rows;
 #[path = "../../examples/synthetic/mod.rs"]
