@@ -25,8 +25,8 @@ MUTANTS = [
     ("no limit before the first zero", SAFETY + "force.rs", "return self.over(&self.rig.baseline_counts, band_counts, limits, \"the rig's baseline\");", "let _ = band_counts; return None;", "tactus-safety"),
     ("a silent element is no matter", SAFETY + "force.rs", "is_silent.then_some((element, silent_s))", "(is_silent && false).then_some((element, silent_s))", "tactus-safety"),
     ("zeros outlive a connection", SAFETY + "supervisor.rs", "self.elements.forget_zeros();\n        self.permits.revoke();", "self.permits.revoke();", "tactus-safety"),
-    ("a trip does not latch", SAFETY + "supervisor.rs", "self.fault = Some(Fault::Tripped(fresh.clone()));", "", "tactus-safety"),
-    ("a trip leaves permits valid", SAFETY + "supervisor.rs", "self.permits.revoke();\n        self.fault = Some(Fault::Tripped", "self.fault = Some(Fault::Tripped", "tactus-safety"),
+    ("a trip does not latch", SAFETY + "supervisor.rs", "self.fault = Some(Fault::Tripped(violation.clone()));", "", "tactus-safety"),
+    ("a trip leaves permits valid", SAFETY + "supervisor.rs", "self.permits.revoke();\n        if violation.is_silence() {", "if violation.is_silence() {", "tactus-safety"),
     ("a fault permits the way down", SAFETY + "supervisor.rs", "self.check_fault()?;\n        self.limits", "self.limits", "tactus-safety"),
     ("no frame is needed to go down", SAFETY + "supervisor.rs", "if age_s <= limit_s { Ok(()) } else { Err(Denied::NoFreshFrame", "if age_s <= limit_s || true { Ok(()) } else { Err(Denied::NoFreshFrame", "tactus-safety"),
     ("no zero is needed to go down", SAFETY + "supervisor.rs", "if !self.elements.has_zero() {", "if false {", "tactus-safety"),
@@ -38,7 +38,7 @@ MUTANTS = [
     ("permits do not expire", SAFETY + "permit.rs", "now > expires", "now < expires && now > expires", "tactus-safety"),
     ("permits cannot be revoked", SAFETY + "permit.rs", "self.revocation.count() != self.revocations", "self.revocation.count() < self.revocations", "tactus-safety"),
     ("a frozen array is believed", SAFETY + "contact.rs", "repeated.frames >= FROZEN_FRAMES", "repeated.frames > 1000", "tactus-safety"),
-    ("a reset does not rearm", SAFETY + "supervisor.rs", "self.fault = Some(Fault::Unfinished);\n        self.is_active", "self.is_active", "tactus-safety"),
+    ("a reset does not rearm", SAFETY + "supervisor.rs", "self.fault = Some(Fault::Unfinished);\n        self.silence = None;", "self.silence = None;", "tactus-safety"),
     ("another covering is not confirmed", ENGINE + "engine.rs", "let wanted_mm = control.wanted_covering_mm.filter(unconfirmed);", "let wanted_mm = control.wanted_covering_mm.filter(unconfirmed).filter(|_| false);", "tactus-engine"),
     ("the thicker covering counts after a restart", ENGINE + "engine.rs", "kept_mm.min(in_file_mm)", "kept_mm.max(in_file_mm)", "tactus-engine"),
     ("a dwell does not ask the stage", ENGINE + "run/steps.rs", "if average.is_disturbed || !is_same {", "if false && (average.is_disturbed || !is_same) {", "tactus-engine"),
@@ -51,7 +51,7 @@ MUTANTS = [
     ("a permit outlives the next", SAFETY + "permit.rs", "        self.revoke();\n        Permit {", "        Permit {", "tactus-safety"),
     ("a permit outlives the place", SAFETY + "supervisor.rs", "&& !self.stands_at(stood_mm)", "&& false", "tactus-safety"),
     ("an old report of the stage is believed", SAFETY + "supervisor.rs", "self.check_report(now)?;", "", "tactus-safety"),
-    ("an element that is not read has no limit", SAFETY + "force.rs", "if let Some(element) = (0..zero.len()).find(is_unread) {", "if let Some(element) = (0..0).find(is_unread) {", "tactus-safety"),
+    ("an element that is not read has no limit", SAFETY + "force.rs", "if let Some(element) = (0..zero.len().max(1)).find(is_unread) {", "if let Some(element) = (0..0).find(is_unread) {", "tactus-safety"),
     ("a thick covering must be felt like a thin one", SAFETY + "contact.rs", ".powi(2).min(1.0)", ".powi(2).clamp(1.0, 1.0)", "tactus-safety"),
 ]
 

@@ -127,7 +127,6 @@ impl Fault {
     pub(crate) fn rank(&self) -> u8 {
         match self {
             Self::Started | Self::Unfinished | Self::Alarm | Self::Unhomed => 0,
-            Self::Tripped(violation) if violation.is_silence() => 0,
             Self::Tripped(_) => 1,
             Self::Defect(_) => 2,
             Self::NotRetracted(_) => 3,

@@ -117,7 +117,7 @@ impl Elements {
         let is_unread = |element: &usize| {
             zero.get(*element).is_none_or(Option::is_none) && !self.rig.unwatched.contains(element)
         };
-        if let Some(element) = (0..zero.len()).find(is_unread) {
+        if let Some(element) = (0..zero.len().max(1)).find(is_unread) {
             return Err(Violation::Unread { element });
         }
         self.tare = Some(zero.clone());

@@ -76,6 +76,9 @@ pub enum Denied {
     /// The stage does not answer.
     #[error("the stage does not answer: is it plugged in and switched on?")]
     NoStage,
+    /// The stage's report has no position.
+    #[error("the stage says that it stands, but not where")]
+    NoPlace,
     /// Deeper than the covering in place allows.
     #[error("{depth_mm:.3} mm is too deep: the limit is {limit_mm:.3} mm")]
     TooDeep { depth_mm: f64, limit_mm: f64 },

@@ -25,12 +25,12 @@ pub struct Supervisor {
     z_mm: Option<f64>,
     /// The last known height when the last frame arrived.
     z_at_frame_mm: Option<f64>,
-    /// What a reset must clear; [`Self::fault`] adds what the stage reports.
+    /// What a reset must clear; [`Self::fault`] adds the silence and what the stage reports.
     fault: Option<Fault>,
+    /// A silence of the sensor, which its return may end. It stands beside the fault, so that nothing else ends with it.
+    silence: Option<Violation>,
     /// True while somebody may move the stage: loads count then at any height.
     is_active: bool,
-    /// Between the begin and the end of a reset.
-    is_resetting: bool,
     has_sensor: bool,
 }
 
@@ -47,8 +47,8 @@ impl Supervisor {
             z_mm: None,
             z_at_frame_mm: None,
             fault: Some(Fault::Started),
+            silence: None,
             is_active: false,
-            is_resetting: false,
             has_sensor: true,
         }
     }
@@ -75,7 +75,12 @@ impl Supervisor {
         if status == StageStatus::Alarm && !matches!(self.fault, Some(Fault::NotRetracted(_))) {
             return Some(Fault::Alarm);
         }
-        self.fault.clone().or((status == StageStatus::Unhomed).then_some(Fault::Unhomed))
+        let latched = match (&self.fault, &self.silence) {
+            (Some(fault), _) if fault.rank() > 0 => Some(fault.clone()),
+            (_, Some(silence)) => Some(Fault::Tripped(silence.clone())),
+            (fault, None) => fault.clone(),
+        };
+        latched.or((status == StageStatus::Unhomed).then_some(Fault::Unhomed))
     }
 
     // --- what happens -------------------------------------------------------------------------------------------------
@@ -112,7 +117,7 @@ impl Supervisor {
             // A permit is for the way from where the stage stood. One that is in use is not checked again.
             self.permits.revoke();
         }
-        if !is_placed(report.status()) {
+        if !is_placed(report) {
             return None;
         }
         self.z_mm = Some(report.z_mm);
@@ -191,15 +196,14 @@ impl Supervisor {
     /// The run or reset is over, however it ended.
     pub fn end(&mut self) {
         self.is_active = false;
-        self.is_resetting = false;
         self.permits.revoke();
     }
 
     /// A reset begins: all faults become one, which permits homing and the way up.
     pub fn begin_reset(&mut self, now: MonoTime) {
         self.fault = Some(Fault::Unfinished);
+        self.silence = None;
         self.is_active = true;
-        self.is_resetting = true;
         self.elements.forget_zeros();
         self.elements.excuse_silence(now);
     }
@@ -209,30 +213,27 @@ impl Supervisor {
     /// # Errors
     /// [`Denied`] if they do not; the fault then remains.
     pub fn finish_reset(&mut self, now: MonoTime) -> Result<(), Denied> {
-        match &self.fault {
+        match self.fault() {
             None | Some(Fault::Unfinished) => {}
-            Some(fault) => return Err(Denied::Fault(fault.clone())),
+            Some(fault) => return Err(Denied::Fault(fault)),
         }
         self.standing_mm()?;
         self.check_frame(now)?;
         self.fault = None;
-        self.is_resetting = false;
         Ok(())
     }
 
     /// Latches a fault until the next reset. An earlier one is kept, because it is the cause, unless this one is worse.
     pub fn latch(&mut self, fault: Fault) {
         self.permits.revoke();
-        if self.fault.as_ref().is_none_or(|known| known.rank() < fault.rank() || self.is_silent()) {
+        if self.fault.as_ref().is_none_or(|known| known.rank() < fault.rank()) {
             self.fault = Some(fault);
         }
     }
 
     /// Forgives a silence of the sensor, and nothing else, once the tip is up.
     pub fn forgive_silence(&mut self, now: MonoTime) {
-        if self.is_silent() {
-            self.fault = self.is_resetting.then_some(Fault::Unfinished);
-        }
+        self.silence = None;
         self.elements.excuse_silence(now);
     }
 
@@ -276,21 +277,19 @@ impl Supervisor {
 
     /// Reports a violation only once: later ones occur while the first is handled.
     fn trip(&mut self, violation: Option<Violation>) -> Option<Violation> {
+        let violation = violation?;
+        let is_worse = self.fault.as_ref().is_some_and(|fault| fault.rank() > 0);
         // What comes while a silence is handled may be worse than it.
-        let is_handled = |violation: &Violation| match &self.fault {
-            Some(Fault::Tripped(known)) => !known.is_silence() || violation.is_silence(),
-            Some(Fault::NotRetracted(_) | Fault::Defect(_)) => true,
-            None | Some(Fault::Started | Fault::Unfinished | Fault::Alarm | Fault::Unhomed) => false,
-        };
-        let fresh = violation.filter(|violation| !is_handled(violation))?;
+        if is_worse || (violation.is_silence() && self.silence.is_some()) {
+            return None;
+        }
         self.permits.revoke();
-        self.fault = Some(Fault::Tripped(fresh.clone()));
-        Some(fresh)
-    }
-
-    /// The fault is a silence of the sensor, which its return may end.
-    fn is_silent(&self) -> bool {
-        matches!(&self.fault, Some(Fault::Tripped(violation)) if violation.is_silence())
+        if violation.is_silence() {
+            self.silence = Some(violation.clone());
+        } else {
+            self.fault = Some(Fault::Tripped(violation.clone()));
+        }
+        Some(violation)
     }
 
     fn is_near(&self) -> bool {
@@ -337,7 +336,8 @@ impl Supervisor {
         let Some(report) = self.report else { return Err(Denied::NoStage) };
         let status = report.status();
         match status {
-            StageStatus::Idle => Ok([report.x_mm, report.y_mm, report.z_mm]),
+            StageStatus::Idle if is_placed(&report) => Ok([report.x_mm, report.y_mm, report.z_mm]),
+            StageStatus::Idle => Err(Denied::NoPlace),
             StageStatus::Unspecified | StageStatus::Disconnected => Err(Denied::NoStage),
             StageStatus::Alarm => Err(Denied::Fault(Fault::Alarm)),
             StageStatus::Unhomed => Err(Denied::Fault(Fault::Unhomed)),
@@ -356,19 +356,20 @@ impl Supervisor {
     }
 
     fn position_mm(&self) -> Option<[f64; 3]> {
-        let report = self.report.filter(|report| is_placed(report.status()))?;
+        let report = self.report.filter(is_placed)?;
         Some([report.x_mm, report.y_mm, report.z_mm])
     }
 }
 
-/// True if a report with this status tells the position.
-fn is_placed(status: StageStatus) -> bool {
-    match status {
+/// True if a report tells the position.
+fn is_placed(report: &pb::StageState) -> bool {
+    let is_known = match report.status() {
         StageStatus::Unspecified | StageStatus::Disconnected | StageStatus::Unhomed | StageStatus::Homing => {
             false
         }
         StageStatus::Idle | StageStatus::Moving | StageStatus::Hold | StageStatus::Alarm => true,
-    }
+    };
+    is_known && [report.x_mm, report.y_mm, report.z_mm].iter().all(|mm| mm.is_finite())
 }
 
 #[cfg(test)]

@@ -489,3 +489,51 @@ fn a_tip_that_is_not_up_is_told_before_all_other_faults() {
     supervisor.on_report(&alarm);
     assert_eq!(supervisor.fault(), Some(Fault::NotRetracted("test".into())));
 }
+
+#[test]
+fn a_report_whose_position_is_no_number_permits_nothing() {
+    for no_number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for place in [
+            pb::StageState { x_mm: no_number, ..standing(0.1) },
+            pb::StageState { y_mm: no_number, ..standing(0.1) },
+            pb::StageState { z_mm: no_number, ..standing(0.1) },
+        ] {
+            let mut supervisor = ready(0.1);
+            assert_eq!(supervisor.on_report(&place), None);
+            let there = [place.x_mm, place.y_mm, place.z_mm];
+            for position_mm in [there, [25.0, 20.0, 0.0], [24.9, 20.0, 7.0]] {
+                let denied = supervisor.permit(Target { position_mm, ..to(0.0) }, at_ms(1010)).unwrap_err();
+                assert_eq!(denied, Denied::NoPlace, "{place:?} to {position_mm:?}");
+            }
+            assert!(supervisor.on_time(at_ms(1200)).is_some(), "the tip is where it was last");
+        }
+    }
+}
+
+#[test]
+fn a_forgiven_silence_takes_no_other_fault_with_it() {
+    let rig = rig(|rig| rig);
+    let mut started = Supervisor::new(&rig, &rig.service.clone().unwrap());
+    assert_eq!(started.on_report(&standing(0.0)), None);
+    assert_eq!(started.on_time(at_ms(1200)).unwrap().rule(), "silence");
+    assert_eq!(started.on_time(at_ms(1233)), None, "it is told once");
+    assert_eq!(started.on_frame(&frame(1250, &[100.0; 48])), None);
+    started.forgive_silence(at_ms(1250));
+    assert_eq!(started.fault(), Some(Fault::Started));
+    assert_eq!(started.finish_reset(at_ms(1250)), Err(Denied::Fault(Fault::Started)));
+
+    let mut unfinished = ready(0.1);
+    unfinished.begin_reset(at_ms(1010));
+    unfinished.on_time(at_ms(1200)).unwrap();
+    assert!(matches!(unfinished.permit_homing(at_ms(1200)), Err(Denied::Fault(Fault::Tripped(_)))));
+    unfinished.end();
+    unfinished.forgive_silence(at_ms(1200));
+    assert_eq!(unfinished.fault(), Some(Fault::Unfinished));
+}
+
+#[test]
+fn a_zero_without_an_element_is_refused_and_the_baseline_still_limits() {
+    let mut supervisor = supervisor();
+    assert_eq!(supervisor.set_reference(&[]), Err(Violation::Unread { element: 0 }));
+    assert_eq!(supervisor.on_frame(&frame(1000, &[4000.0; 48])).unwrap().rule(), "element-force");
+}

@@ -25,7 +25,7 @@ use std::time::Duration;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::faults::{ControllerFault, Fault, FaultScript, FaultScriptError, StageFault};
+use crate::faults::{ControllerFault, FaultScript, FaultScriptError, InjectedFault, StageFault};
 
 pub use shrink::{Shrunk, shrink};
 
@@ -144,10 +144,12 @@ impl Schedule {
         let (mut lie_mm, mut lost_mm) = (0.0_f64, 0.0);
         for (_, line) in &self.faults {
             match line.parse() {
-                Ok(Fault::Stage(StageFault::Controller(ControllerFault::Lie { z_mm }))) => {
+                Ok(InjectedFault::Stage(StageFault::Controller(ControllerFault::Lie { z_mm }))) => {
                     lie_mm = lie_mm.max(z_mm.abs());
                 }
-                Ok(Fault::Stage(StageFault::Controller(ControllerFault::LostSteps { lost_mm: mm }))) => {
+                Ok(InjectedFault::Stage(StageFault::Controller(ControllerFault::LostSteps {
+                    lost_mm: mm,
+                }))) => {
                     lost_mm += mm * 3_f64.sqrt();
                 }
                 Ok(_) | Err(_) => {}
