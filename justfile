@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: (fault-schedules "2000") (simulate-faults "2000") mutants systemd-boot tls vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
+nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials soak mutants systemd-boot tls vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -277,11 +277,17 @@ gpu:
 # Every target of `fuzz/` for so many seconds, two at a time, from shipped files and from where the last time ended (target/fuzz/corpus).
 # An input that makes one panic is kept in target/fuzz/artifacts; the target's program takes it as its argument and shows the panic again.
 # Names of targets run only those.
-fuzz seconds="600" *targets:
+fuzz seconds="600" *targets: (fuzz-with "whole" seconds targets)
+
+# The targets that build in half a minute: protocols, files, meshes, bus messages, the supervisor.
+fuzz-short seconds="5": (fuzz-with "" seconds "anyskin declared files grbl meshes messages singletact supervisor weiss zaber")
+
+[private]
+fuzz-with features seconds targets:
     #!/usr/bin/env bash
     set -euo pipefail
     # fuzz/.cargo/config.toml has the fuzzer's instruments.
-    (cd fuzz && cargo build --quiet --release)
+    (cd fuzz && cargo build --quiet --release --features "{{ features }}")
     # In memory, for files that targets write thousands of times a second.
     export TMPDIR=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
     trap 'rm -rf "$TMPDIR"' EXIT
@@ -311,7 +317,23 @@ simulate-faults schedules="2000":
 
 # So many schedules of faults against the service's core, its drivers and virtual devices; TACTUS_SEED=7 plays one again.
 fault-schedules schedules="200":
-    TACTUS_SCHEDULES={{ schedules }} cargo test --package tactus-runner --test it schedules
+    TACTUS_SCHEDULES={{ schedules }} cargo test --package tactus-runner --test it schedules:: -- --nocapture
+
+# So many days in virtual time with a run and faults every hour: frames, losses, clocks, memory. 30 days take some 40 minutes.
+simulated-days days="30":
+    TACTUS_DAYS={{ days }} cargo test --package tactus-runner --test it days:: -- --nocapture
+
+# STOP at each surface and under each fault, timed: beyond 100 ms fails. As root, on a quiet machine; hours.
+stop-trials trials="200": build
+    TACTUS_TRIALS={{ trials }} cargo test --package tactus-e2e --test e2e stop_trials:: -- --nocapture
+
+# kill -9 at so many random instants of a run in real time; TACTUS_SEED chooses others.
+kill-trials trials="200": build
+    TACTUS_TRIALS={{ trials }} cargo test --package tactus-e2e --test e2e kill_trials:: -- --nocapture
+
+# The service in real time with runs and a subscriber: memory, frames, clock.
+soak hours="1": build
+    TACTUS_SOAK_HOURS={{ hours }} cargo test --package tactus-e2e --test e2e soak:: -- --nocapture
 
 # Plants defects, one at a time: the tests must find each.
 mutants word="":

@@ -24,15 +24,6 @@ const OPERATIONS_MAX: usize = 400;
 /// Permits that are kept to be checked later.
 const PERMITS_MAX: usize = 16;
 
-/// A report with a number that is none permits what it should not: see docs/fuzzing.md. True once the supervisor takes it for no position.
-const REPORTS_MAY_BE_NO_NUMBERS: bool = true;
-
-/// A forgiven silence takes away the fault that it had replaced: see docs/fuzzing.md. True once that fault comes back.
-const FORGIVENESS_KEEPS_FAULTS: bool = true;
-
-/// A first zero without a single element takes away all limits of load: see docs/fuzzing.md. True once the baseline's remain.
-const EMPTY_ZEROS_KEEP_LIMITS: bool = true;
-
 /// Rounding of sums of lengths.
 const ROUNDING_MM: f64 = 1e-6;
 
@@ -93,8 +84,6 @@ struct Play {
     excused: Option<MonoTime>,
     depth_max_mm: f64,
     has_zero: bool,
-    /// The zero has no element.
-    is_blind: bool,
     is_active: bool,
     shut: Shut,
     /// A silence of the sensor was told, and neither forgiven nor followed by worse.
@@ -124,7 +113,6 @@ impl Play {
             excused: None,
             depth_max_mm: service.envelope.depth_max_mm(RIG.covering),
             has_zero: false,
-            is_blind: false,
             is_active: !has_sensor,
             shut: if has_sensor { Shut::Latched } else { Shut::No },
             is_silent: false,
@@ -150,10 +138,7 @@ impl Play {
                 self.on_frame(received, &counts, &bad);
             }
             6..=11 => {
-                let mut position_mm = position(choices, self.report)?;
-                if !REPORTS_MAY_BE_NO_NUMBERS {
-                    position_mm = position_mm.map(|mm| if mm.is_finite() { mm } else { 0.0 });
-                }
+                let position_mm = position(choices, self.report)?;
                 let status = if choices.ratio(3, 4)? { 3 } else { choices.int_in_range(-1..=8)? };
                 self.on_report(position_mm, StageStatus::try_from(status).unwrap_or_default());
             }
@@ -177,7 +162,6 @@ impl Play {
                 self.tell(|| "connected".into());
                 let violation = self.supervisor.on_connected();
                 self.has_zero = false;
-                self.is_blind = false;
                 self.stops += 1;
                 self.told(violation.as_ref());
             }
@@ -218,7 +202,6 @@ impl Play {
                 self.supervisor.latch(fault);
                 self.latched();
             }
-            30 if self.is_silent && self.shut != Shut::No && !FORGIVENESS_KEEPS_FAULTS => {}
             30 => {
                 self.tell(|| "forgive_silence".into());
                 self.supervisor.forgive_silence(self.now);
@@ -270,7 +253,7 @@ impl Play {
             let is_read = counts.is_finite() && !bad.iter().any(|bad| *bad as usize == element);
             is_read && f64::from(*counts) - baseline_counts > limit_counts
         });
-        if is_loaded && self.is_active && !self.has_zero && !self.is_blind {
+        if is_loaded && self.is_active && !self.has_zero {
             assert!(self.supervisor.fault().is_some(), "an overload leaves a fault");
         }
     }
@@ -331,7 +314,6 @@ impl Play {
         self.tell(|| "begin_run".into());
         self.supervisor.begin_run();
         self.has_zero = false;
-        self.is_blind = false;
         self.is_active = true;
     }
 
@@ -341,7 +323,6 @@ impl Play {
         self.shut = Shut::Resetting;
         self.is_silent = false;
         self.has_zero = false;
-        self.is_blind = false;
         self.is_active = true;
         self.excused = Some(self.now);
     }
@@ -366,9 +347,6 @@ impl Play {
         self.tell(|| format!("zero, reference {is_reference}: {counts:?} -> {set:?}"));
         if set.is_err() {
             return;
-        }
-        if is_reference {
-            self.is_blind = !self.supervisor.has_zero() && !EMPTY_ZEROS_KEEP_LIMITS;
         }
         let envelope = &self.service.envelope;
         for (counts, baseline_counts) in counts.iter().zip(&RIG.baseline_counts) {

@@ -253,6 +253,7 @@ impl Bench {
             seed: None,
             who: "trials".into(),
             lease: held.secret(),
+            continue_run: String::new(),
         };
         self.runtime.block_on(client.command(Command::Run, &request, DEADLINE)).unwrap()
     }

@@ -245,6 +245,7 @@ fn keeps_packets_whole(fault: SensorFault) -> bool {
         SensorFault::Link(LinkFault::Stall(_) | LinkFault::DropFrames(_))
         | SensorFault::ClockJump { .. }
         | SensorFault::ClockWrap
+        | SensorFault::ClockDrift { .. }
         | SensorFault::Stuck(_)
         | SensorFault::Saturate(_)
         | SensorFault::Freeze(_)

@@ -222,6 +222,7 @@ fn order(engine: &Engine, hour: u32) -> RunOrder {
         seed: 1,
         who: "test".into(),
         limits: Limits::default(),
+        earlier: None,
         planned: None,
         versions: BTreeMap::new(),
         recording: String::new(),
