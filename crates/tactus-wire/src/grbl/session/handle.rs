@@ -280,7 +280,7 @@ impl Session {
                 let offset = self.work_frame.foreign_mm().map(SessionError::of_work_frame);
                 self.homed = offset.is_none();
                 self.report();
-                let refused = |error: SessionError| Err(Failure::refused("$H", &error.to_string()));
+                let refused = |error: SessionError| Err(Failure::refused("$H", error.to_string()));
                 self.done(offset.map_or(Ok(self.position_mm), refused));
             }
             Some(MachineState::Alarm) => self.handle_alarm(0),
