@@ -421,7 +421,7 @@ impl Relay {
         let (answers, back) = (service_side.try_clone().unwrap(), client_side.try_clone().unwrap());
         let (to_client, clients) = mpsc::channel();
         thread::spawn(move || {
-            let mut bytes = [0; 65536];
+            let mut bytes = vec![0; 65536];
             while let Ok((count, client)) = client_side.recv_from(&mut bytes) {
                 if told.send(Instant::now()).is_err() || to_client.send(client).is_err() {
                     return;
@@ -431,7 +431,7 @@ impl Relay {
             }
         });
         thread::spawn(move || {
-            let mut bytes = [0; 65536];
+            let mut bytes = vec![0; 65536];
             let mut client = None;
             loop {
                 let received = answers.recv(&mut bytes);

@@ -45,7 +45,7 @@ pub(super) struct CommandDesk {
 
 /// What a client wants to run.
 enum Wanted {
-    Experiment(RunRequest),
+    Experiment(Box<RunRequest>),
     /// What is left of an earlier run.
     Rest {
         run_id: String,
@@ -279,7 +279,7 @@ impl CommandDesk {
             let arguments = Arguments::from_json(&request.parameters_json).map_err(Refusal::usage)?;
             let pb::RunRequest { seed, who, .. } = request;
             let request = RunRequest { script, arguments, seed, who, evaluator, earlier: None };
-            return Ok(Wanted::Experiment(request));
+            return Ok(Wanted::Experiment(Box::new(request)));
         }
         let pb::RunRequest { experiment, script, parameters_json, seed, who, continue_run: run_id, .. } =
             request;
@@ -342,7 +342,7 @@ fn prepare(
     stopped: &dyn Fn() -> bool,
 ) -> Result<Prepared, Refusal> {
     let (request, note) = match wanted {
-        Wanted::Experiment(request) => (request, None),
+        Wanted::Experiment(request) => (*request, None),
         Wanted::Rest { run_id, who, evaluator, recordings, experiments } => {
             info!(who, run_id, "an earlier run is read, to go on with it");
             let wish = Wish { run_id: &run_id, folder: &recordings, who, evaluator };

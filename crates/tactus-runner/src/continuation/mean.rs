@@ -8,10 +8,11 @@ pub(super) struct Mean {
     from: MonoTime,
     until: MonoTime,
     /// Number of frames that it was made of.
-    meant: u32,
     frames: u32,
-    /// Per element.
-    mean_counts: Vec<f64>,
+    /// Frames taken so far.
+    taken: u32,
+    /// Mean per element.
+    counts: Vec<f64>,
     squares: Vec<f64>,
 }
 
@@ -21,9 +22,9 @@ impl Mean {
         Self {
             from: MonoTime::from_ns(from_mono_ns),
             until: MonoTime::from_ns(to_mono_ns),
-            meant: frames,
-            frames: 0,
-            mean_counts: Vec::new(),
+            frames,
+            taken: 0,
+            counts: Vec::new(),
             squares: Vec::new(),
         }
     }
@@ -38,33 +39,32 @@ impl Mean {
         if !(self.from..=self.until).contains(&frame.received.mono) {
             return;
         }
-        if self.frames == 0 {
-            self.mean_counts = vec![0.0; frame.counts.len()];
+        if self.taken == 0 {
+            self.counts = vec![0.0; frame.counts.len()];
             self.squares = vec![0.0; frame.counts.len()];
         }
-        self.frames += 1;
-        for ((mean, squares), count) in
-            self.mean_counts.iter_mut().zip(&mut self.squares).zip(frame.counts.iter())
+        self.taken += 1;
+        for ((mean, squares), count) in self.counts.iter_mut().zip(&mut self.squares).zip(frame.counts.iter())
         {
             let deviation = f64::from(*count) - *mean;
-            *mean += deviation / f64::from(self.frames);
+            *mean += deviation / f64::from(self.taken);
             *squares += deviation * (f64::from(*count) - *mean);
         }
     }
 
     /// Per element, counts; `None` if frames are missing.
     pub(super) fn mean_counts(&self) -> Option<&[f64]> {
-        (self.frames == self.meant && self.frames > 0).then_some(&self.mean_counts)
+        (self.taken == self.frames && self.taken > 0).then_some(&self.counts)
     }
 
     /// Standard deviation of each element over the frames, counts.
     pub(super) fn rms_counts(&self) -> Vec<f64> {
-        let freedom = f64::from((self.frames.max(1) - 1).max(1));
+        let freedom = f64::from((self.taken.max(1) - 1).max(1));
         self.squares.iter().map(|squares| (squares / freedom).sqrt()).collect()
     }
 
     /// Number of frames that it was made of.
     pub(super) fn frames(&self) -> u32 {
-        self.meant
+        self.frames
     }
 }

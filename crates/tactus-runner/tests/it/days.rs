@@ -2,6 +2,7 @@
 //! number is wrong, and nothing grows.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(clippy::print_stdout, reason = "the figures are what `just simulated-days` is for")]
 
 use std::collections::BTreeMap;
 use std::fs;

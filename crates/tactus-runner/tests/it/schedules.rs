@@ -3,6 +3,7 @@
 //! reduced to a small one, whose text plays again, too.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(clippy::print_stdout, reason = "a night's schedules tell what they find at once")]
 
 #[path = "schedules/play.rs"]
 mod play;

@@ -34,6 +34,7 @@ pub(super) struct RunSummary {
 }
 
 /// What is to be run.
+#[expect(clippy::large_enum_variant, reason = "there is one of it")]
 enum Subject {
     Experiment {
         script: Script,

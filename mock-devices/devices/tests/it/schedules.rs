@@ -2,6 +2,7 @@
 //! the true tip. A schedule that breaks a promise is reduced to a small one, whose text plays again.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(clippy::print_stdout, reason = "a schedule that is played again is told")]
 
 use std::fmt;
 use std::str::FromStr;
@@ -189,13 +190,11 @@ async fn perform(
     let [x_mm, y_mm] = if z_mm > 1.0 { [20.0, 15.0] } else { [x_mm, y_mm] };
     let position_mm = [x_mm, y_mm, to_z_mm];
     let moved = stage.move_to(permit(Target { position_mm, speed_mm_per_s }));
-    match timeout(Duration::from_millis(ms), moved).await {
-        Ok(result) => told_true(("move", Some(position_mm)), control, hidden_mm, &result),
-        Err(_) => {
-            stage.stop();
-            (format!("move to {position_mm:?} was stopped after {ms} ms"), None)
-        }
+    if let Ok(result) = timeout(Duration::from_millis(ms), moved).await {
+        return told_true(("move", Some(position_mm)), control, hidden_mm, &result);
     }
+    stage.stop();
+    (format!("move to {position_mm:?} was stopped after {ms} ms"), None)
 }
 
 /// A success must be true: the tip stands, and where it was told.

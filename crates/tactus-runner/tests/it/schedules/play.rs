@@ -105,7 +105,7 @@ async fn play_all(schedule: &Schedule, strictness: Strictness) -> Played {
         );
     }
     witness.check_depth();
-    let (events, broken, mut tally) = witness.into_what_was_seen();
+    let (events, broken, mut tally) = witness.what_was_seen();
     for event in events {
         writeln!(log, "{event}").unwrap();
     }

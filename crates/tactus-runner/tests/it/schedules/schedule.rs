@@ -210,7 +210,7 @@ fn earlier(at: Duration) -> impl Iterator<Item = Duration> {
 fn fewer_depths(line: &str) -> impl Iterator<Item = String> {
     let parts = line.split_once('[').and_then(|(head, rest)| {
         let (depths, tail) = rest.split_once(']')?;
-        depths.contains(", ").then(|| (head, depths, tail))
+        depths.contains(", ").then_some((head, depths, tail))
     });
     parts.into_iter().flat_map(|(head, depths, tail)| {
         depths.split(", ").map(move |depth_mm| format!("{head}[{depth_mm}]{tail}"))

@@ -149,7 +149,7 @@ impl Witness {
         Box::new(Recording(std::sync::Arc::clone(this)))
     }
 
-    pub(super) fn into_what_was_seen(&self) -> (Vec<String>, Vec<Broken>, Tally) {
+    pub(super) fn what_was_seen(&self) -> (Vec<String>, Vec<Broken>, Tally) {
         let seen = std::mem::take(&mut *self.seen());
         (seen.events, seen.broken, seen.tally)
     }
