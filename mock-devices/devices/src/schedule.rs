@@ -1,6 +1,6 @@
 //! Random schedules of faults, made from a seed.
 //!
-//! A schedule is a list of lines as in a [`FaultScript`], so that a failing one can be printed, reduced ([`shrink`]) and played
+//! A schedule is a list of lines as in a [`FaultScript`], so that a failing one can be printed, reduced ([`shrink()`]) and played
 //! again. Equal seeds give equal schedules. The faults are those that a lab can have. Some hide from the service where the tip is;
 //! [`Schedule::hidden_mm`] says by how much. Another covering or surface is left out, because no promise covers it.
 //!
