@@ -260,20 +260,34 @@ impl Play {
 
     fn on_report(&mut self, [x_mm, y_mm, z_mm]: [f64; 3], status: StageStatus) {
         self.tell(|| format!("report {:?} {status:?}", [x_mm, y_mm, z_mm]));
-        let report = StageState { x_mm, y_mm, z_mm, status: status.into(), ..Default::default() };
+        let t_mono_ns = self.now.ns();
+        let report = StageState { x_mm, y_mm, z_mm, t_mono_ns, status: status.into(), ..Default::default() };
+        let stood_mm = self.report.as_ref().and_then(standing_mm);
         let violation = self.supervisor.on_report(&report);
+        if stood_mm.is_some_and(|stood_mm| !self.stands_at(&report, stood_mm)) {
+            self.stops += 1;
+        }
         self.report = Some(report);
         self.told(violation.as_ref());
-        let is_placed = matches!(
-            status,
-            StageStatus::Idle | StageStatus::Moving | StageStatus::Hold | StageStatus::Alarm
-        );
+        let is_placed = [x_mm, y_mm, z_mm].iter().all(|mm| mm.is_finite())
+            && matches!(
+                status,
+                StageStatus::Idle | StageStatus::Moving | StageStatus::Hold | StageStatus::Alarm
+            );
         if is_placed {
             self.z_mm = Some(z_mm);
             if -z_mm > self.depth_max_mm + self.service.motion.tolerance_mm {
                 assert!(self.supervisor.fault().is_some(), "{z_mm} mm is too deep and leaves a fault");
             }
         }
+    }
+
+    /// True if the stage stands within tolerance of a place.
+    fn stands_at(&self, report: &StageState, [x_mm, y_mm, z_mm]: [f64; 3]) -> bool {
+        standing_mm(report).is_some_and(|[here_x_mm, here_y_mm, here_z_mm]| {
+            let away_mm = (here_x_mm - x_mm).hypot(here_y_mm - y_mm).hypot(here_z_mm - z_mm);
+            away_mm <= self.service.motion.tolerance_mm
+        })
     }
 
     fn on_time(&mut self) {
@@ -430,7 +444,9 @@ impl Play {
         self.keep(Leave::Homing(permit), true);
     }
 
+    /// A permit voids those before it.
     fn keep(&mut self, permit: Leave, expires: bool) {
+        self.stops += 1;
         if self.given.len() == PERMITS_MAX {
             self.given.remove(0);
         }
@@ -468,6 +484,12 @@ impl Play {
     fn silence_max_s(&self) -> f64 {
         (3.0 / RIG.array.rate_hz()).max(0.03)
     }
+}
+
+/// Where the stage stands, if it stands somewhere.
+fn standing_mm(report: &StageState) -> Option<[f64; 3]> {
+    let place_mm = [report.x_mm, report.y_mm, report.z_mm];
+    (report.status() == StageStatus::Idle && place_mm.iter().all(|mm| mm.is_finite())).then_some(place_mm)
 }
 
 fn seconds_since(now: MonoTime, last: Option<MonoTime>) -> f64 {
