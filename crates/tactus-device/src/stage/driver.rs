@@ -183,7 +183,9 @@ where
             let refuses_requests = !connected || (active.is_some() && !session.is_stopping());
             let takes_requests = refuses_requests || session.is_ready();
             let has_room = waiting.is_empty();
-            let is_watched = active.as_ref().is_some_and(|active| !active.is_abandoned);
+            // A look moves nothing.
+            let is_watched =
+                active.as_ref().is_some_and(|active| active.leave.is_some() && !active.is_abandoned);
             let is_guarded = active.is_some() && self.guard.is_guarding();
             let sign_of_life = if is_guarded { SIGN_OF_LIFE } else { SIGN_OF_LIFE_IDLE };
             actions = tokio::select! {
