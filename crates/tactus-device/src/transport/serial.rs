@@ -1,19 +1,13 @@
 //! A serial port, USB serial device or pseudo-terminal, found by its path or by its USB identity.
 
 use std::fmt;
-use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::io;
 use std::path::{Path, PathBuf};
-use std::pin::Pin;
-use std::task::{Context, Poll};
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use rustix::fs::OFlags;
 use serialport::{SerialPortInfo, SerialPortType};
 use tactus_schema::rig::SerialPort;
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio_serial::{SerialPortBuilderExt, SerialStream};
 
 use super::identity::{Candidate, the_one};
@@ -42,12 +36,10 @@ impl SerialConnector {
 
     fn open(&self) -> Result<Box<dyn ByteStream>, DeviceError> {
         let path = self.path()?;
-        // First, because the port is exclusive from then on. What is wrong with it shows below.
-        let second = open_second(&path).ok();
         match tokio_serial::new(&path, self.baud).open_native_async() {
             Ok(stream) => {
                 tracing::info!(device = %self, path, baud = self.baud, "opened");
-                Ok(Box::new(SerialLink { stream, second }))
+                Ok(Box::new(stream))
             }
             Err(error) => Err(self.explain(&path, error)),
         }
@@ -87,54 +79,8 @@ impl SerialConnector {
     }
 }
 
-/// A port, with a second way to it: the library cannot clone a stream.
-struct SerialLink {
-    stream: SerialStream,
-    second: Option<File>,
-}
-
-/// Opens a port to write only, without waiting for it, and not as the terminal that controls this process.
-fn open_second(path: &str) -> io::Result<File> {
-    let flags = OFlags::NOCTTY | OFlags::NONBLOCK;
-    let flags = i32::try_from(flags.bits()).map_err(io::Error::other)?;
-    OpenOptions::new().write(true).custom_flags(flags).open(path)
-}
-
-impl ByteStream for SerialLink {
-    fn second_writer(&self) -> Option<Box<dyn Write + Send>> {
-        let cloned = self.second.as_ref()?.try_clone();
-        let cloned = cloned.inspect_err(|error| tracing::warn!(%error, "no second way to the port"));
-        Some(Box::new(cloned.ok()?))
-    }
-}
-
-impl AsyncRead for SerialLink {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_read(context, buffer)
-    }
-}
-
-impl AsyncWrite for SerialLink {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_flush(context)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
-    }
-}
+// The library cannot clone a stream, so there is no second way to the port yet.
+impl ByteStream for SerialStream {}
 
 /// Lists all serial ports, sorted by name, without opening them.
 pub(crate) fn ports() -> io::Result<Vec<SerialPortInfo>> {
