@@ -16,8 +16,8 @@ use tactus_device::{Clock, SensorCodec};
 use tactus_engine::{Engine, Record, RecordFailure, RunOrder, RunOutcome, StopOrder, Unpublished};
 use tactus_model::Covering;
 use tactus_plan::{
-    Arguments, Call, Evaluate, Host, InThisProcess, Limits, Location, Outcome, Position, Press, RigView,
-    Script, ScriptError, Step,
+    Arguments, Call, Evaluate, Host, InThisProcess, Location, Outcome, Position, Press, RigView, Script,
+    ScriptError, ScriptLimits, Step,
 };
 use tactus_runner::{devices, embedded::Truth};
 use tactus_schema::pb::{self, ExitStatus, run_event::Event};
@@ -177,7 +177,7 @@ impl Evaluate for Steps {
         arguments: &Arguments,
         _rig: &RigView,
         _seed: u64,
-        _limits: &Limits,
+        _limits: &ScriptLimits,
         host: &mut dyn Host,
     ) -> std::result::Result<Outcome, ScriptError> {
         for (step, line) in self.0.iter().zip(1..) {
@@ -204,7 +204,7 @@ impl Evaluate for Steps {
         script: &Script,
         arguments: &Arguments,
         rig: &RigView,
-        limits: &Limits,
+        limits: &ScriptLimits,
         stopped: &dyn Fn() -> bool,
     ) -> std::result::Result<Arguments, ScriptError> {
         InThisProcess.resolve(script, arguments, rig, limits, stopped)
@@ -356,7 +356,7 @@ fn order(run: usize, steps: &[Step]) -> RunOrder {
         arguments: Arguments::default(),
         seed: 1,
         who: "any".into(),
-        limits: Limits::default(),
+        limits: ScriptLimits::default(),
         planned: None,
         versions: BTreeMap::new(),
         recording: String::new(),

@@ -7,19 +7,19 @@ use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
 use tactus_plan::{
-    Arguments, Call, Exceeded, Host, LOG_LINE_MAX_BYTES, Limits, MeanReading, Outcome, Refusal, Reply,
-    RigView, Script, ScriptError, Step, execute,
+    Arguments, Call, Exceeded, Host, LOG_LINE_MAX_BYTES, MeanReading, Outcome, Refusal, Reply, RigView,
+    Script, ScriptError, ScriptLimits, Step, execute,
 };
 use tactus_schema::Rig;
 
 /// Small, so that an endless script costs little. The evaluator looks at its loops once in a thousand turns.
-static LIMITS: LazyLock<Limits> = LazyLock::new(|| Limits {
+static LIMITS: LazyLock<ScriptLimits> = LazyLock::new(|| ScriptLimits {
     ticks: 4_000,
     heap_bytes: 16 << 20,
     steps: 200,
     log_bytes: 16 << 10,
     think: Duration::from_secs(5),
-    ..Limits::default()
+    ..ScriptLimits::default()
 });
 
 /// Elements of a reading.

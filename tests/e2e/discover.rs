@@ -222,9 +222,9 @@ fn lost_motion_and_hysteresis_are_undecided_by_the_papers_corners_and_decided_by
     let said = tactus(folder, &[&corners[..], &rig].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
     let recording = said.json()["recording"].as_str().unwrap().to_owned();
-    // The seed draws the held-out presses. Of the seeds 1, 3, 4 and 5, under 1 it is decided before, and under 4 by one round.
+    // The seed draws the held-out presses. Of the seeds 1 to 6, one round decides under 1, 2 and 5.
     let active =
-        ["--json", "discover", &recording, "--active", "--rounds", "1", "--budget-min", "3", "--seed", "4"];
+        ["--json", "discover", &recording, "--active", "--rounds", "1", "--budget-min", "3", "--seed", "1"];
     let said = tactus(folder, &[&active[..], &rig].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
     let report = said.json();

@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rustix::process::Signal;
 use tactus_e2e::{ServiceUnderTest, binary, tactus};
 use tactus_plan::{
-    Arguments, Call, Evaluate, Exceeded, Host, Limits, Refusal, Reply, RigView, Script, ScriptError, Step,
+    Arguments, Call, Evaluate, Exceeded, Host, Refusal, Reply, RigView, Script, ScriptError, ScriptLimits,
+    Step,
 };
 use tactus_runner::embedded::SIMULATED_RIG;
 use tactus_runner::script_process::ScriptProcesses;
@@ -56,7 +57,7 @@ impl Host for Counting {
     }
 }
 
-fn execute(body: &str, limits: &Limits, stops_after: u64) -> (Result<(), ScriptError>, u64) {
+fn execute(body: &str, limits: &ScriptLimits, stops_after: u64) -> (Result<(), ScriptError>, u64) {
     let mut host = Counting { steps: 0, stops: AtomicBool::new(false), stops_after };
     let view = RigView::of(&Rig::from_toml(SIMULATED_RIG).unwrap());
     let processes = ScriptProcesses::of(binary("tactus"));
@@ -67,9 +68,17 @@ fn execute(body: &str, limits: &Limits, stops_after: u64) -> (Result<(), ScriptE
 #[test]
 fn every_bomb_names_the_limit_that_it_ran_into() {
     let [memory, stack, stuck, turns] = BOMBS.map(|(_, body)| body);
-    let hasty = Limits { think: std::time::Duration::from_millis(100), ticks: u64::MAX, ..Limits::default() };
-    let brief = Limits { processor: std::time::Duration::from_secs(1), ticks: u64::MAX, ..Limits::default() };
-    let whole = Limits::default();
+    let hasty = ScriptLimits {
+        think: std::time::Duration::from_millis(100),
+        ticks: u64::MAX,
+        ..ScriptLimits::default()
+    };
+    let brief = ScriptLimits {
+        processor: std::time::Duration::from_secs(1),
+        ticks: u64::MAX,
+        ..ScriptLimits::default()
+    };
+    let whole = ScriptLimits::default();
     for (body, limits, exceeded) in [
         (memory, &whole, Exceeded::Process(whole.process_bytes)),
         (stack, &whole, Exceeded::Stack(64 << 20)),
@@ -87,7 +96,7 @@ fn every_bomb_names_the_limit_that_it_ran_into() {
 
 #[test]
 fn steps_and_their_results_go_there_and_back() {
-    let (ended, steps) = execute("for n in range(500):\n    log(n)", &Limits::default(), u64::MAX);
+    let (ended, steps) = execute("for n in range(500):\n    log(n)", &ScriptLimits::default(), u64::MAX);
     assert_eq!((ended, steps), (Ok(()), 500));
 }
 
@@ -95,7 +104,7 @@ fn steps_and_their_results_go_there_and_back() {
 fn a_script_is_stopped_in_the_middle_of_one_operation() {
     let [_, _, (_, stuck), _] = BOMBS;
     // Its time is not over for an hour.
-    let patient = Limits { think: std::time::Duration::from_hours(1), ..Limits::default() };
+    let patient = ScriptLimits { think: std::time::Duration::from_hours(1), ..ScriptLimits::default() };
     let (ended, steps) = execute(stuck, &patient, 1);
     assert!(matches!(ended, Err(ScriptError::Refused { refusal: Refusal::Stopped(_), .. })), "{ended:?}");
     assert_eq!(steps, 1);

@@ -44,9 +44,9 @@ struct Got {
     last_seq: u64,
     frames: u64,
     lost_before: u64,
-    /// Least of arrival - device time of the present minute, in ns, by the service's clock.
-    offset_ns: i64,
-    /// The same of the first minute.
+    /// Least of arrival - device time since the last sample, in ns, by the service's clock; `None` before a frame.
+    offset_ns: Option<i64>,
+    /// The same of the first sample.
     first_offset_ns: Option<i64>,
 }
 
@@ -90,7 +90,7 @@ fn memory_frames_and_clock_hold_as_long_as_the_service_runs() {
     // The clocks are compared from the next sample on: this one has seen a few frames only.
     got.lock().unwrap().first_offset_ns = None;
     let (mut warm, mut next) = (first, begin + period);
-    loop {
+    let last = loop {
         let now = Instant::now();
         if now >= next || now >= begin + whole {
             let sample = sample(&mut bench, &got, runs);
@@ -100,7 +100,7 @@ fn memory_frames_and_clock_hold_as_long_as_the_service_runs() {
             }
             next += period;
             if now >= begin + whole {
-                break;
+                break sample;
             }
         }
         if !is_running(&bench) {
@@ -113,8 +113,7 @@ fn memory_frames_and_clock_hold_as_long_as_the_service_runs() {
             }
         }
         bench.stage.watch((now + Duration::from_secs(1)).min(begin + whole), |_, _| {});
-    }
-    let last = sample(&mut bench, &got, runs);
+    };
     assert_eq!(self::unseen(&mut bench), unseen, "frames that were sent and not received");
     assert_eq!((last.lost - first.lost, last.got.missing()), (0, 0), "{last:?}");
     let reply = bench.until("an answer", |_| true);
@@ -140,12 +139,11 @@ impl Got {
         let offset_ns = received_ns - i64::try_from(frame.device_tick.unwrap_or(0)).unwrap() * 1_000_000;
         if self.frames == 0 {
             self.first_seq = frame.seq;
-            self.offset_ns = offset_ns;
         }
         self.last_seq = frame.seq;
         self.frames += 1;
         self.lost_before += u64::from(frame.lost_before);
-        self.offset_ns = self.offset_ns.min(offset_ns);
+        self.offset_ns = Some(self.offset_ns.map_or(offset_ns, |least| least.min(offset_ns)));
     }
 
     /// Frames that the sensor took and the subscriber never got.
@@ -155,8 +153,12 @@ impl Got {
 }
 
 impl Sample {
+    /// NaN if no frame came since the sample before.
     fn drift_ms(&self) -> f64 {
-        (self.got.offset_ns - self.got.first_offset_ns.unwrap_or(self.got.offset_ns)) as f64 * 1e-6
+        let Got { offset_ns: Some(offset_ns), first_offset_ns: Some(first_offset_ns), .. } = self.got else {
+            return f64::NAN;
+        };
+        (offset_ns - first_offset_ns) as f64 * 1e-6
     }
 
     fn print(&self, elapsed: Duration, first: &Self) {
@@ -183,11 +185,10 @@ fn sample(bench: &mut Bench, got: &Mutex<Got>, runs: u64) -> Sample {
     let health = reply.health.unwrap();
     let got = {
         let mut got = got.lock().unwrap();
-        let offset_ns = got.offset_ns;
-        got.first_offset_ns.get_or_insert(offset_ns);
+        got.first_offset_ns = got.first_offset_ns.or(got.offset_ns);
         let now = *got;
         // The next sample has the least of its own time.
-        got.offset_ns = i64::MAX;
+        got.offset_ns = None;
         now
     };
     Sample {

@@ -52,6 +52,10 @@ MUTANTS = [
     ("a permit outlives the place", SAFETY + "supervisor.rs", "&& !self.stands_at(stood_mm)", "&& false", "tactus-safety"),
     ("an old report of the stage is believed", SAFETY + "supervisor.rs", "self.check_report(now)?;", "", "tactus-safety"),
     ("an element that is not read has no limit", SAFETY + "force.rs", "if let Some(element) = (0..zero.len().max(1)).find(is_unread) {", "if let Some(element) = (0..0).find(is_unread) {", "tactus-safety"),
+    ("a failed reset forgets that the tip is not up", SAFETY + "supervisor.rs", "if let Some(fault) = self.not_retracted.take() {", "if let Some(fault) = self.not_retracted.take().filter(|_| false) {", "tactus-safety"),
+    ("a frame that reads nothing is believed", SAFETY + "force.rs", "        let unwatched = &self.rig.unwatched;\n", "        self.last_frame = Some(at);\n        let unwatched = &self.rig.unwatched;\n", "tactus-safety"),
+    ("a thinner covering counts only once it is confirmed", ENGINE + "run/steps.rs", "let is_thinner = thickness_mm <= before.thickness_mm;", "let is_thinner = thickness_mm < 0.0;", "tactus-engine"),
+    ("stops hold the rising tip", ENGINE + "engine.rs", "if !self.shared.way_up().outlasts_stop(self.shared.clock.now().mono) {", "if true {", "tactus-engine"),
     ("a thick covering must be felt like a thin one", SAFETY + "contact.rs", ".powi(2).min(1.0)", ".powi(2).clamp(1.0, 1.0)", "tactus-safety"),
 ]
 

@@ -160,7 +160,7 @@ impl Socket {
     }
 }
 
-/// Waits for one datagram; `None` if it is no stop for this rig.
+/// Waits for one datagram; `None` if it is not a stop for this rig.
 fn receive(socket: &Socket, rig: &str) -> Option<(Request, Sender)> {
     let mut bytes = [0; BYTES_MAX];
     match socket.receive(&mut bytes) {
@@ -179,7 +179,7 @@ fn receive(socket: &Socket, rig: &str) -> Option<(Request, Sender)> {
     }
 }
 
-/// The rig and the request of a datagram; `None` if it is no stop.
+/// The rig and the request of a datagram; `None` if it is not a stop.
 fn parse(datagram: &[u8]) -> Option<(&[u8], pb::CommandRequest)> {
     let rest = datagram.strip_prefix(START)?;
     let end = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());

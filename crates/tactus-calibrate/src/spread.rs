@@ -215,7 +215,10 @@ impl<'a> SigmaSearch<'a> {
             }
         }
         if search.images.len() < PLACES_LEAST {
-            return Err(format!("{} images are left; it takes {PLACES_LEAST}", search.images.len()));
+            return Err(format!(
+                "only {} images are left; the fit needs {PLACES_LEAST}",
+                search.images.len()
+            ));
         }
         Ok(search)
     }

@@ -43,7 +43,7 @@ pub trait Stage: Send + Sync {
     /// are accepted once the stage stands still.
     fn stop(&self);
 
-    /// Says that somebody still watches the stage. A stage that was watched once and is not watched for 100 ms while it
+    /// Says that somebody still watches the stage. A stage that was watched once and is not watched for 80 ms while it
     /// moves is stopped; its command ends with [`StageError::Unwatched`].
     fn watch(&self);
 
@@ -106,9 +106,9 @@ pub enum StageError {
     /// The permit was void before the command was sent.
     #[error(transparent)]
     Void(#[from] Void),
-    /// Nobody watched the stage for 100 ms.
+    /// Nobody watched the stage for 80 ms.
     #[error(
-        "the stage was stopped at {position_mm:?} mm: the frames and the stage were not watched for 0.1 s"
+        "the stage was stopped at {position_mm:?} mm: the frames and the stage were not watched for 0.08 s"
     )]
     Unwatched { position_mm: [f64; 3] },
     /// The link or the device failed.

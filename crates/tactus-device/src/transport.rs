@@ -25,7 +25,8 @@ pub mod usb;
 
 /// A stream of bytes to and from a device.
 pub trait ByteStream: AsyncRead + AsyncWrite + Unpin + Send {
-    /// A second way to write to the device, for another thread, which never blocks; `None` if there is none.
+    /// A second way to write to the device, for another thread; `None` if there is none. It keeps nothing back, and a write
+    /// waits 10 ms at most.
     fn second_writer(&self) -> Option<Box<dyn Write + Send>> {
         None
     }

@@ -231,12 +231,20 @@ fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> 
     (0..count).map(|k| least * ratio.powf((k as f64 + 0.5) / count as f64)).collect()
 }
 
-/// A pair's term at the end of its range: the element answers for the other alone.
+/// A pair's term at the end of its range: the element answers for the other alone. One that is paired with itself answers for
+/// nothing.
 fn crossed(mut pair: Term) -> Term {
+    // Elements are whole numbers.
+    let is_same = |first: usize, second: usize| (pair.values[first] - pair.values[second]).abs() < 0.5;
+    let is_dead = matches!(elements(&pair)[..], [first, second] if is_same(first, second));
     for (known, value) in pair.definition.parameters.iter().zip(&mut pair.values) {
         if known.kind == ParameterKind::Real {
             let [least, most] = known.range;
-            *value = if known.neutral == 0.0 { most } else { least + 0.02 * (known.neutral - least) };
+            *value = match known.neutral {
+                0.0 if is_dead => 0.0,
+                0.0 => most,
+                neutral => least + 0.02 * (neutral - least),
+            };
         }
     }
     pair
@@ -244,14 +252,13 @@ fn crossed(mut pair: Term) -> Term {
 
 fn wired(definition: &'static Definition, pair: [usize; 2]) -> Option<Term> {
     let mut term = Term::neutral(definition);
-    let places: Vec<usize> = definition
-        .parameters
-        .iter()
-        .enumerate()
-        .filter(|(_, known)| known.kind == ParameterKind::Element)
-        .map(|(place, _)| place)
-        .collect();
-    let [first, second] = <[usize; 2]>::try_from(places).ok()?;
+    let [first, second] = <[usize; 2]>::try_from(elements(&term)).ok()?;
     (term.values[first], term.values[second]) = (pair[0] as f64, pair[1] as f64);
     Some(term)
+}
+
+/// Which parameters of a term are elements.
+fn elements(term: &Term) -> Vec<usize> {
+    let parameters = term.definition.parameters.iter().enumerate();
+    parameters.filter(|(_, known)| known.kind == ParameterKind::Element).map(|(place, _)| place).collect()
 }

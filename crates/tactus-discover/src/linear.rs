@@ -6,7 +6,7 @@ use crate::noise::median;
 use crate::predictor::Parameters;
 use crate::random_walk::Baselines;
 
-/// Range of an element's recalibrated gain relative to the declared one, as a ratio to the array's typical value. An element
+/// Range of an element's recalibrated gain relative to the declared one, as a share of the array's typical value. An element
 /// outside has another fault than a different gain.
 const GAIN_RATIOS: [f64; 2] = [0.25, 4.0];
 /// A gain within this share of an end of the range counts as at the end.
@@ -47,26 +47,24 @@ impl<'a> Problem<'a> {
         }
         let pinned = self.pinned(at);
         for (squares, pinned) in by_gain_squares.iter_mut().zip(&pinned) {
-            if *pinned || *squares * GAIN_ERROR_MAX * GAIN_ERROR_MAX < 1.0 {
+            if pinned.is_some() || *squares * GAIN_ERROR_MAX * GAIN_ERROR_MAX < 1.0 {
                 *squares = 0.0;
             }
         }
         Ok(Linear { problem: self, baselines, by_gain, by_gain_taken, by_gain_squares })
     }
 
-    /// Elements whose gain is at an end of its range. It stays there, and an effect may explain the rest.
-    fn pinned(&self, at: &Parameters) -> Vec<bool> {
+    /// The shares of the elements whose gain is at an end of its range. Each stays there, whatever becomes of the typical gain,
+    /// and an effect may explain the rest.
+    fn pinned(&self, at: &Parameters) -> Vec<Option<f64>> {
         let declared = &self.predictor.known.response.sensitivity_counts_per_mm;
         let ratios: Vec<f64> =
             at.sensitivity.iter().zip(declared).map(|(now, declared)| now / declared).collect();
         let typical = median(&ratios);
-        ratios
-            .iter()
-            .map(|ratio| {
-                let share = ratio / typical;
-                share <= GAIN_RATIOS[0] * (1.0 + PIN_MARGIN) || share >= GAIN_RATIOS[1] * (1.0 - PIN_MARGIN)
-            })
-            .collect()
+        let [least, most] = GAIN_RATIOS;
+        let is_at_an_end =
+            |share: &f64| *share <= least * (1.0 + PIN_MARGIN) || *share >= most * (1.0 - PIN_MARGIN);
+        ratios.iter().map(|ratio| Some(ratio / typical).filter(is_at_an_end)).collect()
     }
 }
 
@@ -122,11 +120,13 @@ impl Linear<'_> {
         let typical = if ratios.is_empty() { 1.0 } else { median(&ratios) };
         let pinned = self.problem.pinned(parameters);
         let mut taken = vec![0.0; elements];
-        for element in (0..elements).filter(|element| !pinned[*element]) {
+        for element in 0..elements {
             let now = parameters.sensitivity[element];
             let bounds = GAIN_RATIOS.map(|ratio| ratio * typical * declared[element]);
             let (least, most) = (bounds[0].min(bounds[1]), bounds[0].max(bounds[1]));
-            let wanted = if self.by_gain_squares[element] > 0.0 {
+            let wanted = if let Some(share) = pinned[element] {
+                share * typical * declared[element]
+            } else if self.by_gain_squares[element] > 0.0 {
                 now * (1.0 + shares[element])
             } else {
                 typical * declared[element]

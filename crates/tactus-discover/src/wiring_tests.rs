@@ -35,3 +35,21 @@ fn both_of_the_papers_faulty_elements_are_found_beside_other_effects() {
     elements.sort_by(f64::total_cmp);
     assert_eq!(elements, [18.0, 22.0]);
 }
+
+/// A tool of another size changes all signals alike; a dead element is no share of that.
+#[test]
+fn dead_elements_are_named_and_not_taken_for_a_tool_of_another_size() {
+    let known = known();
+    let dead = |element: f64| {
+        let parameters =
+            [("element", element), ("answers_for", element), ("own_share", 0.0), ("other_share", 0.0)];
+        Effect::new("miswired", parameters).unwrap()
+    };
+    let noise = processes(ELEMENTS, 2.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(2));
+    let found = found(&known, &measured(&known, &[dead(5.0), dead(39.0)], &noise));
+    let names: Vec<&str> = found.steps.iter().map(|step| step.effect).collect();
+    assert_eq!((names, found.verdict), (vec!["miswired"], Verdict::Explained));
+    let mut elements: Vec<f64> = found.steps[0].terms.iter().map(|term| term[0].value).collect();
+    elements.sort_by(f64::total_cmp);
+    assert_eq!(elements, [5.0, 39.0]);
+}

@@ -32,7 +32,7 @@ const TICKS_PER_STATE: u64 = 15;
 /// Longest time until a question is answered: whoever asks must not hang with the task.
 const ANSWER_MAX: Duration = Duration::from_secs(2);
 
-/// Questions that may wait for the task. Who asks then waits for room.
+/// Questions that may wait for the task. If there are more, the asking task waits.
 const QUESTIONS_MAX: usize = 64;
 
 /// State that each frame and stage report passes through, owned by the acquisition task.
@@ -60,6 +60,13 @@ struct Recording {
     run_id: String,
     event_seq: u64,
     failure: Option<RecordFailure>,
+}
+
+/// What a run leaves.
+pub(crate) struct Ended {
+    pub(crate) finished: pb::RunFinished,
+    /// To be closed; and why it failed, if it did.
+    pub(crate) recording: Option<(Box<dyn Record>, Option<RecordFailure>)>,
 }
 
 /// Something that the task does for somebody else, between two frames.
@@ -325,7 +332,7 @@ impl Acquisition {
         average
     }
 
-    /// Records everything from now on into `sink`, until [`Self::take_recording`].
+    /// Records everything from now on into `sink`, until [`Self::end`].
     pub(crate) fn open_recording(&mut self, sink: Box<dyn Record>, run_id: String) {
         let now = self.shared.clock.now();
         let report = *self.shared.stage.state().borrow();
@@ -338,9 +345,14 @@ impl Acquisition {
         });
     }
 
-    /// Ends the recording: what remains is to close it, which may take long; or why it failed.
-    pub(crate) fn take_recording(&mut self) -> Option<(Box<dyn Record>, Option<RecordFailure>)> {
-        self.recording.take().map(|recording| (recording.sink, recording.failure))
+    /// Ends the run: nothing is permitted to it any more, and `finished` is the last that its recording takes, with the counts
+    /// of what it holds. It remains to close the recording, which may take long.
+    pub(crate) fn end(&mut self, finished: impl FnOnce(Tally) -> pb::RunFinished) -> Ended {
+        self.supervisor.end();
+        let finished = finished(self.tally);
+        self.emit(pb::run_event::Event::Finished(finished.clone()));
+        let recording = self.recording.take().map(|recording| (recording.sink, recording.failure));
+        Ended { finished, recording }
     }
 
     /// Records and publishes an event of the run in progress.

@@ -2,7 +2,8 @@
 
 use std::fmt;
 use std::io;
-use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use tactus_device::{Clock, Sensor, Stage, StageError};
@@ -14,6 +15,7 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 
 use crate::acquisition::{Gone, Mailbox, acquire, mailbox};
+use crate::motion::WayUp;
 use crate::outlet::{Publish, Record};
 use crate::run::{Broken, Ending, Run, RunOrder, RunOutcome, rescue};
 
@@ -166,6 +168,9 @@ pub(crate) struct Shared {
     pub(crate) covering: watch::Sender<Covering>,
     pub(crate) acquisition: Mailbox,
     permits: Revocation,
+    way_up: Mutex<WayUp>,
+    /// A thinner covering was asked for, and nobody has confirmed yet that it is in place.
+    pub(crate) is_covering_asked: AtomicBool,
 }
 
 /// Requests to the run in progress.
@@ -250,6 +255,8 @@ impl Engine {
             covering: watch::Sender::new(covering),
             acquisition: mailbox,
             permits: supervisor.revocation(),
+            way_up: Mutex::default(),
+            is_covering_asked: AtomicBool::new(false),
         });
         let acquiring =
             acquire(Arc::clone(&shared), supervisor, questions, devices.sensor, devices.stage_reports);
@@ -296,6 +303,9 @@ impl Engine {
 
     /// Stops motion at once and ends the run in progress or in preparation, if there is one. Does not wait.
     ///
+    /// While the tip rises after a stop, straight up, it is stopped once a second at most: stops without end would hold it in
+    /// contact.
+    ///
     /// Returns true if there was one.
     pub fn stop(&self, order: StopOrder) -> bool {
         // Set the reason before the stop: a move checks the reason after it has joined the stop order.
@@ -303,7 +313,9 @@ impl Engine {
         if claimed {
             self.shared.end(Ending::Stop(order));
         }
-        self.shared.stop_motion();
+        if !self.shared.way_up().outlasts_stop(self.shared.clock.now().mono) {
+            self.shared.stop_motion();
+        }
         claimed
     }
 
@@ -466,7 +478,7 @@ impl From<Broken> for ResetError {
             | Broken::FramesLost(_)
             | Broken::Disturbed
             | Broken::SensorSilent(_)
-            | Broken::StageSilent(_)
+            | Broken::StageSilent(..)
             | Broken::Script(_)
             | Broken::Refused(_) => Self::NotReady(broken.to_string()),
         }
@@ -490,8 +502,15 @@ impl Shared {
         self.stage.state().borrow().status()
     }
 
+    /// What is known of the tip's way up.
+    pub(crate) fn way_up(&self) -> MutexGuard<'_, WayUp> {
+        // What a panic left is as good as what was there before.
+        self.way_up.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Stops motion now and voids all permits. Never waits.
     pub(crate) fn stop_motion(&self) {
+        self.way_up().stopped(self.clock.now().mono);
         self.permits.revoke();
         self.stage.stop();
     }

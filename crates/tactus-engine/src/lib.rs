@@ -22,6 +22,6 @@ pub use engine::{
     ResumeError, StopOrder, Stopped,
 };
 pub use envelope::{Bounds, Outside};
-pub use outlet::{Publish, Record, RecordFailure, Unpublished};
+pub use outlet::{Publish, Record, RecordFailure, Unpublished, Unrecorded};
 pub use run::{DoneStep, EarlierRun, Planned, RunOrder, RunOutcome};
 pub use tactus_safety::{Fault, Violation};

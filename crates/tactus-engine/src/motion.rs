@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use tactus_device::{StageError, Target};
 use tactus_safety::{Denied, Permit, SAME_HEIGHT_MM, STEP_DOWN_MAX_MM, Void};
+use tactus_schema::MonoTime;
 use tactus_schema::pb::StageStatus;
 use tokio::time::{sleep, timeout};
 
@@ -27,6 +28,43 @@ const HOMINGS_MAX: u32 = 4;
 
 /// Longest time to wait for a permit that the next frame or report may bring.
 const PERMIT_PATIENCE: Duration = Duration::from_secs(5);
+
+/// Least time between two stops of a rising tip.
+const STOP_OF_RISE_EVERY: Duration = Duration::from_secs(1);
+
+/// Whether the tip rises, and when it was last stopped.
+#[derive(Debug, Default)]
+pub(crate) struct WayUp {
+    is_under_way: bool,
+    stopped: Option<MonoTime>,
+}
+
+/// The tip rises as long as this lives.
+struct Rising<'a>(&'a Shared);
+
+impl WayUp {
+    /// True if a stop must wait for its turn, so that the tip gets up.
+    pub(crate) fn outlasts_stop(&self, now: MonoTime) -> bool {
+        self.is_under_way && self.stopped.is_some_and(|stopped| now.since(stopped) < STOP_OF_RISE_EVERY)
+    }
+
+    pub(crate) fn stopped(&mut self, now: MonoTime) {
+        self.stopped = Some(now);
+    }
+}
+
+impl<'a> Rising<'a> {
+    fn begin(shared: &'a Shared) -> Self {
+        shared.way_up().is_under_way = true;
+        Self(shared)
+    }
+}
+
+impl Drop for Rising<'_> {
+    fn drop(&mut self) {
+        self.0.way_up().is_under_way = false;
+    }
+}
 
 impl Shared {
     /// The confirmed position, robot frame.
@@ -96,6 +134,7 @@ impl Shared {
     /// Returns the height reached, or why the tip could not be retracted.
     pub(crate) async fn retract(&self) -> Result<f64, Broken> {
         let (mut troubles, mut stops) = (0, 0);
+        let _rising = Rising::begin(self);
         loop {
             self.stand_still().await;
             let error = match self.rise().await {
@@ -224,6 +263,15 @@ impl Shared {
         Ok(self.stage.state().borrow().epoch)
     }
 
+    /// Retracts the tip. If that fails, it is a fault until the next reset, and told loudly.
+    pub(crate) async fn retract_or_latch(&self) -> Result<f64, Broken> {
+        let retracted = self.retract().await;
+        if let Err(broken) = &retracted {
+            self.latch_not_retracted(broken.to_string()).await;
+        }
+        retracted
+    }
+
     /// Waits until the stage answers again, as long as the rig's policy allows.
     async fn stage_returns(&self) {
         let patience = Duration::from_millis(self.service.policy.reconnect_ms.into());
@@ -241,7 +289,7 @@ impl Shared {
             !matches!(report.status(), StageStatus::Moving | StageStatus::Hold | StageStatus::Homing)
         });
         if timeout(STANDSTILL, standing).await.is_err() {
-            tracing::warn!("the stage did not come to a stand within {STANDSTILL:?}");
+            tracing::warn!("the stage did not come to a standstill within {STANDSTILL:?}");
         }
     }
 }

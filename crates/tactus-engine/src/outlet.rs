@@ -85,3 +85,33 @@ impl Publish for Unpublished {
     fn state(&self, _: &pb::RunState) {}
     fn safety(&self, _: &pb::SafetyEvent) {}
 }
+
+/// Takes what a recording takes, and keeps none of it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unrecorded;
+
+impl Record for Unrecorded {
+    fn sensor_info(&mut self, _: &pb::SensorInfo, _: TimeStamp) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn frame(&mut self, _: &Frame) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn stage(&mut self, _: &pb::StageState) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn event(&mut self, _: &pb::RunEvent) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn safety(&mut self, _: &pb::SafetyEvent) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
+        Ok(())
+    }
+}

@@ -16,7 +16,7 @@ impl Shared {
         if self.status() == StageStatus::Idle {
             // A tip that is too deep, or under a sensor that is silent, breaks a rule at once: up first, which is always
             // permitted.
-            self.retract().await?;
+            self.retract_or_latch().await?;
             self.control.send_modify(|control| {
                 control.ending.take_if(|ending| matches!(ending, Ending::Safety(_)));
             });
@@ -28,7 +28,7 @@ impl Shared {
             self.stage.clear_alarm().await?;
         }
         self.home().await?;
-        self.retract().await?;
+        self.retract_or_latch().await?;
         self.wait_for_sensor().await.map_err(not_ready)?;
         self.check_ended()?;
         self.finish_reset().await?.map_err(|denied| ResetError::NotReady(denied.to_string()))
@@ -41,7 +41,7 @@ impl Shared {
             info!("homing the stage");
             self.home().await?;
         }
-        self.retract().await?;
+        self.retract_or_latch().await?;
         Ok(self.finish_reset().await??)
     }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tactus_plan::{Arguments, Evaluate, Limits, RigView, Script};
+use tactus_plan::{Arguments, Evaluate, RigView, Script, ScriptLimits};
 use tactus_safety::Fault;
 use tactus_schema::table::Phase;
 use tactus_schema::{MonoTime, pb};
@@ -16,13 +16,13 @@ use tokio::task::{JoinError, spawn_blocking};
 use tokio::time::timeout;
 use tracing::{error, info};
 
-use crate::acquisition::Acquisition;
+use crate::acquisition::{Acquisition, Ended, Tally};
 use crate::engine::Shared;
 use crate::envelope::Bounds;
 use crate::outlet::{Record, RecordFailure};
 use crate::script::{self, Request};
 pub(crate) use broken::{Broken, Ending};
-use broken::{refusal, verdict};
+use broken::{done, refusal, verdict};
 use pb::run_event::Event;
 use replay::Replay;
 pub use replay::{DoneStep, EarlierRun};
@@ -48,7 +48,7 @@ pub struct RunOrder {
     /// Who asked for it.
     pub who: String,
     /// Bounds of the script's steps, time and memory.
-    pub limits: Limits,
+    pub limits: ScriptLimits,
     /// Where the script is evaluated.
     pub evaluator: Arc<dyn Evaluate>,
     /// The earlier run that this one goes on with. Script, arguments and seed are those of it.
@@ -292,12 +292,11 @@ impl Run {
     /// Retracts the tip and records the outcome. A tip that cannot be retracted is a fault until the next reset.
     async fn clean_up(&mut self) -> Result<f64, Broken> {
         self.set_phase(Phase::Retract, self.phase.map_or(-1, |(_, press)| press)).await;
-        let retracted = self.shared.retract().await;
+        let retracted = self.shared.retract_or_latch().await;
         self.set_phase(Phase::Idle, -1).await;
         let cleanup = match &retracted {
             Ok(z_mm) => pb::Cleanup { retracted: true, z_mm: *z_mm, detail: String::new() },
             Err(broken) => {
-                self.shared.latch_not_retracted(broken.to_string()).await;
                 let z_mm = self.shared.position_mm()[2];
                 pb::Cleanup { retracted: false, z_mm, detail: broken.to_string() }
             }
@@ -308,39 +307,42 @@ impl Run {
 
     /// Closes the recording and returns the outcome.
     async fn conclude(self, result: &Result<(), Broken>, retracted: Result<f64, Broken>) -> RunOutcome {
-        // After this nothing is permitted to this run.
-        let tally = self.shared.acquisition.ask(|live| {
-            live.supervisor.end();
-            live.tally
-        });
-        let tally = tally.await.unwrap_or_default();
-        let (mut exit_status, mut message) = verdict(result, tally.frames_lost);
-        if let Err(error) = retracted {
-            exit_status = pb::ExitStatus::Failed;
-            message = format!("{message}; THE TIP IS NOT RETRACTED: {error}");
-        }
         let duration_s = self.shared.clock.now().mono.since(self.started).as_secs_f64();
-        self.emit(Event::Finished(pb::RunFinished {
-            exit_status: exit_status.into(),
-            message: message.clone(),
-            frames: tally.frames,
-            frames_lost: tally.frames_lost,
+        let uncounted = pb::RunFinished {
             presses: self.presses,
             dwells: self.dwells,
             duration_s,
-        }))
-        .await;
-        if let Err(failure) = self.shared.close_recording().await {
-            exit_status = pb::ExitStatus::Failed;
-            message = failure.to_string();
-        }
+            ..pb::RunFinished::default()
+        };
+        let broken = result.as_ref().err().map(verdict);
+        let finished = {
+            let uncounted = uncounted.clone();
+            move |tally: Tally| {
+                let (mut exit_status, mut message) = broken.unwrap_or_else(|| done(tally.frames_lost));
+                if let Err(error) = retracted {
+                    exit_status = pb::ExitStatus::Failed;
+                    let before = if message.is_empty() { message } else { format!("{message}; ") };
+                    message = format!("{before}THE TIP IS NOT RETRACTED: {error}");
+                }
+                let Tally { frames, frames_lost } = tally;
+                pb::RunFinished { exit_status: exit_status.into(), message, frames, frames_lost, ..uncounted }
+            }
+        };
+        let (finished, closed) = match self.shared.acquisition.ask(|live| live.end(finished)).await {
+            Ok(Ended { finished, recording }) => (finished, close(recording).await),
+            Err(gone) => (uncounted, Err(RecordFailure(gone.into()))),
+        };
+        let (exit_status, message) = match closed {
+            Ok(()) => (finished.exit_status(), finished.message),
+            Err(failure) => (pb::ExitStatus::Failed, failure.to_string()),
+        };
         info!(run = self.order.run_id, exit_status = exit_status.as_str_name(), message, "run ends");
         self.shared.state.send_modify(|state| {
             state.phase = pb::RunPhase::Finished.into();
             state.exit_status = exit_status.into();
             state.message.clone_from(&message);
-            state.frames = tally.frames;
-            state.frames_lost = tally.frames_lost;
+            state.frames = finished.frames;
+            state.frames_lost = finished.frames_lost;
             state.elapsed_s = duration_s;
             state.remaining_s = 0.0;
         });
@@ -352,8 +354,8 @@ impl Run {
             experiment: self.order.script.name().to_owned(),
             exit_status,
             message,
-            frames: tally.frames,
-            frames_lost: tally.frames_lost,
+            frames: finished.frames,
+            frames_lost: finished.frames_lost,
             presses: self.presses,
             dwells: self.dwells,
             duration_s,
@@ -459,7 +461,7 @@ impl RunOutcome {
 
 impl Shared {
     /// Latches that the tip stays where it is, and tells it loudly.
-    async fn latch_not_retracted(&self, why: String) {
+    pub(crate) async fn latch_not_retracted(&self, why: String) {
         error!("THE TIP IS NOT RETRACTED: {why}");
         let told = self.acquisition.tell(move |live| {
             live.emit_safety(
@@ -475,22 +477,18 @@ impl Shared {
             self.fault.send_replace(Some(Fault::NotRetracted(gone.to_string())));
         }
     }
+}
 
-    /// Closes the recording on a thread of its own: a disk that hangs holds up nothing else.
-    async fn close_recording(&self) -> Result<(), RecordFailure> {
-        let recording = match self.acquisition.ask(Acquisition::take_recording).await {
-            Ok(recording) => recording,
-            Err(gone) => return Err(RecordFailure(gone.into())),
-        };
-        let Some((sink, failure)) = recording else { return Ok(()) };
-        let closed = match timeout(CLOSE_PATIENCE, spawn_blocking(move || sink.finish())).await {
-            Ok(Ok(closed)) => closed,
-            Ok(Err(panic)) => Err(RecordFailure(panic.into())),
-            Err(_) => Err(RecordFailure(
-                format!("it was not closed within {CLOSE_PATIENCE:?}: does the disk hang?").into(),
-            )),
-        };
-        // The error of the end has the final counts.
-        closed.and_then(|()| failure.map_or(Ok(()), Err))
-    }
+/// Closes a recording on a thread of its own: a disk that hangs holds up nothing else.
+async fn close(recording: Option<(Box<dyn Record>, Option<RecordFailure>)>) -> Result<(), RecordFailure> {
+    let Some((sink, failure)) = recording else { return Ok(()) };
+    let closed = match timeout(CLOSE_PATIENCE, spawn_blocking(move || sink.finish())).await {
+        Ok(Ok(closed)) => closed,
+        Ok(Err(panic)) => Err(RecordFailure(panic.into())),
+        Err(_) => Err(RecordFailure(
+            format!("it was not closed within {CLOSE_PATIENCE:?}: does the disk hang?").into(),
+        )),
+    };
+    // The error of the end has the final counts.
+    closed.and_then(|()| failure.map_or(Ok(()), Err))
 }

@@ -38,9 +38,13 @@ impl Shared {
         let answering = state.wait_for(|report| {
             !matches!(report.status(), pb::StageStatus::Unspecified | pb::StageStatus::Disconnected)
         });
-        match self.unless_ended(timeout(patience, answering)).await? {
+        if self.unless_ended(timeout(patience, answering)).await?.is_ok() {
+            return Ok(());
+        }
+        // A driver without a stage says at once why it has none.
+        match self.unless_ended(self.stage.look()).await? {
             Ok(_) => Ok(()),
-            Err(_) => Err(Broken::StageSilent(patience.as_secs_f64())),
+            Err(error) => Err(Broken::StageSilent(patience.as_secs_f64(), error)),
         }
     }
 

@@ -42,6 +42,15 @@ fn height_mm(bench: &Bench) -> f64 {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_run_without_a_stage_says_what_its_driver_knows() {
+    let bench = Bench::start(|rig| rig);
+    bench.lose_stage("$20 is 0: soft limits are off").await;
+    let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Failed);
+    assert!(outcome.message.contains("$20 is 0: soft limits are off"), "{outcome:?}");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_press_is_approached_loaded_held_unloaded_and_retracted() {
     let bench = Bench::start(|rig| rig);
     let memory = Memory::default();
@@ -164,16 +173,21 @@ async fn a_pause_comes_between_steps_with_the_tip_up_and_resuming_does_every_pre
     assert!(!bench.engine.pause("test"), "nothing runs yet");
     let run = start(&bench, PRESSES, &memory);
     until_deep(&mut bench, 0.2).await;
-    assert!(bench.engine.pause("test"));
+    assert!(bench.engine.pause("who pauses"));
     until_phase(&bench, RunPhase::Paused).await;
     assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
-    bench.engine.resume("test", None).unwrap();
+    bench.engine.resume("who resumes", None).unwrap();
     assert_eq!(bench.engine.resume("test", None), Err(ResumeError::NotPaused), "it goes on already");
     let outcome = run.await.unwrap();
     assert_eq!((outcome.exit_status, outcome.presses, outcome.dwells), (ExitStatus::Done, 3, 6));
-    let kinds = memory.kinds();
-    assert_eq!(kinds.iter().filter(|kind| matches!(kind, Event::Paused(_))).count(), 1);
-    assert_eq!(kinds.iter().filter(|kind| matches!(kind, Event::Resumed(_))).count(), 1);
+    let by = memory.kinds().into_iter().filter_map(|kind| {
+        if let Event::Paused(pb::Paused { by }) | Event::Resumed(pb::Resumed { by }) = kind {
+            Some(by)
+        } else {
+            None
+        }
+    });
+    assert_eq!(by.collect::<Vec<_>>(), ["who pauses", "who resumes"]);
 }
 
 #[tokio::test(start_paused = true)]
@@ -348,6 +362,21 @@ async fn however_often_stop_is_pressed_the_tip_ends_up() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn while_stop_is_pressed_without_end_the_tip_rises() {
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    let mut stops = 0;
+    while height_mm(&bench) < 2.0 - 1e-9 {
+        bench.engine.stop(order(false));
+        stops += 1;
+        assert!(stops < 400, "the tip is at {} mm after two seconds", height_mm(&bench));
+        tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+    }
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_stop_before_the_run_has_begun_ends_it_before_anything_moves() {
     let bench = Bench::start(|rig| rig);
     let claim = bench.engine.claim().unwrap();
@@ -369,6 +398,25 @@ async fn the_covering_in_place_stays_from_run_to_run() {
     assert!((bench.engine.rig().covering.thickness_mm - 0.5).abs() < 1e-12);
     let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
     assert_eq!(outcome.exit_status, ExitStatus::Refused, "0.4 mm is too deep under 0.5 mm: {outcome:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_thinner_covering_is_the_limit_from_when_it_is_asked_for_although_nobody_confirms_it() {
+    let note = Arc::new(Note::default());
+    let bench = Bench::with_covering_memory(|rig| rig, Some(note.clone()));
+    let thinner = "def run(rig):\n    covering(0.5)\n";
+    let run = start(&bench, thinner, &Memory::default());
+    until_phase(&bench, RunPhase::Paused).await;
+    bench.engine.stop(order(false));
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
+    assert_eq!(note.recall().unwrap(), Some(0.5), "after a restart, too");
+    let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Refused, "0.4 mm is too deep under 0.5 mm: {outcome:?}");
+
+    let run = start(&bench, thinner, &Memory::default());
+    until_phase(&bench, RunPhase::Paused).await;
+    bench.engine.resume("test", Some(0.5)).unwrap();
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Done, "it is asked for again");
 }
 
 #[tokio::test(start_paused = true)]
@@ -481,6 +529,24 @@ async fn a_dwell_in_which_the_stage_lost_its_place_is_not_told_as_done() {
     assert_eq!((outcome.exit_status, outcome.dwells), (ExitStatus::Failed, 0), "{outcome:?}");
     assert!(outcome.message.contains("did not stand still"), "{}", outcome.message);
     assert!(!memory.kinds().iter().any(|kind| matches!(kind, Event::DwellDone(_))));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_step_in_which_the_stage_lost_its_place_is_not_told_as_done() {
+    for step in ["dwell(60)", "read(60)", "tare(60)"] {
+        let mut bench = Bench::start(|rig| rig);
+        let memory = Memory::default();
+        let script = format!("def run(rig):\n    move(5.0, 5.0, height_mm = 1.0)\n    {step}\n");
+        let run = start(&bench, &script, &memory);
+        bench.stage.wait_for(|stage| (stage.z_mm - 1.0).abs() < 1e-9).await.unwrap();
+        tokio::time::sleep(std::time::Duration::from_secs(30)).await;
+        bench.trouble.lock().unwrap().epoch += 1;
+        let outcome = run.await.unwrap();
+        assert_eq!(outcome.exit_status, ExitStatus::Failed, "{step}: {outcome:?}");
+        assert!(outcome.message.contains("did not stand still"), "{step}: {}", outcome.message);
+        let done = |kind: &Event| matches!(kind, Event::ReadDone(_) | Event::TareDone(_));
+        assert!(!memory.kinds().iter().any(done), "{step}");
+    }
 }
 
 /// Remembers in memory.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::script::resolve;
-use crate::{Limits, Parameter, RigView, Script, ScriptError, json_text};
+use crate::{Parameter, RigView, Script, ScriptError, ScriptLimits, json_text};
 
 /// Values by parameter name: those that differ from the defaults, or all of them once resolved.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -57,7 +57,7 @@ impl Arguments {
     /// [`ScriptError::Argument`] names a parameter that does not exist (and those that do), or whose value has
     /// the wrong type or is out of range; other errors if the script's top level fails.
     pub fn resolve(&self, script: &Script, rig: &RigView) -> Result<Self, ScriptError> {
-        resolve(script, self, rig, &Limits::default(), &|| false)
+        resolve(script, self, rig, &ScriptLimits::default(), &|| false)
     }
 
     /// A JSON object with the values in the order of their names.

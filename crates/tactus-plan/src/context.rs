@@ -37,7 +37,7 @@ pub(crate) struct Watch {
 pub(crate) enum Stop {
     /// The host cancelled.
     Cancelled = 1,
-    /// [`Limits::think`](crate::Limits::think) is over.
+    /// [`ScriptLimits::think`](crate::ScriptLimits::think) is over.
     Think = 2,
 }
 

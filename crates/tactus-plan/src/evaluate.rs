@@ -12,7 +12,8 @@ use starlark::{Error, ErrorKind};
 use crate::builtins::{rig_value, to_json};
 use crate::context::{self, EvaluationContext, Halt, Message, ScriptSection, Watch};
 use crate::{
-    Arguments, Exceeded, Limits, Location, Parameter, Refusal, Reply, RigView, Script, ScriptError, sandbox,
+    Arguments, Exceeded, Location, Parameter, Refusal, Reply, RigView, Script, ScriptError, ScriptLimits,
+    sandbox,
 };
 
 /// Purpose of an evaluation.
@@ -33,7 +34,7 @@ pub(crate) struct Job {
     pub(crate) script: Script,
     pub(crate) arguments: Arguments,
     pub(crate) rig: RigView,
-    pub(crate) limits: Limits,
+    pub(crate) limits: ScriptLimits,
     pub(crate) purpose: Purpose,
     pub(crate) watch: Arc<Watch>,
     pub(crate) calls: SyncSender<Message>,

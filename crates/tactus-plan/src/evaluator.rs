@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::script::resolve;
-use crate::{Arguments, Host, Limits, Outcome, RigView, Script, ScriptError, execute};
+use crate::{Arguments, Host, Outcome, RigView, Script, ScriptError, ScriptLimits, execute};
 
 /// Evaluates scripts: in this process, or in one of their own.
 pub trait Evaluate: fmt::Debug + Send + Sync {
@@ -17,7 +17,7 @@ pub trait Evaluate: fmt::Debug + Send + Sync {
         arguments: &Arguments,
         rig: &RigView,
         seed: u64,
-        limits: &Limits,
+        limits: &ScriptLimits,
         host: &mut dyn Host,
     ) -> Result<Outcome, ScriptError>;
 
@@ -30,7 +30,7 @@ pub trait Evaluate: fmt::Debug + Send + Sync {
         script: &Script,
         arguments: &Arguments,
         rig: &RigView,
-        limits: &Limits,
+        limits: &ScriptLimits,
         stopped: &dyn Fn() -> bool,
     ) -> Result<Arguments, ScriptError>;
 }
@@ -46,7 +46,7 @@ impl Evaluate for InThisProcess {
         arguments: &Arguments,
         rig: &RigView,
         seed: u64,
-        limits: &Limits,
+        limits: &ScriptLimits,
         host: &mut dyn Host,
     ) -> Result<Outcome, ScriptError> {
         execute(script, arguments, rig, seed, limits, host)
@@ -57,7 +57,7 @@ impl Evaluate for InThisProcess {
         script: &Script,
         arguments: &Arguments,
         rig: &RigView,
-        limits: &Limits,
+        limits: &ScriptLimits,
         stopped: &dyn Fn() -> bool,
     ) -> Result<Arguments, ScriptError> {
         resolve(script, arguments, rig, limits, stopped)

@@ -10,7 +10,9 @@ use serde_json::Value;
 
 use crate::context::{Message, Stop, Watch};
 use crate::evaluate::{self, Evaluated, Job, Purpose};
-use crate::{Arguments, Exceeded, Host, Limits, Location, Refusal, RigView, Script, ScriptError, json_text};
+use crate::{
+    Arguments, Exceeded, Host, Location, Refusal, RigView, Script, ScriptError, ScriptLimits, json_text,
+};
 
 /// Stack of a script's thread: enough for the allowed call depth and nesting in a build without optimisation. Only the
 /// used part takes memory.
@@ -30,9 +32,9 @@ pub struct Outcome {
     pub result: Value,
     /// Steps performed, `log` included.
     pub steps: u64,
-    /// Loop turns and calls used, of [`Limits::ticks`].
+    /// Loop turns and calls used, of [`ScriptLimits::ticks`].
     pub ticks: u64,
-    /// Memory used, of [`Limits::heap_bytes`].
+    /// Memory used, of [`ScriptLimits::heap_bytes`].
     pub heap_bytes: usize,
 }
 
@@ -49,7 +51,7 @@ pub fn execute(
     arguments: &Arguments,
     rig: &RigView,
     seed: u64,
-    limits: &Limits,
+    limits: &ScriptLimits,
     host: &mut dyn Host,
 ) -> Result<Outcome, ScriptError> {
     let done = converse(script, arguments, rig, limits, Purpose::Run { seed }, host)?;
@@ -62,7 +64,7 @@ pub(crate) fn converse(
     script: &Script,
     arguments: &Arguments,
     rig: &RigView,
-    limits: &Limits,
+    limits: &ScriptLimits,
     purpose: Purpose,
     host: &mut dyn Host,
 ) -> Result<Evaluated, ScriptError> {
@@ -119,7 +121,7 @@ enum Next {
 }
 
 /// Waits for the script's next message. Demands its end when the run is cancelled or its time is over.
-fn next(messages: &Receiver<Message>, watch: &Watch, limits: &Limits, host: &dyn Host) -> Next {
+fn next(messages: &Receiver<Message>, watch: &Watch, limits: &ScriptLimits, host: &dyn Host) -> Next {
     let since = Instant::now();
     let mut told = None;
     loop {
@@ -140,7 +142,7 @@ fn next(messages: &Receiver<Message>, watch: &Watch, limits: &Limits, host: &dyn
     }
 }
 
-fn left_behind(stop: Stop, at: Location, limits: &Limits) -> ScriptError {
+fn left_behind(stop: Stop, at: Location, limits: &ScriptLimits) -> ScriptError {
     let call_stack = String::new();
     match stop {
         Stop::Cancelled => {

@@ -28,17 +28,17 @@
 //! # What a script cannot do
 //!
 //! Scripts have no `load`, no files, no network and no clock; their random numbers come from the run's seed alone. The
-//! language has no `while`, and endless recursion runs into [`Limits`]:
+//! language has no `while`, and endless recursion runs into [`ScriptLimits`]:
 //!
 //! | bound | checked |
 //! |---|---|
 //! | source of 256 KiB, nested 150 deep | before parsing |
-//! | loop turns and calls ([`Limits::ticks`]) | once in a thousand of them |
-//! | functions under way ([`Limits::call_depth`]) | at each call |
-//! | memory of values ([`Limits::heap_bytes`]) | before each statement and each `+`, `*`, `%`, `\|`; inside a comprehension once in a thousand turns |
+//! | loop turns and calls ([`ScriptLimits::ticks`]) | once in a thousand of them |
+//! | functions under way ([`ScriptLimits::call_depth`]) | at each call |
+//! | memory of values ([`ScriptLimits::heap_bytes`]) | before each statement and each `+`, `*`, `%`, `\|`; inside a comprehension once in a thousand turns |
 //! | texts of 64 KiB, lists of 100,000 values, whole numbers of 64 bits | as operands or results of `+`, `*`, `%`, `\|`, `range`, `zip`, `str`, `log` |
-//! | steps ([`Limits::steps`]), text of the `log` lines ([`Limits::log_bytes`]) | at each step |
-//! | computing time between two steps ([`Limits::think`]), and [`Host::cancelled`] | before each statement, once in a thousand turns |
+//! | steps ([`ScriptLimits::steps`]), text of the `log` lines ([`ScriptLimits::log_bytes`]) | at each step |
+//! | computing time between two steps ([`ScriptLimits::think`]), and [`Host::cancelled`] | before each statement, once in a thousand turns |
 //!
 //! Operations that can make a value much larger than their operands and that cannot be measured beforehand
 //! (`*=`, `%=`, `.extend`, `.format`, `.join`, `.replace`) are refused when the script is parsed.
@@ -56,7 +56,7 @@
 //!   process.
 //!
 //! The service and the command line therefore evaluate each script in a process of its own (`tactus_runner::script_process`),
-//! which the system bounds by [`Limits::process_bytes`] and [`Limits::processor`], and which is killed when its run is
+//! which the system bounds by [`ScriptLimits::process_bytes`] and [`ScriptLimits::processor`], and which is killed when its run is
 //! stopped. What goes there and back ([`Call`], [`Reply`], [`ScriptError`] and the others) is plain data.
 
 mod arguments;
@@ -82,7 +82,7 @@ pub use error::ScriptError;
 pub use evaluator::{Evaluate, InThisProcess};
 pub use execute::{Outcome, STACK_BYTES, execute};
 pub use host::{Call, Host, Location, MeanReading, Refusal, Reply};
-pub use limits::{Exceeded, LOG_LINE_MAX_BYTES, Limits};
+pub use limits::{Exceeded, LOG_LINE_MAX_BYTES, ScriptLimits};
 pub use parameter::{Parameter, ParameterType};
 pub use rig_view::{ElementView, RigView};
 pub use script::Script;

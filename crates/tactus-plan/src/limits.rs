@@ -11,7 +11,7 @@ pub const LOG_LINE_MAX_BYTES: usize = 4 << 10;
 /// Bounds of one evaluation of a script. `Default` suffices for any experiment. The crate's documentation tells when each
 /// is checked and what is not bounded.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Limits {
+pub struct ScriptLimits {
     /// Turns of loops and comprehensions, plus calls of functions and operators. Looked at once in a thousand.
     pub ticks: u64,
     /// Memory of the script's values.
@@ -30,7 +30,7 @@ pub struct Limits {
     pub process_bytes: usize,
 }
 
-impl Default for Limits {
+impl Default for ScriptLimits {
     fn default() -> Self {
         Self {
             ticks: 5_000_000,
@@ -48,28 +48,28 @@ impl Default for Limits {
 /// Which bound a script ran into.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum Exceeded {
-    /// [`Limits::ticks`].
+    /// [`ScriptLimits::ticks`].
     #[error("the script's {0} loop turns and calls are used up: is there a loop without an end?")]
     Ticks(u64),
-    /// [`Limits::heap_bytes`].
+    /// [`ScriptLimits::heap_bytes`].
     #[error("the script's values take more than {} MiB", .0 >> 20)]
     Heap(usize),
-    /// [`Limits::call_depth`].
+    /// [`ScriptLimits::call_depth`].
     #[error("more than {0} functions are under way: does one call itself without an end?")]
     CallDepth(usize),
-    /// [`Limits::steps`].
+    /// [`ScriptLimits::steps`].
     #[error("the script asked for more than {0} steps")]
     Steps(u64),
-    /// [`Limits::log_bytes`].
+    /// [`ScriptLimits::log_bytes`].
     #[error("the script's log lines have more than {} KiB together", .0 >> 10)]
     Log(usize),
-    /// [`Limits::think`].
+    /// [`ScriptLimits::think`].
     #[error("the script computed for more than {:.1} s without asking for a step", .0.as_secs_f64())]
     Think(Duration),
-    /// [`Limits::processor`].
+    /// [`ScriptLimits::processor`].
     #[error("the script computed for more than {:.1} s altogether", .0.as_secs_f64())]
     Processor(Duration),
-    /// [`Limits::process_bytes`].
+    /// [`ScriptLimits::process_bytes`].
     #[error("the script's process needs more than {} MiB", .0 >> 20)]
     Process(usize),
     /// The evaluator's stack: values nest too deep.

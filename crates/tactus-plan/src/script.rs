@@ -11,7 +11,7 @@ use starlark::syntax::ast::{AstLiteral, AstStmt, Expr, Stmt};
 use crate::evaluate::{Evaluated, Purpose};
 use crate::execute::converse;
 use crate::{
-    Arguments, Call, Host, Limits, Location, Parameter, Refusal, Reply, RigView, ScriptError, sandbox,
+    Arguments, Call, Host, Location, Parameter, Refusal, Reply, RigView, ScriptError, ScriptLimits, sandbox,
 };
 
 /// An experiment script.
@@ -88,7 +88,7 @@ impl Script {
     /// # Errors
     /// [`ScriptError`] if the top level fails.
     pub fn parameters(&self, rig: &RigView) -> Result<Vec<Parameter>, ScriptError> {
-        Ok(declare(self, &Arguments::default(), rig, &Limits::default(), &|| false)?.parameters)
+        Ok(declare(self, &Arguments::default(), rig, &ScriptLimits::default(), &|| false)?.parameters)
     }
 
     pub(crate) fn ast(&self) -> &AstModule {
@@ -115,7 +115,7 @@ pub(crate) fn resolve(
     script: &Script,
     arguments: &Arguments,
     rig: &RigView,
-    limits: &Limits,
+    limits: &ScriptLimits,
     stopped: &dyn Fn() -> bool,
 ) -> Result<Arguments, ScriptError> {
     Ok(declare(script, arguments, rig, limits, stopped)?.values)
@@ -125,7 +125,7 @@ fn declare(
     script: &Script,
     arguments: &Arguments,
     rig: &RigView,
-    limits: &Limits,
+    limits: &ScriptLimits,
     stopped: &dyn Fn() -> bool,
 ) -> Result<Evaluated, ScriptError> {
     converse(script, arguments, rig, limits, Purpose::Declare, &mut NoHost(stopped))

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use tactus_plan::{
-    Arguments, Call, Exceeded, Host, Limits, Refusal, Reply, RigView, Script, ScriptError, execute,
+    Arguments, Call, Exceeded, Host, Refusal, Reply, RigView, Script, ScriptError, ScriptLimits, execute,
 };
 use tactus_schema::Rig;
 
@@ -32,7 +32,7 @@ def run(rig):
 ";
     let script = Script::parse("stuck", source).unwrap();
     let rig = Rig::from_toml(include_str!("../../../config/rigs/sim.toml")).unwrap();
-    let limits = Limits { think: Duration::from_millis(100), ..Limits::default() };
+    let limits = ScriptLimits { think: Duration::from_millis(100), ..ScriptLimits::default() };
     let error =
         execute(&script, &Arguments::default(), &RigView::of(&rig), 1, &limits, &mut NoHost).unwrap_err();
     assert!(matches!(error, ScriptError::Limit { exceeded: Exceeded::Think(_), .. }), "{error}");

@@ -52,7 +52,7 @@ pub(crate) struct Confirmed {
 impl Confirmed {
     pub(crate) fn take(&mut self, event: &pb::RunEvent) {
         if event.seq != self.next_event {
-            // Of a step with lost events nobody knows whether it was done.
+            // If events of a step are lost, it is unknown whether it was done.
             self.step = None;
         }
         self.next_event = event.seq.saturating_add(1);

@@ -60,10 +60,17 @@ pub struct Missing {
 
 impl Missing {
     pub(crate) fn one(kind: MessageKind) -> Self {
-        Self { messages: 1, frames: u64::from(kind == MessageKind::Frame), ..Self::default() }
+        Self::message(kind == MessageKind::Frame)
     }
 
-    pub(crate) fn plus(self, more: Self) -> Self {
+    /// One message, which may be a frame.
+    pub fn message(is_frame: bool) -> Self {
+        Self { messages: 1, frames: u64::from(is_frame), ..Self::default() }
+    }
+
+    /// What this and something else lack; the rest is as here.
+    #[must_use]
+    pub fn plus(self, more: Self) -> Self {
         Self { messages: self.messages + more.messages, frames: self.frames + more.frames, ..self }
     }
 }

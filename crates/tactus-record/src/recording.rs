@@ -172,6 +172,11 @@ impl<S: Storage> Recording<S> {
         &self.tally
     }
 
+    /// Messages that wait in memory until their chunk is full.
+    pub fn unstored(&self) -> Missing {
+        self.unstored
+    }
+
     /// A handle that makes durable what has reached the system, for another thread.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use tactus_plan::{Script, ScriptError};
 
 /// The scripts that come with Tactus, by name.
-pub const BUILT_IN: [(&str, &str); 5] = [
+pub const BUILT_IN: &[(&str, &str)] = &[
     ("corners", include_str!("../../../experiments/corners.star")),
     ("diagnose", include_str!("../../../experiments/diagnose.star")),
     ("element-centres", include_str!("../../../experiments/element-centres.star")),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 use tactus_engine::{EarlierRun, RunOrder};
-use tactus_plan::{Arguments, Evaluate, Limits, RigView, Script, ScriptError};
+use tactus_plan::{Arguments, Evaluate, RigView, Script, ScriptError, ScriptLimits};
 use tactus_record::{Header, RecordError, Recording, space, sync_folder_of};
 use tactus_schema::{Rig, WallTime};
 
@@ -48,7 +48,7 @@ pub fn order(
     stopped: &dyn Fn() -> bool,
 ) -> Result<RunOrder, ScriptError> {
     let RunRequest { script, arguments, seed, who, evaluator, earlier } = request;
-    let limits = Limits::default();
+    let limits = ScriptLimits::default();
     // The earlier run's covering at its start: defaults may depend on it.
     let mut rig = rig.clone();
     if let Some(earlier) = &earlier {

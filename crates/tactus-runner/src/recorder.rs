@@ -18,7 +18,7 @@ use std::thread;
 use std::time::Duration;
 
 use tactus_engine::{Record, RecordFailure};
-use tactus_record::{RecordError, Recording, Storage, SyncHandle};
+use tactus_record::{Missing, RecordError, Recording, Storage, SyncHandle};
 use tactus_schema::{Frame, MonoTime, TimeStamp, pb};
 use tracing::{error, warn};
 
@@ -55,6 +55,8 @@ pub struct DirectRecorder(pub Recording);
 pub struct ThreadRecorder {
     entries: SyncSender<Entry>,
     backlog: Backlog,
+    /// What found the queue full.
+    refused: Missing,
     gauge: Gauge,
     ended: Receiver<Result<(), RecordError>>,
     path: String,
@@ -68,6 +70,8 @@ pub struct Gauge(Arc<Readings>);
 struct Readings {
     /// Number of messages that were written.
     written: AtomicU64,
+    /// Messages of them that wait in memory for their chunk.
+    unstored: Mutex<Missing>,
     /// Time of the oldest message that waits.
     oldest_ns: AtomicI64,
     /// Size of the messages that wait.
@@ -90,6 +94,7 @@ impl Default for Readings {
     fn default() -> Self {
         Self {
             written: AtomicU64::new(0),
+            unstored: Mutex::default(),
             oldest_ns: AtomicI64::new(NEVER),
             waiting_bytes: AtomicU64::new(0),
             synced_ns: AtomicI64::new(NEVER),
@@ -104,7 +109,7 @@ impl Default for Readings {
 #[derive(Debug, thiserror::Error)]
 enum QueueError {
     #[error(
-        "the disk cannot keep up with {path}: messages wait to be written since {:.2} s; {messages} of them \
+        "the disk cannot keep up with {path}: messages have been waiting for {:.2} s; {messages} of them \
          ({bytes} bytes), with {frames} frames",
         age.as_secs_f64()
     )]
@@ -116,9 +121,14 @@ enum QueueError {
     #[error(
         "the disk did not answer within {} s: {messages} messages with {frames} frames are not in {path}, which has no end; \
          the service closes it at its next start",
-        FINISH_PATIENCE.as_secs()
+        FINISH_PATIENCE.as_secs(), messages = missing.messages, frames = missing.frames
     )]
-    Hung { path: String, messages: u64, frames: u64 },
+    Hung { path: String, missing: Missing },
+    #[error(
+        "the disk could not keep up with {path}: {messages} messages with {frames} frames are not in it",
+        messages = missing.messages, frames = missing.frames
+    )]
+    Lossy { path: String, missing: Missing },
 }
 
 #[derive(Debug)]
@@ -204,6 +214,14 @@ impl Gauge {
         self.0.failure.give(failure.to_string());
     }
 
+    fn unstored(&self) -> Missing {
+        *self.0.unstored.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn show_unstored(&self, unstored: Missing) {
+        *self.0.unstored.lock().unwrap_or_else(PoisonError::into_inner) = unstored;
+    }
+
     fn show(&self, backlog: &Backlog) {
         self.0.oldest_ns.store(backlog.oldest().map_or(NEVER, MonoTime::ns), Ordering::Relaxed);
         self.0.waiting_bytes.store(backlog.bytes(), Ordering::Relaxed);
@@ -211,6 +229,7 @@ impl Gauge {
 
     fn reset(&self) {
         self.0.written.store(0, Ordering::Relaxed);
+        self.show_unstored(Missing::default());
         self.clear();
         self.0.failure.take();
         self.0.alarm.take();
@@ -285,7 +304,7 @@ impl ThreadRecorder {
             // Nobody may wait for the result any more.
             let _told = end.send(writer.write_all(&queue));
         })?;
-        Ok(Self { entries, backlog: Backlog::default(), gauge, ended, path })
+        Ok(Self { entries, backlog: Backlog::default(), refused: Missing::default(), gauge, ended, path })
     }
 
     /// Checks without a message whether the recorder keeps up: for times in which no message comes.
@@ -303,7 +322,7 @@ impl ThreadRecorder {
             Lag::Alarm(age) => {
                 let (path, messages, age_s) = (&self.path, self.backlog.messages(), age.as_secs_f64());
                 self.gauge.alarm(format!(
-                    "the disk is late: {messages} messages wait for {path} since {age_s:.2} s"
+                    "the disk is late: {messages} messages have been waiting for {path} for {age_s:.2} s"
                 ));
                 Ok(())
             }
@@ -316,16 +335,19 @@ impl ThreadRecorder {
     /// # Errors
     /// As [`Record::finish`].
     pub fn finish_within(self, patience: Duration) -> Result<(), RecordFailure> {
-        let Self { entries, mut backlog, gauge, ended, path } = self;
+        let Self { entries, mut backlog, refused, gauge, ended, path } = self;
         // The thread ends when the queue does; then everything is on disk.
         drop(entries);
         let result = match ended.recv_timeout(patience) {
+            Ok(Ok(())) if refused.messages > 0 => {
+                Err(RecordFailure(Box::new(QueueError::Lossy { path, missing: refused })))
+            }
             Ok(written) => written.map_err(failure),
             Err(RecvTimeoutError::Disconnected) => Err(RecordFailure(Box::new(QueueError::Gone))),
             Err(RecvTimeoutError::Timeout) => {
                 backlog.settle(gauge.written());
-                let (messages, frames) = (backlog.messages(), backlog.frames());
-                Err(RecordFailure(Box::new(QueueError::Hung { path, messages, frames })))
+                let missing = backlog.waiting().plus(gauge.unstored()).plus(refused);
+                Err(RecordFailure(Box::new(QueueError::Hung { path, missing })))
             }
         };
         gauge.clear();
@@ -337,7 +359,11 @@ impl ThreadRecorder {
 
     fn queue(&mut self, entry: Entry, at: MonoTime) -> Result<(), RecordFailure> {
         let (bytes, is_frame) = (entry.bytes(), matches!(entry, Entry::Frame(_)));
-        match self.entries.try_send(entry).err() {
+        let refusal = self.entries.try_send(entry).err();
+        if refusal.is_some() {
+            self.refused = self.refused.plus(Missing::message(is_frame));
+        }
+        match refusal {
             None => {
                 self.backlog.queued(at, bytes, is_frame);
                 self.check(at)
@@ -441,6 +467,7 @@ impl<S: Storage> Writer<S> {
             let written = match queue.recv_timeout(IDLE) {
                 Ok(entry) => {
                     let written = self.write(&entry);
+                    self.gauge.show_unstored(self.recording.unstored());
                     self.gauge.0.written.fetch_add(1, Ordering::Relaxed);
                     written
                 }

@@ -24,8 +24,8 @@ use std::time::{Duration, Instant};
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
 use tactus_plan::{
-    Arguments, Call, Evaluate, Exceeded, Host, Limits, Location, Outcome, Refusal, RigView, Script,
-    ScriptError,
+    Arguments, Call, Evaluate, Exceeded, Host, Location, Outcome, Refusal, RigView, Script, ScriptError,
+    ScriptLimits,
 };
 
 pub use child::main_if_child;
@@ -34,7 +34,7 @@ use frame::{FrameReader, FrameWriter};
 /// How often it is asked whether to stop, while the script computes.
 const POLL: Duration = Duration::from_millis(20);
 
-/// Time beyond [`Limits::think`] in which the script's process may itself tell which line took too long.
+/// Time beyond [`ScriptLimits::think`] in which the script's process may itself tell which line took too long.
 const GRACE: Duration = Duration::from_secs(3);
 
 /// Longest message of the script's process.
@@ -50,7 +50,7 @@ struct Task {
     source: String,
     arguments: Arguments,
     rig: RigView,
-    limits: Limits,
+    limits: ScriptLimits,
     purpose: Purpose,
 }
 
@@ -92,7 +92,7 @@ impl ScriptProcesses {
         Self { program: program.into(), leading: Vec::new() }
     }
 
-    fn start(&self, script: &str, limits: Limits) -> io::Result<ScriptProcess> {
+    fn start(&self, script: &str, limits: ScriptLimits) -> io::Result<ScriptProcess> {
         let mut program = Command::new(&self.program);
         program.arg0("tactus-script").args(&self.leading).arg(child::ARGUMENT);
         ScriptProcess::start(&mut program, script, limits)
@@ -126,7 +126,7 @@ impl Evaluate for ScriptProcesses {
         arguments: &Arguments,
         rig: &RigView,
         seed: u64,
-        limits: &Limits,
+        limits: &ScriptLimits,
         host: &mut dyn Host,
     ) -> Result<Outcome, ScriptError> {
         let task = Task::new(script, arguments, rig, limits, Purpose::Run { seed });
@@ -141,7 +141,7 @@ impl Evaluate for ScriptProcesses {
         script: &Script,
         arguments: &Arguments,
         rig: &RigView,
-        limits: &Limits,
+        limits: &ScriptLimits,
         stopped: &dyn Fn() -> bool,
     ) -> Result<Arguments, ScriptError> {
         let task = Task::new(script, arguments, rig, limits, Purpose::Resolve);
@@ -158,7 +158,13 @@ fn out_of_turn(script: &Script) -> ScriptError {
 }
 
 impl Task {
-    fn new(script: &Script, arguments: &Arguments, rig: &RigView, limits: &Limits, purpose: Purpose) -> Self {
+    fn new(
+        script: &Script,
+        arguments: &Arguments,
+        rig: &RigView,
+        limits: &ScriptLimits,
+        purpose: Purpose,
+    ) -> Self {
         Self {
             name: script.name().to_owned(),
             source: script.source().to_owned(),
@@ -211,13 +217,13 @@ struct ScriptProcess {
     to: FrameWriter,
     from: FrameReader,
     script: String,
-    limits: Limits,
+    limits: ScriptLimits,
     /// The line of the last step.
     line: u32,
 }
 
 impl ScriptProcess {
-    fn start(program: &mut Command, script: &str, limits: Limits) -> io::Result<Self> {
+    fn start(program: &mut Command, script: &str, limits: ScriptLimits) -> io::Result<Self> {
         let mut child = program
             .env_clear()
             .current_dir("/")
@@ -314,7 +320,7 @@ fn last_words(child: &mut Child) -> String {
 }
 
 /// The limit that ended the process, if it was one.
-fn exceeded(status: ExitStatus, said: &str, limits: &Limits) -> Option<Exceeded> {
+fn exceeded(status: ExitStatus, said: &str, limits: &ScriptLimits) -> Option<Exceeded> {
     if status.signal() == Some(Signal::XCPU.as_raw()) {
         return Some(Exceeded::Processor(limits.processor));
     }

@@ -8,12 +8,12 @@ fn resolve_with(shell: &str, stopped: &dyn Fn() -> bool) -> ScriptError {
     let script = Script::parse("s", "def run(rig):\n    pass\n").unwrap();
     let view = RigView::of(&Rig::from_toml(SIMULATED_RIG).unwrap());
     let processes = ScriptProcesses { program: "/bin/sh".into(), leading: vec!["-c".into(), shell.into()] };
-    processes.resolve(&script, &Arguments::default(), &view, &Limits::default(), stopped).unwrap_err()
+    processes.resolve(&script, &Arguments::default(), &view, &ScriptLimits::default(), stopped).unwrap_err()
 }
 
 #[test]
 fn the_end_of_the_process_tells_the_limit() {
-    let limits = Limits::default();
+    let limits = ScriptLimits::default();
     for (ending, exceeded) in [
         ("kill -XCPU $$", Some(Exceeded::Processor(limits.processor))),
         (
@@ -47,7 +47,7 @@ fn what_cannot_be_understood_is_an_error() {
         &Script::parse("s", "def run(rig):\n    pass\n").unwrap(),
         &Arguments::default(),
         &RigView::of(&Rig::from_toml(SIMULATED_RIG).unwrap()),
-        &Limits::default(),
+        &ScriptLimits::default(),
         &|| false,
     );
     assert!(error.unwrap_err().to_string().contains("no process for the script"));

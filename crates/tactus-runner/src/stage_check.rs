@@ -104,7 +104,7 @@ impl CheckedMove {
                 if way_mm * asked_way_mm.signum() < WAY_SHARE_MIN * asked_way_mm.abs() {
                     // The rig's tolerance may be greater than the distance.
                     checked.trouble = Some(format!(
-                        "it reports {:+.1} um of {:+.1} um: it has not moved, or not that way",
+                        "it reports a move of {:+.1} um instead of {:+.1} um: it did not move, or moved the wrong way",
                         way_mm * 1000.0,
                         asked_way_mm * 1000.0
                     ));

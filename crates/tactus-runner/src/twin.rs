@@ -5,9 +5,9 @@ use std::thread;
 use std::time::Duration;
 
 use tactus_device::{Clock, SensorCodec};
-use tactus_engine::{Engine, Planned, Record, RecordFailure, RunOrder, RunOutcome, StopOrder, Unpublished};
+use tactus_engine::{Engine, Planned, RunOrder, RunOutcome, StopOrder, Unpublished, Unrecorded};
 use tactus_schema::rig::Transport;
-use tactus_schema::{Frame, Rig, TimeStamp, pb};
+use tactus_schema::{Rig, pb};
 use tactus_virtual::{Truth, twin_of};
 use tokio::time::timeout;
 use tracing::subscriber::NoSubscriber;
@@ -125,34 +125,5 @@ async fn run(twin: Rig, order: RunOrder, started: &SyncSender<Engine>) -> Result
         Ok(Ok(outcome)) => Ok(outcome),
         Ok(Err(busy)) => unreachable!("a new engine has no other run: {busy}"),
         Err(_) => Err(TwinError::TooLong),
-    }
-}
-
-/// A dry run records nothing.
-struct Unrecorded;
-
-impl Record for Unrecorded {
-    fn sensor_info(&mut self, _: &pb::SensorInfo, _: TimeStamp) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-
-    fn frame(&mut self, _: &Frame) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-
-    fn stage(&mut self, _: &pb::StageState) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-
-    fn event(&mut self, _: &pb::RunEvent) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-
-    fn safety(&mut self, _: &pb::SafetyEvent) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-
-    fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
-        Ok(())
     }
 }

@@ -5,7 +5,7 @@ use tactus_schema::rig::Service;
 use tactus_schema::{Frame, Rig};
 
 use crate::Violation;
-use crate::force::{Elements, has_sign};
+use crate::force::Elements;
 use crate::limits::{Limits, STEP_DOWN_MAX_MM};
 
 /// Frames with the old counts, received after the tip has moved, after which the array counts as frozen.
@@ -60,7 +60,7 @@ impl Contact {
             rig.sensitivity_counts_per_mm.iter().map(|counts| counts.abs()).collect();
         sensitivities.sort_by(f64::total_cmp);
         let mut contact = Self {
-            expects_response: service.envelope.expects_response && !has_sign(service),
+            expects_response: service.envelope.expects_response && !service.sensor.protocol.is_signed(),
             registration: rig.registration,
             extent_mm: rig.array.extent_mm(),
             sensitivity_counts_per_mm: sensitivities.get(sensitivities.len() / 2).copied().unwrap_or(0.0),

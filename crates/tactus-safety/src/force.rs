@@ -1,6 +1,6 @@
 //! Loads on the elements: zeros, and rises above them.
 
-use tactus_schema::rig::{SensorProtocol, Service};
+use tactus_schema::rig::Service;
 use tactus_schema::{Frame, MonoTime, Rig};
 
 use crate::Violation;
@@ -38,14 +38,9 @@ struct Expected {
     band_counts: f64,
     /// Direction of the reading when the element is pressed.
     signs: Vec<f64>,
-    /// A press may take any element either way.
+    /// As [`tactus_schema::rig::SensorProtocol::is_signed`].
     is_signed: bool,
     unwatched: Vec<usize>,
-}
-
-/// True for sensors whose readings are components of a field, not pressures of places.
-pub(crate) fn has_sign(service: &Service) -> bool {
-    service.sensor.protocol == SensorProtocol::AnySkin
 }
 
 impl Elements {
@@ -58,7 +53,7 @@ impl Elements {
             rig: Expected {
                 baseline_counts: rig.baseline_counts.iter().enumerate().map(baseline).collect(),
                 band_counts: envelope.baseline_band_counts,
-                is_signed: has_sign(service),
+                is_signed: service.sensor.protocol.is_signed(),
                 signs: rig.sensitivity_counts_per_mm.iter().map(|counts| counts.signum()).collect(),
                 unwatched,
             },
@@ -89,7 +84,6 @@ impl Elements {
     /// Takes a frame. Elements that were not read are ignored: their value in the frame is an earlier one.
     pub(crate) fn take(&mut self, frame: &Frame) {
         let at = frame.received.mono;
-        self.last_frame = Some(at);
         let unread = ElementState { counts: 0.0, last_read: None, is_read: false };
         self.states.resize(frame.counts.len(), unread);
         for (state, counts) in self.states.iter_mut().zip(frame.counts.iter()) {
@@ -102,8 +96,13 @@ impl Elements {
                 state.is_read = false;
             }
         }
-        for state in self.states.iter_mut().filter(|state| state.is_read) {
+        let unwatched = &self.rig.unwatched;
+        for (element, state) in self.states.iter_mut().enumerate().filter(|(_, state)| state.is_read) {
             state.last_read = Some(at);
+            if !unwatched.contains(&element) {
+                // A frame that reads no element shows no load: it is none.
+                self.last_frame = Some(at);
+            }
         }
     }
 

@@ -27,6 +27,8 @@ pub struct Supervisor {
     z_at_frame_mm: Option<f64>,
     /// What a reset must clear; [`Self::fault`] adds the silence and what the stage reports.
     fault: Option<Fault>,
+    /// Why the tip was not retracted before the reset under way. Only a finished one ends it.
+    not_retracted: Option<Fault>,
     /// A silence of the sensor, which its return may end. It stands beside the fault, so that nothing else ends with it.
     silence: Option<Violation>,
     /// True while somebody may move the stage: loads count then at any height.
@@ -47,6 +49,7 @@ impl Supervisor {
             z_mm: None,
             z_at_frame_mm: None,
             fault: Some(Fault::Started),
+            not_retracted: None,
             silence: None,
             is_active: false,
             has_sensor: true,
@@ -197,11 +200,17 @@ impl Supervisor {
     pub fn end(&mut self) {
         self.is_active = false;
         self.permits.revoke();
+        if let Some(fault) = self.not_retracted.take() {
+            self.latch(fault);
+        }
     }
 
-    /// A reset begins: all faults become one, which permits homing and the way up.
+    /// A reset begins: all faults become one, which permits homing and the way up. If it does not finish, [`Self::end`] tells
+    /// again that the tip was not retracted.
     pub fn begin_reset(&mut self, now: MonoTime) {
-        self.fault = Some(Fault::Unfinished);
+        if let Some(fault @ Fault::NotRetracted(_)) = self.fault.replace(Fault::Unfinished) {
+            self.not_retracted = Some(fault);
+        }
         self.silence = None;
         self.is_active = true;
         self.elements.forget_zeros();
@@ -220,6 +229,7 @@ impl Supervisor {
         self.standing_mm()?;
         self.check_frame(now)?;
         self.fault = None;
+        self.not_retracted = None;
         Ok(())
     }
 

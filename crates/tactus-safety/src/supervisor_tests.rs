@@ -75,10 +75,10 @@ fn many_elements_below_their_limit_are_still_too_much_together() {
 #[test]
 fn silence_counts_only_near_the_covering() {
     let mut supervisor = supervisor();
-    assert_eq!(supervisor.on_frame(&frame(1000, &[])), None);
+    assert_eq!(supervisor.on_frame(&frame(1000, &[100.0; 48])), None);
     assert_eq!(supervisor.on_report(&at_height(2.0)), None);
     assert_eq!(supervisor.on_time(at_ms(5000)), None);
-    assert_eq!(supervisor.on_frame(&frame(5000, &[])), None);
+    assert_eq!(supervisor.on_frame(&frame(5000, &[100.0; 48])), None);
     assert_eq!(supervisor.on_report(&at_height(-0.2)), None);
     assert_eq!(supervisor.on_time(at_ms(5099)), None);
     assert_eq!(supervisor.on_time(at_ms(5101)).unwrap().rule(), "silence");
@@ -488,6 +488,34 @@ fn a_tip_that_is_not_up_is_told_before_all_other_faults() {
     let alarm = pb::StageState { status: StageStatus::Alarm.into(), ..standing(-0.3) };
     supervisor.on_report(&alarm);
     assert_eq!(supervisor.fault(), Some(Fault::NotRetracted("test".into())));
+}
+
+#[test]
+fn a_reset_that_does_not_finish_tells_again_that_the_tip_is_not_up() {
+    let mut supervisor = ready(-0.3);
+    supervisor.latch(Fault::NotRetracted("test".into()));
+    for _ in 0..2 {
+        supervisor.begin_reset(at_ms(1010));
+        assert_eq!(supervisor.fault(), Some(Fault::Unfinished), "the reset may home and raise the tip");
+    }
+    supervisor.end();
+    assert_eq!(supervisor.fault(), Some(Fault::NotRetracted("test".into())));
+
+    supervisor.begin_reset(at_ms(1010));
+    supervisor.finish_reset(at_ms(1010)).unwrap();
+    supervisor.end();
+    assert_eq!(supervisor.fault(), None);
+}
+
+#[test]
+fn a_frame_that_reads_no_element_permits_nothing() {
+    let mut supervisor = ready(2.0);
+    supervisor.begin_reset(at_ms(1010));
+    supervisor.permit_homing(at_ms(1034)).unwrap();
+    supervisor.on_frame(&frame(1200, &[f32::NAN; 48]));
+    assert!(matches!(supervisor.permit_homing(at_ms(1201)), Err(Denied::NoFreshFrame { .. })));
+    supervisor.on_frame(&frame(1233, &[100.0; 48]));
+    supervisor.permit_homing(at_ms(1234)).unwrap();
 }
 
 #[test]

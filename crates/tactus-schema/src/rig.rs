@@ -180,6 +180,17 @@ pub enum SensorProtocol {
     },
 }
 
+impl SensorProtocol {
+    /// True for sensors whose readings are components of a field, not pressures of places: a press may take any of them
+    /// either way.
+    pub fn is_signed(&self) -> bool {
+        match self {
+            Self::AnySkin => true,
+            Self::WeissDsa { .. } | Self::SingleTact { .. } | Self::Declared { .. } => false,
+        }
+    }
+}
+
 /// How older and newer firmware of `weiss-dsa` closes packets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum WeissChecksum {

@@ -44,6 +44,19 @@ fn contradictions_are_refused_with_their_field() {
     }
 }
 
+/// 95 % of 4095 counts less a baseline of 100 are 3,790; the band takes 500 of them.
+#[test]
+fn an_element_that_could_saturate_before_its_limit_is_refused() {
+    let limit =
+        |counts: u32| SIM.replace("element_max_counts = 2000.0", &format!("element_max_counts = {counts}.0"));
+    Rig::from_toml(&limit(3290)).unwrap();
+    let error = Rig::from_toml(&limit(3291)).unwrap_err().to_string();
+    assert!(
+        error.starts_with("envelope.element_max_counts") && error.contains("95 % of full scale"),
+        "{error}"
+    );
+}
+
 #[test]
 fn a_simulated_element_has_one_fault_at_most() {
     let with = |faults: &str| {

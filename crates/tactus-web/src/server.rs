@@ -98,3 +98,7 @@ pub(crate) async fn answer(
         debug!(%error, "a connection broke off");
     }
 }
+
+#[cfg(test)]
+#[path = "server_tests.rs"]
+mod tests;

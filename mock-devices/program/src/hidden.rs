@@ -149,7 +149,7 @@ impl MakeArgs {
     }
 }
 
-/// Warns if a separation was out of reach. Only the label names the physics.
+/// Warns if a separation was out of reach. It does not name the physics: only the label may.
 fn warn_of_unreached(label: &Label) -> Result<()> {
     let mut err = io::stderr().lock();
     for _ in label.physics.iter().filter(|dosed| !dosed.reached) {

@@ -1,6 +1,6 @@
 //! The lease: one holder commands the rig. Times go in, decisions come out; there is no clock here.
 //!
-//! Run, pause, resume and reset want the lease of who asks; status and STOP want none. A lease ends [`EXPIRY`] after its
+//! Run, pause, resume and reset need the caller's lease; status and STOP need none. A lease ends [`EXPIRY`] after its
 //! last renewal. A run in progress goes on without it: another client may then take the lease, and pause or resume the run.
 
 use std::fmt;

@@ -184,9 +184,9 @@ where
             let takes_requests = refuses_requests || session.is_ready();
             let has_room = waiting.is_empty();
             // A look moves nothing.
-            let is_watched =
-                active.as_ref().is_some_and(|active| active.leave.is_some() && !active.is_abandoned);
-            let is_guarded = active.is_some() && self.guard.is_guarding();
+            let motion = active.as_ref().filter(|active| active.leave.is_some());
+            let is_watched = motion.is_some_and(|motion| !motion.is_abandoned);
+            let is_guarded = motion.is_some() && self.guard.is_guarding();
             let sign_of_life = if is_guarded { SIGN_OF_LIFE } else { SIGN_OF_LIFE_IDLE };
             actions = tokio::select! {
                 biased;
@@ -271,8 +271,10 @@ where
                 StageCommand::Look => (None, session.look(now)),
                 StageCommand::ClearAlarm => (None, session.clear_alarm(now)),
             };
+            if leave.is_some() {
+                self.guard.begin(session.halt());
+            }
             self.progress.active = Some(Active { reply, leave, void: None, is_abandoned: false });
-            self.guard.begin(session.halt());
             return actions;
         };
         answer(reply, Err(refusal));

@@ -165,8 +165,7 @@ impl Shared {
     fn fire(&self, watch: &mut Watch, silent: Duration) {
         let Watch { writer: Some(writer), halt: Some(halt), .. } = watch else { return };
         let is_first = !self.has_fired.swap(true, Ordering::SeqCst);
-        let written = writer.write_all(halt).and_then(|()| writer.flush());
-        if let Err(error) = written {
+        if let Err(error) = writer.write_all(halt) {
             tracing::error!(%error, ?silent, "the stage's driver hangs, and the stop cannot be written");
         } else if is_first {
             tracing::error!(?silent, "the stage's driver hangs: the stage was stopped without it");
@@ -176,4 +175,4 @@ impl Shared {
 
 #[cfg(test)]
 #[path = "guard_tests.rs"]
-mod tests;
+pub(super) mod tests;

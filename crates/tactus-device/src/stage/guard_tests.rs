@@ -7,7 +7,7 @@ use super::*;
 const LONGEST: Duration = Duration::from_mins(1);
 
 /// A device that hands on what is written to it.
-struct Device(Sender<Vec<u8>>);
+pub(in crate::stage) struct Device(pub(in crate::stage) Sender<Vec<u8>>);
 
 impl Write for Device {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

@@ -148,7 +148,7 @@ fn choose(name: impl fmt::Display, link: &HidLink, nodes: Vec<HidNode>) -> Resul
     {
         let there: Vec<_> = nodes.iter().filter(|node| is_it(node)).map(Candidate::place).collect();
         let what = format!(
-            "its interface {number} is no human interface device, but {}: put interface right in the rig file",
+            "its interface {number} is not a HID interface, but {}: correct `interface` in the rig file",
             there.join(", ")
         );
         return Err(DeviceError::new(name, ErrorKind::WrongDevice, what));

@@ -45,10 +45,7 @@ fn absent_wrong_and_several_are_told_apart() {
 
     let (kind, what) = find("1209:0020/A1", Some(1)).unwrap_err();
     assert_eq!(kind, ErrorKind::WrongDevice);
-    assert!(
-        what.contains("interface 1 is no human interface device, but /dev/hidraw0 (interface 0), "),
-        "{what}"
-    );
+    assert!(what.contains("interface 1 is not a HID interface, but /dev/hidraw0 (interface 0), "), "{what}");
 
     let (kind, what) = find("1209:0020/A1", None).unwrap_err();
     assert_eq!(kind, ErrorKind::WrongDevice);

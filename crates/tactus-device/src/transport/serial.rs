@@ -1,14 +1,18 @@
 //! A serial port, USB serial device or pseudo-terminal, found by its path or by its USB identity.
 
 use std::fmt;
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::pin::Pin;
+use std::task::{Context, Poll};
+use std::time::Duration;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use serialport::{SerialPortInfo, SerialPortType};
+use serialport::{SerialPortInfo, SerialPortType, TTYPort};
 use tactus_schema::rig::SerialPort;
-use tokio_serial::{SerialPortBuilderExt, SerialStream};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio_serial::SerialStream;
 
 use super::identity::{Candidate, the_one};
 use super::{ByteStream, Connect};
@@ -36,10 +40,10 @@ impl SerialConnector {
 
     fn open(&self) -> Result<Box<dyn ByteStream>, DeviceError> {
         let path = self.path()?;
-        match tokio_serial::new(&path, self.baud).open_native_async() {
-            Ok(stream) => {
+        match SerialLink::open(&path, self.baud) {
+            Ok(link) => {
                 tracing::info!(device = %self, path, baud = self.baud, "opened");
-                Ok(Box::new(stream))
+                Ok(Box::new(link))
             }
             Err(error) => Err(self.explain(&path, error)),
         }
@@ -79,8 +83,58 @@ impl SerialConnector {
     }
 }
 
-// The library cannot clone a stream, so there is no second way to the port yet.
-impl ByteStream for SerialStream {}
+/// The longest that the second way to a port waits for room.
+const SECOND_PATIENCE: Duration = Duration::from_millis(10);
+
+/// An open port, and a second handle of it: an asynchronous stream cannot be cloned.
+struct SerialLink {
+    stream: SerialStream,
+    second: TTYPort,
+}
+
+impl SerialLink {
+    fn open(path: &str, baud: u32) -> tokio_serial::Result<Self> {
+        let port = serialport::new(path, baud).timeout(SECOND_PATIENCE).open_native()?;
+        let second = port.try_clone_native()?;
+        Ok(Self { stream: SerialStream::try_from(port)?, second })
+    }
+}
+
+impl ByteStream for SerialLink {
+    fn second_writer(&self) -> Option<Box<dyn Write + Send>> {
+        let cloned = self.second.try_clone_native();
+        let cloned = cloned.inspect_err(|error| tracing::warn!(%error, "no second way to the port"));
+        Some(Box::new(cloned.ok()?))
+    }
+}
+
+impl AsyncRead for SerialLink {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_read(context, buffer)
+    }
+}
+
+impl AsyncWrite for SerialLink {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
 
 /// Lists all serial ports, sorted by name, without opening them.
 pub(crate) fn ports() -> io::Result<Vec<SerialPortInfo>> {

@@ -50,6 +50,29 @@ async fn bytes_go_through_a_pseudo_terminal_unchanged() {
 }
 
 #[tokio::test]
+async fn a_second_way_to_the_port_writes_to_the_same_device() {
+    let (mut device, path) = terminal();
+    let host = SerialConnector::new(path, 115_200).connect().await.unwrap();
+    let mut second = host.second_writer().unwrap();
+    second.write_all(b"!").unwrap();
+    let mut read = [0];
+    device.read_exact(&mut read).await.unwrap();
+    assert_eq!(read, *b"!");
+}
+
+#[tokio::test]
+async fn a_port_is_free_once_its_link_and_the_second_way_are_dropped() {
+    let (_device, path) = terminal();
+    let connector = SerialConnector::new(path, 115_200);
+    let host = connector.connect().await.unwrap();
+    let second = host.second_writer().unwrap();
+    drop(host);
+    assert_eq!(connector.connect().await.err().expect("it opened twice").kind, ErrorKind::Busy);
+    drop(second);
+    assert!(connector.connect().await.is_ok());
+}
+
+#[tokio::test]
 async fn a_port_that_somebody_holds_is_busy() {
     let (_device, path) = terminal();
     let connector = SerialConnector::new(&path, 115_200);

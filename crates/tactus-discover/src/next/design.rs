@@ -40,7 +40,7 @@ pub(super) struct DesignSpace<'a> {
 
 /// Defaults of `diagnose`.
 const SHARE: f64 = 0.5;
-const SPEEDS_MM_PER_S: [f64; 6] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
+pub(super) const SPEEDS_MM_PER_S: [f64; 6] = [0.1, 0.2, 0.3, 0.5, 0.7, 1.0];
 const ASIDE_MM: f64 = 1.0;
 const DWELL_S: f64 = 0.25;
 const ELEMENT_DEPTHS_MM: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];

@@ -38,8 +38,8 @@ pub(crate) enum Broken {
     Disturbed,
     #[error("no frame from the sensor for {0:.1} s: is it plugged in and switched on?")]
     SensorSilent(f64),
-    #[error("no answer from the stage for {0:.1} s: is it plugged in and switched on?")]
-    StageSilent(f64),
+    #[error("no answer from the stage for {0:.1} s: {1}")]
+    StageSilent(f64, StageError),
     #[error("{0}")]
     Script(String),
     #[error("{0}")]
@@ -80,24 +80,26 @@ pub(super) fn refusal(broken: &Broken) -> Refusal {
         | Broken::FramesLost(_)
         | Broken::Disturbed
         | Broken::SensorSilent(_)
-        | Broken::StageSilent(_)
+        | Broken::StageSilent(..)
         | Broken::Script(_)
         | Broken::Refused(_) => Refusal::Failed(broken.to_string()),
     }
 }
 
-/// The exit status, and the reason for a person.
-pub(super) fn verdict(result: &Result<(), Broken>, frames_lost: u64) -> (pb::ExitStatus, String) {
+/// The exit status of a run whose script came to its end, and the reason for a person.
+pub(super) fn done(frames_lost: u64) -> (pb::ExitStatus, String) {
+    match frames_lost {
+        0 => (pb::ExitStatus::Done, String::new()),
+        lost => (
+            pb::ExitStatus::Degraded,
+            format!("{lost} frames were lost; the dwells they touched were repeated"),
+        ),
+    }
+}
+
+/// The exit status of a run that ended early, and the reason for a person.
+pub(super) fn verdict(broken: &Broken) -> (pb::ExitStatus, String) {
     use pb::ExitStatus;
-    let Err(broken) = result else {
-        return match frames_lost {
-            0 => (ExitStatus::Done, String::new()),
-            lost => (
-                ExitStatus::Degraded,
-                format!("{lost} frames were lost; the dwells they touched were repeated"),
-            ),
-        };
-    };
     let status = match broken {
         Broken::Ended(Ending::Stop(order)) if order.abort => ExitStatus::Aborted,
         Broken::Ended(Ending::Stop(_)) => ExitStatus::Stopped,
@@ -111,7 +113,7 @@ pub(super) fn verdict(result: &Result<(), Broken>, frames_lost: u64) -> (pb::Exi
         | Broken::Disturbed
         | Broken::FramesLost(_)
         | Broken::SensorSilent(_)
-        | Broken::StageSilent(_)
+        | Broken::StageSilent(..)
         | Broken::Script(_) => ExitStatus::Failed,
     };
     (status, broken.to_string())

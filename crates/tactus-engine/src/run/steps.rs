@@ -1,5 +1,6 @@
 //! Execution of each step of a script.
 
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use tactus_model::Covering;
@@ -189,14 +190,7 @@ impl Run {
     ) -> Result<MeanReading, Broken> {
         let epoch = self.shared.stands_at(tip_mm).await?;
         self.wait(self.shared.service.motion.settle_s).await?;
-        let average = self.average(Duration::from_secs_f64(press.dwell_s)).await?;
-        let is_same = self.shared.stands_at(tip_mm).await? == epoch;
-        if average.lost > 0 {
-            return Err(Broken::FramesLost(average.lost));
-        }
-        if average.is_disturbed || !is_same {
-            return Err(Broken::Disturbed);
-        }
+        let average = self.still_average(tip_mm, epoch, Duration::from_secs_f64(press.dwell_s)).await?;
         self.emit(Event::DwellDone(pb::DwellDone {
             press: index,
             dwell,
@@ -281,13 +275,22 @@ impl Run {
         self.shared.unless_ended(sleep(Duration::from_secs_f64(duration_s))).await
     }
 
-    /// Has another covering put in place. A person confirms it by its value; the confirmed one outlives the run.
+    /// Has another covering put in place. A person confirms it by its value; the confirmed one outlives the run. A thinner one
+    /// is the limit from when it is asked for: it may be in place although nobody confirms it.
     pub(super) async fn change_covering(&mut self, thickness_mm: f64) -> Result<Reply, Broken> {
         let covering = Covering { thickness_mm };
-        if covering == *self.shared.covering.borrow() {
+        let before = *self.shared.covering.borrow();
+        if covering == before && !self.shared.is_covering_asked.load(Ordering::SeqCst) {
             return Ok(Reply::Done);
         }
         self.shared.retract().await?;
+        let is_thinner = thickness_mm <= before.thickness_mm;
+        if is_thinner {
+            self.shared.is_covering_asked.store(true, Ordering::SeqCst);
+            // First the limit: it holds although the disk fails.
+            self.limit_depth(covering).await?;
+            self.remember_covering(thickness_mm).await?;
+        }
         if let Some(change) = &self.shared.change_covering {
             change(thickness_mm);
         } else {
@@ -305,15 +308,20 @@ impl Run {
             self.shared.acquisition.ask(|live| live.supervisor.begin_run()).await?;
             self.take_reference().await?;
         }
-        self.remember_covering(thickness_mm).await?;
-        self.bounds = self.bounds.clone().under(covering);
-        let set = self.shared.acquisition.ask(move |live| {
-            live.supervisor.set_covering(covering);
-        });
-        set.await?;
-        self.shared.covering.send_replace(covering);
+        if !is_thinner {
+            self.remember_covering(thickness_mm).await?;
+            self.limit_depth(covering).await?;
+        }
+        self.shared.is_covering_asked.store(false, Ordering::SeqCst);
         self.emit(Event::CoveringChanged(pb::CoveringChanged { covering_mm: thickness_mm })).await;
         Ok(Reply::Done)
+    }
+
+    /// Limits the depth as a covering allows, from now on.
+    async fn limit_depth(&mut self, covering: Covering) -> Result<(), Broken> {
+        self.bounds = self.bounds.clone().under(covering);
+        self.shared.covering.send_replace(covering);
+        Ok(self.shared.acquisition.ask(move |live| live.supervisor.set_covering(covering)).await?)
     }
 
     /// Has the covering in place remembered. The disk is waited for on a thread of its own.
@@ -335,9 +343,8 @@ impl Run {
     pub(super) async fn whole_average(&mut self, duration: Duration) -> Result<Average, Broken> {
         let mut repeats = 0;
         loop {
-            let broken = match self.average(duration).await {
-                Ok(average) if average.lost == 0 => return Ok(average),
-                Ok(average) => Broken::FramesLost(average.lost),
+            let broken = match self.average_in_place(duration).await {
+                Ok(average) => return Ok(average),
                 Err(broken) => broken,
             };
             if repeats == REPEATS_MAX || !self.may_repeat(&broken) {
@@ -347,6 +354,31 @@ impl Run {
             warn!(%broken, "average broken off; it will be repeated");
             self.recover_in_place().await?;
         }
+    }
+
+    /// As [`Self::still_average`], where the stage stands now.
+    async fn average_in_place(&self, duration: Duration) -> Result<Average, Broken> {
+        let tip_mm = self.shared.position_mm();
+        let epoch = self.shared.stands_at(tip_mm).await?;
+        self.still_average(tip_mm, epoch, duration).await
+    }
+
+    /// An average without lost frames. The stage must stand idle in its place, at the same epoch, until its end.
+    async fn still_average(
+        &self,
+        tip_mm: [f64; 3],
+        epoch: u32,
+        duration: Duration,
+    ) -> Result<Average, Broken> {
+        let average = self.average(duration).await?;
+        let is_same = self.shared.stands_at(tip_mm).await? == epoch;
+        if average.lost > 0 {
+            return Err(Broken::FramesLost(average.lost));
+        }
+        if average.is_disturbed || !is_same {
+            return Err(Broken::Disturbed);
+        }
+        Ok(average)
     }
 
     /// The mean over the frames that arrive within the next `duration`.

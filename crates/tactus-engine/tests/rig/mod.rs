@@ -7,7 +7,7 @@ use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use tactus_device::{Clock, HomingPermit, Permit, Sensor, SensorEvent, Stage, StageError};
 use tactus_engine::{CoveringMemory, Devices, Engine, Record, RecordFailure, RunOrder, Unpublished};
-use tactus_plan::{Arguments, InThisProcess, Limits, RigView, Script};
+use tactus_plan::{Arguments, InThisProcess, RigView, Script, ScriptLimits};
 use tactus_schema::{Frame, FrameFlags, MonoTime, Rig, TimeStamp, pb};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
@@ -19,6 +19,8 @@ pub(crate) struct Trouble {
     pub(crate) lose: u32,
     /// No frame comes.
     pub(crate) silent: bool,
+    /// Why there is no stage.
+    pub(crate) absent: Option<&'static str>,
     /// The next question to the stage below the surface panics.
     pub(crate) look_panics: bool,
     /// Epoch of the stage's position.
@@ -198,6 +200,9 @@ impl Stage for FakeStage {
 
     fn look(&self) -> BoxFuture<'_, Result<[f64; 3], StageError>> {
         async {
+            if let Some(why) = self.trouble.lock().unwrap().absent {
+                return Err(StageError::Refused { command: "?".into(), reason: why.into() });
+            }
             let at_mm = self.position_mm();
             let panics = at_mm[2] < 0.0 && std::mem::take(&mut self.trouble.lock().unwrap().look_panics);
             assert!(!panics, "a stage that panics, for a test");
@@ -273,6 +278,12 @@ impl Bench {
         Self { engine, trouble, deepest_mm, stage: state, hand }
     }
 
+    /// The stage is gone, and its driver says why.
+    pub(crate) async fn lose_stage(&self, why: &'static str) {
+        self.trouble.lock().unwrap().absent = Some(why);
+        self.hand.report([0.0; 3], pb::StageStatus::Disconnected).await;
+    }
+
     /// Puts the tip somewhere by hand.
     pub(crate) async fn place(&self, at_mm: [f64; 3]) {
         self.hand.report(at_mm, pb::StageStatus::Idle).await;
@@ -287,7 +298,7 @@ impl Bench {
             arguments,
             seed: 1,
             who: "test".into(),
-            limits: Limits::default(),
+            limits: ScriptLimits::default(),
             evaluator: Arc::new(InThisProcess),
             earlier: None,
             planned: None,

@@ -15,7 +15,7 @@
 //! The curve starts at 0, since the baselines belong to the base model. It follows a drift of any shape: a trend, a warm-up, a
 //! random walk. Least squares leave 4 % of the variance of a random walk; 12 knots would leave 5 % and 6 knots 10 %. A drift
 //! that is faster than a sixteenth of the duration takes several effects, each starting where the one before ends. Elements
-//! that wander each for itself take an effect each.
+//! that drift independently need one effect each.
 //!
 //! Derivatives in closed form. Cost: none.
 //!

@@ -1,12 +1,13 @@
 //! What a script's author is told when something is wrong.
 
 use crate::fake::FakeRig;
-use tactus_plan::{Arguments, Limits, Outcome, Refusal, Script, ScriptError, Step, execute};
+use tactus_plan::{Arguments, Outcome, Refusal, Script, ScriptError, ScriptLimits, Step, execute};
 
 fn run(source: &str) -> Result<(Outcome, FakeRig), ScriptError> {
     let script = Script::parse("bad", source)?;
     let mut rig = FakeRig::new();
-    let outcome = execute(&script, &Arguments::default(), &rig.view(), 1, &Limits::default(), &mut rig)?;
+    let outcome =
+        execute(&script, &Arguments::default(), &rig.view(), 1, &ScriptLimits::default(), &mut rig)?;
     Ok((outcome, rig))
 }
 

@@ -1,8 +1,8 @@
-//! Every shipped experiment, run on a sensor that is a formula.
+//! Shipped experiments, run on a sensor that is a formula.
 
 use crate::fake::FakeRig;
 use serde_json::Value;
-use tactus_plan::{Arguments, Call, Limits, Outcome, Position, Script, Step, execute};
+use tactus_plan::{Arguments, Call, Outcome, Position, Script, ScriptLimits, Step, execute};
 
 const ELEMENT_CENTRES: &str = include_str!("../../../../experiments/element-centres.star");
 const GRID_SWEEP: &str = include_str!("../../../../experiments/grid-sweep.star");
@@ -15,7 +15,7 @@ fn run(name: &str, source: &str, given: &[&str], seed: u64, rig: &mut FakeRig) -
     for assignment in given {
         arguments.set(assignment).unwrap();
     }
-    execute(&script, &arguments, &rig.view(), seed, &Limits::default(), rig).unwrap_or_else(|error| {
+    execute(&script, &arguments, &rig.view(), seed, &ScriptLimits::default(), rig).unwrap_or_else(|error| {
         panic!("{error}\n{}\n{}", error.call_stack(), rig.logged());
     })
 }
@@ -186,7 +186,8 @@ fn a_part_that_is_not_is_refused_with_those_that_are() {
     let mut arguments = Arguments::default();
     arguments.set("parts=hold,rest").unwrap();
     let mut rig = FakeRig::new();
-    let refused = execute(&script, &arguments, &rig.view(), 1, &Limits::default(), &mut rig).unwrap_err();
+    let refused =
+        execute(&script, &arguments, &rig.view(), 1, &ScriptLimits::default(), &mut rig).unwrap_err();
     assert!(
         refused.to_string().contains("parts: there is no rest - there is: [\"drift\", \"repeats\","),
         "{refused}"

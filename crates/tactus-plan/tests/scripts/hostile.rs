@@ -3,17 +3,19 @@
 use std::time::Duration;
 
 use crate::fake::FakeRig;
-use tactus_plan::{Arguments, Call, Exceeded, Host, Limits, Refusal, Reply, Script, ScriptError, execute};
+use tactus_plan::{
+    Arguments, Call, Exceeded, Host, Refusal, Reply, Script, ScriptError, ScriptLimits, execute,
+};
 
-fn limits() -> Limits {
-    Limits { ticks: 10_000, heap_bytes: 8 << 20, ..Limits::default() }
+fn limits() -> ScriptLimits {
+    ScriptLimits { ticks: 10_000, heap_bytes: 8 << 20, ..ScriptLimits::default() }
 }
 
 fn end_of(body: &str) -> Result<(), ScriptError> {
     end_within(body, &limits())
 }
 
-fn end_within(body: &str, limits: &Limits) -> Result<(), ScriptError> {
+fn end_within(body: &str, limits: &ScriptLimits) -> Result<(), ScriptError> {
     let source = format!("def run(rig):\n    {}\n", body.trim().replace('\n', "\n    "));
     let script = Script::parse("hostile", &source)?;
     let mut rig = FakeRig::new();
@@ -116,14 +118,14 @@ fn what_reaches_around_the_bounds_does_not_exist() {
 
 #[test]
 fn steps_run_out() {
-    let few = Limits { steps: 10, ..limits() };
+    let few = ScriptLimits { steps: 10, ..limits() };
     let error = end_within("for _ in range(100):\n    log('again')", &few).unwrap_err();
     assert_eq!(error.to_string(), "hostile.star:3: the script asked for more than 10 steps");
 }
 
 #[test]
 fn a_script_that_computes_too_long_ends() {
-    let hasty = Limits { think: Duration::ZERO, ticks: u64::MAX, ..limits() };
+    let hasty = ScriptLimits { think: Duration::ZERO, ticks: u64::MAX, ..limits() };
     let error =
         end_within("for _ in range(100000):\n    for _ in range(100000):\n        pass", &hasty).unwrap_err();
     assert!(matches!(error, ScriptError::Limit { exceeded: Exceeded::Think(_), .. }), "{error}");
@@ -147,7 +149,7 @@ fn a_stopped_run_ends_a_script_that_computes() {
     let source =
         "def run(rig):\n    for _ in range(100000):\n        for _ in range(100000):\n            pass\n";
     let script = Script::parse("hostile", source).unwrap();
-    let endless = Limits { ticks: u64::MAX, ..limits() };
+    let endless = ScriptLimits { ticks: u64::MAX, ..limits() };
     let view = FakeRig::new().view();
     let error = execute(&script, &Arguments::default(), &view, 1, &endless, &mut Cancelled).unwrap_err();
     assert!(matches!(error, ScriptError::Refused { refusal: Refusal::Stopped(_), .. }), "{error}");

@@ -15,6 +15,12 @@ use super::TableError;
 /// Rows read at once, so that a wrong number of rows in a damaged file costs no memory.
 const BATCH_ROWS: usize = 8192;
 
+/// More values in one column of a row group are refused: a file of a few bytes can claim any number of equal ones.
+const GROUP_VALUES_MAX: usize = 1 << 27;
+
+/// Longer texts are refused.
+const TEXT_MAX_BYTES: usize = 256;
+
 /// The values of a column, grouped by row.
 pub(super) struct Column<T> {
     /// All values that are not null.
@@ -46,10 +52,11 @@ impl<T> Column<T> {
 impl ColumnReader<'_> {
     /// Reads a column of texts; null is an error.
     pub(super) fn texts(&self, leaf: usize, name: &'static str) -> Result<Vec<String>, TableError> {
-        let column = self.column::<ByteArrayType>(leaf, name)?;
+        let column = self.column::<ByteArrayType>(leaf, name, 1)?;
         self.no_nulls(&column, name)?;
         let text = |(row, bytes): (usize, &ByteArray)| match bytes.as_utf8() {
-            Ok(text) => Ok(text.to_owned()),
+            Ok(text) if text.len() <= TEXT_MAX_BYTES => Ok(text.to_owned()),
+            Ok(text) => Err(self.fault(row, name, format!("{} bytes; at most {TEXT_MAX_BYTES}", text.len()))),
             Err(_) => Err(self.fault(row, name, "not UTF-8".into())),
         };
         column.values.iter().enumerate().map(text).collect()
@@ -57,21 +64,21 @@ impl ColumnReader<'_> {
 
     /// Reads a column of 32-bit integers; null is an error.
     pub(super) fn int32s(&self, leaf: usize, name: &'static str) -> Result<Vec<i32>, TableError> {
-        let column = self.column::<Int32Type>(leaf, name)?;
+        let column = self.column::<Int32Type>(leaf, name, 1)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
 
     /// Reads a column of 64-bit integers; null is an error.
     pub(super) fn int64s(&self, leaf: usize, name: &'static str) -> Result<Vec<i64>, TableError> {
-        let column = self.column::<Int64Type>(leaf, name)?;
+        let column = self.column::<Int64Type>(leaf, name, 1)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
 
     /// Reads a column of numbers; null is an error.
     pub(super) fn float64s(&self, leaf: usize, name: &'static str) -> Result<Vec<f64>, TableError> {
-        let column = self.column::<DoubleType>(leaf, name)?;
+        let column = self.column::<DoubleType>(leaf, name, 1)?;
         self.no_nulls(&column, name)?;
         Ok(column.values)
     }
@@ -86,13 +93,18 @@ impl ColumnReader<'_> {
         if self.group.metadata().column(leaf).column_type() != DoubleType::get_physical_type() {
             return Ok(vec![None; rows]);
         }
-        let column = self.column::<DoubleType>(leaf, name)?;
+        let column = self.column::<DoubleType>(leaf, name, 1)?;
         Ok((0..column.rows()).map(|row| column.row(row).first().copied()).collect())
     }
 
-    /// Reads a column of lists of numbers; null lists and null elements are errors.
-    pub(super) fn lists(&self, leaf: usize, name: &'static str) -> Result<Column<f32>, TableError> {
-        let column = self.column::<FloatType>(leaf, name)?;
+    /// Reads a column of lists of `length` numbers; null lists and null elements are errors.
+    pub(super) fn lists(
+        &self,
+        leaf: usize,
+        name: &'static str,
+        length: usize,
+    ) -> Result<Column<f32>, TableError> {
+        let column = self.column::<FloatType>(leaf, name, length)?;
         self.no_nulls(&column, name)?;
         Ok(column)
     }
@@ -108,19 +120,55 @@ impl ColumnReader<'_> {
         }
     }
 
-    fn column<T: DataType>(&self, leaf: usize, name: &'static str) -> Result<Column<T::T>, TableError> {
+    /// Reads a column with `per_row` values in each row.
+    fn column<T: DataType>(
+        &self,
+        leaf: usize,
+        name: &'static str,
+        per_row: usize,
+    ) -> Result<Column<T::T>, TableError> {
         let descriptor = self.group.metadata().column(leaf).column_descr_ptr();
         let failed = |source: ParquetError| TableError::Parquet { path: self.path.to_owned(), source };
+        self.check_values(leaf, name, per_row).map_err(failed)?;
         let reader = get_typed_column_reader::<T>(self.group.get_column_reader(leaf).map_err(failed)?);
         let levels = Levels::read(reader).map_err(failed)?;
         let column = levels.into_column(DefinitionLevels::of(&descriptor));
-        let expected = usize::try_from(self.group.metadata().num_rows()).unwrap_or(0);
+        let expected = self.rows();
         if column.rows() == expected {
             return Ok(column);
         }
-        let group = usize::try_from(self.group.metadata().ordinal().unwrap_or(0)).unwrap_or(0);
-        let (path, found) = (self.path.to_owned(), column.rows());
+        let (path, group, found) = (self.path.to_owned(), self.index(), column.rows());
         Err(TableError::ColumnLength { path, column: name, group, found, expected })
+    }
+
+    /// Checks how many values the pages claim, before they are decoded: they may be run lengths. Up to twice as many as there
+    /// should be are let through, so that the row that is wrong can be named.
+    fn check_values(&self, leaf: usize, name: &str, per_row: usize) -> Result<(), ParquetError> {
+        let expected = self.rows().saturating_mul(per_row);
+        let most = expected.saturating_mul(2).saturating_add(BATCH_ROWS).min(GROUP_VALUES_MAX);
+        let mut claimed = 0_usize;
+        let mut pages = self.group.get_column_page_reader(leaf)?;
+        while let Some(page) = pages.peek_next_page()? {
+            claimed = claimed.saturating_add(page.num_levels.unwrap_or(0));
+            if claimed > most {
+                return Err(ParquetError::General(format!(
+                    "row group {}, column {name}: more than {most} values for {} rows; a row group may have \
+                     {GROUP_VALUES_MAX} at most",
+                    self.index(),
+                    self.rows()
+                )));
+            }
+            pages.skip_next_page()?;
+        }
+        Ok(())
+    }
+
+    fn rows(&self) -> usize {
+        usize::try_from(self.group.metadata().num_rows()).unwrap_or(0)
+    }
+
+    fn index(&self) -> usize {
+        usize::try_from(self.group.metadata().ordinal().unwrap_or(0)).unwrap_or(0)
     }
 }
 

@@ -68,13 +68,14 @@ impl TableReader {
         mut take: impl FnMut(RowView<'_>) -> Result<(), E>,
     ) -> Result<TableHead, E> {
         let Self { path, file, head, leaves } = self;
+        let elements = head.rig.array.elements();
         let mut checker = Checker::new(&head.rig);
         let mut first_row = 0;
         for index in 0..file.num_row_groups() {
             let group = file.get_row_group(index);
             let group = group.map_err(|source| TableError::Parquet { path: path.clone(), source })?;
             let source = ColumnReader { path: &path, group: group.as_ref(), first_row };
-            let group = undamaged(&path, index, || RowGroup::read(&source, &leaves))?;
+            let group = undamaged(&path, index, || RowGroup::read(&source, &leaves, elements))?;
             first_row += group.visit(&source, &mut checker, &mut take)?;
         }
         Ok(head)
@@ -146,7 +147,11 @@ struct RowGroup {
 }
 
 impl RowGroup {
-    fn read(source: &ColumnReader<'_>, leaves: &[usize; CONTRACT.len()]) -> Result<Self, TableError> {
+    fn read(
+        source: &ColumnReader<'_>,
+        leaves: &[usize; CONTRACT.len()],
+        elements: usize,
+    ) -> Result<Self, TableError> {
         let [run, press, phase, t_ns, x_mm, y_mm, z_mm, covering_mm, indenter, temperature_c, counts] =
             *leaves;
         let t_ns = source.int64s(t_ns, "t_ns")?;
@@ -162,7 +167,7 @@ impl RowGroup {
             covering_mm: source.float64s(covering_mm, "covering_mm")?,
             indenter: source.texts(indenter, "indenter")?,
             temperature_c: source.optional_float64s(temperature_c, "temperature_c", t_ns.len())?,
-            counts: source.lists(counts, "counts")?,
+            counts: source.lists(counts, "counts", elements)?,
             t_ns,
         })
     }

@@ -63,7 +63,7 @@ impl TableWriter {
     /// Adds a row.
     ///
     /// # Errors
-    /// If it breaks the contract or cannot be written.
+    /// If the row breaks the table's contract or cannot be written.
     pub fn push(&mut self, row: RowView<'_>) -> Result<(), TableError> {
         self.checker.check(&row).map_err(|fault| fault.at(self.part.path(), self.rows))?;
         self.put(row)

@@ -117,6 +117,16 @@ fn a_wrong_value_is_named_with_its_row_and_column() {
 }
 
 #[test]
+fn a_small_file_with_endless_values_is_refused_before_they_are_decoded() {
+    let path = folder().join("long_counts.parquet");
+    assert!(fs::metadata(&path).unwrap().len() < 20_000);
+    let error = table::validate(path).unwrap_err().to_string();
+    assert!(error.contains("column counts: more than 8240 values for 6 rows"), "{error}");
+    let error = table::validate(folder().join("long_run.parquet")).unwrap_err();
+    assert_eq!((error.row(), error.column()), (Some(0), Some("run")), "{error}");
+}
+
+#[test]
 fn a_table_without_its_rig_is_refused() {
     let missing = table::validate(folder().join("rig_missing.parquet")).unwrap_err();
     assert!(matches!(missing, TableError::RigMissing { .. }), "{missing}");

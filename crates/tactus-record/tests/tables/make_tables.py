@@ -115,6 +115,9 @@ def invalid():
     write("value_counts_null", table(**changed("counts", 3, None)))
     write("value_counts_hole", table(**changed("counts", 2, [1.0, None, 3.0, 4.0])))
     write("value_counts_nan", table(**changed("counts", 4, [1.0, 2.0, float("nan"), 4.0])))
+    # Four million equal values in a file of some kilobytes.
+    write("long_counts", table(**changed("counts", 3, [1.0] * 4_000_000)), compression="zstd")
+    write("long_run", table(run=(pa.string(), ["a" * 300] * ROWS)))
     write("rig_missing", table(), meta={})
     write("rig_wrong", table(), meta={"tactus.rig": json.dumps({**RIG, "schema": "tactus.rig/2"})})
 

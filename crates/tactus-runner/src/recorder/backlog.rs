@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use tactus_record::Missing;
 use tactus_schema::MonoTime;
 
 /// A backlog of this age is an alarm.
@@ -85,6 +86,11 @@ impl Backlog {
     /// Number of frames that wait.
     pub(super) fn frames(&self) -> u64 {
         self.frames
+    }
+
+    /// What waits.
+    pub(super) fn waiting(&self) -> Missing {
+        Missing { messages: self.messages(), frames: self.frames, ..Missing::default() }
     }
 
     /// Size of the messages that wait.

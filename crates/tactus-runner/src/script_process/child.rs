@@ -8,7 +8,7 @@ use std::process::{self, ExitCode};
 
 use rustix::process::{Resource, Rlimit, Signal, set_parent_process_death_signal, setrlimit};
 use serde::Serialize;
-use tactus_plan::{Call, Evaluate, Host, InThisProcess, Limits, Outcome, Refusal, Reply, Script};
+use tactus_plan::{Call, Evaluate, Host, InThisProcess, Outcome, Refusal, Reply, Script, ScriptLimits};
 
 use super::frame::{self, FrameReader, FrameWriter};
 use super::{ANSWER_MAX_BYTES, Answer, Purpose, Task};
@@ -44,7 +44,7 @@ fn main() -> io::Result<()> {
 }
 
 /// Has the system bound this process.
-fn limit(limits: &Limits) -> io::Result<()> {
+fn limit(limits: &ScriptLimits) -> io::Result<()> {
     let set = |resource, soft: u64, hard: u64| {
         setrlimit(resource, Rlimit { current: Some(soft), maximum: Some(hard) })
     };

@@ -4,20 +4,20 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 #![expect(clippy::print_stdout, reason = "the figures are what `just simulated-days` is for")]
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
 use tactus_device::{Clock, SensorCodec};
-use tactus_engine::{Engine, Publish, Record, RecordFailure, RunOrder};
-use tactus_plan::{Arguments, InThisProcess, Limits, RigView, Script};
+use tactus_engine::{Engine, Publish, Unrecorded};
 use tactus_runner::{devices, embedded::Truth};
 use tactus_schema::pb::{self, ExitStatus};
-use tactus_schema::{Frame, FrameFlags, Rig, TimeStamp};
+use tactus_schema::{Frame, FrameFlags, Rig};
 use tactus_virtual::RigControl;
 use tokio::time::{Instant, sleep_until};
+
+use crate::order;
 
 const SIM: &str = include_str!("../../../../config/rigs/sim.toml");
 
@@ -112,30 +112,6 @@ impl Publish for Ledger {
     fn safety(&self, _: &pb::SafetyEvent) {}
 }
 
-/// Takes what a recording takes, and keeps none of it.
-struct Unkept;
-
-impl Record for Unkept {
-    fn sensor_info(&mut self, _: &pb::SensorInfo, _: TimeStamp) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-    fn frame(&mut self, _: &Frame) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-    fn stage(&mut self, _: &pb::StageState) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-    fn event(&mut self, _: &pb::RunEvent) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-    fn safety(&mut self, _: &pb::SafetyEvent) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-    fn finish(self: Box<Self>) -> Result<(), RecordFailure> {
-        Ok(())
-    }
-}
-
 async fn acquire(sensor: Sensor, days: f64) {
     let rig = Rig::from_toml(SIM).unwrap();
     let service = rig.service.clone().unwrap();
@@ -161,8 +137,8 @@ async fn acquire(sensor: Sensor, days: f64) {
             break;
         }
         sleep_until(at(hour, 61)).await;
-        let order = order(&engine, hour);
-        let outcome = engine.run(order, Box::new(Unkept)).await.unwrap();
+        let order = order(&engine, format!("hour-{hour}"), SCRIPT);
+        let outcome = engine.run(order, Box::new(Unrecorded)).await.unwrap();
         assert_eq!((outcome.exit_status, outcome.presses), (ExitStatus::Done, 3), "hour {hour}: {outcome:?}");
         for (second, line) in FAULTS {
             sleep_until(at(hour, second)).await;
@@ -211,25 +187,6 @@ fn check(received: &Received, engine: &Engine, hour: u32) {
 
 fn inject(control: &RigControl, line: &str) {
     control.inject(line.parse().unwrap()).unwrap();
-}
-
-fn order(engine: &Engine, hour: u32) -> RunOrder {
-    let script = Script::parse("hourly", SCRIPT).unwrap();
-    let arguments = Arguments::default().resolve(&script, &RigView::of(&engine.rig())).unwrap();
-    RunOrder {
-        run_id: format!("hour-{hour}"),
-        script,
-        arguments,
-        seed: 1,
-        who: "test".into(),
-        limits: Limits::default(),
-        earlier: None,
-        planned: None,
-        versions: BTreeMap::new(),
-        recording: String::new(),
-        resets: false,
-        evaluator: Arc::new(InThisProcess),
-    }
 }
 
 /// Resident memory of this process.

@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex};
 
 use tactus_device::{Clock, SensorCodec};
 use tactus_plan::{
-    Arguments, Call, Evaluate, Host, InThisProcess, Limits, Outcome, Refusal, Reply, RigView, Script,
-    ScriptError,
+    Arguments, Call, Evaluate, Host, InThisProcess, Outcome, Refusal, Reply, RigView, Script, ScriptError,
+    ScriptLimits,
 };
 use tactus_record::rows;
 use tactus_runner::config::RigFiles;
@@ -159,7 +159,7 @@ impl Evaluate for Listening {
         arguments: &Arguments,
         rig: &RigView,
         seed: u64,
-        limits: &Limits,
+        limits: &ScriptLimits,
         host: &mut dyn Host,
     ) -> Result<Outcome, ScriptError> {
         // Of the dry run.
@@ -172,7 +172,7 @@ impl Evaluate for Listening {
         script: &Script,
         arguments: &Arguments,
         rig: &RigView,
-        limits: &Limits,
+        limits: &ScriptLimits,
         stopped: &dyn Fn() -> bool,
     ) -> Result<Arguments, ScriptError> {
         InThisProcess.resolve(script, arguments, rig, limits, stopped)

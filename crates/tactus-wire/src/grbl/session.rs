@@ -34,8 +34,8 @@ const SPEED_MIN_MM_PER_S: f64 = 0.001 / 60.0;
 const SAME_PLACE_MM: f64 = 0.0005;
 
 /// The host's side of one connection to a controller; see [`stage::Session`]. The controller's coordinates are those of its
-/// machine frame. A controller with another work frame (`G54`, `G92`) is refused, because nobody would know which of both the
-/// rig file means.
+/// machine frame. A controller with another work frame (`G54`, `G92`) is refused, because nobody would know which of the two
+/// the rig file means.
 ///
 /// The position counts as known from a successful homing until an alarm, a reset by others, or a stop that had to reset
 /// the controller in motion.

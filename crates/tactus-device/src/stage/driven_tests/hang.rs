@@ -17,6 +17,7 @@ use tokio::time::sleep;
 
 use super::fake::{self, Shared};
 use super::{OPTIONS, drain, homing, permit, to, until};
+use crate::stage::guard::tests::Device;
 use crate::transport::memory::{MemoryConnector, pair};
 use crate::transport::{ByteStream, Connect};
 use crate::{Clock, DeviceError, Stage, StageError};
@@ -49,8 +50,6 @@ struct TroubledStream {
     written: Sender<Vec<u8>>,
 }
 
-struct Guarded(Sender<Vec<u8>>);
-
 impl fmt::Display for Troubled {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.inner.fmt(f)
@@ -70,18 +69,7 @@ impl Connect for Troubled {
 
 impl ByteStream for TroubledStream {
     fn second_writer(&self) -> Option<Box<dyn io::Write + Send>> {
-        Some(Box::new(Guarded(self.written.clone())))
-    }
-}
-
-impl io::Write for Guarded {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.send(bytes.to_vec()).map_err(io::Error::other)?;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
+        Some(Box::new(Device(self.written.clone())))
     }
 }
 

@@ -1,14 +1,12 @@
 //! Plays one schedule in virtual time.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tactus_device::{Clock, SensorCodec};
-use tactus_engine::{Engine, RunOrder, StopOrder};
-use tactus_plan::{Arguments, InThisProcess, Limits, RigView, Script};
+use tactus_engine::{Engine, StopOrder};
 use tactus_runner::{devices, embedded::Truth};
 use tactus_virtual::RigControl;
 use tokio::time::{Instant, advance, sleep, sleep_until, timeout};
@@ -16,6 +14,7 @@ use tokio::time::{Instant, advance, sleep, sleep_until, timeout};
 use super::schedule::{Act, Event, RUNS, Schedule};
 use super::tally::Tally;
 use super::watch::{Broken, Strictness, TOLERANCE_MM, Witness};
+use crate::order;
 
 /// Only a hang takes this long.
 const LONGEST: Duration = Duration::from_hours(4);
@@ -130,7 +129,7 @@ async fn perform(
         Ok(Err(_)) => witness.count("resets", "failed"),
     }
     let recording = Witness::recording(witness);
-    match timeout(LONGEST, engine.run(order(engine, run, text), recording)).await {
+    match timeout(LONGEST, engine.run(order(engine, format!("run-{run}"), text), recording)).await {
         Err(_) => witness.tell("hang", "a run hangs"),
         Ok(Err(busy)) => {
             witness.count("outcomes", "busy");
@@ -140,25 +139,6 @@ async fn perform(
             writeln!(log, "{outcome:?} at {:?}", control.tip_mm()).unwrap();
             witness.check_outcome(&outcome, presses, engine.fault().is_some());
         }
-    }
-}
-
-fn order(engine: &Engine, run: u32, text: &str) -> RunOrder {
-    let script = Script::parse("random", text).unwrap();
-    let arguments = Arguments::default().resolve(&script, &RigView::of(&engine.rig())).unwrap();
-    RunOrder {
-        run_id: format!("run-{run}"),
-        script,
-        arguments,
-        seed: 1,
-        who: "test".into(),
-        limits: Limits::default(),
-        earlier: None,
-        planned: None,
-        versions: BTreeMap::new(),
-        recording: String::new(),
-        resets: false,
-        evaluator: Arc::new(InThisProcess),
     }
 }
 
