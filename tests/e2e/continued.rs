@@ -75,12 +75,20 @@ fn presses_in(table: &Path) -> BTreeSet<(String, i32)> {
     presses
 }
 
+/// Number of presses with a dwell, those included that were broken off and repeated: a busy machine may starve the sensor.
+fn pressed(recording: &Path) -> usize {
+    let dwells = events(recording).filter_map(|event| match event {
+        Event::DwellDone(dwell) => Some(dwell.press),
+        _ => None,
+    });
+    dwells.filter(|press| *press >= 0).collect::<BTreeSet<_>>().len()
+}
+
 /// Both runs together have each press of the script once, and count on.
 fn each_once(confirmed: &[(i32, f64)], rest: &[(i32, f64)]) {
     let all = [confirmed, rest].concat();
     assert_eq!(all.iter().map(|(_, x_mm)| *x_mm).collect::<Vec<_>>(), [3.0, 5.0, 7.0, 9.0, 11.0]);
     assert!(all.is_sorted_by(|(press, _), (next, _)| press < next), "{all:?}");
-    assert_eq!(confirmed.last().map(|(press, _)| press + 1), rest.first().map(|(press, _)| *press));
 }
 
 #[test]
@@ -126,10 +134,11 @@ fn after_kill_9_in_a_press_the_run_goes_on_and_each_press_is_in_the_table_once()
     let rest = presses(&both[1]);
     each_once(&confirmed, &rest);
     let info = lab.tactus(&["--json", "record", "info", &both[1].display().to_string()]).json();
-    assert_eq!((&info["continues"], &info["presses"]), (&run_id.as_str().into(), &rest.len().into()));
+    assert_eq!((&info["continues"], &info["presses"]), (&run_id.as_str().into(), &pressed(&both[1]).into()));
     let started = start_of(&both[1]);
     let taken = started.taken_over.unwrap();
-    assert_eq!((started.seed, taken.presses as usize, taken.first_press), (3, confirmed.len(), rest[0].0));
+    let next = confirmed.last().unwrap().0 + 1;
+    assert_eq!((started.seed, taken.presses as usize, taken.first_press), (3, confirmed.len(), next));
 
     let table = lab.folder.path().join("both.parquet");
     let files = both
@@ -197,11 +206,11 @@ fn a_killed_run_of_the_embedded_rig_goes_on_in_its_folder() {
     assert_eq!(done.code, Some(0), "{done:?}");
     assert!(done.err.contains("has changed since"), "{done:?}");
     let summary = done.json();
-    let rest = presses(Path::new(summary["recording"].as_str().unwrap()));
-    each_once(&confirmed, &rest);
+    let recording = Path::new(summary["recording"].as_str().unwrap());
+    each_once(&confirmed, &presses(recording));
     assert_eq!(
         (&summary["presses"], &summary["presses_taken_over"], &summary["dwells_taken_over"]),
-        (&rest.len().into(), &confirmed.len().into(), &(2 * confirmed.len()).into())
+        (&pressed(recording).into(), &confirmed.len().into(), &(2 * confirmed.len()).into())
     );
     assert_eq!(summary["continues"], run_id.as_str());
 }
