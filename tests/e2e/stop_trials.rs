@@ -347,7 +347,7 @@ impl Drop for Scene {
 }
 
 /// A plain client of the bus.
-async fn session(endpoint: &str) -> zenoh::Session {
+pub(crate) async fn session(endpoint: &str) -> zenoh::Session {
     let mut config = zenoh::Config::default();
     config.insert_json5("mode", "\"client\"").unwrap();
     config.insert_json5("scouting/multicast/enabled", "false").unwrap();

@@ -1,12 +1,23 @@
 //! The dashboard over HTTP, with a browser's requests; `just browser` tests it with a real one.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on fails")]
 
+use std::cell::Cell;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use prost::Message as _;
 use serde_json::Value;
 use tactus_e2e::{Process, ServiceUnderTest, free_endpoint};
+use tactus_schema::key::{Keys, Topic};
+use tactus_schema::pb;
+use tokio::runtime::Runtime;
+use tokio::time::interval;
+use zenoh::bytes::Encoding;
+
+use crate::stop_trials::session;
 
 const HOLD: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 600.0)\n";
 
@@ -100,6 +111,39 @@ fn the_page_shows_live_frames_and_stops_a_run() {
     assert!(ended["run"]["message"].as_str().unwrap().contains("stopped by dashboard"), "{ended}");
     assert_eq!(client.wait().0, Some(1));
     assert_eq!(web.ask("POST /resume", &web.token).0, 409, "there is no run to go on with");
+}
+
+#[test]
+fn frames_of_another_publisher_are_not_shown() {
+    const FAKE_SEQ: u64 = 1_000_000_000;
+    let lab = ServiceUnderTest::start(|rig| rig);
+    let web = Web::start(&lab, &lab.endpoint);
+    web.until(|view| view["frame"].is_object());
+    let runtime = Runtime::new().unwrap();
+    let rogue = runtime.block_on(session(&lab.endpoint));
+    let is_shown = Arc::new(AtomicBool::new(false));
+    let publishing = runtime.spawn({
+        let is_shown = Arc::clone(&is_shown);
+        async move {
+            let fake = pb::Frame { seq: FAKE_SEQ, counts: vec![9999.0; 48], ..Default::default() };
+            let encoding = Encoding::APPLICATION_PROTOBUF.with_schema("tactus.v1.Frame");
+            let key = Keys::new("bench").topic(Topic::SensorFrame);
+            let mut pace = interval(Duration::from_millis(5));
+            while !is_shown.load(Ordering::SeqCst) {
+                rogue.put(&key, fake.encode_to_vec()).encoding(encoding.clone()).await.unwrap();
+                pace.tick().await;
+            }
+            rogue.close().await.unwrap();
+        }
+    });
+    let views = Cell::new(0);
+    web.until(|view| {
+        assert!(view["frame"]["seq"].as_u64().is_none_or(|seq| seq < FAKE_SEQ), "{view}");
+        views.set(views.get() + 1);
+        views.get() == 80
+    });
+    is_shown.store(true, Ordering::SeqCst);
+    runtime.block_on(publishing).unwrap();
 }
 
 #[test]

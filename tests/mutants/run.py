@@ -42,6 +42,7 @@ MUTANTS = [
     ("another covering is not confirmed", ENGINE + "engine.rs", "let wanted_mm = control.wanted_covering_mm.filter(unconfirmed);", "let wanted_mm = control.wanted_covering_mm.filter(unconfirmed).filter(|_| false);", "tactus-engine"),
     ("the thicker covering counts after a restart", ENGINE + "engine.rs", "kept_mm.min(in_file_mm)", "kept_mm.max(in_file_mm)", "tactus-engine"),
     ("a dwell does not ask the stage", ENGINE + "run/steps.rs", "if average.is_disturbed || !is_same {", "if false && (average.is_disturbed || !is_same) {", "tactus-engine"),
+    ("an alarm is noticed at the end of a dwell", ENGINE + "acquisition.rs", "            self.window = None;\n", "", "tactus-engine"),
     ("a panic of the run leaves the tip", ENGINE + "run.rs", "let retracted = run.end(&result).await;\n    run.conclude(&result, retracted).await\n}", "run.conclude(&result, Ok(0.0)).await\n}", "tactus-engine"),
     ("the driver does not check permits", DEVICE + "driver.rs", "command.check(now.mono)", "Ok::<(), Void>(())", "tactus-device"),
     ("an unwatched stage moves on", DEVICE + "driver.rs", "unwatched(&mut self.watched), if is_watched", "unwatched(&mut self.watched), if false && is_watched", "tactus-device"),

@@ -44,8 +44,8 @@ class Lab:
         self.daemon.wait_for("ready")
         tactus("--endpoint", self.endpoint, "reset")
 
-    def start(self, name, *args):
-        return Process(name, args, self.folder)
+    def start(self, name, *args, **environment):
+        return Process(name, args, self.folder, environment)
 
     def close(self):
         for process in (self.daemon, self.mock):
@@ -55,7 +55,7 @@ class Lab:
 class Process:
     """One of our binaries, running beside a test. Its output is kept and printed."""
 
-    def __init__(self, name, args, folder):
+    def __init__(self, name, args, folder, environment=None):
         self.name = name
         self.lines = queue.Queue()
         self.process = subprocess.Popen(
@@ -65,7 +65,7 @@ class Process:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            env=os.environ | {"RUST_LOG": "info,zenoh=error"},
+            env=os.environ | {"RUST_LOG": "info,zenoh=error"} | (environment or {}),
         )
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
@@ -80,6 +80,12 @@ class Process:
         while text not in (line := self.lines.get(timeout=60)):
             pass
         return line
+
+    def truth(self):
+        """What is true of virtual devices now."""
+        self.process.stdin.write("truth\n")
+        self.process.stdin.flush()
+        return json.loads(self.wait_for("{"))
 
     def end(self):
         self.process.terminate()

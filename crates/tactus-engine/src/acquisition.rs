@@ -273,7 +273,8 @@ impl Acquisition {
         let violation = self.supervisor.on_report(report);
         self.stop_for(violation.as_ref());
         if report.status() != pb::StageStatus::Idle {
-            self.window.iter_mut().for_each(Window::disturb);
+            // Who waits for the average is told at once: a dwell may be long.
+            self.window = None;
         }
         self.record(|sink| sink.stage(report));
         self.tell_violation(violation);

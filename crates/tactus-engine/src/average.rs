@@ -14,7 +14,7 @@ pub(crate) struct Average {
     pub(crate) frames: u32,
     /// Frames of the interval that were lost.
     pub(crate) lost: u64,
-    /// True if the stage reported another state than idle meanwhile.
+    /// True if the sensor connected anew meanwhile.
     pub(crate) is_disturbed: bool,
     /// Arrival of the first and the last of them.
     pub(crate) span: [MonoTime; 2],
@@ -59,7 +59,7 @@ impl Window {
         )
     }
 
-    /// The stage did not stand idle.
+    /// The sensor connected anew.
     pub(crate) fn disturb(&mut self) {
         self.is_disturbed = true;
     }

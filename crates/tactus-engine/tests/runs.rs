@@ -5,6 +5,7 @@ mod continued;
 mod rig;
 
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use pb::ExitStatus;
 use pb::Phase::{Approach, Hold, Idle, Load, Retract, Unload};
@@ -12,6 +13,7 @@ use pb::run_event::Event;
 use rig::{Bench, Memory};
 use tactus_engine::{CoveringMemory, Fault, ResumeError, RunOrder, StopOrder};
 use tactus_schema::pb::{self, RunPhase, StageStatus};
+use tokio::time::{sleep, timeout};
 
 const PRESS: &str = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2, 0.4])\n";
 const PRESSES: &str =
@@ -207,7 +209,7 @@ async fn a_press_in_which_frames_were_lost_is_repeated_under_a_new_index() {
     let memory = Memory::default();
     let run = start(&bench, HOLD, &memory);
     until_deep(&mut bench, 0.3).await;
-    tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+    sleep(Duration::from_secs(1)).await;
     bench.trouble.lock().unwrap().lose = 2;
     let outcome = run.await.unwrap();
     assert_eq!(
@@ -355,7 +357,7 @@ async fn however_often_stop_is_pressed_the_tip_ends_up() {
     until_deep(&mut bench, 0.3).await;
     for _ in 0..10 {
         bench.engine.stop(order(false));
-        tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        sleep(Duration::from_millis(5)).await;
     }
     assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
     assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
@@ -371,7 +373,7 @@ async fn while_stop_is_pressed_without_end_the_tip_rises() {
         bench.engine.stop(order(false));
         stops += 1;
         assert!(stops < 400, "the tip is at {} mm after two seconds", height_mm(&bench));
-        tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        sleep(Duration::from_millis(5)).await;
     }
     assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
 }
@@ -523,12 +525,25 @@ async fn a_dwell_in_which_the_stage_lost_its_place_is_not_told_as_done() {
     let memory = Memory::default();
     let run = start(&bench, HOLD, &memory);
     until_deep(&mut bench, 0.3).await;
-    tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+    sleep(Duration::from_secs(1)).await;
     bench.trouble.lock().unwrap().epoch += 1;
     let outcome = run.await.unwrap();
     assert_eq!((outcome.exit_status, outcome.dwells), (ExitStatus::Failed, 0), "{outcome:?}");
     assert!(outcome.message.contains("did not stand still"), "{}", outcome.message);
     assert!(!memory.kinds().iter().any(|kind| matches!(kind, Event::DwellDone(_))));
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_alarm_in_a_long_dwell_ends_it_at_once_and_is_named() {
+    let mut bench = Bench::start(|rig| rig);
+    let memory = Memory::default();
+    let run = start(&bench, &HOLD.replace("60.0", "600.0"), &memory);
+    until_deep(&mut bench, 0.3).await;
+    sleep(Duration::from_secs(10)).await;
+    bench.trouble.lock().unwrap().alarm = true;
+    let outcome = timeout(Duration::from_secs(2), run).await.unwrap().unwrap();
+    assert_eq!((outcome.exit_status, outcome.dwells), (ExitStatus::Failed, 0), "{outcome:?}");
+    assert!(outcome.message.contains("alarm 1: hard limit"), "{}", outcome.message);
 }
 
 #[tokio::test(start_paused = true)]
@@ -539,7 +554,7 @@ async fn a_step_in_which_the_stage_lost_its_place_is_not_told_as_done() {
         let script = format!("def run(rig):\n    move(5.0, 5.0, height_mm = 1.0)\n    {step}\n");
         let run = start(&bench, &script, &memory);
         bench.stage.wait_for(|stage| (stage.z_mm - 1.0).abs() < 1e-9).await.unwrap();
-        tokio::time::sleep(std::time::Duration::from_secs(30)).await;
+        sleep(Duration::from_secs(30)).await;
         bench.trouble.lock().unwrap().epoch += 1;
         let outcome = run.await.unwrap();
         assert_eq!(outcome.exit_status, ExitStatus::Failed, "{step}: {outcome:?}");

@@ -83,7 +83,7 @@ impl RigControl {
 
     /// Puts another covering in place; its surface stays at the same height. A negative thickness counts as 0.
     pub fn set_covering_mm(&self, thickness_mm: f64) {
-        self.world.lock().set_covering_mm(thickness_mm);
+        self.world.lock().set_covering_mm(thickness_mm, Instant::now());
     }
 
     /// Thickness of the present covering.
@@ -101,7 +101,8 @@ impl RigControl {
         self.world.lock().depth_mm(Instant::now())
     }
 
-    /// The greatest true depth at any instant since the rig was switched on; negative if the tip has never touched.
+    /// The greatest true depth at any instant since the present covering was put in place; negative if the tip has never
+    /// touched it.
     pub fn deepest_mm(&self) -> f64 {
         self.world.lock().deepest_mm(Instant::now())
     }

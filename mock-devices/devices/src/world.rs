@@ -142,7 +142,7 @@ impl World {
         self.surface_mm - self.tip_mm(at)[2]
     }
 
-    /// Greatest depth ever until `now`.
+    /// Greatest depth in the present covering until `now`.
     pub(crate) fn deepest_mm(&mut self, now: Instant) -> f64 {
         self.settle(now);
         self.deepest_mm
@@ -194,10 +194,12 @@ impl World {
         self.covering.thickness_mm
     }
 
-    /// Puts another covering in place; its surface stays at the same height.
-    pub(crate) fn set_covering_mm(&mut self, thickness_mm: f64) {
+    /// Puts another covering in place; its surface stays at the same height. Nothing was pressed into it yet.
+    pub(crate) fn set_covering_mm(&mut self, thickness_mm: f64, now: Instant) {
+        self.settle(now);
         self.covering = Covering { thickness_mm: thickness_mm.max(0.0) };
         self.sensor_model.set_covering(self.covering);
+        self.deepest_mm = self.depth_mm(now);
     }
 
     /// Moves the true surface; the service still believes 0.

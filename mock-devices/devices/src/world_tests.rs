@@ -174,6 +174,8 @@ fn the_record_of_depths_misses_nothing_between_looks() {
         (world.deepest_mm(later) - 0.3).abs() < 1e-9,
         "a surface that rises later was not pressed before"
     );
+    world.set_covering_mm(0.508, later);
+    assert!(world.deepest_mm(later) < -20.0, "another covering was not pressed before");
 }
 
 #[test]
@@ -185,13 +187,13 @@ fn covering_surface_and_stiffness_can_be_changed() {
     let rises =
         |world: &mut World| -> Vec<f64> { world.image(at).iter().map(|counts| counts - 100.0).collect() };
     let thin = rises(&mut world);
-    world.set_covering_mm(5.08);
+    world.set_covering_mm(5.08, at);
     let thick = rises(&mut world);
     assert!(
         thick[21] < thin[21] && thick[0] / thick[21] > thin[0] / thin[21],
         "a thick covering spreads more"
     );
-    world.set_covering_mm(1.016);
+    world.set_covering_mm(1.016, at);
     world.set_surface_mm(0.2, at);
     assert!((world.depth_mm(at) - 0.7).abs() < 1e-9);
     assert!(rises(&mut world)[21] > 1.35 * thin[21]);

@@ -370,8 +370,15 @@ impl Run {
         epoch: u32,
         duration: Duration,
     ) -> Result<Average, Broken> {
-        let average = self.average(duration).await?;
+        let averaged = self.average(duration).await;
+        if let Err(broken) = &averaged
+            && !matches!(broken, Broken::Disturbed)
+        {
+            return averaged;
+        }
+        // Asked also after a disturbance: the stage's answer, such as an alarm, says more.
         let is_same = self.shared.stands_at(tip_mm).await? == epoch;
+        let average = averaged?;
         if average.lost > 0 {
             return Err(Broken::FramesLost(average.lost));
         }
@@ -381,7 +388,7 @@ impl Run {
         Ok(average)
     }
 
-    /// The mean over the frames that arrive within the next `duration`.
+    /// The mean over the frames that arrive within the next `duration`. It ends at once if the stage does not stand idle.
     pub(super) async fn average(&self, duration: Duration) -> Result<Average, Broken> {
         let now = self.shared.clock.now().mono;
         let until = now.after(duration);
@@ -389,7 +396,8 @@ impl Run {
         let patience = duration + (self.shared.sample_period() * LATE_PERIODS_MAX).max(LATE_MIN);
         match self.shared.unless_ended(timeout(patience, average)).await? {
             Ok(Ok(average)) => Ok(average),
-            Ok(Err(_)) | Err(_) => Err(Broken::SensorSilent(patience.as_secs_f64())),
+            Ok(Err(_)) => Err(Broken::Disturbed),
+            Err(_) => Err(Broken::SensorSilent(patience.as_secs_f64())),
         }
     }
 

@@ -25,6 +25,8 @@ pub(crate) struct Trouble {
     pub(crate) look_panics: bool,
     /// Epoch of the stage's position.
     pub(crate) epoch: u32,
+    /// The stage is in alarm.
+    pub(crate) alarm: bool,
     /// The driver panics instead of giving a frame.
     pub(crate) panics: bool,
     /// Counts on top of all elements.
@@ -138,8 +140,12 @@ impl FakeStage {
         loop {
             sleep(Duration::from_millis(100)).await;
             let now = self.clock.now();
+            let alarm = self.trouble.lock().unwrap().alarm;
             self.state.send_modify(|state| {
                 (state.t_mono_ns, state.t_wall_ns) = (now.mono.ns(), now.wall.ns());
+                if alarm {
+                    state.set_status(pb::StageStatus::Alarm);
+                }
             });
             let state = *self.state.borrow();
             if self.reports.send(state).await.is_err() {
@@ -202,6 +208,9 @@ impl Stage for FakeStage {
         async {
             if let Some(why) = self.trouble.lock().unwrap().absent {
                 return Err(StageError::Refused { command: "?".into(), reason: why.into() });
+            }
+            if self.trouble.lock().unwrap().alarm {
+                return Err(StageError::Alarm { code: 1, name: "1".into(), meaning: "hard limit".into() });
             }
             let at_mm = self.position_mm();
             let panics = at_mm[2] < 0.0 && std::mem::take(&mut self.trouble.lock().unwrap().look_panics);

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tactus_device::{Clock, SensorCodec};
-use tactus_engine::{Engine, StopOrder};
+use tactus_engine::{Engine, ResumeError, StopOrder};
 use tactus_runner::{devices, embedded::Truth};
 use tactus_virtual::RigControl;
 use tokio::time::{Instant, advance, sleep, sleep_until, timeout};
@@ -54,7 +54,10 @@ async fn play_all(schedule: &Schedule, strictness: Strictness) -> Played {
     let clock = Clock::paused();
     let started = Instant::now();
     let seed = schedule.seed;
-    let opened = devices::open(&rig, &service, SensorCodec::default(), || Truth::of_rig(&rig, seed), clock);
+    let mut opened =
+        devices::open(&rig, &service, SensorCodec::default(), || Truth::of_rig(&rig, seed), clock);
+    // As for real devices: a person puts the covering in place.
+    opened.devices.change_covering = None;
     let control = opened.control.unwrap();
     let witness = Arc::new(Witness::new(control.clone(), rig.clone(), &schedule.faults(), strictness));
     let engine = Engine::start(rig, opened.devices, clock, Arc::clone(&witness) as _).unwrap();
@@ -75,13 +78,7 @@ async fn play_all(schedule: &Schedule, strictness: Strictness) -> Played {
             }))
         })
         .collect();
-    let operator = engine.clone();
-    let operator = tokio::spawn(async move {
-        loop {
-            sleep(OPERATOR).await;
-            drop(operator.resume("operator", None));
-        }
-    });
+    let operator = tokio::spawn(operate(engine.clone(), Arc::clone(&witness)));
 
     let mut log = String::new();
     for run in 0..RUNS {
@@ -111,6 +108,17 @@ async fn play_all(schedule: &Schedule, strictness: Strictness) -> Played {
     tally.add("virtual time", "s", started.elapsed().as_secs());
     tally.merge(std::mem::take(&mut *played.lock().unwrap()));
     Played { log, broken, tally }
+}
+
+/// Resumes whatever is paused. If another covering is asked for, puts it in place first and confirms it.
+async fn operate(engine: Engine, witness: Arc<Witness>) {
+    loop {
+        sleep(OPERATOR).await;
+        if let Err(ResumeError::CoveringNotConfirmed { wanted_mm }) = engine.resume("operator", None) {
+            witness.put_in_place(wanted_mm);
+            drop(engine.resume("operator", Some(wanted_mm)));
+        }
+    }
 }
 
 /// Resets, and runs one script.

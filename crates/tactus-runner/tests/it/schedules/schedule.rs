@@ -23,8 +23,12 @@ pub(super) const RUNS: u32 = 3;
 /// Faults come within this time; most schedules are over by then.
 const FAULTS_SPAN: Duration = Duration::from_secs(90);
 
-/// The deepest that the covering of the rigs allows is 0.7112 mm.
+/// The deepest that the covering of the rigs, of 1.016 mm, allows is 0.7112 mm.
 const DEEPEST_MM: f64 = 0.71;
+
+/// Coverings that scripts ask for, and a depth that only the thickest allows.
+const COVERINGS_MM: [f64; 3] = [0.508, 1.016, 2.032];
+const DEEP_MM: f64 = 1.4;
 
 /// A seed, a rig, and what happens to it. Its text is one line; reading it gives the same schedule.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,6 +170,10 @@ fn step(rng: &mut ChaCha8Rng) -> String {
         1 => "wait(0.3)".into(),
         2 => format!("move({x_mm:.3}, {y_mm:.3}, height_mm = {:.3})", rng.random_range(0.0..5.0)),
         3 => format!("press({x_mm:.3}, {y_mm:.3}, [{DEEPEST_MM}], speed_mm_per_s = 1.0)"),
+        4 if rng.random() => {
+            format!("covering({:.3})", COVERINGS_MM[rng.random_range(0..COVERINGS_MM.len())])
+        }
+        4 => format!("press({x_mm:.3}, {y_mm:.3}, [{DEEP_MM}], speed_mm_per_s = 1.0)"),
         _ => {
             let depths: Vec<_> =
                 (0..rng.random_range(1..4)).map(|_| format!("{:.3}", rng.random_range(0.05..0.7))).collect();

@@ -61,6 +61,8 @@ struct Seen {
     broken: Vec<Broken>,
     frames: u64,
     last_seq: Option<u64>,
+    /// In any covering so far.
+    deepest_mm: f64,
     /// The greatest depth that the steps below the tip at the last frame allow.
     allowed_mm: f64,
     /// Height of the tip when a frame showed a load that is too great.
@@ -125,22 +127,34 @@ impl Witness {
         }
     }
 
-    /// Holds the greatest depth ever against the limit.
+    /// Holds the greatest depth ever in the covering in place against its limit.
     pub(super) fn check_depth(&self) {
-        let covering_mm = self.service.envelope.depth_max_mm(self.rig.covering) + TOLERANCE_MM;
+        let mut covering = self.rig.covering;
+        covering.thickness_mm = self.control.covering_mm();
+        let covering_mm = self.service.envelope.depth_max_mm(covering) + TOLERANCE_MM;
         let limit_mm = covering_mm + self.hidden_mm + self.damage_mm;
         let limit_mm = self.strictness.depth_max_mm.unwrap_or(limit_mm);
         let deepest_mm = self.control.deepest_mm();
         if deepest_mm > limit_mm {
-            self.tell("depth", format!("the tip was {deepest_mm:.3} mm deep; the limit is {limit_mm:.3} mm"));
+            self.tell(
+                "depth",
+                format!(
+                    "the tip was {deepest_mm:.3} mm deep in {} mm; the limit is {limit_mm:.3} mm",
+                    covering.thickness_mm
+                ),
+            );
         }
         let mut seen = self.seen();
-        seen.tally.count("schedules", "all");
-        for (name, least_mm) in [("in contact", 0.0), ("deeper than 0.5 mm", 0.5)] {
-            if deepest_mm > least_mm {
-                seen.tally.count("schedules", name);
-            }
-        }
+        seen.deepest_mm = seen.deepest_mm.max(deepest_mm);
+    }
+
+    /// A person puts another covering in place.
+    pub(super) fn put_in_place(&self, thickness_mm: f64) {
+        self.check_depth();
+        let was_mm = self.control.covering_mm();
+        self.control.set_covering_mm(thickness_mm);
+        let name = if thickness_mm < was_mm { "thinner covering" } else { "thicker covering" };
+        self.count("operator", name);
     }
 
     /// A recording of a run.
@@ -150,7 +164,14 @@ impl Witness {
     }
 
     pub(super) fn what_was_seen(&self) -> (Vec<String>, Vec<Broken>, Tally) {
-        let seen = std::mem::take(&mut *self.seen());
+        let mut seen = std::mem::take(&mut *self.seen());
+        seen.tally.count("schedules", "all");
+        for (name, least_mm) in [("in contact", 0.0), ("deeper than 0.5 mm", 0.5), ("deeper than 1 mm", 1.0)]
+        {
+            if seen.deepest_mm > least_mm {
+                seen.tally.count("schedules", name);
+            }
+        }
         (seen.events, seen.broken, seen.tally)
     }
 

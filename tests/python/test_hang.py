@@ -1,0 +1,123 @@
+"""Threads of the service hang alone, as `ptrace` stops them: nothing but these threads knows."""
+
+import contextlib
+import ctypes
+import os
+import pathlib
+import socket
+import subprocess
+
+import pytest
+from lab import Lab, binary, tactus
+
+# linux/ptrace.h and linux/wait.h
+PTRACE_DETACH, PTRACE_SEIZE, PTRACE_INTERRUPT, WALL = 17, 0x4206, 0x4207, 0x40000000
+
+libc = ctypes.CDLL(None, use_errno=True)
+libc.ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
+libc.ptrace.restype = ctypes.c_long
+
+HOLD = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.2], dwell_s = 600.0)\n"
+# Each step of 0.1 mm takes two seconds.
+SLOW = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.6], speed_mm_per_s = 0.05)\n"
+
+
+def ptrace(request, thread):
+    if libc.ptrace(request, thread, None, None) != 0:
+        error = ctypes.get_errno()
+        raise OSError(error, os.strerror(error))
+
+
+@contextlib.contextmanager
+def hanging(process, name):
+    """All threads whose name begins with this hang meanwhile."""
+    tasks = pathlib.Path(f"/proc/{process.pid}/task")
+    threads = [int(task.name) for task in tasks.iterdir() if (task / "comm").read_text().startswith(name)]
+    assert threads, f"no thread is named {name}"
+    for thread in threads:
+        ptrace(PTRACE_SEIZE, thread)
+        ptrace(PTRACE_INTERRUPT, thread)
+        os.waitpid(thread, WALL)
+    yield
+    for thread in threads:
+        ptrace(PTRACE_DETACH, thread)
+
+
+class WatchedLab(Lab):
+    """A lab whose service has a watchdog, as under systemd."""
+
+    def __init__(self, folder):
+        self.watchdog = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.watchdog.bind(str(folder / "notify.sock"))
+        self.watchdog.settimeout(60)
+        super().__init__(folder)
+
+    def start(self, name, *args):
+        return super().start(name, *args, NOTIFY_SOCKET=str(self.folder / "notify.sock"), WATCHDOG_USEC="2000000")
+
+    def begin(self, script):
+        """Starts a run, without waiting for its end."""
+        (self.folder / "script.star").write_text(script)
+        return subprocess.Popen(
+            [binary("tactus"), "--endpoint", self.endpoint, "run", "script.star", "--no-report"],
+            cwd=self.folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def wait_for_the_truth(self, is_it):
+        """Asks for the rig's true state until it is so."""
+        while not is_it(truth := self.mock.truth()):
+            pass
+        return truth
+
+    def wait_until_the_watchdog_is_told(self, text):
+        while text not in self.watchdog.recv(4096).decode():
+            pass
+
+    def drain_the_watchdog(self):
+        self.watchdog.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while self.watchdog.recv(4096):
+                pass
+        self.watchdog.settimeout(60)
+
+    def status(self):
+        return tactus("--endpoint", self.endpoint, "status")
+
+
+@pytest.fixture
+def watched(tmp_path):
+    lab = WatchedLab(tmp_path)
+    yield lab
+    lab.close()
+    lab.watchdog.close()
+
+
+def test_a_recorder_that_hangs_fails_the_run_with_the_tip_up(watched):
+    client = watched.begin(HOLD)
+    watched.wait_for_the_truth(lambda truth: truth["depth_mm"] > 0.19 and not truth["moving"])
+    with hanging(watched.daemon.process, "recorder"):
+        watched.drain_the_watchdog()
+        watched.daemon.wait_for("does not go on")
+        watched.wait_until_the_watchdog_is_told("WATCHDOG=trigger")
+        watched.wait_for_the_truth(lambda truth: truth["z_mm"] > 1.9)
+    assert client.wait(timeout=60) != 0
+    watched.wait_until_the_watchdog_is_told("WATCHDOG=1")
+    assert watched.status()["state"]["phase"] == "finished"
+
+
+def test_a_runtime_that_hangs_in_a_step_down_stops_the_stage_within_the_step(watched):
+    client = watched.begin(SLOW)
+    before = watched.wait_for_the_truth(lambda truth: 0.11 < truth["depth_mm"] and truth["moving"])
+    with hanging(watched.daemon.process, "tokio-r"):
+        watched.drain_the_watchdog()
+        rest = watched.wait_for_the_truth(lambda truth: not truth["moving"])
+        # A fifth of a step, which takes four times the 0.1 s that the guard may need.
+        assert rest["depth_mm"] < before["depth_mm"] + 0.02
+        with pytest.raises(TimeoutError):
+            watched.watchdog.settimeout(3)
+            watched.watchdog.recv(4096)
+        watched.watchdog.settimeout(60)
+    watched.wait_for_the_truth(lambda truth: truth["z_mm"] > 1.9)
+    assert client.wait(timeout=60) != 0
