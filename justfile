@@ -313,27 +313,27 @@ fuzz-with features seconds targets:
 
 # So many schedules of faults against a virtual stage and its driver, each from its seed; TACTUS_SEED=7 plays one again.
 simulate-faults schedules="2000":
-    TACTUS_SCHEDULES={{ schedules }} cargo test --package tactus-virtual --test it schedules
+    TACTUS_SCHEDULES={{ schedules }} cargo test --workspace --test it whatever_happens_to_
 
 # So many schedules of faults against the service's core, its drivers and virtual devices; TACTUS_SEED=7 plays one again.
 fault-schedules schedules="200":
-    TACTUS_SCHEDULES={{ schedules }} cargo test --package tactus-runner --test it schedules:: -- --nocapture
+    TACTUS_SCHEDULES={{ schedules }} cargo test --workspace --test it whatever_happens_the_true_tip -- --nocapture
 
 # So many days in virtual time with a run and faults every hour: frames, losses, clocks, memory. 30 days take some 40 minutes.
 simulated-days days="30":
-    TACTUS_DAYS={{ days }} cargo test --package tactus-runner --test it days:: -- --nocapture
+    TACTUS_DAYS={{ days }} cargo test --workspace --test it days:: -- --nocapture
 
 # STOP at each surface and under each fault, timed: beyond 100 ms fails. As root, on a quiet machine; hours.
 stop-trials trials="200": build
-    TACTUS_TRIALS={{ trials }} cargo test --package tactus-e2e --test e2e stop_trials:: -- --nocapture
+    TACTUS_TRIALS={{ trials }} cargo test --workspace --test e2e stop_trials:: -- --nocapture
 
 # kill -9 at so many random instants of a run in real time; TACTUS_SEED chooses others.
 kill-trials trials="200": build
-    TACTUS_TRIALS={{ trials }} cargo test --package tactus-e2e --test e2e kill_trials:: -- --nocapture
+    TACTUS_TRIALS={{ trials }} cargo test --workspace --test e2e kill_trials:: -- --nocapture
 
 # The service in real time with runs and a subscriber: memory, frames, clock.
 soak hours="1": build
-    TACTUS_SOAK_HOURS={{ hours }} cargo test --package tactus-e2e --test e2e soak:: -- --nocapture
+    TACTUS_SOAK_HOURS={{ hours }} cargo test --workspace --test e2e soak:: -- --nocapture
 
 # Plants defects, one at a time: the tests must find each.
 mutants word="":

@@ -77,11 +77,8 @@ fn presses_in(table: &Path) -> BTreeSet<(String, i32)> {
 
 /// Number of presses with a dwell, those included that were broken off and repeated: a busy machine may starve the sensor.
 fn pressed(recording: &Path) -> usize {
-    let dwells = events(recording).filter_map(|event| match event {
-        Event::DwellDone(dwell) => Some(dwell.press),
-        _ => None,
-    });
-    dwells.filter(|press| *press >= 0).collect::<BTreeSet<_>>().len()
+    let press = |event| if let Event::DwellDone(dwell) = event { Some(dwell.press) } else { None };
+    events(recording).filter_map(press).filter(|press| *press >= 0).collect::<BTreeSet<_>>().len()
 }
 
 /// Both runs together have each press of the script once, and count on.

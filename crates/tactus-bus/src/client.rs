@@ -229,17 +229,16 @@ pub async fn stop(
         check_rig_name(rig)?;
     }
     let datagram = stop_by_datagram(endpoint, rig, request, patience);
-    let on_bus = timeout(patience, stop_on_bus(endpoint, rig, request, credentials, patience));
+    let on_bus = stop_on_bus_apart(endpoint, rig, request, credentials, patience);
     tokio::pin!(datagram, on_bus);
-    let late = |_| Err(BusError::NoAnswer { key: STOP_EVERY_RIG.to_owned(), waited: patience });
     let (by_datagram, on_bus) = tokio::select! {
         answer = &mut datagram => {
             let limit = if matches!(answer, Ok(Some(_))) { OTHERS_PATIENCE } else { patience };
-            (answer, timeout(limit, on_bus).await.unwrap_or(Ok(Ok(Vec::new()))).unwrap_or_else(late))
+            (answer, timeout(limit, on_bus).await.unwrap_or(Ok(Vec::new())))
         }
         answers = &mut on_bus => match answers {
-            Ok(Ok(answers)) if !answers.is_empty() => (Ok(None), Ok(answers)),
-            answers => (datagram.await, answers.unwrap_or_else(late)),
+            Ok(answers) if !answers.is_empty() => (Ok(None), Ok(answers)),
+            answers => (datagram.await, answers),
         }
     };
     let mut answers = BTreeMap::new();
@@ -259,17 +258,38 @@ pub async fn stop(
     Ok(answers.into_values().collect())
 }
 
-/// Sends a stop to the endpoint's place for datagrams, if it has one.
-async fn stop_by_datagram(
+/// Sends a stop to the endpoint's place for datagrams, if it has one: now, before the returned future is polled.
+fn stop_by_datagram(
     endpoint: &Endpoint,
     rig: Option<&str>,
     request: &pb::CommandRequest,
     patience: Duration,
-) -> io::Result<Option<pb::CommandReply>> {
+) -> impl Future<Output = io::Result<Option<pb::CommandReply>>> + use<> {
     let (endpoint, rig, request) = (endpoint.clone(), rig.map(str::to_owned), request.clone());
-    tokio::task::spawn_blocking(move || crate::stop::send(&endpoint, rig.as_deref(), &request, patience))
-        .await
-        .map_err(io::Error::other)?
+    let sent =
+        tokio::task::spawn_blocking(move || crate::stop::send(&endpoint, rig.as_deref(), &request, patience));
+    async { sent.await.map_err(io::Error::other)? }
+}
+
+/// As [`stop_on_bus`], in a task of its own: zenoh's `open` blocks its thread until it is connected, and a service without a
+/// free connection may take seconds for that.
+async fn stop_on_bus_apart(
+    endpoint: &Endpoint,
+    rig: Option<&str>,
+    request: &pb::CommandRequest,
+    credentials: &Credentials,
+    patience: Duration,
+) -> Result<Vec<pb::CommandReply>, BusError> {
+    let (of, request, credentials) = (endpoint.clone(), request.clone(), credentials.clone());
+    let rig = rig.map(str::to_owned);
+    let asked = tokio::spawn(async move {
+        let stopping = stop_on_bus(&of, rig.as_deref(), &request, &credentials, patience);
+        let late = |_| Err(BusError::NoAnswer { key: STOP_EVERY_RIG.to_owned(), waited: patience });
+        timeout(patience, stopping).await.unwrap_or_else(late)
+    });
+    asked.await.unwrap_or_else(|panic| {
+        Err(BusError::NotStopped { endpoint: endpoint.to_string(), source: panic.into() })
+    })
 }
 
 /// Sends a stop on the bus, and waits for the answers of all services that it concerns.

@@ -3,11 +3,13 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{
-    net::{TcpStream, UdpSocket},
+    io::Read,
+    net::{TcpListener, TcpStream, UdpSocket},
     time::Duration,
 };
 
 use crate::lab::{Service, free_endpoint, open, open_for, raw_session};
+use prost::Message as _;
 use tactus_bus::{Bus, BusConfig, BusError, Client, CommandCall, Credentials, Endpoint, Request};
 use tactus_schema::{key::Keys, pb};
 use tokio::sync::mpsc;
@@ -104,6 +106,34 @@ async fn a_stop_by_datagram_is_taken_while_the_bus_has_no_room() {
     assert_eq!(stop(&endpoint, None).await.unwrap(), ["bench"]);
     bus.close().await.unwrap();
     assert!(!folder.path().join("bus.sock.stop").exists());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_connection_that_takes_long_does_not_keep_the_datagram_waiting() {
+    // Which of both begins was left to chance.
+    for _ in 0..8 {
+        let endpoint = free_endpoint();
+        let address = endpoint.to_string().trim_start_matches("tcp/").to_owned();
+        let (datagrams, connections) =
+            (UdpSocket::bind(&address).unwrap(), TcpListener::bind(&address).unwrap());
+        let stopping = tokio::spawn(async move { stop(&endpoint, None).await });
+        // The connection is taken, and never answered.
+        let (connection, was_open) = tokio::task::spawn_blocking(move || {
+            let (mut connection, _) = connections.accept().unwrap();
+            let (_, client) = datagrams.recv_from(&mut [0; 4096]).unwrap();
+            connection.set_nonblocking(true).unwrap();
+            let ended = std::iter::repeat_with(|| connection.read(&mut [0; 4096]))
+                .find(|read| !matches!(read, Ok(1..)));
+            let reply = pb::CommandReply { ok: true, rig: "bench".into(), ..Default::default() };
+            datagrams.send_to(&reply.encode_to_vec(), client).unwrap();
+            (connection, ended.is_some_and(|ended| ended.is_err()))
+        })
+        .await
+        .unwrap();
+        assert!(was_open, "the datagram came after the client had given up its connection");
+        assert_eq!(stopping.await.unwrap().unwrap(), ["bench"]);
+        drop(connection);
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
