@@ -1,5 +1,8 @@
 //! Notifications for systemd: ready, alive, stopping. Without systemd nobody is notified.
 
+use std::io;
+use std::sync::mpsc::{self, SyncSender};
+use std::thread;
 use std::time::Duration;
 
 use sd_notify::NotifyState;
@@ -13,22 +16,74 @@ use tracing::{error, info, warn};
 /// The watchdog's limit where systemd sets none.
 const LIMIT: Duration = Duration::from_secs(2);
 
-/// Frames flow: the service is ready.
-pub(crate) fn ready(rig: &str) {
-    tell(&[NotifyState::Ready, NotifyState::Status(&format!("rig {rig}: frames flow"))]);
+/// Messages that wait for a systemd that does not read.
+const WAITING_MAX: usize = 4;
+
+/// The way to systemd. A thread of its own writes to it, because a write waits while systemd does not read.
+#[derive(Debug, Clone)]
+pub(crate) struct Systemd(SyncSender<Message>);
+
+/// What systemd is told.
+#[derive(Debug)]
+enum Message {
+    Ready { rig: String },
+    Alive,
+    Hangs,
+    Stopping,
 }
 
-/// The service is closing down.
-pub(crate) fn stopping() {
-    tell(&[NotifyState::Stopping]);
+impl Systemd {
+    /// Starts the thread. It ends with the last handle.
+    pub(crate) fn start() -> io::Result<Self> {
+        let (to_tell, messages) = mpsc::sync_channel(WAITING_MAX);
+        thread::Builder::new()
+            .name("notify".into())
+            .spawn(move || messages.into_iter().for_each(|message: Message| message.write()))?;
+        Ok(Self(to_tell))
+    }
+
+    /// Frames flow: the service is ready.
+    pub(crate) fn ready(&self, rig: &str) {
+        self.tell(Message::Ready { rig: rig.to_owned() });
+    }
+
+    /// The service is closing down.
+    pub(crate) fn stopping(&self) {
+        self.tell(Message::Stopping);
+    }
+
+    /// Never waits.
+    fn tell(&self, message: Message) {
+        if let Err(error) = self.0.try_send(message) {
+            tracing::debug!(%error, "systemd is not told");
+        }
+    }
+}
+
+impl Message {
+    fn write(self) {
+        let status;
+        let states = match self {
+            Self::Ready { rig } => {
+                status = format!("rig {rig}: frames flow");
+                vec![NotifyState::Ready, NotifyState::Status(&status)]
+            }
+            Self::Alive => vec![NotifyState::Watchdog],
+            Self::Hangs => vec![NotifyState::WatchdogTrigger],
+            Self::Stopping => vec![NotifyState::Stopping],
+        };
+        if let Err(error) = sd_notify::notify(&states) {
+            warn!(%error, "systemd could not be notified");
+        }
+    }
 }
 
 /// Feeds the watchdog while every part of the service makes progress. If one hangs, the stage is stopped; if it still hangs
 /// an eighth of the limit later, systemd is asked to end the service. A disk that hangs is no part of the service: the run fails
 /// by it, and the service goes on.
-pub(crate) async fn feed_watchdog(engine: Engine, recorder: watch::Receiver<Gauge>) {
-    let systemd = sd_notify::watchdog_enabled();
-    let limit = systemd.unwrap_or(LIMIT);
+pub(crate) async fn feed_watchdog(engine: Engine, recorder: watch::Receiver<Gauge>, systemd: Systemd) {
+    let asked = sd_notify::watchdog_enabled();
+    let limit = asked.unwrap_or(LIMIT);
     let mut watch = Watch::new(engine.clock().now().mono, limit / 2);
     let mut recorded = Changes::default();
     let mut tick = interval((limit / 8).max(Duration::from_millis(1)));
@@ -48,14 +103,14 @@ pub(crate) async fn feed_watchdog(engine: Engine, recorder: watch::Receiver<Gaug
                 continue;
             }
             Liveness::StillHangs(_) => {
-                if systemd.is_some() {
-                    tell(&[NotifyState::WatchdogTrigger]);
+                if asked.is_some() {
+                    systemd.tell(Message::Hangs);
                 }
                 continue;
             }
         }
-        if systemd.is_some() {
-            tell(&[NotifyState::Watchdog]);
+        if asked.is_some() {
+            systemd.tell(Message::Alive);
         }
     }
 }
@@ -145,12 +200,6 @@ impl Watch {
             (Some((part, _)), false) => Liveness::Hangs(part),
             (Some((part, _)), true) => Liveness::StillHangs(part),
         }
-    }
-}
-
-fn tell(states: &[NotifyState<'_>]) {
-    if let Err(error) = sd_notify::notify(states) {
-        warn!(%error, "systemd could not be notified");
     }
 }
 

@@ -38,7 +38,8 @@ use tokio::runtime::Handle;
 use tokio::time::timeout;
 use tracing::{error, info};
 
-use crate::{inhibitor, notify};
+use crate::inhibitor;
+use crate::notify::{self, Systemd};
 use commands::CommandDesk;
 use publish::BusPublisher;
 
@@ -112,6 +113,7 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     // Before a device is opened, so that no signal leaves the tip where it is.
     let mut signals = EndingSignals::listen().map_err(system("signals"))?;
 
+    let systemd = Systemd::start().map_err(system("thread"))?;
     let clock = Clock::real();
     let RigFiles { rig, codec, .. } = config.rig.clone();
     let Some(rig_service) = rig.service.clone() else {
@@ -151,7 +153,7 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     let tasks = [
         tokio::spawn(Arc::clone(&desk).answer_commands(commands)),
         tokio::spawn(health::publish(engine.clone(), bus.publisher())),
-        tokio::spawn(notify::feed_watchdog(engine.clone(), desk.recorder())),
+        tokio::spawn(notify::feed_watchdog(engine.clone(), desk.recorder(), systemd.clone())),
         tokio::spawn(inhibitor::keep_awake(engine.clone())),
     ];
 
@@ -165,13 +167,13 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
                 error!("the recordings were not checked for crashed runs: this is a defect of Tactus");
             }
             alive = Some(bus.declare_alive().await);
-            notify::ready(&engine.rig().name);
+            systemd.ready(&engine.rig().name);
             info!("ready: frames flow");
             std::future::pending::<&str>().await
         } => never,
     };
     info!("{signalled}: closing down");
-    notify::stopping();
+    systemd.stopping();
     let closed = end_run(&engine, signalled).await;
     drop(alive);
     for task in tasks {
