@@ -38,7 +38,7 @@ MUTANTS = [
     ("permits do not expire", SAFETY + "permit.rs", "now > expires", "now < expires && now > expires", "tactus-safety"),
     ("permits cannot be revoked", SAFETY + "permit.rs", "self.revocation.count() != self.revocations", "self.revocation.count() < self.revocations", "tactus-safety"),
     ("a frozen array is believed", SAFETY + "contact.rs", "repeated.frames >= FROZEN_FRAMES", "repeated.frames > 1000", "tactus-safety"),
-    ("a reset does not rearm", SAFETY + "supervisor.rs", "self.fault = Some(Fault::Unfinished);\n        self.silence = None;", "self.silence = None;", "tactus-safety"),
+    ("a reset does not rearm", SAFETY + "supervisor.rs", "self.fault.replace(Fault::Unfinished)", "self.fault.take()", "tactus-safety"),
     ("another covering is not confirmed", ENGINE + "engine.rs", "let wanted_mm = control.wanted_covering_mm.filter(unconfirmed);", "let wanted_mm = control.wanted_covering_mm.filter(unconfirmed).filter(|_| false);", "tactus-engine"),
     ("the thicker covering counts after a restart", ENGINE + "engine.rs", "kept_mm.min(in_file_mm)", "kept_mm.max(in_file_mm)", "tactus-engine"),
     ("a dwell does not ask the stage", ENGINE + "run/steps.rs", "if average.is_disturbed || !is_same {", "if false && (average.is_disturbed || !is_same) {", "tactus-engine"),
