@@ -226,11 +226,12 @@ bench-discovery: bench-peers-tools
 # Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes.
 # What discovery finds and names of hidden physics, beside other ways to go about it: docs/discovery-evidence.md.
 discovery-evidence: bench-discovery
-    target/dist/tactus-bench evidence run --size ablation --keep-tables
-    {{ tools }}/peers/bin/python bench/peers/discovery.py report --work target/evidence/work
-    target/dist/tactus-bench evidence run --size ablation --work target/evidence/work/peers/bic --with=--ablation --with=bic
-    target/dist/tactus-bench evidence run
-    target/dist/tactus-bench evidence score --ablation target/evidence/work --costs target/evidence/costs.json \
+    target/dist/tactus-bench evidence run --seeds sealed --size ablation --keep-tables
+    {{ tools }}/peers/bin/python bench/peers/discovery.py report --work target/evidence/sealed/work
+    target/dist/tactus-bench evidence run --seeds sealed --size ablation --work target/evidence/sealed/work/peers/bic \
+        --with=--ablation --with=bic
+    target/dist/tactus-bench evidence run --seeds sealed
+    target/dist/tactus-bench evidence score --seeds sealed --ablation target/evidence/sealed/work --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
 
 # Twins that one active round on the embedded rig decides or does not, some ten minutes: docs/discovery-evidence.md.
@@ -243,13 +244,13 @@ discovery-slice:
     cargo build --profile dist --package tactus --package tactus-bench
     rm -rf target/evidence/slice
     target/dist/tactus-bench evidence run --size slice --check \
-        --work target/evidence/slice/work --sealed target/evidence/slice/sealed
+        --work target/evidence/slice/work --labels target/evidence/slice/labels
 
 # The part of that which CI runs, 11 sets, with the programs that the tests have built.
 discovery-sample: build
     rm -rf target/evidence/sample
     target/debug/tactus-bench evidence run --size sample --check --tactus target/debug/tactus \
-        --work target/evidence/sample/work --sealed target/evidence/sample/sealed
+        --work target/evidence/sample/work --labels target/evidence/sample/labels
 
 # A virtual environment with the peers.
 bench-peers-tools:

@@ -17,15 +17,15 @@ mod timing;
 mod twins;
 
 pub use ablation::{Ablation, ablations};
-pub use campaign::{Campaign, Planned, Sizes, campaigns};
+pub use campaign::{Campaign, Planned, Seeds, Sizes, campaigns};
 pub use document::{Costs, Part, document, into_document, misses};
 pub use outcome::{Named, Outcome, Truth, read};
 pub use picture::pictures;
 pub use rate::{Rate, normal_share, quantile};
 pub use run::{Places, Progress, Ran, Workflow, run};
 pub use score::{
-    Band, Cell, EffectScore, ORACLE_LEVEL, OutsideScore, PowerPoint, Scores, Several, Shrink, Z_DETECTABLE,
-    Z_SEPARATE,
+    Band, Cell, EffectScore, ORACLE_LEVEL, OutsideScore, PowerPoint, Scores, SetSize, Several, Shrink,
+    Spread, Z_DETECTABLE, Z_SEPARATE,
 };
 pub use timing::{Cost, Timing};
 pub use twins::{BUDGET_MIN, Chosen, Decision, TWINS, Twins, Undecided, twins_table};

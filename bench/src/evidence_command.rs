@@ -8,7 +8,7 @@ use std::thread;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use tactus_bench::evidence::{
-    self, Ablation, Campaign, Costs, Outcome, Places, Planned, Scores, Sizes, TWINS, Timing, Workflow,
+    self, Ablation, Campaign, Costs, Outcome, Places, Planned, Scores, Seeds, Sizes, TWINS, Timing, Workflow,
     ablations, campaigns, document, into_document, misses, pictures, read, run, twins_table,
 };
 
@@ -94,18 +94,18 @@ struct WhichArgs {
     /// Only sets whose ids contain this.
     #[arg(long)]
     only: Option<String>,
-    /// Seed of all sets, and of `tactus discover`.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    /// Sets to work with, or those of the published tables: never choose anything by the latter.
+    #[arg(long, value_enum, default_value = "tuning")]
+    seeds: Seeds,
     /// Frames of a set; by default some 6,000.
     #[arg(long)]
     frames: Option<usize>,
-    /// Folder of the reports and results.
-    #[arg(long, default_value = "target/evidence/work")]
-    work: PathBuf,
-    /// Folder of the labels, for the scorer only.
-    #[arg(long, default_value = "target/evidence/sealed")]
-    sealed: PathBuf,
+    /// Folder of the reports and results; by default target/evidence/SEEDS/work.
+    #[arg(long)]
+    work: Option<PathBuf>,
+    /// Folder of the labels, for the scorer only; by default target/evidence/SEEDS/labels.
+    #[arg(long)]
+    labels: Option<PathBuf>,
     /// A work folder with the reports of other methods in `peers`, for the same labels.
     #[arg(long)]
     ablation: Option<PathBuf>,
@@ -186,11 +186,11 @@ impl ActiveArgs {
 
 impl RunArgs {
     fn run(self) -> Result<()> {
+        self.which.check_seeds()?;
         let sets = self.which.sets();
         let workflow = Workflow {
             tactus: self.tactus,
             more: self.more,
-            seed: self.which.seed,
             jobs: self.jobs.or_else(|| thread::available_parallelism().ok()).map_or(1, usize::from),
             keeps_tables: self.keep_tables,
         };
@@ -219,20 +219,34 @@ impl WhichArgs {
         };
         sizes.frames = self.frames;
         let chosen = if self.campaign.is_empty() { &Campaign::ALL[..] } else { &self.campaign };
-        let sets = chosen.iter().flat_map(|campaign| campaigns(*campaign, &sizes, self.seed));
+        let sets = chosen.iter().flat_map(|campaign| campaigns(*campaign, &sizes, self.seeds));
         sets.filter(|set| self.only.as_ref().is_none_or(|part| set.id.contains(part))).collect()
     }
 
     fn places(&self) -> Places {
-        Places { work: self.work.clone(), sealed: self.sealed.clone() }
+        let folder = Path::new("target/evidence").join(self.seeds.name());
+        Places {
+            work: self.work.clone().unwrap_or_else(|| folder.join("work")),
+            labels: self.labels.clone().unwrap_or_else(|| folder.join("labels")),
+        }
+    }
+
+    /// Who looks at a part of the sealed sets could choose by them.
+    fn check_seeds(&self) -> Result<()> {
+        let is_part = self.only.is_some() || !self.campaign.is_empty();
+        ensure!(
+            self.seeds == Seeds::Tuning || !is_part,
+            "sealed sets are run all together: leave out --only and --campaign, or take --seeds tuning"
+        );
+        Ok(())
     }
 
     fn ablations(&self) -> Result<Vec<Ablation>> {
         let Some(work) = &self.ablation else { return Ok(Vec::new()) };
         let sizes = Sizes::ablation();
-        let sets = Campaign::ALL.into_iter().flat_map(|campaign| campaigns(campaign, &sizes, self.seed));
+        let sets = Campaign::ALL.into_iter().flat_map(|campaign| campaigns(campaign, &sizes, self.seeds));
         let sets: Vec<Planned> = sets.collect();
-        ablations(&sets, &Places { work: work.clone(), sealed: self.sealed.clone() })
+        ablations(&sets, &Places { work: work.clone(), ..self.places() })
     }
 
     fn costs(&self) -> Result<Option<Costs>> {
@@ -246,9 +260,12 @@ impl WhichArgs {
         let scores = Scores::new(&outcomes);
         let text = document(&scores, &self.ablations()?, self.costs()?.as_ref());
         println!("{text}");
-        write(&self.work.join("evidence.json"), &serde_json::to_string_pretty(&scores)?)?;
-        write(&self.work.join("evidence.md"), &text)?;
-        write(&self.work.join("misses.txt"), &misses(&outcomes))?;
+        let Places { work, .. } = self.places();
+        write(&work.join("evidence.json"), &serde_json::to_string_pretty(&scores)?)?;
+        write(&work.join("evidence.md"), &text)?;
+        if self.seeds == Seeds::Tuning {
+            write(&work.join("misses.txt"), &misses(&outcomes))?;
+        }
         if let Some(path) = &self.document {
             into(path, evidence::Part::Evidence, &text)?;
         }

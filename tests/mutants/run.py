@@ -44,7 +44,6 @@ MUTANTS = [
     ("a dwell does not ask the stage", ENGINE + "run/steps.rs", "if average.is_disturbed || !is_same {", "if false && (average.is_disturbed || !is_same) {", "tactus-engine"),
     ("an alarm is noticed at the end of a dwell", ENGINE + "acquisition.rs", "            self.window = None;\n", "", "tactus-engine"),
     ("a panic of the run leaves the tip", ENGINE + "run.rs", "let retracted = run.end(&result).await;\n    run.conclude(&result, retracted).await\n}", "run.conclude(&result, Ok(0.0)).await\n}", "tactus-engine"),
-    ("the driver does not check permits", DEVICE + "driver.rs", "command.check(now.mono)", "Ok::<(), Void>(())", "tactus-device"),
     ("an unwatched stage moves on", DEVICE + "driver.rs", "unwatched(&mut self.watched), if is_watched", "unwatched(&mut self.watched), if false && is_watched", "tactus-device"),
     ("a permit is not checked at the byte that moves", DEVICE + "driver.rs", "match self.check_leave() {", "match self.check_leave().or(Ok::<(), Void>(())) {", "tactus-device"),
     ("nobody guards the driver", DEVICE + "guard.rs", "if silent >= HANG_MAX {", "if false && silent >= HANG_MAX {", "tactus-device"),

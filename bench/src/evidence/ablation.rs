@@ -52,7 +52,7 @@ pub fn ablations(sets: &[Planned], places: &Places) -> Result<Vec<Ablation>> {
         for entry in fs::read_dir(&peers).with_context(|| at(&peers))? {
             let path = entry.with_context(|| at(&peers))?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            methods.push((name, Places { work: path, sealed: places.sealed.clone() }));
+            methods.push((name, Places { work: path, labels: places.labels.clone() }));
         }
     }
     methods[1..].sort_by(|one, other| one.0.cmp(&other.0));

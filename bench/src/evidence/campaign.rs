@@ -20,6 +20,15 @@ pub enum Campaign {
     Outside,
 }
 
+/// Which seeds the sets are made from. Sets of both kinds have the same ids, and nothing else in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Seeds {
+    /// For work on the method: constants may be chosen on these sets, and CI watches some of them.
+    Tuning,
+    /// For the published tables alone. Nobody looks at these sets one by one.
+    Sealed,
+}
+
 /// How many sets of each kind, and how strong.
 #[derive(Debug, Clone)]
 pub struct Sizes {
@@ -62,6 +71,24 @@ pub struct Planned {
 
 /// Separation of each effect in sets of several, evenly on a logarithmic scale.
 const SEVERAL_Z: [f64; 2] = [20.0, 60.0];
+
+impl Seeds {
+    /// What the seeds of all sets have in common.
+    const fn domain(self) -> u64 {
+        match self {
+            Self::Tuning => 1,
+            Self::Sealed => 0x7365_616c_6564_2131,
+        }
+    }
+
+    /// Its folder.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tuning => "tuning",
+            Self::Sealed => "sealed",
+        }
+    }
+}
 
 impl Campaign {
     /// Every campaign.
@@ -151,8 +178,9 @@ impl Sizes {
     }
 }
 
-/// The sets of a campaign. A set's seed follows from its id and `seed`, so that a set is the same at all sizes.
-pub fn campaigns(campaign: Campaign, sizes: &Sizes, seed: u64) -> Vec<Planned> {
+/// The sets of a campaign. A set's seed follows from its id and `seeds`, so that a set is the same at all sizes.
+pub fn campaigns(campaign: Campaign, sizes: &Sizes, seeds: Seeds) -> Vec<Planned> {
+    let seed = seeds.domain();
     let planned = |name: String, noise: NoiseKind, content: Content, amount: fn(f64) -> Amount, of: f64| {
         let id = format!("{}/{name}", campaign.name());
         let recipe = Recipe {
@@ -166,14 +194,14 @@ pub fn campaigns(campaign: Campaign, sizes: &Sizes, seed: u64) -> Vec<Planned> {
         };
         Planned { id, campaign, recipe }
     };
-    let doses = |physics: &[&'static Definition], separations: &[f64], strengths: &[f64], seeds: usize| {
+    let doses = |physics: &[&'static Definition], separations: &[f64], strengths: &[f64], each: usize| {
         let amounts = separations.iter().map(|z| ("z", *z, Amount::BeyondSpread as fn(f64) -> Amount));
         let amounts: Vec<_> =
             amounts.chain(strengths.iter().map(|s| ("s", *s, Amount::Strength as _))).collect();
         let mut sets = Vec::new();
         for physics in physics {
             for (letter, of, amount) in &amounts {
-                for index in 0..seeds {
+                for index in 0..each {
                     let name = format!("{}-{letter}{of}-{index}", physics.id);
                     sets.push(planned(name, NoiseKind::Any, alone(physics), *amount, *of));
                 }

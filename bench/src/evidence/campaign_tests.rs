@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use super::*;
 
 fn all(sizes: &Sizes) -> Vec<Planned> {
-    Campaign::ALL.into_iter().flat_map(|campaign| campaigns(campaign, sizes, 1)).collect()
+    Campaign::ALL.into_iter().flat_map(|campaign| campaigns(campaign, sizes, Seeds::Tuning)).collect()
 }
 
 #[test]
@@ -22,6 +22,17 @@ fn no_two_sets_share_an_id_or_a_seed() {
     let ids: BTreeSet<&str> = sets.iter().map(|set| set.id.as_str()).collect();
     let seeds: BTreeSet<u64> = sets.iter().map(|set| set.recipe.seed).collect();
     assert_eq!((ids.len(), seeds.len()), (sets.len(), sets.len()));
+}
+
+#[test]
+fn sealed_sets_have_the_ids_of_tuning_sets_and_none_of_their_seeds() {
+    let sizes = Sizes::whole();
+    let sealed: Vec<Planned> =
+        Campaign::ALL.into_iter().flat_map(|campaign| campaigns(campaign, &sizes, Seeds::Sealed)).collect();
+    let tuning = all(&sizes);
+    let seeds: BTreeSet<u64> = tuning.iter().chain(&sealed).map(|set| set.recipe.seed).collect();
+    assert_eq!(seeds.len(), tuning.len() + sealed.len());
+    assert!(tuning.iter().zip(&sealed).all(|(one, other)| one.id == other.id));
 }
 
 #[test]

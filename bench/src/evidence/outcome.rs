@@ -36,6 +36,8 @@ pub struct Outcome {
     pub alone_shrink: Option<f64>,
     /// Wall time in s.
     pub seconds: f64,
+    /// Greatest resident memory in MiB.
+    pub peak_mib: f64,
 }
 
 /// A hidden physics.
@@ -208,6 +210,7 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryRepo
             .filter_map(|round| round.taken.clone())
             .collect(),
         seconds: ran.seconds,
+        peak_mib: ran.peak_mib,
         verdict: report.as_ref().map_or_else(|| "failed".into(), |report| report.verdict.clone()),
         named: report.map_or_else(Vec::new, |report| report.steps),
     }

@@ -28,6 +28,7 @@ pub(crate) fn set(truths: &[Option<&str>], names: &[(&str, &[&str])], verdict: &
         gap_error: 0.01,
         alone_shrink: None,
         seconds: 1.0,
+        peak_mib: 100.0,
     }
 }
 
@@ -72,7 +73,7 @@ fn unexplained_is_detected_and_a_failure_is_not() {
 #[test]
 fn labels_and_reports_are_read_from_files() -> Result<()> {
     let folder = tempfile::tempdir()?;
-    let places = Places { work: folder.path().join("work"), sealed: folder.path().join("sealed") };
+    let places = Places { work: folder.path().join("work"), labels: folder.path().join("labels") };
     let physics = vec!["relaxation-prony".into()];
     let recipe =
         Recipe { frames: Some(300), content: Content { physics, ..Content::default() }, ..Recipe::new(3) };
@@ -81,7 +82,8 @@ fn labels_and_reports_are_read_from_files() -> Result<()> {
     assert_eq!(read(std::slice::from_ref(&set), &places)?, [], "the set was not run");
 
     let label = set.recipe.make()?.label;
-    let ran = Ran { program: String::new(), seconds: 2.5, exit: Some(0), said: String::new() };
+    let ran =
+        Ran { program: String::new(), seconds: 2.5, peak_mib: 80.0, exit: Some(0), said: String::new() };
     let report = json!({
         "split": { "frames": 3000, "train_presses": 20, "heldout_presses": 10 },
         "base": { "heldout_chi2": 1.5 },

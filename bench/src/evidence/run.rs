@@ -1,19 +1,20 @@
 //! Makes sets and runs `tactus discover` on each.
 
 use std::fmt::Write;
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::sync::Mutex;
 use std::time::Instant;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use rayon::ThreadPoolBuilder;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::campaign::Planned;
+use super::timing::{Watched, watched};
 
 /// The folders of a campaign.
 #[derive(Debug, Clone)]
@@ -21,7 +22,7 @@ pub struct Places {
     /// Reports and results; a set's table while it is worked on.
     pub work: PathBuf,
     /// Labels: for the scorer only.
-    pub sealed: PathBuf,
+    pub labels: PathBuf,
 }
 
 /// How `tactus discover` is run.
@@ -31,8 +32,6 @@ pub struct Workflow {
     pub tactus: PathBuf,
     /// Further arguments of `tactus discover`.
     pub more: Vec<String>,
-    /// Seed of the discovery.
-    pub seed: u64,
     /// Sets that run at the same time, each on one thread.
     pub jobs: usize,
     /// Keeps the tables of measurements and of residuals, for the peers.
@@ -59,11 +58,16 @@ pub struct Ran {
     pub program: String,
     /// Wall time on one thread, while the other jobs run.
     pub seconds: f64,
+    /// Greatest resident memory in MiB.
+    pub peak_mib: f64,
     /// Exit code; `None` if a signal ended the program.
     pub exit: Option<i32>,
     /// Its standard error, if it made no report.
     pub said: String,
 }
+
+/// Seed of every discovery: not of the sets.
+const DISCOVERY_SEED: u64 = 1;
 
 /// Exit code of `tactus` after wrong arguments.
 const USAGE: i32 = 2;
@@ -86,7 +90,7 @@ impl Places {
 
     /// The label of a set.
     pub fn label(&self, id: &str) -> PathBuf {
-        self.sealed.join(format!("{id}.json"))
+        self.labels.join(format!("{id}.json"))
     }
 }
 
@@ -157,20 +161,18 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
     made.write(&table).with_context(|| at(&table))?;
     drop(made);
     let out = folder.join("out");
-    let started = Instant::now();
-    let output = Command::new(&workflow.tactus)
-        .args(["--json", "discover", "--threads", "1", "--seed"])
-        .arg(workflow.seed.to_string())
-        .args(&workflow.more)
-        .arg("--out")
-        .arg(&out)
-        .arg(&table)
-        .output()
-        .with_context(|| at(&workflow.tactus))?;
-    let seconds = started.elapsed().as_secs_f64();
-    let told = || String::from_utf8_lossy(&output.stderr).into_owned();
+    let log = folder.join("log");
+    let mut discover = Command::new(&workflow.tactus);
+    discover.args(["--json", "discover", "--threads", "1", "--seed"]).arg(DISCOVERY_SEED.to_string());
+    discover.args(&workflow.more).arg("--out").arg(&out).arg(&table);
+    discover.stdout(Stdio::null()).stderr(File::create(&log).with_context(|| at(&log))?);
+    let Watched { exit, seconds, peak_mib } = watched(&mut discover)?;
+    let told =
+        || fs::read(&log).map(|text| String::from_utf8_lossy(&text).into_owned()).with_context(|| at(&log));
     // Wrong arguments are an error of the campaign, not a result of a set.
-    ensure!(output.status.code() != Some(USAGE), "{}: {}", at(&workflow.tactus), told());
+    if exit.code() == Some(USAGE) {
+        bail!("{}: {}", at(&workflow.tactus), told()?);
+    }
     let found = out.join("report.json");
     let said = if found.exists() {
         moved(&found, &places.report(&set.id))?;
@@ -181,9 +183,9 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
         }
         String::new()
     } else {
-        told()
+        told()?
     };
-    let ran = Ran { program: program.into(), seconds, exit: output.status.code(), said };
+    let ran = Ran { program: program.into(), seconds, peak_mib, exit: exit.code(), said };
     let path = places.ran(&set.id);
     write(&path, &serde_json::to_string_pretty(&ran).with_context(|| at(&path))?)?;
     fs::remove_dir_all(&folder).with_context(|| at(&folder))

@@ -55,8 +55,32 @@ pub struct Scores {
     pub separate_triples: Several,
     /// Sets outside the library: `all` and by physics.
     pub outside: BTreeMap<String, OutsideScore>,
-    /// Seconds of a set on one thread: median and 95th percentile.
-    pub seconds: Option<[f64; 2]>,
+    /// Seconds of a set on one thread.
+    pub seconds: Option<Spread>,
+    /// Greatest resident memory of a set, in MiB.
+    pub peak_mib: Option<Spread>,
+}
+
+/// How a cost is spread over all sets.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Median.
+    pub median: f64,
+    /// 95th percentile.
+    pub most: f64,
+    /// Greatest.
+    pub greatest: f64,
+}
+
+/// Sizes of the reported sets: a name and its equivalents.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SetSize {
+    /// Number of names.
+    pub of: usize,
+    /// Mean; NaN without names.
+    pub mean: f64,
+    /// Greatest; 0 without names.
+    pub greatest: usize,
 }
 
 /// Scores of sets with one effect.
@@ -66,10 +90,12 @@ pub struct Band {
     pub name: String,
     /// Detected.
     pub detected: Rate,
-    /// The effect is named and nothing else; of the detected sets.
+    /// The effect is named and nothing else; of all sets, those included in which nothing was detected.
     pub exact: Rate,
-    /// The effect is named or in a set of equivalents; of the detected sets.
+    /// The effect is named or in a set of equivalents; of all sets.
     pub in_set: Rate,
+    /// Sizes of the reported sets.
+    pub set_size: SetSize,
     /// A named effect is neither hidden nor equivalent to a hidden one; of all sets.
     pub wrong: Rate,
     /// Shrink of the sets in which the effect is named and the gap is known within a tenth.
@@ -134,6 +160,10 @@ pub struct Several {
     pub in_set: Rate,
     /// A named effect is neither hidden nor equivalent to a hidden one.
     pub wrong: Rate,
+    /// Hidden effects that are named; of all hidden effects.
+    pub recall: Rate,
+    /// Names that are hidden effects; of all names.
+    pub precision: Rate,
     /// Shrink of the sets in which the gap is known within a tenth.
     pub shrink: Shrink,
 }
@@ -162,7 +192,6 @@ impl Scores {
         for outcome in outcomes {
             *sets.entry(outcome.campaign).or_default() += 1;
         }
-        let seconds: Vec<f64> = outcomes.iter().map(|outcome| outcome.seconds).collect();
         let failed = outcomes.iter().filter(|outcome| outcome.has_failed()).map(|outcome| outcome.id.clone());
         let bands = BANDS.iter().map(|(name, range)| Band::new(name, &within(&names, *range)));
         let separate = within(&names, BANDS[3].1);
@@ -183,25 +212,47 @@ impl Scores {
             separate_pairs: Several::new(&within(&pairs, BANDS[3].1)),
             separate_triples: Several::new(&within(&triples, BANDS[3].1)),
             outside: by_physics(&outside),
-            seconds: quantile(seconds.clone(), 0.5).zip(quantile(seconds, 0.95)).map(|(a, b)| [a, b]),
+            seconds: Spread::new(outcomes.iter().map(|outcome| outcome.seconds)),
+            peak_mib: Spread::new(outcomes.iter().map(|outcome| outcome.peak_mib)),
         }
     }
 }
 
 impl Band {
     fn new(name: &str, sets: &[&Outcome]) -> Self {
-        let detected: Vec<&Outcome> = sets.iter().copied().filter(|set| set.is_detected()).collect();
         let known = || sets.iter().filter(|set| set.names_all() && set.gap_error <= SHRINK_ERROR_MAX);
         Self {
             name: name.into(),
-            detected: Rate::new(detected.len(), sets.len()),
-            exact: Rate::of(&detected, |set| set.is_exact()),
-            in_set: Rate::of(&detected, |set| set.holds_all()),
+            detected: Rate::of(sets, |set| set.is_detected()),
+            exact: Rate::of(sets, |set| set.is_exact()),
+            in_set: Rate::of(sets, |set| set.holds_all()),
+            set_size: SetSize::new(sets),
             wrong: Rate::of(sets, |set| !set.wrong_names().is_empty()),
             shrink: Shrink::new(known().filter_map(|set| set.shrink)),
             shrink_to_own_fit: Shrink::new(
                 known().filter_map(|set| Some(set.shrink? / set.alone_shrink.filter(|alone| *alone > 0.0)?)),
             ),
+        }
+    }
+}
+
+impl Spread {
+    fn new(costs: impl Iterator<Item = f64>) -> Option<Self> {
+        let costs: Vec<f64> = costs.collect();
+        let [median, most, greatest] = [0.5, 0.95, 1.0].map(|share| quantile(costs.clone(), share));
+        Some(Self { median: median?, most: most?, greatest: greatest? })
+    }
+}
+
+impl SetSize {
+    fn new(sets: &[&Outcome]) -> Self {
+        let sizes: Vec<usize> =
+            sets.iter().flat_map(|set| &set.named).map(|named| 1 + named.equivalent.len()).collect();
+        let of = sizes.len();
+        Self {
+            of,
+            mean: sizes.iter().sum::<usize>() as f64 / of as f64,
+            greatest: sizes.into_iter().max().unwrap_or(0),
         }
     }
 }
@@ -217,7 +268,15 @@ impl Shrink {
 impl Several {
     fn new(sets: &[&Outcome]) -> Self {
         let known = sets.iter().filter(|set| set.gap_error <= SHRINK_ERROR_MAX);
+        let hidden = sets.iter().flat_map(|set| set.truths.iter().map(move |truth| (set, truth)));
+        let names = sets.iter().flat_map(|set| set.named.iter().map(move |named| (set, named)));
         Self {
+            recall: Rate::of(hidden, |(set, truth)| {
+                set.named.iter().any(|named| truth.effect.as_ref() == Some(&named.effect))
+            }),
+            precision: Rate::of(names, |(set, named)| {
+                set.truths.iter().any(|truth| truth.effect.as_ref() == Some(&named.effect))
+            }),
             named: Rate::of(sets, |set| set.names_all()),
             exact: Rate::of(sets, |set| set.is_exact()),
             in_set: Rate::of(sets, |set| set.holds_all()),

@@ -25,7 +25,7 @@ fn any_verdict_but_nothing_missing_is_a_false_alarm() {
 }
 
 #[test]
-fn names_count_among_the_detected_and_wrong_ones_among_all() {
+fn names_count_among_all_sets_also_where_nothing_was_detected() {
     let effect = [Some("backlash")];
     let sets = [
         set(&effect, &[("backlash", &[])], "explained"),
@@ -37,8 +37,10 @@ fn names_count_among_the_detected_and_wrong_ones_among_all() {
     let scores = Scores::new(&sets);
     let Some(band) = scores.bands.iter().find(|band| band.name == "16 and more") else { panic!("a band") };
     assert_eq!((band.detected.hits, band.detected.of), (3, 4));
-    assert_eq!((band.exact.hits, band.exact.of), (1, 3));
-    assert_eq!((band.in_set.hits, band.wrong.hits, band.wrong.of), (2, 1, 4));
+    assert_eq!((band.exact.hits, band.exact.of), (1, 4));
+    assert_eq!((band.in_set.hits, band.in_set.of), (2, 4));
+    assert_eq!((band.wrong.hits, band.wrong.of), (1, 4));
+    assert_eq!((band.set_size.of, band.set_size.mean, band.set_size.greatest), (3, 4.0 / 3.0, 2));
     assert_eq!(scores.bands[0].detected.of, 5);
     let cell = |named: &str| scores.confusion.iter().find(|cell| cell.named == named).map(|cell| cell.count);
     assert_eq!((cell("backlash"), cell("nothing"), cell("unexplained")), (Some(1), Some(1), None));
@@ -53,6 +55,28 @@ fn a_shrink_counts_only_where_the_gap_is_known() {
     assert_eq!((band.shrink.of, band.shrink.median), (2, Some(0.9)));
     assert_eq!(band.shrink_to_own_fit.of, 1);
     assert!(band.shrink_to_own_fit.median.is_some_and(|median| (median - 1.5).abs() < 1e-12));
+}
+
+#[test]
+fn of_several_effects_each_is_recalled_and_each_name_is_right_or_not() {
+    let truths = [Some("backlash"), Some("imprint")];
+    let sets = [
+        of(Campaign::Pairs, "pairs/000", set(&truths, &[("backlash", &[]), ("imprint", &[])], "explained")),
+        of(Campaign::Pairs, "pairs/001", set(&truths, &[("backlash", &[]), ("hardening", &[])], "explained")),
+        of(Campaign::Pairs, "pairs/002", set(&truths, &[], "unexplained")),
+    ];
+    let pairs = Scores::new(&sets).pairs;
+    assert_eq!((pairs.recall.hits, pairs.recall.of), (3, 6));
+    assert_eq!((pairs.precision.hits, pairs.precision.of), (3, 4));
+}
+
+#[test]
+fn costs_are_told_over_all_sets() {
+    let costs = [1.0, 2.0, 3.0, 4.0, 500.0];
+    let sets = costs.map(|seconds| Outcome { seconds, peak_mib: 10.0 * seconds, ..set(&[], &[], "failed") });
+    let scores = Scores::new(&sets);
+    let (Some(seconds), Some(peak_mib)) = (scores.seconds, scores.peak_mib) else { panic!("five sets") };
+    assert_eq!((seconds.median, seconds.greatest, peak_mib.greatest), (3.0, 500.0, 5000.0));
 }
 
 #[test]

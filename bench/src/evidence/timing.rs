@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -81,14 +81,26 @@ impl Timing {
 
 /// Seconds of a run, and its greatest resident memory in MiB.
 fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
+    let mut discover = Command::new(tactus);
+    discover.args(["--json", "discover", "--out"]).arg(out).arg(table).stdout(Stdio::null());
+    let Watched { exit, seconds, peak_mib } = watched(&mut discover)?;
+    ensure!(exit.success(), "{} {} failed: {exit}", tactus.display(), table.display());
+    Ok((seconds, peak_mib))
+}
+
+/// A program that was watched until its end.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Watched {
+    pub(super) exit: ExitStatus,
+    pub(super) seconds: f64,
+    /// Greatest resident memory.
+    pub(super) peak_mib: f64,
+}
+
+/// Runs a program to its end.
+pub(super) fn watched(command: &mut Command) -> Result<Watched> {
     let started = Instant::now();
-    let mut child = Command::new(tactus)
-        .args(["--json", "discover", "--out"])
-        .arg(out)
-        .arg(table)
-        .stdout(Stdio::null())
-        .spawn()
-        .with_context(|| tactus.display().to_string())?;
+    let mut child = command.spawn().with_context(|| command.get_program().to_string_lossy().into_owned())?;
     let status = format!("/proc/{}/status", child.id());
     let mut peak_kib = 0.0_f64;
     loop {
@@ -96,8 +108,8 @@ fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
         let most_kib = fs::read_to_string(&status).ok().and_then(|text| kib(&text, "VmHWM:"));
         peak_kib = peak_kib.max(most_kib.unwrap_or(0.0));
         if let Some(exit) = child.try_wait()? {
-            ensure!(exit.success(), "{} {} failed: {exit}", tactus.display(), table.display());
-            return Ok((started.elapsed().as_secs_f64(), peak_kib / 1024.0));
+            let seconds = started.elapsed().as_secs_f64();
+            return Ok(Watched { exit, seconds, peak_mib: peak_kib / 1024.0 });
         }
         thread::sleep(LOOK_AGAIN);
     }

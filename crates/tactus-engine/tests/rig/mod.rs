@@ -12,6 +12,9 @@ use tactus_schema::{Frame, FrameFlags, MonoTime, Rig, TimeStamp, pb};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
+/// From a command to the stage's first motion: a controller is asked first, and the stage accelerates.
+const STARTING: Duration = Duration::from_millis(10);
+
 /// What can go wrong with the sensor, set by a test while it runs.
 #[derive(Debug, Default)]
 pub(crate) struct Trouble {
@@ -188,13 +191,10 @@ impl Stage for FakeStage {
             let stopped = tokio::select! {
                 biased;
                 _ = stops.changed() => true,
-                () = sleep(lasts) => false,
+                () = sleep(STARTING + lasts) => false,
             };
-            let share = if lasts.is_zero() {
-                1.0
-            } else {
-                self.clock.now().mono.since(start).as_secs_f64() / lasts.as_secs_f64()
-            };
+            let moved = self.clock.now().mono.since(start).saturating_sub(STARTING);
+            let share = if lasts.is_zero() { 1.0 } else { moved.as_secs_f64() / lasts.as_secs_f64() };
             let share = if stopped { share.min(1.0) } else { 1.0 };
             let at: Vec<_> = from.iter().zip(&way).map(|(from, way)| from + way * share).collect();
             let at = if stopped { [at[0], at[1], at[2]] } else { target.position_mm };
