@@ -3,7 +3,7 @@
 //! | fault | weight in fits, tests and figures | in the model |
 //! |---|---|---|
 //! | dead, stuck | none | `miswired` with both shares at 0: it reads its baseline |
-//! | noisy | none | nothing: it may respond |
+//! | noisy, also where frames repeat each other | none | nothing: it may respond |
 //! | cross-wired | as every element's | `miswired` with the other's share at 1; both shares are fitted with the rest |
 //!
 //! These effects are in the base of the search, so that no other effect is taken to explain a fault. An element that a known
@@ -19,6 +19,9 @@ use crate::{DiscoverError, Frames, Known};
 
 /// Name of the effect of a faulty element.
 pub(crate) const MISWIRED: &str = "miswired";
+/// An element is noisy if its noise is also more than this many times the median where frames repeat each other, or from frame to
+/// frame. At rest alone, the decay after a press looks like noise.
+const NOISY: f64 = 3.0;
 /// One element in this many may be cross-wired. If more seem to be, something else is wrong.
 const CROSS_WIRED_ONE_IN: usize = 10;
 /// This many elements that all answer for the one a common step away are a sensor that lies elsewhere. Two are not: the paper's two
@@ -42,7 +45,7 @@ pub(crate) struct Faulty {
 
 impl Faulty {
     /// Judges every element by its readings.
-    pub(crate) fn of(known: &Known, frames: &Frames) -> Result<Self, DiscoverError> {
+    pub(crate) fn of(known: &Known, frames: &Frames, noise: &Noise) -> Result<Self, DiscoverError> {
         let declared = Declared {
             model: ForwardModel::new(known.array.clone(), known.psf, known.response.clone())?,
             registration: known.registration,
@@ -52,9 +55,15 @@ impl Faulty {
         for row in frames.rows() {
             readings.take(row);
         }
-        Self::judged(known, health(&declared, &readings.finish())?.faults)
+        let mut faults = health(&declared, &readings.finish())?.faults;
+        faults.retain(|one| {
+            let is_noisy = noise.by_element_counts[one.element] > NOISY * noise.rms_counts;
+            is_noisy || !matches!(one.kind, FaultKind::Noisy { .. })
+        });
+        Self::judged(known, faults)
     }
 
+    /// What follows from calibration's judgement.
     fn judged(known: &Known, mut elements: Vec<FaultyElement>) -> Result<Self, DiscoverError> {
         let warning = not_cross_wired(&elements, known.array.cols(), known.array.elements());
         if warning.is_some() {

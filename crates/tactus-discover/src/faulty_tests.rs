@@ -95,11 +95,8 @@ fn stuck_and_noisy_elements_change_no_other_result() {
         faulty[30] += burst[0];
         faulty[12] = f64::NAN;
     }
-    let stuck = |counts: &mut [f32]| {
-        counts.iter_mut().filter(|counts| counts.is_nan()).for_each(|counts| *counts = 812.0)
-    };
     let mut frames = measured(&known, std::slice::from_ref(&hardening), &faulty);
-    stuck(&mut frames.counts);
+    frames.counts.iter_mut().filter(|counts| counts.is_nan()).for_each(|counts| *counts = 812.0);
     let with = found(&known, &frames);
     let without = found(&known, &measured(&known, &[hardening], &sound));
     let kinds: Vec<(usize, FaultKind)> = with.faulty.iter().map(|one| (one.element, one.kind)).collect();
@@ -122,6 +119,26 @@ fn stuck_and_noisy_elements_change_no_other_result() {
     assert!([12, 30].iter().all(|element| with.elements[*element].after_rms_counts.is_nan()));
     // The grown model reads the stuck element's constant, whatever is pressed.
     assert!((with.grown.response.baseline_counts[12] - 812.0).abs() < 1e-6);
+}
+
+/// After a press an element takes half a second to come to rest, as behind a slow filter.
+#[test]
+fn the_decay_after_presses_is_no_noise() {
+    let known = known();
+    let mut upon = noise(7);
+    for press in (0..ELEMENTS).filter(|press| press % 2 == 0) {
+        for frame in 25..30 {
+            let since_s = 0.1 * f64::from(u8::try_from(frame - 24).unwrap());
+            upon[30 * press + frame][20] += 60.0 * (-since_s / 0.3).exp();
+        }
+    }
+    let frames = measured(&known, &[], &upon);
+    let mut readings = ReadingsBuilder::new(&known.array);
+    frames.rows().for_each(|row| readings.take(row));
+    let readings = readings.finish();
+    assert!(readings.noise_rms_counts[20].unwrap() > 6.0, "{:?}", readings.noise_rms_counts[20]);
+    let noise = Noise::of_differences(&frames, known.array.step_counts());
+    assert_eq!(Faulty::of(&known, &frames, &noise).unwrap().elements, []);
 }
 
 #[test]

@@ -49,12 +49,11 @@ impl<'a> Prepared<'a> {
                 heldout.train_presses
             )));
         }
-        let faulty = Faulty::of(known, frames)?;
         let still = still(frames);
         let lattice = lattice::wider_step(frames, known.array.step_counts());
         let step_counts = lattice.map_or(known.array.step_counts(), |(step_counts, _)| step_counts);
         let replicated = Noise::of(frames, &still, step_counts);
-        let mut warnings = Vec::from_iter(faulty.warning.clone());
+        let mut warnings = Vec::new();
         if replicated.is_none() {
             warnings.push(
                 "no frames repeat each other: the noise is estimated from differences of consecutive frames"
@@ -63,6 +62,8 @@ impl<'a> Prepared<'a> {
         }
         let replicates = replicated.is_some();
         let noise = replicated.unwrap_or_else(|| Noise::of_differences(frames, step_counts));
+        let faulty = Faulty::of(known, frames, &noise)?;
+        warnings.extend(faulty.warning.clone());
         let noise_of_silent = noise.clone().without(|element| faulty.noisy.contains(&element));
         let noise = noise.without(|element| faulty.is_weightless(element));
 
@@ -99,6 +100,11 @@ impl<'a> Prepared<'a> {
     /// The least-squares problem of the bins.
     pub(crate) fn problem(&self) -> Problem<'_> {
         Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise)
+    }
+
+    /// The same, with dead and stuck elements weighted as the others.
+    pub(crate) fn problem_with_silent(&self) -> Problem<'_> {
+        Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise_of_silent)
     }
 }
 

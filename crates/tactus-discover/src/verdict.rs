@@ -52,6 +52,16 @@ struct HeldOutResidual {
     residual: Vec<f32>,
 }
 
+impl HeldOutResidual {
+    /// The residual of each element, and that of a grown model.
+    fn elements_beside(&self, grown: &Self) -> Vec<ElementGap> {
+        let elements = self.elements_rms_counts.iter().zip(&grown.elements_rms_counts);
+        elements
+            .map(|(before, after)| ElementGap { before_rms_counts: *before, after_rms_counts: *after })
+            .collect()
+    }
+}
+
 /// Decides the verdict and builds the report of a search.
 pub(crate) fn conclude(
     prepared: &Prepared<'_>,
@@ -59,7 +69,7 @@ pub(crate) fn conclude(
     found: SearchOutcome,
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
-    let Prepared { known, frames, heldout, lattice, .. } = prepared;
+    let Prepared { known, frames, heldout, lattice, faulty, .. } = prepared;
     let SearchOutcome { lacking, base, mut grown, rounds, equivalent, before, after } = found;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
@@ -84,7 +94,6 @@ pub(crate) fn conclude(
         grown = base.clone();
     }
     let named = !names(&grown.parameters, search.known_terms).is_empty();
-    let faulty = &prepared.faulty;
     let missing = p_value <= ALPHA && options.rule == Rule::Protocol;
     let verdict = match (named || lattice.is_some(), missing) {
         (false, false) if !faulty.terms.is_empty() => Verdict::Explained,
@@ -103,8 +112,7 @@ pub(crate) fn conclude(
 
     let mut not_shown = lacking;
     not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.screened)));
-    let with_silent = Problem::new(Predictor::new(known, frames, &prepared.bins), &prepared.noise_of_silent);
-    let mut steps = search.steps(&grown, &equivalent, &with_silent)?;
+    let mut steps = search.steps(&grown, &equivalent, &prepared.problem_with_silent())?;
     let mut effects = grown.parameters.effects()?;
     if let Some((step_counts, p_value)) = lattice {
         effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);
@@ -124,7 +132,6 @@ pub(crate) fn conclude(
     let mut next_experiments = planner.propose(&pairs)?;
     next_experiments.extend(planner.show(&not_shown, &grown.parameters)?);
 
-    let elements = of_base.elements_rms_counts.iter().zip(&of_grown.elements_rms_counts);
     Ok(Discovery {
         seed: options.seed,
         not_shown,
@@ -143,9 +150,7 @@ pub(crate) fn conclude(
         global: GlobalTest { statistic: before.statistic, p_value },
         gap: before.gap,
         curves: search.curves(&base, &grown)?,
-        elements: elements
-            .map(|(before, after)| ElementGap { before_rms_counts: *before, after_rms_counts: *after })
-            .collect(),
+        elements: of_base.elements_beside(&of_grown),
         rounds: rounds.into_iter().map(|tried| tried.round).collect(),
         steps,
         final_: Final {
