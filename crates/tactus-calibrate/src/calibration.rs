@@ -75,22 +75,9 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
     let declared = &referred(declared, readings, &mut warnings)?;
     let reference_mm = declared.model.response().reference_covering.thickness_mm;
 
-    let mut place = SensorPose::declared(declared, reference_mm);
-    let mut health = examine(declared, readings, &place);
-    let sound = health.sound(readings.elements);
-    let registration = match register(declared, readings, &sound) {
-        Ok((mut registration, fitted)) => {
-            place = fitted;
-            // With the fitted pose, faults show more clearly.
-            health = examine(declared, readings, &place);
-            let sounder = health.sound(readings.elements);
-            if sounder != sound
-                && let Ok((again, fitted)) = register(declared, readings, &sounder)
-            {
-                (registration, place) = (again, fitted);
-            }
-            Some(registration)
-        }
+    let Placed { health, place, registration } = Placed::of(declared, readings);
+    let registration = match registration {
+        Ok(registration) => Some(registration),
         Err(problem) => {
             missing.push(format!(
                 "Registration: {problem}. Origin, rotation and surface are taken as declared."
@@ -130,6 +117,45 @@ pub fn calibrate(declared: &Declared, readings: &Readings) -> Result<Calibration
     }
     calibration.remark(declared, readings);
     Ok(calibration)
+}
+
+/// Judges every element of a sensor as [`calibrate`] does, without the steps that come after it.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn health(declared: &Declared, readings: &Readings) -> Result<Health, ModelError> {
+    let declared = referred(declared, readings, &mut Vec::new())?;
+    Ok(Placed::of(&declared, readings).health)
+}
+
+/// The elements' health and the sensor's place, each found with the help of the other.
+struct Placed {
+    health: Health,
+    place: SensorPose,
+    registration: Result<RegistrationFit, String>,
+}
+
+impl Placed {
+    fn of(declared: &Declared, readings: &Readings) -> Self {
+        let reference_mm = declared.model.response().reference_covering.thickness_mm;
+        let mut place = SensorPose::declared(declared, reference_mm);
+        let mut health = examine(declared, readings, &place);
+        let sound = health.sound(readings.elements);
+        let mut registration = register(declared, readings, &sound);
+        if let Ok((_, fitted)) = &registration {
+            place = fitted.clone();
+            // With the fitted pose, faults show more clearly.
+            health = examine(declared, readings, &place);
+            let sounder = health.sound(readings.elements);
+            if sounder != sound
+                && let Ok((again, fitted)) = register(declared, readings, &sounder)
+            {
+                place = fitted.clone();
+                registration = Ok((again, fitted));
+            }
+        }
+        Self { health, place, registration: registration.map(|(registration, _)| registration) }
+    }
 }
 
 impl Calibration {

@@ -5,10 +5,21 @@
 //! | stuck | one and the same reading in every frame, while others have noise |
 //! | noisy | a standard deviation at rest several times the median element's |
 //! | cross-wired | press by press, its readings follow the prediction for another element, not its own |
-//! | dead | pressed as hard as the others, it does not rise above its noise |
+//! | dead | its rises do not grow with its predicted indentation, while the others' do |
 //!
 //! The prediction is the base model's equivalent indentation. An element is judged only if a press came near enough.
 //! The others are listed, so that an element without a fault is not mistaken for one that was tested.
+//!
+//! A dead element is judged by the slope of its rises `r` against its predicted indentations `p`, over the `n` presses that
+//! it should feel:
+//!
+//! ```text
+//! g = sum p r / sum p^2        se^2 = sum (r - g p)^2 / (n - 1) / sum p^2
+//! ```
+//!
+//! It is dead if `|g| + 3 se` is below a twentieth of the strong elements' slope. The greatest rise of many presses would not do:
+//! it grows with their number, also in noise. The error comes from the scatter between presses, because the noise within a
+//! press may be correlated.
 //!
 //! # Source
 //! Paper, Sec. 2.2: two elements "responded to a stimulus of one adjacent element, but not to the element itself".
@@ -29,8 +40,16 @@ const NOISY: f64 = 3.0;
 const FRAMES_LEAST: u64 = 30;
 /// An element counts as pressed if its predicted indentation is this share of that from a press at its centre.
 const PRESSED: f64 = 0.85;
-/// A dead element rises less than this share of the stronger elements, and less than this many standard deviations.
-const DEAD: [f64; 2] = [0.02, 8.0];
+/// An element should feel a press if its predicted indentation is this share of that from the same press at its centre.
+const FELT: f64 = 0.3;
+/// Presses needed for a slope.
+const SLOPE_PRESSES_LEAST: usize = 3;
+/// A dead element's slope is less than this share of the strong elements'.
+const DEAD_SHARE: f64 = 0.05;
+/// Standard errors by which a slope must be on one side of a limit.
+const CERTAIN_Z: f64 = 3.0;
+/// If less than a tenth of the elements have slopes of more than this many standard errors, nothing is felt and none is judged.
+const FELT_Z: f64 = 5.0;
 /// Likeness is the cosine between readings and prediction; another element's must exceed the element's own by this.
 const STRANGER: f64 = 0.02;
 /// Distinct places needed to tell which element's signal an element gives.
@@ -122,7 +141,7 @@ pub(crate) fn examine(declared: &Declared, readings: &Readings, place: &SensorPo
             faults.push(fault(FaultKind::Noisy { rms_counts: noise }, evidence));
             continue;
         }
-        match trials.health(element, noise) {
+        match trials.health(element) {
             ElementHealth::Unknown => not_judged.push(element),
             ElementHealth::Sound => {}
             ElementHealth::Faulty(kind, evidence) => faults.push(fault(kind, evidence)),
@@ -140,21 +159,28 @@ fn stuck(readings: &Readings, element: usize, typical_noise: f64) -> Option<f32>
 
 /// The deepest dwell of every press: predicted indentations and measured rises.
 struct Trials {
-    /// Predicted indentation by press and element.
-    predicted: Vec<Vec<f64>>,
+    /// Predicted indentation by press and element, in mm.
+    predicted_mm: Vec<Vec<f64>>,
+    /// Predicted indentation of an element with the same press at its centre, by press, in mm.
+    centred_mm: Vec<f64>,
     /// Measured rise by press and element, in counts.
     rises: Vec<Vec<f64>>,
-    /// Standard deviation of a rise in units of one frame's noise.
-    spread: Vec<f64>,
     places_mm: Vec<[f64; 2]>,
     /// Greatest predicted indentation of each element, as a share of that from the same press at its centre.
     reach: Vec<f64>,
-    /// 90th percentile of the rises of pressed elements, which dead ones hardly influence.
-    strong_rise: f64,
-    /// Greatest rise of any element in units of its standard deviation.
-    clearest: f64,
+    /// 90th percentile of the slopes of pressed elements, which dead ones hardly influence; `None` if it is not above their errors.
+    strong_counts_per_mm: Option<f64>,
     /// True if the presses go across the sensor: in one patch all elements rise and fall alike.
     across: bool,
+}
+
+/// Rises of an element against predicted indentations, through the origin.
+#[derive(Debug, Clone, Copy)]
+struct Slope {
+    counts_per_mm: f64,
+    /// From the scatter between presses.
+    standard_error: f64,
+    presses: usize,
 }
 
 enum ElementHealth {
@@ -166,101 +192,125 @@ enum ElementHealth {
 impl Trials {
     fn of(declared: &Declared, readings: &Readings, place: &SensorPose) -> Self {
         let mut trials = Self {
-            predicted: Vec::new(),
+            predicted_mm: Vec::new(),
+            centred_mm: Vec::new(),
             rises: Vec::new(),
-            spread: Vec::new(),
             places_mm: Vec::new(),
             reach: vec![0.0; readings.elements],
-            strong_rise: 0.0,
-            clearest: 0.0,
+            strong_counts_per_mm: None,
             across: false,
         };
         let Ok(model) = declared.unit_model(place.sigma_mm) else { return trials };
         let centre_mm = declared.array().centre_mm(0).unwrap_or_default();
-        let mut at_centre = vec![0.0; readings.elements];
+        let mut centred_mm = vec![0.0; readings.elements];
         for press in across(declared, readings) {
             let Some((dwell, indenter)) = press.deepest().zip(declared.indenter(press)) else { continue };
-            let Some(variance) = press.rise(dwell, 0).map(|[_, variance]| variance) else { continue };
+            if press.rest.is_none() {
+                continue;
+            }
             let contact = place.placement.contact(press, dwell, indenter);
-            let mut predicted = vec![0.0; readings.elements];
+            let mut predicted_mm = vec![0.0; readings.elements];
             let covering = Covering { thickness_mm: press.covering_mm };
-            model.indentation(&contact, covering, &mut predicted);
+            model.indentation(&contact, covering, &mut predicted_mm);
             let centred = Contact { position_mm: centre_mm, ..contact };
-            model.indentation(&centred, covering, &mut at_centre);
-            if at_centre[0] > 0.0 {
-                for (reach, predicted) in trials.reach.iter_mut().zip(&predicted) {
-                    *reach = reach.max(predicted / at_centre[0]);
+            model.indentation(&centred, covering, &mut centred_mm);
+            if centred_mm[0] > 0.0 {
+                for (reach, predicted_mm) in trials.reach.iter_mut().zip(&predicted_mm) {
+                    *reach = reach.max(predicted_mm / centred_mm[0]);
                 }
             }
             let rises =
                 (0..readings.elements).filter_map(|element| press.rise(dwell, element)).map(|[rise, _]| rise);
             trials.rises.push(rises.collect());
-            trials.predicted.push(predicted);
-            trials.spread.push(variance.sqrt());
+            trials.predicted_mm.push(predicted_mm);
+            trials.centred_mm.push(centred_mm[0]);
             trials.places_mm.push(press.place_mm);
         }
-        let pressed: Vec<usize> =
-            (0..readings.elements).filter(|element| trials.reach[*element] >= PRESSED).collect();
-        trials.strong_rise =
-            quantile(pressed.iter().map(|element| trials.greatest(*element)[0]), 0.9).unwrap_or(0.0);
-        let clear = |element: &usize| {
-            let noise = readings.noise_rms_counts[*element].unwrap_or(f64::INFINITY);
-            let [rise, spread] = trials.greatest(*element);
-            rise / (noise * spread)
-        };
-        trials.clearest = pressed.iter().map(clear).fold(0.0, f64::max);
+        trials.strong_counts_per_mm = trials.strong_counts_per_mm();
         trials.across = goes_across(declared, across(declared, readings).into_iter());
         trials
     }
 
-    fn health(&self, element: usize, noise: f64) -> ElementHealth {
-        let [share, deviations] = DEAD;
+    fn strong_counts_per_mm(&self) -> Option<f64> {
+        let pressed = (0..self.reach.len()).filter(|element| self.reach[*element] >= PRESSED);
+        let slopes: Vec<Slope> = pressed.filter_map(|element| self.slope(element, element)).collect();
+        let felt = slopes.iter().filter(|slope| slope.counts_per_mm.abs() > FELT_Z * slope.standard_error);
+        let felt = 10 * felt.count() >= slopes.len();
+        quantile(slopes.iter().map(|slope| slope.counts_per_mm.abs()), 0.9).filter(|_| felt)
+    }
+
+    fn health(&self, element: usize) -> ElementHealth {
         // If no element rises, the presses are too light to judge by, or every element is dead.
-        if self.reach[element] < PRESSED || self.clearest < deviations {
+        let Some(strong) = self.strong_counts_per_mm.filter(|_| self.reach[element] >= PRESSED) else {
             return ElementHealth::Unknown;
+        };
+        let Some(slope) = self.slope(element, element) else { return ElementHealth::Unknown };
+        // First, because an element that gives a distant one's signal does not feel presses on itself either.
+        if let Some(fault) = self.cross_wired(element, strong) {
+            return fault;
         }
-        let [rise, spread] = self.greatest(element);
-        if rise < share * self.strong_rise && rise < deviations * noise * spread {
+        let Slope { counts_per_mm, standard_error, presses } = slope;
+        if counts_per_mm.abs() + CERTAIN_Z * standard_error < DEAD_SHARE * strong {
             let evidence = format!(
-                "rose by {rise:.1} counts at most under presses that raised others by {:.0}",
-                self.strong_rise
+                "rises by {counts_per_mm:.1} +- {standard_error:.1} counts per mm of predicted indentation over {presses} presses, \
+                 where strong elements rise by {strong:.0}"
             );
             return ElementHealth::Faulty(FaultKind::Dead, evidence);
         }
-        if !self.across || distinct(&self.places_mm) < WIRING_PLACES_LEAST {
-            return ElementHealth::Sound;
-        }
-        let own = self.likeness(element, element);
-        let best = (0..self.reach.len())
-            .map(|other| (other, self.likeness(element, other)))
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        match best {
-            // The other element's likeness must come from a signal, not from noise.
-            Some((other, likeness))
-                if other != element && likeness > own + STRANGER && 1.0 - likeness < (1.0 - own) / 4.0 =>
-            {
-                let evidence = format!(
-                    "over {} presses its readings follow the prediction for element {other} (cosine {likeness:.4}), not its own \
-                     ({own:.4})",
-                    self.rises.len()
-                );
-                ElementHealth::Faulty(FaultKind::CrossWired { answers_for: other }, evidence)
-            }
-            _ => ElementHealth::Sound,
-        }
+        ElementHealth::Sound
     }
 
-    /// Greatest rise of an element, either way, and its standard deviation in units of a frame's noise.
-    fn greatest(&self, element: usize) -> [f64; 2] {
-        let rises =
-            self.rises.iter().zip(&self.spread).map(|(rises, spread)| [rises[element].abs(), *spread]);
-        rises.max_by(|a, b| a[0].total_cmp(&b[0])).unwrap_or([0.0, 1.0])
+    /// The fault of an element whose readings follow the prediction for another element.
+    fn cross_wired(&self, element: usize, strong_counts_per_mm: f64) -> Option<ElementHealth> {
+        if !self.across || distinct(&self.places_mm) < WIRING_PLACES_LEAST {
+            return None;
+        }
+        let own = self.likeness(element, element);
+        let (other, likeness) = (0..self.reach.len())
+            .map(|other| (other, self.likeness(element, other)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let is_liker = other != element && likeness > own + STRANGER && 1.0 - likeness < (1.0 - own) / 4.0;
+        // The likeness must come from a signal, not from noise.
+        let rises = |slope: Slope| {
+            slope.counts_per_mm.abs() - CERTAIN_Z * slope.standard_error > DEAD_SHARE * strong_counts_per_mm
+        };
+        (is_liker && self.slope(element, other).is_some_and(rises)).then(|| {
+            let evidence = format!(
+                "over {} presses its readings follow the prediction for element {other} (cosine {likeness:.4}), not its own \
+                 ({own:.4})",
+                self.rises.len()
+            );
+            ElementHealth::Faulty(FaultKind::CrossWired { answers_for: other }, evidence)
+        })
+    }
+
+    /// Slope of an element's rises against the predicted indentations of another or of itself, over the presses that the
+    /// latter should feel; `None` if they are too few.
+    fn slope(&self, element: usize, other: usize) -> Option<Slope> {
+        let felt = || {
+            let presses = self.predicted_mm.iter().zip(&self.centred_mm).zip(&self.rises);
+            presses
+                .map(|((predicted_mm, centred_mm), rises)| (predicted_mm[other], *centred_mm, rises[element]))
+                .filter(|(predicted_mm, centred_mm, _)| {
+                    *predicted_mm > 0.0 && *predicted_mm >= FELT * centred_mm
+                })
+        };
+        let presses = felt().count();
+        let squares: f64 = felt().map(|(predicted_mm, ..)| predicted_mm * predicted_mm).sum();
+        let counts_per_mm = felt().map(|(predicted_mm, _, rise)| predicted_mm * rise).sum::<f64>() / squares;
+        let residuals = felt().map(|(predicted_mm, _, rise)| rise - counts_per_mm * predicted_mm);
+        let scatter = residuals.map(|residual| residual * residual).sum::<f64>() / (presses as f64 - 1.0);
+        (presses >= SLOPE_PRESSES_LEAST).then(|| Slope {
+            counts_per_mm,
+            standard_error: (scatter / squares).sqrt(),
+            presses,
+        })
     }
 
     /// Cosine between the readings of one element and the prediction for another, whatever the sign of the sensitivity.
     fn likeness(&self, element: usize, other: usize) -> f64 {
         let (mut both, mut read, mut predicted) = (0.0, 0.0, 0.0);
-        for (rises, predictions) in self.rises.iter().zip(&self.predicted) {
+        for (rises, predictions) in self.rises.iter().zip(&self.predicted_mm) {
             both += rises[element] * predictions[other];
             read += rises[element] * rises[element];
             predicted += predictions[other] * predictions[other];

@@ -26,7 +26,7 @@ mod spread;
 mod synthetic_sensor;
 mod thickness;
 
-pub use calibration::{Calibration, DataSummary, calibrate};
+pub use calibration::{Calibration, DataSummary, calibrate, health};
 pub use estimate::Estimate;
 pub use faults::{FaultKind, FaultyElement, Health};
 pub use placement::Declared;

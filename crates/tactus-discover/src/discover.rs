@@ -121,7 +121,7 @@ fn discover_on_threads(
         problem: &problem,
         candidates: &candidates,
         options,
-        known_terms: known.effects.len(),
+        known_terms: known.effects.len() + prepared.faulty.terms.len(),
         base_gap: problem.heldout_gap(&base.predicted).value,
         progress: &|what| reporter.report(what, 0.0),
     };

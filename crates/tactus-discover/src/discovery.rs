@@ -1,5 +1,6 @@
 //! The result of a discovery.
 
+use tactus_calibrate::FaultyElement;
 use tactus_model::{Effect, Psf, Response};
 
 /// What the data say about a model, and what they add to it.
@@ -17,7 +18,10 @@ pub struct Discovery {
     pub heldout_frames: Vec<bool>,
     /// Standard deviation of one reading, from frames that repeat each other; `None` if no frames do.
     pub noise_rms_counts: Option<f64>,
-    /// How far the recalibrated base model is from the held-out presses.
+    /// Elements that calibration finds faulty, with its evidence. Stuck, noisy and dead ones have no weight: no figure here but that
+    /// of the step `miswired` contains their readings.
+    pub faulty: Vec<FaultyElement>,
+    /// How far the recalibrated base model is from the held-out presses. It has the effects of faulty elements.
     pub base: Level,
     /// Whether the residual of the base model has structure beyond noise.
     pub global: GlobalTest,
@@ -25,7 +29,7 @@ pub struct Discovery {
     pub gap: Vec<Gap>,
     /// The gap against each covariate, before and after.
     pub curves: Vec<Curve>,
-    /// The gap of each element, row-major, before and after.
+    /// The gap of each element, row-major, before and after; NaN for elements without weight.
     pub elements: Vec<ElementGap>,
     /// Each round of the search: which effects were tried, and with what result.
     pub rounds: Vec<Round>,

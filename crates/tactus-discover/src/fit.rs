@@ -126,7 +126,12 @@ impl<'a> Problem<'a> {
                 free.push(Free::SigmaSlope);
             }
         }
-        for (term, Term { definition, values }) in parameters.terms.iter().enumerate() {
+        for (term, at) in parameters.terms.iter().enumerate() {
+            let Term { definition, values } = at;
+            if at.rewires().is_some_and(|element| self.element_weight[element] == 0.0) {
+                // Nothing shows the shares of an element without weight.
+                continue;
+            }
             let mut values = definition.parameters.iter().zip(values);
             if values.any(|(known, value)| known.kind == ParameterKind::ElementOrAll && *value >= 0.0) {
                 // The known drift of one element's baseline is not refitted.

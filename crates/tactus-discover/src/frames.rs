@@ -73,6 +73,29 @@ impl Frames {
         self.t_s.is_empty()
     }
 
+    /// The frames as rows of the measurement table, in order; the time is since the run's first frame.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = RowView<'_>> {
+        let mut run = 0;
+        (0..self.len()).map(move |frame| {
+            while self.runs[run].1 <= frame {
+                run += 1;
+            }
+            #[expect(clippy::cast_possible_truncation, reason = "a whole number of nanoseconds before")]
+            let t_ns = (self.t_s[frame] * 1e9).round() as i64;
+            RowView {
+                run: &self.runs[run].0,
+                press: self.press[frame],
+                phase: self.phase[frame],
+                t_ns,
+                position_mm: self.position_mm[frame],
+                covering_mm: self.covering_mm[frame],
+                indenter: &self.indenters[usize::from(self.indenter[frame])],
+                temperature_c: Some(f64::from(self.temperature_c[frame])).filter(|c| c.is_finite()),
+                counts: self.counts_of(frame),
+            }
+        })
+    }
+
     /// The counts of a frame, row-major.
     pub(crate) fn counts_of(&self, frame: usize) -> &[f32] {
         &self.counts[frame * self.elements..(frame + 1) * self.elements]

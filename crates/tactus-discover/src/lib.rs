@@ -8,6 +8,7 @@ mod contacts;
 mod covariates;
 mod discover;
 mod discovery;
+mod faulty;
 mod fit;
 #[cfg(test)]
 mod fixtures;
@@ -37,3 +38,4 @@ pub use discovery::{
     NextExperiment, NotShown, Point, Round, RunWalks, Split, TriedEffect, Unexplained, Verdict,
 };
 pub use frames::Frames;
+pub use tactus_calibrate::{FaultKind, FaultyElement};

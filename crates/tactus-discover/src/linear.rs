@@ -60,7 +60,8 @@ impl<'a> Problem<'a> {
         let declared = &self.predictor.known.response.sensitivity_counts_per_mm;
         let ratios: Vec<f64> =
             at.sensitivity.iter().zip(declared).map(|(now, declared)| now / declared).collect();
-        let typical = median(&ratios);
+        let of_weighed = ratios.iter().zip(&self.element_weight).filter(|(_, weight)| **weight > 0.0);
+        let typical = median(&of_weighed.map(|(ratio, _)| *ratio).collect::<Vec<_>>());
         let [least, most] = GAIN_RATIOS;
         let is_at_an_end =
             |share: &f64| *share <= least * (1.0 + PIN_MARGIN) || *share >= most * (1.0 - PIN_MARGIN);

@@ -1,6 +1,7 @@
 //! Preparation of a search: split, noise, bins, recalibrated base model, and lines in the spectrum.
 
 use crate::bins::{Bins, HeldOut, still};
+use crate::faulty::Faulty;
 use crate::fit::{Fitted, Problem};
 use crate::noise::Noise;
 use crate::predictor::{Parameters, Predictor};
@@ -17,7 +18,12 @@ pub(crate) struct Prepared<'a> {
     pub(crate) frames: &'a Frames,
     pub(crate) heldout: HeldOut,
     pub(crate) still: Vec<usize>,
+    /// The elements that calibration finds faulty.
+    pub(crate) faulty: Faulty,
+    /// Infinite for elements without weight.
     pub(crate) noise: Noise,
+    /// The same with the noise of dead and stuck elements, to show what their effects explain.
+    pub(crate) noise_of_silent: Noise,
     /// True if frames repeat each other, so that the noise is known.
     pub(crate) replicates: bool,
     /// Step of the converter: as declared, or wider if the readings show this.
@@ -56,24 +62,30 @@ impl<'a> Prepared<'a> {
         }
         let replicates = replicated.is_some();
         let noise = replicated.unwrap_or_else(|| Noise::of_differences(frames, step_counts));
+        let faulty = Faulty::of(known, frames, &noise)?;
+        warnings.extend(faulty.warning.clone());
+        let noise_of_silent = noise.clone().without(|element| faulty.noisy.contains(&element));
+        let noise = noise.without(|element| faulty.is_weightless(element));
 
         let whole = Bins::of(frames, false)?;
         let mut bins = Bins::of(frames, true)?;
         bins.weigh(frames, &noise, &heldout);
-        let mut base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise))?;
-        let frequencies_hz = lines_hz(&Predictor::new(known, frames, &whole), &base)?;
+        let mut base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise), &faulty)?;
+        let frequencies_hz = lines_hz(&Predictor::new(known, frames, &whole), &base, &faulty)?;
         if !frequencies_hz.is_empty() {
             // Averaging over several frames would remove a tone.
             bins = Bins::of(frames, false)?;
             bins.weigh(frames, &noise, &heldout);
-            base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise))?;
+            base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise), &faulty)?;
         }
         Ok(Self {
             known,
             frames,
             heldout,
             still,
+            faulty,
             noise,
+            noise_of_silent,
             replicates,
             step_counts,
             lattice,
@@ -89,18 +101,28 @@ impl<'a> Prepared<'a> {
     pub(crate) fn problem(&self) -> Problem<'_> {
         Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise)
     }
+
+    /// The same, with dead and stuck elements weighted as the others.
+    pub(crate) fn problem_with_silent(&self) -> Problem<'_> {
+        Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise_of_silent)
+    }
 }
 
-/// The base model, fitted to the bins.
-fn recalibrated(problem: &Problem<'_>) -> Result<Fitted, DiscoverError> {
+/// The base model with the effects of faulty elements, fitted to the bins.
+fn recalibrated(problem: &Problem<'_>, faulty: &Faulty) -> Result<Fitted, DiscoverError> {
     let Predictor { known, bins, .. } = problem.predictor;
-    problem.fit_from(Parameters::declared(known, bins.paths.len()), BASE_ROUNDS)
+    let mut start = Parameters::declared(known, bins.paths.len());
+    start.terms.extend(faulty.terms.iter().cloned());
+    problem.fit_from(start, BASE_ROUNDS)
 }
 
 /// Frequencies of lines in the spectrum of a model's residual of all frames.
-fn lines_hz(whole: &Predictor<'_>, base: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+fn lines_hz(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<Vec<f64>, DiscoverError> {
     let predicted = whole.predict(&base.parameters)?;
-    let residual: Vec<f64> =
+    let mut residual: Vec<f64> =
         whole.frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
+    for element in (0..whole.frames.elements).filter(|element| faulty.is_weightless(*element)) {
+        residual.iter_mut().skip(element).step_by(whole.frames.elements).for_each(|residual| *residual = 0.0);
+    }
     Ok(spectrum::lines_hz(whole.frames, &residual))
 }

@@ -252,8 +252,10 @@ impl<'a> Baselines<'a> {
         let last = self.knots - 1;
         let whole: f64 = gram.iter().map(|[own, next]| own + 2.0 * next).sum();
         let total: f64 = values.iter().step_by(elements).sum();
-        if whole <= 0.0 {
-            values.iter_mut().step_by(elements).for_each(|value| *value = 0.0);
+        if whole <= 0.0 || weight <= 0.0 {
+            // Without a weight nothing tells a walk from noise: the baseline is constant.
+            let constant = if whole > 0.0 { total / whole } else { 0.0 };
+            values.iter_mut().step_by(elements).for_each(|value| *value = constant);
             return 0.0;
         }
         let mut pivots = vec![0.0; self.knots];
@@ -313,7 +315,8 @@ impl Problem<'_> {
 
     /// The random walk with the greatest likelihood, given the residual of constant baselines and the bins' weights.
     fn estimate_walk(&self, residual: &[f64], weights: &[f64]) -> WalkEstimate {
-        let noise_counts = median(&self.element_weight).powf(-0.5);
+        let weighed = self.element_weight.iter().copied().filter(|weight| *weight > 0.0);
+        let noise_counts = median(&weighed.collect::<Vec<_>>()).powf(-0.5);
         let mut best: Option<WalkEstimate> = None;
         let mut knots = KNOTS;
         loop {

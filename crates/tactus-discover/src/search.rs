@@ -70,7 +70,7 @@ pub(crate) struct Search<'a> {
     pub(crate) problem: &'a Problem<'a>,
     pub(crate) candidates: &'a [Candidate],
     pub(crate) options: Options,
-    /// Number of terms of the known model, which are never removed.
+    /// Number of terms of the known model and of faulty elements, which are never removed.
     pub(crate) known_terms: usize,
     /// Gap of the base model on the held-out presses; see `HeldOutGap`.
     pub(crate) base_gap: f64,

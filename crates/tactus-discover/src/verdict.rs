@@ -6,7 +6,8 @@ use crate::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, NotShown, Split,
     Unexplained, Verdict,
 };
-use crate::fit::Fitted;
+use crate::faulty::MISWIRED;
+use crate::fit::{Fitted, Problem};
 use crate::locate::Located;
 use crate::next::{Explanation, Pair, Planner};
 use crate::noise::Noise;
@@ -51,6 +52,16 @@ struct HeldOutResidual {
     residual: Vec<f32>,
 }
 
+impl HeldOutResidual {
+    /// The residual of each element, and that of a grown model.
+    fn elements_beside(&self, grown: &Self) -> Vec<ElementGap> {
+        let elements = self.elements_rms_counts.iter().zip(&grown.elements_rms_counts);
+        elements
+            .map(|(before, after)| ElementGap { before_rms_counts: *before, after_rms_counts: *after })
+            .collect()
+    }
+}
+
 /// Decides the verdict and builds the report of a search.
 pub(crate) fn conclude(
     prepared: &Prepared<'_>,
@@ -58,7 +69,7 @@ pub(crate) fn conclude(
     found: SearchOutcome,
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
-    let Prepared { known, frames, heldout, lattice, .. } = prepared;
+    let Prepared { known, frames, heldout, lattice, faulty, .. } = prepared;
     let SearchOutcome { lacking, base, mut grown, rounds, equivalent, before, after } = found;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
@@ -85,6 +96,8 @@ pub(crate) fn conclude(
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let missing = p_value <= ALPHA && options.rule == Rule::Protocol;
     let verdict = match (named || lattice.is_some(), missing) {
+        (false, false) if !faulty.terms.is_empty() => Verdict::Explained,
+        (false, true) if !faulty.terms.is_empty() => Verdict::PartlyExplained,
         (false, false) => Verdict::NothingMissing,
         (false, true) => Verdict::Unexplained,
         (true, _) if certain <= EXPLAINED_SHARE && (share <= EXPLAINED_SHARE || !left) => Verdict::Explained,
@@ -99,7 +112,7 @@ pub(crate) fn conclude(
 
     let mut not_shown = lacking;
     not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.screened)));
-    let mut steps = search.steps(&grown, &equivalent)?;
+    let mut steps = search.steps(&grown, &equivalent, &prepared.problem_with_silent())?;
     let mut effects = grown.parameters.effects()?;
     if let Some((step_counts, p_value)) = lattice {
         effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);
@@ -119,7 +132,6 @@ pub(crate) fn conclude(
     let mut next_experiments = planner.propose(&pairs)?;
     next_experiments.extend(planner.show(&not_shown, &grown.parameters)?);
 
-    let elements = of_base.elements_rms_counts.iter().zip(&of_grown.elements_rms_counts);
     Ok(Discovery {
         seed: options.seed,
         not_shown,
@@ -133,13 +145,12 @@ pub(crate) fn conclude(
         },
         heldout_frames: heldout.frames.clone(),
         noise_rms_counts: prepared.replicates.then_some(floor),
+        faulty: faulty.elements.clone(),
         base: in_noise(of_base.level),
         global: GlobalTest { statistic: before.statistic, p_value },
         gap: before.gap,
         curves: search.curves(&base, &grown)?,
-        elements: elements
-            .map(|(before, after)| ElementGap { before_rms_counts: *before, after_rms_counts: *after })
-            .collect(),
+        elements: of_base.elements_beside(&of_grown),
         rounds: rounds.into_iter().map(|tried| tried.round).collect(),
         steps,
         final_: Final {
@@ -157,6 +168,8 @@ pub(crate) fn conclude(
             share: match verdict {
                 Verdict::NothingMissing => 0.0,
                 Verdict::Unexplained => 1.0,
+                // Faulty elements are in the base, so that nothing of its gap is left to close.
+                Verdict::Explained if !named && lattice.is_none() => 0.0,
                 Verdict::Explained | Verdict::PartlyExplained => share.max(certain),
             },
         },
@@ -212,12 +225,17 @@ impl Prepared<'_> {
             }
         }
         let count = count.max(1.0);
-        let mean = squares.iter().sum::<f64>() / (count * elements as f64);
+        let weightless = |element: usize| self.faulty.is_weightless(element);
+        let weighed: Vec<f64> =
+            (0..elements).filter(|element| !weightless(*element)).map(|element| squares[element]).collect();
+        let mean = weighed.iter().sum::<f64>() / (count * weighed.len().max(1) as f64);
         #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
         let residual = frames.counts.iter().zip(&predicted).map(|(counts, of)| counts - *of as f32).collect();
         Ok(HeldOutResidual {
             level: Level { heldout_rms_counts: mean.sqrt(), heldout_chi2: mean / noise.rms_counts.powi(2) },
-            elements_rms_counts: squares.into_iter().map(|sum| (sum / count).sqrt()).collect(),
+            elements_rms_counts: (0..elements)
+                .map(|element| if weightless(element) { f64::NAN } else { (squares[element] / count).sqrt() })
+                .collect(),
             residual,
         })
     }
@@ -225,6 +243,7 @@ impl Prepared<'_> {
     /// The noise given the grown model. Before a tone is in the model, it looks like noise.
     fn floor_counts(&self, grown: &HeldOutResidual) -> f64 {
         let left = Noise::of_residual(self.frames, &grown.residual, &self.still, self.step_counts);
+        let left = left.map(|left| left.without(|element| self.faulty.is_weightless(element)));
         left.map_or(self.noise.rms_counts, |left| left.rms_counts.min(self.noise.rms_counts))
     }
 }
@@ -253,19 +272,23 @@ impl Search<'_> {
         if closed + left > 0.0 { (left / (closed + left)).clamp(0.0, 1.0) } else { 1.0 }
     }
 
-    /// The added effects, each name once.
+    /// The added effects, those of faulty elements included, each name once. `with_silent` is the problem in which dead and stuck elements
+    /// have a weight.
     pub(crate) fn steps(
         &self,
         grown: &Fitted,
         equivalent: &Equivalent,
+        with_silent: &Problem<'_>,
     ) -> Result<Vec<AddedEffect>, DiscoverError> {
-        let names = names(&grown.parameters, self.known_terms);
+        let known_terms = self.problem.predictor.known.effects.len();
+        let names = names(&grown.parameters, known_terms);
         let mut steps = Vec::new();
         for name in names {
-            let less = without(&grown.parameters, name, self.known_terms);
-            let before = self.problem.fit_from(less, POLISH_ROUNDS)?;
-            let gains = self.problem.heldout_gains(&before.predicted, &grown.predicted);
-            let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(self.known_terms);
+            let problem = if name == MISWIRED { with_silent } else { self.problem };
+            let less = without(&grown.parameters, name, known_terms);
+            let before = problem.fit_from(less, POLISH_ROUNDS)?;
+            let gains = problem.heldout_gains(&before.predicted, &grown.predicted);
+            let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(known_terms);
             let estimated = |(term, errors): (&Term, &Vec<f64>)| {
                 term.definition
                     .parameters
@@ -287,8 +310,8 @@ impl Search<'_> {
                 terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
                 p_value,
                 q_value: p_value,
-                heldout_rms_before_counts: self.problem.heldout_rms_counts(&before.predicted),
-                heldout_rms_after_counts: self.problem.heldout_rms_counts(&grown.predicted),
+                heldout_rms_before_counts: problem.heldout_rms_counts(&before.predicted),
+                heldout_rms_after_counts: problem.heldout_rms_counts(&grown.predicted),
                 equivalent: equivalent
                     .get(name)
                     .into_iter()

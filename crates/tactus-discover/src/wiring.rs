@@ -31,11 +31,12 @@ pub(crate) fn pairs(problem: &Problem<'_>, fitted: &Fitted) -> Vec<[usize; 2]> {
     let sums = Sums::of(problem, &signal);
     let mut found: Vec<(f64, [usize; 2])> = Vec::new();
     let declared = &problem.predictor.known.response.sensitivity_counts_per_mm;
-    for (element, declared) in declared.iter().enumerate() {
-        let others = (0..elements).filter(|other| *other != element);
+    let weighed = |element: &usize| problem.element_weight[*element] > 0.0;
+    for element in (0..elements).filter(weighed) {
+        let others = (0..elements).filter(|other| *other != element).filter(weighed);
         let best = others.map(|other| (sums.gain(element, other), other)).max_by(|a, b| a.0.total_cmp(&b.0));
         found.extend(best.map(|(gain, other)| (gain, [element, other])));
-        let ratio = fitted.parameters.sensitivity[element] / declared;
+        let ratio = fitted.parameters.sensitivity[element] / declared[element];
         if ratio.abs() < DEAD_SHARE {
             found.push((f64::INFINITY, [element, element]));
         }

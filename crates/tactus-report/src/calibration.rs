@@ -5,7 +5,7 @@
 
 mod elements;
 mod figures;
-mod health;
+pub(crate) mod health;
 mod registration;
 mod response;
 mod spread;

@@ -8,6 +8,7 @@ mod active;
 mod added;
 mod after;
 mod basis;
+mod faulty;
 mod figures;
 mod gap;
 mod json;
@@ -67,7 +68,7 @@ pub struct DataSource {
 
 /// Makes the page of a discovery: HTML with its style and figures inline.
 ///
-/// The order is: what the data cannot show; the verdict; where the gap is; what was tried and added; the gap before and
+/// The order is: what the data cannot show; the verdict; faulty elements; where the gap is; what was tried and added; the gap before and
 /// after; what stays unexplained; what to measure next; the data. All text from outside is escaped; nothing is loaded.
 pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
     let page = fmt::from_fn(|f| {
@@ -75,6 +76,7 @@ pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
         sensor_header(f, "Discovery", about, report.rig, report.array, report.simulated)?;
         remarks(f, report)?;
         verdict(f, report.discovery)?;
+        faulty::section(f, report)?;
         gap::section(f, report)?;
         tried::section(f, report.discovery)?;
         added::section(f, report.discovery)?;

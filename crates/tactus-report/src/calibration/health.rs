@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_calibrate::FaultKind;
+use tactus_calibrate::{FaultKind, FaultyElement};
 use tactus_model::Array;
 
 use super::{CalibrationReport, elements::health_map};
@@ -21,17 +21,7 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>
     if health.faults.is_empty() {
         writeln!(f, "<p>No fault was found.</p>")?;
     } else {
-        let mut table = Table::new(&[
-            Column::Number("element"),
-            Column::Name("(row, col)"),
-            Column::Name("fault"),
-            Column::Prose("evidence"),
-        ]);
-        for fault in &health.faults {
-            let kind = kind(array, fault.kind);
-            table.row([fault.element.to_string(), place(array, fault.element), kind, fault.evidence.clone()]);
-        }
-        writeln!(f, "{table}")?;
+        writeln!(f, "{}", table(array, &health.faults))?;
     }
     let (faulty, not_judged) = (health.faults.len(), health.not_judged.len());
     let sound = array.elements().saturating_sub(faulty + not_judged);
@@ -51,6 +41,21 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &CalibrationReport<'_>
         "</div>\n<figure>\n{}\n<figcaption>The array from above, row 0 at the bottom.{lines}</figcaption>\n</figure>\n</div>\n</section>",
         health_map(array, health)
     )
+}
+
+/// The faulty elements, each with its evidence.
+pub(crate) fn table(array: &Array, faults: &[FaultyElement]) -> Table<'static> {
+    let mut table = Table::new(&[
+        Column::Number("element"),
+        Column::Name("(row, col)"),
+        Column::Name("fault"),
+        Column::Prose("evidence"),
+    ]);
+    for fault in faults {
+        let kind = kind(array, fault.kind);
+        table.row([fault.element.to_string(), place(array, fault.element), kind, fault.evidence.clone()]);
+    }
+    table
 }
 
 /// `(row, col)` of an element.

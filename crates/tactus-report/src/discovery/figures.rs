@@ -56,7 +56,8 @@ pub fn element_maps(array: &Array, elements: &[ElementGap], noise_rms_counts: Op
     // Noise alone is not drawn in bright colours.
     let scale = Scale::new(0.0, if noise_rms_counts.is_some() { greatest.max(2.0) } else { greatest });
     let maps = [(BEFORE, &before), (AFTER, &after)];
-    let maps = if before == after { &maps[..1] } else { &maps[..] };
+    let is_same = before.iter().zip(&after).all(|(before, after)| before.to_bits() == after.to_bits());
+    let maps = if is_same { &maps[..1] } else { &maps[..] };
     let cell_px = (500.0 / cols as f64).min(300.0 / rows as f64).clamp(1.0, 44.0);
     let (width, height) = (cell_px * cols as f64, cell_px * rows as f64);
     let size_px = [(2.0 * width + GUTTER_PX).max(560.0), height + 70.0];

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tactus_discover::{
-    AddedEffect, Curve, Discovery, Estimated, Gap, Level, NextExperiment, Round, TriedEffect,
+    AddedEffect, Curve, Discovery, Estimated, FaultyElement, Gap, Level, NextExperiment, Round, TriedEffect,
 };
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
@@ -37,6 +37,7 @@ struct ReportJson<'a> {
     warnings: &'a [String],
     split: SplitJson<'a>,
     noise_rms_counts: Option<f64>,
+    faulty: &'a [FaultyElement],
     base: LevelJson,
     global: GlobalTestJson,
     gap: Vec<GapJson<'a>>,
@@ -223,6 +224,7 @@ impl<'a> ReportJson<'a> {
                 heldout_coverings_mm: &found.split.heldout_coverings_mm,
             },
             noise_rms_counts: found.noise_rms_counts,
+            faulty: &found.faulty,
             base: LevelJson::of(found.base),
             global: GlobalTestJson { statistic: found.global.statistic, p_value: found.global.p_value },
             gap: found.gap.iter().map(GapJson::of).collect(),

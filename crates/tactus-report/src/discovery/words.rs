@@ -2,6 +2,7 @@
 
 use tactus_discover::{Discovery, Verdict};
 
+use super::faulty;
 use crate::numbers::{digits, short};
 use crate::plot::number;
 
@@ -18,10 +19,14 @@ pub fn in_words(found: &Discovery) -> String {
     let closed = found.final_.shrink.map_or_else(String::new, |share| {
         format!(", which closes {} of the gap between model and noise", percent(share))
     });
-    let falls = format!(
-        "On held-out presses the residual falls from {before} to {after} counts rms{closed}; {noise_is}."
-    );
-    match found.verdict {
+    let falls = if found.base == found.final_.level {
+        format!("On held-out presses the residual is {before} counts rms; {noise_is}.")
+    } else {
+        format!(
+            "On held-out presses the residual falls from {before} to {after} counts rms{closed}; {noise_is}."
+        )
+    };
+    let verdict = match found.verdict {
         Verdict::NothingMissing => format!(
             "The model is missing no effect that these data can show: on held-out presses its residual is {before} counts rms and {noise_is}. \
              The probability of as much structure by noise alone is {}.",
@@ -37,7 +42,8 @@ pub fn in_words(found: &Discovery) -> String {
              {noise_is}. {}",
             left(found)
         ),
-    }
+    };
+    [verdict].into_iter().chain(faulty::in_words(found)).collect::<Vec<_>>().join(" ")
 }
 
 /// The unexplained share, and the covariates on which it depends.

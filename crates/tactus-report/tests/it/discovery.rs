@@ -6,7 +6,7 @@
 
 use std::{env, fs, path::Path};
 
-use crate::made_up::discovery::{data, empty, explained, nothing_missing, report, unexplained};
+use crate::made_up::discovery::{data, empty, explained, faulty, nothing_missing, report, unexplained};
 use serde_json::Value;
 use tactus_discover::{Discovery, NextExperiment, Unexplained, Verdict};
 use tactus_model::Array;
@@ -86,6 +86,7 @@ fn the_json_keeps_its_form_to_the_byte() {
     discovery.curves[0].points.truncate(2);
     discovery.elements.truncate(2);
     discovery.heldout_frames.clear();
+    discovery.faulty = faulty().faulty;
     discovery.global.statistic = f64::NAN;
     discovery.base.heldout_chi2 = f64::INFINITY;
     let undecided = |equivalent| AmbiguousEffect { effect: "hysteresis", equivalent };
@@ -153,6 +154,39 @@ fn the_verdict_says_what_it_rests_on() {
         ..explained()
     };
     assert!(in_words(&partly).ends_with("The remaining 30 % of the gap depends on temperature."));
+}
+
+#[test]
+fn faulty_elements_are_listed_with_their_evidence_and_have_no_figure() {
+    let discovery = faulty();
+    assert_eq!(
+        in_words(&discovery),
+        "The model was missing miswired. On held-out presses the residual is 2.01 counts rms; the noise is 2.00 counts. Faulty: \
+         elements 5 and 39 are dead, element 12 is stuck, element 30 is noisy and element 18 answers for 19."
+    );
+    let html = html(&discovery);
+    show("faulty.html", &html);
+    for text in [
+        "<h2>Faulty elements</h2>",
+        "<td class=\"n\">39</td><td>(4, 7)</td><td>dead</td><td class=\"prose\">rises by 2.0 +- 3.3 counts per mm</td>",
+        "<td>stuck at 812</td>",
+        "<td>cross-wired to 19 (2, 3)</td>",
+        "<td>noisy, 31.4 counts rms</td>",
+    ] {
+        assert!(html.contains(text), "{text}");
+    }
+    let found = json(&discovery);
+    assert_eq!(found["faulty"][0]["kind"], serde_json::json!({ "kind": "dead" }));
+    assert_eq!(found["faulty"][2]["kind"], serde_json::json!({ "kind": "cross-wired", "answers_for": 19 }));
+    assert_eq!(found["faulty"][4]["evidence"], "rises by 2.0 +- 3.3 counts per mm");
+    assert_eq!(found["elements"][5]["before_rms_counts"], Value::Null);
+    let map = element_maps(&Array::digitacts(), &discovery.elements, Some(2.0)).to_string();
+    assert!(!map.contains("grown") && map.matches("h1v1h-1z").count() == 44);
+}
+
+#[test]
+fn without_a_fault_no_page_speaks_of_faults() {
+    assert!(!html(&nothing_missing()).contains("Faulty"));
 }
 
 #[test]
@@ -257,7 +291,7 @@ fn what_no_effect_matches_has_no_name() {
 
 #[test]
 fn no_page_has_a_number_that_is_none() {
-    for discovery in [explained(), nothing_missing(), unexplained(), empty()] {
+    for discovery in [explained(), nothing_missing(), unexplained(), empty(), faulty()] {
         let html = html(&discovery);
         assert!(!html.contains("NaN") && !html.contains("inf"), "{:?}", discovery.verdict);
         assert!(html.ends_with("</main>\n</body>\n</html>\n"));

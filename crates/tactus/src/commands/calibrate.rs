@@ -17,7 +17,7 @@ use crate::cli::{CalibrateArgs, Common};
 use crate::exit::Exit;
 use crate::output;
 
-pub(crate) use print::estimate;
+pub(crate) use print::{estimate, faulty};
 
 /// Name of the form of `calibration.json`.
 const SCHEMA: &str = "tactus.calibration/1";

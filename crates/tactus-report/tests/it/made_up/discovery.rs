@@ -1,8 +1,8 @@
 //! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
-    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level,
-    NextExperiment, NotShown, Point, Round, Split, TriedEffect, Unexplained, Verdict,
+    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement, Final, Gap,
+    GlobalTest, Level, NextExperiment, NotShown, Point, Round, Split, TriedEffect, Unexplained, Verdict,
 };
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
 use tactus_report::discovery::{DataSource, DiscoveryReport};
@@ -44,6 +44,7 @@ pub(crate) fn explained() -> Discovery {
         },
         heldout_frames: vec![false; 36_000],
         noise_rms_counts: Some(NOISE_COUNTS),
+        faulty: vec![],
         base: level(9.36),
         global: GlobalTest { statistic: 41.2, p_value: 0.000_5 },
         gap: vec![
@@ -137,6 +138,30 @@ pub(crate) fn nothing_missing() -> Discovery {
         next_experiments: vec![],
         effects: vec![],
         ..whole
+    }
+}
+
+/// Two elements are dead, one is stuck, one is noisy, and one gives another's signal; nothing else is missing.
+pub(crate) fn faulty() -> Discovery {
+    let fault = |element, kind, evidence: &str| FaultyElement { element, kind, evidence: evidence.into() };
+    let whole = explained();
+    let mut elements = vec![ElementGap { before_rms_counts: 2.0, after_rms_counts: 2.0 }; 48];
+    for element in [5, 12, 30, 39] {
+        elements[element] = ElementGap { before_rms_counts: f64::NAN, after_rms_counts: f64::NAN };
+    }
+    Discovery {
+        faulty: vec![
+            fault(5, FaultKind::Dead, "rises by -0.4 +- 3.9 counts per mm"),
+            fault(12, FaultKind::Stuck { counts: 812.0 }, "reads 812 in each of 36000 frames"),
+            fault(18, FaultKind::CrossWired { answers_for: 19 }, "follows the prediction for element 19"),
+            fault(30, FaultKind::Noisy { rms_counts: 31.4 }, "31.4 counts rms at rest"),
+            fault(39, FaultKind::Dead, "rises by 2.0 +- 3.3 counts per mm"),
+        ],
+        elements,
+        steps: whole.steps[1..].to_vec(),
+        verdict: Verdict::Explained,
+        effects: vec![],
+        ..nothing_missing()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tactus_calibrate::{Estimate, FaultKind};
+use tactus_calibrate::{Estimate, FaultKind, FaultyElement};
 
 use super::Calibrated;
 use crate::output::{print_fields, print_table, say};
@@ -40,13 +40,7 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
         }
     }
     for fault in &calibration.health.faults {
-        let what = match fault.kind {
-            FaultKind::Dead => "is dead".into(),
-            FaultKind::Stuck { counts } => format!("is stuck at {counts}"),
-            FaultKind::CrossWired { answers_for } => format!("answers for {answers_for}"),
-            FaultKind::Noisy { rms_counts } => format!("is noisy: {rms_counts:.1} counts rms"),
-        };
-        fields.push(("faulty", format!("element {} {what}", fault.element)));
+        fields.push(("faulty", faulty(fault)));
     }
     if let Some(response) = &calibration.response {
         fields
@@ -97,6 +91,17 @@ pub(super) fn calibrated(calibrated: &Calibrated, paths: &[PathBuf]) {
     for path in paths {
         say(&path.display().to_string());
     }
+}
+
+/// `element 5 is dead`.
+pub(crate) fn faulty(fault: &FaultyElement) -> String {
+    let what = match fault.kind {
+        FaultKind::Dead => "is dead".into(),
+        FaultKind::Stuck { counts } => format!("is stuck at {counts}"),
+        FaultKind::CrossWired { answers_for } => format!("answers for {answers_for}"),
+        FaultKind::Noisy { rms_counts } => format!("is noisy: {rms_counts:.1} counts rms"),
+    };
+    format!("element {} {what}", fault.element)
 }
 
 /// `2.7256 +- 0.0007`: rounded to the first digit of the error.

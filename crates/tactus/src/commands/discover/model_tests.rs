@@ -65,6 +65,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
         },
         heldout_frames: vec![false; 10],
         noise_rms_counts: Some(2.0),
+        faulty: Vec::new(),
         base: level,
         global: GlobalTest { statistic: 9.0, p_value: 0.001 },
         gap: Vec::new(),

@@ -8,7 +8,7 @@ use tactus_report::discovery::{
     AmbiguousEffect, DiscoveryReport, Proposal, command, in_words, not_shown, proposals,
 };
 
-use crate::commands::calibrate::estimate;
+use crate::commands::calibrate::{estimate, faulty};
 use crate::output::{duration, print_fields, print_table, say};
 
 /// Parameters of one term that fit on a line.
@@ -21,6 +21,9 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
     }
     for warning in report.notes.iter().chain(&found.warnings) {
         say(&format!("warning: {warning}"));
+    }
+    for fault in &found.faulty {
+        say(&format!("faulty: {}: {}", faulty(fault), fault.evidence));
     }
     say("");
     facts(report);
