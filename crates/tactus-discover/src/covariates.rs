@@ -298,9 +298,8 @@ fn of_elements(forms: &Forms, deep: &[bool], elements: usize) -> Vec<Feature> {
         let within =
             |depth: &f64| f64::from(u8::from(*depth > 0.0 && *depth >= range[0] && *depth < range[1]));
         let factor = Arc::new(depth_mm.iter().map(within).collect());
-        let at_depth = |element: &usize| {
-            feature("element and depth", "mm", closed(range, &depths), *element, &factor)
-        };
+        let at_depth =
+            |element: &usize| feature("element and depth", "mm", closed(range, &depths), *element, &factor);
         made.extend(loudest.iter().map(at_depth));
     }
     made

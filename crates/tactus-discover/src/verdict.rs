@@ -104,9 +104,10 @@ pub(crate) fn conclude(
         is_missing: p_value <= ALPHA && options.rule == Rule::Protocol,
         is_left: left,
         upper_noise,
-        is_tolerable: options.tolerance_counts.is_some_and(|counts| {
-            floor.rms_counts().is_some_and(|noise_counts| upper_noise * noise_counts < counts)
-        }),
+        tolerance_noise: options
+            .tolerance_counts
+            .zip(floor.rms_counts())
+            .map_or(0.0, |(tolerance, noise)| tolerance / noise),
     };
     let verdict = evidence.verdict();
     let squares = |level: Level| level.heldout_rms_counts.powi(2);
@@ -197,14 +198,14 @@ struct Evidence {
     is_left: bool,
     /// Upper bound of what is structured in the grown model's residual.
     upper_noise: f64,
-    /// This bound is below the tolerance that was declared beforehand.
-    is_tolerable: bool,
+    /// The tolerance that was declared beforehand; 0 if none was.
+    tolerance_noise: f64,
 }
 
 impl Evidence {
     fn verdict(self) -> Verdict {
         let is_seen = self.upper_noise < SEEN_NOISE;
-        let is_little = self.upper_noise < LITTLE_NOISE || self.is_tolerable;
+        let is_little = self.upper_noise < LITTLE_NOISE.max(self.tolerance_noise);
         match (self.is_named, self.is_missing) {
             (false, false) if is_seen => Verdict::NothingMissing,
             // No test rejects, but there may be more than one would overlook.

@@ -8,7 +8,7 @@ use crate::{Frames, discover};
 
 /// Effects were named, a test rejects the base model, and none the grown one.
 const NAMED: Evidence =
-    Evidence { is_named: true, is_missing: true, is_left: false, upper_noise: 1.9, is_tolerable: false };
+    Evidence { is_named: true, is_missing: true, is_left: false, upper_noise: 1.9, tolerance_noise: 0.0 };
 
 #[test]
 fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
@@ -16,8 +16,9 @@ fn names_explain_if_no_test_rejects_and_less_than_twice_the_noise_is_left() {
     assert_eq!(Evidence { is_left: true, ..NAMED }.verdict(), Verdict::PartlyExplained);
     assert_eq!(Evidence { upper_noise: 2.1, ..NAMED }.verdict(), Verdict::PartlyExplained);
     assert_eq!(Evidence { is_left: true, upper_noise: 0.4, ..NAMED }.verdict(), Verdict::Explained);
-    let tolerable = Evidence { is_left: true, upper_noise: 30.0, is_tolerable: true, ..NAMED };
+    let tolerable = Evidence { is_left: true, upper_noise: 30.0, tolerance_noise: 31.0, ..NAMED };
     assert_eq!(tolerable.verdict(), Verdict::Explained);
+    assert_eq!(Evidence { tolerance_noise: 29.0, ..tolerable }.verdict(), Verdict::PartlyExplained);
 }
 
 /// Nine tenths of the variance of a gap of ten times the noise leave three times the noise: 32 % of the rms.
