@@ -382,6 +382,28 @@ impl StageLine {
         }
     }
 
+    /// As [`Self::until`]; `None` if it `is_over`, which is asked once a second.
+    pub(crate) fn unless<T>(
+        &self,
+        is_over: impl Fn() -> bool,
+        mut pick: impl FnMut(Instant, &Seen) -> Option<T>,
+    ) -> Option<T> {
+        let deadline = Instant::now() + DEADLINE;
+        while Instant::now() < deadline {
+            let look = Instant::now() + Duration::from_secs(1);
+            while let Ok((at, seen)) = self.seen.recv_timeout(look.saturating_duration_since(Instant::now()))
+            {
+                if let Some(picked) = pick(at, &seen) {
+                    return Some(picked);
+                }
+            }
+            if is_over() {
+                return None;
+            }
+        }
+        panic!("never on the line, and never over");
+    }
+
     /// Waits until the controller stands idle, deeper than this.
     pub(crate) fn until_idle_below(&self, limit_mm: f64) {
         self.until("idle in the covering", |_, seen| match seen {

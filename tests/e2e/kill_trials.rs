@@ -27,6 +27,9 @@ use crate::bench::{Bench, Options, Seen, number, trials};
 /// One press, slow enough that its parts can be told apart.
 const PRESS: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 0.3)\n";
 
+/// Runs for one kill, if they end before the part in which it is to be.
+const RUNS_MAX: usize = 4;
+
 /// Below this height the way down goes in steps that are confirmed one by one.
 const APPROACH_HEIGHT_MM: f64 = 0.3;
 
@@ -113,10 +116,14 @@ fn trial(bench: &mut Bench, part: Part, after: Duration) -> Shown {
         let _resetting = bench.send(Command::Reset);
         bench.stage.until("homing", |_, seen| matches!(seen, Seen::Home).then_some(()));
     } else {
-        bench.reset();
-        bench.stage.forget();
-        run = Some((bench.run(PRESS), Instant::now()));
-        confirmed_mm = until(bench, part);
+        // A machine without time for the frames lets the supervisor end the run before that part.
+        let until_part = |_| {
+            bench.reset();
+            bench.stage.forget();
+            run = Some((bench.run(PRESS), Instant::now()));
+            until(bench, part)
+        };
+        confirmed_mm = (0..RUNS_MAX).find_map(until_part).expect("a run comes to each part");
     }
     // A report of a stage that stands still is a confirmation.
     bench.stage.watch(Instant::now() + after, |_, seen| {
@@ -172,10 +179,14 @@ fn trial(bench: &mut Bench, part: Part, after: Duration) -> Shown {
     Shown { part, deeper_mm, lost_ms }
 }
 
-/// Waits until a part of the run begins; returns the height that was last confirmed.
-fn until(bench: &Bench, part: Part) -> Option<f64> {
+/// Waits until a part of the run begins; returns the height that was last confirmed. `None` if the run ends before.
+fn until(bench: &Bench, part: Part) -> Option<Option<f64>> {
     let (mut has_pressed, mut confirmed_mm) = (false, None);
-    bench.stage.until("the next part", |_, seen| {
+    let is_over = || {
+        let state = bench.command(Command::Status).state;
+        state.is_some_and(|state| state.phase() == pb::RunPhase::Finished)
+    };
+    bench.stage.unless(is_over, |_, seen| {
         let Seen::Report { state, z_mm } = seen else { return None };
         if state == "Idle" {
             has_pressed |= *z_mm < -0.29;

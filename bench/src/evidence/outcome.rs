@@ -61,14 +61,14 @@ pub struct Named {
 }
 
 impl Outcome {
-    /// True if the verdict is not `nothing-missing` or an effect is named.
+    /// True if the verdict is neither `nothing-missing` nor `cannot-judge`, or an effect is named.
     pub fn is_detected(&self) -> bool {
         !self.has_failed() && (self.verdict != "nothing-missing" || !self.named.is_empty())
     }
 
-    /// True if there is no report.
+    /// True if there is no report, or one that judges nothing.
     pub fn has_failed(&self) -> bool {
-        self.verdict == "failed"
+        self.verdict == "failed" || self.verdict == "cannot-judge"
     }
 
     /// True if every hidden effect is named.

@@ -67,7 +67,10 @@ fn outside_the_library_no_name_is_right() {
 fn unexplained_is_detected_and_a_failure_is_not() {
     assert!(set(&[None], &[], "unexplained").is_detected());
     assert!(!set(&[None], &[], "nothing-missing").is_detected());
-    assert!(!set(&[None], &[], "failed").is_detected());
+    for verdict in ["failed", "cannot-judge"] {
+        let unjudged = set(&[None], &[], verdict);
+        assert!(unjudged.has_failed() && !unjudged.is_detected());
+    }
 }
 
 #[test]

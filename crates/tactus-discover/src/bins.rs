@@ -10,9 +10,9 @@ use crate::rng::Rng;
 use crate::{DiscoverError, Frames};
 
 /// A smaller movement counts as none.
-const STILL_MM: f64 = 0.001;
+pub(crate) const STILL_MM: f64 = 0.001;
 /// Above this height, movements of the tip do not affect the readings.
-const CLEAR_MM: f64 = 0.25;
+pub(crate) const CLEAR_MM: f64 = 0.25;
 /// Greatest number of frames in a bin, as a share of the frames since the tip came to rest.
 const GROWTH: f64 = 0.25;
 /// Greatest number of frames in a bin.
@@ -297,7 +297,7 @@ fn same(one: f64, other: f64) -> bool {
 }
 
 /// True if the stage starts or stops at a frame, near the surface or in contact.
-fn turns(frames: &Frames, frame: usize) -> bool {
+pub(crate) fn turns(frames: &Frames, frame: usize) -> bool {
     let Some(before) = frame.checked_sub(1).filter(|_| frame + 1 < frames.len()) else { return false };
     let z_mm = |frame: usize| frames.position_mm[frame][2];
     let speed = |from: usize| (z_mm(from + 1) - z_mm(from)) / (frames.t_s[from + 1] - frames.t_s[from]);

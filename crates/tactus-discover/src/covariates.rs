@@ -1,5 +1,7 @@
 //! Covariates on which the residual may depend, each divided into ranges, and the forms that a dependence may take.
 
+use std::sync::Arc;
+
 use tactus_model::effect::Definition;
 use tactus_model::{Contact, Covering, ForwardModel, Response};
 
@@ -13,6 +15,10 @@ const LOOK_MM: f64 = 0.3;
 /// A sideways move shorter than this has no direction.
 const ASIDE_MM: f64 = 0.05;
 
+/// Greatest number of elements that are covariates by themselves: those with the most signal.
+const ELEMENTS_MAX: usize = 48;
+/// Ranges of the depth for each of them.
+const ELEMENT_DEPTHS: usize = 3;
 /// Presses count as all at the same place within their elements if these places differ by no more than this.
 const CENTRED_MM: f64 = 0.02;
 
@@ -52,6 +58,8 @@ pub(crate) struct Feature {
 pub(crate) enum Factor {
     Bins(Vec<f64>),
     Readings(Vec<f64>),
+    /// For each bin, of one element; 0 for the others.
+    Element(usize, Arc<Vec<f64>>),
 }
 
 /// Values of the forms at a point of the parameters, reading by reading.
@@ -131,6 +139,8 @@ impl Forms {
         let factor = |reading: usize| match &feature.factor {
             Factor::Bins(of_bin) => of_bin[reading / elements],
             Factor::Readings(of_reading) => of_reading[reading],
+            Factor::Element(element, of_bin) if reading % elements == *element => of_bin[reading / elements],
+            Factor::Element(..) => 0.0,
         };
         (0..self.signal.len())
             .map(|reading| factor(reading) * form.map_or(1.0, |form| form[reading]))
@@ -236,6 +246,8 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
             add(in_element, "mm", &within, &deep, 4, &[Signal, along[axis]]);
         }
     }
+    let sums: Vec<f64> = forms.signal.chunks_exact(bins.elements).map(|signal| signal.iter().sum()).collect();
+    add("sum of signals", "counts", &sums, &deep, 6, &[Signal, Offset]);
     if history.temperature_c.iter().all(|c| c.is_finite()) {
         add("temperature", "C", &history.temperature_c, &every, 4, &[Offset, Signal]);
     }
@@ -254,6 +266,41 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
         let factor = Factor::Readings(forms.signal.iter().map(within).collect());
         let range = closed(range, &forms.signal);
         made.push(Feature { covariate: "signal", unit: "counts", form: Signal, range, factor });
+    }
+    made.extend(of_elements(forms, &deep, bins.elements));
+    made
+}
+
+/// Features of single elements: their own signal, at any depth and at some.
+fn of_elements(forms: &Forms, deep: &[bool], elements: usize) -> Vec<Feature> {
+    let depth_mm = &forms.history.depth_mm;
+    let mut squares = vec![0.0; elements];
+    for signal in forms.signal.chunks_exact(elements) {
+        squares.iter_mut().zip(signal).for_each(|(sum, signal)| *sum += signal * signal);
+    }
+    let mut loudest: Vec<usize> = (0..elements).filter(|element| squares[*element] > 0.0).collect();
+    loudest.sort_by(|a, b| squares[*b].total_cmp(&squares[*a]));
+    loudest.truncate(ELEMENTS_MAX);
+    loudest.sort_unstable();
+    let feature = |covariate, unit, range, element, of_bins: &Arc<Vec<f64>>| {
+        let factor = Factor::Element(element, Arc::clone(of_bins));
+        Feature { covariate, unit, form: Form::Signal, range, factor }
+    };
+    let always = Arc::new(vec![1.0; depth_mm.len()]);
+    let whole = |element: &usize| {
+        let index = *element as f64;
+        feature("element", "", [index, index], *element, &always)
+    };
+    let mut made: Vec<Feature> = loudest.iter().map(whole).collect();
+    let depths: Vec<f64> =
+        depth_mm.iter().zip(deep).filter(|(_, deep)| **deep).map(|(depth, _)| *depth).collect();
+    for range in ranges(depth_mm, deep, ELEMENT_DEPTHS) {
+        let within =
+            |depth: &f64| f64::from(u8::from(*depth > 0.0 && *depth >= range[0] && *depth < range[1]));
+        let factor = Arc::new(depth_mm.iter().map(within).collect());
+        let at_depth =
+            |element: &usize| feature("element and depth", "mm", closed(range, &depths), *element, &factor);
+        made.extend(loudest.iter().map(at_depth));
     }
     made
 }
@@ -410,3 +457,7 @@ impl SensorHistory {
         self.last = Some((t_s, at));
     }
 }
+
+#[cfg(test)]
+#[path = "covariates_tests.rs"]
+mod tests;

@@ -12,8 +12,8 @@ use crate::predictor::{Parameters, Predictor, Term};
 use crate::prepare::Prepared;
 use crate::random_walk::RandomWalk;
 use crate::search::{Grown, Search, SearchPhase};
-use crate::verdict::{SearchOutcome, conclude};
-use crate::{BaseModel, Discovery, Frames, not_shown};
+use crate::verdict::{SearchOutcome, cannot_judge, conclude};
+use crate::{BaseModel, Discovery, Floor, Frames, not_shown};
 
 /// What is known beforehand: the model with which the data are compared.
 #[derive(Debug, Clone)]
@@ -33,7 +33,7 @@ pub struct Known {
 }
 
 /// Options of a discovery.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// The seed of the split and of the Monte-Carlo tests.
     pub seed: u64,
@@ -41,6 +41,9 @@ pub struct Options {
     pub threads: usize,
     /// The rule by which effects are added.
     pub rule: Rule,
+    /// A structured residual that is tolerable, declared before the data are judged. If the 95 % upper bound of what is structured
+    /// is lower, the added effects count as the explanation.
+    pub tolerance_counts: Option<f64>,
 }
 
 /// The rule by which effects are added.
@@ -111,6 +114,9 @@ fn discover_on_threads(
     let reporter = ProgressReport { progress, share: Mutex::new(0.0) };
     reporter.report("recalibrating the base model", 0.02);
     let prepared = Prepared::new(known, frames, options)?;
+    if prepared.floor == Floor::None {
+        return cannot_judge(&prepared, options);
+    }
     let problem = prepared.problem();
     let base = prepared.base.clone();
     reporter.report("scoring the effects", 0.1);

@@ -16,15 +16,17 @@ pub struct Discovery {
     pub split: Split,
     /// Whether each frame was held out, in the order in which the frames were given.
     pub heldout_frames: Vec<bool>,
-    /// Standard deviation of one reading, from frames that repeat each other; `None` if no frames do.
-    pub noise_rms_counts: Option<f64>,
+    /// The noise of one reading, and where it is known from.
+    pub floor: Floor,
+    /// The structured residual that the user declared beforehand to be tolerable.
+    pub tolerance_counts: Option<f64>,
     /// Elements that calibration finds faulty, with its evidence. Stuck, noisy and dead ones have no weight: no figure here but that
     /// of the step `miswired` contains their readings.
     pub faulty: Vec<FaultyElement>,
     /// How far the recalibrated base model is from the held-out presses. It has the effects of faulty elements.
     pub base: Level,
-    /// Whether the residual of the base model has structure beyond noise.
-    pub global: GlobalTest,
+    /// Whether the residual of the base model has structure beyond noise; `None` without a floor.
+    pub global: Option<GlobalTest>,
     /// Where the recalibrated base model and the data disagree, strongest first.
     pub gap: Vec<Gap>,
     /// The gap against each covariate, before and after.
@@ -97,13 +99,51 @@ pub struct Split {
     pub heldout_coverings_mm: Vec<f64>,
 }
 
+/// The noise of one reading: the least residual that any model can leave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Floor {
+    /// From frames that repeat each other in time, while the tip rests.
+    Time {
+        /// Standard deviation of one reading.
+        rms_counts: f64,
+        /// Degrees of freedom of the estimate.
+        freedom: f64,
+    },
+    /// From presses that repeat each other: the same run, covering, tool, place (to 20 um), depth (to 5 um) and direction. It
+    /// contains what differs from press to press.
+    Repeats {
+        /// Standard deviation of one reading.
+        rms_counts: f64,
+        /// Degrees of freedom of the estimate.
+        freedom: f64,
+    },
+    /// Nothing repeats, so noise and missing physics cannot be told apart.
+    None,
+}
+
 /// How far a model is from the held-out frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
     /// Root mean square of the residuals.
     pub heldout_rms_counts: f64,
-    /// Mean square of the residuals, in units of the noise variance.
-    pub heldout_chi2: f64,
+    /// Mean square of the residuals, in units of the noise variance; `None` without a floor.
+    pub heldout_chi2: Option<f64>,
+    /// The part of the residuals that is not noise; `None` without a floor.
+    pub structured: Option<Structured>,
+}
+
+/// The part of a model's residuals on held-out presses that is not noise.
+///
+/// It is measured among all readings and among those with a signal. The part with the greater bound is given: readings far
+/// from the tip would hide what is wrong near it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Structured {
+    /// Root mean square, in standard deviations of the noise.
+    pub rms_noise: f64,
+    /// Upper 95 % bound of `rms_noise`; infinite with fewer than three held-out presses.
+    pub upper_noise: f64,
+    /// True if it is that of the readings with a signal.
+    pub with_signal: bool,
 }
 
 /// A Monte-Carlo test for structure of any kind. It stays calibrated under autocorrelated noise.
@@ -233,9 +273,12 @@ pub struct Final {
 /// The result of a discovery in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// The residual has no structure beyond noise.
+    /// No noise floor, or too few presses to see a residual of twice the noise.
+    CannotJudge,
+    /// No test finds structure beyond noise, and there is certainly less than twice the noise.
     NothingMissing,
-    /// The added effects explain the gap.
+    /// With the added effects no test finds structure, and there is certainly less than twice the noise; or there is certainly
+    /// less than half the noise, or than the tolerance that was declared beforehand.
     Explained,
     /// The added effects explain part of the gap.
     PartlyExplained,
@@ -263,14 +306,15 @@ pub struct NextExperiment {
     pub duration_s: f64,
     /// The two explanations.
     pub separates: [String; 2],
-    /// By how many standard errors their predictions would differ.
-    pub expected_z: f64,
+    /// By how many standard errors their predictions would differ; `None` if that cannot be predicted.
+    pub expected_z: Option<f64>,
 }
 
 impl Verdict {
     /// The word in the report.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::CannotJudge => "cannot-judge",
             Self::NothingMissing => "nothing-missing",
             Self::Explained => "explained",
             Self::PartlyExplained => "partly-explained",
@@ -278,3 +322,53 @@ impl Verdict {
         }
     }
 }
+
+impl Floor {
+    /// Standard deviation of one reading.
+    pub const fn rms_counts(self) -> Option<f64> {
+        match self {
+            Self::Time { rms_counts, .. } | Self::Repeats { rms_counts, .. } => Some(rms_counts),
+            Self::None => None,
+        }
+    }
+
+    /// The same with the noise of fewer elements.
+    pub(crate) const fn with_rms(self, rms_counts: f64) -> Self {
+        match self {
+            Self::Time { freedom, .. } => Self::Time { rms_counts, freedom },
+            Self::Repeats { freedom, .. } => Self::Repeats { rms_counts, freedom },
+            Self::None => Self::None,
+        }
+    }
+
+    /// Degrees of freedom of the estimate.
+    pub const fn freedom(self) -> Option<f64> {
+        match self {
+            Self::Time { freedom, .. } | Self::Repeats { freedom, .. } => Some(freedom),
+            Self::None => None,
+        }
+    }
+
+    /// 90 % interval of the standard deviation of one reading.
+    ///
+    /// # Source
+    /// Quantiles of chi-square: E. B. Wilson and M. M. Hilferty, *Proc. Natl. Acad. Sci.* 17 (1931) 684.
+    pub fn interval90_counts(self) -> Option<[f64; 2]> {
+        let (rms_counts, spread) = (self.rms_counts()?, 2.0 / (9.0 * self.freedom()?));
+        // The square root of chi-square over its degrees of freedom.
+        let root = |z: f64| (1.0 - spread + z * spread.sqrt()).max(0.0).powf(1.5);
+        Some([Z_95, -Z_95].map(|z| rms_counts / root(z)))
+    }
+
+    /// What the noise is known from, in a report.
+    pub const fn source(self) -> &'static str {
+        match self {
+            Self::Time { .. } => "repeats in time",
+            Self::Repeats { .. } => "repeats of a place",
+            Self::None => "none",
+        }
+    }
+}
+
+/// The 95 % quantile of the standard normal distribution.
+pub(crate) const Z_95: f64 = 1.644_854;

@@ -5,7 +5,7 @@ use crate::fit::{Fitted, Problem};
 /// A remainder counts as certain beyond this many standard errors.
 const SURE_Z: f64 = 2.0;
 /// Readings have a signal above the first number of noise standard deviations, and none below the second.
-const LOUD: f64 = 5.0;
+pub(crate) const LOUD: f64 = 5.0;
 const QUIET: f64 = 0.5;
 /// A gap of this many standard errors is known within a few percent.
 const LARGE_Z: f64 = 20.0;

@@ -29,13 +29,14 @@ mod scale;
 mod score;
 mod search;
 mod spectrum;
+mod structured;
 mod verdict;
 mod wiring;
 
 pub use discover::{DiscoverError, Known, Options, Progress, Rule, discover, predict};
 pub use discovery::{
-    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, Final, Gap, GlobalTest, Level,
-    NextExperiment, NotShown, Point, Round, RunWalks, Split, TriedEffect, Unexplained, Verdict,
+    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, Final, Floor, Gap, GlobalTest, Level,
+    NextExperiment, NotShown, Point, Round, RunWalks, Split, Structured, TriedEffect, Unexplained, Verdict,
 };
 pub use frames::Frames;
 pub use tactus_calibrate::{FaultKind, FaultyElement};

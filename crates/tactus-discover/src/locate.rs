@@ -1,7 +1,7 @@
 //! Where a model and the data disagree: the covariates on which the residual depends.
 
 use crate::DiscoverError;
-use crate::covariates::{Feature, Form, Forms, features};
+use crate::covariates::{Factor, Feature, Form, Forms, features};
 use crate::discovery::{Curve, Gap, Point};
 use crate::fit::Fitted;
 use crate::parallel;
@@ -10,6 +10,8 @@ use crate::search::{FLIPS, Search};
 
 /// Greatest false-discovery rate among the reported covariates.
 const Q_MAX: f64 = 0.05;
+/// Least part of a feature that recalibration does not take up.
+const OWN_LEAST: f64 = 1e-3;
 /// Changes the seed, so that covariates have other sign flips than candidates.
 const STREAM: u64 = 0x0010_ca7e;
 
@@ -33,7 +35,12 @@ impl Search<'_> {
         let scored = |feature: &Feature| {
             let mut column = forms.column(feature, elements);
             let readings = column.iter().filter(|value| **value != 0.0).count();
+            let whole = fitting.size(&column);
             fitting.free(&mut column);
+            // What recalibration takes up is no feature, such as the signal of an element whose gain is fitted.
+            if fitting.size(&column) < OWN_LEAST * whole {
+                column.fill(0.0);
+            }
             let z = fitting.wanted(&column) / fitting.size(&column).max(f64::MIN_POSITIVE);
             (fitting.score(&[column]), z, readings)
         };
@@ -78,7 +85,9 @@ impl Search<'_> {
         let forms = Forms::of(problem, &base.parameters, &base.predicted)?;
         let features = features(problem, &forms);
         let mut curves: Vec<Curve> = Vec::new();
-        for feature in features.iter().filter(|one| matches!(one.form, Form::Signal | Form::Offset)) {
+        for feature in features.iter().filter(|one| {
+            matches!(one.form, Form::Signal | Form::Offset) && !matches!(one.factor, Factor::Element(..))
+        }) {
             let column = forms.column(feature, problem.predictor.bins.elements);
             let Some([before, standard_error]) = problem.share(&column, &base.predicted) else { continue };
             let Some([after, _]) = problem.share(&column, &grown.predicted) else { continue };

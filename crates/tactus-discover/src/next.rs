@@ -64,6 +64,9 @@ const PROPOSALS_MAX: usize = 3;
 /// Assumed size of an effect that was not shown, as a share of the experiment's largest signal.
 const SMALL_SHARE: f64 = 0.02;
 
+/// Parts of `diagnose` that rest, and that repeat a press.
+const FLOOR_PARTS: [&str; 2] = ["drift", "repeats"];
+
 /// Plans the next experiments from the data and their noise.
 #[derive(Clone, Copy)]
 pub(crate) struct Planner<'a> {
@@ -121,6 +124,21 @@ impl Planner<'_> {
         Ok(proposals)
     }
 
+    /// The experiment that gives data a floor: it rests, and presses one place many times.
+    pub(crate) fn repeats(self) -> NextExperiment {
+        let designs = DesignSpace::of(self.known, self.frames).designs();
+        let of = |name: &str| designs.iter().find(|one| one.name == name && one.is_whole());
+        let parts = FLOOR_PARTS.map(of);
+        let depth = parts.iter().flatten().flat_map(|one| &one.parameters).find(|(key, _)| *key != "parts");
+        NextExperiment {
+            experiment: "diagnose",
+            parameters: [("parts", FLOOR_PARTS.join(","))].into_iter().chain(depth.cloned()).collect(),
+            duration_s: parts.iter().flatten().map(|one| one.duration_s).sum(),
+            separates: ["what is missing".to_owned(), "noise".to_owned()],
+            expected_z: None,
+        }
+    }
+
     fn best(
         designs: &[&Design],
         separates: &[String; 2],
@@ -147,7 +165,7 @@ impl Planner<'_> {
             parameters: design.parameters.clone(),
             duration_s: design.duration_s,
             separates: separates.clone(),
-            expected_z: expected.z,
+            expected_z: Some(expected.z),
         });
         Ok(proposals.collect())
     }

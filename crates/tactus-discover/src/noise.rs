@@ -8,10 +8,16 @@
 //!
 //! The plateau of `D` is the variance of a reading, and the rise of `D` gives the autocorrelation `rho`. Slow changes such
 //! as drift hardly contribute to a difference over a second. None of this depends on the model.
+//!
+//! Where no rest is long enough for the plateau, [`stretches`] fits the rise of `D` in short ones. Where the tip never rests
+//! for some frames, [`repeats`] compares presses with the same command.
+
+mod repeats;
+mod stretches;
 
 use std::f64::consts::PI;
 
-use crate::Frames;
+use crate::{Floor, Frames};
 
 /// The tip is at rest if it was still for this time.
 const SETTLED_S: f64 = 1.0;
@@ -21,6 +27,15 @@ const PLATEAU: std::ops::RangeInclusive<usize> = 20..=30;
 const ALIKE_Z: f64 = 3.0;
 /// Least number of pairs of frames for an estimate.
 const PAIRS_LEAST: usize = 20;
+/// Least number of degrees of freedom of a floor: with 10, the standard error of the noise is 22 %.
+const FREEDOM_LEAST: f64 = 10.0;
+/// Share of the degrees of freedom in differences of neighbours, beside independent readings of as many pairs (J. von Neumann
+/// et al., *Ann. Math. Stat.* 12 (1941) 153).
+const DIFFERENCES_SHARE: f64 = 2.0 / 3.0;
+
+/// The noise of an element counts as at least this share of the typical noise. A single element that is quieter than most cannot
+/// be distinguished from rounding.
+pub(crate) const QUIETEST: f64 = 0.7;
 
 /// Median absolute value of a standard normal deviate.
 const MEDIAN_SIZE: f64 = 0.674_490;
@@ -39,18 +54,39 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// `None` if no frames repeat each other.
-    pub(crate) fn of(frames: &Frames, still: &[usize], step_counts: f64) -> Option<Self> {
-        Self::of_residual(frames, &frames.counts, still, step_counts)
+    /// The noise with the best floor that the data have. Without a floor, the noise serves as weights only.
+    pub(crate) fn measured(frames: &Frames, still: &[usize], step_counts: f64) -> (Self, Floor) {
+        if let Some((noise, freedom)) = Self::in_time(frames, &frames.counts, still, step_counts) {
+            let rms_counts = noise.rms_counts;
+            return (noise, Floor::Time { rms_counts, freedom });
+        }
+        if let Some((noise, freedom)) = repeats::noise(frames, still, step_counts) {
+            let rms_counts = noise.rms_counts;
+            return (noise, Floor::Repeats { rms_counts, freedom });
+        }
+        (Self::of_differences(frames, step_counts), Floor::None)
     }
 
-    /// As [`Noise::of`], from a model's residual: frame by frame, element by element.
-    pub(crate) fn of_residual(
+    /// The noise from repeats in time of counts or of a model's residual, frame by frame, element by element, and its degrees
+    /// of freedom. `None` if the tip rests too rarely or too briefly.
+    pub(crate) fn in_time(
         frames: &Frames,
-        residual: &[f32],
+        values: &[f32],
         still: &[usize],
         step_counts: f64,
-    ) -> Option<Self> {
+    ) -> Option<(Self, f64)> {
+        let found = Self::of(frames, values, still, step_counts)
+            .or_else(|| stretches::noise(frames, values, still, step_counts));
+        found.filter(|(_, freedom)| *freedom >= FREEDOM_LEAST)
+    }
+
+    /// The noise from rests that reach the plateau, and its degrees of freedom. `None` if there are none.
+    pub(crate) fn of(
+        frames: &Frames,
+        values: &[f32],
+        still: &[usize],
+        step_counts: f64,
+    ) -> Option<(Self, f64)> {
         let elements = frames.elements;
         let lags = *PLATEAU.end();
         let mut squares = vec![0.0_f64; (lags + 1) * elements];
@@ -62,21 +98,20 @@ impl Noise {
                     continue;
                 }
                 pairs[lag] += 1;
-                let of = |frame: usize| &residual[frame * elements..(frame + 1) * elements];
+                let of = |frame: usize| &values[frame * elements..(frame + 1) * elements];
                 let (now, then) = (of(frame), of(frame - lag));
                 for ((sum, now), then) in squares[lag * elements..].iter_mut().zip(now).zip(then) {
                     *sum += f64::from(now - then).powi(2) / 2.0;
                 }
             }
         }
-        let longest = (1..=lags).rev().find(|lag| pairs[*lag] >= PAIRS_LEAST)?;
-        let plateau: Vec<usize> =
-            if longest >= *PLATEAU.start() { (*PLATEAU.start()..=longest).collect() } else { vec![longest] };
+        let longest = PLATEAU.rev().find(|lag| pairs[*lag] >= PAIRS_LEAST)?;
+        let plateau = *PLATEAU.start()..=longest;
         // The variance of rounding of a uniform distribution.
         let rounding = step_counts * step_counts / 12.0;
         let variance = |element: usize| {
-            let (sum, count) = plateau.iter().fold((0.0, 0), |(sum, count), lag| {
-                (sum + squares[lag * elements + element], count + pairs[*lag])
+            let (sum, count) = plateau.clone().fold((0.0, 0), |(sum, count), lag| {
+                (sum + squares[lag * elements + element], count + pairs[lag])
             });
             (sum / count as f64).max(rounding).max(f64::MIN_POSITIVE)
         };
@@ -96,15 +131,19 @@ impl Noise {
         let variances = pooled(&variances, ALIKE_Z * (2.0 / independent).sqrt());
         let typical = median(&variances);
         let rounding_share = bias_variance(typical - rounding, step_counts) / typical;
-        Some(Self {
+        let noise = Self {
             rms_counts: typical.sqrt(),
             by_element_counts: variances.iter().map(|variance| variance.sqrt()).collect(),
             correlation,
             rounding_share,
-        })
+        };
+        let readings = DIFFERENCES_SHARE * (pairs[longest] * elements) as f64;
+        let freedom = readings / noise.squares_inflation(pairs[longest]);
+        Some((noise, freedom))
     }
 
-    /// From differences of consecutive frames, for data in which no frames repeat each other. Fast signals contribute too.
+    /// From differences of consecutive frames, for the weights of data in which nothing repeats. Fast signals contribute too, and
+    /// autocorrelated noise looks smaller than it is, so this is no floor.
     pub(crate) fn of_differences(frames: &Frames, step_counts: f64) -> Self {
         let elements = frames.elements;
         let rms = |element: usize| {
@@ -141,6 +180,11 @@ impl Noise {
         let inflation = self.inflation(frames);
         let phi = ((inflation - 1.0) / (inflation + 1.0)).clamp(0.0, 0.98);
         (1.0 + phi * phi) / (1.0 - phi * phi)
+    }
+
+    /// Correlation of two readings that are `lag` frames apart.
+    pub(crate) fn correlation_at(&self, lag: usize) -> f64 {
+        self.correlation.get(lag).copied().unwrap_or(0.0) + self.rounding_share
     }
 
     /// Number of frames after which readings are independent.

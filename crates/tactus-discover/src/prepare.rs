@@ -5,7 +5,7 @@ use crate::faulty::Faulty;
 use crate::fit::{Fitted, Problem};
 use crate::noise::Noise;
 use crate::predictor::{Parameters, Predictor};
-use crate::{DiscoverError, Frames, Known, Options, lattice, spectrum};
+use crate::{DiscoverError, Floor, Frames, Known, Options, lattice, spectrum};
 
 /// Least number of fitted presses.
 const PRESSES_LEAST: usize = 3;
@@ -24,7 +24,8 @@ pub(crate) struct Prepared<'a> {
     pub(crate) noise: Noise,
     /// The same with the noise of dead and stuck elements, to show what their effects explain.
     pub(crate) noise_of_silent: Noise,
-    /// True if frames repeat each other, so that the noise is known.
+    pub(crate) floor: Floor,
+    /// True if the tip rests long enough to show tones and steps.
     pub(crate) replicates: bool,
     /// Step of the converter: as declared, or wider if the readings show this.
     pub(crate) step_counts: f64,
@@ -52,20 +53,21 @@ impl<'a> Prepared<'a> {
         let still = still(frames);
         let lattice = lattice::wider_step(frames, known.array.step_counts());
         let step_counts = lattice.map_or(known.array.step_counts(), |(step_counts, _)| step_counts);
-        let replicated = Noise::of(frames, &still, step_counts);
+        let (noise, floor) = Noise::measured(frames, &still, step_counts);
+        let replicates = Noise::of(frames, &frames.counts, &still, step_counts).is_some();
         let mut warnings = Vec::new();
-        if replicated.is_none() {
+        if matches!(floor, Floor::Repeats { .. }) {
             warnings.push(
-                "no frames repeat each other: the noise is estimated from differences of consecutive frames"
+                "the tip never rests for some frames: the noise is that between presses that repeat each other, and contains what \
+                 differs from press to press"
                     .to_owned(),
             );
         }
-        let replicates = replicated.is_some();
-        let noise = replicated.unwrap_or_else(|| Noise::of_differences(frames, step_counts));
         let faulty = Faulty::of(known, frames, &noise)?;
         warnings.extend(faulty.warning.clone());
         let noise_of_silent = noise.clone().without(|element| faulty.noisy.contains(&element));
         let noise = noise.without(|element| faulty.is_weightless(element));
+        let floor = floor.with_rms(noise.rms_counts);
 
         let whole = Bins::of(frames, false)?;
         let mut bins = Bins::of(frames, true)?;
@@ -86,6 +88,7 @@ impl<'a> Prepared<'a> {
             faulty,
             noise,
             noise_of_silent,
+            floor,
             replicates,
             step_counts,
             lattice,

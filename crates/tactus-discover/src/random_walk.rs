@@ -18,7 +18,8 @@
 //! S = sum over b, c of K_bc sum over e of U_be U_ce
 //! ```
 //!
-//! Flips do not change the products of a block with itself. `S` is large if blocks that are near in time are alike.
+//! Flips do not change the products of a block with itself. `S` is large if blocks that are near in time are alike. Pairs of blocks
+//! within the memory of the noise do not count: coloured noise makes them alike.
 //!
 //! # Source
 //! Random walks given readings: G. Wahba, *Spline Models for Observational Data* (1990), ch. 1 and 4. Fits beside them
@@ -28,7 +29,7 @@ use nalgebra::{DMatrix, DVector};
 use tactus_model::Effect;
 use tactus_model::effect::{Definition, Make, Now, OnReadout, Parameter};
 
-use crate::bins::Bins;
+use crate::bins::{Bins, interval_s};
 use crate::candidates::Screened;
 use crate::fit::Problem;
 use crate::noise::median;
@@ -56,6 +57,8 @@ const KNOTS: usize = 16;
 const KNOT_S_LEAST: f64 = 3.0;
 /// By how much knots at half the distance must reduce the cost.
 const FINER_GAIN: f64 = 10.0;
+/// A correlation of the noise that makes no blocks alike.
+const FORGOTTEN: f64 = 0.01;
 /// Rates that are tried, in noise standard deviations per root second: from the least in factors of the root of 2.
 const RATE_LEAST: f64 = 1e-3;
 const RATES: i32 = 32;
@@ -368,11 +371,16 @@ impl Problem<'_> {
         let mut sums = vec![0.0; bins.blocks * elements];
         let (mut weights, mut times, mut runs) =
             (vec![0.0; bins.blocks], vec![0.0; bins.blocks], vec![0; bins.blocks]);
+        let mut spans_s = vec![[f64::INFINITY, f64::NEG_INFINITY]; bins.blocks];
         for ((bin, values), weight) in residual.chunks_exact(elements).enumerate().zip(&self.slow_and_clear) {
             let block = bins.block[bin];
             runs[block] = bins.run[bin];
             weights[block] += weight;
             times[block] += weight * bins.t_s[bin];
+            if *weight > 0.0 {
+                let [first_s, last_s] = spans_s[block];
+                spans_s[block] = [first_s.min(bins.t_s[bin]), last_s.max(bins.t_s[bin])];
+            }
             let of_block = sums[block * elements..].iter_mut().zip(values).zip(&self.element_weight);
             of_block.for_each(|((sum, value), of_element)| *sum += weight * of_element * value);
         }
@@ -387,6 +395,11 @@ impl Problem<'_> {
             totals[runs[*block]] += weights[*block];
         }
         let shares = DVector::from_fn(count, |b, _| weights[used[b]] / totals[runs[used[b]]]);
+        let memory_s = self.memory_s();
+        let is_near = |b: usize, c: usize| {
+            let [[first_b, last_b], [first_c, last_c]] = [spans_s[used[b]], spans_s[used[c]]];
+            b != c && (first_b - last_c).max(first_c - last_b) < memory_s
+        };
         let of = |kernel_s: &f64| {
             let same = |b: usize, c: usize| runs[used[b]] == runs[used[c]];
             let apart_s = |b: usize, c: usize| {
@@ -400,13 +413,29 @@ impl Problem<'_> {
             for b in 0..count {
                 of_run[runs[used[b]]] += shares[b] * means[b];
             }
-            let products = DMatrix::from_fn(count, count, |b, c| {
+            let mut products = DMatrix::from_fn(count, count, |b, c| {
                 let centred = kernel[(b, c)] - means[b] - means[c] + of_run[runs[used[b]]];
                 if same(b, c) { centred * products[(b, c)] } else { 0.0 }
             });
+            for b in 0..count {
+                for c in (0..count).filter(|c| same(b, *c) && is_near(b, *c)) {
+                    // What flips do not change keeps the sum positive for any signs.
+                    products[(b, b)] += products[(b, c)].abs();
+                    products[(b, c)] = 0.0;
+                }
+            }
             Score::of_products(&products, &used, bins.blocks)
         };
         KERNELS_S.iter().map(of).collect()
+    }
+}
+
+impl Problem<'_> {
+    /// Time after which the correlation of the noise is below [`FORGOTTEN`], if it is first-order autoregressive.
+    fn memory_s(&self) -> f64 {
+        let square = (self.squares_inflation - 1.0) / (self.squares_inflation + 1.0);
+        let phi = square.clamp(1e-12, 0.98).sqrt();
+        FORGOTTEN.ln() / phi.ln() * interval_s(self.predictor.frames)
     }
 }
 

@@ -1,34 +1,42 @@
 //! The verdict on a search, and the [`Discovery`] that reports it.
 
+use std::ops::Range;
+
 use tactus_model::{Effect, Response};
 
+use crate::bins::turns;
 use crate::discovery::{
-    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, NotShown, Split,
-    Unexplained, Verdict,
+    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, Floor, GlobalTest, Level, NotShown,
+    Split, Structured, Unexplained, Verdict,
 };
 use crate::faulty::MISWIRED;
 use crate::fit::{Fitted, Problem};
+use crate::heldout::LOUD;
 use crate::locate::Located;
 use crate::next::{Explanation, Pair, Planner};
-use crate::noise::Noise;
+use crate::noise::{Noise, QUIETEST};
 use crate::predictor::{Parameters, Predictor, Term};
 use crate::prepare::Prepared;
 use crate::random_walk::RandomWalk;
 use crate::score::{q_values, sign_flip_p};
 use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Rivals, Search, Tried, names, without};
+use crate::structured::Readings;
 use crate::{DiscoverError, Options, Rule, not_shown};
 
-/// Greatest remaining share of the gap for the verdict `Explained`.
-const EXPLAINED_SHARE: f64 = 0.1;
+/// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests,
+const SEEN_NOISE: f64 = 2.0;
+/// and for the verdict `Explained` whatever the tests say.
+const LITTLE_NOISE: f64 = 0.5;
 /// All added effects are withdrawn if more than this share of the gap certainly remains, or if the remainder depends on a
 /// covariate and is more than this share of a gap that is well known,
 const UNEXPLAINED_SHARE: f64 = 0.3;
 /// or, if the gap is not well known, if the statistic of the dependence exceeds this value and this share of the initial one.
 const LEFT_Z: f64 = 5.2;
 const LEFT_SHARE: f64 = 0.45;
-/// A single effect is also withdrawn if more than this share remains, and certainly more than [`EXPLAINED_SHARE`]. Several
-/// correct effects may leave as much together.
+/// A single effect is also withdrawn if more than the first share remains, and certainly more than the second. Several correct
+/// effects may leave as much together.
 const LONE_SHARE: f64 = 0.5;
+const LONE_SHARE_CERTAIN: f64 = 0.1;
 
 /// The outcome of a search.
 pub(crate) struct SearchOutcome {
@@ -45,11 +53,14 @@ pub(crate) struct SearchOutcome {
 
 /// The residual of a model on the held-out frames.
 struct HeldOutResidual {
-    level: Level,
+    /// Root mean square.
+    rms_counts: f64,
     /// Root mean square for each element.
     elements_rms_counts: Vec<f64>,
     /// For all frames, fitted and held out: frame by frame, element by element.
     residual: Vec<f32>,
+    /// Whether each reading has a signal.
+    has_signal: Vec<bool>,
 }
 
 impl HeldOutResidual {
@@ -69,7 +80,7 @@ pub(crate) fn conclude(
     found: SearchOutcome,
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
-    let Prepared { known, frames, heldout, lattice, faulty, .. } = prepared;
+    let Prepared { lattice, faulty, .. } = prepared;
     let SearchOutcome { lacking, base, mut grown, rounds, equivalent, before, after } = found;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
@@ -85,30 +96,35 @@ pub(crate) fn conclude(
     // The remainder of a single effect that closes most of the gap is an error of its form. Several effects that leave as
     // much are a patchwork.
     let is_form = count == 1 && search.likely_share_left(&base, &grown) <= UNEXPLAINED_SHARE;
-    let is_little = count == 1 && share > LONE_SHARE && certain > EXPLAINED_SHARE;
+    let is_little = count == 1 && share > LONE_SHARE && certain > LONE_SHARE_CERTAIN;
     let leaves_too_much = certain > UNEXPLAINED_SHARE
         || is_little
         || left && if large { share > UNEXPLAINED_SHARE } else { clear && !is_form };
-    if leaves_too_much && options.rule == Rule::Protocol {
+    let is_withdrawn = leaves_too_much && options.rule == Rule::Protocol;
+    if is_withdrawn {
         // Effects that leave so much are not the explanation.
         grown = base.clone();
     }
     let named = !names(&grown.parameters, search.known_terms).is_empty();
-    let missing = p_value <= ALPHA && options.rule == Rule::Protocol;
-    let verdict = match (named || lattice.is_some(), missing) {
-        (false, false) if !faulty.terms.is_empty() => Verdict::Explained,
-        (false, true) if !faulty.terms.is_empty() => Verdict::PartlyExplained,
-        (false, false) => Verdict::NothingMissing,
-        (false, true) => Verdict::Unexplained,
-        (true, _) if certain <= EXPLAINED_SHARE && (share <= EXPLAINED_SHARE || !left) => Verdict::Explained,
-        (true, _) => Verdict::PartlyExplained,
-    };
-
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
-    let floor = prepared.floor_counts(&of_grown);
-    let in_noise = |level: Level| Level { heldout_chi2: (level.heldout_rms_counts / floor).powi(2), ..level };
-    let squares = |held: &HeldOutResidual| held.level.heldout_rms_counts.powi(2);
-    let (gap, closed) = (squares(&of_base) - floor.powi(2), squares(&of_base) - squares(&of_grown));
+    let floor = prepared.floor_of(&of_grown);
+    let [base_level, grown_level] = [&of_base, &of_grown].map(|held| prepared.level(held, floor));
+    let upper_noise = grown_level.structured.map_or(f64::INFINITY, |part| part.upper_noise);
+    let evidence = Evidence {
+        is_named: named || lattice.is_some() || !faulty.terms.is_empty(),
+        is_missing: p_value <= ALPHA && options.rule == Rule::Protocol,
+        is_left: left,
+        upper_noise,
+        tolerance_noise: options
+            .tolerance_counts
+            .zip(floor.rms_counts())
+            .map_or(0.0, |(tolerance, noise)| tolerance / noise),
+    };
+    let verdict = evidence.verdict();
+    let squares = |level: Level| level.heldout_rms_counts.powi(2);
+    let noise_square = floor.rms_counts().unwrap_or(0.0).powi(2);
+    let gap = squares(base_level) - noise_square;
+    let closed = squares(base_level) - squares(grown_level);
 
     let mut not_shown = lacking;
     not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.screened)));
@@ -116,7 +132,7 @@ pub(crate) fn conclude(
     let mut effects = grown.parameters.effects()?;
     if let Some((step_counts, p_value)) = lattice {
         effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);
-        steps.push(coarse(*step_counts, *p_value, of_grown.level.heldout_rms_counts));
+        steps.push(coarse(*step_counts, *p_value, grown_level.heldout_rms_counts));
     }
     let explained =
         |name: &'static str, fitted: &Fitted| Explanation { name, parameters: fitted.parameters.clone() };
@@ -128,56 +144,87 @@ pub(crate) fn conclude(
             gain: without.cost - grown.cost,
         }));
     }
-    let planner = Planner { known, frames, noise: &prepared.noise };
+    let planner = prepared.planner();
     let mut next_experiments = planner.propose(&pairs)?;
     next_experiments.extend(planner.show(&not_shown, &grown.parameters)?);
+    if verdict == Verdict::CannotJudge {
+        next_experiments.insert(0, planner.repeats());
+    }
 
+    let remainder = if is_withdrawn { &before.gap } else { &after.gap };
+    let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     Ok(Discovery {
-        seed: options.seed,
         not_shown,
-        warnings: prepared.warnings.clone(),
-        split: Split {
-            frames: frames.len(),
-            train_presses: heldout.train_presses,
-            heldout_presses: heldout.presses,
-            heldout_depths_mm: heldout.depths_mm.clone(),
-            heldout_coverings_mm: heldout.coverings_mm.clone(),
-        },
-        heldout_frames: heldout.frames.clone(),
-        noise_rms_counts: prepared.replicates.then_some(floor),
-        faulty: faulty.elements.clone(),
-        base: in_noise(of_base.level),
-        global: GlobalTest { statistic: before.statistic, p_value },
-        gap: before.gap,
+        floor,
+        base: base_level,
+        global: Some(GlobalTest { statistic: before.statistic, p_value }),
         curves: search.curves(&base, &grown)?,
         elements: of_base.elements_beside(&of_grown),
         rounds: rounds.into_iter().map(|tried| tried.round).collect(),
         steps,
         final_: Final {
-            level: in_noise(of_grown.level),
+            level: grown_level,
             // By chance the remainder may be smaller than the noise.
             shrink: (p_value <= ALPHA && gap > 0.0).then(|| (closed / gap).min(1.0)),
         },
         verdict,
         unexplained: Unexplained {
-            depends_on: if left && verdict != Verdict::NothingMissing {
-                after.gap.iter().map(|gap| gap.covariate).collect()
+            depends_on: if left && !is_clean {
+                remainder.iter().map(|gap| gap.covariate).collect()
             } else {
                 Vec::new()
             },
             share: match verdict {
                 Verdict::NothingMissing => 0.0,
-                Verdict::Unexplained => 1.0,
+                Verdict::CannotJudge | Verdict::Unexplained => 1.0,
                 // Faulty elements are in the base, so that nothing of its gap is left to close.
                 Verdict::Explained if !named && lattice.is_none() => 0.0,
                 Verdict::Explained | Verdict::PartlyExplained => share.max(certain),
             },
         },
         next_experiments,
-        recalibrated: base_of(prepared, &base.parameters),
         effects,
         grown: base_of(prepared, &grown.parameters),
+        gap: before.gap,
+        ..prepared.unjudged(&of_base, options)?
     })
+}
+
+/// The report of data without a floor: figures of the base model in counts, no names, and what to measure next.
+pub(crate) fn cannot_judge(prepared: &Prepared<'_>, options: Options) -> Result<Discovery, DiscoverError> {
+    let of_base = prepared.held(&prepared.base.parameters)?;
+    let unjudged = prepared.unjudged(&of_base, options)?;
+    Ok(Discovery { next_experiments: vec![prepared.planner().repeats()], ..unjudged })
+}
+
+/// What the verdict depends on.
+#[derive(Debug, Clone, Copy)]
+struct Evidence {
+    /// Effects were added and not withdrawn.
+    is_named: bool,
+    /// A test rejects the base model.
+    is_missing: bool,
+    /// A test rejects the grown model.
+    is_left: bool,
+    /// Upper bound of what is structured in the grown model's residual.
+    upper_noise: f64,
+    /// The tolerance that was declared beforehand; 0 if none was.
+    tolerance_noise: f64,
+}
+
+impl Evidence {
+    fn verdict(self) -> Verdict {
+        let is_seen = self.upper_noise < SEEN_NOISE;
+        let is_little = self.upper_noise < LITTLE_NOISE.max(self.tolerance_noise);
+        match (self.is_named, self.is_missing) {
+            (false, false) if is_seen => Verdict::NothingMissing,
+            // No test rejects, but there may be more than one would overlook.
+            (false, false) => Verdict::CannotJudge,
+            (false, true) => Verdict::Unexplained,
+            (true, _) if is_little || is_seen && !self.is_left => Verdict::Explained,
+            (true, _) => Verdict::PartlyExplained,
+        }
+    }
 }
 
 /// The added effect for a converter that is coarser than declared.
@@ -209,6 +256,43 @@ fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> BaseModel {
 }
 
 impl Prepared<'_> {
+    /// A report of the recalibrated base model that judges nothing.
+    fn unjudged(&self, of_base: &HeldOutResidual, options: Options) -> Result<Discovery, DiscoverError> {
+        let level = self.level(of_base, self.floor);
+        let element = |rms: &f64| ElementGap { before_rms_counts: *rms, after_rms_counts: *rms };
+        let recalibrated = base_of(self, &self.base.parameters);
+        Ok(Discovery {
+            seed: options.seed,
+            not_shown: Vec::new(),
+            warnings: self.warnings.clone(),
+            split: Split {
+                frames: self.frames.len(),
+                train_presses: self.heldout.train_presses,
+                heldout_presses: self.heldout.presses,
+                heldout_depths_mm: self.heldout.depths_mm.clone(),
+                heldout_coverings_mm: self.heldout.coverings_mm.clone(),
+            },
+            heldout_frames: self.heldout.frames.clone(),
+            floor: self.floor,
+            tolerance_counts: options.tolerance_counts,
+            faulty: self.faulty.elements.clone(),
+            base: level,
+            global: None,
+            gap: Vec::new(),
+            curves: Vec::new(),
+            elements: of_base.elements_rms_counts.iter().map(element).collect(),
+            rounds: Vec::new(),
+            steps: Vec::new(),
+            final_: Final { level, shrink: None },
+            verdict: Verdict::CannotJudge,
+            unexplained: Unexplained { depends_on: Vec::new(), share: 1.0 },
+            next_experiments: Vec::new(),
+            grown: recalibrated.clone(),
+            recalibrated,
+            effects: self.base.parameters.effects()?,
+        })
+    }
+
     /// The residual of a model on the held-out frames.
     fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
         let Self { known, frames, heldout, noise, whole, .. } = self;
@@ -231,20 +315,87 @@ impl Prepared<'_> {
         let mean = weighed.iter().sum::<f64>() / (count * weighed.len().max(1) as f64);
         #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
         let residual = frames.counts.iter().zip(&predicted).map(|(counts, of)| counts - *of as f32).collect();
+        let mut signal = predicted;
+        if let Some(walk) = &parameters.walk {
+            walk.add(whole, -1.0, &mut signal);
+        }
+        let baselines = whole.run.iter().flat_map(|run| &parameters.baseline[*run]);
+        let noises = noise.by_element_counts.iter().cycle();
+        let signal = signal.iter().zip(baselines).zip(noises);
         Ok(HeldOutResidual {
-            level: Level { heldout_rms_counts: mean.sqrt(), heldout_chi2: mean / noise.rms_counts.powi(2) },
+            rms_counts: mean.sqrt(),
             elements_rms_counts: (0..elements)
                 .map(|element| if weightless(element) { f64::NAN } else { (squares[element] / count).sqrt() })
                 .collect(),
             residual,
+            has_signal: signal.map(|((of, zero), noise)| (of - zero).abs() > LOUD * noise).collect(),
         })
     }
 
-    /// The noise given the grown model. Before a tone is in the model, it looks like noise.
-    fn floor_counts(&self, grown: &HeldOutResidual) -> f64 {
-        let left = Noise::of_residual(self.frames, &grown.residual, &self.still, self.step_counts);
-        let left = left.map(|left| left.without(|element| self.faulty.is_weightless(element)));
-        left.map_or(self.noise.rms_counts, |left| left.rms_counts.min(self.noise.rms_counts))
+    /// The floor given the grown model. Before a tone is in the model, it looks like noise.
+    fn floor_of(&self, grown: &HeldOutResidual) -> Floor {
+        let left = Noise::in_time(self.frames, &grown.residual, &self.still, self.step_counts);
+        let is_weightless = |element| self.faulty.is_weightless(element);
+        let left = left.map(|(left, freedom)| (left.without(is_weightless), freedom));
+        match (self.floor, left) {
+            (Floor::Time { rms_counts, .. }, Some((left, freedom))) if left.rms_counts < rms_counts => {
+                Floor::Time { rms_counts: left.rms_counts, freedom }
+            }
+            (floor, _) => floor,
+        }
+    }
+
+    /// How far a model is from the held-out frames.
+    fn level(&self, held: &HeldOutResidual, floor: Floor) -> Level {
+        let in_noise = |noise_counts: f64| (held.rms_counts / noise_counts).powi(2);
+        Level {
+            heldout_rms_counts: held.rms_counts,
+            heldout_chi2: floor.rms_counts().map(in_noise),
+            structured: self.structured(held, floor),
+        }
+    }
+
+    /// The structured part of a residual on held-out presses: among all readings or among those with a signal.
+    fn structured(&self, held: &HeldOutResidual, floor: Floor) -> Option<Structured> {
+        let elements = self.frames.elements;
+        let rms_counts = floor.rms_counts()?;
+        let scale = rms_counts / self.noise.rms_counts;
+        let noise_counts: Vec<f64> = self.noise.by_element_counts.iter().map(|rms| rms * scale).collect();
+        let lag = self.noise.memory_frames();
+        let readings = Readings {
+            elements,
+            residual: &held.residual,
+            presses: &self.heldout_presses(),
+            unit_counts: &noise_counts.iter().map(|rms| rms.max(QUIETEST * rms_counts)).collect::<Vec<_>>(),
+            noise_counts: &noise_counts,
+            lag,
+            correlation: self.noise.correlation_at(lag),
+            freedom: floor.freedom()?,
+        };
+        // Where the stage starts or stops between two reports, the position of the tip is not known.
+        let turns: Vec<bool> = (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect();
+        let is_known = |place: usize| !turns[place / elements];
+        let parts = [
+            readings.structured(is_known, false),
+            readings.structured(|place| is_known(place) && held.has_signal[place], true),
+        ];
+        parts.into_iter().flatten().max_by(|one, other| one.upper_noise.total_cmp(&other.upper_noise))
+    }
+
+    /// Frames of each held-out press and of each held-out rest between presses.
+    fn heldout_presses(&self) -> Vec<Range<usize>> {
+        let (frames, held) = (self.frames, &self.heldout.frames);
+        let key = |frame: usize| (held[frame], self.whole.run[frame], frames.press[frame]);
+        let all: Vec<usize> = (0..frames.len()).collect();
+        let presses = all.chunk_by(|one, next| key(*one) == key(*next));
+        presses
+            .filter_map(|press| Some(*press.first()?..press.last()? + 1))
+            .filter(|press| held[press.start])
+            .collect()
+    }
+
+    fn planner(&self) -> Planner<'_> {
+        Planner { known: self.known, frames: self.frames, noise: &self.noise }
     }
 }
 
@@ -326,3 +477,7 @@ impl Search<'_> {
         Ok(steps)
     }
 }
+
+#[cfg(test)]
+#[path = "verdict_tests.rs"]
+mod tests;

@@ -120,7 +120,7 @@ fn remarks(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Res
 fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     let class = match found.verdict {
         Verdict::NothingMissing | Verdict::Explained => "good",
-        Verdict::PartlyExplained | Verdict::Unexplained => "warn",
+        Verdict::CannotJudge | Verdict::PartlyExplained | Verdict::Unexplained => "warn",
     };
     writeln!(
         f,
@@ -128,18 +128,30 @@ fn verdict(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
         found.verdict.name(),
         Text(in_words(found))
     )?;
-    let noise = found.noise_rms_counts;
+    let noise = found.floor.rms_counts();
     let level = |counts: f64| {
         let in_noise = noise.map_or_else(String::new, |noise| {
             format!(" <small>{} &#215; noise</small>", digits(counts / noise, 3))
         });
         format!("{}{in_noise}", digits(counts, 3))
     };
+    let structured = found.final_.level.structured.map_or_else(
+        || "unknown".to_owned(),
+        |part| {
+            let upper = if part.upper_noise.is_finite() {
+                format!("at most {}", digits(part.upper_noise, 3))
+            } else {
+                "no bound".to_owned()
+            };
+            format!("{} <small>{upper} (95 %)</small>", digits(part.rms_noise, 3))
+        },
+    );
     let split = &found.split;
     for (name, figure) in [
         ("noise / counts", noise.map_or_else(|| "unknown".into(), |rms| digits(rms, 3))),
         ("residual before / counts", level(found.base.heldout_rms_counts)),
         ("residual after / counts", level(found.final_.level.heldout_rms_counts)),
+        ("structured after / noise", structured),
         ("gap closed", found.final_.shrink.map_or_else(|| "\u{2013}".into(), words::percent)),
         (
             "presses fitted",

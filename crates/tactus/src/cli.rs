@@ -294,6 +294,10 @@ pub(crate) struct DiscoverArgs {
     /// Number of threads; the result does not depend on it. Default: the number of cores.
     #[arg(long, value_name = "N")]
     pub(crate) threads: Option<NonZeroUsize>,
+    /// Tolerable residual in counts rms, declared before the data are judged: if what is not noise is certainly less, the added
+    /// effects count as the explanation.
+    #[arg(long, value_name = "COUNTS")]
+    pub(crate) tolerance: Option<f64>,
     /// Run the experiments that distinguish the remaining explanations, and analyse again with their recordings. Without
     /// a service they run on the embedded simulated rig; without files the first run is `diagnose`.
     #[arg(long)]

@@ -21,6 +21,13 @@ pub(super) struct Design {
     pub(super) frames: Frames,
 }
 
+impl Design {
+    /// True at its full length.
+    pub(super) fn is_whole(&self) -> bool {
+        self.parameters.iter().all(|(key, _)| *key != "scale")
+    }
+}
+
 /// Limits of possible experiments: what the rig has done so far.
 #[derive(Debug)]
 pub(super) struct DesignSpace<'a> {

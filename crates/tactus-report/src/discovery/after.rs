@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{Discovery, Level};
+use tactus_discover::{Discovery, Level, Verdict};
 
 use super::{
     figures::levels,
@@ -26,25 +26,33 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
         Column::Name("on held-out presses"),
         Column::Number("residual / counts rms"),
         Column::Number("residual / noise"),
-        Column::Number("\u{3c7}\u{b2} a reading"),
+        Column::Number("variance / counts\u{b2}"),
+        Column::Number("variance / noise\u{b2}"),
         Column::Number("gap / counts rms"),
         Column::Number("gap / noise"),
+        Column::Number("structured / noise"),
+        Column::Number("at most (95 %)"),
     ]);
-    let noise = found.noise_rms_counts;
-    let dash = || "\u{2013}".to_owned();
-    let mut row = |name: &str, Level { heldout_rms_counts: rms, heldout_chi2 }: Level| {
+    let noise = found.floor.rms_counts();
+    let or_dash = |value: Option<f64>| {
+        value.map_or_else(
+            || "\u{2013}".to_owned(),
+            |value| if value.is_finite() { digits(value, 3) } else { "unknown".into() },
+        )
+    };
+    let mut row = |name: &str, level: Level| {
+        let rms = level.heldout_rms_counts;
         let gap = noise.map(|noise| (rms * rms - noise * noise).max(0.0).sqrt());
-        let in_noise = |counts: Option<f64>| match (counts, noise) {
-            (Some(counts), Some(noise)) => digits(counts / noise, 3),
-            _ => dash(),
-        };
         table.row([
             name.to_owned(),
             digits(rms, 3),
-            in_noise(Some(rms)),
-            digits(heldout_chi2, 3),
-            gap.map_or_else(dash, |gap| digits(gap, 3)),
-            in_noise(gap),
+            or_dash(noise.map(|noise| rms / noise)),
+            digits(rms * rms, 3),
+            or_dash(level.heldout_chi2),
+            or_dash(gap),
+            or_dash(gap.zip(noise).map(|(gap, noise)| gap / noise)),
+            or_dash(level.structured.map(|part| part.rms_noise)),
+            or_dash(level.structured.map(|part| part.upper_noise)),
         ]);
     };
     row("base model, recalibrated", found.base);
@@ -53,7 +61,8 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
         f,
         "<section>\n<h2>The gap before and after</h2>\n<figure>\n{}\n<figcaption>Root mean square of the residual on held-out presses, in \
          counts.</figcaption>\n</figure>\n{table}\n<p class=\"lead\">The gap is the part of the residual beyond noise: the square root of the \
-         difference of their mean squares. {}</p>\n</section>",
+         difference of their mean squares. What is structured is not noise: among all held-out readings, or among those with a signal if more is \
+         structured there. {}</p>\n</section>",
         levels(found),
         found.final_.shrink.map_or_else(String::new, |share| format!(
             "{} of the base model's gap was closed, in mean squares.",
@@ -65,7 +74,9 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Resul
 fn unexplained(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     let share = percent(found.unexplained.share);
     writeln!(f, "<section>\n<h2>What stays unexplained</h2>")?;
-    if found.unexplained.depends_on.is_empty() {
+    if found.verdict == Verdict::CannotJudge {
+        writeln!(f, "<p>Unknown: these data do not tell it from noise.</p>")?;
+    } else if found.unexplained.depends_on.is_empty() {
         writeln!(f, "<p>Nothing beyond noise is left that depends on any covariate examined.</p>")?;
     } else {
         writeln!(

@@ -15,16 +15,27 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
         let values: Vec<String> = values.iter().map(|value| short(*value, 3)).collect();
         if values.is_empty() { "none".into() } else { values.join(", ") + " mm" }
     };
-    let noise = match found.noise_rms_counts {
-        Some(rms) => format!("{} counts rms, from repeated frames", digits(rms, 3)),
-        None => "unknown: no frames are repeats".into(),
+    let noise = match (found.floor.rms_counts(), found.floor.interval90_counts()) {
+        (Some(rms), Some([least, most])) => format!(
+            "{} counts rms, from {} (90 % interval {} to {})",
+            digits(rms, 3),
+            found.floor.source(),
+            digits(least, 3),
+            digits(most, 3)
+        ),
+        _ => "unknown: nothing repeats".into(),
     };
+    let tolerance = found.tolerance_counts.map_or_else(
+        || "none declared".into(),
+        |counts| format!("{} counts rms, declared beforehand", digits(counts, 3)),
+    );
     let sensor = if report.simulated { "SIMULATED: no physical sensor was read" } else { "physical" };
     writeln!(f, "<section>\n<h2>Data</h2>\n<div class=\"facts\">\n<table>")?;
     for (name, fact) in [
         ("sensor", sensor.into()),
         ("frames", count(split.frames as u64)),
         ("noise", noise),
+        ("tolerance", tolerance),
         ("seed", found.seed.to_string()),
     ] {
         writeln!(f, "<tr><th>{name}</th><td>{fact}</td></tr>")?;

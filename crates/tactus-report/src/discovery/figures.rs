@@ -84,7 +84,7 @@ pub fn levels(found: &Discovery) -> Sheet {
         }));
         bars.push(LevelBar::new(AFTER, found.final_.level.heldout_rms_counts, Ink::Blue));
     }
-    bars.extend(found.noise_rms_counts.map(|rms| LevelBar::new("noise", rms, Ink::Muted)));
+    bars.extend(found.floor.rms_counts().map(|rms| LevelBar::new("noise", rms, Ink::Muted)));
     let longest = bars.iter().map(|bar| bar.rms_counts).filter(|rms| rms.is_finite()).fold(0.0, f64::max);
     let size_px = [BARS_PX[0] + BARS_PX[1] + 70.0, BAR_PX * bars.len() as f64];
     let mut sheet = Sheet::new("Held-out residual, rms in counts", size_px);

@@ -31,19 +31,24 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) 
         writeln!(f, "</div>")?;
     }
     if !found.elements.is_empty() {
-        let unit = if found.noise_rms_counts.is_some() { "units of the noise" } else { "counts" };
+        let unit = if found.floor.rms_counts().is_some() { "units of the noise" } else { "counts" };
         writeln!(
             f,
             "<h3>The residual of each element</h3>\n<figure>\n{}\n<figcaption>Root mean square on held-out presses in {unit}, on one scale; the \
              array from above, row 0 at the bottom.</figcaption>\n</figure>",
-            element_maps(report.array, &found.elements, found.noise_rms_counts)
+            element_maps(report.array, &found.elements, found.floor.rms_counts())
         )?;
     }
     writeln!(f, "</section>")
 }
 
 fn table(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
-    let global = found.global;
+    let Some(global) = found.global else {
+        return writeln!(
+            f,
+            "<p>Nothing was tested: without a noise floor, no size of a residual means anything.</p>"
+        );
+    };
     writeln!(
         f,
         "<p>Is there structure beyond noise? The largest standardised score is {}. The probability of a larger one in data whose residuals \

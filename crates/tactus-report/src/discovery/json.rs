@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tactus_discover::{
-    AddedEffect, Curve, Discovery, Estimated, FaultyElement, Gap, Level, NextExperiment, Round, TriedEffect,
+    AddedEffect, Curve, Discovery, Estimated, FaultyElement, Floor, Gap, GlobalTest, Level, NextExperiment,
+    Round, Structured, TriedEffect,
 };
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
@@ -37,9 +38,11 @@ struct ReportJson<'a> {
     warnings: &'a [String],
     split: SplitJson<'a>,
     noise_rms_counts: Option<f64>,
+    floor: FloorJson,
+    tolerance: Option<ToleranceJson>,
     faulty: &'a [FaultyElement],
     base: LevelJson,
-    global: GlobalTestJson,
+    global: Option<GlobalTestJson>,
     gap: Vec<GapJson<'a>>,
     curves: Vec<CurveJson<'a>>,
     elements: Vec<ElementJson>,
@@ -78,9 +81,37 @@ struct SplitJson<'a> {
 }
 
 #[derive(Serialize)]
+struct FloorJson {
+    source: &'static str,
+    interval90_counts: Option<[f64; 2]>,
+    freedom: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct ToleranceJson {
+    counts: f64,
+    declared: &'static str,
+}
+
+/// Root mean squares, and the same as variances.
+#[derive(Serialize)]
 struct LevelJson {
     heldout_rms_counts: f64,
-    heldout_chi2: f64,
+    heldout_rms_noise: Option<f64>,
+    heldout_variance_counts2: f64,
+    heldout_chi2: Option<f64>,
+    structured: Option<StructuredJson>,
+}
+
+#[derive(Serialize)]
+struct StructuredJson {
+    of: &'static str,
+    rms_noise: f64,
+    upper95_noise: f64,
+    rms_counts: f64,
+    upper95_counts: f64,
+    variance_noise2: f64,
+    upper95_variance_noise2: f64,
 }
 
 #[derive(Serialize)]
@@ -179,7 +210,7 @@ struct NextExperimentJson<'a> {
     parameters: BTreeMap<&'a str, &'a str>,
     duration_s: f64,
     separates: &'a [String; 2],
-    expected_z: f64,
+    expected_z: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -223,10 +254,12 @@ impl<'a> ReportJson<'a> {
                 heldout_depths_mm: &found.split.heldout_depths_mm,
                 heldout_coverings_mm: &found.split.heldout_coverings_mm,
             },
-            noise_rms_counts: found.noise_rms_counts,
+            noise_rms_counts: found.floor.rms_counts(),
+            floor: FloorJson::of(found.floor),
+            tolerance: found.tolerance_counts.map(ToleranceJson::of),
             faulty: &found.faulty,
-            base: LevelJson::of(found.base),
-            global: GlobalTestJson { statistic: found.global.statistic, p_value: found.global.p_value },
+            base: LevelJson::of(found.base, found.floor),
+            global: found.global.map(GlobalTestJson::of),
             gap: found.gap.iter().map(GapJson::of).collect(),
             curves: found.curves.iter().map(CurveJson::of).collect(),
             elements: elements
@@ -237,7 +270,10 @@ impl<'a> ReportJson<'a> {
                 .collect(),
             rounds: found.rounds.iter().map(RoundJson::of).collect(),
             steps: found.steps.iter().map(StepJson::of).collect(),
-            grown: GrownJson { level: LevelJson::of(found.final_.level), shrink: found.final_.shrink },
+            grown: GrownJson {
+                level: LevelJson::of(found.final_.level, found.floor),
+                shrink: found.final_.shrink,
+            },
             verdict: found.verdict.name(),
             verdict_text: in_words(found),
             unexplained: UnexplainedJson {
@@ -256,9 +292,53 @@ impl<'a> SourceJson<'a> {
     }
 }
 
+impl FloorJson {
+    fn of(floor: Floor) -> Self {
+        Self {
+            source: floor.source(),
+            interval90_counts: floor.interval90_counts(),
+            freedom: floor.freedom(),
+        }
+    }
+}
+
+impl ToleranceJson {
+    fn of(counts: f64) -> Self {
+        Self { counts, declared: "beforehand" }
+    }
+}
+
 impl LevelJson {
-    fn of(level: Level) -> Self {
-        Self { heldout_rms_counts: level.heldout_rms_counts, heldout_chi2: level.heldout_chi2 }
+    fn of(level: Level, floor: Floor) -> Self {
+        let noise_counts = floor.rms_counts();
+        let structured = level.structured.zip(noise_counts);
+        Self {
+            heldout_rms_counts: level.heldout_rms_counts,
+            heldout_rms_noise: noise_counts.map(|noise| level.heldout_rms_counts / noise),
+            heldout_variance_counts2: level.heldout_rms_counts.powi(2),
+            heldout_chi2: level.heldout_chi2,
+            structured: structured.map(|(part, noise)| StructuredJson::of(part, noise)),
+        }
+    }
+}
+
+impl StructuredJson {
+    fn of(part: Structured, noise_counts: f64) -> Self {
+        Self {
+            of: if part.with_signal { "readings with a signal" } else { "all readings" },
+            rms_noise: part.rms_noise,
+            upper95_noise: part.upper_noise,
+            rms_counts: part.rms_noise * noise_counts,
+            upper95_counts: part.upper_noise * noise_counts,
+            variance_noise2: part.rms_noise.powi(2),
+            upper95_variance_noise2: part.upper_noise.powi(2),
+        }
+    }
+}
+
+impl GlobalTestJson {
+    fn of(GlobalTest { statistic, p_value }: GlobalTest) -> Self {
+        Self { statistic, p_value }
     }
 }
 

@@ -44,11 +44,11 @@ fn decides(questions: &[&NextExperiment]) -> String {
     let mut shown: Vec<String> = Vec::new();
     for next in questions {
         let [one, other] = &next.separates;
-        let z = digits(next.expected_z, 2);
+        let z = next.expected_z.map_or_else(String::new, |z| format!(" (z = {})", digits(z, 2)));
         if other == "nothing" {
-            shown.push(format!("{one} (z = {z})"));
+            shown.push(format!("{one}{z}"));
         } else {
-            parts.push(format!("distinguishes {one} from {other} (z = {z})"));
+            parts.push(format!("distinguishes {one} from {other}{z}"));
         }
     }
     if !shown.is_empty() {

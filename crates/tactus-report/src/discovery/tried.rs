@@ -14,7 +14,9 @@ use crate::{
 pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     writeln!(f, "<section>\n<h2>What was tried</h2>")?;
     if found.rounds.is_empty() {
-        return writeln!(f, "<p>Nothing: there is no structure to explain.</p>\n</section>");
+        let why =
+            if found.global.is_some() { "there is no structure to explain" } else { "nothing can be judged" };
+        return writeln!(f, "<p>Nothing: {why}.</p>\n</section>");
     }
     writeln!(
         f,

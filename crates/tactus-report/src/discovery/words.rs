@@ -1,7 +1,8 @@
 //! The verdict of a discovery in words.
 
-use tactus_discover::{Discovery, Verdict};
+use tactus_discover::{Discovery, Floor, Verdict};
 
+use super::active::command;
 use super::faulty;
 use crate::numbers::{digits, short};
 use crate::plot::number;
@@ -10,12 +11,12 @@ use crate::plot::number;
 pub fn in_words(found: &Discovery) -> String {
     let before = digits(found.base.heldout_rms_counts, 3);
     let after = digits(found.final_.level.heldout_rms_counts, 3);
-    let noise = found.noise_rms_counts.map(|rms| digits(rms, 3));
     let added = list(found.steps.iter().map(|step| step.effect));
-    let noise_is = noise.as_ref().map_or_else(
+    let noise_is = found.floor.rms_counts().map_or_else(
         || "the size of the noise is unknown".into(),
-        |noise| format!("the noise is {noise} counts"),
+        |noise| format!("the noise is {} counts, from {}", digits(noise, 3), found.floor.source()),
     );
+    let bound = bound(found);
     let closed = found.final_.shrink.map_or_else(String::new, |share| {
         format!(", which closes {} of the gap between model and noise", percent(share))
     });
@@ -27,23 +28,68 @@ pub fn in_words(found: &Discovery) -> String {
         )
     };
     let verdict = match found.verdict {
+        Verdict::CannotJudge if found.floor == Floor::None => format!(
+            "Nothing can be judged: no frame and no press of these data repeats another, so noise and missing physics look the same. On \
+             held-out presses the residual is {before} counts rms. Give a run that rests and repeats a press together with these data{}.",
+            runs(found)
+        ),
+        Verdict::CannotJudge => format!(
+            "Nothing can be judged: these data show too little. No test finds an effect, but more than twice the noise may be missing. On \
+             held-out presses the residual is {before} counts rms; {noise_is}.{bound} More presses, and presses that repeat each other, \
+             would tell{}.",
+            runs(found)
+        ),
         Verdict::NothingMissing => format!(
             "The model is missing no effect that these data can show: on held-out presses its residual is {before} counts rms and {noise_is}. \
-             The probability of as much structure by noise alone is {}.",
-            probability(found.global.p_value)
+             The probability of as much structure by noise alone is {}.{bound}",
+            found.global.map_or_else(|| "unknown".into(), |global| probability(global.p_value))
         ),
-        Verdict::Explained => format!("The model was missing {added}. {falls}"),
+        Verdict::Explained => format!("The model was missing {added}. {falls}{bound}{}", tolerance(found)),
         Verdict::PartlyExplained => format!(
-            "The model was missing {added}, and something more that no known effect matches. {falls} {}",
+            "The model was missing {added}, and something more that no known effect matches. {falls}{bound} {}",
             left(found)
         ),
         Verdict::Unexplained => format!(
             "The model is missing something that no known effect matches: on held-out presses its residual is {before} counts rms and \
-             {noise_is}. {}",
+             {noise_is}.{bound} {}",
             left(found)
         ),
     };
     [verdict].into_iter().chain(faulty::in_words(found)).collect::<Vec<_>>().join(" ")
+}
+
+/// What is structured in the grown model's residual.
+fn bound(found: &Discovery) -> String {
+    let (Some(part), Some(noise)) = (found.final_.level.structured, found.floor.rms_counts()) else {
+        return String::new();
+    };
+    let among = if part.with_signal { "readings with a signal" } else { "all readings" };
+    if !part.upper_noise.is_finite() {
+        return format!(" How much of it is not noise has no bound: too few presses are held out ({among}).");
+    }
+    let both = |times_noise: f64| {
+        format!("{} times the noise ({} counts)", digits(times_noise, 2), digits(times_noise * noise, 2))
+    };
+    format!(
+        " Of {among}, {} is not noise; with 95 % confidence it is at most {}.",
+        both(part.rms_noise),
+        both(part.upper_noise)
+    )
+}
+
+/// The tolerance, if one was declared.
+fn tolerance(found: &Discovery) -> String {
+    let of = |counts: f64| {
+        format!(" A structured residual of {} counts was declared tolerable beforehand.", digits(counts, 3))
+    };
+    found.tolerance_counts.map_or_else(String::new, of)
+}
+
+/// The first proposed experiment.
+fn runs(found: &Discovery) -> String {
+    found.next_experiments.first().map_or_else(String::new, |next| {
+        format!(", such as `{}`", command(next.experiment, &next.parameters))
+    })
 }
 
 /// The unexplained share, and the covariates on which it depends.

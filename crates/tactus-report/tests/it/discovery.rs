@@ -6,9 +6,11 @@
 
 use std::{env, fs, path::Path};
 
-use crate::made_up::discovery::{data, empty, explained, faulty, nothing_missing, report, unexplained};
+use crate::made_up::discovery::{
+    cannot_judge, data, empty, explained, faulty, nothing_missing, report, unexplained,
+};
 use serde_json::Value;
-use tactus_discover::{Discovery, NextExperiment, Unexplained, Verdict};
+use tactus_discover::{Discovery, GlobalTest, NextExperiment, Unexplained, Verdict};
 use tactus_model::Array;
 use tactus_report::discovery::{
     ActiveRun, AmbiguousEffect, DiscoveryReport, discovery_html, discovery_json, element_maps, in_words,
@@ -44,6 +46,13 @@ fn the_json_has_every_field_of_its_schema_where_it_belongs() {
         ("/noise_rms_counts", "2.0"),
         ("/base/heldout_rms_counts", "9.36"),
         ("/base/heldout_chi2", "21.902399999999997"),
+        ("/base/heldout_rms_noise", "4.68"),
+        ("/base/heldout_variance_counts2", "87.60959999999999"),
+        ("/final/structured/of", "\"readings with a signal\""),
+        ("/final/structured/upper95_counts", "0.7141428428542855"),
+        ("/floor/source", "\"repeats in time\""),
+        ("/tolerance/counts", "2.5"),
+        ("/tolerance/declared", "\"beforehand\""),
         ("/gap/0/where/covariate", "\"time since contact\""),
         ("/gap/0/where/range", "[0.4,30.0]"),
         ("/gap/0/effect_size", "3.81"),
@@ -87,8 +96,8 @@ fn the_json_keeps_its_form_to_the_byte() {
     discovery.elements.truncate(2);
     discovery.heldout_frames.clear();
     discovery.faulty = faulty().faulty;
-    discovery.global.statistic = f64::NAN;
-    discovery.base.heldout_chi2 = f64::INFINITY;
+    discovery.global = discovery.global.map(|global| GlobalTest { statistic: f64::NAN, ..global });
+    discovery.base.heldout_chi2 = Some(f64::INFINITY);
     let undecided = |equivalent| AmbiguousEffect { effect: "hysteresis", equivalent };
     let active = [ActiveRun {
         experiment: "diagnose".into(),
@@ -136,17 +145,27 @@ fn the_verdict_says_what_it_rests_on() {
     assert_eq!(
         in_words(&explained()),
         "The model was missing hysteresis and miswired. On held-out presses the residual falls from 9.36 to 2.08 counts rms, which \
-         closes 99.6 % of the gap between model and noise; the noise is 2.00 counts."
+         closes 99.6 % of the gap between model and noise; the noise is 2.00 counts, from repeats in time. Of readings with a signal, 0.29 \
+         times the noise (0.57 counts) is not noise; with 95 % confidence it is at most 0.36 times the noise (0.71 counts). A structured \
+         residual of 2.50 counts was declared tolerable beforehand."
     );
     assert_eq!(
         in_words(&nothing_missing()),
         "The model is missing no effect that these data can show: on held-out presses its residual is 2.01 counts rms and the noise is \
-         2.00 counts. The probability of as much structure by noise alone is 0.431."
+         2.00 counts, from repeats in time. The probability of as much structure by noise alone is 0.431. Of readings with a signal, 0.10 \
+         times the noise (0.20 counts) is not noise; with 95 % confidence it is at most 0.13 times the noise (0.25 counts)."
     );
     assert_eq!(
         in_words(&unexplained()),
-        "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms and the size \
-         of the noise is unknown. The remaining 100 % of the gap depends on time since contact and depth."
+        "The model is missing something that no known effect matches: on held-out presses its residual is 9.36 counts rms and the noise \
+         is 2.00 counts, from repeats of a place. Of readings with a signal, 4.6 times the noise (9.1 counts) is not noise; with 95 % \
+         confidence it is at most 5.7 times the noise (11 counts). The remaining 100 % of the gap depends on time since contact and depth."
+    );
+    assert_eq!(
+        in_words(&cannot_judge()),
+        "Nothing can be judged: no frame and no press of these data repeats another, so noise and missing physics look the same. On \
+         held-out presses the residual is 54.0 counts rms. Give a run that rests and repeats a press together with these data, such as \
+         `tactus run diagnose -p parts=drift,repeats`."
     );
     let partly = Discovery {
         verdict: Verdict::PartlyExplained,
@@ -250,7 +269,10 @@ fn the_pages_numbers_are_those_that_were_found() {
         "cannot distinguish it from backlash",
         "The data distinguish it from every other effect",
         "and fitted again with the rest: misregistration.",
-        "<td>grown model</td><td class=\"n\">2.08</td><td class=\"n\">1.04</td><td class=\"n\">1.08</td><td class=\"n\">0.571</td><td class=\"n\">0.286</td>",
+        "<td>grown model</td><td class=\"n\">2.08</td><td class=\"n\">1.04</td><td class=\"n\">4.33</td><td class=\"n\">1.08</td><td class=\"n\">0.571</td><td class=\"n\">0.286</td><td class=\"n\">0.286</td><td class=\"n\">0.357</td>",
+        "<dt>structured after / noise</dt><dd>0.286 <small>at most 0.357 (95 %)</small></dd>",
+        "<th>noise</th><td>2.00 counts rms, from repeats in time (90 % interval 1.93 to 2.08)</td>",
+        "<th>tolerance</th><td>2.50 counts rms, declared beforehand</td>",
         "whole coverings</th><td>2.54 mm",
         "<td>grid-sweep-2</td><td class=\"n\">16\u{202f}000</td>",
     ] {
@@ -281,7 +303,7 @@ fn what_no_effect_matches_has_no_name() {
     show("unexplained.html", &html);
     for text in [
         ">unexplained</span>",
-        "<dd>unknown</dd>",
+        "from repeats of a place",
         "depends on time since contact and depth",
         "None was taken",
     ] {
@@ -290,8 +312,40 @@ fn what_no_effect_matches_has_no_name() {
 }
 
 #[test]
+fn what_cannot_be_judged_has_figures_in_counts_and_says_what_to_run() {
+    let found = cannot_judge();
+    let html = html(&found);
+    show("cannot-judge.html", &html);
+    for text in [
+        ">cannot-judge</span>",
+        "<dd>unknown</dd>",
+        "<dd>54.0</dd>",
+        "Nothing was tested",
+        "Nothing: nothing can be judged.",
+        "Unknown: these data do not tell it from noise.",
+        "<code>tactus run diagnose -p parts=drift,repeats</code>",
+        "distinguishes what is missing from noise",
+    ] {
+        assert!(html.contains(text), "{text}");
+    }
+    let found = json(&found);
+    for (place, value) in [
+        ("/verdict", "\"cannot-judge\""),
+        ("/noise_rms_counts", "null"),
+        ("/floor/source", "\"none\""),
+        ("/base/heldout_rms_noise", "null"),
+        ("/base/structured", "null"),
+        ("/base/heldout_variance_counts2", "2916.0"),
+        ("/global", "null"),
+        ("/next_experiments/0/expected_z", "null"),
+    ] {
+        assert_eq!(found.pointer(place).unwrap().to_string(), value, "{place}");
+    }
+}
+
+#[test]
 fn no_page_has_a_number_that_is_none() {
-    for discovery in [explained(), nothing_missing(), unexplained(), empty(), faulty()] {
+    for discovery in [explained(), nothing_missing(), unexplained(), cannot_judge(), empty(), faulty()] {
         let html = html(&discovery);
         assert!(!html.contains("NaN") && !html.contains("inf"), "{:?}", discovery.verdict);
         assert!(html.ends_with("</main>\n</body>\n</html>\n"));
@@ -343,8 +397,8 @@ fn an_experiment_that_answers_several_questions_is_proposed_once() {
     let parameters = vec![("parts", "hold".to_owned())];
     found.next_experiments.extend([
         NextExperiment { separates: separates("imprint", "nothing"), parameters, ..first.clone() },
-        NextExperiment { separates: separates("imprint", "nothing"), expected_z: 4.0, ..first.clone() },
-        NextExperiment { separates: separates("relaxation", "nothing"), expected_z: 5.0, ..first },
+        NextExperiment { separates: separates("imprint", "nothing"), expected_z: Some(4.0), ..first.clone() },
+        NextExperiment { separates: separates("relaxation", "nothing"), expected_z: Some(5.0), ..first },
     ]);
     let proposals = proposals(&found);
     let told: Vec<[&str; 2]> = proposals.iter().map(|one| [&*one.command, &*one.decides]).collect();

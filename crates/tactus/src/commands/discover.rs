@@ -83,7 +83,10 @@ fn analysed(
         None => Rule::Protocol,
         Some(Ablation::Bic) => Rule::Bic,
     };
-    let options = Options { seed: args.seed, threads, rule };
+    let options = Options { seed: args.seed, threads, rule, tolerance_counts: args.tolerance };
+    if args.tolerance.is_some_and(|counts| !(counts > 0.0 && counts.is_finite())) {
+        return Err(Failure::new(Exit::Usage, "--tolerance must be above 0 counts").into());
+    }
     let found = tactus_discover::discover(&known, &measured.frames, options, &|now| {
         progress.show(&now.what, now.share);
     });

@@ -1,8 +1,9 @@
 //! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
-    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement, Final, Gap,
-    GlobalTest, Level, NextExperiment, NotShown, Point, Round, Split, TriedEffect, Unexplained, Verdict,
+    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement, Final, Floor,
+    Gap, GlobalTest, Level, NextExperiment, NotShown, Point, Round, Split, Structured, TriedEffect,
+    Unexplained, Verdict,
 };
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
 use tactus_report::discovery::{DataSource, DiscoveryReport};
@@ -43,10 +44,11 @@ pub(crate) fn explained() -> Discovery {
             heldout_coverings_mm: vec![2.54],
         },
         heldout_frames: vec![false; 36_000],
-        noise_rms_counts: Some(NOISE_COUNTS),
+        floor: Floor::Time { rms_counts: NOISE_COUNTS, freedom: 1000.0 },
+        tolerance_counts: Some(2.5),
         faulty: vec![],
         base: level(9.36),
-        global: GlobalTest { statistic: 41.2, p_value: 0.000_5 },
+        global: Some(GlobalTest { statistic: 41.2, p_value: 0.000_5 }),
         gap: vec![
             gap("time since contact", "s", [0.4, 30.0], 3.81, 1e-9),
             gap("depth", "mm", [0.45, 0.7], 1.24, 0.002_4),
@@ -99,7 +101,7 @@ pub(crate) fn explained() -> Discovery {
             parameters: vec![("parts", "approach".into())],
             duration_s: 60.0,
             separates: ["hysteresis".into(), "backlash".into()],
-            expected_z: 11.3,
+            expected_z: Some(11.3),
         }],
         recalibrated: base(),
         grown: base(),
@@ -126,7 +128,8 @@ pub(crate) fn nothing_missing() -> Discovery {
         not_shown: vec![],
         warnings: vec![],
         base: level(2.01),
-        global: GlobalTest { statistic: 2.4, p_value: 0.431 },
+        global: Some(GlobalTest { statistic: 2.4, p_value: 0.431 }),
+        tolerance_counts: None,
         gap: vec![],
         curves: whole.curves.into_iter().map(flat).collect(),
         elements: vec![ElementGap { before_rms_counts: 2.0, after_rms_counts: 2.0 }; 48],
@@ -165,11 +168,12 @@ pub(crate) fn faulty() -> Discovery {
     }
 }
 
-/// There is a gap that no candidate closes; the noise is unknown.
+/// There is a gap that no candidate closes; the noise is known from repeats of a place.
 pub(crate) fn unexplained() -> Discovery {
     let whole = explained();
     Discovery {
-        noise_rms_counts: None,
+        floor: Floor::Repeats { rms_counts: NOISE_COUNTS, freedom: 12.0 },
+        tolerance_counts: None,
         final_: Final { level: whole.base, shrink: Some(0.0) },
         rounds: vec![Round { taken: None, ..whole.rounds[0].clone() }],
         steps: vec![],
@@ -181,11 +185,35 @@ pub(crate) fn unexplained() -> Discovery {
     }
 }
 
+/// Nothing repeats.
+pub(crate) fn cannot_judge() -> Discovery {
+    let level = Level { heldout_rms_counts: 54.0, heldout_chi2: None, structured: None };
+    Discovery {
+        floor: Floor::None,
+        global: None,
+        base: level,
+        final_: Final { level, shrink: None },
+        verdict: Verdict::CannotJudge,
+        unexplained: Unexplained { depends_on: vec![], share: 1.0 },
+        curves: vec![],
+        next_experiments: vec![NextExperiment {
+            experiment: "diagnose",
+            parameters: vec![("parts", "drift,repeats".into())],
+            duration_s: 270.0,
+            separates: ["what is missing".into(), "noise".into()],
+            expected_z: None,
+        }],
+        ..nothing_missing()
+    }
+}
+
 /// Empty, with NaN wherever possible.
 pub(crate) fn empty() -> Discovery {
-    let nowhere = Level { heldout_rms_counts: f64::NAN, heldout_chi2: f64::NAN };
+    let structured = Structured { rms_noise: f64::NAN, upper_noise: f64::INFINITY, with_signal: true };
+    let nowhere =
+        Level { heldout_rms_counts: f64::NAN, heldout_chi2: Some(f64::NAN), structured: Some(structured) };
     Discovery {
-        noise_rms_counts: None,
+        floor: Floor::None,
         split: Split {
             frames: 0,
             train_presses: 0,
@@ -194,7 +222,7 @@ pub(crate) fn empty() -> Discovery {
             heldout_coverings_mm: vec![],
         },
         base: nowhere,
-        global: GlobalTest { statistic: f64::NAN, p_value: f64::NAN },
+        global: Some(GlobalTest { statistic: f64::NAN, p_value: f64::NAN }),
         curves: vec![],
         elements: vec![],
         final_: Final { level: nowhere, shrink: None },
@@ -246,7 +274,13 @@ fn rounds() -> Vec<Round> {
 }
 
 fn level(rms_counts: f64) -> Level {
-    Level { heldout_rms_counts: rms_counts, heldout_chi2: (rms_counts / NOISE_COUNTS).powi(2) }
+    let variance_noise2 = (rms_counts / NOISE_COUNTS).powi(2);
+    let rms_noise = (variance_noise2 - 1.0).sqrt();
+    Level {
+        heldout_rms_counts: rms_counts,
+        heldout_chi2: Some(variance_noise2),
+        structured: Some(Structured { rms_noise, upper_noise: 1.25 * rms_noise, with_signal: true }),
+    }
 }
 
 fn lacks(effect: &'static str, reason: &str) -> NotShown {

@@ -106,7 +106,8 @@ fn choose(found: &Discovery, budget_s: f64, done: &[ActiveRun]) -> Vec<ChosenExp
             chosen.push(one);
         }
     }
-    let unexplained = matches!(found.verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    let unexplained =
+        matches!(found.verdict, Verdict::CannotJudge | Verdict::Unexplained | Verdict::PartlyExplained);
     if chosen.is_empty() && unexplained {
         let scale = (budget_s / DIAGNOSE_S).min(1.0);
         let one = ChosenExperiment::diagnose((100.0 * scale).floor() / 100.0);
@@ -127,7 +128,7 @@ impl ChosenExperiment {
             parameters: next.parameters.clone(),
             duration_s: next.duration_s,
             separates: next.separates.clone(),
-            expected_z: Some(next.expected_z),
+            expected_z: next.expected_z,
         }
     }
 

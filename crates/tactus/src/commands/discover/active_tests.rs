@@ -8,7 +8,7 @@ fn next(experiment: &'static str, part: &str, separates: [&str; 2], duration_s: 
         parameters: vec![("parts", part.to_owned())],
         duration_s,
         separates: separates.map(Into::into),
-        expected_z: 9.0,
+        expected_z: Some(9.0),
     }
 }
 

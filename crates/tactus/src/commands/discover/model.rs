@@ -9,7 +9,7 @@ use tactus_schema::model::{BaseModel, Evidence, KnownEffect};
 /// their data; effects known before keep their evidence.
 pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
     let base = BaseModel::of(before.base.array.clone(), found.grown.psf, found.grown.response.clone());
-    let noise_rms_counts = found.noise_rms_counts.unwrap_or(before.base.noise_rms_counts);
+    let noise_rms_counts = found.floor.rms_counts().unwrap_or(before.base.noise_rms_counts);
     let effects = found.effects.iter().enumerate().map(|(nth, effect)| {
         let added = found.steps.iter().find_map(|step| Some((step, term(step, effect)?)));
         // A random walk of each element is one step with many effects.

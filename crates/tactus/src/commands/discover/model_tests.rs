@@ -1,4 +1,4 @@
-use tactus_discover::{Final, GlobalTest, Level, Split, Unexplained, Verdict};
+use tactus_discover::{Final, Floor, GlobalTest, Level, Split, Unexplained, Verdict};
 use tactus_model::effect::Definition;
 use tactus_schema::Rig;
 
@@ -43,7 +43,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
             })
             .to_vec()
     };
-    let level = Level { heldout_rms_counts: 2.0, heldout_chi2: 1.0 };
+    let level = Level { heldout_rms_counts: 2.0, heldout_chi2: Some(1.0), structured: None };
     let base = tactus_discover::BaseModel {
         psf: model.base.psf,
         response: model.base.response.clone(),
@@ -64,10 +64,11 @@ pub(crate) fn found(model: &Model) -> Discovery {
             heldout_coverings_mm: Vec::new(),
         },
         heldout_frames: vec![false; 10],
-        noise_rms_counts: Some(2.0),
+        floor: Floor::Time { rms_counts: 2.0, freedom: 100.0 },
+        tolerance_counts: None,
         faulty: Vec::new(),
         base: level,
-        global: GlobalTest { statistic: 9.0, p_value: 0.001 },
+        global: Some(GlobalTest { statistic: 9.0, p_value: 0.001 }),
         gap: Vec::new(),
         curves: Vec::new(),
         elements: Vec::new(),
@@ -132,7 +133,7 @@ fn the_grown_model_loads_again() {
 #[test]
 fn without_repeats_the_noise_stays_as_it_was_said_to_be() {
     let before = before();
-    let found = Discovery { noise_rms_counts: None, ..found(&before) };
+    let found = Discovery { floor: Floor::None, ..found(&before) };
     let noise_rms_counts = grown(&before, &found, "a").base.noise_rms_counts;
     assert!((noise_rms_counts - 1.5).abs() < 1e-12);
 }

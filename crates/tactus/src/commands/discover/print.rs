@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tactus_calibrate::Estimate;
-use tactus_discover::{AddedEffect, Estimated};
+use tactus_discover::{AddedEffect, Estimated, Level};
 use tactus_report::discovery::{
     AmbiguousEffect, DiscoveryReport, Proposal, command, in_words, not_shown, proposals,
 };
@@ -63,11 +63,29 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
 fn facts(report: &DiscoveryReport<'_>) {
     let found = report.discovery;
     let split = &found.split;
-    let noise = found.noise_rms_counts;
-    let level = |counts: f64| match noise {
-        Some(noise) => format!("{counts:.3} counts rms held out, {:.2} times the noise", counts / noise),
-        None => format!("{counts:.3} counts rms held out"),
+    let noise = found.floor.rms_counts();
+    let level = |level: Level| {
+        let counts = level.heldout_rms_counts;
+        let said = format!("{counts:.3} counts rms held out (variance {:.3})", counts * counts);
+        match noise.zip(level.heldout_chi2) {
+            Some((noise, chi2)) => {
+                format!("{said}, {:.2} times the noise (variance {chi2:.2})", counts / noise)
+            }
+            None => said,
+        }
     };
+    let structured = found.final_.level.structured.map_or_else(
+        || "unknown".to_owned(),
+        |part| {
+            let among = if part.with_signal { "readings with a signal" } else { "all readings" };
+            let upper = if part.upper_noise.is_finite() {
+                format!("at most {:.2} (95 %)", part.upper_noise)
+            } else {
+                "without a bound: too few presses are held out".to_owned()
+            };
+            format!("{:.2} times the noise, {upper}, of {among}", part.rms_noise)
+        },
+    );
     print_fields(&[
         ("rig", format!("{}{}", report.rig, if report.simulated { " (SIMULATED)" } else { "" })),
         (
@@ -83,12 +101,20 @@ fn facts(report: &DiscoveryReport<'_>) {
         (
             "noise",
             noise.map_or_else(
-                || "unknown: no frames are repeats".into(),
-                |rms| format!("{rms:.3} counts rms"),
+                || "unknown: nothing repeats".into(),
+                |rms| format!("{rms:.3} counts rms, from {}", found.floor.source()),
             ),
         ),
-        ("before", level(found.base.heldout_rms_counts)),
-        ("after", level(found.final_.level.heldout_rms_counts)),
+        (
+            "tolerance",
+            found.tolerance_counts.map_or_else(
+                || "none declared".into(),
+                |counts| format!("{counts} counts rms, declared beforehand"),
+            ),
+        ),
+        ("before", level(found.base)),
+        ("after", level(found.final_.level)),
+        ("not noise", structured),
     ]);
 }
 
