@@ -68,6 +68,13 @@ fn what_is_no_model_is_refused_before_anything_is_read() {
 }
 
 #[test]
+fn a_tolerance_of_nothing_is_refused() {
+    let said = refused(&["nowhere.mcap"], &["--tolerance", "0"]);
+    assert_eq!(said.code, Some(2));
+    assert!(said.err.contains("--tolerance must be above 0 counts"), "{said:?}");
+}
+
+#[test]
 fn no_threads_are_too_few() {
     assert_eq!(refused(&["nowhere.mcap"], &["--threads", "0"]).code, Some(2));
 }

@@ -51,7 +51,7 @@ type Sums = [f64; 2];
 
 impl Readings<'_> {
     /// What is structured among the readings that `among` selects by their place in the residual; `None` if there are none.
-    pub(crate) fn structured(&self, among: impl Fn(usize) -> bool, with_signal: bool) -> Option<Structured> {
+    pub(crate) fn structured(&self, among: impl Fn(usize) -> bool) -> Option<Structured> {
         let sums: Vec<[Sums; 2]> = self.presses.iter().map(|press| self.sums(press, &among)).collect();
         let [lasting, all] = [0, 1].map(|which| {
             sums.iter().map(|of| of[which]).filter(|[_, count]| *count > 0.0).collect::<Vec<Sums>>()
@@ -61,7 +61,7 @@ impl Readings<'_> {
         let mut found = Structured {
             rms_noise: value.max(0.0).sqrt(),
             upper_noise: (value + student_95(all.len()) * error).max(0.0).sqrt(),
-            with_signal,
+            with_signal: false,
         };
         if let Some((value, error)) = jackknife(&lasting).filter(|(_, error)| error.is_finite()) {
             let upper = value + student_95(lasting.len()) * error;

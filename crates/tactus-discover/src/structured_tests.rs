@@ -45,7 +45,7 @@ impl Planted {
             correlation: 0.0,
             freedom,
         };
-        readings.structured(|_| true, false).unwrap()
+        readings.structured(|_| true).unwrap()
     }
 }
 

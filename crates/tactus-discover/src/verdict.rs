@@ -134,16 +134,7 @@ pub(crate) fn conclude(
         effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);
         steps.push(coarse(*step_counts, *p_value, grown_level.heldout_rms_counts));
     }
-    let explained =
-        |name: &'static str, fitted: &Fitted| Explanation { name, parameters: fitted.parameters.clone() };
-    let mut pairs: Vec<Pair> = Vec::new();
-    for (name, Rivals { without, same }) in equivalent.iter().filter(|_| named) {
-        pairs.extend(same.iter().map(|(rival, fitted)| Pair {
-            of: [explained(name, &grown), explained(rival, fitted)],
-            without: without.parameters.clone(),
-            gain: without.cost - grown.cost,
-        }));
-    }
+    let pairs = if named { undecided(&equivalent, &grown) } else { Vec::new() };
     let planner = prepared.planner();
     let mut next_experiments = planner.propose(&pairs)?;
     next_experiments.extend(planner.show(&not_shown, &grown.parameters)?);
@@ -153,8 +144,11 @@ pub(crate) fn conclude(
 
     let remainder = if is_withdrawn { &before.gap } else { &after.gap };
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
+    let mut warnings = prepared.warnings.clone();
+    warnings.extend(prepared.not_judged(&of_grown, floor));
     Ok(Discovery {
         not_shown,
+        warnings,
         floor,
         base: base_level,
         global: Some(GlobalTest { statistic: before.statistic, p_value }),
@@ -195,6 +189,20 @@ pub(crate) fn cannot_judge(prepared: &Prepared<'_>, options: Options) -> Result<
     let of_base = prepared.held(&prepared.base.parameters)?;
     let unjudged = prepared.unjudged(&of_base, options)?;
     Ok(Discovery { next_experiments: vec![prepared.planner().repeats()], ..unjudged })
+}
+
+/// The added effects, each with an effect that the data do not distinguish from it.
+fn undecided(equivalent: &Equivalent, grown: &Fitted) -> Vec<Pair> {
+    let explained =
+        |name: &'static str, fitted: &Fitted| Explanation { name, parameters: fitted.parameters.clone() };
+    let pairs = equivalent.iter().flat_map(|(name, Rivals { without, same })| {
+        same.iter().map(move |(rival, fitted)| Pair {
+            of: [explained(name, grown), explained(rival, fitted)],
+            without: without.parameters.clone(),
+            gain: without.cost - grown.cost,
+        })
+    });
+    pairs.collect()
 }
 
 /// What the verdict depends on.
@@ -357,13 +365,46 @@ impl Prepared<'_> {
 
     /// The structured part of a residual on held-out presses: among all readings or among those with a signal.
     fn structured(&self, held: &HeldOutResidual, floor: Floor) -> Option<Structured> {
-        let elements = self.frames.elements;
+        let (elements, turns) = (self.frames.elements, self.turns());
+        let is_known = |place: usize| !turns[place / elements];
+        let parts = [
+            self.structured_among(held, floor, is_known),
+            self.structured_among(held, floor, |place| is_known(place) && held.has_signal[place])
+                .map(|part| Structured { with_signal: true, ..part }),
+        ];
+        parts.into_iter().flatten().max_by(|one, other| one.upper_noise.total_cmp(&other.upper_noise))
+    }
+
+    /// A warning if much is structured in the frames that are not judged.
+    fn not_judged(&self, held: &HeldOutResidual, floor: Floor) -> Option<String> {
+        let (elements, turns) = (self.frames.elements, self.turns());
+        let part = self.structured_among(held, floor, |place| turns[place / elements])?;
+        (part.rms_noise > SEEN_NOISE).then(|| {
+            format!(
+                "frames at which the stage starts or stops near the surface are not judged, because its position between two reports \
+                 is not known: what is structured in them is {:.1} times the noise",
+                part.rms_noise
+            )
+        })
+    }
+
+    /// Whether the stage starts or stops near the surface, for each frame.
+    fn turns(&self) -> Vec<bool> {
+        (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect()
+    }
+
+    fn structured_among(
+        &self,
+        held: &HeldOutResidual,
+        floor: Floor,
+        among: impl Fn(usize) -> bool,
+    ) -> Option<Structured> {
         let rms_counts = floor.rms_counts()?;
         let scale = rms_counts / self.noise.rms_counts;
         let noise_counts: Vec<f64> = self.noise.by_element_counts.iter().map(|rms| rms * scale).collect();
         let lag = self.noise.memory_frames();
         let readings = Readings {
-            elements,
+            elements: self.frames.elements,
             residual: &held.residual,
             presses: &self.heldout_presses(),
             unit_counts: &noise_counts.iter().map(|rms| rms.max(QUIETEST * rms_counts)).collect::<Vec<_>>(),
@@ -372,14 +413,7 @@ impl Prepared<'_> {
             correlation: self.noise.correlation_at(lag),
             freedom: floor.freedom()?,
         };
-        // Where the stage starts or stops between two reports, the position of the tip is not known.
-        let turns: Vec<bool> = (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect();
-        let is_known = |place: usize| !turns[place / elements];
-        let parts = [
-            readings.structured(is_known, false),
-            readings.structured(|place| is_known(place) && held.has_signal[place], true),
-        ];
-        parts.into_iter().flatten().max_by(|one, other| one.upper_noise.total_cmp(&other.upper_noise))
+        readings.structured(among)
     }
 
     /// Frames of each held-out press and of each held-out rest between presses.

@@ -34,6 +34,10 @@ struct Discovered {
 }
 
 pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<Exit> {
+    if let Some(counts) = args.tolerance.filter(|counts| !(*counts > 0.0 && counts.is_finite())) {
+        let error = format!("--tolerance must be above 0 counts, not {counts}");
+        return Err(Failure::new(Exit::Usage, error).into());
+    }
     let progress = ComputationProgress::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
     let analyse =
@@ -84,9 +88,6 @@ fn analysed(
         Some(Ablation::Bic) => Rule::Bic,
     };
     let options = Options { seed: args.seed, threads, rule, tolerance_counts: args.tolerance };
-    if args.tolerance.is_some_and(|counts| !(counts > 0.0 && counts.is_finite())) {
-        return Err(Failure::new(Exit::Usage, "--tolerance must be above 0 counts").into());
-    }
     let found = tactus_discover::discover(&known, &measured.frames, options, &|now| {
         progress.show(&now.what, now.share);
     });
