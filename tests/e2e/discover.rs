@@ -192,7 +192,10 @@ fn dead_elements_are_named_with_calibrates_evidence_and_the_grown_model_closes_t
         "{faulty:?}, {terms:?}"
     );
     assert!(faulty.iter().all(|one| one["kind"]["kind"] == "dead"), "{faulty:?}");
-    assert!(faulty[0]["evidence"].as_str().unwrap().contains("where strong elements rise by"), "{faulty:?}");
+    assert!(
+        faulty[0]["evidence"].as_str().unwrap().contains("where the median element rises by"),
+        "{faulty:?}"
+    );
 }
 
 #[test]
