@@ -156,8 +156,8 @@ fn gap_counts(one: &str, other: &str) -> f64 {
 }
 
 /// Diagnoses a rig with hidden physics and discovers a model. Then makes the experiment with another seed on that rig, on
-/// the rig without hidden physics, and on a rig with the discovered model.
-fn is_named_and_closed(physics: &str, effect: &str, times_smaller: f64) {
+/// the rig without hidden physics, and on a rig with the discovered model. Returns the report.
+fn is_named_and_closed(physics: &str, effect: &str, times_smaller: f64) -> Value {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     hide(folder, physics, 1.0);
@@ -174,6 +174,7 @@ fn is_named_and_closed(physics: &str, effect: &str, times_smaller: f64) {
         without > times_smaller * grown,
         "{physics}: {without} counts without, {grown} with the grown model"
     );
+    found
 }
 
 #[test]
@@ -184,6 +185,24 @@ fn a_relaxing_covering_is_named_and_the_grown_model_closes_the_gap_on_a_new_run(
 #[test]
 fn a_sloping_surface_is_named_and_the_grown_model_closes_the_gap_on_a_new_run() {
     is_named_and_closed("sloping-surface", "surface-tilt", 2.0);
+}
+
+#[test]
+fn dead_elements_are_named_with_calibrates_evidence_and_the_grown_model_closes_the_gap_on_a_new_run() {
+    let found = is_named_and_closed("dead-element", "miswired", 3.0);
+    let faulty = found["faulty"].as_array().unwrap();
+    let dead: Vec<&Value> = faulty.iter().map(|one| &one["element"]).collect();
+    let terms = found["steps"][0]["terms"].as_array().unwrap();
+    let named: Vec<f64> = terms.iter().map(|term| term["element"]["value"].as_f64().unwrap()).collect();
+    assert!(
+        !dead.is_empty() && dead.iter().map(|one| one.as_f64().unwrap()).eq(named),
+        "{faulty:?}, {terms:?}"
+    );
+    assert!(faulty.iter().all(|one| one["kind"]["kind"] == "dead"), "{faulty:?}");
+    assert!(
+        faulty[0]["evidence"].as_str().unwrap().contains("where the median element rises by"),
+        "{faulty:?}"
+    );
 }
 
 #[test]

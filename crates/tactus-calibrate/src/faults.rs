@@ -17,9 +17,9 @@
 //! g = sum p r / sum p^2        se^2 = sum (r - g p)^2 / (n - 1) / sum p^2
 //! ```
 //!
-//! It is dead if `|g| + 3 se` is below a twentieth of the strong elements' slope. The greatest rise of many presses would not do:
-//! it grows with their number, also in noise. The error comes from the scatter between presses, because the noise within a
-//! press may be correlated.
+//! It is dead if `|g| + 3 se` is below a twentieth of the median slope of the elements that respond. The greatest rise of many
+//! presses would not do: it grows with their number, also in noise. The error comes from the scatter between presses, because
+//! the noise within a press may be correlated.
 //!
 //! # Source
 //! Paper, Sec. 2.2: two elements "responded to a stimulus of one adjacent element, but not to the element itself".
@@ -28,7 +28,7 @@ use serde::Serialize;
 use tactus_model::{Contact, Covering};
 
 use crate::{
-    order::{median, quantile},
+    order::median,
     placement::{Declared, across, goes_across},
     readings::{Readings, distinct_places},
     registration::SensorPose,
@@ -44,11 +44,11 @@ const PRESSED: f64 = 0.85;
 const FELT: f64 = 0.3;
 /// Presses needed for a slope.
 const SLOPE_PRESSES_LEAST: usize = 3;
-/// A dead element's slope is less than this share of the strong elements'.
+/// A dead element's slope is less than this share of the median of those that respond.
 const DEAD_SHARE: f64 = 0.05;
 /// Standard errors by which a slope must be on one side of a limit.
 const CERTAIN_Z: f64 = 3.0;
-/// If less than a tenth of the elements have slopes of more than this many standard errors, nothing is felt and none is judged.
+/// An element responds if its slope is more than this many standard errors. If less than a tenth do, none is judged.
 const FELT_Z: f64 = 5.0;
 /// Likeness is the cosine between readings and prediction; another element's must exceed the element's own by this.
 const STRANGER: f64 = 0.02;
@@ -168,8 +168,8 @@ struct Trials {
     places_mm: Vec<[f64; 2]>,
     /// Greatest predicted indentation of each element, as a share of that from the same press at its centre.
     reach: Vec<f64>,
-    /// 90th percentile of the slopes of pressed elements, which dead ones hardly influence; `None` if it is not above their errors.
-    strong_counts_per_mm: Option<f64>,
+    /// Median slope of the elements that respond; `None` if hardly any does.
+    typical_counts_per_mm: Option<f64>,
     /// True if the presses go across the sensor: in one patch all elements rise and fall alike.
     across: bool,
 }
@@ -197,7 +197,7 @@ impl Trials {
             rises: Vec::new(),
             places_mm: Vec::new(),
             reach: vec![0.0; readings.elements],
-            strong_counts_per_mm: None,
+            typical_counts_per_mm: None,
             across: false,
         };
         let Ok(model) = declared.unit_model(place.sigma_mm) else { return trials };
@@ -226,34 +226,35 @@ impl Trials {
             trials.centred_mm.push(centred_mm[0]);
             trials.places_mm.push(press.place_mm);
         }
-        trials.strong_counts_per_mm = trials.strong_counts_per_mm();
+        trials.typical_counts_per_mm = trials.typical_counts_per_mm();
         trials.across = goes_across(declared, across(declared, readings).into_iter());
         trials
     }
 
-    fn strong_counts_per_mm(&self) -> Option<f64> {
+    fn typical_counts_per_mm(&self) -> Option<f64> {
         let pressed = (0..self.reach.len()).filter(|element| self.reach[*element] >= PRESSED);
         let slopes: Vec<Slope> = pressed.filter_map(|element| self.slope(element, element)).collect();
-        let felt = slopes.iter().filter(|slope| slope.counts_per_mm.abs() > FELT_Z * slope.standard_error);
-        let felt = 10 * felt.count() >= slopes.len();
-        quantile(slopes.iter().map(|slope| slope.counts_per_mm.abs()), 0.9).filter(|_| felt)
+        let sizes = slopes.iter().map(|slope| (slope.counts_per_mm.abs(), slope.standard_error));
+        let felt = sizes.filter(|(size, standard_error)| *size > FELT_Z * standard_error);
+        let felt: Vec<f64> = felt.map(|(size, _)| size).collect();
+        median(felt.iter().copied()).filter(|_| 10 * felt.len() >= slopes.len())
     }
 
     fn health(&self, element: usize) -> ElementHealth {
         // If no element rises, the presses are too light to judge by, or every element is dead.
-        let Some(strong) = self.strong_counts_per_mm.filter(|_| self.reach[element] >= PRESSED) else {
+        let Some(typical) = self.typical_counts_per_mm.filter(|_| self.reach[element] >= PRESSED) else {
             return ElementHealth::Unknown;
         };
         let Some(slope) = self.slope(element, element) else { return ElementHealth::Unknown };
         // First, because an element that gives a distant one's signal does not feel presses on itself either.
-        if let Some(fault) = self.cross_wired(element, strong) {
+        if let Some(fault) = self.cross_wired(element, typical) {
             return fault;
         }
         let Slope { counts_per_mm, standard_error, presses } = slope;
-        if counts_per_mm.abs() + CERTAIN_Z * standard_error < DEAD_SHARE * strong {
+        if counts_per_mm.abs() + CERTAIN_Z * standard_error < DEAD_SHARE * typical {
             let evidence = format!(
                 "rises by {counts_per_mm:.1} +- {standard_error:.1} counts per mm of predicted indentation over {presses} presses, \
-                 where strong elements rise by {strong:.0}"
+                 where the median element rises by {typical:.0}"
             );
             return ElementHealth::Faulty(FaultKind::Dead, evidence);
         }
@@ -261,7 +262,7 @@ impl Trials {
     }
 
     /// The fault of an element whose readings follow the prediction for another element.
-    fn cross_wired(&self, element: usize, strong_counts_per_mm: f64) -> Option<ElementHealth> {
+    fn cross_wired(&self, element: usize, typical_counts_per_mm: f64) -> Option<ElementHealth> {
         if !self.across || distinct(&self.places_mm) < WIRING_PLACES_LEAST {
             return None;
         }
@@ -272,7 +273,7 @@ impl Trials {
         let is_liker = other != element && likeness > own + STRANGER && 1.0 - likeness < (1.0 - own) / 4.0;
         // The likeness must come from a signal, not from noise.
         let rises = |slope: Slope| {
-            slope.counts_per_mm.abs() - CERTAIN_Z * slope.standard_error > DEAD_SHARE * strong_counts_per_mm
+            slope.counts_per_mm.abs() - CERTAIN_Z * slope.standard_error > DEAD_SHARE * typical_counts_per_mm
         };
         (is_liker && self.slope(element, other).is_some_and(rises)).then(|| {
             let evidence = format!(

@@ -60,6 +60,16 @@ fn more_than_a_tenth_cannot_be_cross_wired() {
 }
 
 #[test]
+fn a_sensor_that_lies_a_pitch_aside_has_no_cross_wired_element() {
+    let frames = measured(&known(), &[], &noise(8));
+    let mut aside = known();
+    aside.registration.origin_mm = [2.0, 0.0];
+    let noise = Noise::of_differences(&frames, aside.array.step_counts());
+    let faulty = Faulty::of(&aside, &frames, &noise).unwrap();
+    assert_eq!((faulty.elements.len(), faulty.terms.len()), (0, 0), "{:?}", faulty.elements);
+}
+
+#[test]
 fn an_element_that_the_model_rewires_is_not_rewired_again() {
     let known = Known { effects: vec![miswired(18, 19, 1.0), miswired(5, 5, 0.0)], ..known() };
     let dead = |element| FaultyElement { element, kind: FaultKind::Dead, evidence: String::new() };
