@@ -123,7 +123,8 @@ fn trial(bench: &mut Bench, part: Part, after: Duration) -> Shown {
             run = Some((bench.run(PRESS), Instant::now()));
             until(bench, part)
         };
-        confirmed_mm = (0..RUNS_MAX).find_map(until_part).expect("a run comes to each part");
+        confirmed_mm = (0..RUNS_MAX).find_map(until_part);
+        assert!(confirmed_mm.is_some(), "no run came to {part:?}");
     }
     // A report of a stage that stands still is a confirmation.
     bench.stage.watch(Instant::now() + after, |_, seen| {
@@ -179,9 +180,10 @@ fn trial(bench: &mut Bench, part: Part, after: Duration) -> Shown {
     Shown { part, deeper_mm, lost_ms }
 }
 
-/// Waits until a part of the run begins; returns the height that was last confirmed. `None` if the run ends before.
-fn until(bench: &Bench, part: Part) -> Option<Option<f64>> {
-    let (mut has_pressed, mut confirmed_mm) = (false, None);
+/// Waits until a part of the run begins; returns the height that was last confirmed, infinite if none was. `None` if the run
+/// ends before.
+fn until(bench: &Bench, part: Part) -> Option<f64> {
+    let (mut has_pressed, mut confirmed_mm) = (false, f64::INFINITY);
     let is_over = || {
         let state = bench.command(Command::Status).state;
         state.is_some_and(|state| state.phase() == pb::RunPhase::Finished)
@@ -190,7 +192,7 @@ fn until(bench: &Bench, part: Part) -> Option<Option<f64>> {
         let Seen::Report { state, z_mm } = seen else { return None };
         if state == "Idle" {
             has_pressed |= *z_mm < -0.29;
-            confirmed_mm = Some(*z_mm);
+            confirmed_mm = *z_mm;
         }
         let begins = match part {
             Part::Homing => true,
