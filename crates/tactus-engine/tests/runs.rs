@@ -540,7 +540,7 @@ async fn an_alarm_in_a_long_dwell_ends_it_at_once_and_is_named() {
     let run = start(&bench, &HOLD.replace("60.0", "600.0"), &memory);
     until_deep(&mut bench, 0.3).await;
     sleep(Duration::from_secs(10)).await;
-    bench.trouble.lock().unwrap().alarm = true;
+    bench.trouble.lock().unwrap().alarm = Some(1);
     let outcome = timeout(Duration::from_secs(2), run).await.unwrap().unwrap();
     assert_eq!((outcome.exit_status, outcome.dwells), (ExitStatus::Failed, 0), "{outcome:?}");
     assert!(outcome.message.contains("alarm 1: hard limit"), "{}", outcome.message);

@@ -28,8 +28,8 @@ pub(crate) struct Trouble {
     pub(crate) look_panics: bool,
     /// Epoch of the stage's position.
     pub(crate) epoch: u32,
-    /// The stage is in alarm.
-    pub(crate) alarm: bool,
+    /// Number of the stage's alarm, if it is in one.
+    pub(crate) alarm: Option<u32>,
     /// The driver panics instead of giving a frame.
     pub(crate) panics: bool,
     /// Counts on top of all elements.
@@ -146,7 +146,7 @@ impl FakeStage {
             let alarm = self.trouble.lock().unwrap().alarm;
             self.state.send_modify(|state| {
                 (state.t_mono_ns, state.t_wall_ns) = (now.mono.ns(), now.wall.ns());
-                if alarm {
+                if alarm.is_some() {
                     state.set_status(pb::StageStatus::Alarm);
                 }
             });
@@ -209,8 +209,8 @@ impl Stage for FakeStage {
             if let Some(why) = self.trouble.lock().unwrap().absent {
                 return Err(StageError::Refused { command: "?".into(), reason: why.into() });
             }
-            if self.trouble.lock().unwrap().alarm {
-                return Err(StageError::Alarm { code: 1, name: "1".into(), meaning: "hard limit".into() });
+            if let Some(code) = self.trouble.lock().unwrap().alarm {
+                return Err(StageError::Alarm { code, name: code.to_string(), meaning: "hard limit".into() });
             }
             let at_mm = self.position_mm();
             let panics = at_mm[2] < 0.0 && std::mem::take(&mut self.trouble.lock().unwrap().look_panics);
