@@ -53,7 +53,8 @@ struct Got {
 /// A line of the table.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
-    resident_kib: u64,
+    /// The service's own memory, without the pages of its program's file, which come as they are used.
+    anonymous_kib: u64,
     sent: u64,
     received: u64,
     lost: u64,
@@ -81,7 +82,7 @@ fn memory_frames_and_clock_hold_as_long_as_the_service_runs() {
 
     println!(
         "{:>8}{:>14}{:>10}{:>10}{:>8}{:>12}{:>10}{:>10}{:>8}",
-        "minutes", "resident KiB", "sent", "received", "lost", "subscriber", "missing", "drift ms", "runs"
+        "minutes", "memory KiB", "sent", "received", "lost", "subscriber", "missing", "drift ms", "runs"
     );
     let unseen = unseen(&mut bench);
     let begin = Instant::now();
@@ -121,14 +122,14 @@ fn memory_frames_and_clock_hold_as_long_as_the_service_runs() {
     println!(
         "clock: the service tells an uncertainty of {:.1} ms; {resets} resets; grown by {} KiB since minute {:.0}",
         health.clock_uncertainty_s.unwrap_or_default() * 1e3,
-        last.resident_kib.saturating_sub(warm.resident_kib),
+        last.anonymous_kib.saturating_sub(warm.anonymous_kib),
         WARM.min(whole).as_secs_f64() / 60.0,
     );
     // What the clocks drift apart, the service tells as uncertainty.
     let drift_s = last.drift_ms().abs() * 1e-3;
     assert!(drift_s <= health.clock_uncertainty_s.unwrap() + 1e-3, "{drift_s} s of drift; {health:?}");
     if hours.is_some() {
-        let grown = last.resident_kib.saturating_sub(warm.resident_kib);
+        let grown = last.anonymous_kib.saturating_sub(warm.anonymous_kib);
         assert!(grown < GROWTH_MAX_KIB, "{grown} KiB more than after {WARM:?}");
     }
 }
@@ -165,7 +166,7 @@ impl Sample {
         println!(
             "{:>8.1}{:>14}{:>10}{:>10}{:>8}{:>12}{:>10}{:>10.1}{:>8}",
             elapsed.as_secs_f64() / 60.0,
-            self.resident_kib,
+            self.anonymous_kib,
             self.sent - first.sent,
             self.received - first.received,
             self.lost - first.lost,
@@ -179,7 +180,7 @@ impl Sample {
 
 fn sample(bench: &mut Bench, got: &Mutex<Got>, runs: u64) -> Sample {
     let status = fs::read_to_string(format!("/proc/{}/status", bench.daemon().id())).unwrap();
-    let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+    let anonymous = status.lines().find_map(|line| line.strip_prefix("RssAnon:")).unwrap();
     let reply = bench.until("an answer", |_| true);
     let sent = bench.sent().frames;
     let health = reply.health.unwrap();
@@ -192,7 +193,7 @@ fn sample(bench: &mut Bench, got: &Mutex<Got>, runs: u64) -> Sample {
         now
     };
     Sample {
-        resident_kib: resident.trim().trim_end_matches(" kB").parse().unwrap(),
+        anonymous_kib: anonymous.trim().trim_end_matches(" kB").parse().unwrap(),
         sent,
         received: health.frames,
         lost: health.frames_lost,
