@@ -39,6 +39,9 @@ const STEP_MM: f64 = 0.1;
 /// The stage's own resolution and tolerance.
 const TOLERANCE_MM: f64 = 0.006;
 
+/// Bytes that were sent just before the kill reach the stage within this time, and it begins to move.
+const UNDER_WAY: Duration = Duration::from_millis(500);
+
 /// What a killed service may lose of its recording.
 const LOSS_MAX_MS: u32 = 1000;
 
@@ -150,6 +153,7 @@ fn trial(bench: &mut Bench, part: Part, after: Duration) -> Shown {
         }
     });
 
+    bench.stage.pass(UNDER_WAY);
     let rest = bench.truth_at_rest();
     let rest_mm = rest["z_mm"].as_f64().unwrap();
     let (from_mm, allowed_mm) = match (part, confirmed_mm) {
