@@ -45,6 +45,7 @@ impl Problem<'_> {
     fn blocks_of(&self, predicted: &[f64], among: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
         let bins = self.predictor.bins;
         let elements = bins.elements;
+        let weighed = self.weighed_elements();
         let mut blocks = vec![[0.0; 2]; bins.blocks];
         let of_bins = bins.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
         for (bin, (counts, predicted)) in of_bins.filter(|(bin, _)| among(*bin)) {
@@ -52,9 +53,14 @@ impl Problem<'_> {
             let sum: f64 = squares.map(|((counts, of), weight)| weight * (counts - of).powi(2)).sum();
             let [total, readings] = &mut blocks[bins.block[bin]];
             *total += bins.weight[bin] * sum;
-            *readings += if bins.weight[bin] > 0.0 { elements as f64 } else { 0.0 };
+            *readings += if bins.weight[bin] > 0.0 { weighed } else { 0.0 };
         }
         blocks
+    }
+
+    /// Number of elements with weight: faulty ones have none.
+    fn weighed_elements(&self) -> f64 {
+        self.element_weight.iter().filter(|weight| **weight > 0.0).count() as f64
     }
 
     /// By how much `more` is nearer to the held-out bins than `less`, block by block.
@@ -93,7 +99,7 @@ impl Problem<'_> {
         (squares > 0.0).then(|| [share, scatter.sqrt() / squares])
     }
 
-    /// Root mean square of the residuals of the held-out bins, each weighted by its number of frames.
+    /// Root mean square of the residuals of the elements with weight in the held-out bins, each weighted by its number of frames.
     pub(crate) fn heldout_rms_counts(&self, predicted: &[f64]) -> f64 {
         let bins = self.predictor.bins;
         let elements = bins.elements;
@@ -101,9 +107,10 @@ impl Problem<'_> {
         let of_bins = bins.counts.chunks_exact(elements).zip(predicted.chunks_exact(elements)).enumerate();
         for (bin, (counts, predicted)) in of_bins.filter(|(bin, _)| bins.heldout[*bin]) {
             let frames = bins.frames_in(bin) as f64;
-            sum +=
-                frames * counts.iter().zip(predicted).map(|(counts, of)| (counts - of).powi(2)).sum::<f64>();
-            readings += frames * elements as f64;
+            let readings_of = counts.iter().zip(predicted).zip(&self.element_weight);
+            let weighed = readings_of.filter(|(_, weight)| **weight > 0.0);
+            sum += frames * weighed.map(|((counts, of), _)| (counts - of).powi(2)).sum::<f64>();
+            readings += frames * self.weighed_elements();
         }
         if readings > 0.0 { (sum / readings).sqrt() } else { 0.0 }
     }
@@ -126,9 +133,8 @@ impl Problem<'_> {
         for (bin, (counts, predicted)) in of_bins.filter(|(bin, _)| bins.weight[*bin] > 0.0) {
             held[usize::from(bins.heldout[bin])] += 1.0;
             let baseline = &at.parameters.baseline[bins.run[bin]];
-            for (((counts, of), weight), baseline) in
-                counts.iter().zip(predicted).zip(&self.element_weight).zip(baseline)
-            {
+            let of_elements = counts.iter().zip(predicted).zip(&self.element_weight).zip(baseline);
+            for (((counts, of), weight), baseline) in of_elements.filter(|((_, weight), _)| **weight > 0.0) {
                 let signal = (of - baseline).abs() * weight.sqrt();
                 let square = bins.weight[bin] * weight * (counts - of).powi(2);
                 let [sum, readings] = if signal > LOUD {
