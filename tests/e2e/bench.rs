@@ -26,8 +26,9 @@ pub(crate) const RIG: &str = "bench";
 /// Time between two questions about a state that nobody announces.
 const AGAIN: Duration = Duration::from_millis(20);
 
-/// A machine without time for devices and service lets resets fail.
+/// A machine without time for devices and service lets resets fail, and ends runs.
 const RESETS_MAX: usize = 4;
+pub(crate) const RUNS_MAX: usize = 4;
 
 /// How often the tests of this kind repeat each of their trials: `TACTUS_TRIALS`.
 pub(crate) fn trials() -> Option<usize> {
@@ -253,6 +254,29 @@ impl Bench {
         PathBuf::from(reply.state.unwrap().recording)
     }
 
+    /// Starts a run, and waits until the controller stands idle, deeper than this. A run that ends before is begun again: a
+    /// machine without time for the frames makes the supervisor stop it.
+    pub(crate) fn run_until_below(&self, script: &str, limit_mm: f64) {
+        for _ in 0..RUNS_MAX {
+            self.run(script);
+            let idle_below = |_, seen: &Seen| match seen {
+                Seen::Report { state, z_mm } => (state == "Idle" && *z_mm < limit_mm).then_some(()),
+                Seen::Stop | Seen::Home => None,
+            };
+            if self.stage.unless(|| self.is_finished(), idle_below).is_some() {
+                return;
+            }
+            self.reset();
+        }
+        panic!("no run came below {limit_mm} mm");
+    }
+
+    /// True if the last run has ended.
+    pub(crate) fn is_finished(&self) -> bool {
+        let state = self.command(Command::Status).state;
+        state.is_some_and(|state| state.phase() == pb::RunPhase::Finished)
+    }
+
     /// Starts a run, if the service lets it.
     pub(crate) fn try_run(&self, script: &str) -> pb::CommandReply {
         let (client, held) = self.commander.as_ref().expect("who commands");
@@ -402,14 +426,6 @@ impl StageLine {
             }
         }
         panic!("never on the line, and never over");
-    }
-
-    /// Waits until the controller stands idle, deeper than this.
-    pub(crate) fn until_idle_below(&self, limit_mm: f64) {
-        self.until("idle in the covering", |_, seen| match seen {
-            Seen::Report { state, z_mm } => (state == "Idle" && *z_mm < limit_mm).then_some(()),
-            Seen::Stop | Seen::Home => None,
-        });
     }
 
     /// Looks at the line for so long.

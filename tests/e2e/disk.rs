@@ -29,8 +29,7 @@ fn a_disk_that_hangs_fails_the_run_and_neither_stops_nor_ends_the_service() {
     };
     let mut bench = Bench::start(Options { recordings: Some(disk.path.clone()), ..Options::default() });
     bench.reset();
-    bench.run(HOLD);
-    bench.stage.until_idle_below(-0.15);
+    bench.run_until_below(HOLD, -0.15);
     disk.hang();
     let reply = bench.until("the run has failed", |reply| {
         reply.state.as_ref().is_some_and(|state| state.phase() == pb::RunPhase::Finished)

@@ -22,13 +22,10 @@ use tactus_record::{Entry, Message};
 use tactus_schema::key::Command;
 use tactus_schema::pb::{self, run_event::Event};
 
-use crate::bench::{Bench, Options, Seen, number, trials};
+use crate::bench::{Bench, Options, RUNS_MAX, Seen, number, trials};
 
 /// One press, slow enough that its parts can be told apart.
 const PRESS: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 0.3)\n";
-
-/// Runs or resets for one kill, if they end before the part in which it is to be.
-const RUNS_MAX: usize = 4;
 
 /// Below this height the way down goes in steps that are confirmed one by one.
 const APPROACH_HEIGHT_MM: f64 = 0.3;
@@ -191,26 +188,25 @@ fn trial(bench: &mut Bench, part: Part, after: Duration) -> Shown {
 /// ends before.
 fn until(bench: &Bench, part: Part) -> Option<f64> {
     let (mut has_pressed, mut confirmed_mm) = (false, f64::INFINITY);
-    let is_over = || {
-        let state = bench.command(Command::Status).state;
-        state.is_some_and(|state| state.phase() == pb::RunPhase::Finished)
-    };
-    bench.stage.unless(is_over, |_, seen| {
-        let Seen::Report { state, z_mm } = seen else { return None };
-        if state == "Idle" {
-            has_pressed |= *z_mm < -0.29;
-            confirmed_mm = *z_mm;
-        }
-        let begins = match part {
-            Part::Homing => true,
-            Part::Approach => *z_mm < 1.99,
-            Part::Loading => *z_mm < APPROACH_HEIGHT_MM - 0.01,
-            Part::Dwell => has_pressed,
-            Part::Retract => has_pressed && *z_mm > -0.28,
-            Part::Closing => has_pressed && *z_mm > 1.9,
-        };
-        begins.then_some(confirmed_mm)
-    })
+    bench.stage.unless(
+        || bench.is_finished(),
+        |_, seen| {
+            let Seen::Report { state, z_mm } = seen else { return None };
+            if state == "Idle" {
+                has_pressed |= *z_mm < -0.29;
+                confirmed_mm = *z_mm;
+            }
+            let begins = match part {
+                Part::Homing => true,
+                Part::Approach => *z_mm < 1.99,
+                Part::Loading => *z_mm < APPROACH_HEIGHT_MM - 0.01,
+                Part::Dwell => has_pressed,
+                Part::Retract => has_pressed && *z_mm > -0.28,
+                Part::Closing => has_pressed && *z_mm > 1.9,
+            };
+            begins.then_some(confirmed_mm)
+        },
+    )
 }
 
 /// How much of what the sensor had sent at the kill the recording lacks, in ms; `None` if the run was over and the recording

@@ -259,8 +259,7 @@ impl Scene {
             | Condition::Rogue
             | Condition::OneCore
             | Condition::HungDisk => {
-                self.bench.run(HOLD);
-                self.bench.stage.until_idle_below(-0.15);
+                self.bench.run_until_below(HOLD, -0.15);
             }
         }
         if self.condition == Condition::Connections {

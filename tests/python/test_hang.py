@@ -6,6 +6,7 @@ import os
 import pathlib
 import socket
 import subprocess
+import time
 
 import pytest
 from lab import Lab, binary, tactus
@@ -57,20 +58,27 @@ class WatchedLab(Lab):
     def start(self, name, *args):
         return super().start(name, *args, NOTIFY_SOCKET=str(self.folder / "notify.sock"), WATCHDOG_USEC="2000000")
 
-    def begin(self, script):
-        """Starts a run, without waiting for its end."""
+    def run_until(self, script, is_it):
+        """Starts a run and returns it once the rig's true state is so. A run that a busy machine ends before is begun again."""
         (self.folder / "script.star").write_text(script)
-        return subprocess.Popen(
-            [binary("tactus"), "--endpoint", self.endpoint, "run", "script.star", "--no-report"],
-            cwd=self.folder,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        for _ in range(4):
+            client = subprocess.Popen(
+                [binary("tactus"), "--endpoint", self.endpoint, "run", "script.star", "--no-report"],
+                cwd=self.folder,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+            while client.poll() is None:
+                if is_it(self.mock.truth()):
+                    return client
+            tactus("--endpoint", self.endpoint, "reset")
+        raise AssertionError("no run came so far")
 
     def wait_for_the_truth(self, is_it):
-        """Asks for the rig's true state until it is so."""
+        """Asks for the rig's true state until it is so; only a hang takes a minute."""
+        deadline = time.monotonic() + 60
         while not is_it(truth := self.mock.truth()):
-            pass
+            assert time.monotonic() < deadline, truth
         return truth
 
     def wait_until_the_watchdog_is_told(self, text):
@@ -97,8 +105,7 @@ def watched(tmp_path):
 
 
 def test_a_recorder_that_hangs_fails_the_run_with_the_tip_up(watched):
-    client = watched.begin(HOLD)
-    watched.wait_for_the_truth(lambda truth: truth["depth_mm"] > 0.19 and not truth["moving"])
+    client = watched.run_until(HOLD, lambda truth: truth["depth_mm"] > 0.19 and not truth["moving"])
     with hanging(watched.daemon.process, "recorder"):
         watched.drain_the_watchdog()
         watched.daemon.wait_for("does not go on")
@@ -110,13 +117,12 @@ def test_a_recorder_that_hangs_fails_the_run_with_the_tip_up(watched):
 
 
 def test_a_runtime_that_hangs_in_a_step_down_stops_the_stage_within_the_step(watched):
-    client = watched.begin(SLOW)
-    before = watched.wait_for_the_truth(lambda truth: 0.11 < truth["depth_mm"] and truth["moving"])
+    client = watched.run_until(SLOW, lambda truth: 0.11 < truth["depth_mm"] < 0.13 and truth["moving"])
     with hanging(watched.daemon.process, "tokio-r"):
         watched.drain_the_watchdog()
         rest = watched.wait_for_the_truth(lambda truth: not truth["moving"])
-        # A fifth of a step takes 0.4 s; the guard needs 0.1 s.
-        assert rest["depth_mm"] < before["depth_mm"] + 0.02
+        # The step would end at 0.2 mm, more than a second later.
+        assert rest["depth_mm"] < 0.19
         watched.watchdog.settimeout(3)
         with pytest.raises(TimeoutError):
             # What was on its way.
