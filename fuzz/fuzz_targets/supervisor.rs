@@ -242,7 +242,12 @@ impl Play {
             bad_elements: bad.into(),
         };
         let violation = self.supervisor.on_frame(&frame);
-        self.frame = Some(received);
+        let is_read = |element: usize| !bad.iter().any(|bad| *bad as usize == element);
+        let unwatched = &self.service.envelope.unwatched_elements;
+        // A frame that reads no watched element shows no load: it is none.
+        if (0..counts.len()).any(|e| counts[e].is_finite() && is_read(e) && !unwatched.contains(&e)) {
+            self.frame = Some(received);
+        }
         self.z_at_frame_mm = self.z_mm;
         self.told(violation.as_ref());
         // Without a zero each element is held against the rig file's baseline.
