@@ -27,8 +27,7 @@ pub(crate) const RIG: &str = "bench";
 const AGAIN: Duration = Duration::from_millis(20);
 
 /// A machine without time for devices and service lets resets fail, and ends runs.
-const RESETS_MAX: usize = 4;
-pub(crate) const RUNS_MAX: usize = 4;
+pub(crate) const TRIES_MAX: usize = 4;
 
 /// How often the tests of this kind repeat each of their trials: `TACTUS_TRIALS`.
 pub(crate) fn trials() -> Option<usize> {
@@ -237,7 +236,7 @@ impl Bench {
     /// Clears the fault and homes, as a person does: on a busy machine not always at once.
     pub(crate) fn reset(&self) {
         let mut said = Vec::new();
-        for _ in 0..RESETS_MAX {
+        for _ in 0..TRIES_MAX {
             let reply = self.command(Command::Reset);
             if reply.ok {
                 return;
@@ -257,7 +256,7 @@ impl Bench {
     /// Starts a run, and waits until the controller stands idle, deeper than this. A run that ends before is begun again: a
     /// machine without time for the frames makes the supervisor stop it.
     pub(crate) fn run_until_below(&self, script: &str, limit_mm: f64) {
-        for _ in 0..RUNS_MAX {
+        for _ in 0..TRIES_MAX {
             self.run(script);
             let idle_below = |_, seen: &Seen| match seen {
                 Seen::Report { state, z_mm } => (state == "Idle" && *z_mm < limit_mm).then_some(()),
@@ -395,18 +394,11 @@ impl StageLine {
     }
 
     /// Waits for something on the line.
-    pub(crate) fn until<T>(&self, what: &str, mut pick: impl FnMut(Instant, &Seen) -> Option<T>) -> T {
-        let deadline = Instant::now() + DEADLINE;
-        loop {
-            let left = deadline.saturating_duration_since(Instant::now());
-            let Ok((at, seen)) = self.seen.recv_timeout(left) else { panic!("never on the line: {what}") };
-            if let Some(picked) = pick(at, &seen) {
-                return picked;
-            }
-        }
+    pub(crate) fn until<T>(&self, what: &str, pick: impl FnMut(Instant, &Seen) -> Option<T>) -> T {
+        self.unless(|| false, pick).unwrap_or_else(|| panic!("never on the line: {what}"))
     }
 
-    /// As [`Self::until`]; `None` if it `is_over`, which is asked once a second.
+    /// As [`Self::until`]; `None` if it `is_over`, which is asked once a second, or if only a hang takes so long.
     pub(crate) fn unless<T>(
         &self,
         is_over: impl Fn() -> bool,
@@ -417,15 +409,16 @@ impl StageLine {
             let look = Instant::now() + Duration::from_secs(1);
             while let Ok((at, seen)) = self.seen.recv_timeout(look.saturating_duration_since(Instant::now()))
             {
-                if let Some(picked) = pick(at, &seen) {
-                    return Some(picked);
+                let picked = pick(at, &seen);
+                if picked.is_some() {
+                    return picked;
                 }
             }
             if is_over() {
                 return None;
             }
         }
-        panic!("never on the line, and never over");
+        None
     }
 
     /// Looks at the line for so long.
@@ -444,6 +437,15 @@ impl StageLine {
     pub(crate) fn forget(&self) {
         while self.seen.try_recv().is_ok() {}
     }
+}
+
+/// A plain client of the bus.
+pub(crate) async fn raw_session(endpoint: &str) -> zenoh::Session {
+    let mut config = zenoh::Config::default();
+    config.insert_json5("mode", "\"client\"").unwrap();
+    config.insert_json5("scouting/multicast/enabled", "false").unwrap();
+    config.insert_json5("connect/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
+    zenoh::open(config).await.unwrap()
 }
 
 /// A controller's report, `<Idle|MPos:1.000,2.000,-0.300|...>`.

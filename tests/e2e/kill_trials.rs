@@ -22,7 +22,7 @@ use tactus_record::{Entry, Message};
 use tactus_schema::key::Command;
 use tactus_schema::pb::{self, run_event::Event};
 
-use crate::bench::{Bench, Options, RUNS_MAX, Seen, number, trials};
+use crate::bench::{Bench, Options, Seen, TRIES_MAX, number, trials};
 
 /// One press, slow enough that its parts can be told apart.
 const PRESS: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.3], dwell_s = 0.3)\n";
@@ -117,7 +117,7 @@ fn trial(bench: &mut Bench, part: Part, after: Duration) -> Shown {
             let homes = |_, seen: &Seen| matches!(seen, Seen::Home).then_some(());
             bench.stage.unless(|| resetting.is_finished(), homes)
         };
-        assert!((0..RUNS_MAX).find_map(until_homing).is_some(), "no reset came to homing");
+        assert!((0..TRIES_MAX).find_map(until_homing).is_some(), "no reset came to homing");
     } else {
         // A machine without time for the frames lets the supervisor end the run before that part.
         let until_part = |_| {
@@ -126,7 +126,7 @@ fn trial(bench: &mut Bench, part: Part, after: Duration) -> Shown {
             run = Some((bench.run(PRESS), Instant::now()));
             until(bench, part)
         };
-        confirmed_mm = (0..RUNS_MAX).find_map(until_part);
+        confirmed_mm = (0..TRIES_MAX).find_map(until_part);
         assert!(confirmed_mm.is_some(), "no run came to {part:?}");
     }
     // A report of a stage that stands still is a confirmation.

@@ -26,7 +26,7 @@ use tactus_schema::key::Command;
 use tactus_schema::pb;
 use tokio::task::JoinHandle;
 
-use crate::bench::{Bench, Options, Seen, trials};
+use crate::bench::{Bench, Options, Seen, raw_session, trials};
 use crate::disk::Disk;
 
 const HOLD: &str = "def run(rig):\n    tare()\n    press(5.0, 5.0, depths_mm = [0.2], dwell_s = 600.0)\n";
@@ -208,10 +208,10 @@ impl Scene {
         });
         let dashboard = Dashboard::start(&bench, condition != Condition::NoSensor);
         let relay = Relay::to(&bench.endpoint);
-        let session = bench.runtime.block_on(session(&bench.endpoint));
+        let session = bench.runtime.block_on(raw_session(&bench.endpoint));
         let rogue = (condition == Condition::Rogue).then(|| {
             bench.runtime.block_on(async {
-                let rogue = self::session(&bench.endpoint).await;
+                let rogue = raw_session(&bench.endpoint).await;
                 for key in ["tactus/stop", "tactus/bench/cmd/stop", "tactus/**"] {
                     rogue.declare_queryable(key).callback(drop).background().await.unwrap();
                 }
@@ -319,7 +319,7 @@ impl Scene {
             assert_eq!(code, Some(0), "{said}");
             self.resetting = None;
             self.bench.restart();
-            self.session = self.bench.runtime.block_on(session(&self.bench.endpoint));
+            self.session = self.bench.runtime.block_on(raw_session(&self.bench.endpoint));
             self.make_ready();
             return;
         }
@@ -343,15 +343,6 @@ impl Drop for Scene {
             drop(self.bench.runtime.block_on(async { session.close().await }));
         }
     }
-}
-
-/// A plain client of the bus.
-pub(crate) async fn session(endpoint: &str) -> zenoh::Session {
-    let mut config = zenoh::Config::default();
-    config.insert_json5("mode", "\"client\"").unwrap();
-    config.insert_json5("scouting/multicast/enabled", "false").unwrap();
-    config.insert_json5("connect/endpoints", &format!("[\"{endpoint}\"]")).unwrap();
-    zenoh::open(config).await.unwrap()
 }
 
 /// Opens connections that ask nothing, as many as are wanted and still missing.

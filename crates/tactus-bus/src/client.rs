@@ -12,7 +12,7 @@ use tokio::{
     time::{Instant, timeout, timeout_at},
 };
 use zenoh::{
-    Session,
+    Session, Wait,
     handlers::FifoChannelHandler,
     qos::{CongestionControl, Priority},
     query::{ConsolidationMode, QueryTarget, Reply},
@@ -229,7 +229,11 @@ pub async fn stop(
         check_rig_name(rig)?;
     }
     let datagram = stop_by_datagram(endpoint, rig, request, patience);
-    let on_bus = stop_on_bus_apart(endpoint, rig, request, credentials, patience);
+    let on_bus = async {
+        let late = |_| Err(BusError::NoAnswer { key: STOP_EVERY_RIG.to_owned(), waited: patience });
+        let stopping = stop_on_bus(endpoint, rig, request, credentials, patience);
+        timeout(patience, stopping).await.unwrap_or_else(late)
+    };
     tokio::pin!(datagram, on_bus);
     let (by_datagram, on_bus) = tokio::select! {
         answer = &mut datagram => {
@@ -269,27 +273,6 @@ fn stop_by_datagram(
     let sent =
         tokio::task::spawn_blocking(move || crate::stop::send(&endpoint, rig.as_deref(), &request, patience));
     async { sent.await.map_err(io::Error::other)? }
-}
-
-/// As [`stop_on_bus`], in a task of its own: zenoh's `open` blocks its thread until it is connected, and a service without a
-/// free connection may take seconds for that.
-async fn stop_on_bus_apart(
-    endpoint: &Endpoint,
-    rig: Option<&str>,
-    request: &pb::CommandRequest,
-    credentials: &Credentials,
-    patience: Duration,
-) -> Result<Vec<pb::CommandReply>, BusError> {
-    let (of, request, credentials) = (endpoint.clone(), request.clone(), credentials.clone());
-    let rig = rig.map(str::to_owned);
-    let asked = tokio::spawn(async move {
-        let stopping = stop_on_bus(&of, rig.as_deref(), &request, &credentials, patience);
-        let late = |_| Err(BusError::NoAnswer { key: STOP_EVERY_RIG.to_owned(), waited: patience });
-        timeout(patience, stopping).await.unwrap_or_else(late)
-    });
-    asked.await.unwrap_or_else(|panic| {
-        Err(BusError::NotStopped { endpoint: endpoint.to_string(), source: panic.into() })
-    })
 }
 
 /// Sends a stop on the bus, and waits for the answers of all services that it concerns.
@@ -355,9 +338,13 @@ fn decode(key: &str, sample: &Sample) -> Result<pb::CommandReply, BusError> {
         .map_err(|source| BusError::Answer { key: key.to_owned(), source })
 }
 
+/// Opens a session on a thread for waiting: zenoh's `open` blocks its thread until it is connected, and a service without a free
+/// connection may take seconds for that.
 async fn open(endpoint: &Endpoint, credentials: &Credentials) -> Result<Session, BusError> {
-    zenoh::open(config::client(endpoint, credentials)?)
-        .await
+    let opening = zenoh::open(config::client(endpoint, credentials)?);
+    let opened = tokio::task::spawn_blocking(move || opening.wait()).await;
+    opened
+        .unwrap_or_else(|panic| Err(panic.into()))
         .map_err(|source| BusError::Session { endpoint: endpoint.to_string(), source })
 }
 

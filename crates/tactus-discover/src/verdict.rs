@@ -150,7 +150,6 @@ pub(crate) fn conclude(
         not_shown,
         warnings,
         floor,
-        base: base_level,
         global: Some(GlobalTest { statistic: before.statistic, p_value }),
         curves: search.curves(&base, &grown)?,
         elements: of_base.elements_beside(&of_grown),
@@ -180,14 +179,14 @@ pub(crate) fn conclude(
         effects,
         grown: base_of(prepared, &grown.parameters),
         gap: before.gap,
-        ..prepared.unjudged(&of_base, options)?
+        ..prepared.unjudged(&of_base, base_level, options)?
     })
 }
 
 /// The report of data without a floor: figures of the base model in counts, no names, and what to measure next.
 pub(crate) fn cannot_judge(prepared: &Prepared<'_>, options: Options) -> Result<Discovery, DiscoverError> {
     let of_base = prepared.held(&prepared.base.parameters)?;
-    let unjudged = prepared.unjudged(&of_base, options)?;
+    let unjudged = prepared.unjudged(&of_base, prepared.level(&of_base, prepared.floor), options)?;
     Ok(Discovery { next_experiments: vec![prepared.planner().repeats()], ..unjudged })
 }
 
@@ -265,8 +264,12 @@ fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> BaseModel {
 
 impl Prepared<'_> {
     /// A report of the recalibrated base model that judges nothing.
-    fn unjudged(&self, of_base: &HeldOutResidual, options: Options) -> Result<Discovery, DiscoverError> {
-        let level = self.level(of_base, self.floor);
+    fn unjudged(
+        &self,
+        of_base: &HeldOutResidual,
+        level: Level,
+        options: Options,
+    ) -> Result<Discovery, DiscoverError> {
         let element = |rms: &f64| ElementGap { before_rms_counts: *rms, after_rms_counts: *rms };
         let recalibrated = base_of(self, &self.base.parameters);
         Ok(Discovery {
