@@ -8,28 +8,25 @@
 
 use crate::DiscoverError;
 use crate::fit::Fitted;
-use crate::predictor::Term;
-use crate::search::{FITTED_MAX, Grown, POLISH_ROUNDS, Search, TERMS_MAX};
+use crate::search::{Grown, NAMES_MAX, POLISH_ROUNDS, Search};
 
 impl Search<'_> {
     /// Grows a model as long as the criterion falls.
     pub(crate) fn grow_by_bic(&self, base: Fitted) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base);
-        for round in 0..TERMS_MAX {
+        for index in 0..=NAMES_MAX {
             let at = &grown.at;
-            let mut tried = self.round(at, round)?;
-            tried.screened.sort_by(|a, b| b.promise.total_cmp(&a.promise));
-            let wanted = tried.screened.iter().take(FITTED_MAX).filter(|one| one.promise > 0.0);
-            let starts: Vec<Term> = wanted.map(|one| one.start.clone()).collect();
-            let fits = self.fits(at, &starts, 0.0)?;
+            let pass = self.pass(at)?;
+            let mut tried = self.tested(&pass, at, index);
+            let fits = self.others(&pass, at, &[], 0.0)?;
             let best = fits
                 .into_iter()
-                .min_by(|(_, a), (_, b)| self.criterion(a).total_cmp(&self.criterion(b)))
-                .filter(|(_, best)| self.criterion(best) < self.criterion(at));
-            tried.round.taken = best.as_ref().map(|(name, _)| *name);
+                .min_by(|a, b| self.criterion(&a.fitted).total_cmp(&self.criterion(&b.fitted)))
+                .filter(|best| self.criterion(&best.fitted) < self.criterion(at));
+            tried.round.taken = best.as_ref().map(|best| best.name);
             grown.rounds.push(tried);
-            let Some((_, best)) = best else { break };
-            grown.at = self.problem.fit_from(best.parameters, POLISH_ROUNDS)?;
+            let Some(best) = best else { break };
+            grown.at = self.problem.fit_from(best.fitted.parameters, POLISH_ROUNDS)?;
         }
         Ok(grown)
     }

@@ -2,12 +2,11 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::{Definition, ParameterKind, REGISTRY};
 
-use crate::fit::{Fitted, Free, Problem, solve};
+use crate::fit::{Fitted, Free, Problem};
 use crate::predictor::{Parameters, Term};
-use crate::score::{Fitting, Score};
+use crate::scale::Scale;
 use crate::{DiscoverError, wiring};
 
 /// Number of grid values of a shape parameter that spans orders of magnitude, and of any other.
@@ -35,20 +34,6 @@ enum Shapes {
     Grid(Vec<Term>),
     /// Pairs of elements: those that a model's residual suggests.
     Wiring,
-}
-
-/// The score of a candidate at the residual of a model.
-#[derive(Debug, Clone)]
-pub(crate) struct Screened {
-    pub(crate) definition: &'static Definition,
-    /// The scores of all its amplitudes at all its shapes.
-    pub(crate) scores: Vec<Score>,
-    /// Reduction of the cost by a first linear step, at the best shape.
-    pub(crate) promise: f64,
-    /// End of that step, at which a fit starts.
-    pub(crate) start: Term,
-    /// Width of the amplitude's range in standard errors at the best shape: how well these data can show the effect.
-    pub(crate) reach: f64,
 }
 
 impl Candidate {
@@ -95,17 +80,8 @@ impl Candidate {
         Ok(Self { definition, amplitudes, shapes })
     }
 
-    /// Approximate number of derivatives that a screening takes.
-    pub(crate) fn columns(&self) -> usize {
-        let shapes = match &self.shapes {
-            Shapes::Grid(terms) => terms.len(),
-            Shapes::Wiring => wiring::PAIRS_MAX,
-        };
-        shapes * self.amplitudes.len()
-    }
-
     /// Starts of fits of this effect in addition to a model, with neutral amplitudes.
-    fn shapes(&self, problem: &Problem<'_>, at: &Fitted) -> Cow<'_, [Term]> {
+    pub(crate) fn shapes(&self, problem: &Problem<'_>, at: &Fitted) -> Cow<'_, [Term]> {
         match &self.shapes {
             Shapes::Grid(terms) => Cow::Borrowed(terms),
             Shapes::Wiring => {
@@ -115,83 +91,27 @@ impl Candidate {
         }
     }
 
-    /// Scores this effect at the residual of a model.
-    pub(crate) fn screen(
-        &self,
-        fitting: &Fitting<'_>,
-        problem: &Problem<'_>,
-        at: &Fitted,
-    ) -> Result<Screened, DiscoverError> {
-        let mut screened = Screened {
-            definition: self.definition,
-            scores: Vec::new(),
-            promise: 0.0,
-            start: Term::neutral(self.definition),
-            reach: 0.0,
-        };
-        for shape in self.shapes(problem, at).iter() {
-            let start = with(&at.parameters, shape.clone());
-            let term = start.terms.len() - 1;
-            let mut columns = Vec::with_capacity(self.amplitudes.len());
-            for parameter in &self.amplitudes {
-                let free = Free::Of { term, parameter: *parameter };
-                let mut column = problem.slope(&start, &at.predicted, free)?;
-                let whole = fitting.size(&column);
-                fitting.free(&mut column);
-                if fitting.size(&column) < 1e-6 * whole {
-                    column.fill(0.0);
-                }
-                let [least, most] = self.definition.parameters[*parameter].range;
-                screened.reach = screened.reach.max(fitting.size(&column) * (most - least));
-                columns.push(column);
-            }
-            screened.scores.push(fitting.score(&columns));
-            let (promise, values) = self.first_step(fitting, shape, &columns);
-            if promise > screened.promise {
-                (screened.promise, screened.start) = (promise, values);
-            }
-        }
-        Ok(screened)
+    /// The parameters that change the prediction of a shape.
+    pub(crate) fn amplitudes(&self) -> &[usize] {
+        &self.amplitudes
     }
 
-    /// The linear step from the neutral values within the ranges: its reduction of the cost, and its end.
-    fn first_step(&self, fitting: &Fitting<'_>, shape: &Term, columns: &[Vec<f64>]) -> (f64, Term) {
-        let mut active: Vec<usize> = (0..columns.len()).collect();
+    /// A shape with the coefficients of its amplitudes, from which a fit starts.
+    pub(crate) fn start(&self, problem: &Problem<'_>, shape: &Term, coefficients: &[f64]) -> Term {
+        let mut start = shape.clone();
         let wires = matches!(self.shapes, Shapes::Wiring);
-        loop {
-            if active.is_empty() {
-                return (0.0, shape.clone());
-            }
-            let count = active.len();
-            let gram = DMatrix::from_fn(count, count, |i, j| {
-                fitting.inner(&columns[active[i]], &columns[active[j]])
-            });
-            let right = DVector::from_fn(count, |i, _| fitting.wanted(&columns[active[i]]));
-            let step = solve(&gram, &right, 0.0, gram.diagonal().as_slice());
-            let outside = active.iter().zip(step.iter()).position(|(place, step)| {
-                let parameter = self.amplitudes[*place];
-                let range = self.definition.parameters[parameter].range;
-                let value = shape.values[parameter];
-                let ends = (*step < 0.0 && value <= range[0]) || (*step > 0.0 && value >= range[1]);
-                ends && !wires
-            });
-            if let Some(outside) = outside {
-                active.remove(outside);
-                continue;
-            }
-            let mut start = shape.clone();
-            if wires && step.iter().any(|step| !(0.0..CROSSED_SHARE).contains(step)) {
-                return (step.dot(&right), crossed(start));
-            }
-            for (place, step) in active.iter().zip(step.iter()) {
-                let parameter = self.amplitudes[*place];
-                let [least, most] = self.definition.parameters[parameter].range;
-                let value = &mut start.values[parameter];
-                *value =
-                    (*value + step).clamp(least + 0.02 * (*value - least), most - 0.02 * (most - *value));
-            }
-            return (step.dot(&right), start);
+        if wires && coefficients.iter().any(|step| !(0.0..CROSSED_SHARE).contains(step)) {
+            return crossed(start);
         }
+        for (parameter, step) in self.amplitudes.iter().zip(coefficients) {
+            let known = &self.definition.parameters[*parameter];
+            let [least, most] = known.range;
+            let value = &mut start.values[*parameter];
+            let margin = [0.02 * (*value - least), 0.02 * (most - *value)];
+            let moved = Scale::of(known, problem.duration_s).forward(*value, *step);
+            *value = moved.clamp(least + margin[0], most - margin[1]);
+        }
+        start
     }
 }
 

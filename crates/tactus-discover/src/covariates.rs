@@ -1,5 +1,6 @@
 //! Covariates on which the residual may depend, each divided into ranges, and the forms that a dependence may take.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use tactus_model::effect::Definition;
@@ -127,6 +128,11 @@ impl Forms {
 
     /// A feature's column.
     pub(crate) fn column(&self, feature: &Feature, elements: usize) -> Vec<f64> {
+        self.values(feature, 0..self.signal.len() / elements, elements)
+    }
+
+    /// A feature's column at some bins.
+    pub(crate) fn values(&self, feature: &Feature, bins: Range<usize>, elements: usize) -> Vec<f64> {
         let form = match feature.form {
             Form::Offset => None,
             Form::Signal => Some(&self.signal),
@@ -142,9 +148,14 @@ impl Forms {
             Factor::Element(element, of_bin) if reading % elements == *element => of_bin[reading / elements],
             Factor::Element(..) => 0.0,
         };
-        (0..self.signal.len())
+        (bins.start * elements..bins.end * elements)
             .map(|reading| factor(reading) * form.map_or(1.0, |form| form[reading]))
             .collect()
+    }
+
+    /// 1 for bins in contact, else 0.
+    pub(crate) fn deep(&self) -> Vec<f64> {
+        self.history.depth_mm.iter().map(|depth_mm| f64::from(u8::from(*depth_mm > 0.0))).collect()
     }
 }
 

@@ -28,7 +28,6 @@ fn gap(more: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<Gap> {
         candidates: &[],
         options: OPTIONS,
         known_terms: 0,
-        base_gap: 0.0,
         progress: &|_| {},
     };
     let located = search.locate(&prepared.base).unwrap();

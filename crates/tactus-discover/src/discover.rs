@@ -128,15 +128,11 @@ fn discover_on_threads(
         candidates: &candidates,
         options,
         known_terms: known.effects.len() + prepared.faulty.terms.len(),
-        base_gap: problem.heldout_gap(&base.predicted).value,
         progress: &|what| reporter.report(what, 0.0),
     };
     let before = search.locate(&base)?;
     let phase = |phase: SearchPhase| match phase {
-        SearchPhase::Pruning => {
-            reporter.report("removing effects that the held-out presses do not support", 0.6);
-        }
-        SearchPhase::Exchanging => reporter.report("comparing each effect with others in its place", 0.7),
+        SearchPhase::Holding => reporter.report("comparing each effect with others in its place", 0.6),
     };
     let Grown { at: grown, rounds, equivalent, .. } = match options.rule {
         Rule::Protocol => search.grow(&base, &phase)?,

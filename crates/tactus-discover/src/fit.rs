@@ -17,6 +17,7 @@ use tactus_model::effect::ParameterKind;
 
 use crate::DiscoverError;
 use crate::contacts::Contacts;
+use crate::grams::Direction;
 use crate::linear::Linear;
 use crate::noise::Noise;
 use crate::parallel;
@@ -55,6 +56,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) slow: Vec<f64>,
     /// `slow` without contact, where a missing effect of the presses cannot be mistaken for drift; 0 in contact.
     pub(crate) slow_and_clear: Vec<f64>,
+    /// Variance of slow sums of the noise, in units of that of the fitted bins' weights.
+    pub(crate) variance: f64,
     /// Number of coverings in the data. With one, the slope of the spread is not fitted.
     pub(crate) coverings: usize,
     /// True if the spread is fitted.
@@ -98,6 +101,8 @@ impl<'a> Problem<'a> {
         let slow: Vec<f64> = train.iter().enumerate().map(slow).collect();
         let clear = |(bin, weight): (usize, &f64)| if bins.is_clear(frames, bin) { *weight } else { 0.0 };
         let slow_and_clear = slow.iter().enumerate().map(clear).collect();
+        let sum = |weights: &[f64]| weights.iter().sum::<f64>();
+        let variance = (sum(&train) / sum(&slow).max(f64::MIN_POSITIVE)).max(1.0);
         // A single element that is quieter than most cannot be distinguished from rounding.
         let element_weight =
             noise.by_element_counts.iter().map(|rms| rms.max(0.7 * noise.rms_counts).powi(-2)).collect();
@@ -109,6 +114,7 @@ impl<'a> Problem<'a> {
             train,
             slow,
             slow_and_clear,
+            variance,
             coverings: coverings_mm.len(),
             spread_free: Contacts::of(frames).distinct_places() > 1,
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
@@ -188,6 +194,12 @@ impl<'a> Problem<'a> {
             *slope = (*slope - predicted) / step;
         }
         Ok(slope)
+    }
+
+    /// The direction of a free parameter.
+    pub(crate) fn towards(&self, at: &Parameters, free: Free) -> Direction<'static> {
+        let (parameters, step) = self.moved(at, free);
+        Direction::Towards { parameters, step }
     }
 
     /// The parameters after a small step for a derivative, and that step on the parameter's [`Scale`].

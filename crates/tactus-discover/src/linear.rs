@@ -12,7 +12,7 @@ const GAIN_RATIOS: [f64; 2] = [0.25, 4.0];
 /// A gain within this share of an end of the range counts as at the end.
 const PIN_MARGIN: f64 = 0.02;
 /// An element keeps its declared gain if the relative error of its fitted gain would be greater than this.
-const GAIN_ERROR_MAX: f64 = 0.3;
+pub(crate) const GAIN_ERROR_MAX: f64 = 0.3;
 
 /// Projection that removes gains and baselines, at one point of the parameters.
 pub(crate) struct Linear<'a> {
@@ -56,7 +56,7 @@ impl<'a> Problem<'a> {
 
     /// The shares of the elements whose gain is at an end of its range. Each stays there, whatever becomes of the typical gain,
     /// and an effect may explain the rest.
-    fn pinned(&self, at: &Parameters) -> Vec<Option<f64>> {
+    pub(crate) fn pinned(&self, at: &Parameters) -> Vec<Option<f64>> {
         let declared = &self.predictor.known.response.sensitivity_counts_per_mm;
         let ratios: Vec<f64> =
             at.sensitivity.iter().zip(declared).map(|(now, declared)| now / declared).collect();

@@ -1,9 +1,8 @@
 //! Effects that these data cannot show at any size, and what the data lack.
 
 use tactus_model::Phase;
-use tactus_model::effect::REGISTRY;
+use tactus_model::effect::{Definition, REGISTRY};
 
-use crate::candidates::Screened;
 use crate::contacts::Contacts;
 use crate::discovery::NotShown;
 use crate::fit::Problem;
@@ -27,15 +26,15 @@ pub(crate) fn lacking(problem: &Problem<'_>, replicates: bool) -> Vec<NotShown> 
 }
 
 /// Effects that would hardly change these data even at the ends of their ranges.
-pub(crate) fn out_of_sight(screened: &[Screened]) -> Vec<NotShown> {
-    let unseen = screened
+pub(crate) fn out_of_sight(reach: &[(&'static Definition, f64)]) -> Vec<NotShown> {
+    let unseen = reach
         .iter()
-        .filter(|one| one.reach < REACH_LEAST && !LATTICE.contains(&one.definition.name))
-        .map(|one| NotShown {
-            effect: one.definition.name,
+        .filter(|(definition, reach)| *reach < REACH_LEAST && !LATTICE.contains(&definition.name))
+        .map(|(definition, _)| NotShown {
+            effect: definition.name,
             reason: format!(
                 "its change of these data is too small, or recalibration can reproduce it; {} would show it",
-                one.definition.shown_by.join(" or ")
+                definition.shown_by.join(" or ")
             ),
         });
     unseen.collect()

@@ -101,43 +101,15 @@ impl<'a> Predictor<'a> {
 
     /// Counts of every bin and element, without noise and rounding.
     pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
-        let Self { known, frames, bins, .. } = self;
-        let effects = parameters.terms.iter().map(Term::effect).collect::<Result<Vec<_>, _>>()?;
-        let elements = bins.elements;
-        let mut predicted: Vec<f64> = Vec::with_capacity(bins.len() * elements);
-        let mut bin = 0;
-        for (run, path) in bins.paths.iter().enumerate() {
-            let mut pipeline: Option<(u16, f64, Pipeline)> = None;
-            while bin < bins.len() && bins.run[bin] == run {
-                let frame = bins.first[bin];
-                let (tool, covering_mm) = (frames.indenter[frame], frames.covering_mm[frame]);
-                let covering = Covering { thickness_mm: covering_mm };
-                if pipeline.as_ref().is_none_or(|(known, ..)| *known != tool) {
-                    let made = self.pipeline(parameters, run, tool, covering, &effects)?;
-                    pipeline = Some((tool, covering_mm, made));
-                }
-                if let Some((_, last_mm, pipeline)) = &mut pipeline {
-                    if last_mm.to_bits() != covering_mm.to_bits() {
-                        pipeline.set_covering(covering);
-                        *last_mm = covering_mm;
-                    }
-                    let temperature_c = Some(f64::from(frames.temperature_c[frame]))
-                        .filter(|temperature_c| temperature_c.is_finite());
-                    predicted.extend(pipeline.step(Moment { t_s: bins.t_s[bin], temperature_c }, path));
-                }
-                bin += 1;
-            }
-        }
-        if let Some(walk) = &parameters.walk {
-            walk.add(bins, 1.0, &mut predicted);
-        }
-        let full_scale_counts = known.array.full_scale_counts();
-        let least =
-            if parameters.sensitivity.iter().all(|one| *one >= 0.0) { 0.0 } else { f64::NEG_INFINITY };
-        for counts in &mut predicted {
-            *counts = counts.clamp(least, full_scale_counts);
-        }
+        let mut predicted = Vec::with_capacity(self.bins.len() * self.bins.elements);
+        self.stream(parameters.clone())?.take(self.bins.len(), &mut predicted)?;
         Ok(predicted)
+    }
+
+    /// The prediction of a model, to be taken part by part.
+    pub(crate) fn stream(&self, parameters: Parameters) -> Result<Stream<'_>, DiscoverError> {
+        let effects = parameters.terms.iter().map(Term::effect).collect::<Result<Vec<_>, _>>()?;
+        Ok(Stream { predictor: self, parameters, effects, bin: 0, running: None })
     }
 
     fn pipeline(
@@ -172,5 +144,64 @@ impl<'a> Predictor<'a> {
         let id = &self.frames.indenters[usize::from(tool)];
         let unknown = || DiscoverError::TooLittle(format!("the rig describes no indenter {id:?}"));
         self.known.indenters.get(id).cloned().ok_or_else(unknown)
+    }
+}
+
+/// The prediction of a model in order of time, with the history of the bins taken so far.
+pub(crate) struct Stream<'a> {
+    predictor: &'a Predictor<'a>,
+    parameters: Parameters,
+    effects: Vec<Effect>,
+    /// The next bin.
+    bin: usize,
+    running: Option<Running>,
+}
+
+/// The pipeline of a run and a tool.
+struct Running {
+    run: usize,
+    tool: u16,
+    covering_mm: f64,
+    pipeline: Pipeline,
+}
+
+impl Stream<'_> {
+    /// Appends the counts of so many more bins.
+    pub(crate) fn take(&mut self, count: usize, predicted: &mut Vec<f64>) -> Result<(), DiscoverError> {
+        let Predictor { known, frames, bins, .. } = *self.predictor;
+        let (first_bin, first) = (self.bin, predicted.len());
+        for bin in first_bin..first_bin + count {
+            let frame = bins.first[bin];
+            let (run, tool, covering_mm) =
+                (bins.run[bin], frames.indenter[frame], frames.covering_mm[frame]);
+            let covering = Covering { thickness_mm: covering_mm };
+            let running = match self.running.take().filter(|one| (one.run, one.tool) == (run, tool)) {
+                Some(running) => running,
+                None => {
+                    let pipeline =
+                        self.predictor.pipeline(&self.parameters, run, tool, covering, &self.effects)?;
+                    Running { run, tool, covering_mm, pipeline }
+                }
+            };
+            let running = self.running.insert(running);
+            if running.covering_mm.to_bits() != covering_mm.to_bits() {
+                running.pipeline.set_covering(covering);
+                running.covering_mm = covering_mm;
+            }
+            let temperature_c = Some(f64::from(frames.temperature_c[frame])).filter(|c| c.is_finite());
+            let moment = Moment { t_s: bins.t_s[bin], temperature_c };
+            predicted.extend(running.pipeline.step(moment, &bins.paths[run]));
+        }
+        self.bin += count;
+        if let Some(walk) = &self.parameters.walk {
+            walk.add_from(bins, first_bin, 1.0, &mut predicted[first..]);
+        }
+        let full_scale_counts = known.array.full_scale_counts();
+        let is_positive = self.parameters.sensitivity.iter().all(|one| *one >= 0.0);
+        let least = if is_positive { 0.0 } else { f64::NEG_INFINITY };
+        for counts in &mut predicted[first..] {
+            *counts = counts.clamp(least, full_scale_counts);
+        }
+        Ok(())
     }
 }

@@ -30,7 +30,6 @@ use tactus_model::Effect;
 use tactus_model::effect::{Definition, Make, Now, OnReadout, Parameter};
 
 use crate::bins::{Bins, interval_s};
-use crate::candidates::Screened;
 use crate::fit::Problem;
 use crate::noise::median;
 use crate::predictor::{Parameters, Term};
@@ -89,6 +88,16 @@ pub(crate) struct Baselines<'a> {
     grams: Vec<Vec<[f64; 2]>>,
 }
 
+/// A random walk that a model does not have.
+pub(crate) struct TriedWalk {
+    /// For each kernel of the test.
+    pub(crate) scores: Vec<Score>,
+    /// Reduction of the cost.
+    pub(crate) promise: f64,
+    /// The term from which a fit starts.
+    pub(crate) start: Term,
+}
+
 /// Estimated statistics of a random walk.
 #[derive(Debug, Clone, Copy)]
 struct WalkEstimate {
@@ -101,8 +110,13 @@ struct WalkEstimate {
 impl RandomWalk {
     /// Adds a multiple of the walk to readings, which are ordered bin by bin, element by element.
     pub(crate) fn add(&self, bins: &Bins, times: f64, readings: &mut [f64]) {
+        self.add_from(bins, 0, times, readings);
+    }
+
+    /// As [`Self::add`], to the readings of some bins from `first` on.
+    pub(crate) fn add_from(&self, bins: &Bins, first: usize, times: f64, readings: &mut [f64]) {
         let elements = bins.elements;
-        for (bin, readings) in readings.chunks_exact_mut(elements).enumerate() {
+        for (bin, readings) in (first..).zip(readings.chunks_exact_mut(elements)) {
             let of_run = &self.runs[bins.run[bin]];
             let (knot, share) = place(bins.t_s[bin], self.knot_s, of_run.len() / elements);
             for (knot, share) in [(knot, 1.0 - share), (knot + 1, share)] {
@@ -345,23 +359,18 @@ impl Problem<'_> {
         best.unwrap_or(WalkEstimate { knot_s: self.duration_s, counts_per_root_s: 0.0, gain: 0.0 })
     }
 
-    /// Scores a random walk at the residual of a model; `None` if the model has one. The residual without contact must show
-    /// it too, because in contact any missing effect resembles a walk.
-    pub(crate) fn screen_random_walk(&self, fitting: &Fitting<'_>, at: &Parameters) -> Option<Screened> {
+    /// A random walk at the residual of a model; `None` if the model has one. The residual without contact must show it too,
+    /// because in contact any missing effect resembles a walk.
+    pub(crate) fn tried_walk(&self, fitting: &Fitting<'_>, at: &Parameters) -> Option<TriedWalk> {
         if at.terms.iter().any(is_random_walk) {
             return None;
         }
-        let walk = self.estimate_walk(&fitting.residual(), &self.slow);
-        let clear = self.estimate_walk(&fitting.residual(), &self.slow_and_clear);
+        let residual = fitting.residual();
+        let walk = self.estimate_walk(&residual, &self.slow);
+        let clear = self.estimate_walk(&residual, &self.slow_and_clear);
         let mut start = Term::neutral(&RANDOM_WALK);
         start.values[..2].copy_from_slice(&[walk.counts_per_root_s, walk.knot_s]);
-        Some(Screened {
-            definition: &RANDOM_WALK,
-            scores: self.alike(&fitting.residual()),
-            promise: walk.gain.min(clear.gain),
-            start,
-            reach: f64::INFINITY,
-        })
+        Some(TriedWalk { scores: self.alike(&residual), promise: walk.gain.min(clear.gain), start })
     }
 
     /// Scores for each kernel whether blocks that are near in time are alike.

@@ -37,6 +37,11 @@ impl Scale {
         Self { range, logarithmic: false, step: STEP * width, stride_max: STRIDE_MAX * width }
     }
 
+    /// Width of the range on this scale.
+    pub(crate) fn width(&self) -> f64 {
+        self.distance(self.range[0], self.range[1])
+    }
+
     /// The value after a step, limited to the range.
     pub(crate) fn forward(&self, value: f64, step: f64) -> f64 {
         let moved = if self.logarithmic { value * step.exp() } else { value + step };

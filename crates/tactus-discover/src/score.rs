@@ -176,31 +176,88 @@ impl<'a> Fitting<'a> {
             wanted[bins.block[bin]] += sum;
             variance[bins.block[bin]] += squares;
         }
-        let total: f64 = variance.iter().sum();
-        if !(total > 0.0 && total.is_finite()) {
-            return (0.0, vec![0.0; bins.blocks]);
+        standardised(&wanted, &variance)
+    }
+}
+
+/// A direction's score and its blocks' parts from the blocks' products with the residual and with themselves.
+fn standardised(wanted: &[f64], variance: &[f64]) -> (f64, Vec<f32>) {
+    let total: f64 = variance.iter().sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return (0.0, vec![0.0; wanted.len()]);
+    }
+    let common = wanted.iter().sum::<f64>() / total;
+    // Blocks with hardly any weight in the direction say nothing about the scatter.
+    let scatter: Vec<f64> = wanted
+        .iter()
+        .zip(variance)
+        .filter(|(_, variance)| **variance > 1e-4 * total)
+        .map(|(wanted, variance)| (wanted - common * variance).powi(2) / variance)
+        .collect();
+    let excess = if scatter.len() >= BLOCKS_LEAST {
+        (median(&scatter) / MEDIAN_SQUARE).max(1.0)
+    } else {
+        EXCESS_OF_FEW
+    };
+    let deviation = (excess * total).sqrt();
+    let parts = wanted.iter().zip(variance).map(|(wanted, variance)| {
+        let most = CLIP * (excess * variance).sqrt();
+        #[expect(clippy::cast_possible_truncation, reason = "a part of a test's statistic")]
+        let part = (wanted.clamp(-most, most) / deviation) as f32;
+        part
+    });
+    (wanted.iter().sum::<f64>() / deviation, parts.collect())
+}
+
+/// The combined score of directions, from their products with each other, and each block's products with the residual (`along`) and of
+/// each direction with itself (`squares`).
+pub(crate) fn blockwise(
+    directions: &[usize],
+    products: &DMatrix<f64>,
+    along: &[Vec<f64>],
+    squares: &[Vec<f64>],
+) -> Score {
+    let blocks = along.first().map_or(0, Vec::len);
+    // Rows of the orthonormal directions in terms of the given ones.
+    let mut independent: Vec<Vec<(usize, f64)>> = Vec::new();
+    for one in directions {
+        let mut row = vec![(*one, 1.0)];
+        for other in &independent {
+            let inner: f64 = other.iter().map(|(number, share)| share * products[(*number, *one)]).sum();
+            for (number, share) in other {
+                match row.iter_mut().find(|(known, _)| known == number) {
+                    Some((_, value)) => *value -= inner * share,
+                    None => row.push((*number, -inner * share)),
+                }
+            }
         }
-        let common = wanted.iter().sum::<f64>() / total;
-        // Blocks with hardly any weight in the direction say nothing about the scatter.
-        let scatter: Vec<f64> = wanted
-            .iter()
-            .zip(&variance)
-            .filter(|(_, variance)| **variance > 1e-4 * total)
-            .map(|(wanted, variance)| (wanted - common * variance).powi(2) / variance)
-            .collect();
-        let excess = if scatter.len() >= BLOCKS_LEAST {
-            (median(&scatter) / MEDIAN_SQUARE).max(1.0)
-        } else {
-            EXCESS_OF_FEW
+        let product = |(a, share): &(usize, f64)| -> f64 {
+            row.iter().map(|(b, other)| share * other * products[(*a, *b)]).sum()
         };
-        let deviation = (excess * total).sqrt();
-        let parts = wanted.iter().zip(&variance).map(|(wanted, variance)| {
-            let most = CLIP * (excess * variance).sqrt();
-            #[expect(clippy::cast_possible_truncation, reason = "a part of a test's statistic")]
-            let part = (wanted.clamp(-most, most) / deviation) as f32;
-            part
-        });
-        (wanted.iter().sum::<f64>() / deviation, parts.collect())
+        let square: f64 = row.iter().map(product).sum();
+        let whole = products[(*one, *one)];
+        if square > 1e-6 * whole && square > 0.0 {
+            row.iter_mut().for_each(|(_, share)| *share /= square.sqrt());
+            independent.push(row);
+        }
+    }
+    let scored = |row: &Vec<(usize, f64)>| {
+        let sum = |block: usize| row.iter().map(|(number, share)| share * along[*number][block]).sum();
+        let wanted: Vec<f64> = (0..blocks).map(sum).collect();
+        // The blocks' shares of a sum of directions: those of its parts.
+        let sizes: f64 = row.iter().map(|(number, share)| share * share * products[(*number, *number)]).sum();
+        let square = |block: usize| {
+            row.iter().map(|(number, share)| share * share * squares[*number][block]).sum::<f64>() / sizes
+        };
+        let variance: Vec<f64> = (0..blocks).map(square).collect();
+        standardised(&wanted, &variance)
+    };
+    let scores: Vec<(f64, Vec<f32>)> = independent.iter().map(scored).collect();
+    let freedom = scores.len() as f64;
+    Score {
+        z: deviate(scores.iter().map(|(z, _)| z * z).sum(), freedom),
+        chi_square: ChiSquare { times: 1.0, freedom },
+        parts: scores.into_iter().map(|(_, parts)| parts).collect(),
     }
 }
 

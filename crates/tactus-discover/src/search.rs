@@ -1,21 +1,29 @@
 //! The search for the effects that, together with the base parameters, leave only noise.
 //!
-//! Forward: every effect of the library is scored at the residual of the present model. Those with the best first steps are
-//! fitted jointly with everything in the model, and the one that reduces the cost of the fitted presses most is added. An
-//! effect may be added again: real physics rarely has exactly the form in the library, and a second term of the same effect
-//! is a simpler explanation than another effect. Backward: each effect is compared with the model without it, and with
-//! every other effect in its place.
+//! A *pass* over the data gives the products of all additions at the present model: every shape of every effect of the library, and
+//! rivals without a name. From them follow the sets of additions with the greatest odds ([`crate::evidence`]) and a test by
+//! flipped signs that repeats the whole first step. The classes of the best sets are fitted, without the approximation of small
+//! effects, and the one with the greatest odds is added. Then each class has to hold its place: against the model without it, against
+//! rivals without a name, and against every other class, each in its place. Classes that the data cannot tell apart in one place
+//! are reported as one set. Names live and die alone.
+//!
+//! All choices use the fitted presses only. The held-out presses give the figures of the report.
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
 use tactus_model::effect::{Definition, ParameterKind};
 
-use crate::candidates::{Candidate, Screened, with};
+use crate::candidates::{Candidate, with};
 use crate::discovery;
-use crate::fit::{Fitted, Problem};
+use crate::evidence::{Addition, Evidence, Set, Signs};
+use crate::fit::{Fitted, Free, Problem};
+use crate::grams::{Direction, Grams};
 use crate::parallel;
 use crate::predictor::{Parameters, Term};
-use crate::random_walk::RANDOM_WALK;
+use crate::random_walk::{RANDOM_WALK, TriedWalk};
+use crate::rivals::rivals;
+use crate::scale::Scale;
 use crate::score::{Fitting, Score, flipped, largest, p_value};
 use crate::{DiscoverError, Options};
 
@@ -23,47 +31,34 @@ use crate::{DiscoverError, Options};
 pub(crate) const FLIPS: usize = 1999;
 /// Probability of adding an effect to a complete model.
 pub(crate) const ALPHA: f64 = 0.005;
-/// Greatest number of candidates that a round fits.
-pub(crate) const FITTED_MAX: usize = 7;
-/// Greatest number of added terms.
-pub(crate) const TERMS_MAX: usize = 7;
-/// Greatest number of different added effects.
-const NAMES_MAX: usize = 4;
-/// Another term of an effect in the model is preferred to a new effect if its gain is more than this share of the new
-/// effect's gain.
-const AGAIN_SHARE: f64 = 0.5;
-/// Rounds of a fit that compares candidates.
-const TRIAL_ROUNDS: usize = 5;
-/// Rounds after which candidates are given up whose gain is below a share of the best, and how many candidates go on.
+/// Greatest number of added effects.
+pub(crate) const NAMES_MAX: usize = 5;
+/// Rounds of a fit that compares candidates: of all, and of the best.
 const FIRST_ROUNDS: usize = 2;
-const BEHIND_SHARE: f64 = 0.4;
-const FINISHED_MAX: usize = 4;
-/// A term whose gain is below this share of the gain of all before it only corrects their form. It is not added.
-const GAIN_SHARE_LEAST: f64 = 0.01;
+const TRIAL_ROUNDS: usize = 6;
 /// Rounds of a fit of a model that is kept.
 pub(crate) const POLISH_ROUNDS: usize = 8;
-/// By how much a term, and each of its parameters, must at least reduce the cost.
-const PENALTY: f64 = 10.0;
-const PENALTY_EACH: f64 = 6.0;
-/// Greatest number of rivals that are fitted in an effect's place, and the least share of its gain that their first step
-/// must promise.
-const RIVALS_MAX: usize = 5;
-const RIVAL_SHARE: f64 = 0.15;
-/// Least share of the replaced effect's gain that a rival must reach within the first rounds.
-const RIVAL_FITTED_SHARE: f64 = 0.5;
-const EXCHANGES_MAX: usize = 3;
-/// Two models are indistinguishable if they differ by fewer standard errors than this, or if one closes at least this
-/// share of what the other closes.
-const INSEPARABLE_Z: f64 = 3.0;
-const INSEPARABLE_SHARE: f64 = 0.9;
-/// An effect stays if its gain on the held-out presses is at least this many standard errors, and at least this share of the
-/// certain remainder of the whole model.
-const EARNS_Z: f64 = 2.0;
-const EARNS_SHARE: f64 = 0.3;
-/// Several effects are kept in place of a single one if their additional gain on the held-out presses is at least this many
-/// standard errors, and at least this share of the single effect's gain.
-const SEVERAL_Z: f64 = 3.0;
-const SEVERAL_SHARE: f64 = 0.1;
+/// Greatest number of classes that a round fits, and that it fits to the end.
+const FITTED_MAX: usize = 5;
+const FINISHED_MAX: usize = 2;
+/// A class is fitted if its first step promises this share of the best one's odds.
+const PROMISE_SHARE: f64 = 0.3;
+/// Logarithm of the odds with which a class is added and holds its place.
+const LN_ODDS_LEAST: f64 = 5.0;
+/// A rival without a name takes the place of a class if its odds are greater by this logarithm.
+const RIVAL_LN_ODDS: f64 = 5.0;
+/// Another class takes the place of one if its odds are greater by this logarithm.
+const BETTER_LN_ODDS: f64 = 3.0;
+const EXCHANGES_MAX: usize = 4;
+/// Greatest number of other classes that are fitted in a class's place.
+const OTHERS_MAX: usize = 4;
+/// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
+/// `1 + MISFIT_SHARE x gain`.
+const MISFIT_SHARE: f64 = 0.02;
+/// Probability of a reported set of classes.
+const SET_PROBABILITY: f64 = 0.95;
+/// Prior odds against a class.
+const ODDS_AGAINST: f64 = 20.0;
 
 /// Data, candidates and options of a search.
 pub(crate) struct Search<'a> {
@@ -72,31 +67,27 @@ pub(crate) struct Search<'a> {
     pub(crate) options: Options,
     /// Number of terms of the known model and of faulty elements, which are never removed.
     pub(crate) known_terms: usize,
-    /// Gap of the base model on the held-out presses; see `HeldOutGap`.
-    pub(crate) base_gap: f64,
     pub(crate) progress: &'a (dyn Fn(&str) + Sync),
 }
 
-/// For each added effect, the rivals that explain the data as well in its place.
-pub(crate) type Equivalent = BTreeMap<&'static str, Rivals>;
+/// For each added effect, the others that explain the data as well in its place.
+pub(crate) type Equivalent = BTreeMap<&'static str, Alike>;
 
 /// Effects that explain the data as well as an added one.
-pub(crate) struct Rivals {
+pub(crate) struct Alike {
     /// The model without the effect.
     pub(crate) without: Fitted,
-    /// The models with a rival in its place.
+    /// The models with another in its place.
     pub(crate) same: Vec<(&'static str, Fitted)>,
 }
 
 /// Results of one round.
 pub(crate) struct Tried {
     pub(crate) round: discovery::Round,
-    /// Scores of all candidates.
-    pub(crate) screened: Vec<Screened>,
-    /// The fits, best first.
-    pub(crate) fits: Vec<(&'static str, Fitted)>,
-    /// p-value of the largest score of all candidates.
+    /// p-value of the largest score of all additions.
     pub(crate) p_value: f64,
+    /// How well the data can show each effect: the width of its range in standard errors.
+    pub(crate) reach: Vec<(&'static Definition, f64)>,
 }
 
 /// The grown model, and the rounds that led to it.
@@ -104,371 +95,427 @@ pub(crate) struct Grown {
     pub(crate) at: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
-    /// Reduction of the cost by added effects whose real form may differ from the library's.
-    gained: f64,
 }
 
 impl From<Fitted> for Grown {
     fn from(base: Fitted) -> Self {
-        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new(), gained: 0.0 }
+        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new() }
     }
 }
 
 /// The part of the protocol at which a search is, for progress reports.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum SearchPhase {
-    Pruning,
-    Exchanging,
+    Holding,
 }
 
-/// Result of the comparison of each effect with others in its place.
-enum Exchanged {
-    /// A model in which a rival is better.
-    Better(Fitted),
-    /// No rival is better.
-    Settled(Equivalent),
+/// All additions at a model, with their products.
+pub(crate) struct Pass {
+    additions: Vec<Addition>,
+    kinds: Vec<Kind>,
+    /// Names of the classes.
+    classes: Vec<&'static str>,
+    scores: Vec<Score>,
+    products: DMatrix<f64>,
+    grams: Grams,
+    walk: Option<TriedWalk>,
+    /// Classes of the model.
+    present: Vec<usize>,
+    variance: f64,
+}
+
+/// What an addition is.
+enum Kind {
+    /// A candidate in a shape.
+    Term { candidate: usize, shape: Term },
+    Rival,
+}
+
+/// A class that was fitted beside a model.
+#[derive(Clone)]
+pub(crate) struct Beside {
+    pub(crate) name: &'static str,
+    pub(crate) fitted: Fitted,
+    /// Logarithm of its odds.
+    pub(crate) ln_odds: f64,
+}
+
+impl Pass {
+    fn evidence(&self) -> Evidence<'_> {
+        Evidence {
+            additions: &self.additions,
+            products: &self.products,
+            variance: self.variance,
+            present: &self.present,
+        }
+    }
+
+    fn is_named(&self, addition: usize) -> bool {
+        matches!(self.kinds[addition], Kind::Term { .. })
+    }
+
+    fn class_of(&self, addition: usize) -> &'static str {
+        self.classes[self.additions[addition].class]
+    }
+
+    /// The additions whose class `among` selects by name.
+    fn among(&self, among: impl Fn(&str) -> bool) -> Vec<usize> {
+        (0..self.additions.len()).filter(|one| self.is_named(*one) && among(self.class_of(*one))).collect()
+    }
+
+    /// Logarithm of the odds of the best rival without a name.
+    fn best_rival(&self) -> f64 {
+        let evidence = self.evidence();
+        let none = evidence.none();
+        let rivals = (0..self.additions.len()).filter(|one| !self.is_named(*one));
+        rivals.map(|one| evidence.gain(&none, one).ln_odds).fold(f64::NEG_INFINITY, f64::max)
+    }
 }
 
 impl Search<'_> {
-    /// Scores of all candidates at a model.
-    pub(crate) fn screen(&self, fitting: &Fitting<'_>, at: &Fitted) -> Result<Vec<Screened>, DiscoverError> {
-        let mut screened = self.screen_among(|_| true, fitting, at)?;
-        if screened.iter().any(|one| one.definition.name == RANDOM_WALK.name) {
-            screened.extend(self.problem.screen_random_walk(fitting, &at.parameters));
+    /// The products of all additions at a model.
+    pub(crate) fn pass(&self, at: &Fitted) -> Result<Pass, DiscoverError> {
+        let problem = self.problem;
+        let mut directions: Vec<Direction<'_>> = Vec::new();
+        let (mut additions, mut kinds, mut classes) = (Vec::new(), Vec::new(), Vec::new());
+        for (candidate, of) in self.candidates.iter().enumerate() {
+            let class = classes.len();
+            classes.push(of.definition.name);
+            for shape in of.shapes(problem, at).iter() {
+                let start = with(&at.parameters, shape.clone());
+                let term = start.terms.len() - 1;
+                let first = directions.len();
+                let (mut widths, mut signs) = (Vec::new(), Vec::new());
+                for parameter in of.amplitudes() {
+                    directions.push(problem.towards(&start, Free::Of { term, parameter: *parameter }));
+                    let known = &of.definition.parameters[*parameter];
+                    widths.push(Scale::of(known, problem.duration_s).width());
+                    let value = shape.values[*parameter];
+                    let wires = shape.rewires().is_some();
+                    signs.push(match known.range {
+                        _ if wires => Signs::Both,
+                        [least, _] if value <= least => Signs::Positive,
+                        [_, most] if value >= most => Signs::Negative,
+                        _ => Signs::Both,
+                    });
+                }
+                if first < directions.len() {
+                    let directions = (first..directions.len()).collect();
+                    additions.push(Addition { class, directions, widths, signs });
+                    kinds.push(Kind::Term { candidate, shape: shape.clone() });
+                }
+            }
         }
-        Ok(screened)
+        for rival in rivals(problem, at)? {
+            let first = directions.len();
+            let count = rival.columns.len();
+            directions.extend(rival.columns);
+            additions.push(Addition {
+                class: classes.len(),
+                directions: (first..first + count).collect(),
+                widths: vec![1.0; count],
+                signs: vec![Signs::Both; count],
+            });
+            classes.push(rival.name);
+            kinds.push(Kind::Rival);
+        }
+        let grams = problem.grams(at, directions)?;
+        let products = grams.reduced().clone();
+        let last = products.nrows() - 1;
+        let residual = products[(last, last)].sqrt();
+        for (addition, kind) in additions.iter_mut().zip(&kinds) {
+            if matches!(kind, Kind::Rival) {
+                // As a rival has no range: what would make the whole residual.
+                for (width, direction) in addition.widths.iter_mut().zip(&addition.directions) {
+                    *width = residual / grams.whole(*direction).max(f64::MIN_POSITIVE);
+                }
+            }
+        }
+        let scores = parallel::map(&additions, |one| grams.score(&one.directions));
+        let names = names(&at.parameters, self.known_terms);
+        let present = (0..classes.len()).filter(|class| names.contains(&classes[*class])).collect();
+        let walk = if classes.contains(&RANDOM_WALK.name) {
+            problem.tried_walk(&self.fitting(at)?, &at.parameters)
+        } else {
+            None
+        };
+        Ok(Pass { additions, kinds, classes, scores, products, grams, walk, present, variance: problem.variance })
     }
 
-    /// Scores at a model of the candidates that `among` selects by name.
-    fn screen_among(
-        &self,
-        among: impl Fn(&str) -> bool,
-        fitting: &Fitting<'_>,
-        at: &Fitted,
-    ) -> Result<Vec<Screened>, DiscoverError> {
-        let candidates: Vec<&Candidate> =
-            self.candidates.iter().filter(|one| among(one.definition.name)).collect();
-        let screen = |one: &&Candidate| one.screen(fitting, self.problem, at);
-        parallel::map_longest_first(&candidates, |one| one.columns(), screen).into_iter().collect()
-    }
-
-    /// Grows a model until no effect is missing, unnecessary or worse than another.
+    /// Grows a model until no class is missing, unnecessary or worse than another.
     pub(crate) fn grow(&self, base: &Fitted, said: &dyn Fn(SearchPhase)) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base.clone());
-        let mut exchanges_left = EXCHANGES_MAX;
         loop {
-            self.forward(&mut grown)?;
-            said(SearchPhase::Pruning);
-            grown.at = self.back(grown.at)?;
-            if let Some(simpler) = self.simpler(base, &grown.at)? {
-                grown.at = simpler;
-            }
-            said(SearchPhase::Exchanging);
-            match self.exchange(&grown.at, exchanges_left > 0)? {
-                Exchanged::Better(better) => {
-                    exchanges_left -= 1;
-                    grown.at = self.problem.fit_from(better.parameters, POLISH_ROUNDS)?;
-                }
-                Exchanged::Settled(equivalent) => {
-                    grown.equivalent = equivalent;
-                    return Ok(grown);
-                }
-            }
-        }
-    }
-
-    /// Adds effects until no candidate is significant.
-    fn forward(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
-        loop {
-            let at = &grown.at;
-            let mut tried = self.round(at, grown.rounds.len())?;
-            let full = at.parameters.terms.len() - self.known_terms >= TERMS_MAX;
-            let Some((taken, fitted)) = self.take(at, &tried, grown.gained).filter(|_| !full) else {
-                grown.rounds.push(tried);
-                return Ok(());
+            let index = grown.rounds.len();
+            (self.progress)(&format!("round {}: scoring the effects", index + 1));
+            let pass = self.pass(&grown.at)?;
+            let mut tried = self.tested(&pass, &grown.at, index);
+            let is_full = names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
+            let taken = if 2.0 * tried.p_value <= ALPHA && !is_full {
+                self.next(&grown.at, &pass)?
+            } else {
+                None
             };
-            (self.progress)(&format!("round {}: adding {taken}", grown.rounds.len() + 1));
-            tried.round.taken = Some(taken);
+            tried.round.taken = taken.as_ref().map(|taken| taken.name);
             grown.rounds.push(tried);
-            let fitted = self.problem.fit_from(fitted.parameters, POLISH_ROUNDS)?;
-            if fitted.parameters.terms.last().is_some_and(|term| !is_exact(term.definition)) {
-                grown.gained += grown.at.cost - fitted.cost;
+            match taken {
+                Some(taken) => grown.at = self.problem.fit_from(taken.fitted.parameters, POLISH_ROUNDS)?,
+                None => break,
             }
-            grown.at = fitted;
         }
+        said(SearchPhase::Holding);
+        self.hold(&mut grown)?;
+        Ok(grown)
     }
 
-    /// Scores every candidate, and fits the best if the scores are significant.
-    pub(crate) fn round(&self, at: &Fitted, index: usize) -> Result<Tried, DiscoverError> {
-        (self.progress)(&format!("round {}: scoring the effects", index + 1));
-        let fitting = self.fitting(at)?;
-        let screened = self.screen(&fitting, at)?;
-        let groups: Vec<Vec<&Score>> = screened.iter().map(|one| one.scores.iter().collect()).collect();
-        let under_none = flipped(&groups, FLIPS, self.options.seed ^ (index as u64 + 1));
-        let largest = largest(&under_none);
-        let statistic = |one: &Screened| one.scores.iter().map(|score| score.z).fold(0.0, f64::max);
-        let mut tried: Vec<discovery::TriedEffect> = screened
+    /// Tests all additions at once: the largest score against those under flipped signs.
+    pub(crate) fn tested(&self, pass: &Pass, at: &Fitted, index: usize) -> Tried {
+        let groups: Vec<(&'static str, Vec<&Score>)> = (0..pass.classes.len())
+            .map(|class| {
+                let of_class = pass.additions.iter().zip(&pass.scores).filter(|(one, _)| one.class == class);
+                let mut scores: Vec<&Score> = of_class.map(|(_, score)| score).collect();
+                if pass.classes[class] == RANDOM_WALK.name {
+                    scores.extend(pass.walk.iter().flat_map(|walk| &walk.scores));
+                }
+                (pass.classes[class], scores)
+            })
+            .collect();
+        let scores: Vec<Vec<&Score>> = groups.iter().map(|(_, scores)| scores.clone()).collect();
+        let under_none = largest(&flipped(&scores, FLIPS, self.options.seed ^ (index as u64 + 1)));
+        let statistic = |scores: &[&Score]| scores.iter().map(|score| score.z).fold(0.0, f64::max);
+        let is_effect = |name: &str| self.candidates.iter().any(|one| one.definition.name == name);
+        let mut candidates: Vec<discovery::TriedEffect> = groups
             .iter()
-            .map(|one| discovery::TriedEffect {
-                effect: one.definition.name,
-                score: statistic(one),
-                p_value: p_value(statistic(one), &largest),
+            .filter(|(name, _)| is_effect(name))
+            .map(|(effect, scores)| discovery::TriedEffect {
+                effect,
+                score: statistic(scores),
+                p_value: p_value(statistic(scores), &under_none),
                 heldout_rms_counts: None,
                 shrink: None,
             })
             .collect();
-        // Of two forms with one name, the one with the greater score.
-        tried.sort_by(|a, b| a.effect.cmp(b.effect).then(b.score.total_cmp(&a.score)));
-        tried.dedup_by_key(|one| one.effect);
-        let p_value = tried.iter().map(|one| one.p_value).fold(1.0, f64::min);
-        let mut order: Vec<usize> = (0..screened.len()).collect();
-        order.sort_by(|a, b| screened[*b].promise.total_cmp(&screened[*a].promise));
-        let wanted = 2.0 * p_value <= ALPHA;
-        order.retain(|one| wanted && screened[*one].promise > PENALTY);
-        let best = order.first().map_or(0.0, |one| screened[*one].promise);
-        order.retain(|one| screened[*one].promise > 0.05 * best);
-        order.truncate(FITTED_MAX);
-        let starts: Vec<Term> = order.iter().map(|one| screened[*one].start.clone()).collect();
-        let mut fits = self.fits(at, &starts, 0.0)?;
-        fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
-        for (name, fitted) in fits.iter().rev() {
-            if let Some(one) = tried.iter_mut().find(|one| one.effect == *name) {
-                let share =
-                    self.problem.heldout_gap(&fitted.predicted).value / self.base_gap.max(f64::MIN_POSITIVE);
-                one.shrink = (self.base_gap > 0.0).then_some(1.0 - share);
-                one.heldout_rms_counts = Some(self.problem.heldout_rms_counts(&fitted.predicted));
+        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let p_value =
+            groups.iter().map(|(_, scores)| p_value(statistic(scores), &under_none)).fold(1.0, f64::min);
+        let reach = |(index, of): (usize, &Candidate)| {
+            let mut widest = 0.0_f64;
+            for (addition, kind) in pass.additions.iter().zip(&pass.kinds) {
+                if matches!(kind, Kind::Term { candidate, .. } if *candidate == index) {
+                    let sizes = addition.directions.iter().map(|direction| pass.grams.size(*direction));
+                    widest = sizes.zip(&addition.widths).map(|(size, width)| size * width).fold(widest, f64::max);
+                }
             }
-        }
-        let place = |name: &str| fits.iter().position(|(fitted, _)| *fitted == name).unwrap_or(usize::MAX);
-        tried.sort_by(|a, b| place(a.effect).cmp(&place(b.effect)).then(b.score.total_cmp(&a.score)));
-        let names = names(&at.parameters, self.known_terms);
-        Ok(Tried {
-            round: discovery::Round { with: names, candidates: tried, taken: None },
-            screened,
-            fits,
+            let has_walk = of.definition.name == RANDOM_WALK.name && pass.walk.is_some();
+            (of.definition, if has_walk { f64::INFINITY } else { widest })
+        };
+        Tried {
+            round: discovery::Round { with: names(&at.parameters, self.known_terms), candidates, taken: None },
             p_value,
-        })
+            reach: self.candidates.iter().enumerate().map(reach).collect(),
+        }
     }
 
-    /// Fits of a model with each of the terms: first all in a few rounds, then the best to the end, if they reduce the cost by
-    /// more than `gain_least`.
-    pub(crate) fn fits(
-        &self,
-        at: &Fitted,
-        starts: &[Term],
-        gain_least: f64,
-    ) -> Result<Vec<(&'static str, Fitted)>, DiscoverError> {
-        let fit = |start: &Term| {
-            (self.progress)(&format!("fitting {}", start.definition.name));
-            let started = with(&at.parameters, start.clone());
-            Ok((start.definition.name, self.problem.fit_from(started, FIRST_ROUNDS)?))
+    /// The class to add: of those in the best sets, the one with the greatest odds once fitted.
+    fn next(&self, at: &Fitted, pass: &Pass) -> Result<Option<Beside>, DiscoverError> {
+        let evidence = pass.evidence();
+        let best = evidence.sets(|_| true).into_iter().next();
+        let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
+        let none = evidence.none();
+        let mut starts: Vec<(&'static str, f64, Vec<Term>)> = Vec::new();
+        let mut propose = |set: &Set, promise: Option<f64>| {
+            for member in set.members.iter().copied().filter(|member| pass.is_named(*member)) {
+                let name = pass.class_of(member);
+                if starts.iter().all(|(known, ..)| *known != name) {
+                    let alone = promise.unwrap_or(f64::INFINITY);
+                    starts.push((name, alone, self.starts(pass, &evidence, set, name)));
+                }
+            }
         };
-        let mut fits: Vec<(&'static str, Fitted)> =
-            parallel::map_longest_first(starts, |one| one.values.len(), fit)
-                .into_iter()
-                .collect::<Result<_, DiscoverError>>()?;
-        fits.sort_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
-        let best = fits.first().map_or(0.0, |(_, best)| at.cost - best.cost);
-        fits.retain(|(_, fitted)| at.cost - fitted.cost > gain_least.max(BEHIND_SHARE * best));
+        for set in best.iter().chain(&named) {
+            propose(set, None);
+        }
+        let mut alone: Vec<(usize, f64)> = pass
+            .among(|_| true)
+            .into_iter()
+            .map(|one| (one, evidence.gain(&none, one).ln_odds))
+            .filter(|(_, ln_odds)| *ln_odds > 0.0)
+            .collect();
+        alone.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let most = alone.first().map_or(0.0, |(_, ln_odds)| *ln_odds);
+        for (one, ln_odds) in alone.into_iter().filter(|(_, ln_odds)| *ln_odds > PROMISE_SHARE * most) {
+            propose(&evidence.set([one]), Some(ln_odds));
+        }
+        starts.truncate(FITTED_MAX);
+        if let Some(walk) = &pass.walk {
+            let ln_odds = 0.5 * walk.promise - ODDS_AGAINST.ln();
+            if ln_odds > LN_ODDS_LEAST.max(PROMISE_SHARE * most) {
+                starts.push((RANDOM_WALK.name, ln_odds, vec![walk.start.clone()]));
+            }
+        }
+        let starts = starts.into_iter().map(|(name, _, terms)| (name, terms)).collect::<Vec<_>>();
+        let fits = self.fits(at, &starts)?;
+        let Some(taken) = fits.into_iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds)) else { return Ok(None) };
+        // A rival without a name explains more than any class.
+        let rival = pass.best_rival();
+        let is_beaten = rival > taken.ln_odds + RIVAL_LN_ODDS;
+        let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
+        Ok(Some(taken).filter(|taken| taken.ln_odds > LN_ODDS_LEAST && (best_has_names || !is_beaten)))
+    }
+
+    /// The terms of a class from which a fit starts: its members of a set.
+    fn starts(&self, pass: &Pass, evidence: &Evidence<'_>, set: &Set, name: &str) -> Vec<Term> {
+        let coefficients = evidence.coefficients(set);
+        let of = |direction: &usize| {
+            coefficients.iter().find(|(one, _)| one == direction).map_or(0.0, |(_, coefficient)| *coefficient)
+        };
+        let term = |member: &usize| match &pass.kinds[*member] {
+            Kind::Term { candidate, shape } if pass.class_of(*member) == name => {
+                let steps: Vec<f64> = pass.additions[*member].directions.iter().map(of).collect();
+                Some(self.candidates[*candidate].start(self.problem, shape, &steps))
+            }
+            _ => None,
+        };
+        set.members.iter().filter_map(term).collect()
+    }
+
+    /// Fits of a model with the terms of each class: first all in a few rounds, then the best to the end.
+    fn fits(&self, at: &Fitted, starts: &[(&'static str, Vec<Term>)]) -> Result<Vec<Beside>, DiscoverError> {
+        let fit = |(name, terms): &(&'static str, Vec<Term>)| {
+            (self.progress)(&format!("fitting {name}"));
+            let mut started = at.parameters.clone();
+            started.terms.extend(terms.iter().cloned());
+            let fitted = self.problem.fit_from(started, FIRST_ROUNDS)?;
+            Ok(Beside { name, ln_odds: self.ln_odds(at, &fitted), fitted })
+        };
+        let mut fits: Vec<Beside> = parallel::map_longest_first(starts, |(_, terms)| terms.len(), fit)
+            .into_iter()
+            .collect::<Result<_, DiscoverError>>()?;
+        fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
         fits.truncate(FINISHED_MAX);
-        let finish = |(name, fitted): &(&'static str, Fitted)| {
-            Ok((*name, self.problem.fit_from(fitted.parameters.clone(), TRIAL_ROUNDS)?))
+        let finish = |one: &Beside| {
+            let fitted = self.problem.fit_from(one.fitted.parameters.clone(), TRIAL_ROUNDS)?;
+            Ok(Beside { name: one.name, ln_odds: self.ln_odds(at, &fitted), fitted })
         };
         parallel::map(&fits, finish).into_iter().collect()
+    }
+
+    /// Logarithm of the odds of a model with further terms, against the model without. Each of their numbers is charged as if its
+    /// prior were as wide as its part of the gain allows.
+    fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
+        let numbers = |fitted: &Fitted| -> usize {
+            let reals = |term: &Term| {
+                term.definition.parameters.iter().filter(|one| one.kind == ParameterKind::Real).count()
+            };
+            fitted.parameters.terms.iter().map(reals).sum()
+        };
+        let gain = (less.cost - more.cost) / (2.0 * self.problem.variance);
+        let count = numbers(more).saturating_sub(numbers(less)).max(1) as f64;
+        gain - 0.5 * count * (2.0 * gain.max(0.0) / count).ln_1p() - ODDS_AGAINST.ln()
+    }
+
+    /// Lets each class hold its place: against the model without it, rivals without a name, and other classes.
+    fn hold(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
+        let mut exchanges_left = EXCHANGES_MAX;
+        'again: loop {
+            grown.equivalent.clear();
+            let names = names(&grown.at.parameters, self.known_terms);
+            let without = |name: &&'static str| {
+                (self.progress)(&format!("without {name}"));
+                let less = without(&grown.at.parameters, name, self.known_terms);
+                self.problem.fit_from(less, TRIAL_ROUNDS)
+            };
+            let lesses: Vec<Fitted> =
+                parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
+            let odds: Vec<f64> = lesses.iter().map(|less| self.ln_odds(less, &grown.at)).collect();
+            let weakest = odds.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
+            if let Some((weakest, _)) = weakest.filter(|(_, ln_odds)| **ln_odds < LN_ODDS_LEAST) {
+                let less = lesses[weakest].parameters.clone();
+                grown.at = self.problem.fit_from(less, POLISH_ROUNDS)?;
+                continue 'again;
+            }
+            for ((name, less), ln_odds) in names.iter().zip(lesses).zip(odds) {
+                if is_exact(name) {
+                    // No other effect acts like miswired elements.
+                    continue;
+                }
+                (self.progress)(&format!("comparing {name} with others in its place"));
+                let pass = self.pass(&less)?;
+                if pass.best_rival() > ln_odds + RIVAL_LN_ODDS {
+                    grown.at = self.problem.fit_from(less.parameters, POLISH_ROUNDS)?;
+                    continue 'again;
+                }
+                let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
+                let best = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
+                let better = best.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
+                if let Some(better) = better {
+                    exchanges_left -= 1;
+                    grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
+                    continue 'again;
+                }
+                let same = credible(ln_odds, others);
+                grown.equivalent.insert(name, Alike { without: less, same });
+            }
+            return Ok(());
+        }
+    }
+
+    /// The other classes, fitted in a place, if their first steps promise these odds.
+    pub(crate) fn others(
+        &self,
+        pass: &Pass,
+        less: &Fitted,
+        names: &[&'static str],
+        ln_odds_least: f64,
+    ) -> Result<Vec<Beside>, DiscoverError> {
+        let evidence = pass.evidence();
+        let none = evidence.none();
+        let mut best: Vec<(&'static str, usize, f64)> = Vec::new();
+        for one in pass.among(|name| !names.contains(&name)) {
+            let (name, ln_odds) = (pass.class_of(one), evidence.gain(&none, one).ln_odds);
+            match best.iter_mut().find(|(known, ..)| *known == name) {
+                Some(known) if known.2 < ln_odds => *known = (name, one, ln_odds),
+                Some(_) => {}
+                None => best.push((name, one, ln_odds)),
+            }
+        }
+        best.retain(|(.., ln_odds)| *ln_odds > ln_odds_least);
+        best.sort_by(|a, b| b.2.total_cmp(&a.2));
+        best.truncate(OTHERS_MAX);
+        let starts: Vec<(&'static str, Vec<Term>)> = best
+            .into_iter()
+            .map(|(name, one, _)| (name, self.starts(pass, &evidence, &evidence.set([one]), name)))
+            .collect();
+        self.fits(less, &starts)
     }
 
     /// The model's tangent space and residual.
     pub(crate) fn fitting(&self, at: &Fitted) -> Result<Fitting<'_>, DiscoverError> {
         Fitting::at(self.problem, &at.parameters, &at.predicted)
     }
+}
 
-    fn take(&self, at: &Fitted, tried: &Tried, gained: f64) -> Option<(&'static str, Fitted)> {
-        let names = names(&at.parameters, self.known_terms);
-        let allowed = |name: &&'static str| names.contains(name) || names.len() < NAMES_MAX;
-        let (best_name, best) = tried.fits.iter().find(|(name, _)| allowed(name))?;
-        let gain = charged(at) - charged(best);
-        if gain <= PENALTY || gain < GAIN_SHARE_LEAST * gained {
-            return None;
+/// The other classes of the smallest set that has, with a class of these odds, the wanted probability.
+fn credible(ln_odds: f64, mut others: Vec<Beside>) -> Vec<(&'static str, Fitted)> {
+    let unit = 1.0 + MISFIT_SHARE * ln_odds.max(0.0);
+    let weight = |one: f64| ((one - ln_odds) / unit).exp();
+    let total: f64 = 1.0 + others.iter().map(|other| weight(other.ln_odds)).sum::<f64>();
+    others.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
+    let mut reached = 1.0 / total;
+    let mut same = Vec::new();
+    for other in others {
+        if reached >= SET_PROBABILITY {
+            break;
         }
-        let again = tried.fits.iter().find(|(name, fitted)| {
-            names.contains(name) && charged(at) - charged(fitted) > AGAIN_SHARE * gain
-        });
-        let (name, fitted) = again.map_or((best_name, best), |(name, fitted)| (name, fitted));
-        Some((name, fitted.clone()))
+        reached += weight(other.ln_odds) / total;
+        same.push((other.name, other.fitted));
     }
-
-    /// A single effect, possibly with two terms, that explains nearly as much as several added ones. The others may only
-    /// correct its form.
-    fn simpler(&self, base: &Fitted, at: &Fitted) -> Result<Option<Fitted>, DiscoverError> {
-        let alone = keeping(&at.parameters, self.known_terms, is_exact);
-        let [all, exact] = [&at.parameters, &alone].map(|one| names(one, self.known_terms).len());
-        if all < exact + 2 {
-            return Ok(None);
-        }
-        (self.progress)("trying one effect in the place of several");
-        let alone = if alone.terms.len() == self.known_terms {
-            base.clone()
-        } else {
-            self.problem.fit_from(alone, POLISH_ROUNDS)?
-        };
-        let mut best: Option<Fitted> = None;
-        let starts = self.starts(&alone, |_| true, RIVALS_MAX)?;
-        let least = RIVAL_FITTED_SHARE * (alone.cost - at.cost);
-        for (name, once) in self.fits(&alone, &starts, least)? {
-            let once = self.problem.fit_from(once.parameters, POLISH_ROUNDS)?;
-            let again = self.starts(&once, |other| other == name, 1)?.into_iter().next();
-            let twice = again.map(|start| {
-                let started = with(&once.parameters, start);
-                self.problem.fit_from(started, POLISH_ROUNDS)
-            });
-            for one in twice.transpose()?.into_iter().chain([once]) {
-                if best.as_ref().is_none_or(|best| charged(&one) < charged(best)) {
-                    best = Some(one);
-                }
-            }
-        }
-        Ok(best.filter(|one| {
-            let [gain, error] = self.problem.heldout_gain(one, at);
-            let [closed, _] = self.problem.heldout_gain(&alone, one);
-            gain < (SEVERAL_Z * error).max(SEVERAL_SHARE * closed)
-        }))
-    }
-
-    /// Starts of fits of the candidates with the best first steps, among those that `among` selects by name.
-    fn starts(
-        &self,
-        at: &Fitted,
-        among: impl Fn(&str) -> bool,
-        most: usize,
-    ) -> Result<Vec<Term>, DiscoverError> {
-        let mut screened = self.screen_among(among, &self.fitting(at)?, at)?;
-        screened.retain(|one| one.promise > PENALTY);
-        screened.sort_by(|a, b| b.promise.total_cmp(&a.promise));
-        screened.truncate(most);
-        Ok(screened.into_iter().map(|one| one.start).collect())
-    }
-
-    /// Tries other effects in the place of each added one. Returns a better model, or else the rivals that are as good.
-    fn exchange(&self, at: &Fitted, may_exchange: bool) -> Result<Exchanged, DiscoverError> {
-        let mut equivalent = Equivalent::new();
-        let mut at_leaves_something = None;
-        let exact = names(&keeping(&at.parameters, self.known_terms, is_exact), self.known_terms);
-        let names = names(&at.parameters, self.known_terms);
-        // No other effect acts like miswired elements.
-        for name in names.iter().filter(|name| !exact.contains(name)) {
-            let less = without(&at.parameters, name, self.known_terms);
-            let less = self.problem.fit_from(less, TRIAL_ROUNDS)?;
-            let fitting = self.fitting(&less)?;
-            let mut rivals = self.screen(&fitting, &less)?;
-            rivals.retain(|one| !names.contains(&one.definition.name) && one.promise > PENALTY);
-            rivals.sort_by(|a, b| b.promise.total_cmp(&a.promise));
-            // An effect whose first step closes little of the gap is no rival.
-            rivals.retain(|one| one.promise > RIVAL_SHARE * (less.cost - at.cost));
-            rivals.truncate(RIVALS_MAX);
-            let starts: Vec<Term> = rivals.into_iter().map(|one| one.start).collect();
-            let fits = self.fits(&less, &starts, RIVAL_FITTED_SHARE * (less.cost - at.cost))?;
-            let best = fits.iter().min_by(|a, b| charged(&a.1).total_cmp(&charged(&b.1)));
-            if let Some((_, best)) =
-                best.filter(|(_, best)| may_exchange && charged(best) < charged(at) - PENALTY)
-            {
-                return Ok(Exchanged::Better(best.clone()));
-            }
-            let mut same = Vec::new();
-            for (rival, fitted) in fits {
-                if self.serves_as_well(&less, &fitted, at, &mut at_leaves_something)? {
-                    same.push((rival, fitted));
-                }
-            }
-            equivalent.insert(*name, Rivals { without: less, same });
-        }
-        Ok(Exchanged::Settled(equivalent))
-    }
-
-    /// True if the data do not distinguish a rival from the effect in the model: it is hardly worse block by block, or it closes
-    /// nearly as much of the gap, so that they may differ by an error of form only. The latter does not count if the rival
-    /// leaves structure where the model leaves none.
-    ///
-    /// `at_leaves_something` caches whether the model leaves structure.
-    fn serves_as_well(
-        &self,
-        less: &Fitted,
-        rival: &Fitted,
-        at: &Fitted,
-        at_leaves_something: &mut Option<bool>,
-    ) -> Result<bool, DiscoverError> {
-        let (of_rival, of_model) =
-            (self.problem.blocks(&rival.predicted), self.problem.blocks(&at.predicted));
-        let worse: Vec<f64> = if [rival, at].iter().all(|one| one.parameters.walk.is_none()) {
-            of_rival.iter().zip(&of_model).map(|(rival, model)| rival - model).collect()
-        } else {
-            // A random walk also fits noise where it is fitted.
-            self.problem.heldout_gains(&rival.predicted, &at.predicted)
-        };
-        let sum: f64 = worse.iter().sum();
-        let mean = sum / worse.len().max(1) as f64;
-        let scatter = worse.iter().map(|one| (one - mean).powi(2)).sum::<f64>().sqrt();
-        if sum < INSEPARABLE_Z * scatter {
-            return Ok(true);
-        }
-        if less.cost - rival.cost <= INSEPARABLE_SHARE * (less.cost - at.cost) {
-            return Ok(false);
-        }
-        let at_does = match *at_leaves_something {
-            Some(known) => known,
-            None => *at_leaves_something.insert(self.leaves_something(at)?),
-        };
-        Ok(at_does || !self.leaves_something(rival)?)
-    }
-
-    /// True if the residual of a model depends on any covariate.
-    fn leaves_something(&self, one: &Fitted) -> Result<bool, DiscoverError> {
-        Ok(self.locate(one)?.p_value <= ALPHA)
-    }
-
-    /// Removes added effects that the held-out presses do not support, one at a time.
-    fn back(&self, mut at: Fitted) -> Result<Fitted, DiscoverError> {
-        loop {
-            let names = names(&at.parameters, self.known_terms);
-            if names.is_empty() {
-                return Ok(at);
-            }
-            let without = |name: &&'static str| {
-                (self.progress)(&format!("without {name}"));
-                self.problem.fit_from(without(&at.parameters, name, self.known_terms), TRIAL_ROUNDS)
-            };
-            let fits: Vec<Fitted> = parallel::map(&names, without).into_iter().collect::<Result<_, _>>()?;
-            let left = EARNS_SHARE * self.problem.surely_left(&at);
-            let worth = |less: &Fitted| {
-                let [gain, error] = self.problem.heldout_gain(less, &at);
-                // Significant, and not small against the certain remainder of the whole model.
-                (gain / error.max(f64::MIN_POSITIVE) / EARNS_Z).min(if left > 0.0 {
-                    gain / left
-                } else {
-                    f64::INFINITY
-                })
-            };
-            let Some((least, worth)) = fits.iter().map(worth).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
-            else {
-                return Ok(at);
-            };
-            if worth >= 1.0 {
-                return Ok(at);
-            }
-            let Some(simpler) = fits.into_iter().nth(least) else { return Ok(at) };
-            at = self.problem.fit_from(simpler.parameters, POLISH_ROUNDS)?;
-        }
-    }
+    same
 }
 
 /// True if an effect has the same form in reality as in the library: wiring is right or wrong.
-fn is_exact(definition: &Definition) -> bool {
-    definition.parameters.iter().any(|parameter| parameter.kind == ParameterKind::Element)
-}
-
-/// Cost of a model plus a penalty for each parameter.
-fn charged(fitted: &Fitted) -> f64 {
-    let parameters: usize = fitted.parameters.terms.iter().map(|term| term.values.len()).sum();
-    fitted.cost + PENALTY_EACH * parameters as f64
+fn is_exact(name: &str) -> bool {
+    name == crate::faulty::MISWIRED
 }
 
 /// Names of the added effects, each once, in order.
@@ -485,16 +532,11 @@ pub(crate) fn names(parameters: &Parameters, known_terms: usize) -> Vec<&'static
 
 /// A model without the added terms of an effect.
 pub(crate) fn without(parameters: &Parameters, name: &str, known_terms: usize) -> Parameters {
-    keeping(parameters, known_terms, |definition| definition.name != name)
-}
-
-/// A model with only those added terms that `stays` selects.
-fn keeping(parameters: &Parameters, known_terms: usize, stays: impl Fn(&Definition) -> bool) -> Parameters {
     let mut less = parameters.clone();
     let mut index = 0;
     less.terms.retain(|term| {
         index += 1;
-        index <= known_terms || stays(term.definition)
+        index <= known_terms || term.definition.name != name
     });
     less
 }

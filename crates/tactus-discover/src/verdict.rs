@@ -19,7 +19,7 @@ use crate::predictor::{Parameters, Predictor, Term};
 use crate::prepare::Prepared;
 use crate::random_walk::RandomWalk;
 use crate::score::{q_values, sign_flip_p};
-use crate::search::{ALPHA, Equivalent, FLIPS, POLISH_ROUNDS, Rivals, Search, Tried, names, without};
+use crate::search::{ALPHA, Alike, Equivalent, FLIPS, POLISH_ROUNDS, Search, Tried, names, without};
 use crate::structured::Readings;
 use crate::{DiscoverError, Options, Rule, not_shown};
 
@@ -27,17 +27,6 @@ use crate::{DiscoverError, Options, Rule, not_shown};
 const SEEN_NOISE: f64 = 2.0;
 /// and for the verdict `Explained` whatever the tests say.
 const LITTLE_NOISE: f64 = 0.5;
-/// All added effects are withdrawn if more than this share of the gap certainly remains, or if the remainder depends on a
-/// covariate and is more than this share of a gap that is well known,
-const UNEXPLAINED_SHARE: f64 = 0.3;
-/// or, if the gap is not well known, if the statistic of the dependence exceeds this value and this share of the initial one.
-const LEFT_Z: f64 = 5.2;
-const LEFT_SHARE: f64 = 0.45;
-/// A single effect is also withdrawn if more than the first share remains, and certainly more than the second. Several correct
-/// effects may leave as much together.
-const LONE_SHARE: f64 = 0.5;
-const LONE_SHARE_CERTAIN: f64 = 0.1;
-
 /// The outcome of a search.
 pub(crate) struct SearchOutcome {
     /// Effects that were not tried, because the data cannot show them.
@@ -81,30 +70,13 @@ pub(crate) fn conclude(
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
-    let SearchOutcome { lacking, base, mut grown, rounds, equivalent, before, after } = found;
+    let SearchOutcome { lacking, base, grown, rounds, equivalent, before, after } = found;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
     let share = search.share_left(&base, &grown);
     let left = after.p_value <= ALPHA;
     let count = names(&grown.parameters, search.known_terms).len();
-    // Coarse steps scatter only readings that change; this scatter does not count as a remainder.
-    let certain = if count > 0 && lattice.is_none() { search.certain_share_left(&base, &grown) } else { 0.0 };
-    // A small gap is judged by the dependence on covariates, a large one by the share that remains.
-    let clear = after.statistic > LEFT_Z.max(LEFT_SHARE * before.statistic);
-    let large = search.problem.heldout_gap(&base.predicted).is_large();
-    // The remainder of a single effect that closes most of the gap is an error of its form. Several effects that leave as
-    // much are a patchwork.
-    let is_form = count == 1 && search.likely_share_left(&base, &grown) <= UNEXPLAINED_SHARE;
-    let is_little = count == 1 && share > LONE_SHARE && certain > LONE_SHARE_CERTAIN;
-    let leaves_too_much = certain > UNEXPLAINED_SHARE
-        || is_little
-        || left && if large { share > UNEXPLAINED_SHARE } else { clear && !is_form };
-    let is_withdrawn = leaves_too_much && options.rule == Rule::Protocol;
-    if is_withdrawn {
-        // Effects that leave so much are not the explanation.
-        grown = base.clone();
-    }
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
     let floor = prepared.floor_of(&of_grown);
@@ -127,7 +99,7 @@ pub(crate) fn conclude(
     let closed = squares(base_level) - squares(grown_level);
 
     let mut not_shown = lacking;
-    not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.screened)));
+    not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.reach)));
     let mut steps = search.steps(&grown, &equivalent, &prepared.problem_with_silent())?;
     let mut effects = grown.parameters.effects()?;
     if let Some((step_counts, p_value)) = lattice {
@@ -142,7 +114,6 @@ pub(crate) fn conclude(
         next_experiments.insert(0, planner.repeats());
     }
 
-    let remainder = if is_withdrawn { &before.gap } else { &after.gap };
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     let mut warnings = prepared.warnings.clone();
     warnings.extend(prepared.not_judged(&of_grown, floor));
@@ -163,7 +134,7 @@ pub(crate) fn conclude(
         verdict,
         unexplained: Unexplained {
             depends_on: if left && !is_clean {
-                remainder.iter().map(|gap| gap.covariate).collect()
+                after.gap.iter().map(|gap| gap.covariate).collect()
             } else {
                 Vec::new()
             },
@@ -172,7 +143,7 @@ pub(crate) fn conclude(
                 Verdict::CannotJudge | Verdict::Unexplained => 1.0,
                 // Faulty elements are in the base, so that nothing of its gap is left to close.
                 Verdict::Explained if !named && lattice.is_none() => 0.0,
-                Verdict::Explained | Verdict::PartlyExplained => share.max(certain),
+                Verdict::Explained | Verdict::PartlyExplained => share,
             },
         },
         next_experiments,
@@ -194,7 +165,7 @@ pub(crate) fn cannot_judge(prepared: &Prepared<'_>, options: Options) -> Result<
 fn undecided(equivalent: &Equivalent, grown: &Fitted) -> Vec<Pair> {
     let explained =
         |name: &'static str, fitted: &Fitted| Explanation { name, parameters: fitted.parameters.clone() };
-    let pairs = equivalent.iter().flat_map(|(name, Rivals { without, same })| {
+    let pairs = equivalent.iter().flat_map(|(name, Alike { without, same })| {
         same.iter().map(move |(rival, fitted)| Pair {
             of: [explained(name, grown), explained(rival, fitted)],
             without: without.parameters.clone(),
@@ -443,18 +414,6 @@ impl Search<'_> {
         self.share_of(base, grown, left)
     }
 
-    /// Remaining share of the gap for the most likely noise.
-    fn likely_share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
-        let left = self.problem.heldout_gap(&grown.predicted).value.max(0.0);
-        self.share_of(base, grown, left)
-    }
-
-    /// Remaining share of the gap from the comparison of readings with and without a signal, which does not need the noise.
-    fn certain_share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
-        let left = self.problem.surely_left(grown);
-        if left > 0.0 { self.share_of(base, grown, left) } else { 0.0 }
-    }
-
     fn share_of(&self, base: &Fitted, grown: &Fitted, left: f64) -> f64 {
         let [closed, _] = self.problem.heldout_gain(base, grown);
         if closed + left > 0.0 { (left / (closed + left)).clamp(0.0, 1.0) } else { 1.0 }
@@ -503,7 +462,7 @@ impl Search<'_> {
                 equivalent: equivalent
                     .get(name)
                     .into_iter()
-                    .flat_map(|rivals| rivals.same.iter().map(|(rival, _)| *rival))
+                    .flat_map(|alike| alike.same.iter().map(|(rival, _)| *rival))
                     .collect(),
             });
         }

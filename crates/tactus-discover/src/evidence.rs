@@ -1,0 +1,283 @@
+//! How much more likely the data are with certain additions to a model: marginal likelihoods from reduced products.
+//!
+//! An addition's coefficients `c` have the prior `N(0, tau^2 width^2)` each, with one `tau` for the addition. With `s` the
+//! products of its directions in units of the width and of the noise, and `q` those with the residual, the logarithm of the ratio of
+//! marginal likelihoods with and without it is
+//!
+//! ```text
+//! ln L = 1/2 sum over i of [ q_i^2 tau^2 / (1 + tau^2 l_i) - ln(1 + tau^2 l_i) ]        l_i, q_i: in the eigenbasis of s
+//! ```
+//!
+//! at the `tau` with the greatest value. Freedom is charged by the second term. A coefficient that may have one sign only, and would
+//! have the other, is left out. Once an addition is in, its directions are swept from the products with their prior precision, and the
+//! logarithms add up to that of the whole set.
+//!
+//! A name has a prior probability of 1 in 20, shared among its shapes.
+//!
+//! # Source
+//! D. J. C. MacKay, *Neural Comput.* 4 (1992) 415 (evidence, one variance a group); R. E. Kass and A. E. Raftery, *J. Am. Stat.
+//! Assoc.* 90 (1995) 773 (what a ratio of likelihoods says).
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Prior odds against a class.
+const ODDS_AGAINST: f64 = 20.0;
+/// Prior odds against one more term of a class.
+const ODDS_AGAINST_AGAIN: f64 = 4.0;
+/// Values of `tau`: from the least in factors of two.
+const TAU_LEAST: f64 = 1e-5;
+const TAUS: i32 = 18;
+
+/// Something that could be added to a model.
+#[derive(Debug, Clone)]
+pub(crate) struct Addition {
+    /// The class it belongs to, as a number; those of one class are its shapes.
+    pub(crate) class: usize,
+    /// Its directions.
+    pub(crate) directions: Vec<usize>,
+    /// Width of each coefficient's range.
+    pub(crate) widths: Vec<f64>,
+    /// Signs that each coefficient may have.
+    pub(crate) signs: Vec<Signs>,
+}
+
+/// Signs that a coefficient may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Signs {
+    Both,
+    Positive,
+    Negative,
+}
+
+/// A set of additions, in the order in which they were made.
+#[derive(Debug, Clone)]
+pub(crate) struct Set {
+    /// Their numbers.
+    pub(crate) members: Vec<usize>,
+    /// Logarithm of the ratio of marginal likelihoods with and without the set, prior odds included.
+    pub(crate) ln_odds: f64,
+    /// Products that are left, with the residual as the last.
+    products: DMatrix<f64>,
+    /// Directions in the set, with the prior precision of their coefficients.
+    swept: Vec<(usize, f64)>,
+}
+
+/// What an addition gains beside a set.
+#[derive(Debug, Clone)]
+pub(crate) struct Gain {
+    /// Without prior odds.
+    pub(crate) ln_likelihood: f64,
+    /// With them.
+    pub(crate) ln_odds: f64,
+    /// The directions that take part, with the prior precision of their coefficients.
+    active: Vec<(usize, f64)>,
+}
+
+/// The additions at a model, and the products of their directions.
+pub(crate) struct Evidence<'a> {
+    pub(crate) additions: &'a [Addition],
+    /// Products of the directions and, last, the residual.
+    pub(crate) products: &'a DMatrix<f64>,
+    /// Variance of the noise of slow sums, in units of that of the weights.
+    pub(crate) variance: f64,
+    /// Classes that the model has already.
+    pub(crate) present: &'a [usize],
+}
+
+/// Sets kept from one size to the next, and the greatest size.
+const BEAM: usize = 6;
+const SIZE_MAX: usize = 6;
+/// An addition is worth a look if it multiplies the odds by more than the exponential of this.
+const GAIN_LEAST: f64 = 1.0;
+
+impl Signs {
+    fn allow(self, value: f64) -> bool {
+        match self {
+            Self::Both => true,
+            Self::Positive => value >= 0.0,
+            Self::Negative => value <= 0.0,
+        }
+    }
+}
+
+impl Evidence<'_> {
+    /// No additions.
+    pub(crate) fn none(&self) -> Set {
+        Set { members: Vec::new(), ln_odds: 0.0, products: self.products.clone(), swept: Vec::new() }
+    }
+
+    /// What an addition gains beside a set.
+    pub(crate) fn gain(&self, set: &Set, addition: usize) -> Gain {
+        let Addition { class, directions, widths, signs } = &self.additions[addition];
+        let last = set.products.nrows() - 1;
+        let mut places: Vec<usize> = (0..directions.len())
+            .filter(|place| set.products[(directions[*place], directions[*place])] > 0.0)
+            .collect();
+        let mut found = Gain { ln_likelihood: 0.0, ln_odds: f64::NEG_INFINITY, active: Vec::new() };
+        loop {
+            let count = places.len();
+            if count == 0 {
+                return found;
+            }
+            let products = DMatrix::from_fn(count, count, |i, j| {
+                let (a, b) = (places[i], places[j]);
+                widths[a] * widths[b] * set.products[(directions[a], directions[b])] / self.variance
+            });
+            let wanted = DVector::from_fn(count, |i, _| {
+                widths[places[i]] * set.products[(directions[places[i]], last)] / self.variance
+            });
+            let SymmetricEigen { eigenvectors, eigenvalues } = products.symmetric_eigen();
+            let along = eigenvectors.transpose() * &wanted;
+            let ln_likelihood = |tau: f64| -> f64 {
+                let of = |(value, along): (&f64, &f64)| {
+                    let spread = 1.0 + tau * tau * value.max(0.0);
+                    along * along * tau * tau / spread - spread.ln()
+                };
+                0.5 * eigenvalues.iter().zip(along.iter()).map(of).sum::<f64>()
+            };
+            let taus = (0..TAUS).map(|step| TAU_LEAST * 2.0_f64.powi(step));
+            let best = taus.map(|tau| (ln_likelihood(tau), tau)).max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((ln_likelihood, tau)) = best.filter(|(gain, _)| *gain > 0.0) else { return found };
+            let scaled = DVector::from_fn(count, |i, _| {
+                tau * tau * along[i] / (1.0 + tau * tau * eigenvalues[i].max(0.0))
+            });
+            let coefficients = &eigenvectors * scaled;
+            let wrong = (0..count)
+                .filter(|i| !signs[places[*i]].allow(coefficients[*i]))
+                .max_by(|a, b| coefficients[*a].abs().total_cmp(&coefficients[*b].abs()));
+            if let Some(wrong) = wrong {
+                places.remove(wrong);
+                continue;
+            }
+            found.ln_likelihood = ln_likelihood;
+            found.ln_odds = ln_likelihood - self.charge(set, *class);
+            found.active = places
+                .iter()
+                .map(|place| (directions[*place], self.variance / (tau * widths[*place]).powi(2)))
+                .collect();
+            return found;
+        }
+    }
+
+    /// Logarithm of the prior odds against an addition of a class.
+    fn charge(&self, set: &Set, class: usize) -> f64 {
+        let shapes = self.additions.iter().filter(|one| one.class == class).count();
+        let is_again = self.present.contains(&class)
+            || set.members.iter().any(|member| self.additions[*member].class == class);
+        (shapes as f64).ln() + if is_again { ODDS_AGAINST_AGAIN.ln() } else { ODDS_AGAINST.ln() }
+    }
+
+    /// A set with one more addition.
+    pub(crate) fn with(&self, set: &Set, addition: usize, gain: &Gain) -> Set {
+        let mut with = set.clone();
+        with.members.push(addition);
+        with.ln_odds += gain.ln_odds;
+        for (direction, precision) in &gain.active {
+            let pivot = with.products[(*direction, *direction)] + precision;
+            let row = with.products.row(*direction).clone_owned();
+            with.products.ger(-1.0 / pivot, &row.transpose(), &row.transpose(), 1.0);
+            with.swept.push((*direction, *precision));
+        }
+        with
+    }
+
+    /// The set of some additions, each made after those before it.
+    pub(crate) fn set(&self, members: impl IntoIterator<Item = usize>) -> Set {
+        members.into_iter().fold(self.none(), |set, member| self.with(&set, member, &self.gain(&set, member)))
+    }
+
+    /// The sets with the greatest odds among the additions that `among` selects, best first: the empty one is among them.
+    pub(crate) fn sets(&self, among: impl Fn(usize) -> bool) -> Vec<Set> {
+        let among: Vec<usize> = (0..self.additions.len()).filter(|one| among(*one)).collect();
+        let mut found = vec![self.none()];
+        let mut beam = found.clone();
+        for _ in 0..SIZE_MAX {
+            let mut next: Vec<Set> = Vec::new();
+            for set in &beam {
+                for (addition, gain) in self.steps(set, &among) {
+                    let mut members = set.members.clone();
+                    members.push(addition);
+                    members.sort_unstable();
+                    let is_new = |other: &Set| {
+                        let mut others = other.members.clone();
+                        others.sort_unstable();
+                        others != members
+                    };
+                    if next.iter().all(is_new) {
+                        next.push(self.with(set, addition, &gain));
+                    }
+                }
+            }
+            next.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
+            next.truncate(BEAM);
+            if next.is_empty() {
+                break;
+            }
+            found.extend(next.iter().cloned());
+            beam = next;
+        }
+        found.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
+        found.truncate(BEAM);
+        // Each member is exchanged once more, given all others.
+        if let Some(best) = found.first() {
+            let exchanged = self.exchanged(best.clone(), &among);
+            if exchanged.ln_odds > best.ln_odds + 1e-9 {
+                found.insert(0, exchanged);
+            }
+        }
+        found
+    }
+
+    /// For each class, the shape that gains most beside a set.
+    fn steps(&self, set: &Set, among: &[usize]) -> Vec<(usize, Gain)> {
+        let mut best: Vec<(usize, Gain)> = Vec::new();
+        for addition in among.iter().copied().filter(|one| !set.members.contains(one)) {
+            let gain = self.gain(set, addition);
+            if gain.ln_odds < GAIN_LEAST {
+                continue;
+            }
+            let class = self.additions[addition].class;
+            match best.iter_mut().find(|(known, _)| self.additions[*known].class == class) {
+                Some(known) if known.1.ln_odds < gain.ln_odds => *known = (addition, gain),
+                Some(_) => {}
+                None => best.push((addition, gain)),
+            }
+        }
+        best.sort_by(|a, b| b.1.ln_odds.total_cmp(&a.1.ln_odds));
+        best.truncate(BEAM);
+        best
+    }
+
+    fn exchanged(&self, mut best: Set, among: &[usize]) -> Set {
+        for place in 0..best.members.len() {
+            let Some(leaving) = best.members.get(place).copied() else { break };
+            let others: Vec<usize> = best.members.iter().copied().filter(|one| *one != leaving).collect();
+            let less = self.set(others);
+            let entering = self.steps(&less, among).into_iter().next();
+            let next = entering.map_or_else(|| less.clone(), |(one, gain)| self.with(&less, one, &gain));
+            for next in [less, next] {
+                if next.ln_odds > best.ln_odds + 1e-9 {
+                    best = next;
+                }
+            }
+        }
+        best
+    }
+
+    /// The coefficients of a set's directions with the greatest posterior probability.
+    pub(crate) fn coefficients(&self, set: &Set) -> Vec<(usize, f64)> {
+        let count = set.swept.len();
+        let last = self.products.nrows() - 1;
+        let matrix = DMatrix::from_fn(count, count, |i, j| {
+            let ((a, precision), (b, _)) = (set.swept[i], set.swept[j]);
+            self.products[(a, b)] + if i == j { precision } else { 0.0 }
+        });
+        let right = DVector::from_fn(count, |i, _| self.products[(set.swept[i].0, last)]);
+        let solved = matrix.cholesky().map_or_else(|| DVector::zeros(count), |factors| factors.solve(&right));
+        set.swept.iter().map(|(direction, _)| *direction).zip(solved.iter().copied()).collect()
+    }
+}
+
+#[cfg(test)]
+#[path = "evidence_tests.rs"]
+mod tests;
