@@ -1,60 +1,14 @@
 //! The protocol: recalibrate the base model, test for structure, locate it, name the effect, add it, and repeat.
 
-use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use rayon::ThreadPoolBuilder;
-use tactus_model::{Array, Effect, EffectError, Indenter, ModelError, Psf, Registration, Response};
+use tactus_model::Effect;
 
-use crate::bins::Bins;
-use crate::candidates::Candidate;
-use crate::predictor::{Parameters, Predictor, Term};
-use crate::prepare::Prepared;
-use crate::random_walk::RandomWalk;
-use crate::search::{Grown, Search, SearchPhase};
-use crate::verdict::{SearchOutcome, cannot_judge, conclude};
-use crate::{BaseModel, Discovery, Floor, Frames, not_shown};
-
-/// What is known beforehand: the model with which the data are compared.
-#[derive(Debug, Clone)]
-pub struct Known {
-    /// Geometry and converter of the sensor.
-    pub array: Array,
-    /// Declared point spread.
-    pub psf: Psf,
-    /// Declared response of the elements.
-    pub response: Response,
-    /// Assumed position of the sensor in the robot frame.
-    pub registration: Registration,
-    /// The indenters by id.
-    pub indenters: BTreeMap<String, Indenter>,
-    /// Effects of the known model. They are refitted with the rest and never removed.
-    pub effects: Vec<Effect>,
-}
-
-/// Options of a discovery.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
-    /// The seed of the split and of the Monte-Carlo tests.
-    pub seed: u64,
-    /// How many threads compute; 0 counts as 1. The result does not depend on it.
-    pub threads: usize,
-    /// The rule by which effects are added.
-    pub rule: Rule,
-    /// A structured residual that is tolerable, declared before the data are judged. If the 95 % upper bound of what is structured
-    /// is lower, the added effects count as the explanation.
-    pub tolerance_counts: Option<f64>,
-}
-
-/// The rule by which effects are added.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Rule {
-    /// Corrected tests, held-out presses, and a comparison of each added effect with others in its place.
-    #[default]
-    Protocol,
-    /// Forward selection by the Bayesian information criterion of the fitted presses alone, as a comparison for the protocol.
-    Bic,
-}
+use crate::data::{Bins, DiscoverError, Floor, Frames, Known};
+use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
+use crate::search::{Candidate, Grown, Options, Rule, Search, not_shown};
+use crate::verdict::{BaseModel, Discovery, SearchOutcome, cannot_judge, conclude};
 
 /// Progress of a discovery.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,28 +17,6 @@ pub struct Progress {
     pub what: String,
     /// Estimated share that is done, 0 to 1; never falls.
     pub share: f64,
-}
-
-/// Why a discovery failed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DiscoverError {
-    /// The data do not suffice.
-    #[error("{0}")]
-    TooLittle(String),
-    /// The declared parameters are no valid model.
-    #[error("the declared model: {0}")]
-    Model(#[from] ModelError),
-    /// A known effect does not fit the array.
-    #[error("the declared model: {0}")]
-    Effect(#[from] EffectError),
-    /// The operating system could not start the threads.
-    #[error("cannot start {threads} threads: {reason}")]
-    Threads {
-        /// [`Options::threads`].
-        threads: usize,
-        /// From the operating system.
-        reason: String,
-    },
 }
 
 /// Finds which effects a model lacks, by the whole protocol.
@@ -113,7 +45,7 @@ fn discover_on_threads(
 ) -> Result<Discovery, DiscoverError> {
     let reporter = ProgressReport { progress, share: Mutex::new(0.0) };
     reporter.report("recalibrating the base model", 0.02);
-    let prepared = Prepared::new(known, frames, options)?;
+    let prepared = Prepared::new(known, frames, options.seed)?;
     if prepared.floor == Floor::None {
         return cannot_judge(&prepared, options);
     }
@@ -127,15 +59,12 @@ fn discover_on_threads(
         problem: &problem,
         candidates: &candidates,
         options,
-        known_terms: known.effects.len() + prepared.faulty.terms.len(),
+        known_terms: known.effects.len() + prepared.faulty.effects.len(),
         progress: &|what| reporter.report(what, 0.0),
     };
     let before = search.locate(&base)?;
-    let phase = |phase: SearchPhase| match phase {
-        SearchPhase::Holding => reporter.report("comparing each effect with others in its place", 0.6),
-    };
-    let Grown { at: grown, rounds, equivalent, .. } = match options.rule {
-        Rule::Protocol => search.grow(&base, &phase)?,
+    let Grown { at: grown, rounds, equivalent } = match options.rule {
+        Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
     reporter.report("locating what remains", 0.9);

@@ -1,45 +1,26 @@
 //! Finds what a simulation is missing: where its predictions and measured frames disagree, which effect of the library
 //! explains the difference, and how far the gap shrinks with that effect added to the model.
+//!
+//! Each module uses only those before it: `numbers`, `data`, `fit`, `search`, `next`, `verdict`, `discover`. A test holds this:
+//! `xtask/tests/it/modules.rs`.
 
-mod bic;
-mod bins;
-mod candidates;
-mod contacts;
-mod covariates;
+mod data;
 mod discover;
-mod discovery;
-mod evidence;
-mod faulty;
 mod fit;
 #[cfg(test)]
 mod fixtures;
-mod frames;
-mod grams;
-mod heldout;
-mod lattice;
-mod linear;
-mod locate;
 mod next;
-mod noise;
-mod not_shown;
-mod parallel;
-mod predictor;
-mod prepare;
-mod random_walk;
-mod rivals;
-mod rng;
-mod scale;
-mod score;
+mod numbers;
 mod search;
-mod spectrum;
-mod structured;
 mod verdict;
-mod wiring;
 
-pub use discover::{DiscoverError, Known, Options, Progress, Rule, discover, predict};
-pub use discovery::{
-    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, Final, Floor, Gap, GlobalTest, Level,
-    NextExperiment, NotShown, Point, Round, RunWalks, Split, Structured, TriedEffect, Unexplained, Verdict,
-};
-pub use frames::Frames;
+pub use data::{DiscoverError, Floor, Frames, Known};
+pub use discover::{Progress, discover, predict};
+pub use fit::RunWalks;
+pub use next::NextExperiment;
+pub use search::{Curve, Gap, NotShown, Options, Point, Round, Rule, TriedEffect};
 pub use tactus_calibrate::{FaultKind, FaultyElement};
+pub use verdict::{
+    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, Split, Structured,
+    Unexplained, Verdict,
+};

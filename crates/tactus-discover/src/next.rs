@@ -20,15 +20,26 @@ mod design;
 
 use tactus_model::effect::{Definition, ParameterKind};
 
-use crate::bins::{Bins, HeldOut};
-use crate::discovery::{NextExperiment, NotShown};
-use crate::fit::{Free, Problem};
-use crate::noise::Noise;
-use crate::parallel;
-use crate::predictor::{Parameters, Predictor, Term};
-use crate::score::Fitting;
-use crate::{DiscoverError, Frames, Known};
+use crate::data::{Bins, DiscoverError, Frames, HeldOut, Known, Noise};
+use crate::fit::{Free, Parameters, Predictor, Problem, Term};
+use crate::numbers::parallel;
+use crate::search::{Fitting, NotShown};
 use design::{Design, DesignSpace};
+
+/// An experiment that would distinguish two explanations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NextExperiment {
+    /// Name of the experiment for `tactus run`.
+    pub experiment: &'static str,
+    /// Its parameters and their values for `tactus run --param`.
+    pub parameters: Vec<(&'static str, String)>,
+    /// Approximate duration on the rig.
+    pub duration_s: f64,
+    /// The two explanations.
+    pub separates: [String; 2],
+    /// By how many standard errors their predictions would differ; `None` if that cannot be predicted.
+    pub expected_z: Option<f64>,
+}
 
 /// A model that may explain the data.
 #[derive(Debug, Clone)]

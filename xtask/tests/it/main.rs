@@ -2,4 +2,5 @@
 
 mod ci;
 mod dependencies;
+mod modules;
 mod references;

@@ -5,9 +5,8 @@
 use tactus_model::Registration;
 use tactus_schema::table::{Phase, RowView};
 
-use crate::bins::interval_s;
-use crate::rng::Rng;
-use crate::{Frames, Known};
+use crate::data::{Frames, Known, interval_s};
+use crate::numbers::Rng;
 
 /// A possible experiment.
 #[derive(Debug, Clone)]
@@ -85,7 +84,7 @@ impl<'a> DesignSpace<'a> {
         let here = (0..frames.len()).filter(|frame| (frames.covering_mm[*frame] - covering_mm).abs() < 1e-6);
         let deepest_mm = here.map(|frame| -frames.position_mm[frame][2]).fold(0.0, f64::max);
         let loads: Vec<f64> = (1..frames.len()).filter_map(|frame| load_mm_per_s(frames, frame)).collect();
-        let load_mm_per_s = if loads.is_empty() { 1.0 } else { crate::noise::median(&loads) };
+        let load_mm_per_s = if loads.is_empty() { 1.0 } else { crate::numbers::median(&loads) };
         let reached = NEARLY * deepest_mm / (1.2 * covering_mm);
         let hundredths = (100.0 * deepest_mm / (1.2 * covering_mm)).floor().max(5.0);
         Self {

@@ -1,0 +1,36 @@
+//! The data before any model: frames, where the tip rests and presses, bins of frames, the noise of a reading, faulty elements.
+//!
+//! Readings are averaged where the tip rests ([`bins`]). The mean of `n` consecutive readings with the autocorrelation `rho` has the
+//! variance
+//!
+//! ```text
+//! noise^2 / n (1 + 2 sum over k of (1 - k / n) rho(k))
+//! ```
+//!
+//! The noise is that of readings that repeat each other ([`noise`]), so it does not depend on the model. One press in three is held out.
+//! Blocks of bins that are long beside the memory of the noise count as independent. Elements that calibration finds faulty
+//! ([`faulty`]) have no weight, or an effect of their own in the base model.
+
+mod bins;
+mod contacts;
+mod error;
+mod faulty;
+mod floor;
+mod frames;
+mod history;
+mod known;
+pub(crate) mod lattice;
+mod motion;
+mod noise;
+pub(crate) mod spectrum;
+
+pub(crate) use bins::{Bins, HeldOut};
+pub(crate) use contacts::Contacts;
+pub use error::DiscoverError;
+pub(crate) use faulty::{Faulty, MISWIRED, rewired};
+pub use floor::Floor;
+pub use frames::Frames;
+pub(crate) use history::History;
+pub use known::Known;
+pub(crate) use motion::{interval_s, still, turns};
+pub(crate) use noise::{Noise, QUIETEST};

@@ -1,0 +1,277 @@
+//! Bins of frames: where the tip rests, consecutive frames are averaged into one bin.
+//!
+//! A frame in motion is a bin of its own. Once the tip rests, each bin holds more frames than the one before, up to half a
+//! second, so bins are short where relaxation is fast.
+
+use tactus_model::{Trajectory, TrajectoryError};
+
+use super::error::DiscoverError;
+use super::frames::Frames;
+use super::motion::{CLEAR_MM, interval_s, pressing, turns, unchanged};
+use super::noise::Noise;
+use crate::numbers::Rng;
+
+/// Greatest number of frames in a bin, as a share of the frames since the tip came to rest.
+const GROWTH: f64 = 0.25;
+/// Greatest number of frames in a bin.
+const FRAMES_MAX: usize = 15;
+/// Least duration of a block. Readings of different blocks are taken to be independent.
+const BLOCK_S: f64 = 3.0;
+/// Longest stretch of rest that is fitted or held out as a unit.
+const STRETCH_S: f64 = 10.0;
+/// One press in this many is held out.
+const HELDOUT_ONE_IN: usize = 3;
+
+/// Bins in order of time, run by run.
+#[derive(Debug)]
+pub(crate) struct Bins {
+    pub(crate) elements: usize,
+    /// First frame of each bin; one more entry holds the number of frames.
+    pub(crate) first: Vec<usize>,
+    pub(crate) run: Vec<usize>,
+    /// Mean time of the bin's frames since the run's first frame.
+    pub(crate) t_s: Vec<f64>,
+    /// Mean counts, bin by bin.
+    pub(crate) counts: Vec<f64>,
+    /// Inverse variance of a bin's mean for a noise of one count; 0 for bins that are ignored.
+    pub(crate) weight: Vec<f64>,
+    /// Block of each bin. Bins of one block may be dependent, blocks are independent.
+    pub(crate) block: Vec<usize>,
+    pub(crate) blocks: usize,
+    /// True for bins that are not fitted.
+    pub(crate) heldout: Vec<bool>,
+    /// Path of the tip in each run.
+    pub(crate) paths: Vec<Trajectory>,
+}
+
+/// The held-out part of the data.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct HeldOut {
+    /// Whether each frame is held out.
+    pub(crate) frames: Vec<bool>,
+    pub(crate) train_presses: usize,
+    pub(crate) presses: usize,
+    pub(crate) depths_mm: Vec<f64>,
+    pub(crate) coverings_mm: Vec<f64>,
+}
+
+impl Bins {
+    /// Bins of several frames where the tip rests (`average`), or of one frame each; not weighted yet.
+    pub(crate) fn of(frames: &Frames, average: bool) -> Result<Self, DiscoverError> {
+        let unchanged = unchanged(frames, CLEAR_MM);
+        let elements = frames.elements;
+        let (mut first, mut run, mut t_s, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut begin = 0;
+        let mut paths = Vec::new();
+        for (index, (_, end)) in frames.runs.iter().enumerate() {
+            paths.push(path(frames, begin, *end)?);
+            let mut frame = begin;
+            while frame < *end {
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]
+                let most = if average {
+                    ((GROWTH * unchanged[frame] as f64) as usize).clamp(1, FRAMES_MAX)
+                } else {
+                    1
+                };
+                let mut next = frame + 1;
+                while next < *end
+                    && next - frame < most
+                    && unchanged[next] > unchanged[next - 1]
+                    && pressing(frames.phase[next]) == pressing(frames.phase[frame])
+                {
+                    next += 1;
+                }
+                first.push(frame);
+                run.push(index);
+                let count = (next - frame) as f64;
+                t_s.push(frames.t_s[frame..next].iter().sum::<f64>() / count);
+                let at = counts.len();
+                counts.resize(at + elements, 0.0);
+                for member in frame..next {
+                    for (sum, one) in counts[at..].iter_mut().zip(frames.counts_of(member)) {
+                        *sum += f64::from(*one) / count;
+                    }
+                }
+                frame = next;
+            }
+            begin = *end;
+        }
+        let bins = run.len();
+        first.push(frames.len());
+        Ok(Self {
+            elements,
+            first,
+            run,
+            t_s,
+            counts,
+            weight: vec![1.0; bins],
+            block: vec![0; bins],
+            blocks: 1,
+            heldout: vec![false; bins],
+            paths,
+        })
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.run.len()
+    }
+
+    /// Number of frames in a bin.
+    pub(crate) fn frames_in(&self, bin: usize) -> usize {
+        self.first[bin + 1] - self.first[bin]
+    }
+
+    /// True if the tip was clear of the surface.
+    pub(crate) fn is_clear(&self, frames: &Frames, bin: usize) -> bool {
+        frames.position_mm[self.first[bin]][2] > CLEAR_MM
+    }
+
+    /// Sets the bins' weights from the noise, and divides them into blocks.
+    pub(crate) fn weigh(&mut self, frames: &Frames, noise: &Noise, heldout: &HeldOut) {
+        let interval_s = interval_s(frames);
+        let block_s = BLOCK_S.max(10.0 * noise.memory_frames() as f64 * interval_s);
+        let mut block = 0;
+        let mut began = 0;
+        for bin in 0..self.len() {
+            let (frame, start) = (self.first[bin], self.first[began]);
+            self.heldout[bin] = heldout.frames[frame];
+            let count = self.frames_in(bin);
+            let whole = count as f64 / noise.inflation(count);
+            self.weight[bin] = if turns(frames, frame) { 0.0 } else { whole };
+            let other = self.run[bin] != self.run[began]
+                || frames.press[frame] != frames.press[start]
+                || heldout.frames[frame] != heldout.frames[start]
+                || self.t_s[bin] - self.t_s[began] > block_s;
+            if other {
+                block += 1;
+                began = bin;
+            }
+            self.block[bin] = block;
+        }
+        self.blocks = block + 1;
+    }
+}
+
+impl HeldOut {
+    /// Holds out one press in three with the rest that follows it. If the data have several coverings, or else several depths,
+    /// all presses of one of them are held out.
+    pub(crate) fn choose(frames: &Frames, seed: u64) -> Self {
+        let mut rng = Rng::new(seed);
+        let presses = PressSpan::of(frames);
+        let mut out = vec![false; presses.len()];
+        let mut order: Vec<usize> = (0..presses.len()).collect();
+        rng.shuffle(&mut order);
+        let wanted = presses.len() / HELDOUT_ONE_IN;
+        let (mut depths_mm, mut coverings_mm) = (Vec::new(), Vec::new());
+        // One in the middle: outside the fitted range even the true model may look wrong.
+        if let Some(covering_mm) = middle(presses.iter().map(|press| press.covering_mm)) {
+            coverings_mm.push(covering_mm);
+        } else if let Some(depth_mm) = middle(presses.iter().map(|press| press.depth_mm)) {
+            depths_mm.push(depth_mm);
+        }
+        for (out, press) in out.iter_mut().zip(&presses) {
+            *out = coverings_mm.iter().any(|one| same(*one, press.covering_mm))
+                || depths_mm.iter().any(|one| same(*one, press.depth_mm));
+        }
+        for index in order {
+            if out.iter().filter(|out| **out).count() >= wanted {
+                break;
+            }
+            out[index] = true;
+        }
+        let mut of_frame = vec![false; frames.len()];
+        for (press, out) in presses.iter().zip(&out) {
+            of_frame[press.first..press.end].fill(*out);
+        }
+        rests(frames, &presses, &mut rng, &mut of_frame);
+        let held = out.iter().filter(|out| **out).count();
+        Self { frames: of_frame, train_presses: presses.len() - held, presses: held, depths_mm, coverings_mm }
+    }
+}
+
+/// Frames of a press and of the rest after it, up to the next press or [`STRETCH_S`].
+struct PressSpan {
+    first: usize,
+    end: usize,
+    depth_mm: f64,
+    covering_mm: f64,
+}
+
+impl PressSpan {
+    fn of(frames: &Frames) -> Vec<Self> {
+        let mut presses: Vec<Self> = Vec::new();
+        let mut begin = 0;
+        for (_, run_end) in &frames.runs {
+            let mut last: Option<i32> = None;
+            let mut left_s = f64::NEG_INFINITY;
+            for frame in begin..*run_end {
+                let press = frames.press[frame];
+                if press >= 0 {
+                    if last != Some(press) {
+                        let covering_mm = frames.covering_mm[frame];
+                        presses.push(Self { first: frame, end: frame + 1, depth_mm: 0.0, covering_mm });
+                        last = Some(press);
+                    }
+                    left_s = frames.t_s[frame];
+                }
+                let belongs = press >= 0 || frames.t_s[frame] - left_s <= STRETCH_S;
+                if let Some(current) = presses.last_mut().filter(|_| last.is_some() && belongs) {
+                    current.end = frame + 1;
+                    current.depth_mm = current.depth_mm.max(-frames.position_mm[frame][2]);
+                }
+            }
+            begin = *run_end;
+        }
+        presses
+    }
+}
+
+/// Holds out one stretch in three of the frames that belong to no press.
+fn rests(frames: &Frames, presses: &[PressSpan], rng: &mut Rng, out: &mut [bool]) {
+    let mut taken = vec![false; frames.len()];
+    for press in presses {
+        taken[press.first..press.end].fill(true);
+    }
+    let mut stretch: Option<(f64, bool)> = None;
+    let mut run = frames.runs.iter().map(|(_, end)| *end).peekable();
+    for frame in 0..frames.len() {
+        if run.next_if(|end| *end <= frame).is_some() || taken[frame] {
+            stretch = None;
+        }
+        if taken[frame] {
+            continue;
+        }
+        let t_s = frames.t_s[frame];
+        let (_, held) = *match &mut stretch {
+            Some(begun) if t_s - begun.0 <= STRETCH_S => begun,
+            other => other.insert((t_s, rng.below(HELDOUT_ONE_IN) == 0)),
+        };
+        out[frame] = held;
+    }
+}
+
+/// The middle one of at least four different values, if each occurs often.
+fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let count = values.len();
+    values.dedup_by(|a, b| same(*a, *b));
+    // Values that scatter are no distinct settings.
+    (values.len() >= 4 && count >= 4 * values.len()).then(|| values[values.len() / 2])
+}
+
+fn same(one: f64, other: f64) -> bool {
+    (one - other).abs() < 0.005
+}
+
+fn path(frames: &Frames, begin: usize, end: usize) -> Result<Trajectory, DiscoverError> {
+    let mut last_s = f64::NEG_INFINITY;
+    let points = (begin..end).filter_map(|frame| {
+        let t_s = frames.t_s[frame];
+        let rises = t_s > last_s;
+        last_s = last_s.max(t_s);
+        rises.then_some((t_s, frames.position_mm[frame]))
+    });
+    Trajectory::new(points)
+        .map_err(|problem: TrajectoryError| DiscoverError::TooLittle(format!("the stage's path: {problem}")))
+}

@@ -1,0 +1,165 @@
+//! The contacts in the data, and how they differ.
+
+use tactus_model::Phase;
+
+use super::frames::Frames;
+use super::motion::{pressing, still};
+
+/// Depths, places and speeds that differ by less count as the same.
+const SAME_DEPTH_MM: f64 = 0.03;
+const SAME_PLACE_MM: f64 = 0.05;
+const SAME_SPEED_RATIO: f64 = 1.5;
+
+/// Contacts in order of time: unbroken sequences of frames below the surface.
+#[derive(Debug)]
+pub(crate) struct Contacts<'a> {
+    frames: &'a Frames,
+    /// First frame, and the one after the last.
+    spans: Vec<[usize; 2]>,
+    still: Vec<usize>,
+}
+
+impl<'a> Contacts<'a> {
+    pub(crate) fn of(frames: &'a Frames) -> Self {
+        let touches = |frame: usize| frames.position_mm[frame][2] < 0.0 || pressing(frames.phase[frame]);
+        let ends: Vec<usize> = frames.runs.iter().map(|(_, end)| *end).collect();
+        let mut spans: Vec<[usize; 2]> = Vec::new();
+        for frame in (0..frames.len()).filter(|frame| touches(*frame)) {
+            match spans.last_mut() {
+                Some([_, end]) if *end == frame && !ends.contains(&frame) => *end = frame + 1,
+                _ => spans.push([frame, frame + 1]),
+            }
+        }
+        Self { frames, spans, still: still(frames) }
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// Number of depths at which the tip rested, or that were the greatest of a contact.
+    pub(crate) fn distinct_depths(&self) -> usize {
+        let mut depths_mm: Vec<f64> = self
+            .spans
+            .iter()
+            .flat_map(|[first, end]| {
+                let rests =
+                    (*first..*end).filter(|frame| self.still[*frame] == 3).map(|frame| self.depth_mm(frame));
+                rests.chain([(*first..*end).map(|frame| self.depth_mm(frame)).fold(0.0, f64::max)])
+            })
+            .filter(|depth_mm| *depth_mm > 0.0)
+            .collect();
+        depths_mm.sort_by(f64::total_cmp);
+        distinct(&depths_mm, |a, b| b - a > SAME_DEPTH_MM)
+    }
+
+    pub(crate) fn distinct_places(&self) -> usize {
+        tactus_calibrate::distinct_places(self.places_mm()).len()
+    }
+
+    pub(crate) fn longest_hold_s(&self) -> f64 {
+        let holds = self.spans.iter().flat_map(|[first, end]| *first..*end);
+        holds
+            .map(|frame| self.frames.t_s[frame] - self.frames.t_s[frame - self.still[frame]])
+            .fold(0.0, f64::max)
+    }
+
+    /// Longest time without contact after a contact.
+    pub(crate) fn longest_rest_s(&self) -> f64 {
+        let starts = self.spans.iter().skip(1).map(|[first, _]| *first).chain([self.frames.len()]);
+        self.spans
+            .iter()
+            .zip(starts)
+            .filter(|([_, end], next)| next > end)
+            .map(|([_, end], next)| self.frames.t_s[next - 1] - self.frames.t_s[*end])
+            .fold(0.0, f64::max)
+    }
+
+    /// True if the tip rises within a contact.
+    pub(crate) fn falls_in_contact(&self) -> bool {
+        self.spans.iter().any(|[first, end]| {
+            (first + 1..*end).any(|frame| self.depth_mm(frame) < self.depth_mm(frame - 1) - 0.005)
+        })
+    }
+
+    /// Number of loading speeds.
+    pub(crate) fn distinct_speeds(&self) -> usize {
+        let mut speeds: Vec<f64> =
+            self.spans.iter().filter_map(|[first, end]| self.speed_mm_per_s(*first, *end)).collect();
+        speeds.sort_by(f64::total_cmp);
+        distinct(&speeds, |a, b| b / a > SAME_SPEED_RATIO)
+    }
+
+    /// True if one place was reached from different sides.
+    pub(crate) fn approaches(&self) -> bool {
+        let from: Vec<([f64; 2], [bool; 2])> =
+            self.spans.iter().filter_map(|[first, _]| self.from(*first)).collect();
+        from.iter()
+            .any(|(place, sides)| from.iter().any(|(other, others)| !far(*place, *other) && sides != others))
+    }
+
+    /// True if a place was pressed more than once.
+    pub(crate) fn repeats(&self) -> bool {
+        self.distinct_places() < self.count()
+    }
+
+    /// Number of frames in contact with a moving tip.
+    pub(crate) fn frames_in_motion(&self) -> usize {
+        self.spans
+            .iter()
+            .flat_map(|[first, end]| *first..*end)
+            .filter(|frame| self.still[*frame] == 0)
+            .count()
+    }
+
+    fn depth_mm(&self, frame: usize) -> f64 {
+        -self.frames.position_mm[frame][2]
+    }
+
+    fn places_mm(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        self.spans.iter().map(|[first, _]| {
+            let [x, y, _] = self.frames.position_mm[*first];
+            [x, y]
+        })
+    }
+
+    /// Median loading speed of a contact.
+    fn speed_mm_per_s(&self, first: usize, end: usize) -> Option<f64> {
+        let speed = |frame: usize| {
+            let dt_s = self.frames.t_s[frame] - self.frames.t_s[frame - 1];
+            (self.depth_mm(frame) - self.depth_mm(frame - 1)) / dt_s.max(1e-6)
+        };
+        let mut speeds: Vec<f64> =
+            (first + 1..end).filter(|frame| self.frames.phase[*frame] != Phase::Unload).map(speed).collect();
+        speeds.retain(|speed| *speed > 0.01);
+        speeds.sort_by(f64::total_cmp);
+        speeds.get(speeds.len() / 2).copied()
+    }
+
+    /// A contact's place, and whether it was last approached in the positive direction of x and of y.
+    fn from(&self, first: usize) -> Option<([f64; 2], [bool; 2])> {
+        let [x, y, _] = self.frames.position_mm[first];
+        let before = (0..first).rev().take(600).map(|frame| self.frames.position_mm[frame]);
+        let [from_x, from_y, _] = before.into_iter().find(|at| far([at[0], at[1]], [x, y]))?;
+        Some(([x, y], [from_x < x - SAME_PLACE_MM, from_y < y - SAME_PLACE_MM]))
+    }
+}
+
+fn far([x, y]: [f64; 2], [other_x, other_y]: [f64; 2]) -> bool {
+    (x - other_x).hypot(y - other_y) > SAME_PLACE_MM
+}
+
+/// Number of distinct values in a sorted list.
+fn distinct(sorted: &[f64], differ: impl Fn(f64, f64) -> bool) -> usize {
+    let mut last: Option<f64> = None;
+    sorted
+        .iter()
+        .filter(|value| {
+            let new = last.is_none_or(|last| differ(last, **value));
+            if new {
+                last = Some(**value);
+            }
+            new
+        })
+        .count()
+}

@@ -1,0 +1,136 @@
+//! What the sensor has been through before each bin: contact, rest, speed, place and the largest depth so far.
+
+use super::bins::Bins;
+use super::frames::Frames;
+
+/// A sideways move shorter than this has no direction.
+const ASIDE_MM: f64 = 0.05;
+
+/// Covariates of the bins.
+#[derive(Debug)]
+pub(crate) struct History {
+    pub(crate) since_contact_s: Vec<f64>,
+    pub(crate) since_release_s: Vec<f64>,
+    pub(crate) depth_mm: Vec<f64>,
+    pub(crate) deepest_before_mm: Vec<f64>,
+    pub(crate) upward: Vec<f64>,
+    pub(crate) speed_mm_per_s: Vec<f64>,
+    pub(crate) travel_mm_per_s: Vec<f64>,
+    pub(crate) aside: [Vec<f64>; 2],
+    pub(crate) press: Vec<f64>,
+    pub(crate) place_mm: [Vec<f64>; 2],
+    pub(crate) last_place_mm: Vec<Option<[f64; 2]>>,
+    pub(crate) temperature_c: Vec<f64>,
+}
+
+impl History {
+    /// The covariates of each bin, from all frames up to its end.
+    pub(crate) fn of(frames: &Frames, bins: &Bins) -> Self {
+        let count = bins.len();
+        let empty = || Vec::with_capacity(count);
+        let mut history = Self {
+            since_contact_s: empty(),
+            since_release_s: empty(),
+            depth_mm: empty(),
+            deepest_before_mm: empty(),
+            upward: empty(),
+            speed_mm_per_s: empty(),
+            travel_mm_per_s: empty(),
+            aside: [empty(), empty()],
+            press: empty(),
+            place_mm: [empty(), empty()],
+            last_place_mm: Vec::with_capacity(count),
+            temperature_c: empty(),
+        };
+        let mut state = SensorHistory::default();
+        let mut next = 0;
+        let mut run = usize::MAX;
+        for bin in 0..count {
+            if bins.run[bin] != run {
+                run = bins.run[bin];
+                state = SensorHistory::default();
+            }
+            while next < bins.first[bin + 1] {
+                state.take(frames, next);
+                next += 1;
+            }
+            let frame = bins.first[bin];
+            let t_s = bins.t_s[bin];
+            history.since_contact_s.push(t_s - state.contact_s);
+            history.since_release_s.push(state.release_s.map_or(f64::NAN, |release_s| t_s - release_s));
+            history.depth_mm.push(state.depth_mm);
+            history.deepest_before_mm.push(state.deepest_before_mm);
+            history.upward.push(f64::from(u8::from(state.upward)));
+            history.speed_mm_per_s.push(state.speed_mm_per_s);
+            history.travel_mm_per_s.push(state.travel_mm_per_s);
+            history.aside[0].push(state.aside[0]);
+            history.aside[1].push(state.aside[1]);
+            history.press.push(state.presses);
+            history.place_mm[0].push(frames.position_mm[frame][0]);
+            history.place_mm[1].push(frames.position_mm[frame][1]);
+            history.last_place_mm.push(state.last_place_mm.filter(|_| state.depth_mm <= 0.0));
+            history.temperature_c.push(f64::from(frames.temperature_c[frame]));
+        }
+        history
+    }
+}
+
+/// History of the sensor up to a frame.
+#[derive(Debug, Default)]
+struct SensorHistory {
+    last: Option<(f64, [f64; 3])>,
+    depth_mm: f64,
+    contact_s: f64,
+    release_s: Option<f64>,
+    upward: bool,
+    speed_mm_per_s: f64,
+    travel_mm_per_s: f64,
+    aside: [f64; 2],
+    presses: f64,
+    press: Option<i32>,
+    deepest_mm: f64,
+    deepest_before_mm: f64,
+    last_place_mm: Option<[f64; 2]>,
+}
+
+impl SensorHistory {
+    fn take(&mut self, frames: &Frames, frame: usize) {
+        let (t_s, at) = (frames.t_s[frame], frames.position_mm[frame]);
+        let depth_mm = -at[2];
+        if let Some((last_s, last)) = self.last {
+            let dt_s = (t_s - last_s).max(1e-6);
+            let fell_mm = last[2] - at[2];
+            if fell_mm.abs() > 1e-3 {
+                self.upward = fell_mm < 0.0;
+                if depth_mm > 0.0 {
+                    self.speed_mm_per_s = fell_mm.abs() / dt_s;
+                }
+            }
+            let aside = [at[0] - last[0], at[1] - last[1]];
+            let far = aside[0].hypot(aside[1]);
+            self.travel_mm_per_s = far.max(fell_mm.abs()) / dt_s;
+            for (held, moved) in self.aside.iter_mut().zip(aside) {
+                if moved.abs() > ASIDE_MM.min(far) && moved.abs() > 1e-3 {
+                    *held = moved.signum();
+                }
+            }
+        }
+        if frames.press[frame] >= 0 && self.press != Some(frames.press[frame]) {
+            self.press = Some(frames.press[frame]);
+            self.presses += 1.0;
+            self.deepest_before_mm = self.deepest_mm;
+        }
+        let touched = self.depth_mm > 0.0;
+        if depth_mm > 0.0 {
+            if !touched {
+                self.contact_s = t_s;
+            }
+            self.deepest_mm = self.deepest_mm.max(depth_mm);
+            self.last_place_mm = Some([at[0], at[1]]);
+        } else if touched {
+            self.release_s = Some(t_s);
+        }
+        self.depth_mm = depth_mm;
+        self.last = Some((t_s, at));
+    }
+}

@@ -1,0 +1,87 @@
+//! Parameters of the whole model during a fit.
+
+use tactus_model::effect::Definition;
+use tactus_model::{Effect, Psf};
+
+use super::random_walk::{RandomWalk, is_random_walk};
+use crate::data::{DiscoverError, Known, rewired};
+
+/// Parameters of the whole model.
+#[derive(Debug, Clone)]
+pub(crate) struct Parameters {
+    /// Counts per mm, one per element.
+    pub(crate) sensitivity: Vec<f64>,
+    /// Baselines, run by run, one per element.
+    pub(crate) baseline: Vec<Vec<f64>>,
+    /// Random walks of the baselines, if the model has them.
+    pub(crate) walk: Option<RandomWalk>,
+    pub(crate) psf: Psf,
+    pub(crate) terms: Vec<Term>,
+}
+
+/// An effect in the model, with the values of its parameters during a fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Term {
+    pub(crate) definition: &'static Definition,
+    pub(crate) values: Vec<f64>,
+}
+
+impl Term {
+    pub(crate) fn neutral(definition: &'static Definition) -> Self {
+        Self { definition, values: definition.parameters.iter().map(|one| one.neutral).collect() }
+    }
+
+    pub(crate) fn effect(&self) -> Result<Effect, DiscoverError> {
+        let names = self.definition.parameters.iter().map(|parameter| parameter.name);
+        Ok(Effect::of(self.definition, names.zip(self.values.iter().copied()))?)
+    }
+
+    pub(crate) fn of(effect: &Effect) -> Self {
+        Self {
+            definition: effect.definition(),
+            values: effect.parameters().map(|(_, value)| value).collect(),
+        }
+    }
+
+    /// The element whose signal this term replaces, if it is a term of that kind.
+    pub(crate) fn rewires(&self) -> Option<usize> {
+        rewired(self.definition, self.values.iter().copied())
+    }
+}
+
+impl Parameters {
+    /// The declared parameters, for a number of runs.
+    pub(crate) fn declared(known: &Known, runs: usize) -> Self {
+        Self {
+            sensitivity: known.response.sensitivity_counts_per_mm.clone(),
+            baseline: vec![known.response.baseline_counts.clone(); runs],
+            walk: None,
+            psf: known.psf,
+            terms: known.effects.iter().map(Term::of).collect(),
+        }
+    }
+
+    /// The same with one more term.
+    pub(crate) fn with(&self, term: Term) -> Self {
+        let mut with = self.clone();
+        with.terms.push(term);
+        with
+    }
+
+    /// Baselines of the elements, the mean over the runs.
+    pub(crate) fn mean_baseline(&self) -> Vec<f64> {
+        let runs = self.baseline.len().max(1) as f64;
+        let mean = |element: usize| self.baseline.iter().map(|run| run[element]).sum::<f64>() / runs;
+        (0..self.sensitivity.len()).map(mean).collect()
+    }
+
+    /// The effects as effects of the library; a random walk becomes several.
+    pub(crate) fn effects(&self) -> Result<Vec<Effect>, DiscoverError> {
+        let terms = self.terms.iter().filter(|term| !is_random_walk(term));
+        let mut effects = terms.map(Term::effect).collect::<Result<Vec<_>, _>>()?;
+        if let Some(walk) = &self.walk {
+            effects.extend(walk.effects(self.sensitivity.len())?);
+        }
+        Ok(effects)
+    }
+}

@@ -1,0 +1,131 @@
+//! Preparation of a search: split, noise, bins, recalibrated base model, and lines in the spectrum.
+
+use super::parameters::{Parameters, Term};
+use super::predictor::Predictor;
+use super::problem::{Fitted, Problem};
+use crate::data::{
+    Bins, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Noise, lattice, spectrum, still,
+};
+
+/// Least number of fitted presses.
+const PRESSES_LEAST: usize = 3;
+/// Greatest number of rounds of the base model's fit.
+const BASE_ROUNDS: usize = 12;
+
+/// The prepared data.
+pub(crate) struct Prepared<'a> {
+    pub(crate) known: &'a Known,
+    pub(crate) frames: &'a Frames,
+    pub(crate) heldout: HeldOut,
+    pub(crate) still: Vec<usize>,
+    /// The elements that calibration finds faulty.
+    pub(crate) faulty: Faulty,
+    /// Infinite for elements without weight.
+    pub(crate) noise: Noise,
+    /// The same with the noise of dead and stuck elements, to show what their effects explain.
+    pub(crate) noise_of_silent: Noise,
+    pub(crate) floor: Floor,
+    /// True if the tip rests long enough to show tones and steps.
+    pub(crate) replicates: bool,
+    /// Step of the converter: as declared, or wider if the readings show this.
+    pub(crate) step_counts: f64,
+    /// The wider step, if there is one, and its p-value.
+    pub(crate) lattice: Option<(f64, f64)>,
+    /// One frame in each bin.
+    pub(crate) whole: Bins,
+    pub(crate) bins: Bins,
+    /// The base model, recalibrated on the bins.
+    pub(crate) base: Fitted,
+    /// Frequencies of lines in the spectrum of the base model's residual; a grid of frequencies would miss them.
+    pub(crate) frequencies_hz: Vec<f64>,
+    pub(crate) warnings: Vec<String>,
+}
+
+impl<'a> Prepared<'a> {
+    pub(crate) fn new(known: &'a Known, frames: &'a Frames, seed: u64) -> Result<Self, DiscoverError> {
+        let heldout = HeldOut::choose(frames, seed);
+        if heldout.train_presses < PRESSES_LEAST {
+            return Err(DiscoverError::TooLittle(format!(
+                "{} presses can be fitted; at least {PRESSES_LEAST} are needed, and half as many to hold out",
+                heldout.train_presses
+            )));
+        }
+        let still = still(frames);
+        let lattice = lattice::wider_step(frames, known.array.step_counts());
+        let step_counts = lattice.map_or(known.array.step_counts(), |(step_counts, _)| step_counts);
+        let (noise, floor) = Noise::measured(frames, &still, step_counts);
+        let replicates = Noise::of(frames, &frames.counts, &still, step_counts).is_some();
+        let mut warnings = Vec::new();
+        if matches!(floor, Floor::Repeats { .. }) {
+            warnings.push(
+                "the tip never rests for some frames: the noise is that between presses that repeat each other, and contains what \
+                 differs from press to press"
+                    .to_owned(),
+            );
+        }
+        let faulty = Faulty::of(known, frames, &noise)?;
+        warnings.extend(faulty.warning.clone());
+        let noise_of_silent = noise.clone().without(|element| faulty.noisy.contains(&element));
+        let noise = noise.without(|element| faulty.is_weightless(element));
+        let floor = floor.with_rms(noise.rms_counts);
+
+        let whole = Bins::of(frames, false)?;
+        let mut bins = Bins::of(frames, true)?;
+        bins.weigh(frames, &noise, &heldout);
+        let mut base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise), &faulty)?;
+        let frequencies_hz = lines_hz(&Predictor::new(known, frames, &whole), &base, &faulty)?;
+        if !frequencies_hz.is_empty() {
+            // Averaging over several frames would remove a tone.
+            bins = Bins::of(frames, false)?;
+            bins.weigh(frames, &noise, &heldout);
+            base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise), &faulty)?;
+        }
+        Ok(Self {
+            known,
+            frames,
+            heldout,
+            still,
+            faulty,
+            noise,
+            noise_of_silent,
+            floor,
+            replicates,
+            step_counts,
+            lattice,
+            whole,
+            bins,
+            base,
+            frequencies_hz,
+            warnings,
+        })
+    }
+
+    /// The least-squares problem of the bins.
+    pub(crate) fn problem(&self) -> Problem<'_> {
+        Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise)
+    }
+
+    /// The same, with dead and stuck elements weighted as the others.
+    pub(crate) fn problem_with_silent(&self) -> Problem<'_> {
+        Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise_of_silent)
+    }
+}
+
+/// The base model with the effects of faulty elements, fitted to the bins.
+fn recalibrated(problem: &Problem<'_>, faulty: &Faulty) -> Result<Fitted, DiscoverError> {
+    let Predictor { known, bins, .. } = problem.predictor;
+    let mut start = Parameters::declared(known, bins.paths.len());
+    start.terms.extend(faulty.effects.iter().map(Term::of));
+    problem.fit_from(start, BASE_ROUNDS)
+}
+
+/// Frequencies of lines in the spectrum of a model's residual of all frames.
+fn lines_hz(whole: &Predictor<'_>, base: &Fitted, faulty: &Faulty) -> Result<Vec<f64>, DiscoverError> {
+    let predicted = whole.predict(&base.parameters)?;
+    let mut residual: Vec<f64> =
+        whole.frames.counts.iter().zip(&predicted).map(|(counts, of)| f64::from(*counts) - of).collect();
+    for element in (0..whole.frames.elements).filter(|element| faulty.is_weightless(*element)) {
+        residual.iter_mut().skip(element).step_by(whole.frames.elements).for_each(|residual| *residual = 0.0);
+    }
+    Ok(spectrum::lines_hz(whole.frames, &residual))
+}

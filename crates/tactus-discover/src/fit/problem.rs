@@ -1,0 +1,474 @@
+//! The joint fit: base parameters and effects together, by weighted least squares.
+//!
+//! ```text
+//! counts(bin, e) = baseline(run, e) + gain_e m_e(bin; sigma, effects) + ...
+//! ```
+//!
+//! A baseline and a gain each act on one element, so they are eliminated in closed form: every residual and every
+//! derivative by another parameter is first projected onto the complement of the element's own baseline and gain. What
+//! remains is a small problem in the spread and the parameters of the effects, solved by damped Gauss-Newton steps.
+//!
+//! # Source
+//! Variable projection: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413. Damping: Levenberg and
+//! Marquardt.
+
+use nalgebra::{DMatrix, DVector};
+use tactus_model::effect::ParameterKind;
+
+use super::grams::Direction;
+use super::linear::Linear;
+use super::parameters::{Parameters, Term};
+use super::predictor::Predictor;
+use super::scale::Scale;
+use crate::data::{Contacts, DiscoverError, Noise};
+use crate::numbers::parallel;
+
+/// A fit ends when the expected reduction of the cost by a step is less than this.
+const COST_LEAST: f64 = 0.05;
+const COST_SHARE_LEAST: f64 = 1e-4;
+
+/// Gains and baselines are fitted first if they alone remove this share of the cost.
+const TAKEN_UP_LEAST: f64 = 0.1;
+
+/// Least share of a derivative's square that counts as the parameter's own in the damping. A parameter whose action gains
+/// and baselines can nearly replace is thus kept from long steps.
+const OWN_SHARE_LEAST: f64 = 1e-3;
+
+/// A knot is undetermined if the data determine it by less than this share of the knot before.
+const UNSEEN_SHARE: f64 = 0.1;
+
+/// A number of frames long beside the correlation time of the noise.
+const LONG_FRAMES: usize = 1000;
+
+/// Effects with more parameters have their derivatives taken once per fit.
+const PARAMETERS_MANY: usize = 6;
+
+/// A least-squares problem: the data with their weights, and the model.
+#[derive(Debug)]
+pub(crate) struct Problem<'a> {
+    pub(crate) predictor: Predictor<'a>,
+    /// Inverse variance of a reading of each element, times that of the bin.
+    pub(crate) element_weight: Vec<f64>,
+    /// Weight of the fitted bins; 0 for those held out.
+    pub(crate) train: Vec<f64>,
+    /// The same for signals that are slow beside the correlation time of the noise.
+    pub(crate) slow: Vec<f64>,
+    /// `slow` without contact, where a missing effect of the presses cannot be mistaken for drift; 0 in contact.
+    pub(crate) slow_and_clear: Vec<f64>,
+    /// Variance of slow sums of the noise, in units of that of the fitted bins' weights.
+    pub(crate) variance: f64,
+    /// Number of coverings in the data. With one, the slope of the spread is not fitted.
+    pub(crate) coverings: usize,
+    /// True if the spread is fitted.
+    pub(crate) spread_free: bool,
+    /// Duration of the longest run; at least 1 s.
+    pub(crate) duration_s: f64,
+    /// By how much the variance of a sum of squares exceeds that of independent readings.
+    pub(crate) squares_inflation: f64,
+}
+
+/// A model that was fitted.
+#[derive(Debug, Clone)]
+pub(crate) struct Fitted {
+    pub(crate) parameters: Parameters,
+    pub(crate) predicted: Vec<f64>,
+    /// Weighted sum of squared residuals of the fitted bins; with a random walk, that of constant baselines less the gain in
+    /// likelihood.
+    pub(crate) cost: f64,
+    /// Standard errors of the terms' parameters; NaN where one was not fitted.
+    pub(crate) errors: Vec<Vec<f64>>,
+}
+
+/// A parameter that is fitted, other than gains and baselines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Free {
+    SigmaIntercept,
+    SigmaSlope,
+    Of { term: usize, parameter: usize },
+}
+
+impl<'a> Problem<'a> {
+    /// The problem of fitting the bins that are not held out.
+    pub(crate) fn new(predictor: Predictor<'a>, noise: &Noise) -> Self {
+        let (bins, frames) = (predictor.bins, predictor.frames);
+        let weigh = |(weight, heldout): (&f64, &bool)| if *heldout { 0.0 } else { *weight };
+        let train: Vec<f64> = bins.weight.iter().zip(&bins.heldout).map(weigh).collect();
+        let inflation = noise.inflation(LONG_FRAMES);
+        let slow = |(bin, weight): (usize, &f64)| {
+            if *weight > 0.0 { bins.frames_in(bin) as f64 / inflation } else { 0.0 }
+        };
+        let slow: Vec<f64> = train.iter().enumerate().map(slow).collect();
+        let clear = |(bin, weight): (usize, &f64)| if bins.is_clear(frames, bin) { *weight } else { 0.0 };
+        let slow_and_clear = slow.iter().enumerate().map(clear).collect();
+        let sum = |weights: &[f64]| weights.iter().sum::<f64>();
+        let variance = (sum(&train) / sum(&slow).max(f64::MIN_POSITIVE)).max(1.0);
+        // A single element that is quieter than most cannot be distinguished from rounding.
+        let element_weight =
+            noise.by_element_counts.iter().map(|rms| rms.max(0.7 * noise.rms_counts).powi(-2)).collect();
+        let mut coverings_mm = frames.covering_mm.clone();
+        coverings_mm.sort_by(f64::total_cmp);
+        coverings_mm.dedup();
+        Self {
+            element_weight,
+            train,
+            slow,
+            slow_and_clear,
+            variance,
+            coverings: coverings_mm.len(),
+            spread_free: Contacts::of(frames).distinct_places() > 1,
+            duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
+            predictor,
+            squares_inflation: noise.squares_inflation(LONG_FRAMES),
+        }
+    }
+
+    /// The parameters that a fit of a model varies.
+    pub(crate) fn free(&self, parameters: &Parameters) -> Vec<Free> {
+        let mut free = Vec::new();
+        if self.spread_free {
+            free.push(Free::SigmaIntercept);
+            if self.coverings > 1 {
+                free.push(Free::SigmaSlope);
+            }
+        }
+        for (term, at) in parameters.terms.iter().enumerate() {
+            let Term { definition, values } = at;
+            if at.rewires().is_some_and(|element| self.element_weight[element] == 0.0) {
+                // Nothing shows the shares of an element without weight.
+                continue;
+            }
+            let mut values = definition.parameters.iter().zip(values);
+            if values.any(|(known, value)| known.kind == ParameterKind::ElementOrAll && *value >= 0.0) {
+                // The known drift of one element's baseline is not refitted.
+                continue;
+            }
+            for (parameter, known) in definition.parameters.iter().enumerate() {
+                if known.kind == ParameterKind::Real && known.name != "duration_s" {
+                    free.push(Free::Of { term, parameter });
+                }
+            }
+        }
+        free
+    }
+
+    pub(crate) fn predict(&self, parameters: &Parameters) -> Result<Vec<f64>, DiscoverError> {
+        self.predictor.predict(parameters)
+    }
+
+    /// Weighted sum of squared residuals of the fitted bins.
+    pub(crate) fn cost(&self, predicted: &[f64]) -> f64 {
+        self.residuals(predicted)
+            .zip(self.weights())
+            .map(|(residual, weight)| weight * residual * residual)
+            .sum()
+    }
+
+    /// Weighted sum of the squares of a column in the fitted bins.
+    fn weighed_square(&self, column: &[f64]) -> f64 {
+        column.iter().zip(self.weights()).map(|(value, weight)| weight * value * value).sum()
+    }
+
+    pub(crate) fn residuals<'b>(&'b self, predicted: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
+        self.predictor.bins.counts.iter().zip(predicted).map(|(counts, predicted)| counts - predicted)
+    }
+
+    /// Weights of the fitted readings, bin by bin, element by element.
+    pub(crate) fn weights(&self) -> impl Iterator<Item = f64> + '_ {
+        self.train.iter().flat_map(|bin| self.element_weight.iter().map(move |element| bin * element))
+    }
+
+    /// Derivative of every reading by a free parameter, by a finite difference.
+    pub(crate) fn slope(
+        &self,
+        at: &Parameters,
+        predicted: &[f64],
+        free: Free,
+    ) -> Result<Vec<f64>, DiscoverError> {
+        let (moved, step) = self.moved(at, free);
+        if step == 0.0 {
+            return Ok(vec![0.0; predicted.len()]);
+        }
+        let mut slope = self.predict(&moved)?;
+        for (slope, predicted) in slope.iter_mut().zip(predicted) {
+            *slope = (*slope - predicted) / step;
+        }
+        Ok(slope)
+    }
+
+    /// The direction of a free parameter.
+    pub(crate) fn towards(&self, at: &Parameters, free: Free) -> Direction<'static> {
+        let (parameters, step) = self.moved(at, free);
+        Direction::Towards { parameters, step }
+    }
+
+    /// The parameters after a small step for a derivative, and that step on the parameter's [`Scale`].
+    fn moved(&self, at: &Parameters, free: Free) -> (Parameters, f64) {
+        let mut moved = at.clone();
+        let step = match free {
+            Free::SigmaIntercept => {
+                moved.psf.sigma_intercept_mm += 1e-3;
+                1e-3
+            }
+            Free::SigmaSlope => {
+                moved.psf.sigma_per_mm += 1e-3;
+                1e-3
+            }
+            Free::Of { term, parameter } => {
+                let scale = self.scale(at, term, parameter);
+                let value = at.terms[term].values[parameter];
+                let at_the_end = scale.distance(value, scale.forward(value, scale.step)) < 0.5 * scale.step;
+                let step = if at_the_end { -scale.step } else { scale.step };
+                moved.terms[term].values[parameter] = scale.forward(value, step);
+                // Towards a bound the step may be cut short.
+                scale.distance(value, moved.terms[term].values[parameter])
+            }
+        };
+        (moved, step)
+    }
+
+    fn scale(&self, at: &Parameters, term: usize, parameter: usize) -> Scale {
+        let known = &at.terms[term].definition.parameters[parameter];
+        Scale::of(known, self.duration_s)
+    }
+
+    /// Derivatives of every reading by each free parameter.
+    pub(crate) fn columns(&self, at: &Parameters, predicted: &[f64]) -> Result<Vec<Vec<f64>>, DiscoverError> {
+        let free = self.free(at);
+        parallel::map(&free, |one| self.slope(at, predicted, *one)).into_iter().collect()
+    }
+
+    /// The best parameters near a start, in at most `rounds` rounds. Derivatives by the parameters of effects with many
+    /// parameters, such as the knots of a curve, are taken once, because the counts are nearly linear in them.
+    pub(crate) fn fit_from(&self, start: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
+        let free = self.free(&start);
+        let mut at = self.with_walk(start)?;
+        let mut predicted = self.predict(&at)?;
+        let mut linear = self.linear(&at, &predicted)?;
+        if let Some((better, of_better)) = self.taken_up(&linear, &at, &predicted)? {
+            linear = self.linear(&better, &of_better)?;
+            (at, predicted) = (better, of_better);
+        }
+        let mut cost = self.cost(&predicted);
+        let mut damping = 1e-3;
+        let mut kept: Vec<Option<Vec<f64>>> = vec![None; free.len()];
+        let mut covariance = None;
+        for round in 0..rounds {
+            if round > 0 {
+                linear = self.linear(&at, &predicted)?;
+            }
+            let mut residual = self.standing(&at, &predicted);
+            let raw = residual.clone();
+            linear.project(&mut residual);
+            let places: Vec<usize> = (0..free.len()).collect();
+            let column = |place: &usize| match &kept[*place] {
+                Some(column) => Ok(column.clone()),
+                None => self.slope(&at, &predicted, free[*place]),
+            };
+            let columns: Vec<Vec<f64>> =
+                parallel::map(&places, column).into_iter().collect::<Result<_, DiscoverError>>()?;
+            for ((kept, column), one) in kept.iter_mut().zip(&columns).zip(&free) {
+                if matches!(one, Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY) {
+                    kept.get_or_insert_with(|| column.clone());
+                }
+            }
+            let mut projected = columns.clone();
+            for column in &mut projected {
+                linear.project(column);
+            }
+            let (gram, right) = normal(self, &projected, &residual);
+            let own = |(index, column): (usize, &Vec<f64>)| {
+                gram[(index, index)].max(OWN_SHARE_LEAST * self.weighed_square(column))
+            };
+            let squares: Vec<f64> = columns.iter().enumerate().map(own).collect();
+            covariance = Some(gram.clone());
+            let mut improved = false;
+            let mut promise = 0.0;
+            while damping < 1e8 {
+                let step = solve(&gram, &right, damping, &squares);
+                promise = step.dot(&right);
+                let next = self.stepped(&at, &free, &step, &linear, &raw, &columns);
+                let next_predicted = self.predict(&next)?;
+                let next_cost = self.cost(&next_predicted);
+                if next_cost < cost {
+                    damping = (damping / 10.0).max(1e-9);
+                    promise = cost - next_cost;
+                    (at, predicted, cost) = (next, next_predicted, next_cost);
+                    improved = true;
+                    break;
+                }
+                if promise < COST_LEAST.max(COST_SHARE_LEAST * cost) && damping > 1e-3 {
+                    break;
+                }
+                damping *= 10.0;
+            }
+            if !improved || promise < COST_LEAST.max(COST_SHARE_LEAST * cost) {
+                break;
+            }
+        }
+        if covariance.as_ref().is_some_and(|gram| follow(&mut at, &free, gram)) {
+            predicted = self.predict(&at)?;
+        }
+        if at.walk.is_some() {
+            cost = self.cost_with_walk(&at, &predicted);
+        }
+        let errors = self.errors(&at, &free, covariance);
+        Ok(Fitted { parameters: at, predicted, cost, errors })
+    }
+
+    /// The parameters with refitted gains and baselines, and their prediction, if this reduces the cost by much. A start whose
+    /// effects are not neutral needs it, because its gains are those of a model without these effects.
+    fn taken_up(
+        &self,
+        linear: &Linear<'_>,
+        at: &Parameters,
+        predicted: &[f64],
+    ) -> Result<Option<(Parameters, Vec<f64>)>, DiscoverError> {
+        let raw = self.standing(at, predicted);
+        let mut residual = raw.clone();
+        linear.project(&mut residual);
+        if self.weighed_square(&residual) > (1.0 - TAKEN_UP_LEAST) * self.weighed_square(&raw) {
+            return Ok(None);
+        }
+        let mut next = at.clone();
+        linear.take_up(&raw, &mut next);
+        let of_next = self.predict(&next)?;
+        Ok((self.cost(&of_next) < self.cost(predicted)).then_some((next, of_next)))
+    }
+
+    fn stepped(
+        &self,
+        at: &Parameters,
+        free: &[Free],
+        step: &DVector<f64>,
+        linear: &Linear<'_>,
+        residual: &[f64],
+        columns: &[Vec<f64>],
+    ) -> Parameters {
+        let mut next = at.clone();
+        let mut taken = Vec::with_capacity(free.len());
+        for (one, step) in free.iter().zip(step.iter()) {
+            taken.push(match one {
+                Free::SigmaIntercept => {
+                    let floor = 0.2 * self.predictor.known.psf.sigma_intercept_mm.abs().max(0.1);
+                    let old = next.psf.sigma_intercept_mm;
+                    next.psf.sigma_intercept_mm = (old + step.clamp(-0.5, 0.5)).max(floor.min(old));
+                    next.psf.sigma_intercept_mm - old
+                }
+                Free::SigmaSlope => {
+                    let old = next.psf.sigma_per_mm;
+                    next.psf.sigma_per_mm = (old + step.clamp(-0.3, 0.3)).max(0.0_f64.min(old));
+                    next.psf.sigma_per_mm - old
+                }
+                Free::Of { term, parameter } => {
+                    let scale = self.scale(at, *term, *parameter);
+                    let value = &mut next.terms[*term].values[*parameter];
+                    let old = *value;
+                    *value = scale.forward(old, scale.bounded(*step));
+                    scale.distance(old, *value)
+                }
+            });
+        }
+        // The elements' own gains and baselines fit what the other parameters leave.
+        let mut left = residual.to_vec();
+        for (column, taken) in columns.iter().zip(taken) {
+            for (left, slope) in left.iter_mut().zip(column) {
+                *left -= taken * slope;
+            }
+        }
+        linear.take_up(&left, &mut next);
+        next
+    }
+
+    fn errors(&self, at: &Parameters, free: &[Free], gram: Option<DMatrix<f64>>) -> Vec<Vec<f64>> {
+        let mut errors: Vec<Vec<f64>> =
+            at.terms.iter().map(|term| vec![f64::NAN; term.values.len()]).collect();
+        let Some(gram) = gram else { return errors };
+        let size = gram.nrows();
+        let scaled = scaled(&gram, 1e-9);
+        let Some(inverse) = scaled.try_inverse() else { return errors };
+        for (index, one) in free.iter().enumerate().take(size) {
+            if let Free::Of { term, parameter } = one {
+                let diagonal = gram[(index, index)];
+                let variance = inverse[(index, index)] / diagonal;
+                let scale = self.scale(at, *term, *parameter);
+                let value = at.terms[*term].values[*parameter];
+                if diagonal > 0.0 && variance > 0.0 {
+                    errors[*term][*parameter] = scale.error(value, variance.sqrt());
+                }
+            }
+        }
+        errors
+    }
+}
+
+/// Sets undetermined knots of a curve to the value of the knot before, so that the curve stays constant without data.
+/// Returns true if there are such knots.
+fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
+    let mut any = false;
+    for (index, pair) in free.windows(2).enumerate() {
+        let [Free::Of { term, parameter: before }, Free::Of { term: same, parameter: knot }] = pair else {
+            continue;
+        };
+        let Term { definition, values } = &mut at.terms[*term];
+        let family = |parameter: usize| {
+            definition.parameters[parameter].name.replace(|letter: char| letter.is_ascii_digit(), "")
+        };
+        let unseen = gram[(index + 1, index + 1)] < UNSEEN_SHARE * gram[(index, index)];
+        if term == same && values.len() > PARAMETERS_MANY && family(*before) == family(*knot) && unseen {
+            values[*knot] = values[*before];
+            any = true;
+        }
+    }
+    any
+}
+
+/// The normal equations of projected columns.
+fn normal(problem: &Problem<'_>, columns: &[Vec<f64>], residual: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+    let count = columns.len();
+    let mut gram = DMatrix::zeros(count, count);
+    let mut right = DVector::zeros(count);
+    for (i, column) in columns.iter().enumerate() {
+        let weighted: Vec<f64> = column.iter().zip(problem.weights()).map(|(c, w)| c * w).collect();
+        right[i] = dot(&weighted, residual);
+        for (j, other) in columns.iter().enumerate().take(i + 1) {
+            gram[(i, j)] = dot(&weighted, other);
+            gram[(j, i)] = gram[(i, j)];
+        }
+    }
+    (gram, right)
+}
+
+pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(a, b)| a * b).sum()
+}
+
+/// A step of the damped normal equations. The damping of each parameter is relative to its entry in `squares`.
+pub(crate) fn solve(
+    gram: &DMatrix<f64>,
+    right: &DVector<f64>,
+    damping: f64,
+    squares: &[f64],
+) -> DVector<f64> {
+    let scale: Vec<f64> = squares.iter().map(|square| positive_root(*square)).collect();
+    let mut damped =
+        DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / (scale[i] * scale[j]));
+    for i in 0..gram.nrows() {
+        damped[(i, i)] += if gram[(i, i)] > 0.0 { damping + 1e-9 } else { 1.0 };
+    }
+    let scaled_right = DVector::from_fn(gram.nrows(), |i, _| right[i] / scale[i]);
+    let Some(factors) = damped.cholesky() else { return DVector::zeros(gram.nrows()) };
+    let step = factors.solve(&scaled_right);
+    DVector::from_fn(gram.nrows(), |i, _| if gram[(i, i)] > 0.0 { step[i] / scale[i] } else { 0.0 })
+}
+
+/// A Gram matrix scaled to `1 + more` on its diagonal.
+fn scaled(gram: &DMatrix<f64>, more: f64) -> DMatrix<f64> {
+    let scale: Vec<f64> = (0..gram.nrows()).map(|i| positive_root(gram[(i, i)])).collect();
+    DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {
+        if i == j { 1.0 + more } else { gram[(i, j)] / (scale[i] * scale[j]) }
+    })
+}
+
+fn positive_root(square: f64) -> f64 {
+    if square > 0.0 { square.sqrt() } else { 1.0 }
+}

@@ -1,0 +1,13 @@
+//! Numbers that know nothing of tactile arrays: random numbers, medians, quantiles, work on several threads.
+//!
+//! Results do not depend on the machine or on the number of threads: random numbers follow from a seed, and the results of parallel
+//! work keep the order of its items.
+
+mod median;
+pub(crate) mod parallel;
+mod quantiles;
+mod rng;
+
+pub(crate) use median::median;
+pub(crate) use quantiles::{Z_95, student_95};
+pub(crate) use rng::Rng;

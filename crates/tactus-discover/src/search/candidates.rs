@@ -1,0 +1,176 @@
+//! Every effect of the library as a candidate, with the starts of its fits.
+
+use std::borrow::Cow;
+
+use tactus_model::effect::{Definition, ParameterKind, REGISTRY};
+
+use super::wiring;
+use crate::data::DiscoverError;
+use crate::fit::{Fitted, Free, Problem, Scale, Term};
+
+/// Number of grid values of a shape parameter that spans orders of magnitude, and of any other.
+const VALUES_MANY: usize = 5;
+const VALUES_FEW: usize = 3;
+
+/// If an element's reading seems to contain more than this share of another's signal, or a negative share, the element may
+/// answer for the other alone. Its fitted gain then means nothing.
+const CROSSED_SHARE: f64 = 0.5;
+
+/// An effect of the library, with the parameters that these data could determine.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub(crate) definition: &'static Definition,
+    /// Parameters that change the prediction if all others are neutral.
+    amplitudes: Vec<usize>,
+    /// Values of the others from which fits start.
+    shapes: Shapes,
+}
+
+/// Where the values of an effect's shape parameters come from.
+#[derive(Debug, Clone)]
+enum Shapes {
+    /// A grid, the same for every model.
+    Grid(Vec<Term>),
+    /// Pairs of elements: those that a model's residual suggests.
+    Wiring,
+}
+
+impl Candidate {
+    /// All effects of the library, given a model without them and the frequencies of lines in its residual's spectrum.
+    pub(crate) fn all(
+        problem: &Problem<'_>,
+        at: &Fitted,
+        frequencies_hz: &[f64],
+    ) -> Result<Vec<Self>, DiscoverError> {
+        REGISTRY.iter().map(|definition| Self::of(definition, problem, at, frequencies_hz)).collect()
+    }
+
+    fn of(
+        definition: &'static Definition,
+        problem: &Problem<'_>,
+        at: &Fitted,
+        frequencies_hz: &[f64],
+    ) -> Result<Self, DiscoverError> {
+        let mut amplitudes = Vec::new();
+        let mut shapes = vec![Term::neutral(definition)];
+        for (parameter, known) in definition.parameters.iter().enumerate() {
+            if known.kind != ParameterKind::Real {
+                continue;
+            }
+            let acts = known.neutral == 0.0 || {
+                let with = at.parameters.with(Term::neutral(definition));
+                let free = Free::Of { term: with.terms.len() - 1, parameter };
+                problem.slope(&with, &at.predicted, free)?.iter().any(|slope| *slope != 0.0)
+            };
+            let range = known.range;
+            if known.name.ends_with("_hz") {
+                shapes = cross(&shapes, parameter, frequencies_hz);
+            } else if known.name == "duration_s" {
+                shapes = cross(&shapes, parameter, &[problem.duration_s.clamp(range[0], range[1])]);
+            } else if acts {
+                amplitudes.push(parameter);
+            } else {
+                let values = grid(known.name, range, known.neutral, problem.duration_s);
+                shapes = cross(&shapes, parameter, &values);
+            }
+        }
+        let wires = definition.parameters.iter().any(|known| known.kind == ParameterKind::Element);
+        let shapes = if wires { Shapes::Wiring } else { Shapes::Grid(shapes) };
+        Ok(Self { definition, amplitudes, shapes })
+    }
+
+    /// Starts of fits of this effect in addition to a model, with neutral amplitudes.
+    pub(crate) fn shapes(&self, problem: &Problem<'_>, at: &Fitted) -> Cow<'_, [Term]> {
+        match &self.shapes {
+            Shapes::Grid(terms) => Cow::Borrowed(terms),
+            Shapes::Wiring => {
+                let pairs = wiring::pairs(problem, at);
+                Cow::Owned(pairs.into_iter().filter_map(|pair| wired(self.definition, pair)).collect())
+            }
+        }
+    }
+
+    /// The parameters that change the prediction of a shape.
+    pub(crate) fn amplitudes(&self) -> &[usize] {
+        &self.amplitudes
+    }
+
+    /// A shape with the coefficients of its amplitudes, from which a fit starts.
+    pub(crate) fn start(&self, problem: &Problem<'_>, shape: &Term, coefficients: &[f64]) -> Term {
+        let mut start = shape.clone();
+        let wires = matches!(self.shapes, Shapes::Wiring);
+        if wires && coefficients.iter().any(|step| !(0.0..CROSSED_SHARE).contains(step)) {
+            return crossed(start);
+        }
+        for (parameter, step) in self.amplitudes.iter().zip(coefficients) {
+            let known = &self.definition.parameters[*parameter];
+            let [least, most] = known.range;
+            let value = &mut start.values[*parameter];
+            let margin = [0.02 * (*value - least), 0.02 * (most - *value)];
+            let moved = Scale::of(known, problem.duration_s).forward(*value, *step);
+            *value = moved.clamp(least + margin[0], most - margin[1]);
+        }
+        start
+    }
+}
+
+fn cross(shapes: &[Term], parameter: usize, values: &[f64]) -> Vec<Term> {
+    let set = |shape: &Term, value: f64| {
+        let mut set = shape.clone();
+        set.values[parameter] = value;
+        set
+    };
+    shapes.iter().flat_map(|shape| values.iter().map(move |value| set(shape, *value))).collect()
+}
+
+/// Values of a shape parameter at which fits start.
+fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> {
+    let [mut least, mut most] = range;
+    if name.ends_with("_s") {
+        // The data do not show anything faster than a frame or slower than their duration.
+        most = most.min(duration_s);
+        least = least.max(0.02).min(most);
+    }
+    let ratio = most / least;
+    if !(least > 0.0 && ratio.is_finite()) {
+        return vec![neutral];
+    }
+    if ratio < 1.0 + 1e-9 {
+        return vec![least];
+    }
+    let count = if ratio > 300.0 { VALUES_MANY } else { VALUES_FEW };
+    // The middles of equal parts of the logarithmic range.
+    (0..count).map(|k| least * ratio.powf((k as f64 + 0.5) / count as f64)).collect()
+}
+
+/// A pair's term at the end of its range: the element answers for the other alone. One that is paired with itself answers for
+/// nothing.
+fn crossed(mut pair: Term) -> Term {
+    // Elements are whole numbers.
+    let is_same = |first: usize, second: usize| (pair.values[first] - pair.values[second]).abs() < 0.5;
+    let is_dead = matches!(elements(&pair)[..], [first, second] if is_same(first, second));
+    for (known, value) in pair.definition.parameters.iter().zip(&mut pair.values) {
+        if known.kind == ParameterKind::Real {
+            let [least, most] = known.range;
+            *value = match known.neutral {
+                0.0 if is_dead => 0.0,
+                0.0 => most,
+                neutral => least + 0.02 * (neutral - least),
+            };
+        }
+    }
+    pair
+}
+
+fn wired(definition: &'static Definition, pair: [usize; 2]) -> Option<Term> {
+    let mut term = Term::neutral(definition);
+    let [first, second] = <[usize; 2]>::try_from(elements(&term)).ok()?;
+    (term.values[first], term.values[second]) = (pair[0] as f64, pair[1] as f64);
+    Some(term)
+}
+
+/// Which parameters of a term are elements.
+fn elements(term: &Term) -> Vec<usize> {
+    let parameters = term.definition.parameters.iter().enumerate();
+    parameters.filter(|(_, known)| known.kind == ParameterKind::Element).map(|(place, _)| place).collect()
+}

@@ -1,0 +1,558 @@
+//! The search for the effects that, together with the base parameters, leave only noise.
+//!
+//! A *pass* over the data gives the products of all additions at the present model: every shape of every effect of the library, and
+//! rivals without a name. From them follow the sets of additions with the greatest odds ([`super::evidence`]) and a test by
+//! flipped signs that repeats the whole first step. The classes of the best sets are fitted, without the approximation of small
+//! effects, and the one with the greatest odds is added. Then each class has to hold its place: against the model without it, against
+//! rivals without a name, and against every other class, each in its place. Classes that the data cannot tell apart in one place
+//! are reported as one set. Names live and die alone.
+//!
+//! All choices use the fitted presses only. The held-out presses give the figures of the report.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use tactus_model::effect::{Definition, ParameterKind};
+
+use super::candidates::Candidate;
+use super::drift::TriedWalk;
+use super::evidence::{Addition, Evidence, Set, Signs};
+use super::options::Options;
+use super::rivals::rivals;
+use super::score::{Fitting, Score, flipped, largest, p_value};
+use crate::data::{DiscoverError, MISWIRED};
+use crate::fit::{Direction, Fitted, Free, Grams, Parameters, Problem, RANDOM_WALK, Scale, Term};
+use crate::numbers::parallel;
+
+/// A round of the search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Round {
+    /// The effects in the model before this round.
+    pub with: Vec<&'static str>,
+    /// The effects that were tried, greatest score first.
+    pub candidates: Vec<TriedEffect>,
+    /// The effect that was added, if any.
+    pub taken: Option<&'static str>,
+}
+
+/// An effect that was tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TriedEffect {
+    /// Its name.
+    pub effect: &'static str,
+    /// Largest standardised score of a first step away from zero effect.
+    pub score: f64,
+    /// p-value of the score, corrected for all candidates of the round.
+    pub p_value: f64,
+    /// Root mean square of the held-out residuals of the model with this effect, if it was fitted.
+    pub heldout_rms_counts: Option<f64>,
+    /// Share of the gap that it closes on the held-out presses, if it was fitted.
+    pub shrink: Option<f64>,
+}
+
+/// Number of sign-flipped data sets in a test.
+pub(crate) const FLIPS: usize = 1999;
+/// Probability of adding an effect to a complete model.
+pub(crate) const ALPHA: f64 = 0.005;
+/// Greatest number of added effects.
+pub(crate) const NAMES_MAX: usize = 5;
+/// Rounds of a fit that compares candidates: of all, and of the best.
+const FIRST_ROUNDS: usize = 2;
+const TRIAL_ROUNDS: usize = 6;
+/// Rounds of a fit of a model that is kept.
+pub(crate) const POLISH_ROUNDS: usize = 8;
+/// Greatest number of classes that a round fits, and that it fits to the end.
+const FITTED_MAX: usize = 5;
+const FINISHED_MAX: usize = 2;
+/// A class is fitted if its first step promises this share of the best one's odds.
+const PROMISE_SHARE: f64 = 0.3;
+/// Logarithm of the odds with which a class is added and holds its place.
+const LN_ODDS_LEAST: f64 = 5.0;
+/// A rival without a name takes the place of a class if its odds are greater by this logarithm.
+const RIVAL_LN_ODDS: f64 = 5.0;
+/// Another class takes the place of one if its odds are greater by this logarithm.
+const BETTER_LN_ODDS: f64 = 3.0;
+const EXCHANGES_MAX: usize = 4;
+/// Greatest number of other classes that are fitted in a class's place.
+const OTHERS_MAX: usize = 4;
+/// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
+/// `1 + MISFIT_SHARE x gain`.
+const MISFIT_SHARE: f64 = 0.02;
+/// Probability of a reported set of classes.
+const SET_PROBABILITY: f64 = 0.95;
+/// Prior odds against a class.
+const ODDS_AGAINST: f64 = 20.0;
+
+/// Data, candidates and options of a search.
+pub(crate) struct Search<'a> {
+    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) candidates: &'a [Candidate],
+    pub(crate) options: Options,
+    /// Number of terms of the known model and of faulty elements, which are never removed.
+    pub(crate) known_terms: usize,
+    pub(crate) progress: &'a (dyn Fn(&str) + Sync),
+}
+
+/// For each added effect, the others that explain the data as well in its place.
+pub(crate) type Equivalent = BTreeMap<&'static str, Alike>;
+
+/// Effects that explain the data as well as an added one.
+pub(crate) struct Alike {
+    /// The model without the effect.
+    pub(crate) without: Fitted,
+    /// The models with another in its place.
+    pub(crate) same: Vec<(&'static str, Fitted)>,
+}
+
+/// Results of one round.
+pub(crate) struct Tried {
+    pub(crate) round: Round,
+    /// p-value of the largest score of all additions.
+    pub(crate) p_value: f64,
+    /// How well the data can show each effect: the width of its range in standard errors.
+    pub(crate) reach: Vec<(&'static Definition, f64)>,
+}
+
+/// The grown model, and the rounds that led to it.
+pub(crate) struct Grown {
+    pub(crate) at: Fitted,
+    pub(crate) rounds: Vec<Tried>,
+    pub(crate) equivalent: Equivalent,
+}
+
+impl From<Fitted> for Grown {
+    fn from(base: Fitted) -> Self {
+        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new() }
+    }
+}
+
+/// All additions at a model, with their products.
+pub(crate) struct Pass {
+    additions: Vec<Addition>,
+    kinds: Vec<Kind>,
+    /// Names of the classes.
+    classes: Vec<&'static str>,
+    scores: Vec<Score>,
+    products: DMatrix<f64>,
+    grams: Grams,
+    walk: Option<TriedWalk>,
+    /// Classes of the model.
+    present: Vec<usize>,
+    variance: f64,
+}
+
+/// What an addition is.
+enum Kind {
+    /// A candidate in a shape.
+    Term { candidate: usize, shape: Term },
+    Rival,
+}
+
+/// A class that was fitted beside a model.
+#[derive(Clone)]
+pub(crate) struct Beside {
+    pub(crate) name: &'static str,
+    pub(crate) fitted: Fitted,
+    /// Logarithm of its odds.
+    pub(crate) ln_odds: f64,
+}
+
+impl Pass {
+    fn evidence(&self) -> Evidence<'_> {
+        Evidence {
+            additions: &self.additions,
+            products: &self.products,
+            variance: self.variance,
+            present: &self.present,
+        }
+    }
+
+    fn is_named(&self, addition: usize) -> bool {
+        matches!(self.kinds[addition], Kind::Term { .. })
+    }
+
+    fn class_of(&self, addition: usize) -> &'static str {
+        self.classes[self.additions[addition].class]
+    }
+
+    /// The additions whose class `among` selects by name.
+    fn among(&self, among: impl Fn(&str) -> bool) -> Vec<usize> {
+        (0..self.additions.len()).filter(|one| self.is_named(*one) && among(self.class_of(*one))).collect()
+    }
+
+    /// Logarithm of the odds of the best rival without a name.
+    fn best_rival(&self) -> f64 {
+        let evidence = self.evidence();
+        let none = evidence.none();
+        let rivals = (0..self.additions.len()).filter(|one| !self.is_named(*one));
+        rivals.map(|one| evidence.gain(&none, one).ln_odds).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+impl Search<'_> {
+    /// The products of all additions at a model.
+    pub(crate) fn pass(&self, at: &Fitted) -> Result<Pass, DiscoverError> {
+        let problem = self.problem;
+        let mut directions: Vec<Direction<'_>> = Vec::new();
+        let (mut additions, mut kinds, mut classes) = (Vec::new(), Vec::new(), Vec::new());
+        for (candidate, of) in self.candidates.iter().enumerate() {
+            let class = classes.len();
+            classes.push(of.definition.name);
+            for shape in of.shapes(problem, at).iter() {
+                let start = at.parameters.with(shape.clone());
+                let term = start.terms.len() - 1;
+                let first = directions.len();
+                let (mut widths, mut signs) = (Vec::new(), Vec::new());
+                for parameter in of.amplitudes() {
+                    directions.push(problem.towards(&start, Free::Of { term, parameter: *parameter }));
+                    let known = &of.definition.parameters[*parameter];
+                    widths.push(Scale::of(known, problem.duration_s).width());
+                    let value = shape.values[*parameter];
+                    let wires = shape.rewires().is_some();
+                    signs.push(match known.range {
+                        _ if wires => Signs::Both,
+                        [least, _] if value <= least => Signs::Positive,
+                        [_, most] if value >= most => Signs::Negative,
+                        _ => Signs::Both,
+                    });
+                }
+                if first < directions.len() {
+                    let directions = (first..directions.len()).collect();
+                    additions.push(Addition { class, directions, widths, signs });
+                    kinds.push(Kind::Term { candidate, shape: shape.clone() });
+                }
+            }
+        }
+        for rival in rivals(problem, at)? {
+            let first = directions.len();
+            let count = rival.columns.len();
+            directions.extend(rival.columns);
+            additions.push(Addition {
+                class: classes.len(),
+                directions: (first..first + count).collect(),
+                widths: vec![1.0; count],
+                signs: vec![Signs::Both; count],
+            });
+            classes.push(rival.name);
+            kinds.push(Kind::Rival);
+        }
+        let grams = problem.grams(at, directions)?;
+        let products = grams.reduced().clone();
+        let last = products.nrows() - 1;
+        let residual = products[(last, last)].sqrt();
+        for (addition, kind) in additions.iter_mut().zip(&kinds) {
+            if matches!(kind, Kind::Rival) {
+                // As a rival has no range: what would make the whole residual.
+                for (width, direction) in addition.widths.iter_mut().zip(&addition.directions) {
+                    *width = residual / grams.whole(*direction).max(f64::MIN_POSITIVE);
+                }
+            }
+        }
+        let scores = parallel::map(&additions, |one| Score::of_grams(&grams, &one.directions));
+        let names = names(&at.parameters, self.known_terms);
+        let present = (0..classes.len()).filter(|class| names.contains(&classes[*class])).collect();
+        let walk = if classes.contains(&RANDOM_WALK.name) {
+            problem.tried_walk(&self.fitting(at)?, &at.parameters)
+        } else {
+            None
+        };
+        Ok(Pass { additions, kinds, classes, scores, products, grams, walk, present, variance: problem.variance })
+    }
+
+    /// Grows a model until no class is missing, unnecessary or worse than another.
+    pub(crate) fn grow(&self, base: &Fitted) -> Result<Grown, DiscoverError> {
+        let mut grown = Grown::from(base.clone());
+        loop {
+            let index = grown.rounds.len();
+            (self.progress)(&format!("round {}: scoring the effects", index + 1));
+            let pass = self.pass(&grown.at)?;
+            let mut tried = self.tested(&pass, &grown.at, index);
+            let is_full = names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
+            let taken = if 2.0 * tried.p_value <= ALPHA && !is_full {
+                self.next(&grown.at, &pass)?
+            } else {
+                None
+            };
+            tried.round.taken = taken.as_ref().map(|taken| taken.name);
+            grown.rounds.push(tried);
+            match taken {
+                Some(taken) => grown.at = self.problem.fit_from(taken.fitted.parameters, POLISH_ROUNDS)?,
+                None => break,
+            }
+        }
+        self.hold(&mut grown)?;
+        Ok(grown)
+    }
+
+    /// Tests all additions at once: the largest score against those under flipped signs.
+    pub(crate) fn tested(&self, pass: &Pass, at: &Fitted, index: usize) -> Tried {
+        let groups: Vec<(&'static str, Vec<&Score>)> = (0..pass.classes.len())
+            .map(|class| {
+                let of_class = pass.additions.iter().zip(&pass.scores).filter(|(one, _)| one.class == class);
+                let mut scores: Vec<&Score> = of_class.map(|(_, score)| score).collect();
+                if pass.classes[class] == RANDOM_WALK.name {
+                    scores.extend(pass.walk.iter().flat_map(|walk| &walk.scores));
+                }
+                (pass.classes[class], scores)
+            })
+            .collect();
+        let scores: Vec<Vec<&Score>> = groups.iter().map(|(_, scores)| scores.clone()).collect();
+        let under_none = largest(&flipped(&scores, FLIPS, self.options.seed ^ (index as u64 + 1)));
+        let statistic = |scores: &[&Score]| scores.iter().map(|score| score.z).fold(0.0, f64::max);
+        let is_effect = |name: &str| self.candidates.iter().any(|one| one.definition.name == name);
+        let mut candidates: Vec<TriedEffect> = groups
+            .iter()
+            .filter(|(name, _)| is_effect(name))
+            .map(|(effect, scores)| TriedEffect {
+                effect,
+                score: statistic(scores),
+                p_value: p_value(statistic(scores), &under_none),
+                heldout_rms_counts: None,
+                shrink: None,
+            })
+            .collect();
+        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let p_value =
+            groups.iter().map(|(_, scores)| p_value(statistic(scores), &under_none)).fold(1.0, f64::min);
+        let reach = |(index, of): (usize, &Candidate)| {
+            let mut widest = 0.0_f64;
+            for (addition, kind) in pass.additions.iter().zip(&pass.kinds) {
+                if matches!(kind, Kind::Term { candidate, .. } if *candidate == index) {
+                    let sizes = addition.directions.iter().map(|direction| pass.grams.size(*direction));
+                    widest = sizes.zip(&addition.widths).map(|(size, width)| size * width).fold(widest, f64::max);
+                }
+            }
+            let has_walk = of.definition.name == RANDOM_WALK.name && pass.walk.is_some();
+            (of.definition, if has_walk { f64::INFINITY } else { widest })
+        };
+        Tried {
+            round: Round { with: names(&at.parameters, self.known_terms), candidates, taken: None },
+            p_value,
+            reach: self.candidates.iter().enumerate().map(reach).collect(),
+        }
+    }
+
+    /// The class to add: of those in the best sets, the one with the greatest odds once fitted.
+    fn next(&self, at: &Fitted, pass: &Pass) -> Result<Option<Beside>, DiscoverError> {
+        let evidence = pass.evidence();
+        let best = evidence.sets(|_| true).into_iter().next();
+        let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
+        let none = evidence.none();
+        let mut starts: Vec<(&'static str, f64, Vec<Term>)> = Vec::new();
+        let mut propose = |set: &Set, promise: Option<f64>| {
+            for member in set.members.iter().copied().filter(|member| pass.is_named(*member)) {
+                let name = pass.class_of(member);
+                if starts.iter().all(|(known, ..)| *known != name) {
+                    let alone = promise.unwrap_or(f64::INFINITY);
+                    starts.push((name, alone, self.starts(pass, &evidence, set, name)));
+                }
+            }
+        };
+        for set in best.iter().chain(&named) {
+            propose(set, None);
+        }
+        let mut alone: Vec<(usize, f64)> = pass
+            .among(|_| true)
+            .into_iter()
+            .map(|one| (one, evidence.gain(&none, one).ln_odds))
+            .filter(|(_, ln_odds)| *ln_odds > 0.0)
+            .collect();
+        alone.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let most = alone.first().map_or(0.0, |(_, ln_odds)| *ln_odds);
+        for (one, ln_odds) in alone.into_iter().filter(|(_, ln_odds)| *ln_odds > PROMISE_SHARE * most) {
+            propose(&evidence.set([one]), Some(ln_odds));
+        }
+        starts.truncate(FITTED_MAX);
+        if let Some(walk) = &pass.walk {
+            let ln_odds = 0.5 * walk.promise - ODDS_AGAINST.ln();
+            if ln_odds > LN_ODDS_LEAST.max(PROMISE_SHARE * most) {
+                starts.push((RANDOM_WALK.name, ln_odds, vec![walk.start.clone()]));
+            }
+        }
+        let starts = starts.into_iter().map(|(name, _, terms)| (name, terms)).collect::<Vec<_>>();
+        let fits = self.fits(at, &starts)?;
+        let Some(taken) = fits.into_iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds)) else { return Ok(None) };
+        // A rival without a name explains more than any class.
+        let rival = pass.best_rival();
+        let is_beaten = rival > taken.ln_odds + RIVAL_LN_ODDS;
+        let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
+        Ok(Some(taken).filter(|taken| taken.ln_odds > LN_ODDS_LEAST && (best_has_names || !is_beaten)))
+    }
+
+    /// The terms of a class from which a fit starts: its members of a set.
+    fn starts(&self, pass: &Pass, evidence: &Evidence<'_>, set: &Set, name: &str) -> Vec<Term> {
+        let coefficients = evidence.coefficients(set);
+        let of = |direction: &usize| {
+            coefficients.iter().find(|(one, _)| one == direction).map_or(0.0, |(_, coefficient)| *coefficient)
+        };
+        let term = |member: &usize| match &pass.kinds[*member] {
+            Kind::Term { candidate, shape } if pass.class_of(*member) == name => {
+                let steps: Vec<f64> = pass.additions[*member].directions.iter().map(of).collect();
+                Some(self.candidates[*candidate].start(self.problem, shape, &steps))
+            }
+            _ => None,
+        };
+        set.members.iter().filter_map(term).collect()
+    }
+
+    /// Fits of a model with the terms of each class: first all in a few rounds, then the best to the end.
+    fn fits(&self, at: &Fitted, starts: &[(&'static str, Vec<Term>)]) -> Result<Vec<Beside>, DiscoverError> {
+        let fit = |(name, terms): &(&'static str, Vec<Term>)| {
+            (self.progress)(&format!("fitting {name}"));
+            let mut started = at.parameters.clone();
+            started.terms.extend(terms.iter().cloned());
+            let fitted = self.problem.fit_from(started, FIRST_ROUNDS)?;
+            Ok(Beside { name, ln_odds: self.ln_odds(at, &fitted), fitted })
+        };
+        let mut fits: Vec<Beside> = parallel::map_longest_first(starts, |(_, terms)| terms.len(), fit)
+            .into_iter()
+            .collect::<Result<_, DiscoverError>>()?;
+        fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
+        fits.truncate(FINISHED_MAX);
+        let finish = |one: &Beside| {
+            let fitted = self.problem.fit_from(one.fitted.parameters.clone(), TRIAL_ROUNDS)?;
+            Ok(Beside { name: one.name, ln_odds: self.ln_odds(at, &fitted), fitted })
+        };
+        parallel::map(&fits, finish).into_iter().collect()
+    }
+
+    /// Logarithm of the odds of a model with further terms, against the model without. Each of their numbers is charged as if its
+    /// prior were as wide as its part of the gain allows.
+    fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
+        let numbers = |fitted: &Fitted| -> usize {
+            let reals = |term: &Term| {
+                term.definition.parameters.iter().filter(|one| one.kind == ParameterKind::Real).count()
+            };
+            fitted.parameters.terms.iter().map(reals).sum()
+        };
+        let gain = (less.cost - more.cost) / (2.0 * self.problem.variance);
+        let count = numbers(more).saturating_sub(numbers(less)).max(1) as f64;
+        gain - 0.5 * count * (2.0 * gain.max(0.0) / count).ln_1p() - ODDS_AGAINST.ln()
+    }
+
+    /// Lets each class hold its place: against the model without it, rivals without a name, and other classes.
+    fn hold(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
+        let mut exchanges_left = EXCHANGES_MAX;
+        'again: loop {
+            grown.equivalent.clear();
+            let names = names(&grown.at.parameters, self.known_terms);
+            let without = |name: &&'static str| {
+                (self.progress)(&format!("without {name}"));
+                let less = without(&grown.at.parameters, name, self.known_terms);
+                self.problem.fit_from(less, TRIAL_ROUNDS)
+            };
+            let lesses: Vec<Fitted> =
+                parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
+            let odds: Vec<f64> = lesses.iter().map(|less| self.ln_odds(less, &grown.at)).collect();
+            let weakest = odds.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
+            if let Some((weakest, _)) = weakest.filter(|(_, ln_odds)| **ln_odds < LN_ODDS_LEAST) {
+                let less = lesses[weakest].parameters.clone();
+                grown.at = self.problem.fit_from(less, POLISH_ROUNDS)?;
+                continue 'again;
+            }
+            for ((name, less), ln_odds) in names.iter().zip(lesses).zip(odds) {
+                if is_exact(name) {
+                    // No other effect acts like miswired elements.
+                    continue;
+                }
+                (self.progress)(&format!("comparing {name} with others in its place"));
+                let pass = self.pass(&less)?;
+                if pass.best_rival() > ln_odds + RIVAL_LN_ODDS {
+                    grown.at = self.problem.fit_from(less.parameters, POLISH_ROUNDS)?;
+                    continue 'again;
+                }
+                let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
+                let best = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
+                let better = best.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
+                if let Some(better) = better {
+                    exchanges_left -= 1;
+                    grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
+                    continue 'again;
+                }
+                let same = credible(ln_odds, others);
+                grown.equivalent.insert(name, Alike { without: less, same });
+            }
+            return Ok(());
+        }
+    }
+
+    /// The other classes, fitted in a place, if their first steps promise these odds.
+    pub(crate) fn others(
+        &self,
+        pass: &Pass,
+        less: &Fitted,
+        names: &[&'static str],
+        ln_odds_least: f64,
+    ) -> Result<Vec<Beside>, DiscoverError> {
+        let evidence = pass.evidence();
+        let none = evidence.none();
+        let mut best: Vec<(&'static str, usize, f64)> = Vec::new();
+        for one in pass.among(|name| !names.contains(&name)) {
+            let (name, ln_odds) = (pass.class_of(one), evidence.gain(&none, one).ln_odds);
+            match best.iter_mut().find(|(known, ..)| *known == name) {
+                Some(known) if known.2 < ln_odds => *known = (name, one, ln_odds),
+                Some(_) => {}
+                None => best.push((name, one, ln_odds)),
+            }
+        }
+        best.retain(|(.., ln_odds)| *ln_odds > ln_odds_least);
+        best.sort_by(|a, b| b.2.total_cmp(&a.2));
+        best.truncate(OTHERS_MAX);
+        let starts: Vec<(&'static str, Vec<Term>)> = best
+            .into_iter()
+            .map(|(name, one, _)| (name, self.starts(pass, &evidence, &evidence.set([one]), name)))
+            .collect();
+        self.fits(less, &starts)
+    }
+
+    /// The model's tangent space and residual.
+    pub(crate) fn fitting(&self, at: &Fitted) -> Result<Fitting<'_>, DiscoverError> {
+        Fitting::at(self.problem, &at.parameters, &at.predicted)
+    }
+}
+
+/// The other classes of the smallest set that has, with a class of these odds, the wanted probability.
+fn credible(ln_odds: f64, mut others: Vec<Beside>) -> Vec<(&'static str, Fitted)> {
+    let unit = 1.0 + MISFIT_SHARE * ln_odds.max(0.0);
+    let weight = |one: f64| ((one - ln_odds) / unit).exp();
+    let total: f64 = 1.0 + others.iter().map(|other| weight(other.ln_odds)).sum::<f64>();
+    others.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
+    let mut reached = 1.0 / total;
+    let mut same = Vec::new();
+    for other in others {
+        if reached >= SET_PROBABILITY {
+            break;
+        }
+        reached += weight(other.ln_odds) / total;
+        same.push((other.name, other.fitted));
+    }
+    same
+}
+
+/// True if an effect has the same form in reality as in the library: wiring is right or wrong.
+fn is_exact(name: &str) -> bool {
+    name == MISWIRED
+}
+
+/// Names of the added effects, each once, in order.
+pub(crate) fn names(parameters: &Parameters, known_terms: usize) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = Vec::new();
+    for Term { definition, .. } in parameters.terms.iter().skip(known_terms) {
+        let Definition { name, .. } = definition;
+        if !names.contains(name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// A model without the added terms of an effect.
+pub(crate) fn without(parameters: &Parameters, name: &str, known_terms: usize) -> Parameters {
+    let mut less = parameters.clone();
+    let mut index = 0;
+    less.terms.retain(|term| {
+        index += 1;
+        index <= known_terms || term.definition.name != name
+    });
+    less
+}

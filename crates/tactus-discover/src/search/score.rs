@@ -1,0 +1,386 @@
+//! Score tests: would the residual shrink if the model changed in a given direction?
+//!
+//! The score of a direction `f` (a derivative of the prediction, less the part that the fitted
+//! parameters explain) is, over blocks of bins,
+//!
+//! ```text
+//! U_b = sum over block b of w r f        V_b = sum over block b of w f^2
+//! z   = sum U_b / sqrt(phi sum V_b)
+//! ```
+//!
+//! Without an effect, `U_b` is as likely as `-U_b`, whatever the noise does within a block. The distribution of the largest
+//! of many `z` therefore follows from flipping the signs of whole blocks, in the same way for all directions. This controls
+//! the probability of any false alarm among all directions, however they depend on each other, also under autocorrelated
+//! noise. `phi >= 1` is the median excess of the scatter of blocks about their common value over that of their noise. As a
+//! median it does not let an effect in a single block, or in all, inflate its own scatter. For the same reason a block
+//! counts at most four standard deviations in the flipped sums.
+//!
+//! Several directions of one effect are made orthonormal under the weights and combined: the sum of the squares of their
+//! scores is chi-square, which Wilson and Hilferty's cube root brings to the scale of a normal deviate.
+//!
+//! # Source
+//! J. Hemerik, J. J. Goeman and L. Finos, *J. R. Stat. Soc. B* 82 (2020) 841 (sign-flipped scores); P. H. Westfall and
+//! S. S. Young, *Resampling-Based Multiple Testing* (1993), ch. 2 (the largest of many).
+
+use nalgebra::DMatrix;
+
+use crate::data::DiscoverError;
+use crate::fit::{Grams, Linear, Parameters, Problem, dot};
+use crate::numbers::{Rng, median, parallel};
+
+/// Median of the squared standard normal distribution.
+const MEDIAN_SQUARE: f64 = 0.454_936;
+/// Greatest part of one block in a flipped sum, in standard deviations.
+const CLIP: f64 = 4.0;
+/// Least number of blocks from which the excess scatter is estimated, and the excess assumed for fewer.
+const BLOCKS_LEAST: usize = 8;
+const EXCESS_OF_FEW: f64 = 1.5;
+
+/// The score of one direction, or of several orthonormal ones together.
+#[derive(Debug, Clone)]
+pub(crate) struct Score {
+    /// On the scale of the standard normal distribution, not negative.
+    pub(crate) z: f64,
+    /// For each direction, the part of each block, clipped.
+    parts: Vec<Vec<f32>>,
+    chi_square: ChiSquare,
+}
+
+/// Distribution of a sum of squares under flips: `times` chi-square with `freedom` degrees of freedom.
+#[derive(Debug, Clone, Copy)]
+struct ChiSquare {
+    times: f64,
+    freedom: f64,
+}
+
+/// The tangent space of the fitted parameters, and the residual orthogonal to it.
+pub(crate) struct Fitting<'a> {
+    problem: &'a Problem<'a>,
+    linear: Linear<'a>,
+    /// Orthonormal under the weights.
+    directions: Vec<Vec<f64>>,
+    /// The residual orthogonal to the tangent space, times its weight.
+    weighted_residual: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl<'a> Fitting<'a> {
+    /// The tangent space and residual at a point.
+    pub(crate) fn at(
+        problem: &'a Problem<'a>,
+        parameters: &Parameters,
+        predicted: &[f64],
+    ) -> Result<Self, DiscoverError> {
+        let linear = problem.linear(parameters, predicted)?;
+        let columns = problem.columns(parameters, predicted)?;
+        let mut residual = problem.standing(parameters, predicted);
+        linear.project(&mut residual);
+        let weights: Vec<f64> = problem.weights().collect();
+        let mut fitting =
+            Self { problem, linear, directions: Vec::new(), weighted_residual: residual, weights };
+        for mut column in columns {
+            let whole = fitting.size(&column);
+            fitting.free(&mut column);
+            let size = fitting.size(&column);
+            // Skips a direction that the others contain.
+            if size > 1e-4 * whole && size > 0.0 {
+                shorten(&mut column, size);
+                let along = fitting.inner(&column, &fitting.weighted_residual);
+                take_off(&mut fitting.weighted_residual, along, &column);
+                fitting.directions.push(column);
+            }
+        }
+        for (residual, weight) in fitting.weighted_residual.iter_mut().zip(&fitting.weights) {
+            *residual *= weight;
+        }
+        Ok(fitting)
+    }
+
+    /// Removes from a column its part in the tangent space.
+    pub(crate) fn free(&self, column: &mut [f64]) {
+        self.linear.project(column);
+        self.free_of(column, &self.directions);
+    }
+
+    /// Removes from a column its part along orthonormal directions.
+    fn free_of(&self, column: &mut [f64], directions: &[Vec<f64>]) {
+        for direction in directions {
+            take_off(column, self.inner(direction, column), direction);
+        }
+    }
+
+    /// Product of two columns under the weights.
+    pub(crate) fn inner(&self, one: &[f64], other: &[f64]) -> f64 {
+        one.iter().zip(other).zip(&self.weights).map(|((a, b), w)| a * b * w).sum()
+    }
+
+    /// Length of a column under the weights: its inverse is the standard error of the column's coefficient.
+    pub(crate) fn size(&self, column: &[f64]) -> f64 {
+        self.inner(column, column).sqrt()
+    }
+
+    /// Inner product of the residual and a column from which the tangent space was removed.
+    pub(crate) fn wanted(&self, column: &[f64]) -> f64 {
+        dot(&self.weighted_residual, column)
+    }
+
+    /// The residual orthogonal to the tangent space; 0 for readings that are not fitted.
+    pub(crate) fn residual(&self) -> Vec<f64> {
+        let of = |(weighted, weight): (&f64, &f64)| if *weight > 0.0 { weighted / weight } else { 0.0 };
+        self.weighted_residual.iter().zip(&self.weights).map(of).collect()
+    }
+
+    /// The combined score of columns from which the tangent space was removed.
+    pub(crate) fn score(&self, columns: &[Vec<f64>]) -> Score {
+        let mut independent: Vec<Vec<f64>> = Vec::new();
+        for column in columns {
+            let mut column = column.clone();
+            let whole = self.size(&column);
+            self.free_of(&mut column, &independent);
+            let size = self.size(&column);
+            if size > 1e-3 * whole && size > 0.0 {
+                shorten(&mut column, size);
+                independent.push(column);
+            }
+        }
+        let scores: Vec<(f64, Vec<f32>)> = independent.iter().map(|column| self.score_of(column)).collect();
+        let squares: f64 = scores.iter().map(|(z, _)| z * z).sum();
+        Score {
+            z: deviate(squares, scores.len() as f64),
+            chi_square: ChiSquare { times: 1.0, freedom: scores.len() as f64 },
+            parts: scores.into_iter().map(|(_, parts)| parts).collect(),
+        }
+    }
+
+    fn score_of(&self, column: &[f64]) -> (f64, Vec<f32>) {
+        let bins = self.problem.predictor.bins;
+        let elements = bins.elements;
+        let mut wanted = vec![0.0; bins.blocks];
+        let mut variance = vec![0.0; bins.blocks];
+        for bin in 0..bins.len() {
+            if self.problem.train[bin] == 0.0 {
+                continue;
+            }
+            let at = bin * elements..(bin + 1) * elements;
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for ((value, residual), weight) in
+                column[at.clone()].iter().zip(&self.weighted_residual[at.clone()]).zip(&self.weights[at])
+            {
+                sum += value * residual;
+                squares += value * value * weight;
+            }
+            wanted[bins.block[bin]] += sum;
+            variance[bins.block[bin]] += squares;
+        }
+        standardised(&wanted, &variance)
+    }
+}
+
+/// A direction's score and its blocks' parts from the blocks' products with the residual and with themselves.
+fn standardised(wanted: &[f64], variance: &[f64]) -> (f64, Vec<f32>) {
+    let total: f64 = variance.iter().sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return (0.0, vec![0.0; wanted.len()]);
+    }
+    let common = wanted.iter().sum::<f64>() / total;
+    // Blocks with hardly any weight in the direction say nothing about the scatter.
+    let scatter: Vec<f64> = wanted
+        .iter()
+        .zip(variance)
+        .filter(|(_, variance)| **variance > 1e-4 * total)
+        .map(|(wanted, variance)| (wanted - common * variance).powi(2) / variance)
+        .collect();
+    let excess = if scatter.len() >= BLOCKS_LEAST {
+        (median(&scatter) / MEDIAN_SQUARE).max(1.0)
+    } else {
+        EXCESS_OF_FEW
+    };
+    let deviation = (excess * total).sqrt();
+    let parts = wanted.iter().zip(variance).map(|(wanted, variance)| {
+        let most = CLIP * (excess * variance).sqrt();
+        #[expect(clippy::cast_possible_truncation, reason = "a part of a test's statistic")]
+        let part = (wanted.clamp(-most, most) / deviation) as f32;
+        part
+    });
+    (wanted.iter().sum::<f64>() / deviation, parts.collect())
+}
+
+impl Score {
+    /// The combined score of directions.
+    pub(crate) fn of_grams(grams: &Grams, directions: &[usize]) -> Self {
+        let products = grams.reduced();
+        let blocks = directions.first().map_or(0, |one| grams.along(*one).len());
+        // Rows of the orthonormal directions in terms of the given ones.
+        let mut independent: Vec<Vec<(usize, f64)>> = Vec::new();
+        for one in directions {
+            let mut row = vec![(*one, 1.0)];
+            for other in &independent {
+                let inner: f64 = other.iter().map(|(number, share)| share * products[(*number, *one)]).sum();
+                for (number, share) in other {
+                    match row.iter_mut().find(|(known, _)| known == number) {
+                        Some((_, value)) => *value -= inner * share,
+                        None => row.push((*number, -inner * share)),
+                    }
+                }
+            }
+            let product = |(a, share): &(usize, f64)| -> f64 {
+                row.iter().map(|(b, other)| share * other * products[(*a, *b)]).sum()
+            };
+            let square: f64 = row.iter().map(product).sum();
+            let whole = products[(*one, *one)];
+            if square > 1e-6 * whole && square > 0.0 {
+                row.iter_mut().for_each(|(_, share)| *share /= square.sqrt());
+                independent.push(row);
+            }
+        }
+        let scored = |row: &Vec<(usize, f64)>| {
+            let sum = |block: usize| row.iter().map(|(number, share)| share * grams.along(*number)[block]).sum();
+            let wanted: Vec<f64> = (0..blocks).map(sum).collect();
+            // The blocks' shares of a sum of directions: those of its parts.
+            let sizes: f64 = row.iter().map(|(number, share)| share * share * products[(*number, *number)]).sum();
+            let square = |block: usize| {
+                row.iter().map(|(number, share)| share * share * grams.squares(*number)[block]).sum::<f64>() / sizes
+            };
+            let variance: Vec<f64> = (0..blocks).map(square).collect();
+            standardised(&wanted, &variance)
+        };
+        let scores: Vec<(f64, Vec<f32>)> = independent.iter().map(scored).collect();
+        let freedom = scores.len() as f64;
+        Self {
+            z: deviate(scores.iter().map(|(z, _)| z * z).sum(), freedom),
+            chi_square: ChiSquare { times: 1.0, freedom },
+            parts: scores.into_iter().map(|(_, parts)| parts).collect(),
+        }
+    }
+
+    /// Its value after a flip of the blocks' signs.
+    fn flipped(&self, signs: &[f32]) -> f64 {
+        let square = |parts: &Vec<f32>| {
+            let sum: f32 = parts.iter().zip(signs).map(|(part, sign)| part * sign).sum();
+            f64::from(sum * sum)
+        };
+        let ChiSquare { times, freedom } = self.chi_square;
+        deviate(self.parts.iter().map(square).sum::<f64>() / times, freedom)
+    }
+
+    /// The score of a sum of products of pairs of blocks, which is positive for any signs. Flips do not change the products of
+    /// a block with itself; the others give the variance (F. E. Satterthwaite, *Biometrics Bull.* 2 (1946) 110).
+    pub(crate) fn of_products(products: &DMatrix<f64>, blocks: &[usize], all_blocks: usize) -> Self {
+        let mean = products.trace();
+        let variance = 2.0 * (products.norm_squared() - products.diagonal().norm_squared());
+        let none = Self { z: 0.0, parts: Vec::new(), chi_square: ChiSquare { times: 1.0, freedom: 0.0 } };
+        // The diagonal does not depend on signs, so a small addition for the factorisation does no harm.
+        let firm = DMatrix::from_diagonal_element(blocks.len(), blocks.len(), 1e-9 * mean);
+        let Some(factors) = (products + firm).cholesky().filter(|_| variance > 0.0) else { return none };
+        let chi_square = ChiSquare { times: variance / (2.0 * mean), freedom: 2.0 * mean * mean / variance };
+        let part = |column: usize| {
+            let mut part = vec![0.0; all_blocks];
+            for (block, value) in blocks.iter().zip(factors.l_dirty().column(column).iter()).skip(column) {
+                #[expect(clippy::cast_possible_truncation, reason = "a part of a test's statistic")]
+                let value = *value as f32;
+                part[*block] = value;
+            }
+            part
+        };
+        Self {
+            z: deviate(products.sum() / chi_square.times, chi_square.freedom),
+            parts: (0..blocks.len()).map(part).collect(),
+            chi_square,
+        }
+    }
+}
+
+/// Subtracts a multiple of a direction from a column.
+fn take_off(column: &mut [f64], along: f64, direction: &[f64]) {
+    for (value, direction) in column.iter_mut().zip(direction) {
+        *value -= along * direction;
+    }
+}
+
+/// Scales a column of this size to unit size.
+fn shorten(column: &mut [f64], size: f64) {
+    for value in column {
+        *value /= size;
+    }
+}
+
+/// A chi-square number on the scale of a standard normal deviate, not negative.
+///
+/// # Source
+/// E. B. Wilson and M. M. Hilferty, *Proc. Natl. Acad. Sci.* 17 (1931) 684.
+fn deviate(chi_square: f64, freedom: f64) -> f64 {
+    if freedom <= 0.0 {
+        return 0.0;
+    }
+    let spread = 2.0 / (9.0 * freedom);
+    (((chi_square / freedom).cbrt() - (1.0 - spread)) / spread.sqrt()).max(0.0)
+}
+
+/// For each group, the largest of its scores in each of many sign-flipped data sets.
+pub(crate) fn flipped(groups: &[Vec<&Score>], flips: usize, seed: u64) -> Vec<Vec<f64>> {
+    let blocks =
+        groups.iter().flatten().flat_map(|score| score.parts.iter().map(Vec::len)).max().unwrap_or(0);
+    let mut rng = Rng::new(seed);
+    let mut signs = vec![1.0_f32; flips * blocks];
+    for chunk in signs.chunks_mut(blocks.max(1)).flat_map(|flip| flip.chunks_mut(64)) {
+        let bits = rng.bits();
+        for (place, sign) in chunk.iter_mut().enumerate() {
+            *sign = if bits >> place & 1 == 1 { 1.0 } else { -1.0 };
+        }
+    }
+    let largest = |group: &Vec<&Score>| -> Vec<f64> {
+        let of_flip = |flip: usize| {
+            let signs = &signs[flip * blocks..(flip + 1) * blocks];
+            group.iter().map(|score| score.flipped(signs)).fold(0.0, f64::max)
+        };
+        (0..flips).map(of_flip).collect()
+    };
+    parallel::map(groups, largest)
+}
+
+/// The largest of all groups in each flipped data set.
+pub(crate) fn largest(groups: &[Vec<f64>]) -> Vec<f64> {
+    let flips = groups.first().map_or(0, Vec::len);
+    (0..flips).map(|flip| groups.iter().map(|group| group[flip]).fold(0.0, f64::max)).collect()
+}
+
+/// Share of the Monte-Carlo statistics, including the data's own, that reach the data's.
+pub(crate) fn p_value(statistic: f64, under_none: &[f64]) -> f64 {
+    let reached = under_none.iter().filter(|other| **other >= statistic).count();
+    (reached + 1) as f64 / (under_none.len() + 1) as f64
+}
+
+/// Probability that a sum of gains as large results from flips of their signs.
+pub(crate) fn sign_flip_p(gains: &[f64], flips: usize, seed: u64) -> f64 {
+    let mut rng = Rng::new(seed);
+    let sum: f64 = gains.iter().sum();
+    let flipped: Vec<f64> = (0..flips)
+        .map(|_| gains.iter().map(|gain| if rng.bits() & 1 == 1 { *gain } else { -gain }).sum())
+        .collect();
+    p_value(sum, &flipped)
+}
+
+/// Adjusts p-values for the false-discovery rate.
+///
+/// # Source
+/// Y. Benjamini and Y. Hochberg, *J. R. Stat. Soc. B* 57 (1995) 289.
+pub(crate) fn q_values(p_values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p_values.len()).collect();
+    order.sort_by(|a, b| p_values[*b].total_cmp(&p_values[*a]));
+    let count = p_values.len();
+    let mut q_values = vec![1.0; count];
+    let mut least = 1.0_f64;
+    for (above, index) in order.into_iter().enumerate() {
+        least = least.min(p_values[index] * count as f64 / (count - above) as f64);
+        q_values[index] = least;
+    }
+    q_values
+}
+
+#[cfg(test)]
+#[path = "score_tests.rs"]
+mod tests;
+
+#[cfg(test)]
+#[path = "grams_tests.rs"]
+mod tests_of_grams;

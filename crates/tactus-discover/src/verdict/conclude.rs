@@ -1,0 +1,472 @@
+//! The verdict on a search, and the [`Discovery`] that reports it.
+
+use std::ops::Range;
+
+use tactus_model::{Effect, Response};
+
+use super::discovery::{
+    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, Split, Unexplained,
+    Verdict,
+};
+use super::structured::{Readings, Structured};
+use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
+use crate::fit::{Fitted, LOUD, Parameters, Predictor, Prepared, Problem, RandomWalk, Term};
+use crate::next::{Explanation, Pair, Planner};
+use crate::search::{
+    ALPHA, Alike, Equivalent, FLIPS, Located, NotShown, Options, POLISH_ROUNDS, Rule, Search, Tried, names,
+    not_shown, q_values, sign_flip_p, without,
+};
+
+/// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests,
+const SEEN_NOISE: f64 = 2.0;
+/// and for the verdict `Explained` whatever the tests say.
+const LITTLE_NOISE: f64 = 0.5;
+/// The outcome of a search.
+pub(crate) struct SearchOutcome {
+    /// Effects that were not tried, because the data cannot show them.
+    pub(crate) lacking: Vec<NotShown>,
+    pub(crate) base: Fitted,
+    pub(crate) grown: Fitted,
+    pub(crate) rounds: Vec<Tried>,
+    pub(crate) equivalent: Equivalent,
+    /// Where the base model and the data disagree, and where the grown model still does.
+    pub(crate) before: Located,
+    pub(crate) after: Located,
+}
+
+/// The residual of a model on the held-out frames.
+struct HeldOutResidual {
+    /// Root mean square.
+    rms_counts: f64,
+    /// Root mean square for each element.
+    elements_rms_counts: Vec<f64>,
+    /// For all frames, fitted and held out: frame by frame, element by element.
+    residual: Vec<f32>,
+    /// Whether each reading has a signal.
+    has_signal: Vec<bool>,
+}
+
+impl HeldOutResidual {
+    /// The residual of each element, and that of a grown model.
+    fn elements_beside(&self, grown: &Self) -> Vec<ElementGap> {
+        let elements = self.elements_rms_counts.iter().zip(&grown.elements_rms_counts);
+        elements
+            .map(|(before, after)| ElementGap { before_rms_counts: *before, after_rms_counts: *after })
+            .collect()
+    }
+}
+
+/// Decides the verdict and builds the report of a search.
+pub(crate) fn conclude(
+    prepared: &Prepared<'_>,
+    search: &Search<'_>,
+    found: SearchOutcome,
+    options: Options,
+) -> Result<Discovery, DiscoverError> {
+    let Prepared { lattice, faulty, .. } = prepared;
+    let SearchOutcome { lacking, base, grown, rounds, equivalent, before, after } = found;
+    // Two tests: Bonferroni's correction.
+    let first = rounds.first();
+    let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
+    let share = search.share_left(&base, &grown);
+    let left = after.p_value <= ALPHA;
+    let named = !names(&grown.parameters, search.known_terms).is_empty();
+    let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
+    let floor = prepared.floor_of(&of_grown);
+    let [base_level, grown_level] = [&of_base, &of_grown].map(|held| prepared.level(held, floor));
+    let upper_noise = grown_level.structured.map_or(f64::INFINITY, |part| part.upper_noise);
+    let evidence = Evidence {
+        is_named: named || lattice.is_some() || !faulty.effects.is_empty(),
+        is_missing: p_value <= ALPHA && options.rule == Rule::Protocol,
+        is_left: left,
+        upper_noise,
+        tolerance_noise: options
+            .tolerance_counts
+            .zip(floor.rms_counts())
+            .map_or(0.0, |(tolerance, noise)| tolerance / noise),
+    };
+    let verdict = evidence.verdict();
+    let squares = |level: Level| level.heldout_rms_counts.powi(2);
+    let noise_square = floor.rms_counts().unwrap_or(0.0).powi(2);
+    let gap = squares(base_level) - noise_square;
+    let closed = squares(base_level) - squares(grown_level);
+
+    let mut not_shown = lacking;
+    not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.reach)));
+    let mut steps = search.steps(&grown, &equivalent, &prepared.problem_with_silent())?;
+    let mut effects = grown.parameters.effects()?;
+    if let Some((step_counts, p_value)) = lattice {
+        effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);
+        steps.push(coarse(*step_counts, *p_value, grown_level.heldout_rms_counts));
+    }
+    let pairs = if named { undecided(&equivalent, &grown) } else { Vec::new() };
+    let planner = prepared.planner();
+    let mut next_experiments = planner.propose(&pairs)?;
+    next_experiments.extend(planner.show(&not_shown, &grown.parameters)?);
+    if verdict == Verdict::CannotJudge {
+        next_experiments.insert(0, planner.repeats());
+    }
+
+    let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
+    let mut warnings = prepared.warnings.clone();
+    warnings.extend(prepared.not_judged(&of_grown, floor));
+    Ok(Discovery {
+        not_shown,
+        warnings,
+        floor,
+        global: Some(GlobalTest { statistic: before.statistic, p_value }),
+        curves: search.curves(&base, &grown)?,
+        elements: of_base.elements_beside(&of_grown),
+        rounds: rounds.into_iter().map(|tried| tried.round).collect(),
+        steps,
+        final_: Final {
+            level: grown_level,
+            // By chance the remainder may be smaller than the noise.
+            shrink: (p_value <= ALPHA && gap > 0.0).then(|| (closed / gap).min(1.0)),
+        },
+        verdict,
+        unexplained: Unexplained {
+            depends_on: if left && !is_clean {
+                after.gap.iter().map(|gap| gap.covariate).collect()
+            } else {
+                Vec::new()
+            },
+            share: match verdict {
+                Verdict::NothingMissing => 0.0,
+                Verdict::CannotJudge | Verdict::Unexplained => 1.0,
+                // Faulty elements are in the base, so that nothing of its gap is left to close.
+                Verdict::Explained if !named && lattice.is_none() => 0.0,
+                Verdict::Explained | Verdict::PartlyExplained => share,
+            },
+        },
+        next_experiments,
+        effects,
+        grown: base_of(prepared, &grown.parameters),
+        gap: before.gap,
+        ..prepared.unjudged(&of_base, base_level, options)?
+    })
+}
+
+/// The report of data without a floor: figures of the base model in counts, no names, and what to measure next.
+pub(crate) fn cannot_judge(prepared: &Prepared<'_>, options: Options) -> Result<Discovery, DiscoverError> {
+    let of_base = prepared.held(&prepared.base.parameters)?;
+    let unjudged = prepared.unjudged(&of_base, prepared.level(&of_base, prepared.floor), options)?;
+    Ok(Discovery { next_experiments: vec![prepared.planner().repeats()], ..unjudged })
+}
+
+/// The added effects, each with an effect that the data do not distinguish from it.
+fn undecided(equivalent: &Equivalent, grown: &Fitted) -> Vec<Pair> {
+    let explained =
+        |name: &'static str, fitted: &Fitted| Explanation { name, parameters: fitted.parameters.clone() };
+    let pairs = equivalent.iter().flat_map(|(name, Alike { without, same })| {
+        same.iter().map(move |(rival, fitted)| Pair {
+            of: [explained(name, grown), explained(rival, fitted)],
+            without: without.parameters.clone(),
+            gain: without.cost - grown.cost,
+        })
+    });
+    pairs.collect()
+}
+
+/// What the verdict depends on.
+#[derive(Debug, Clone, Copy)]
+struct Evidence {
+    /// Effects were added and not withdrawn.
+    is_named: bool,
+    /// A test rejects the base model.
+    is_missing: bool,
+    /// A test rejects the grown model.
+    is_left: bool,
+    /// Upper bound of what is structured in the grown model's residual.
+    upper_noise: f64,
+    /// The tolerance that was declared beforehand; 0 if none was.
+    tolerance_noise: f64,
+}
+
+impl Evidence {
+    fn verdict(self) -> Verdict {
+        let is_seen = self.upper_noise < SEEN_NOISE;
+        let is_little = self.upper_noise < LITTLE_NOISE.max(self.tolerance_noise);
+        match (self.is_named, self.is_missing) {
+            (false, false) if is_seen => Verdict::NothingMissing,
+            // No test rejects, but there may be more than one would overlook.
+            (false, false) => Verdict::CannotJudge,
+            (false, true) => Verdict::Unexplained,
+            (true, _) if is_little || is_seen && !self.is_left => Verdict::Explained,
+            (true, _) => Verdict::PartlyExplained,
+        }
+    }
+}
+
+/// The added effect for a converter that is coarser than declared.
+fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffect {
+    AddedEffect {
+        effect: "quantisation",
+        terms: vec![vec![Estimated { name: "step_counts", value: step_counts, standard_error: None }]],
+        p_value,
+        q_value: p_value,
+        // It does not change a mean.
+        heldout_rms_before_counts: heldout_rms_counts,
+        heldout_rms_after_counts: heldout_rms_counts,
+        equivalent: Vec::new(),
+    }
+}
+
+fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> BaseModel {
+    let response = Response {
+        sensitivity_counts_per_mm: parameters.sensitivity.clone(),
+        baseline_counts: parameters.mean_baseline(),
+        ..prepared.known.response.clone()
+    };
+    BaseModel {
+        psf: parameters.psf,
+        response,
+        run_baselines_counts: parameters.baseline.clone(),
+        run_walks: parameters.walk.as_ref().and_then(RandomWalk::apart),
+    }
+}
+
+impl Prepared<'_> {
+    /// A report of the recalibrated base model that judges nothing.
+    fn unjudged(
+        &self,
+        of_base: &HeldOutResidual,
+        level: Level,
+        options: Options,
+    ) -> Result<Discovery, DiscoverError> {
+        let element = |rms: &f64| ElementGap { before_rms_counts: *rms, after_rms_counts: *rms };
+        let recalibrated = base_of(self, &self.base.parameters);
+        Ok(Discovery {
+            seed: options.seed,
+            not_shown: Vec::new(),
+            warnings: self.warnings.clone(),
+            split: Split {
+                frames: self.frames.len(),
+                train_presses: self.heldout.train_presses,
+                heldout_presses: self.heldout.presses,
+                heldout_depths_mm: self.heldout.depths_mm.clone(),
+                heldout_coverings_mm: self.heldout.coverings_mm.clone(),
+            },
+            heldout_frames: self.heldout.frames.clone(),
+            floor: self.floor,
+            tolerance_counts: options.tolerance_counts,
+            faulty: self.faulty.elements.clone(),
+            base: level,
+            global: None,
+            gap: Vec::new(),
+            curves: Vec::new(),
+            elements: of_base.elements_rms_counts.iter().map(element).collect(),
+            rounds: Vec::new(),
+            steps: Vec::new(),
+            final_: Final { level, shrink: None },
+            verdict: Verdict::CannotJudge,
+            unexplained: Unexplained { depends_on: Vec::new(), share: 1.0 },
+            next_experiments: Vec::new(),
+            grown: recalibrated.clone(),
+            recalibrated,
+            effects: self.base.parameters.effects()?,
+        })
+    }
+
+    /// The residual of a model on the held-out frames.
+    fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
+        let Self { known, frames, heldout, noise, whole, .. } = self;
+        let predicted = Predictor::new(known, frames, whole).predict(parameters)?;
+        let elements = frames.elements;
+        let mut squares = vec![0.0; elements];
+        let mut count = 0.0_f64;
+        for (frame, of) in
+            predicted.chunks_exact(elements).enumerate().filter(|(frame, _)| heldout.frames[*frame])
+        {
+            count += 1.0;
+            for ((sum, counts), of) in squares.iter_mut().zip(frames.counts_of(frame)).zip(of) {
+                *sum += (f64::from(*counts) - of).powi(2);
+            }
+        }
+        let count = count.max(1.0);
+        let weightless = |element: usize| self.faulty.is_weightless(element);
+        let weighed: Vec<f64> =
+            (0..elements).filter(|element| !weightless(*element)).map(|element| squares[element]).collect();
+        let mean = weighed.iter().sum::<f64>() / (count * weighed.len().max(1) as f64);
+        #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
+        let residual = frames.counts.iter().zip(&predicted).map(|(counts, of)| counts - *of as f32).collect();
+        let mut signal = predicted;
+        if let Some(walk) = &parameters.walk {
+            walk.add(whole, -1.0, &mut signal);
+        }
+        let baselines = whole.run.iter().flat_map(|run| &parameters.baseline[*run]);
+        let noises = noise.by_element_counts.iter().cycle();
+        let signal = signal.iter().zip(baselines).zip(noises);
+        Ok(HeldOutResidual {
+            rms_counts: mean.sqrt(),
+            elements_rms_counts: (0..elements)
+                .map(|element| if weightless(element) { f64::NAN } else { (squares[element] / count).sqrt() })
+                .collect(),
+            residual,
+            has_signal: signal.map(|((of, zero), noise)| (of - zero).abs() > LOUD * noise).collect(),
+        })
+    }
+
+    /// The floor given the grown model. Before a tone is in the model, it looks like noise.
+    fn floor_of(&self, grown: &HeldOutResidual) -> Floor {
+        let left = Noise::in_time(self.frames, &grown.residual, &self.still, self.step_counts);
+        let is_weightless = |element| self.faulty.is_weightless(element);
+        let left = left.map(|(left, freedom)| (left.without(is_weightless), freedom));
+        match (self.floor, left) {
+            (Floor::Time { rms_counts, .. }, Some((left, freedom))) if left.rms_counts < rms_counts => {
+                Floor::Time { rms_counts: left.rms_counts, freedom }
+            }
+            (floor, _) => floor,
+        }
+    }
+
+    /// How far a model is from the held-out frames.
+    fn level(&self, held: &HeldOutResidual, floor: Floor) -> Level {
+        let in_noise = |noise_counts: f64| (held.rms_counts / noise_counts).powi(2);
+        Level {
+            heldout_rms_counts: held.rms_counts,
+            heldout_chi2: floor.rms_counts().map(in_noise),
+            structured: self.structured(held, floor),
+        }
+    }
+
+    /// The structured part of a residual on held-out presses: among all readings or among those with a signal.
+    fn structured(&self, held: &HeldOutResidual, floor: Floor) -> Option<Structured> {
+        let (elements, turns) = (self.frames.elements, self.turns());
+        let is_known = |place: usize| !turns[place / elements];
+        let parts = [
+            self.structured_among(held, floor, is_known),
+            self.structured_among(held, floor, |place| is_known(place) && held.has_signal[place])
+                .map(|part| Structured { with_signal: true, ..part }),
+        ];
+        parts.into_iter().flatten().max_by(|one, other| one.upper_noise.total_cmp(&other.upper_noise))
+    }
+
+    /// A warning if much is structured in the frames that are not judged.
+    fn not_judged(&self, held: &HeldOutResidual, floor: Floor) -> Option<String> {
+        let (elements, turns) = (self.frames.elements, self.turns());
+        let part = self.structured_among(held, floor, |place| turns[place / elements])?;
+        (part.rms_noise > SEEN_NOISE).then(|| {
+            format!(
+                "frames at which the stage starts or stops near the surface are not judged, because its position between two reports \
+                 is not known: what is structured in them is {:.1} times the noise",
+                part.rms_noise
+            )
+        })
+    }
+
+    /// Whether the stage starts or stops near the surface, for each frame.
+    fn turns(&self) -> Vec<bool> {
+        (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect()
+    }
+
+    fn structured_among(
+        &self,
+        held: &HeldOutResidual,
+        floor: Floor,
+        among: impl Fn(usize) -> bool,
+    ) -> Option<Structured> {
+        let rms_counts = floor.rms_counts()?;
+        let scale = rms_counts / self.noise.rms_counts;
+        let noise_counts: Vec<f64> = self.noise.by_element_counts.iter().map(|rms| rms * scale).collect();
+        let lag = self.noise.memory_frames();
+        let readings = Readings {
+            elements: self.frames.elements,
+            residual: &held.residual,
+            presses: &self.heldout_presses(),
+            unit_counts: &noise_counts.iter().map(|rms| rms.max(QUIETEST * rms_counts)).collect::<Vec<_>>(),
+            noise_counts: &noise_counts,
+            lag,
+            correlation: self.noise.correlation_at(lag),
+            freedom: floor.freedom()?,
+        };
+        readings.structured(among)
+    }
+
+    /// Frames of each held-out press and of each held-out rest between presses.
+    fn heldout_presses(&self) -> Vec<Range<usize>> {
+        let (frames, held) = (self.frames, &self.heldout.frames);
+        let key = |frame: usize| (held[frame], self.whole.run[frame], frames.press[frame]);
+        let all: Vec<usize> = (0..frames.len()).collect();
+        let presses = all.chunk_by(|one, next| key(*one) == key(*next));
+        presses
+            .filter_map(|press| Some(*press.first()?..press.last()? + 1))
+            .filter(|press| held[press.start])
+            .collect()
+    }
+
+    fn planner(&self) -> Planner<'_> {
+        Planner { known: self.known, frames: self.frames, noise: &self.noise }
+    }
+}
+
+impl Search<'_> {
+    /// Remaining share of the gap, less the uncertainty of the noise.
+    fn share_left(&self, base: &Fitted, grown: &Fitted) -> f64 {
+        let left = self.problem.heldout_gap(&grown.predicted).sure();
+        self.share_of(base, grown, left)
+    }
+
+    fn share_of(&self, base: &Fitted, grown: &Fitted, left: f64) -> f64 {
+        let [closed, _] = self.problem.heldout_gain(base, grown);
+        if closed + left > 0.0 { (left / (closed + left)).clamp(0.0, 1.0) } else { 1.0 }
+    }
+
+    /// The added effects, those of faulty elements included, each name once. `with_silent` is the problem in which dead and stuck elements
+    /// have a weight.
+    pub(crate) fn steps(
+        &self,
+        grown: &Fitted,
+        equivalent: &Equivalent,
+        with_silent: &Problem<'_>,
+    ) -> Result<Vec<AddedEffect>, DiscoverError> {
+        let known_terms = self.problem.predictor.known.effects.len();
+        let names = names(&grown.parameters, known_terms);
+        let mut steps = Vec::new();
+        for name in names {
+            let problem = if name == MISWIRED { with_silent } else { self.problem };
+            let less = without(&grown.parameters, name, known_terms);
+            let before = problem.fit_from(less, POLISH_ROUNDS)?;
+            let gains = problem.heldout_gains(&before.predicted, &grown.predicted);
+            let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(known_terms);
+            let estimated = |(term, errors): (&Term, &Vec<f64>)| {
+                term.definition
+                    .parameters
+                    .iter()
+                    .zip(&term.values)
+                    .zip(errors)
+                    .map(|((known, value), error)| Estimated {
+                        name: known.name,
+                        value: *value,
+                        // An error greater than the range means that the data do not determine it.
+                        standard_error: Some(*error)
+                            .filter(|error| *error <= known.range[1] - known.range[0]),
+                    })
+                    .collect()
+            };
+            let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
+            steps.push(AddedEffect {
+                effect: name,
+                terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
+                p_value,
+                q_value: p_value,
+                heldout_rms_before_counts: problem.heldout_rms_counts(&before.predicted),
+                heldout_rms_after_counts: problem.heldout_rms_counts(&grown.predicted),
+                equivalent: equivalent
+                    .get(name)
+                    .into_iter()
+                    .flat_map(|alike| alike.same.iter().map(|(rival, _)| *rival))
+                    .collect(),
+            });
+        }
+        let p_values: Vec<f64> = steps.iter().map(|step| step.p_value).collect();
+        for (step, q_value) in steps.iter_mut().zip(q_values(&p_values)) {
+            step.q_value = q_value;
+        }
+        Ok(steps)
+    }
+}
+
+#[cfg(test)]
+#[path = "conclude_tests.rs"]
+mod tests;
