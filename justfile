@@ -239,6 +239,12 @@ discovery-active:
     cargo build --profile dist --package tactus --package tactus-bench
     target/dist/tactus-bench evidence active --document docs/discovery-evidence.md
 
+# One table for work on the method, of 54 tuning sets, with the programs of `just build`; misses are in target/evidence/quick/work/misses.txt.
+discovery-quick: build
+    rm -rf target/evidence/quick
+    target/debug/tactus-bench evidence run --size quick --tactus target/debug/tactus \
+        --work target/evidence/quick/work --labels target/evidence/quick/labels
+
 # The part of it that fails if discovery has become worse: always the same 46 sets, some two minutes on two cores.
 discovery-slice:
     cargo build --profile dist --package tactus --package tactus-bench

@@ -2,8 +2,8 @@
 //!
 //! A *campaign* is a list of sets, each made from its own seed ([`campaigns()`]). [`run()`] makes the sets, writes their
 //! labels into a separate folder, and starts the program `tactus`, which gets a measurement table and nothing else. Only
-//! [`read()`] opens the labels; it compares them with the reports. [`Scores`] counts the outcomes, [`document()`] and
-//! [`pictures()`] present them.
+//! [`read()`] opens the labels; it compares them with the reports. [`Scores`] counts the outcomes, [`summary()`],
+//! [`document()`] and [`pictures()`] present them.
 
 mod ablation;
 mod campaign;
@@ -13,6 +13,7 @@ mod picture;
 mod rate;
 mod run;
 mod score;
+mod summary;
 mod timing;
 mod twins;
 
@@ -27,5 +28,6 @@ pub use score::{
     Band, Cell, EffectScore, ORACLE_LEVEL, OutsideScore, PowerPoint, Scores, SetSize, Several, Shrink,
     Spread, Z_DETECTABLE, Z_SEPARATE,
 };
+pub use summary::summary;
 pub use timing::{Cost, Timing};
 pub use twins::{BUDGET_MIN, Chosen, Decision, TWINS, Twins, Undecided, twins_table};

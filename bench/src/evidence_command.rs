@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use tactus_bench::evidence::{
     self, Ablation, Campaign, Costs, Outcome, Places, Planned, Scores, Seeds, Sizes, TWINS, Timing, Workflow,
-    ablations, campaigns, document, into_document, misses, pictures, read, run, twins_table,
+    ablations, campaigns, document, into_document, misses, pictures, read, run, summary, twins_table,
 };
 
 #[derive(Debug, Args)]
@@ -85,7 +85,7 @@ struct RunArgs {
 
 #[derive(Debug, Args)]
 struct WhichArgs {
-    /// Which sets: all, those for other methods, a first look of some hundred, a slice of 46, or the sample of 11 that CI runs.
+    /// Which sets: all, those for other methods, a first look of some hundred, a short loop of 54, a slice of 46, or the sample of 11 that CI runs.
     #[arg(long, value_enum, default_value = "whole")]
     size: Size,
     /// Campaigns, separated by commas; by default all.
@@ -125,6 +125,7 @@ enum Size {
     Whole,
     Ablation,
     Glance,
+    Quick,
     Slice,
     Sample,
 }
@@ -203,7 +204,9 @@ impl RunArgs {
         }
         match self.which.size {
             Size::Sample => SAMPLE_BOUNDS.check(&outcomes),
-            Size::Whole | Size::Ablation | Size::Glance | Size::Slice => BOUNDS.check(&outcomes),
+            Size::Whole | Size::Ablation | Size::Glance | Size::Quick | Size::Slice => {
+                BOUNDS.check(&outcomes)
+            }
         }
     }
 }
@@ -214,6 +217,7 @@ impl WhichArgs {
             Size::Whole => Sizes::whole(),
             Size::Ablation => Sizes::ablation(),
             Size::Glance => Sizes::glance(),
+            Size::Quick => Sizes::quick(),
             Size::Slice => Sizes::slice(),
             Size::Sample => Sizes::sample(),
         };
@@ -259,7 +263,10 @@ impl WhichArgs {
         let outcomes = read(&self.sets(), &self.places())?;
         let scores = Scores::new(&outcomes);
         let text = document(&scores, &self.ablations()?, self.costs()?.as_ref());
-        println!("{text}");
+        match self.size {
+            Size::Quick => println!("{}", summary(&outcomes)),
+            Size::Whole | Size::Ablation | Size::Glance | Size::Slice | Size::Sample => println!("{text}"),
+        }
         let Places { work, .. } = self.places();
         write(&work.join("evidence.json"), &serde_json::to_string_pretty(&scores)?)?;
         write(&work.join("evidence.md"), &text)?;

@@ -69,6 +69,23 @@ pub struct Planned {
     pub recipe: Recipe,
 }
 
+/// Effects whose form differs from one rig to the next.
+const FREE_FORMS: [&str; 13] = [
+    "hardening",
+    "heavy-tail",
+    "depth-dependent-spread",
+    "relaxation",
+    "hysteresis",
+    "rate-stiffening",
+    "imprint",
+    "softening",
+    "crosstalk",
+    "saturation",
+    "baseline-drift",
+    "gain-drift",
+    "low-pass",
+];
+
 /// Separation of each effect in sets of several, evenly on a logarithmic scale.
 const SEVERAL_Z: [f64; 2] = [20.0, 60.0];
 
@@ -138,6 +155,18 @@ impl Sizes {
             outside_strengths: Vec::new(),
             outside_seeds: 1,
             ..Self::whole()
+        }
+    }
+
+    /// A short loop for work on the method: two physics of each class with a free form, and a few sets of every other campaign.
+    pub fn quick() -> Self {
+        Self {
+            false_alarms: 8,
+            physics: FREE_FORMS.iter().flat_map(|effect| instances(effect).take(2)).collect(),
+            pairs: 6,
+            triples: 4,
+            outside: outside().take(10).collect(),
+            ..Self::glance()
         }
     }
 
@@ -250,6 +279,10 @@ fn within() -> impl Iterator<Item = &'static Definition> {
 
 fn outside() -> impl Iterator<Item = &'static Definition> {
     CATALOGUE.iter().copied().filter(|definition| definition.effect.is_none())
+}
+
+fn instances(effect: &str) -> impl Iterator<Item = &'static Definition> {
+    CATALOGUE.iter().copied().filter(move |definition| definition.effect == Some(effect))
 }
 
 /// The first physics of each effect.

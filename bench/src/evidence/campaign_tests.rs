@@ -38,7 +38,7 @@ fn sealed_sets_have_the_ids_of_tuning_sets_and_none_of_their_seeds() {
 #[test]
 fn a_set_is_the_same_in_a_small_campaign_and_in_the_whole() {
     let whole = all(&Sizes::whole());
-    for set in all(&Sizes::slice()).into_iter().chain(all(&Sizes::sample())) {
+    for set in [Sizes::quick(), Sizes::slice(), Sizes::sample()].iter().flat_map(all) {
         let twin = whole.iter().find(|other| other.id == set.id);
         assert_eq!(twin.map(|twin| twin.recipe.seed), Some(set.recipe.seed), "{}", set.id);
     }
@@ -47,6 +47,11 @@ fn a_set_is_the_same_in_a_small_campaign_and_in_the_whole() {
 #[test]
 fn the_table_does_not_say_what_is_hidden() {
     assert!(all(&Sizes::whole()).iter().all(|set| set.recipe.name == "set"));
+}
+
+#[test]
+fn the_quick_sets_take_two_forms_of_each_free_class() {
+    assert_eq!(all(&Sizes::quick()).len(), 8 + 26 + 6 + 4 + 10);
 }
 
 #[test]

@@ -97,6 +97,11 @@ impl Outcome {
         self.named.iter().filter(|named| !is_true(named)).map(|named| named.effect.as_str()).collect()
     }
 
+    /// The shrink over that of the first hidden effect, fitted alone.
+    pub fn shrink_to_own_fit(&self) -> Option<f64> {
+        Some(self.shrink? / self.alone_shrink.filter(|alone| *alone > 0.0)?)
+    }
+
     /// Separation of the weakest hidden physics; infinite if there is none.
     pub fn z(&self) -> f64 {
         self.truths.iter().map(|truth| truth.z).fold(f64::INFINITY, f64::min)

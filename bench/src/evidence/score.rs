@@ -229,15 +229,13 @@ impl Band {
             set_size: SetSize::new(sets),
             wrong: Rate::of(sets, |set| !set.wrong_names().is_empty()),
             shrink: Shrink::new(known().filter_map(|set| set.shrink)),
-            shrink_to_own_fit: Shrink::new(
-                known().filter_map(|set| Some(set.shrink? / set.alone_shrink.filter(|alone| *alone > 0.0)?)),
-            ),
+            shrink_to_own_fit: Shrink::new(known().filter_map(|set| set.shrink_to_own_fit())),
         }
     }
 }
 
 impl Spread {
-    fn new(costs: impl Iterator<Item = f64>) -> Option<Self> {
+    pub(super) fn new(costs: impl Iterator<Item = f64>) -> Option<Self> {
         let costs: Vec<f64> = costs.collect();
         let [median, most, greatest] = [0.5, 0.95, 1.0].map(|share| quantile(costs.clone(), share));
         Some(Self { median: median?, most: most?, greatest: greatest? })
@@ -245,7 +243,7 @@ impl Spread {
 }
 
 impl SetSize {
-    fn new(sets: &[&Outcome]) -> Self {
+    pub(super) fn new(sets: &[&Outcome]) -> Self {
         let sizes: Vec<usize> =
             sets.iter().flat_map(|set| &set.named).map(|named| 1 + named.equivalent.len()).collect();
         let of = sizes.len();

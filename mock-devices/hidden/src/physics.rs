@@ -1,8 +1,10 @@
 //! The catalogue of hidden physics, its parameters, and the hooks into the pipeline.
 
 mod contact;
+mod converter;
 mod drift;
 mod element;
+mod friction;
 mod hardening;
 mod hysteresis;
 mod memory;
@@ -10,8 +12,14 @@ mod motion;
 mod outside;
 mod rate;
 mod readout;
+mod registration;
 mod relaxation;
+mod skin;
 mod spread;
+mod surface;
+mod surroundings;
+mod timing;
+mod wiring;
 
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -25,6 +33,8 @@ pub struct Definition {
     pub id: &'static str,
     /// The library's effect that it is an instance of; `None` if there is none.
     pub effect: Option<&'static str>,
+    /// True if the effect of the library can do exactly this at some values of its parameters: a set with it says nothing about other forms.
+    pub is_library_point: bool,
     /// What it does: equation and source.
     pub about: &'static str,
     /// True if it needs time steps finer than a frame.
@@ -52,41 +62,79 @@ pub static CATALOGUE: &[&Definition] = &[
     &motion::TURNED_MOUNT,
     &motion::STRETCHED_STAGE,
     &motion::SHEARED_STAGE,
+    &registration::BENT_GUIDE,
+    &registration::SCREW_ERROR,
+    &registration::UNEQUAL_AXES,
     &motion::LATE_TOUCH,
     &motion::DEAD_BAND,
+    &surface::TOE,
+    &surface::SETTLING_SURFACE,
     &motion::SLOPING_SURFACE,
+    &surface::BOWED_SURFACE,
+    &surface::FOLDED_SURFACE,
+    &surface::TWISTED_SURFACE,
     &motion::LATE_FRAMES,
+    &timing::JITTER,
+    &timing::CLOCKS_APART,
+    &timing::BUNDLES,
     &motion::LOST_MOTION,
+    &friction::DAHL,
+    &friction::WORN_SCREW,
+    &friction::STICTION,
     &contact::WORN_TOOL,
+    &contact::ROUNDED_RIM,
+    &contact::SPREADING_TIP,
+    &contact::WEARING_TOOL,
     &contact::COCKED_TOOL,
+    &contact::WOBBLING_TOOL,
+    &contact::YIELDING_TOOL,
+    &contact::BENDING_ARM,
     &hardening::EXPONENTIAL,
     &hardening::POWER,
     &hardening::QUADRATIC,
+    &hardening::LIMIT,
+    &hardening::TWO_LAYERS,
     &spread::LAYERED_TAIL,
     &spread::EXPONENTIAL_TAIL,
     &spread::POWER_TAIL,
     &spread::STRETCHED,
+    &spread::SLANTED,
+    &spread::STRETCHED_BY_DEPTH,
+    &spread::STRETCHED_HALF,
     &spread::WIDER_WITH_DEPTH,
     &spread::NARROWER_AT_FIRST,
+    &spread::WIDER_BEYOND,
     &spread::SOFT_EDGE,
     &spread::SEAM,
+    &spread::SOFT_CORNERS,
+    &spread::GLUED_SIDE,
     &relaxation::PRONY,
     &relaxation::POWER_LAW,
     &relaxation::LOGARITHMIC,
+    &relaxation::STRETCHED,
     &hysteresis::PRANDTL_ISHLINSKII,
     &hysteresis::PREISACH,
     &hysteresis::BOUC_WEN,
     &rate::POWER,
     &rate::LOGARITHMIC,
+    &rate::EYRING,
+    &rate::SATURATING,
     &memory::IMPRINT_POWER_LAW,
     &memory::IMPRINT_TWO_EXPONENTIALS,
+    &memory::IMPRINT_DWELL,
     &memory::MULLINS_EXPONENTIAL,
     &memory::MULLINS_DISCONTINUOUS,
+    &memory::SOFTENING_WORK,
     &element::LADDER,
     &element::NEIGHBOURS,
     &element::COLUMN_SUM,
+    &element::GHOST,
+    &element::STRAY_FIELD,
     &element::DEAD,
     &element::ANSWERS_FOR_NEIGHBOUR,
+    &wiring::LOOSE_CONTACT,
+    &wiring::FLICKERING_ADDRESS,
+    &wiring::OPENS_WHEN_PRESSED,
     &element::RATIONAL,
     &element::EXPONENTIAL,
     &element::KNEE,
@@ -96,13 +144,22 @@ pub static CATALOGUE: &[&Definition] = &[
     &drift::GAIN_WARM_UP,
     &drift::GAIN_WALK,
     &drift::GAIN_TEMPERATURE,
+    &drift::GAIN_WARMTH,
     &readout::SECOND_ORDER,
     &readout::MOVING_AVERAGE,
+    &readout::UNEVEN,
     &readout::ROWS,
     &readout::ELEMENTS,
+    &timing::INTERLEAVED,
+    &timing::SERPENTINE,
+    &timing::HALVES,
     &readout::SINE,
     &readout::HARMONICS,
+    &readout::WANDERING,
     &readout::COARSE_STEPS,
+    &converter::MISSING_CODES,
+    &converter::UNEVEN_STEPS,
+    &converter::COMPANDED,
     &outside::SUPPLY_DROOP,
     &outside::DRAGGED_SPREAD,
     &outside::STICK_SLIP,
@@ -114,6 +171,19 @@ pub static CATALOGUE: &[&Definition] = &[
     &outside::GROUNDING,
     &outside::ELECTRODE_TEXTURE,
     &outside::BULGE,
+    &skin::THERMAL_GROWTH,
+    &skin::AIR_POCKET,
+    &skin::GRIT,
+    &skin::TAUT_SHEET,
+    &skin::VIBRATING_TABLE,
+    &surroundings::COMMON_MODE,
+    &surroundings::GAIN_FLICKER,
+    &surroundings::ROW_BURSTS,
+    &surroundings::FRAME_TEARING,
+    &surroundings::BIT_FLIPS,
+    &surroundings::CONTACT_HUM,
+    &surroundings::STATIC_CHARGE,
+    &surroundings::RANGE_SWITCH,
 ];
 
 impl Definition {
@@ -322,6 +392,17 @@ impl<'a> Knobs<'a> {
         (0..array.elements()).filter_map(|element| array.centre_mm(element)).collect()
     }
 
+    /// Rows and columns of the array.
+    fn grid(&self) -> (usize, usize) {
+        let array = self.sensor.model.array();
+        (array.rows(), array.cols())
+    }
+
+    /// Half the array along x and y.
+    fn half_size_mm(&self) -> [f64; 2] {
+        self.sensor.model.array().extent_mm().map(|[least, greatest]| (greatest - least) / 2.0)
+    }
+
     /// Middle of the array, sensor frame.
     fn middle_mm(&self) -> [f64; 2] {
         self.sensor.model.array().extent_mm().map(|[least, greatest]| f64::midpoint(least, greatest))
@@ -373,3 +454,7 @@ fn dot([px, py]: [f64; 2], [qx, qy]: [f64; 2]) -> f64 {
 #[cfg(test)]
 #[path = "physics_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "foreign_tests.rs"]
+mod foreign_tests;

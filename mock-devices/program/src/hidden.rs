@@ -19,7 +19,7 @@ pub(crate) struct HiddenArgs {
 
 #[derive(Debug, Subcommand)]
 enum HiddenCommand {
-    /// Lists all physics: id, the library's effect that it is an instance of, what it does.
+    /// Lists all physics: id, the library's effect that it is an instance of, "point" if that effect can do exactly this, what it does.
     List {
         /// As JSON.
         #[arg(long)]
@@ -92,12 +92,15 @@ fn list(as_json: bool) -> Result<()> {
     if as_json {
         let all: Vec<_> = CATALOGUE
             .iter()
-            .map(|Definition { id, effect, about, .. }| json!({ "id": id, "effect": effect, "about": about }))
+            .map(|Definition { id, effect, is_library_point, about, .. }| {
+                json!({ "id": id, "effect": effect, "is_library_point": is_library_point, "about": about })
+            })
             .collect();
         writeln!(out, "{}", json!(all))?;
     } else {
-        for Definition { id, effect, about, .. } in CATALOGUE {
-            writeln!(out, "{id:32}{:24}{about}", effect.unwrap_or("-"))?;
+        for Definition { id, effect, is_library_point, about, .. } in CATALOGUE {
+            let point = if *is_library_point { "point" } else { "" };
+            writeln!(out, "{id:32}{:24}{point:7}{about}", effect.unwrap_or("-"))?;
         }
     }
     Ok(out.flush()?)

@@ -22,12 +22,14 @@
 pub mod plan;
 
 mod label;
+mod nearest;
 mod noise;
 mod recipe;
 mod separation;
 mod set;
 
 pub use label::{Label, PhysicsLabel};
+pub use nearest::ClassFits;
 pub use noise::{Noise, NoiseKind};
 pub use plan::Plan;
 pub use recipe::{Amount, Content, Recipe, RecipeError};

@@ -4,11 +4,13 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tactus_hidden::{CATALOGUE, Climate, Definition, Dose, HiddenSensor, RandomRig, STRENGTH_MAX};
+use tactus_model::effect::REGISTRY;
 use tactus_model::{ModelError, Simulator, TrajectoryError};
 use tactus_schema::Rig;
 use tactus_schema::table::Row;
 
 use crate::label::{Label, PhysicsLabel};
+use crate::nearest::{ClassFits, Fitter};
 use crate::noise::{Noise, NoiseKind};
 use crate::plan::{Plan, PlannedRun};
 use crate::separation::Separation;
@@ -120,12 +122,7 @@ impl Recipe {
         self.check()?;
         let chosen = self.content.choose(&mut self.rng(RandomStream::Content))?;
         let base = RandomRig::new(self.seed_of(RandomStream::Base))?;
-        let Rig { array, registration, covering, .. } = &base.rig;
-        let planned =
-            self.plan.runs(array, *registration, *covering, self.frames, self.seed_of(RandomStream::Plan))?;
-        let climate = Climate::new(self.seed_of(RandomStream::Climate));
-        let noise = Noise::draw(self.noise, &mut self.rng(RandomStream::NoiseKind));
-        let oracle = SeparationOracle::new(&base, planned, climate, noise);
+        let oracle = self.oracle(&base)?;
         let (doses, mut physics) = self.doses(&chosen, &oracle);
         let Readings { rows, clean } = self.read(&oracle, &doses);
         let Separation { z, z_beyond_spread, .. } = oracle.separation_of(&clean);
@@ -143,13 +140,56 @@ impl Recipe {
             physics,
             z,
             z_beyond_spread,
-            noise,
+            noise: oracle.noise,
             sensitivity_counts_per_mm: response.sensitivity_counts_per_mm.clone(),
             baseline_counts: response.baseline_counts.clone(),
             sigma_intercept_mm: psf.sigma_intercept_mm,
             sigma_per_mm: psf.sigma_per_mm,
         };
         Ok(DataSet { rig: base.rig, rows, label })
+    }
+
+    /// The fits of all effects of the library to one physics of this set's label, alone and without noise.
+    ///
+    /// # Errors
+    /// As [`Recipe::make`].
+    pub fn class_fits(&self, of: &PhysicsLabel) -> Result<ClassFits, RecipeError> {
+        self.fitted(of, |fitter| fitter.all(of.effect.as_deref()))
+    }
+
+    /// The same of one effect alone.
+    ///
+    /// # Errors
+    /// As [`Recipe::make`].
+    pub fn class_fit(&self, of: &PhysicsLabel, effect: &str) -> Result<ClassFits, RecipeError> {
+        let found = REGISTRY.iter().find(|known| known.name == effect);
+        let definition = found.ok_or_else(|| RecipeError::UnknownEffect(effect.into()))?;
+        self.fitted(of, |fitter| fitter.one(definition))
+    }
+
+    fn fitted(
+        &self,
+        of: &PhysicsLabel,
+        fit: impl Fn(&Fitter<'_>) -> ClassFits,
+    ) -> Result<ClassFits, RecipeError> {
+        let physics = Definition::find(&of.id).ok_or_else(|| RecipeError::UnknownPhysics(of.id.clone()))?;
+        let base = RandomRig::new(self.seed_of(RandomStream::Base))?;
+        let oracle = self.oracle(&base)?;
+        let with = oracle.counts(&base, &[Dose { physics, strength: of.strength, seed: of.seed }]);
+        Ok(fit(&Fitter::new(&oracle, &with)))
+    }
+
+    fn oracle<'a>(&self, base: &'a RandomRig) -> Result<SeparationOracle<'a>, RecipeError> {
+        let Rig { array, registration, covering, .. } = &base.rig;
+        let planned =
+            self.plan.runs(array, *registration, *covering, self.frames, self.seed_of(RandomStream::Plan))?;
+        Ok(SeparationOracle::new(
+            base,
+            planned,
+            Climate::new(self.seed_of(RandomStream::Climate)),
+            self.rng(RandomStream::Thermometer).random_bool(0.7),
+            Noise::draw(self.noise, &mut self.rng(RandomStream::NoiseKind)),
+        ))
     }
 
     /// The dose of each physics, and its label.
@@ -193,7 +233,6 @@ impl Recipe {
     /// The readings of all runs.
     fn read(&self, oracle: &SeparationOracle<'_>, doses: &[Dose]) -> Readings {
         let array = &oracle.base.rig.array;
-        let has_thermometer = self.rng(RandomStream::Thermometer).random_bool(0.7);
         let mut rng = self.rng(RandomStream::Noise);
         let mut noise_of = oracle.noise.series(&mut rng, array.elements());
         let mut noise_counts = vec![0.0; array.elements()];
@@ -214,7 +253,7 @@ impl Recipe {
                 }
                 #[expect(clippy::cast_possible_truncation, reason = "a run of some minutes")]
                 let t_ns = (t_s * 1e9).round() as i64;
-                let temperature_c = sensor.temperature_c().filter(|_| has_thermometer);
+                let temperature_c = sensor.temperature_c().filter(|_| oracle.has_thermometer);
                 readings.rows.push(Row {
                     run: run.clone(),
                     press,
@@ -299,13 +338,15 @@ struct Readings {
 }
 
 /// Computes how far physics is from the base model on the runs of one set.
-struct SeparationOracle<'a> {
-    base: &'a RandomRig,
-    planned: Vec<PlannedRun>,
-    climate: Climate,
+pub(crate) struct SeparationOracle<'a> {
+    pub(crate) base: &'a RandomRig,
+    pub(crate) planned: Vec<PlannedRun>,
+    pub(crate) climate: Climate,
+    /// True if the table tells the temperature.
+    pub(crate) has_thermometer: bool,
     noise: Noise,
     /// Counts of all frames, without physics and noise.
-    clean: Vec<f64>,
+    pub(crate) clean: Vec<f64>,
     /// The same with a spread that is [`WIDER`] times as wide.
     wider: Vec<f64>,
 }
@@ -317,8 +358,15 @@ const SPREAD_CHANGE_LEAST: f64 = 5e-4;
 const SPREAD_ROUNDS: usize = 3;
 
 impl<'a> SeparationOracle<'a> {
-    fn new(base: &'a RandomRig, planned: Vec<PlannedRun>, climate: Climate, noise: Noise) -> Self {
-        let mut oracle = Self { base, planned, climate, noise, clean: Vec::new(), wider: Vec::new() };
+    fn new(
+        base: &'a RandomRig,
+        planned: Vec<PlannedRun>,
+        climate: Climate,
+        has_thermometer: bool,
+        noise: Noise,
+    ) -> Self {
+        let (clean, wider) = (Vec::new(), Vec::new());
+        let mut oracle = Self { base, planned, climate, has_thermometer, noise, clean, wider };
         oracle.clean = oracle.counts(base, &[]);
         oracle.wider =
             base.spread_by(WIDER).map_or_else(|_| oracle.clean.clone(), |wider| oracle.counts(&wider, &[]));
@@ -348,9 +396,13 @@ impl<'a> SeparationOracle<'a> {
         self.separation_of(&self.counts(self.base, &[dose]))
     }
 
-    fn separation_of(&self, with: &[f64]) -> Separation {
+    pub(crate) fn sigma_counts(&self) -> f64 {
+        self.noise.effective_rms_counts(self.base.rig.array.step_counts())
+    }
+
+    pub(crate) fn separation_of(&self, with: &[f64]) -> Separation {
         let array = &self.base.rig.array;
-        let sigma_counts = self.noise.effective_rms_counts(array.step_counts());
+        let sigma_counts = self.sigma_counts();
         let from = |clean: &[f64], wider: &[f64]| {
             Separation::new(clean, with, wider, array.elements(), sigma_counts)
         };

@@ -8,6 +8,7 @@ use super::{Definition, PipelineHook, left, shift};
 pub(super) const COMMON_WALK: Definition = Definition {
     id: "drift-common-walk",
     effect: Some("baseline-drift"),
+    is_library_point: false,
     about: "b' = b + W(t), W one Wiener process for all elements: the reference voltage drifts",
     is_fine: false,
     make: |knobs| {
@@ -23,6 +24,7 @@ pub(super) const COMMON_WALK: Definition = Definition {
 pub(super) const ORNSTEIN_UHLENBECK: Definition = Definition {
     id: "drift-ornstein-uhlenbeck",
     effect: Some("baseline-drift"),
+    is_library_point: false,
     about: "db = -b dt/T + noise, each element for itself: leakage currents (Uhlenbeck and Ornstein 1930)",
     is_fine: false,
     make: |knobs| {
@@ -44,6 +46,7 @@ pub(super) const ORNSTEIN_UHLENBECK: Definition = Definition {
 pub(super) const WARM_UP: Definition = Definition {
     id: "drift-warm-up",
     effect: Some("baseline-drift"),
+    is_library_point: false,
     about: "b' = b + A_e (1 - exp(-t/T)), A_e of one sign: the electronics warm up after they were switched on",
     is_fine: false,
     make: |knobs| {
@@ -60,6 +63,7 @@ pub(super) const WARM_UP: Definition = Definition {
 pub(super) const GAIN_WARM_UP: Definition = Definition {
     id: "gain-warm-up",
     effect: Some("gain-drift"),
+    is_library_point: false,
     about: "s' = s (1 + a (1 - exp(-t/T))): the excitation's amplitude settles after it was switched on",
     is_fine: false,
     make: |knobs| {
@@ -72,6 +76,7 @@ pub(super) const GAIN_WARM_UP: Definition = Definition {
 pub(super) const GAIN_WALK: Definition = Definition {
     id: "gain-walk",
     effect: Some("gain-drift"),
+    is_library_point: false,
     about: "s' = s (1 + W(t)), W one Wiener process for all elements: the excitation's amplitude drifts",
     is_fine: false,
     make: |knobs| {
@@ -87,6 +92,7 @@ pub(super) const GAIN_WALK: Definition = Definition {
 pub(super) const GAIN_TEMPERATURE: Definition = Definition {
     id: "gain-temperature",
     effect: Some("gain-drift"),
+    is_library_point: true,
     about: "s' = s (1 + a (T - T_0)): the covering's permittivity changes with temperature",
     is_fine: false,
     make: |knobs| {
@@ -94,6 +100,24 @@ pub(super) const GAIN_TEMPERATURE: Definition = Definition {
         let mut first_c = None;
         gain(knobs.baselines_counts(), move |_, _, temperature_c| {
             per_k * (temperature_c - *first_c.get_or_insert(temperature_c))
+        })
+    },
+};
+
+pub(super) const GAIN_WARMTH: Definition = Definition {
+    id: "gain-warmth",
+    effect: Some("gain-drift"),
+    is_library_point: false,
+    about: "s' = s (1 + a (w - w_0)), dw/dt = (T - w)/tau: the covering's permittivity follows the room's temperature slowly",
+    is_fine: false,
+    make: |knobs| {
+        let time_s = knobs.decade("time_constant_s", 20.0, 80.0);
+        let per_k = knobs.sign("side") * knobs.scaled("per_k", 0.05);
+        let mut warmth_c: Option<[f64; 2]> = None;
+        gain(knobs.baselines_counts(), move |_, dt_s, temperature_c| {
+            let [first_c, now_c] = warmth_c.get_or_insert([temperature_c; 2]);
+            *now_c += (temperature_c - *now_c) * (1.0 - left(dt_s, time_s));
+            per_k * (*now_c - *first_c)
         })
     },
 };
@@ -107,6 +131,6 @@ fn gain(baselines: Vec<f64>, mut excess: impl FnMut(f64, f64, f64) -> f64 + Send
 }
 
 /// A deviate of the standard normal distribution.
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
+pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }

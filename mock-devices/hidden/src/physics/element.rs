@@ -1,10 +1,11 @@
 //! Element: wiring and amplifiers, on the signal above the baseline.
 
-use super::{Definition, Knobs, PipelineHook};
+use super::{Definition, PipelineHook, minus};
 
 pub(super) const LADDER: Definition = Definition {
     id: "crosstalk-ladder",
     effect: Some("crosstalk"),
+    is_library_point: false,
     about: "s' = s + sum over the row of s_k r^|k - c|: each row is a resistive ladder that leaks from column to column",
     is_fine: false,
     make: |knobs| {
@@ -26,12 +27,13 @@ pub(super) const LADDER: Definition = Definition {
 pub(super) const NEIGHBOURS: Definition = Definition {
     id: "crosstalk-neighbours",
     effect: Some("crosstalk"),
+    is_library_point: true,
     about: "s' = s + c (sum of the four beside + d of the four across corners): stray capacitance between electrodes",
     is_fine: false,
     make: |knobs| {
         let across = knobs.between("across_corners", 0.2, 0.6);
         let share = knobs.scaled("share", 0.03);
-        let (rows, cols) = grid(knobs);
+        let (rows, cols) = knobs.grid();
         PipelineHook::element(move |_, signal| {
             let clean = signal.to_vec();
             for (element, value) in signal.iter_mut().enumerate() {
@@ -54,11 +56,12 @@ pub(super) const NEIGHBOURS: Definition = Definition {
 pub(super) const COLUMN_SUM: Definition = Definition {
     id: "crosstalk-column",
     effect: Some("crosstalk"),
+    is_library_point: true,
     about: "s' = s + c sum of the column's others: the sense amplifier's finite gain, shared by a column",
     is_fine: false,
     make: |knobs| {
         let share = knobs.scaled("share", 0.03);
-        let (_, cols) = grid(knobs);
+        let (_, cols) = knobs.grid();
         PipelineHook::element(move |_, signal| {
             let mut sums = vec![0.0; cols];
             for row in signal.chunks_exact(cols) {
@@ -71,9 +74,54 @@ pub(super) const COLUMN_SUM: Definition = Definition {
     },
 };
 
+pub(super) const GHOST: Definition = Definition {
+    id: "crosstalk-ghost",
+    effect: Some("crosstalk"),
+    is_library_point: false,
+    about: "s_e' = s_e + c s_(e-1), the element sampled before: the multiplexer carries charge on",
+    is_fine: false,
+    make: |knobs| {
+        let share = knobs.scaled("share", 0.05);
+        PipelineHook::element(move |_, signal| {
+            for element in (1..signal.len()).rev() {
+                signal[element] += share * signal[element - 1];
+            }
+        })
+    },
+};
+
+pub(super) const STRAY_FIELD: Definition = Definition {
+    id: "crosstalk-stray-field",
+    effect: Some("crosstalk"),
+    is_library_point: false,
+    about: "s' = s + c sum of all others s_k (P/r)^3, P the pitch: the stray field of a dipole",
+    is_fine: false,
+    make: |knobs| {
+        let share = knobs.scaled("share", 0.02);
+        let centres_mm = knobs.centres_mm();
+        let pitch_mm = knobs.sensor.model.array().element_mm()[0];
+        let nearness = |one: &[f64; 2], other: &[f64; 2]| {
+            let [x, y] = minus(*one, *other);
+            let distance_mm = x.hypot(y);
+            if distance_mm > 0.0 { (pitch_mm / distance_mm).powi(3) } else { 0.0 }
+        };
+        let reaches: Vec<Vec<f64>> = centres_mm
+            .iter()
+            .map(|one| centres_mm.iter().map(|other| share * nearness(one, other)).collect())
+            .collect();
+        PipelineHook::element(move |_, signal| {
+            let clean = signal.to_vec();
+            for (value, reaches) in signal.iter_mut().zip(&reaches) {
+                *value += reaches.iter().zip(&clean).map(|(reach, s)| reach * s).sum::<f64>();
+            }
+        })
+    },
+};
+
 pub(super) const DEAD: Definition = Definition {
     id: "dead-element",
     effect: Some("miswired"),
+    is_library_point: true,
     about: "s' = 0 of one element, of two above strength 1, ...: broken traces",
     is_fine: false,
     make: |knobs| {
@@ -87,11 +135,12 @@ pub(super) const DEAD: Definition = Definition {
 pub(super) const ANSWERS_FOR_NEIGHBOUR: Definition = Definition {
     id: "answers-for-neighbour",
     effect: Some("miswired"),
+    is_library_point: true,
     about: "s_e' = (1 - a) s_e + a s_n, a = 1 at strength 1: the paper's two faulty elements",
     is_fine: false,
     make: |knobs| {
         let element = knobs.which("element");
-        let (_, cols) = grid(knobs);
+        let (_, cols) = knobs.grid();
         let beside = if element % cols + 1 < cols { element + 1 } else { element - 1 };
         let swapped = knobs.share("swapped", 1.0);
         PipelineHook::element(move |_, signal| {
@@ -103,6 +152,7 @@ pub(super) const ANSWERS_FOR_NEIGHBOUR: Definition = Definition {
 pub(super) const RATIONAL: Definition = Definition {
     id: "saturation-rational",
     effect: Some("saturation"),
+    is_library_point: false,
     about: "s' = s / (1 + |s|/S): a capacitive divider",
     is_fine: false,
     make: |knobs| {
@@ -114,6 +164,7 @@ pub(super) const RATIONAL: Definition = Definition {
 pub(super) const EXPONENTIAL: Definition = Definition {
     id: "saturation-exponential",
     effect: Some("saturation"),
+    is_library_point: false,
     about: "s' = S (1 - exp(-s/S)): an amplifier that runs out of supply",
     is_fine: false,
     make: |knobs| {
@@ -125,6 +176,7 @@ pub(super) const EXPONENTIAL: Definition = Definition {
 pub(super) const KNEE: Definition = Definition {
     id: "saturation-knee",
     effect: Some("saturation"),
+    is_library_point: false,
     about: "s' = s below a knee, K + c (s - K) above it: a protection diode begins to conduct",
     is_fine: false,
     make: |knobs| {
@@ -135,8 +187,3 @@ pub(super) const KNEE: Definition = Definition {
         }))
     },
 };
-
-fn grid(knobs: &Knobs<'_>) -> (usize, usize) {
-    let array = knobs.sensor.model.array();
-    (array.rows(), array.cols())
-}

@@ -5,6 +5,7 @@ use super::{Definition, PipelineHook};
 pub(super) const EXPONENTIAL: Definition = Definition {
     id: "hardening-exponential",
     effect: Some("hardening"),
+    is_library_point: false,
     about: "depth' = (exp(b depth) - 1)/b: an exponential elastic law of soft tissue (Fung 1967)",
     is_fine: false,
     make: |knobs| {
@@ -16,6 +17,7 @@ pub(super) const EXPONENTIAL: Definition = Definition {
 pub(super) const POWER: Definition = Definition {
     id: "hardening-power",
     effect: Some("hardening"),
+    is_library_point: true,
     about: "u' = u + a u^1.5: a Hertz-like term of every element's own indentation",
     is_fine: false,
     make: |knobs| {
@@ -27,10 +29,36 @@ pub(super) const POWER: Definition = Definition {
 pub(super) const QUADRATIC: Definition = Definition {
     id: "hardening-quadratic",
     effect: Some("hardening"),
+    is_library_point: true,
     about: "u' = u + k u^2: the paper's quadratic response at large depths (Sec. 2.2)",
     is_fine: false,
     make: |knobs| {
         let quadratic_per_mm = knobs.scaled("quadratic_per_mm", 0.4);
         PipelineHook::Covering(PipelineHook::each(move |u_mm| u_mm + quadratic_per_mm * u_mm * u_mm))
+    },
+};
+
+pub(super) const LIMIT: Definition = Definition {
+    id: "hardening-limit",
+    effect: Some("hardening"),
+    is_library_point: false,
+    about: "depth' = depth / (1 - depth/L): chains of the covering come to the end of their length (Gent 1996)",
+    is_fine: false,
+    make: |knobs| {
+        let by_mm = knobs.scaled("inverse_length_per_mm", 0.35);
+        PipelineHook::depth(move |_, depth_mm| depth_mm / (1.0 - (by_mm * depth_mm).min(0.9)))
+    },
+};
+
+pub(super) const TWO_LAYERS: Definition = Definition {
+    id: "hardening-two-layers",
+    effect: Some("hardening"),
+    is_library_point: false,
+    about: "depth' = depth + k max(0, depth - d0): a stiffer layer below bears from d0 on",
+    is_fine: false,
+    make: |knobs| {
+        let from_mm = knobs.between("from_mm", 0.2, 0.4);
+        let stiffer = knobs.scaled("stiffer", 0.6);
+        PipelineHook::depth(move |_, depth_mm| depth_mm + stiffer * (depth_mm - from_mm).max(0.0))
     },
 };

@@ -6,6 +6,7 @@ use super::{Definition, PipelineHook, left};
 pub(super) const PRANDTL_ISHLINSKII: Definition = Definition {
     id: "hysteresis-prandtl-ishlinskii",
     effect: Some("hysteresis"),
+    is_library_point: false,
     about: "depth' = depth + sum p_i (depth - F_i[depth]), F_i plays of several widths: sliders in parallel (Iwan 1966)",
     is_fine: false,
     make: |knobs| {
@@ -32,6 +33,7 @@ pub(super) const PRANDTL_ISHLINSKII: Definition = Definition {
 pub(super) const PREISACH: Definition = Definition {
     id: "hysteresis-preisach",
     effect: Some("hysteresis"),
+    is_library_point: false,
     about: "depth' = depth - w t (f - mean branch), f = sum of Everett integrals of relays of density exp(-(a-b)/k) (Mayergoyz 1986)",
     is_fine: false,
     make: |knobs| {
@@ -50,6 +52,7 @@ pub(super) const PREISACH: Definition = Definition {
 pub(super) const BOUC_WEN: Definition = Definition {
     id: "hysteresis-bouc-wen",
     effect: Some("hysteresis"),
+    is_library_point: false,
     about: "dz = dx - (b |dx| z + g dx |z|), depth' = depth + w z: Bouc-Wen (Wen 1976), n = 1, A = 1",
     is_fine: false,
     make: |knobs| {

@@ -6,6 +6,7 @@ use super::{Definition, PipelineHook, left};
 pub(super) const IMPRINT_POWER_LAW: Definition = Definition {
     id: "imprint-power-law",
     effect: Some("imprint"),
+    is_library_point: false,
     about: "after release u' = a u_held (1 + t/T)^-b: a dent that closes by a power law",
     is_fine: false,
     make: |knobs| {
@@ -20,6 +21,7 @@ pub(super) const IMPRINT_POWER_LAW: Definition = Definition {
 pub(super) const IMPRINT_TWO_EXPONENTIALS: Definition = Definition {
     id: "imprint-two-exponentials",
     effect: Some("imprint"),
+    is_library_point: false,
     about: "after release u' = a u_held (c exp(-t/T1) + (1 - c) exp(-t/T2)): skin and bulk recover each at its pace",
     is_fine: false,
     make: |knobs| {
@@ -34,6 +36,7 @@ pub(super) const IMPRINT_TWO_EXPONENTIALS: Definition = Definition {
 pub(super) const MULLINS_EXPONENTIAL: Definition = Definition {
     id: "softening-exponential",
     effect: Some("softening"),
+    is_library_point: false,
     about: "u' = u (1 - a (1 - exp(-m/m0))), m the element's largest indentation in the past: Mullins by damage (Simo 1987)",
     is_fine: false,
     make: |knobs| {
@@ -52,6 +55,7 @@ pub(super) const MULLINS_EXPONENTIAL: Definition = Definition {
 pub(super) const MULLINS_DISCONTINUOUS: Definition = Definition {
     id: "softening-ogden-roxburgh",
     effect: Some("softening"),
+    is_library_point: false,
     about: "u' = u (1 - a tanh((m - u)/w)), m the largest indentation in the past: softer below it only (Ogden and Roxburgh 1999)",
     is_fine: false,
     make: |knobs| {
@@ -62,6 +66,46 @@ pub(super) const MULLINS_DISCONTINUOUS: Definition = Definition {
             for (value, largest_mm) in indentation_mm.iter_mut().zip(&mut largest_mm) {
                 *largest_mm = largest_mm.max(*value);
                 *value *= 1.0 - loss * ((*largest_mm - *value) / width_mm).tanh();
+            }
+        })
+    },
+};
+
+pub(super) const IMPRINT_DWELL: Definition = Definition {
+    id: "imprint-dwell",
+    effect: Some("imprint"),
+    is_library_point: false,
+    about: "u' = u + a max(0, m - u), dm/dt = (u - m)/T with a short T while u > m and a long one after: a dent as deep as the dwell was long",
+    is_fine: false,
+    make: |knobs| {
+        let times_s = [knobs.between("setting_s", 0.5, 3.0), knobs.decade("recovery_s", 3.0, 20.0)];
+        let share = knobs.scaled("share", 0.12);
+        let mut dents_mm = vec![0.0_f64; knobs.elements()];
+        PipelineHook::covering(move |now, indentation_mm| {
+            for (value, dent_mm) in indentation_mm.iter_mut().zip(&mut dents_mm) {
+                let time_s = times_s[usize::from(*value <= *dent_mm)];
+                *dent_mm += (*value - *dent_mm) * (1.0 - left(now.dt_s, time_s));
+                *value += share * (*dent_mm - *value).max(0.0);
+            }
+        })
+    },
+};
+
+pub(super) const SOFTENING_WORK: Definition = Definition {
+    id: "softening-work",
+    effect: Some("softening"),
+    is_library_point: false,
+    about: "u' = u (1 - a (1 - exp(-w/w0))), w the element's loading path so far: continuous damage (Miehe 1995)",
+    is_fine: false,
+    make: |knobs| {
+        let scale_mm = knobs.decade("scale_mm", 0.3, 2.0);
+        let loss = knobs.share("loss", 0.15);
+        let mut paths_mm = vec![[0.0_f64; 2]; knobs.elements()];
+        PipelineHook::covering(move |_, indentation_mm| {
+            for (value, [path_mm, last_mm]) in indentation_mm.iter_mut().zip(&mut paths_mm) {
+                *path_mm += (*value - *last_mm).max(0.0);
+                *last_mm = *value;
+                *value *= 1.0 - loss * (1.0 - left(*path_mm, scale_mm));
             }
         })
     },

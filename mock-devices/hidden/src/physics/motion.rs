@@ -5,6 +5,7 @@ use super::{Definition, PipelineHook, dot, left, minus};
 pub(super) const SHIFTED_MOUNT: Definition = Definition {
     id: "shifted-mount",
     effect: Some("misregistration"),
+    is_library_point: true,
     about: "p' = p + s: the sensor was put back 0.15 mm aside",
     is_fine: false,
     make: |knobs| {
@@ -19,6 +20,7 @@ pub(super) const SHIFTED_MOUNT: Definition = Definition {
 pub(super) const TURNED_MOUNT: Definition = Definition {
     id: "turned-mount",
     effect: Some("misregistration"),
+    is_library_point: true,
     about: "p' = c + Rot(a) (p - c): the sensor turned about a place near its middle",
     is_fine: false,
     make: |knobs| {
@@ -39,6 +41,7 @@ pub(super) const TURNED_MOUNT: Definition = Definition {
 pub(super) const STRETCHED_STAGE: Definition = Definition {
     id: "stretched-stage",
     effect: Some("misregistration"),
+    is_library_point: true,
     about: "p' = c + (1 + e) (p - c): both lead screws have another pitch than the controller believes",
     is_fine: false,
     make: |knobs| {
@@ -55,6 +58,7 @@ pub(super) const STRETCHED_STAGE: Definition = Definition {
 pub(super) const SHEARED_STAGE: Definition = Definition {
     id: "sheared-stage",
     effect: Some("misregistration"),
+    is_library_point: false,
     about: "x' = x + e (y - c_y): the stage's axes are not square, which turns and shears at once",
     is_fine: false,
     make: |knobs| {
@@ -67,6 +71,7 @@ pub(super) const SHEARED_STAGE: Definition = Definition {
 pub(super) const LATE_TOUCH: Definition = Definition {
     id: "late-touch",
     effect: Some("surface-offset"),
+    is_library_point: true,
     about: "depth' = depth + h: the touch that found the surface was read too early or too late",
     is_fine: false,
     make: |knobs| {
@@ -78,6 +83,7 @@ pub(super) const LATE_TOUCH: Definition = Definition {
 pub(super) const DEAD_BAND: Definition = Definition {
     id: "dead-band",
     effect: Some("surface-offset"),
+    is_library_point: false,
     about: "depth' = depth - c (1 - exp(-depth/c)): a loose skin that must be taken up before anything presses",
     is_fine: false,
     make: |knobs| {
@@ -92,6 +98,7 @@ pub(super) const DEAD_BAND: Definition = Definition {
 pub(super) const SLOPING_SURFACE: Definition = Definition {
     id: "sloping-surface",
     effect: Some("surface-tilt"),
+    is_library_point: true,
     about: "depth' = depth + g . (p - p0): the sensor lies slanted, its height found at p0 alone",
     is_fine: false,
     make: |knobs| {
@@ -111,6 +118,7 @@ pub(super) const SLOPING_SURFACE: Definition = Definition {
 pub(super) const LATE_FRAMES: Definition = Definition {
     id: "late-frames",
     effect: Some("time-lag"),
+    is_library_point: true,
     about: "p'(t) = p(t - l): frames wait in a buffer before they are stamped, or the stage's reports do (l < 0)",
     is_fine: false,
     make: |knobs| {
@@ -122,6 +130,7 @@ pub(super) const LATE_FRAMES: Definition = Definition {
 pub(super) const LOST_MOTION: Definition = Definition {
     id: "lost-motion",
     effect: Some("backlash"),
+    is_library_point: true,
     about: "q' = max(p - r, min(p + r, q)): the play operator on each axis (Krasnosel'skii and Pokrovskii 1989)",
     is_fine: false,
     make: |knobs| {

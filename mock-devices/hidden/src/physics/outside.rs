@@ -7,6 +7,7 @@ use super::{Definition, Knobs, Now, PipelineHook, dot, left, minus, scale};
 pub(super) const SUPPLY_DROOP: Definition = Definition {
     id: "supply-droop",
     effect: None,
+    is_library_point: false,
     about: "s' = s (1 - a (sum of s / S)^2): one supply feeds all elements and sags when many signals are high",
     is_fine: false,
     make: |knobs| {
@@ -22,6 +23,7 @@ pub(super) const SUPPLY_DROOP: Definition = Definition {
 pub(super) const DRAGGED_SPREAD: Definition = Definition {
     id: "dragged-spread",
     effect: None,
+    is_library_point: false,
     about: "u' = u (1 + a (q^3 - 3 q)), q = n . (p_e - p)/sigma, n the last lateral travel: a skew without a shift (Hermite H3)",
     is_fine: false,
     make: |knobs| {
@@ -45,6 +47,7 @@ pub(super) const DRAGGED_SPREAD: Definition = Definition {
 pub(super) const STICK_SLIP: Definition = Definition {
     id: "stick-slip",
     effect: None,
+    is_library_point: false,
     about: "depth' = depth + a saw(travel/L): the tool's rim sticks to the covering and slips once every L of travel",
     is_fine: false,
     make: |knobs| {
@@ -63,6 +66,7 @@ pub(super) const STICK_SLIP: Definition = Definition {
 pub(super) const ADHESION: Definition = Definition {
     id: "adhesion",
     effect: None,
+    is_library_point: false,
     about: "u' = -a G(p_e - p) (1 - h/H) for heights h < H on the way up: the covering clings to the tool and is pulled",
     is_fine: false,
     make: |knobs| {
@@ -83,6 +87,7 @@ pub(super) const ADHESION: Definition = Definition {
 pub(super) const CONVERTER_RIPPLE: Definition = Definition {
     id: "converter-ripple",
     effect: None,
+    is_library_point: false,
     about: "y = x + a sin(2 pi x/P): the converter's differential nonlinearity repeats every P counts",
     is_fine: false,
     make: |knobs| {
@@ -95,6 +100,7 @@ pub(super) const CONVERTER_RIPPLE: Definition = Definition {
 pub(super) const RINGING: Definition = Definition {
     id: "ringing",
     effect: None,
+    is_library_point: false,
     about: "depth' = depth + a v exp(-t/T) sin(2 pi f t) since the last stop: the column swings after every move",
     is_fine: true,
     make: |knobs| {
@@ -120,6 +126,7 @@ pub(super) const RINGING: Definition = Definition {
 pub(super) const STAGE_PICKUP: Definition = Definition {
     id: "stage-pickup",
     effect: None,
+    is_library_point: false,
     about: "y = x + a w_e |v|/10 mm/s, in contact or not: the motors' currents couple into the array while the stage moves",
     is_fine: false,
     make: |knobs| {
@@ -135,6 +142,7 @@ pub(super) const STAGE_PICKUP: Definition = Definition {
 pub(super) const PROXIMITY: Definition = Definition {
     id: "proximity",
     effect: None,
+    is_library_point: false,
     about: "u' = u + a G(p_e - p) exp(-h/H) at heights h > 0: a metal tool changes the capacitance before it touches",
     is_fine: false,
     make: |knobs| {
@@ -150,6 +158,7 @@ pub(super) const PROXIMITY: Definition = Definition {
 pub(super) const GROUNDING: Definition = Definition {
     id: "grounding",
     effect: None,
+    is_library_point: false,
     about: "y = x + a w_e while the tool touches, whatever its depth and place: touching grounds the shield",
     is_fine: false,
     make: |knobs| {
@@ -166,6 +175,7 @@ pub(super) const GROUNDING: Definition = Definition {
 pub(super) const ELECTRODE_TEXTURE: Definition = Definition {
     id: "electrode-texture",
     effect: None,
+    is_library_point: false,
     about: "u' = u (1 + a cos(2 pi x/L) cos(2 pi y/L)): a woven fabric in the covering, finer than the elements",
     is_fine: false,
     make: |knobs| {
@@ -182,6 +192,7 @@ pub(super) const ELECTRODE_TEXTURE: Definition = Definition {
 pub(super) const BULGE: Definition = Definition {
     id: "bulge",
     effect: None,
+    is_library_point: false,
     about: "u' = u - a depth exp(-((r - r0)/w)^2): an incompressible covering rises in a ring about the tool, which lifts off the elements there",
     is_fine: false,
     make: |knobs| {

@@ -3,12 +3,14 @@
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use super::relaxation::Branches;
+use super::drift::normal;
+use super::relaxation::{Branches, followed};
 use super::{Definition, PipelineHook, shift};
 
 pub(super) const SECOND_ORDER: Definition = Definition {
     id: "low-pass-second-order",
     effect: Some("low-pass"),
+    is_library_point: false,
     about: "two poles, each dy/dt = (x - y)/T: a filter of second order, critically damped",
     is_fine: true,
     make: |knobs| {
@@ -35,6 +37,7 @@ pub(super) const SECOND_ORDER: Definition = Definition {
 pub(super) const MOVING_AVERAGE: Definition = Definition {
     id: "low-pass-moving-average",
     effect: Some("low-pass"),
+    is_library_point: false,
     about: "y(t) = mean of x over [t - T, t]: the converter integrates",
     is_fine: true,
     make: |knobs| {
@@ -47,9 +50,33 @@ pub(super) const MOVING_AVERAGE: Definition = Definition {
     },
 };
 
+pub(super) const UNEVEN: Definition = Definition {
+    id: "low-pass-uneven",
+    effect: Some("low-pass"),
+    is_library_point: false,
+    about: "dy_e/dt = (x_e - y_e)/T_e, T_e from 0.2 to 1.8 T: each element has a line of its own resistance",
+    is_fine: true,
+    make: |knobs| {
+        let time_s = knobs.scaled("time_constant_s", 0.06).max(1e-18);
+        let times_s: Vec<f64> = knobs.per_element(0.2, 1.8).iter().map(|share| share * time_s).collect();
+        let mut settled: Option<[Vec<f64>; 2]> = None;
+        PipelineHook::readout(move |now, counts| {
+            let [last, values] = settled.get_or_insert_with(|| [counts.to_vec(), counts.to_vec()]);
+            for (((count, last), value), time_s) in counts.iter_mut().zip(last).zip(values).zip(&times_s) {
+                if now.dt_s > 0.0 {
+                    *value = followed(*value, *last, *count, now.dt_s, *time_s);
+                    *last = *count;
+                }
+                *count = *value;
+            }
+        })
+    },
+};
+
 pub(super) const ROWS: Definition = Definition {
     id: "scan-rows",
     effect: Some("scan-skew"),
+    is_library_point: true,
     about: "y_e(t) = x_e(t - S (R - 1 - row)/R): rows are sampled one after another, the last at the stamp",
     is_fine: true,
     make: |knobs| {
@@ -63,6 +90,7 @@ pub(super) const ROWS: Definition = Definition {
 pub(super) const ELEMENTS: Definition = Definition {
     id: "scan-elements",
     effect: Some("scan-skew"),
+    is_library_point: true,
     about: "y_e(t) = x_e(t - S (N - 1 - e)/N): one multiplexer goes through all elements, the last at the stamp",
     is_fine: true,
     make: |knobs| {
@@ -76,6 +104,7 @@ pub(super) const ELEMENTS: Definition = Definition {
 pub(super) const SINE: Definition = Definition {
     id: "hum-sine",
     effect: Some("periodic-interference"),
+    is_library_point: false,
     about: "y = x + A w_e sin(2 pi f t + phase): the mains, folded to below 15 Hz",
     is_fine: false,
     make: |knobs| {
@@ -93,6 +122,7 @@ pub(super) const SINE: Definition = Definition {
 pub(super) const HARMONICS: Definition = Definition {
     id: "hum-harmonics",
     effect: Some("periodic-interference"),
+    is_library_point: false,
     about: "y = x + A (sin p + h sin 2p), p = 2 pi f t + phase_row: a dimmed lamp, rows at different phases",
     is_fine: false,
     make: |knobs| {
@@ -111,9 +141,30 @@ pub(super) const HARMONICS: Definition = Definition {
     },
 };
 
+pub(super) const WANDERING: Definition = Definition {
+    id: "hum-wandering",
+    effect: Some("periodic-interference"),
+    is_library_point: false,
+    about: "y = x + A w_e sin(2 pi f t + W(t)), W a Wiener process: a motor nearby does not hold its speed",
+    is_fine: false,
+    make: |knobs| {
+        let frequency_hz = knobs.between("frequency_hz", 0.7, 14.0);
+        let rad_per_root_s = knobs.between("rad_per_root_s", 0.1, 0.4);
+        let amplitude_counts = knobs.scaled("amplitude_counts", 4.0);
+        let weights = knobs.per_element(0.6, 1.4);
+        let (mut rng, mut phase) = (knobs.rng(), 0.0);
+        PipelineHook::readout(move |now, counts| {
+            phase += rad_per_root_s * now.dt_s.sqrt() * normal(&mut rng);
+            let tone = amplitude_counts * (TAU * frequency_hz * now.t_s + phase).sin();
+            counts.iter_mut().zip(&weights).for_each(|(count, weight)| *count += weight * tone);
+        })
+    },
+};
+
 pub(super) const COARSE_STEPS: Definition = Definition {
     id: "coarse-steps",
     effect: Some("quantisation"),
+    is_library_point: true,
     about: "y = q round(x/q), q whole counts: the converter's low bits are lost",
     is_fine: false,
     make: |knobs| {
@@ -176,7 +227,7 @@ impl ReadingHistory {
     }
 }
 
-fn skewed(delays_s: Vec<f64>) -> PipelineHook {
+pub(super) fn skewed(delays_s: Vec<f64>) -> PipelineHook {
     let kept_s = delays_s.iter().copied().fold(0.0, f64::max);
     let mut past = ReadingHistory::default();
     PipelineHook::readout(move |now, counts| {

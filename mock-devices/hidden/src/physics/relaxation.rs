@@ -5,6 +5,7 @@ use super::{Definition, PipelineHook, left};
 pub(super) const PRONY: Definition = Definition {
     id: "relaxation-prony",
     effect: Some("relaxation"),
+    is_library_point: false,
     about: "u' = integral of E(t - s) du(s), E = 1 - sum g_i (1 - exp(-t/T_i)): generalised Maxwell, three branches",
     is_fine: false,
     make: |knobs| {
@@ -23,6 +24,7 @@ pub(super) const PRONY: Definition = Definition {
 pub(super) const POWER_LAW: Definition = Definition {
     id: "relaxation-power-law",
     effect: Some("relaxation"),
+    is_library_point: false,
     about: "E(t) = 1 - g + g (1 + t/T)^-b: power-law relaxation of a fractional element (Laplace mixture of exponentials)",
     is_fine: false,
     make: |knobs| {
@@ -37,6 +39,7 @@ pub(super) const POWER_LAW: Definition = Definition {
 pub(super) const LOGARITHMIC: Definition = Definition {
     id: "creep-logarithmic",
     effect: Some("relaxation"),
+    is_library_point: false,
     about: "u' = u (1 + a log10(1 + t_c/T)), t_c the time in contact: logarithmic creep, signal grows at held depth",
     is_fine: false,
     make: |knobs| {
@@ -47,6 +50,20 @@ pub(super) const LOGARITHMIC: Definition = Definition {
             in_contact_s = if depth_mm > 0.0 { in_contact_s + now.dt_s } else { 0.0 };
             depth_mm * (1.0 + by_decade * (1.0 + in_contact_s / time_s).log10())
         })
+    },
+};
+
+pub(super) const STRETCHED: Definition = Definition {
+    id: "relaxation-stretched",
+    effect: Some("relaxation"),
+    is_library_point: false,
+    about: "E(t) = 1 - g + g exp(-sqrt(t/T)): a stretched exponential (Kohlrausch 1854), as the Laplace mixture that it is",
+    is_fine: false,
+    make: |knobs| {
+        let time_s = knobs.decade("time_constant_s", 0.3, 3.0);
+        let share = knobs.share("relaxed_share", 0.2);
+        let (times_s, weights) = stretched(time_s);
+        relaxing(times_s, weights.into_iter().map(|weight| share * weight).collect())
     },
 };
 
@@ -70,10 +87,8 @@ impl Branches {
         for (time_s, values) in self.times_s.iter().zip(&mut self.values) {
             values.resize(input.len(), 0.0);
             if dt_s > 0.0 {
-                let kept = left(dt_s, *time_s);
-                let lag = -(-dt_s / time_s).exp_m1() * time_s / dt_s;
                 for ((value, last), input) in values.iter_mut().zip(&self.last).zip(input) {
-                    *value = kept * (*value - last) + input - (input - last) * lag;
+                    *value = followed(*value, *last, *input, dt_s, *time_s);
                 }
             }
         }
@@ -84,6 +99,12 @@ impl Branches {
     pub(super) fn at(&self, element: usize) -> impl Iterator<Item = f64> {
         self.values.iter().map(move |values| values[element])
     }
+}
+
+/// What follows an input with a time constant, after a time in which the input went straight from `last` to `input`.
+pub(super) fn followed(value: f64, last: f64, input: f64, dt_s: f64, time_s: f64) -> f64 {
+    let lag = -(-dt_s / time_s).exp_m1() * time_s / dt_s;
+    left(dt_s, time_s) * (value - last) + input - (input - last) * lag
 }
 
 /// The stress of a relaxing solid, `u - sum of weight times branch`, while the tool touches and never negative: a tool
@@ -114,6 +135,17 @@ pub(super) fn power_law(exponent: f64, time_s: f64) -> (Vec<f64>, Vec<f64>) {
         .unzip();
     times_s.push(1e12);
     weights.push(rate_of(-14.5).powf(exponent) / exponent);
+    let all: f64 = weights.iter().sum();
+    (times_s, weights.into_iter().map(|weight| weight / all).collect())
+}
+
+/// Time constants and weights of exponentials that add up to `exp(-sqrt(t/T))`: Levy's density
+/// `s^(-3/2) exp(-1/(4 s)) / (2 sqrt(pi))` of rates, in equal steps of `ln s`.
+pub(super) fn stretched(time_s: f64) -> (Vec<f64>, Vec<f64>) {
+    const STEP: f64 = 0.5;
+    let rates = (-8..=24).map(|step| (STEP * f64::from(step)).exp());
+    let (times_s, weights): (Vec<f64>, Vec<f64>) =
+        rates.map(|rate| (time_s / rate, (-0.25 / rate).exp() / rate.sqrt())).unzip();
     let all: f64 = weights.iter().sum();
     (times_s, weights.into_iter().map(|weight| weight / all).collect())
 }

@@ -35,7 +35,7 @@ fn the_list_says_which_effect_each_physics_is() {
     let folder = TempDir::new().unwrap();
     let listed: Vec<Value> = serde_json::from_slice(&hidden(&folder, &["list", "--json"]).stdout).unwrap();
     let prony = listed.iter().find(|physics| physics["id"] == "relaxation-prony").unwrap();
-    assert_eq!(prony["effect"], "relaxation");
+    assert_eq!((&prony["effect"], &prony["is_library_point"]), (&"relaxation".into(), &false.into()));
     assert!(listed.iter().any(|physics| physics["effect"].is_null()));
 }
 
