@@ -60,10 +60,11 @@ fn discover_on_threads(
         candidates: &candidates,
         options,
         known_terms: known.effects.len() + prepared.faulty.effects.len(),
+        rounds: prepared.lattice.is_some(),
         progress: &|what| reporter.report(what, 0.0),
     };
     let before = search.locate(&base)?;
-    let Grown { at: grown, rounds, equivalent } = match options.rule {
+    let Grown { at: grown, rounds, equivalent, p_left } = match options.rule {
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
@@ -73,7 +74,7 @@ fn discover_on_threads(
     let told = conclude(
         &prepared,
         &search,
-        SearchOutcome { lacking, base, grown, rounds, equivalent, before, after },
+        SearchOutcome { lacking, base, grown, rounds, equivalent, p_left, before, after },
         options,
     )?;
     reporter.report("done", 1.0);

@@ -57,14 +57,13 @@ impl Problem<'_> {
 
     /// By how much `more` is nearer to the held-out bins than `less`, and its standard error from the scatter of blocks.
     pub(crate) fn heldout_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
-        let (less, more) = (self.heldout_blocks(&less.predicted), self.heldout_blocks(&more.predicted));
-        let gains = gains(&less, &more);
-        let sum: f64 = gains.iter().sum();
-        let held = less.iter().filter(|[_, readings]| *readings > 0.0).count().max(1) as f64;
-        let scatter: f64 = gains.iter().map(|gain| gain * gain).sum::<f64>() - sum * sum / held;
-        // A gain in a single block counts fully, so the error is at most that of the difference of two predictions.
-        let noise = 4.0 * sum.abs();
-        [sum, scatter.max(0.0).min(noise).sqrt()]
+        gain(&self.heldout_blocks(&less.predicted), &self.heldout_blocks(&more.predicted))
+    }
+
+    /// The same of the fitted bins.
+    pub(crate) fn fitted_gain(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
+        let of = |fitted: &Fitted| self.blocks_of(&fitted.predicted, |bin| self.train[bin] > 0.0);
+        gain(&of(less), &of(more))
     }
 
     /// Coefficient of a column in the residual of all bins, and its standard error from the scatter of blocks.
@@ -113,4 +112,15 @@ impl Problem<'_> {
 
 fn gains(less: &[[f64; 2]], more: &[[f64; 2]]) -> Vec<f64> {
     less.iter().zip(more).map(|([less, _], [more, _])| less - more).collect()
+}
+
+/// The sum of gains, and its standard error from the scatter of blocks.
+fn gain(less: &[[f64; 2]], more: &[[f64; 2]]) -> [f64; 2] {
+    let gains = gains(less, more);
+    let sum: f64 = gains.iter().sum();
+    let blocks = less.iter().filter(|[_, readings]| *readings > 0.0).count().max(1) as f64;
+    let scatter: f64 = gains.iter().map(|gain| gain * gain).sum::<f64>() - sum * sum / blocks;
+    // A gain in a single block counts fully, so the error is at most that of the difference of two predictions.
+    let noise = 4.0 * sum.abs();
+    [sum, scatter.max(0.0).min(noise).sqrt()]
 }

@@ -132,9 +132,13 @@ impl Forms {
             .collect()
     }
 
-    /// 1 for bins in contact, else 0.
-    pub(crate) fn deep(&self) -> Vec<f64> {
-        self.history.depth_mm.iter().map(|depth_mm| f64::from(u8::from(*depth_mm > 0.0))).collect()
+    pub(crate) const fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// The signal of every reading, in counts.
+    pub(crate) fn signal(&self) -> &[f64] {
+        &self.signal
     }
 }
 

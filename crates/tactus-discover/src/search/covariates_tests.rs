@@ -28,6 +28,7 @@ fn gap(more: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<Gap> {
         candidates: &[],
         options: OPTIONS,
         known_terms: 0,
+        rounds: false,
         progress: &|_| {},
     };
     let located = search.locate(&prepared.base).unwrap();

@@ -78,6 +78,10 @@ const OTHERS_MAX: usize = 4;
 /// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
 /// `1 + MISFIT_SHARE x gain`.
 const MISFIT_SHARE: f64 = 0.02;
+/// A class with less than this share of the strongest one's odds may be an error of that one's form.
+const FORM_SHARE: f64 = 0.07;
+/// A class must gain so many standard errors, from the scatter of blocks.
+const BLOCKS_Z: f64 = 2.0;
 /// Probability of a reported set of classes.
 const SET_PROBABILITY: f64 = 0.95;
 /// Prior odds against a class.
@@ -90,6 +94,8 @@ pub(crate) struct Search<'a> {
     pub(crate) options: Options,
     /// Number of terms of the known model and of faulty elements, which are never removed.
     pub(crate) known_terms: usize,
+    /// True if the steps of the converter are wider than declared.
+    pub(crate) rounds: bool,
     pub(crate) progress: &'a (dyn Fn(&str) + Sync),
 }
 
@@ -118,11 +124,13 @@ pub(crate) struct Grown {
     pub(crate) at: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
+    /// p-value of the largest score of all additions to it.
+    pub(crate) p_left: f64,
 }
 
 impl From<Fitted> for Grown {
     fn from(base: Fitted) -> Self {
-        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new() }
+        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new(), p_left: 1.0 }
     }
 }
 
@@ -223,7 +231,7 @@ impl Search<'_> {
                 }
             }
         }
-        for rival in rivals(problem, at)? {
+        for rival in rivals(problem, at, self.rounds)? {
             let first = directions.len();
             let count = rival.columns.len();
             directions.extend(rival.columns);
@@ -262,6 +270,7 @@ impl Search<'_> {
     /// Grows a model until no class is missing, unnecessary or worse than another.
     pub(crate) fn grow(&self, base: &Fitted) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base.clone());
+        let mut strongest = 0.0_f64;
         loop {
             let index = grown.rounds.len();
             (self.progress)(&format!("round {}: scoring the effects", index + 1));
@@ -269,24 +278,35 @@ impl Search<'_> {
             let mut tried = self.tested(&pass, &grown.at, index);
             let is_full = names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
             let taken = if 2.0 * tried.p_value <= ALPHA && !is_full {
-                self.next(&grown.at, &pass)?
+                // What is small beside the gain of another class may be an error of that one's form.
+                self.next(&grown.at, &pass)?.filter(|taken| taken.ln_odds > FORM_SHARE * strongest)
             } else {
                 None
             };
             tried.round.taken = taken.as_ref().map(|taken| taken.name);
+            if std::env::var("TD").is_ok() { eprintln!("ROUND {index} p {} {:?}", tried.p_value, tried.round.candidates.iter().take(4).map(|c| (c.effect, c.score)).collect::<Vec<_>>()); }
             grown.rounds.push(tried);
             match taken {
-                Some(taken) => grown.at = self.problem.fit_from(taken.fitted.parameters, POLISH_ROUNDS)?,
+                Some(taken) => {
+                    if !is_exact(taken.name) {
+                        strongest = strongest.max(taken.ln_odds);
+                    }
+                    grown.at = self.problem.fit_from(taken.fitted.parameters, POLISH_ROUNDS)?;
+                }
                 None => break,
             }
         }
         self.hold(&mut grown)?;
+        grown.p_left = self.tested(&self.pass(&grown.at)?, &grown.at, grown.rounds.len()).p_value;
         Ok(grown)
     }
 
     /// Tests all additions at once: the largest score against those under flipped signs.
     pub(crate) fn tested(&self, pass: &Pass, at: &Fitted, index: usize) -> Tried {
+        // Rivals get no names, so they are no part of the test for one.
+        let is_effect = |name: &str| self.candidates.iter().any(|one| one.definition.name == name);
         let groups: Vec<(&'static str, Vec<&Score>)> = (0..pass.classes.len())
+            .filter(|class| is_effect(pass.classes[*class]))
             .map(|class| {
                 let of_class = pass.additions.iter().zip(&pass.scores).filter(|(one, _)| one.class == class);
                 let mut scores: Vec<&Score> = of_class.map(|(_, score)| score).collect();
@@ -299,10 +319,8 @@ impl Search<'_> {
         let scores: Vec<Vec<&Score>> = groups.iter().map(|(_, scores)| scores.clone()).collect();
         let under_none = largest(&flipped(&scores, FLIPS, self.options.seed ^ (index as u64 + 1)));
         let statistic = |scores: &[&Score]| scores.iter().map(|score| score.z).fold(0.0, f64::max);
-        let is_effect = |name: &str| self.candidates.iter().any(|one| one.definition.name == name);
         let mut candidates: Vec<TriedEffect> = groups
             .iter()
-            .filter(|(name, _)| is_effect(name))
             .map(|(effect, scores)| TriedEffect {
                 effect,
                 score: statistic(scores),
@@ -359,10 +377,16 @@ impl Search<'_> {
             .collect();
         alone.sort_by(|a, b| b.1.total_cmp(&a.1));
         let most = alone.first().map_or(0.0, |(_, ln_odds)| *ln_odds);
-        for (one, ln_odds) in alone.into_iter().filter(|(_, ln_odds)| *ln_odds > PROMISE_SHARE * most) {
+        for (one, ln_odds) in alone.iter().copied().filter(|(_, ln_odds)| *ln_odds > PROMISE_SHARE * most) {
             propose(&evidence.set([one]), Some(ln_odds));
         }
         starts.truncate(FITTED_MAX);
+        if std::env::var("TD").is_ok() {
+            for set in [&best, &named].into_iter().flatten() { eprintln!("set {:?} {:.1}", set.members.iter().map(|m| pass.class_of(*m)).collect::<Vec<_>>(), set.ln_odds); }
+            eprintln!("alone {:?}", alone.iter().take(8).map(|(one,l)| (pass.class_of(*one), l.round())).collect::<Vec<_>>());
+            for r in (0..pass.additions.len()).filter(|one| !pass.is_named(*one)) { eprintln!("rival {} {:.1}", pass.class_of(r), evidence.gain(&none, r).ln_odds); }
+            eprintln!("walk {:?}", pass.walk.as_ref().map(|w| w.promise));
+        }
         if let Some(walk) = &pass.walk {
             let ln_odds = 0.5 * walk.promise - ODDS_AGAINST.ln();
             if ln_odds > LN_ODDS_LEAST.max(PROMISE_SHARE * most) {
@@ -374,6 +398,7 @@ impl Search<'_> {
         let Some(taken) = fits.into_iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds)) else { return Ok(None) };
         // A rival without a name explains more than any class.
         let rival = pass.best_rival();
+        if std::env::var("TD").is_ok() { eprintln!("TAKEN {} {:.1} rival {rival:.1}", taken.name, taken.ln_odds); }
         let is_beaten = rival > taken.ln_odds + RIVAL_LN_ODDS;
         let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
         Ok(Some(taken).filter(|taken| taken.ln_odds > LN_ODDS_LEAST && (best_has_names || !is_beaten)))
@@ -444,8 +469,11 @@ impl Search<'_> {
             let lesses: Vec<Fitted> =
                 parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
             let odds: Vec<f64> = lesses.iter().map(|less| self.ln_odds(less, &grown.at)).collect();
-            let weakest = odds.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
-            if let Some((weakest, _)) = weakest.filter(|(_, ln_odds)| **ln_odds < LN_ODDS_LEAST) {
+            if std::env::var("TD").is_ok() { eprintln!("HOLD {names:?} {odds:.1?}"); }
+            let worth = |(index, less): (usize, &Fitted)| self.worth(&grown.at, less, index, &names, &odds);
+            let worths: Vec<f64> = lesses.iter().enumerate().map(worth).collect();
+            let weakest = worths.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
+            if let Some((weakest, _)) = weakest.filter(|(_, worth)| **worth < 1.0) {
                 let less = lesses[weakest].parameters.clone();
                 grown.at = self.problem.fit_from(less, POLISH_ROUNDS)?;
                 continue 'again;
@@ -462,6 +490,7 @@ impl Search<'_> {
                     continue 'again;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
+                if std::env::var("TD").is_ok() { eprintln!("IN PLACE OF {name} {ln_odds:.1}: rival {:.1} others {:?}", pass.best_rival(), others.iter().map(|o| (o.name, o.ln_odds.round())).collect::<Vec<_>>()); }
                 let best = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
                 let better = best.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
                 if let Some(better) = better {
@@ -474,6 +503,21 @@ impl Search<'_> {
             }
             return Ok(());
         }
+    }
+
+    /// What a class gains over the least gain with which it holds its place: from 1 on it does. What is small beside the
+    /// gain of another class may be that one's form, and blocks must agree.
+    fn worth(&self, at: &Fitted, less: &Fitted, index: usize, names: &[&'static str], odds: &[f64]) -> f64 {
+        let others = names.iter().zip(odds).enumerate().filter(|(other, (name, _))| *other != index && !is_exact(name));
+        let strongest = others.map(|(_, (_, odds))| *odds).fold(0.0, f64::max);
+        let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
+        let by_odds = odds[index] / least;
+        if [at, less].iter().any(|one| one.parameters.walk.is_some()) {
+            // A walk fits the noise of the blocks too.
+            return by_odds;
+        }
+        let [gain, error] = self.problem.fitted_gain(less, at);
+        by_odds.min(gain / (BLOCKS_Z * error).max(f64::MIN_POSITIVE))
     }
 
     /// The other classes, fitted in a place, if their first steps promise these odds.

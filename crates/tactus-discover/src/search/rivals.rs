@@ -1,31 +1,26 @@
 //! Rivals without a name: dependences that no effect of the library is, and that a name must beat.
 //!
-//! Each is a group of columns with free coefficients. None is modelled after a known physics: a factor of the sum of all signals, a map
-//! over place, a dependence on the place within an element, on the side from which the tool came, an offset of each element in contact.
+//! Each is a group of columns with free coefficients: a smooth function (straight lines between knots) of a covariate, or of two, times
+//! the signal or its slope. None is modelled after a known physics.
+//!
+//! | rival | function of | times |
+//! |---|---|---|
+//! | sum of signals | the sum of all signals | the element's own signal |
+//! | place | the tip's x and, apart, y | the element's own signal |
+//! | place in the element | the tip's x and y from the nearest centre | the element's own signal |
+//! | direction of approach | the side from which the tool came, x and y | the signal, its slopes along x and y |
+//! | speed of travel | the speed of the stage without contact | 1 |
+//! | contact | the element, while the tool touches | 1 |
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::covariates::{Factor, Feature, Form, Forms, features};
+use super::covariates::{Factor, Feature, Form, Forms};
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Problem};
 
-/// Which covariates and forms of dependence belong to a rival.
-const RIVALS: [(&str, &[&str], &[Form]); 5] = [
-    ("sum of signals", &["sum of signals"], &[Form::Signal]),
-    ("place", &["place along x", "place along y"], &[Form::Signal]),
-    ("place in the element", &["place in the element along x", "place in the element along y"], &[
-        Form::Signal,
-    ]),
-    (
-        "direction of approach",
-        &["direction of approach along x", "direction of approach along y"],
-        &[Form::Signal, Form::AlongX, Form::AlongY],
-    ),
-    ("speed of travel", &["speed of travel"], &[Form::Offset]),
-];
-/// The rival that has an offset of each element in contact.
-const CONTACT: &str = "contact";
+/// Knots of a function of one covariate.
+const KNOTS: usize = 5;
 
 /// A rival and its columns.
 pub(crate) struct Rival {
@@ -33,32 +28,105 @@ pub(crate) struct Rival {
     pub(crate) columns: Vec<Direction<'static>>,
 }
 
-/// The rivals at a model.
-pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted) -> Result<Vec<Rival>, DiscoverError> {
+/// The rivals at a model. `rounds` if the converter's steps are seen: then each element in contact has an offset of its own anyway.
+pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result<Vec<Rival>, DiscoverError> {
     let forms = Arc::new(Forms::of(problem, &at.parameters, &at.predicted)?);
-    let elements = problem.predictor.bins.elements;
-    let all = features(problem, &forms);
-    let column = |feature: Feature| -> Direction<'static> {
+    let bins = problem.predictor.bins;
+    let elements = bins.elements;
+    let array = &problem.predictor.known.array;
+    let history = forms.history();
+    let column = |factor: Factor, form: Form| -> Direction<'static> {
         let forms = Arc::clone(&forms);
+        let feature = Feature { covariate: "", unit: "", form, range: [0.0; 2], factor };
         Direction::Column(Box::new(move |bins: Range<usize>| forms.values(&feature, bins, elements)))
     };
-    let mut found: Vec<Rival> = Vec::new();
-    for (name, covariates, kinds) in RIVALS {
-        let of_rival =
-            all.iter().filter(|one| covariates.contains(&one.covariate) && kinds.contains(&one.form));
-        found.push(Rival { name, columns: of_rival.cloned().map(column).collect() });
-    }
-    let deep = Arc::new(forms.deep());
-    let of_element = |element: usize| {
-        column(Feature {
-            covariate: CONTACT,
-            unit: "",
-            form: Form::Offset,
-            range: [0.0, 0.0],
-            factor: Factor::Element(element, Arc::clone(&deep)),
-        })
+    let deep: Vec<bool> = history.depth_mm.iter().map(|depth_mm| *depth_mm > 0.0).collect();
+    let free: Vec<bool> = deep.iter().map(|deep| !deep).collect();
+    let place: Vec<[f64; 2]> = history.place_mm[0]
+        .iter()
+        .zip(&history.place_mm[1])
+        .map(|(x, y)| problem.predictor.known.registration.to_sensor([*x, *y]))
+        .collect();
+    let of_place = |axis: usize| -> Vec<f64> { place.iter().map(|place| place[axis]).collect() };
+    let in_element = |axis: usize| -> Vec<f64> {
+        let centres = if axis == 0 { array.col_centres_mm() } else { array.row_centres_mm() };
+        let from_nearest = |place: &[f64; 2]| {
+            let from = centres.iter().map(|centre| place[axis] - centre);
+            from.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+        };
+        place.iter().map(from_nearest).collect()
     };
-    found.push(Rival { name: CONTACT, columns: (0..elements).map(of_element).collect() });
+    let sums: Vec<f64> = forms.signal().chunks_exact(elements).map(|signal| signal.iter().sum()).collect();
+    let smooth = |values: &[f64], among: &[bool], form: Form| -> Vec<Direction<'static>> {
+        hats(values, among).into_iter().map(|hat| column(Factor::Bins(hat), form)).collect()
+    };
+    let both = |of: &dyn Fn(usize) -> Vec<f64>| -> Vec<Direction<'static>> {
+        [0, 1].into_iter().flat_map(|axis| smooth(&of(axis), &deep, Form::Signal)).collect()
+    };
+    let aside = [0, 1].into_iter().flat_map(|axis| {
+        let side = &history.aside[axis];
+        let only = side.iter().zip(&deep).map(|(side, deep)| if *deep { *side } else { 0.0 });
+        let only: Vec<f64> = only.collect();
+        [Form::Signal, Form::AlongX, Form::AlongY].map(|form| column(Factor::Bins(only.clone()), form))
+    });
+    let mut found = vec![
+        Rival { name: "sum of signals", columns: smooth(&sums, &deep, Form::Signal) },
+        Rival { name: "place", columns: both(&of_place) },
+        Rival { name: "place in the element", columns: both(&in_element) },
+        Rival { name: "direction of approach", columns: aside.collect() },
+        Rival { name: "speed of travel", columns: smooth(&history.travel_mm_per_s, &free, Form::Offset) },
+    ];
+    if !rounds {
+        let in_contact: Arc<Vec<f64>> = Arc::new(deep.iter().map(|deep| f64::from(u8::from(*deep))).collect());
+        let of_element = |element| column(Factor::Element(element, Arc::clone(&in_contact)), Form::Offset);
+        found.push(Rival { name: "contact", columns: (0..elements).map(of_element).collect() });
+    }
     found.retain(|rival| !rival.columns.is_empty());
     Ok(found)
 }
+
+/// For each knot, the weight of its value in a function that is straight between knots; 0 for bins that are not among those. No knots if
+/// the values do not differ.
+fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
+    let kept = values.iter().zip(among).filter(|(value, among)| **among && value.is_finite());
+    let knots = knots(kept.map(|(value, _)| *value).collect());
+    let hat = |knot: usize| {
+        let of = |(value, among): (&f64, &bool)| {
+            if !among || !value.is_finite() {
+                return 0.0;
+            }
+            let value = value.clamp(knots[0], knots[knots.len() - 1]);
+            let below = knot.checked_sub(1).map_or(f64::NEG_INFINITY, |below| knots[below]);
+            let above = knots.get(knot + 1).copied().unwrap_or(f64::INFINITY);
+            if value <= knots[knot] {
+                if below.is_finite() { ((value - below) / (knots[knot] - below)).max(0.0) } else { 1.0 }
+            } else if above.is_finite() {
+                ((above - value) / (above - knots[knot])).max(0.0)
+            } else {
+                1.0
+            }
+        };
+        values.iter().zip(among).map(of).collect()
+    };
+    if knots.len() < 2 { Vec::new() } else { (0..knots.len()).map(hat).collect() }
+}
+
+/// Quantiles of the values from the least to the greatest, each apart from the one before.
+fn knots(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let (Some(least), Some(most)) = (values.first().copied(), values.last().copied()) else { return Vec::new() };
+    // The reported position of a stage at rest still varies slightly.
+    let apart = 1e-3 * (most - least).max(least.abs()).max(most.abs()).max(1.0);
+    let quantiles = (0..KNOTS).map(|knot| values[knot * (values.len() - 1) / (KNOTS - 1)]);
+    let mut knots: Vec<f64> = Vec::new();
+    for value in quantiles {
+        if knots.last().is_none_or(|last| value - last > apart) {
+            knots.push(value);
+        }
+    }
+    knots
+}
+
+#[cfg(test)]
+#[path = "rivals_tests.rs"]
+mod tests;

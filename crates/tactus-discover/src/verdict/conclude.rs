@@ -29,6 +29,8 @@ pub(crate) struct SearchOutcome {
     pub(crate) grown: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
+    /// p-value of the largest score of all additions to the grown model.
+    pub(crate) p_left: f64,
     /// Where the base model and the data disagree, and where the grown model still does.
     pub(crate) before: Located,
     pub(crate) after: Located,
@@ -64,12 +66,12 @@ pub(crate) fn conclude(
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
-    let SearchOutcome { lacking, base, grown, rounds, equivalent, before, after } = found;
+    let SearchOutcome { lacking, base, grown, rounds, equivalent, p_left, before, after } = found;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
     let share = search.share_left(&base, &grown);
-    let left = after.p_value <= ALPHA;
+    let left = 2.0 * p_left.min(after.p_value) <= ALPHA;
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
     let floor = prepared.floor_of(&of_grown);
