@@ -1,11 +1,15 @@
 //! Discovery on the command line: refused input, and predictions of its model for a new run.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::Duration;
+use std::{fs, thread};
 
+use rustix::fs::{CWD, Mode, mkfifoat};
+use rustix::process::Signal;
 use serde_json::Value;
-use tactus_e2e::{CommandOutput, repository, tactus};
+use tactus_e2e::{CommandOutput, Process, repository, tactus};
 use tactus_record::rows;
 use tempfile::TempDir;
 
@@ -205,17 +209,74 @@ fn dead_elements_are_named_with_calibrates_evidence_and_the_grown_model_closes_t
     );
 }
 
+/// Names of what is in a folder, in order.
+fn listed(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|one| one.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// Reading waits for the other end of a pipe, so the signal surely comes before the end.
+fn interrupted(folder: &Path) -> String {
+    let pipe = folder.join("table.parquet");
+    mkfifoat(CWD, &pipe, Mode::RUSR | Mode::WUSR).unwrap();
+    let run = Process::start("tactus", folder, &["discover", "table.parquet", "--out", "found"]);
+    let (told, opened) = mpsc::channel();
+    let to_open = pipe.clone();
+    let opening = thread::spawn(move || told.send(fs::File::options().write(true).open(to_open)));
+    let _writer = opened.recv_timeout(Duration::from_secs(60)).expect("the table is read").unwrap();
+    opening.join().unwrap().unwrap();
+    let partial = format!("partial-{}", run.id());
+    let is_there = [folder.join(format!("found.{partial}")), folder.join("found").join(&partial)];
+    assert!(is_there.iter().any(|path| path.is_dir()), "{partial}");
+    run.signal(Signal::INT);
+    let (code, said) = run.wait();
+    assert_eq!(code, Some(130), "{said}");
+    fs::remove_file(&pipe).unwrap();
+    said
+}
+
+#[test]
+fn an_interrupted_discovery_leaves_nothing() {
+    let folder = TempDir::new().unwrap();
+    let said = interrupted(folder.path());
+    assert!(listed(folder.path()).is_empty(), "{:?}, {said}", listed(folder.path()));
+}
+
+#[test]
+fn an_interrupted_discovery_leaves_an_earlier_result_as_it_was() {
+    let folder = TempDir::new().unwrap();
+    let found = folder.path().join("found");
+    fs::create_dir(&found).unwrap();
+    fs::write(found.join("report.json"), "earlier").unwrap();
+    interrupted(folder.path());
+    assert_eq!((listed(folder.path()), listed(&found)), (vec!["found".into()], vec!["report.json".into()]));
+    assert_eq!(fs::read_to_string(found.join("report.json")).unwrap(), "earlier");
+}
+
 #[test]
 fn the_same_data_and_seed_give_the_same_report() {
     let folder = TempDir::new().unwrap();
     hide(folder.path(), "hum-sine", 1.0);
     let recording = diagnosed(folder.path(), &["--truth", "hidden.toml"], "1");
+    fs::create_dir(folder.path().join("one")).unwrap();
+    fs::write(folder.path().join("one/report.json"), "earlier").unwrap();
     let [one, other] = [("one", "1"), ("other", "2")].map(|(out, threads)| {
         let said = tactus(folder.path(), &["discover", &recording, "--out", out, "--threads", threads]);
         assert_eq!(said.code, Some(0), "{said:?}");
         fs::read(folder.path().join(out).join("report.json")).unwrap()
     });
     assert_eq!(one, other);
+    // One folder was there before, with a report; nothing else is left in or beside either.
+    let files = ["model.toml", "report.html", "report.json", "residuals.parquet"];
+    let left = ["one", "other"].map(|out| listed(&folder.path().join(out)));
+    assert!(left.iter().all(|left| *left == files), "{left:?}");
+    assert!(
+        listed(folder.path()).iter().all(|name| !name.contains("partial")),
+        "{:?}",
+        listed(folder.path())
+    );
 }
 
 #[test]

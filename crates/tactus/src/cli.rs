@@ -285,7 +285,7 @@ pub(crate) struct DiscoverArgs {
     /// The model to compare with the data, instead of the rig file's; of the same array.
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
-    /// Folder for report.html, report.json, model.toml and residuals.parquet.
+    /// Folder for report.html, report.json, model.toml and residuals.parquet, which appear there when all are complete.
     #[arg(short, long, value_name = "DIR", default_value = "discovery")]
     pub(crate) out: PathBuf,
     /// Seed of the split into fitted and held-out presses and of the tests against noise.

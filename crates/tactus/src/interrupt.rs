@@ -1,8 +1,10 @@
-//! Signals that would end the program: they stop the run in progress. Without a run they end the program.
+//! Signals that would end the program: they stop the run in progress. Without a run they remove what is unfinished and end the
+//! program.
 
-use std::process;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
-use std::thread;
+use std::{fs, process, thread};
 
 use anyhow::Context;
 use tactus_engine::{Engine, StopOrder};
@@ -71,6 +73,68 @@ impl Drop for StopsRun {
     }
 }
 
+/// More than the files of any folder here.
+const REMOVALS_MAX: usize = 16;
+
+/// A folder of this process whose files are not complete yet.
+static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
+
+fn unfinished() -> MutexGuard<'static, Option<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A folder that is removed with this, or when a signal ends the program. A process has one at a time.
+#[must_use = "the folder is removed once this is dropped"]
+#[derive(Debug)]
+pub(crate) struct Unfinished(PathBuf);
+
+impl Unfinished {
+    /// Makes the folder.
+    ///
+    /// # Errors
+    /// If the system gives no folder, runtime, handler or thread.
+    pub(crate) fn create(path: PathBuf) -> anyhow::Result<Self> {
+        listen()?;
+        let mut unfinished = unfinished();
+        fs::create_dir_all(&path)?;
+        *unfinished = Some(path.clone());
+        Ok(Self(path))
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Moves the complete folder by `rename`. A signal waits for that.
+    ///
+    /// # Errors
+    /// Those of `rename`.
+    pub(crate) fn finish(&self, rename: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
+        let mut unfinished = unfinished();
+        rename(&self.0)?;
+        *unfinished = None;
+        Ok(())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        if let Some(folder) = unfinished().take() {
+            remove(&folder);
+        }
+    }
+}
+
+/// Removes a folder with its files, also if another thread is just adding one.
+fn remove(folder: &Path) {
+    for _ in 0..REMOVALS_MAX {
+        // Other errors leave the folder, and its name says what it is.
+        if !fs::remove_dir_all(folder).is_err_and(|error| error.kind() == ErrorKind::DirectoryNotEmpty) {
+            return;
+        }
+    }
+}
+
 /// Starts the thread that listens, once for all runs: a run in virtual time occupies the thread that makes it.
 fn listen() -> anyhow::Result<()> {
     static LISTENING: Once = Once::new();
@@ -91,7 +155,12 @@ fn listen() -> anyhow::Result<()> {
                         run.came = Some(ending);
                         run.stop();
                     }
-                    None => process::exit(ending.exit_code()),
+                    None => {
+                        // Held to the end, so that nobody makes or finishes anything meanwhile.
+                        let unfinished = unfinished();
+                        unfinished.iter().for_each(|folder| remove(folder));
+                        process::exit(ending.exit_code())
+                    }
                 }
             }
         })

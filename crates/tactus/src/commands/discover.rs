@@ -5,6 +5,7 @@ mod measurements;
 mod model;
 mod print;
 mod residuals;
+mod unfinished;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,6 +22,10 @@ use crate::exit::{Exit, Failure};
 use crate::output;
 use crate::progress::ComputationProgress;
 use measurements::Measurements;
+use unfinished::UnfinishedFolder;
+
+/// What a discovery writes: the report, its numbers, the grown model and the residuals.
+const FILES: [&str; 4] = ["report.html", "report.json", "model.toml", "residuals.parquet"];
 
 /// A discovery with its data and its model.
 struct Discovered {
@@ -40,6 +45,7 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     }
     let progress = ComputationProgress::new(common.json);
     let declared = args.model.as_deref().map(declared).transpose()?;
+    let folder = UnfinishedFolder::create(&args.out)?;
     let analyse =
         |files: &[PathBuf], of: Option<&str>| analysed(args, declared.clone(), files, of, &progress);
     let discovered = if args.active {
@@ -48,7 +54,10 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
         analyse(&args.files, None)?
     };
     progress.show("writing", 1.0);
-    let paths = discovered.write(&args.out)?;
+    discovered.write(folder.path())?;
+    folder.finish()?;
+    let paths = FILES.map(|name| std::path::absolute(args.out.join(name)));
+    let paths = paths.into_iter().collect::<Result<Vec<_>, _>>()?;
     progress.clear();
     if common.json {
         output::write(&discovery_json(&discovered.report()))?;
@@ -101,26 +110,17 @@ fn analysed(
 }
 
 impl Discovered {
-    /// Writes report, numbers, model and residuals; returns the files.
-    fn write(&self, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    /// Writes report, numbers, model and residuals.
+    fn write(&self, folder: &Path) -> anyhow::Result<()> {
         let report = self.report();
         let grown = model::grown(&self.model, &self.discovery, &self.measured.id());
-        let texts = [
-            ("report.html", discovery_html(&report)),
-            ("report.json", discovery_json(&report)),
-            ("model.toml", grown.to_toml().context("the grown model")?),
-        ];
-        let mut paths = Vec::new();
-        for (name, text) in texts {
-            let path = folder.join(name);
-            fs::write(&path, text).with_context(|| path.display().to_string())?;
-            paths.push(std::path::absolute(path)?);
+        let texts =
+            [discovery_html(&report), discovery_json(&report), grown.to_toml().context("the grown model")?];
+        let [html, json, model, residuals] = FILES.map(|name| folder.join(name));
+        for (path, text) in [html, json, model].iter().zip(texts) {
+            fs::write(path, text).with_context(|| path.display().to_string())?;
         }
-        let path = folder.join("residuals.parquet");
-        residuals::write(self, &path)?;
-        paths.push(std::path::absolute(path)?);
-        Ok(paths)
+        residuals::write(self, &residuals)
     }
 
     fn report(&self) -> DiscoveryReport<'_> {
