@@ -12,6 +12,8 @@
 //! Variable projection: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413. Damping: Levenberg and
 //! Marquardt.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::ParameterKind;
 
@@ -250,7 +252,7 @@ impl<'a> Problem<'a> {
         }
         let mut cost = self.cost(&predicted);
         let mut damping = 1e-3;
-        let mut kept: Vec<Option<Vec<f64>>> = vec![None; free.len()];
+        let mut kept: Vec<Option<Arc<Vec<f64>>>> = vec![None; free.len()];
         let mut covariance = None;
         for round in 0..rounds {
             if round > 0 {
@@ -261,22 +263,18 @@ impl<'a> Problem<'a> {
             linear.project(&mut residual);
             let places: Vec<usize> = (0..free.len()).collect();
             let column = |place: &usize| match &kept[*place] {
-                Some(column) => Ok(column.clone()),
-                None => self.slope(&at, &predicted, free[*place]),
+                Some(column) => Ok(Arc::clone(column)),
+                None => self.slope(&at, &predicted, free[*place]).map(Arc::new),
             };
-            let columns: Vec<Vec<f64>> =
+            let columns: Vec<Arc<Vec<f64>>> =
                 parallel::map(&places, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             for ((kept, column), one) in kept.iter_mut().zip(&columns).zip(&free) {
                 if matches!(one, Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY) {
-                    kept.get_or_insert_with(|| column.clone());
+                    kept.get_or_insert_with(|| Arc::clone(column));
                 }
             }
-            let mut projected = columns.clone();
-            for column in &mut projected {
-                linear.project(column);
-            }
-            let (gram, right) = normal(self, &projected, &residual);
-            let own = |(index, column): (usize, &Vec<f64>)| {
+            let (gram, right) = self.normal(&linear, &columns, &residual);
+            let own = |(index, column): (usize, &Arc<Vec<f64>>)| {
                 gram[(index, index)].max(OWN_SHARE_LEAST * self.weighed_square(column))
             };
             let squares: Vec<f64> = columns.iter().enumerate().map(own).collect();
@@ -315,6 +313,33 @@ impl<'a> Problem<'a> {
         Ok(Fitted { parameters: at, predicted, cost, errors })
     }
 
+    /// The normal equations of columns, less what gains and baselines fit, and of a residual that is already less that.
+    fn normal(
+        &self,
+        linear: &Linear<'_>,
+        columns: &[Arc<Vec<f64>>],
+        residual: &[f64],
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let project = |column: &Arc<Vec<f64>>| {
+            let mut projected = column.to_vec();
+            linear.project(&mut projected);
+            projected
+        };
+        let projected: Vec<Vec<f64>> = columns.iter().map(project).collect();
+        let count = columns.len();
+        let mut gram = DMatrix::zeros(count, count);
+        let mut right = DVector::zeros(count);
+        for (i, column) in projected.iter().enumerate() {
+            let weighted: Vec<f64> = column.iter().zip(self.weights()).map(|(c, w)| c * w).collect();
+            right[i] = dot(&weighted, residual);
+            for (j, other) in projected.iter().enumerate().take(i + 1) {
+                gram[(i, j)] = dot(&weighted, other);
+                gram[(j, i)] = gram[(i, j)];
+            }
+        }
+        (gram, right)
+    }
+
     /// The parameters with refitted gains and baselines, and their prediction, if this reduces the cost by much. A start whose
     /// effects are not neutral needs it, because its gains are those of a model without these effects.
     fn taken_up(
@@ -342,7 +367,7 @@ impl<'a> Problem<'a> {
         step: &DVector<f64>,
         linear: &Linear<'_>,
         residual: &[f64],
-        columns: &[Vec<f64>],
+        columns: &[Arc<Vec<f64>>],
     ) -> Parameters {
         let mut next = at.clone();
         let mut taken = Vec::with_capacity(free.len());
@@ -371,7 +396,7 @@ impl<'a> Problem<'a> {
         // The elements' own gains and baselines fit what the other parameters leave.
         let mut left = residual.to_vec();
         for (column, taken) in columns.iter().zip(taken) {
-            for (left, slope) in left.iter_mut().zip(column) {
+            for (left, slope) in left.iter_mut().zip(column.iter()) {
                 *left -= taken * slope;
             }
         }
@@ -420,22 +445,6 @@ fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
         }
     }
     any
-}
-
-/// The normal equations of projected columns.
-fn normal(problem: &Problem<'_>, columns: &[Vec<f64>], residual: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
-    let count = columns.len();
-    let mut gram = DMatrix::zeros(count, count);
-    let mut right = DVector::zeros(count);
-    for (i, column) in columns.iter().enumerate() {
-        let weighted: Vec<f64> = column.iter().zip(problem.weights()).map(|(c, w)| c * w).collect();
-        right[i] = dot(&weighted, residual);
-        for (j, other) in columns.iter().enumerate().take(i + 1) {
-            gram[(i, j)] = dot(&weighted, other);
-            gram[(j, i)] = gram[(i, j)];
-        }
-    }
-    (gram, right)
 }
 
 pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {
