@@ -8,7 +8,7 @@ use tactus_model::Effect;
 use crate::data::{Bins, DiscoverError, Floor, Frames, Known};
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
 use crate::search::{Candidate, Grown, Options, Rule, Search, not_shown};
-use crate::verdict::{BaseModel, Discovery, SearchOutcome, cannot_judge, conclude};
+use crate::verdict::{BaseModel, Discovery, SearchOutcome, cannot_judge, conclude, confirmed};
 
 /// Progress of a discovery.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,17 +64,19 @@ fn discover_on_threads(
         progress: &|what| reporter.report(what, 0.0),
     };
     let before = search.locate(&base)?;
-    let Grown { at: grown, rounds, equivalent, p_left } = match options.rule {
+    let Grown { at: grown, rounds, mut equivalent } = match options.rule {
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
+    let (grown, tentative) = confirmed(&search, grown, &mut equivalent)?;
     reporter.report("locating what remains", 0.9);
+    let p_left = search.p_left(&grown)?;
     let after = search.locate(&grown)?;
     reporter.report("planning what to measure next", 0.95);
     let told = conclude(
         &prepared,
         &search,
-        SearchOutcome { lacking, base, grown, rounds, equivalent, p_left, before, after },
+        SearchOutcome { lacking, base, grown, rounds, equivalent, tentative, p_left, before, after },
         options,
     )?;
     reporter.report("done", 1.0);

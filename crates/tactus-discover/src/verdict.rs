@@ -14,7 +14,7 @@ mod conclude;
 mod discovery;
 mod structured;
 
-pub(crate) use conclude::{SearchOutcome, cannot_judge, conclude};
+pub(crate) use conclude::{SearchOutcome, cannot_judge, conclude, confirmed};
 pub use discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, Split, Unexplained,
     Verdict,

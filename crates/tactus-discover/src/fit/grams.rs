@@ -106,7 +106,8 @@ impl Problem<'_> {
     /// The products of directions at a fitted model.
     pub(crate) fn grams(&self, at: &Fitted, directions: Vec<Direction<'_>>) -> Result<Grams, DiscoverError> {
         let own = self.free(&at.parameters);
-        let mut all: Vec<Direction<'_>> = own.iter().map(|free| self.towards(&at.parameters, *free)).collect();
+        let mut all: Vec<Direction<'_>> =
+            own.iter().map(|free| self.towards(&at.parameters, *free)).collect();
         all.extend(directions);
         let segments = Segments::of(self, &at.parameters);
         let total = self.sums(at, &all, own.len(), &segments)?;
@@ -151,7 +152,10 @@ impl Problem<'_> {
                         let now = &at.predicted[first * bins.elements..end * bins.elements];
                         // A parameter that cannot move has no derivative.
                         let per_step = if *step == 0.0 { 0.0 } else { 1.0 / step };
-                        column.iter_mut().zip(now).for_each(|(value, now)| *value = (*value - now) * per_step);
+                        column
+                            .iter_mut()
+                            .zip(now)
+                            .for_each(|(value, now)| *value = (*value - now) * per_step);
                         Ok(column)
                     }
                     (Direction::Column(values), _) if is_used => Ok(values(range.clone())),
@@ -170,7 +174,9 @@ impl Problem<'_> {
                 for bin in range.filter(|bin| self.train[*bin] > 0.0) {
                     let key = (bins.block[bin] / joined, segments.of_bin[bin]);
                     match parts.last_mut() {
-                        Some((block, part)) if (*block, segments.of_bin[part.start]) == key => part.end = bin + 1,
+                        Some((block, part)) if (*block, segments.of_bin[part.start]) == key => {
+                            part.end = bin + 1
+                        }
                         _ => parts.push((key.0, bin..bin + 1)),
                     }
                 }
@@ -207,10 +213,8 @@ impl Problem<'_> {
             products: DMatrix::zeros(count, count),
             border: Border::new(count, elements),
         };
-        let gains: Vec<f64> = readings
-            .iter()
-            .map(|(bin, element, root)| root * chunk.by_gain[place(*bin, *element)])
-            .collect();
+        let gains: Vec<f64> =
+            readings.iter().map(|(bin, element, root)| root * chunk.by_gain[place(*bin, *element)]).collect();
         for ((_, element, root), gain) in readings.iter().zip(&gains) {
             let [one, mixed, square] = &mut sums.border.own[*element];
             *one += root * root;
@@ -330,7 +334,8 @@ struct Segments {
 impl Segments {
     fn of(problem: &Problem<'_>, at: &Parameters) -> Self {
         let bins = problem.predictor.bins;
-        let walk = at.terms.iter().find(|term| is_random_walk(term)).map(|term| [term.values[0], term.values[1]]);
+        let walk =
+            at.terms.iter().find(|term| is_random_walk(term)).map(|term| [term.values[0], term.values[1]]);
         let walk = walk.filter(|[rate, knot_s]| *rate > 0.0 && *knot_s > 0.0);
         let (mut of_bin, mut run) = (Vec::with_capacity(bins.len()), Vec::new());
         let mut key = None;
@@ -476,7 +481,8 @@ impl Elimination {
         let (zero, gain) = (&self.baselines[block.segment], &self.gains);
         // Half of the quadratic part, so that both factors of a product together take it whole.
         let half = |element: usize, number: usize, [by_zero, by_gain]: [f64; 2]| {
-            0.5 * (by_zero * f64::from(zero[(element, number)]) + by_gain * f64::from(gain[(element, number)]))
+            0.5 * (by_zero * f64::from(zero[(element, number)])
+                + by_gain * f64::from(gain[(element, number)]))
         };
         #[expect(clippy::cast_possible_truncation, reason = "parts of a test's statistic")]
         let less = |sums: &DMatrix<f32>, of: fn([f64; 3]) -> [f64; 2]| {

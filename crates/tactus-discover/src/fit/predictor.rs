@@ -100,8 +100,7 @@ impl Stream<'_> {
         let (first_bin, first) = (self.bin, predicted.len());
         for bin in first_bin..first_bin + count {
             let frame = bins.first[bin];
-            let (run, tool, covering_mm) =
-                (bins.run[bin], frames.indenter[frame], frames.covering_mm[frame]);
+            let (run, tool, covering_mm) = (bins.run[bin], frames.indenter[frame], frames.covering_mm[frame]);
             let covering = Covering { thickness_mm: covering_mm };
             let running = match self.running.take().filter(|one| (one.run, one.tool) == (run, tool)) {
                 Some(running) => running,

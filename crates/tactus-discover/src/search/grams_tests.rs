@@ -49,7 +49,8 @@ fn products_are_those_of_whole_columns_that_are_projected_one_by_one() {
             near(grams.reduced()[(i, j)], fitting.inner(one, other), scale);
         }
         near(grams.reduced()[(i, last)], fitting.wanted(one), fitting.size(one) * 100.0);
-        let (of_grams, of_columns) = (Score::of_grams(&grams, &[i]).z, fitting.score(std::slice::from_ref(one)).z);
+        let (of_grams, of_columns) =
+            (Score::of_grams(&grams, &[i]).z, fitting.score(std::slice::from_ref(one)).z);
         assert!((of_grams - of_columns).abs() < 1e-2 * of_columns.max(1.0), "{i}: {of_grams} {of_columns}");
     }
     let (of_grams, of_columns) = (Score::of_grams(&grams, &[0, 1, 2]).z, fitting.score(&columns).z);

@@ -124,13 +124,11 @@ pub(crate) struct Grown {
     pub(crate) at: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
-    /// p-value of the largest score of all additions to it.
-    pub(crate) p_left: f64,
 }
 
 impl From<Fitted> for Grown {
     fn from(base: Fitted) -> Self {
-        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new(), p_left: 1.0 }
+        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new() }
     }
 }
 
@@ -152,7 +150,10 @@ pub(crate) struct Pass {
 /// What an addition is.
 enum Kind {
     /// A candidate in a shape.
-    Term { candidate: usize, shape: Term },
+    Term {
+        candidate: usize,
+        shape: Term,
+    },
     Rival,
 }
 
@@ -264,7 +265,17 @@ impl Search<'_> {
         } else {
             None
         };
-        Ok(Pass { additions, kinds, classes, scores, products, grams, walk, present, variance: problem.variance })
+        Ok(Pass {
+            additions,
+            kinds,
+            classes,
+            scores,
+            products,
+            grams,
+            walk,
+            present,
+            variance: problem.variance,
+        })
     }
 
     /// Grows a model until no class is missing, unnecessary or worse than another.
@@ -276,7 +287,8 @@ impl Search<'_> {
             (self.progress)(&format!("round {}: scoring the effects", index + 1));
             let pass = self.pass(&grown.at)?;
             let mut tried = self.tested(&pass, &grown.at, index);
-            let is_full = names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
+            let is_full =
+                names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
             let taken = if 2.0 * tried.p_value <= ALPHA && !is_full {
                 // What is small beside the gain of another class may be an error of that one's form.
                 self.next(&grown.at, &pass)?.filter(|taken| taken.ln_odds > FORM_SHARE * strongest)
@@ -284,7 +296,13 @@ impl Search<'_> {
                 None
             };
             tried.round.taken = taken.as_ref().map(|taken| taken.name);
-            if std::env::var("TD").is_ok() { eprintln!("ROUND {index} p {} {:?}", tried.p_value, tried.round.candidates.iter().take(4).map(|c| (c.effect, c.score)).collect::<Vec<_>>()); }
+            if std::env::var("TD").is_ok() {
+                eprintln!(
+                    "ROUND {index} p {} {:?}",
+                    tried.p_value,
+                    tried.round.candidates.iter().take(4).map(|c| (c.effect, c.score)).collect::<Vec<_>>()
+                );
+            }
             grown.rounds.push(tried);
             match taken {
                 Some(taken) => {
@@ -297,8 +315,12 @@ impl Search<'_> {
             }
         }
         self.hold(&mut grown)?;
-        grown.p_left = self.tested(&self.pass(&grown.at)?, &grown.at, grown.rounds.len()).p_value;
         Ok(grown)
+    }
+
+    /// p-value of the largest score of all additions to a grown model.
+    pub(crate) fn p_left(&self, grown: &Fitted) -> Result<f64, DiscoverError> {
+        Ok(self.tested(&self.pass(grown)?, grown, 2 * NAMES_MAX + 1).p_value)
     }
 
     /// Tests all additions at once: the largest score against those under flipped signs.
@@ -337,7 +359,8 @@ impl Search<'_> {
             for (addition, kind) in pass.additions.iter().zip(&pass.kinds) {
                 if matches!(kind, Kind::Term { candidate, .. } if *candidate == index) {
                     let sizes = addition.directions.iter().map(|direction| pass.grams.size(*direction));
-                    widest = sizes.zip(&addition.widths).map(|(size, width)| size * width).fold(widest, f64::max);
+                    widest =
+                        sizes.zip(&addition.widths).map(|(size, width)| size * width).fold(widest, f64::max);
                 }
             }
             let has_walk = of.definition.name == RANDOM_WALK.name && pass.walk.is_some();
@@ -382,9 +405,20 @@ impl Search<'_> {
         }
         starts.truncate(FITTED_MAX);
         if std::env::var("TD").is_ok() {
-            for set in [&best, &named].into_iter().flatten() { eprintln!("set {:?} {:.1}", set.members.iter().map(|m| pass.class_of(*m)).collect::<Vec<_>>(), set.ln_odds); }
-            eprintln!("alone {:?}", alone.iter().take(8).map(|(one,l)| (pass.class_of(*one), l.round())).collect::<Vec<_>>());
-            for r in (0..pass.additions.len()).filter(|one| !pass.is_named(*one)) { eprintln!("rival {} {:.1}", pass.class_of(r), evidence.gain(&none, r).ln_odds); }
+            for set in [&best, &named].into_iter().flatten() {
+                eprintln!(
+                    "set {:?} {:.1}",
+                    set.members.iter().map(|m| pass.class_of(*m)).collect::<Vec<_>>(),
+                    set.ln_odds
+                );
+            }
+            eprintln!(
+                "alone {:?}",
+                alone.iter().take(8).map(|(one, l)| (pass.class_of(*one), l.round())).collect::<Vec<_>>()
+            );
+            for r in (0..pass.additions.len()).filter(|one| !pass.is_named(*one)) {
+                eprintln!("rival {} {:.1}", pass.class_of(r), evidence.gain(&none, r).ln_odds);
+            }
             eprintln!("walk {:?}", pass.walk.as_ref().map(|w| w.promise));
         }
         if let Some(walk) = &pass.walk {
@@ -395,10 +429,14 @@ impl Search<'_> {
         }
         let starts = starts.into_iter().map(|(name, _, terms)| (name, terms)).collect::<Vec<_>>();
         let fits = self.fits(at, &starts)?;
-        let Some(taken) = fits.into_iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds)) else { return Ok(None) };
+        let Some(taken) = fits.into_iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds)) else {
+            return Ok(None);
+        };
         // A rival without a name explains more than any class.
         let rival = pass.best_rival();
-        if std::env::var("TD").is_ok() { eprintln!("TAKEN {} {:.1} rival {rival:.1}", taken.name, taken.ln_odds); }
+        if std::env::var("TD").is_ok() {
+            eprintln!("TAKEN {} {:.1} rival {rival:.1}", taken.name, taken.ln_odds);
+        }
         let is_beaten = rival > taken.ln_odds + RIVAL_LN_ODDS;
         let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
         Ok(Some(taken).filter(|taken| taken.ln_odds > LN_ODDS_LEAST && (best_has_names || !is_beaten)))
@@ -469,7 +507,9 @@ impl Search<'_> {
             let lesses: Vec<Fitted> =
                 parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
             let odds: Vec<f64> = lesses.iter().map(|less| self.ln_odds(less, &grown.at)).collect();
-            if std::env::var("TD").is_ok() { eprintln!("HOLD {names:?} {odds:.1?}"); }
+            if std::env::var("TD").is_ok() {
+                eprintln!("HOLD {names:?} {odds:.1?}");
+            }
             let worth = |(index, less): (usize, &Fitted)| self.worth(&grown.at, less, index, &names, &odds);
             let worths: Vec<f64> = lesses.iter().enumerate().map(worth).collect();
             let weakest = worths.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
@@ -490,9 +530,16 @@ impl Search<'_> {
                     continue 'again;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
-                if std::env::var("TD").is_ok() { eprintln!("IN PLACE OF {name} {ln_odds:.1}: rival {:.1} others {:?}", pass.best_rival(), others.iter().map(|o| (o.name, o.ln_odds.round())).collect::<Vec<_>>()); }
+                if std::env::var("TD").is_ok() {
+                    eprintln!(
+                        "IN PLACE OF {name} {ln_odds:.1}: rival {:.1} others {:?}",
+                        pass.best_rival(),
+                        others.iter().map(|o| (o.name, o.ln_odds.round())).collect::<Vec<_>>()
+                    );
+                }
                 let best = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
-                let better = best.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
+                let better =
+                    best.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
                 if let Some(better) = better {
                     exchanges_left -= 1;
                     grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
@@ -508,7 +555,11 @@ impl Search<'_> {
     /// What a class gains over the least gain with which it holds its place: from 1 on it does. What is small beside the
     /// gain of another class may be that one's form, and blocks must agree.
     fn worth(&self, at: &Fitted, less: &Fitted, index: usize, names: &[&'static str], odds: &[f64]) -> f64 {
-        let others = names.iter().zip(odds).enumerate().filter(|(other, (name, _))| *other != index && !is_exact(name));
+        let others = names
+            .iter()
+            .zip(odds)
+            .enumerate()
+            .filter(|(other, (name, _))| *other != index && !is_exact(name));
         let strongest = others.map(|(_, (_, odds))| *odds).fold(0.0, f64::max);
         let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
         let by_odds = odds[index] / least;

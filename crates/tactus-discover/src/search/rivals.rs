@@ -77,7 +77,8 @@ pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result
         Rival { name: "speed of travel", columns: smooth(&history.travel_mm_per_s, &free, Form::Offset) },
     ];
     if !rounds {
-        let in_contact: Arc<Vec<f64>> = Arc::new(deep.iter().map(|deep| f64::from(u8::from(*deep))).collect());
+        let in_contact: Arc<Vec<f64>> =
+            Arc::new(deep.iter().map(|deep| f64::from(u8::from(*deep))).collect());
         let of_element = |element| column(Factor::Element(element, Arc::clone(&in_contact)), Form::Offset);
         found.push(Rival { name: "contact", columns: (0..elements).map(of_element).collect() });
     }
@@ -114,7 +115,9 @@ fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
 /// Quantiles of the values from the least to the greatest, each apart from the one before.
 fn knots(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
-    let (Some(least), Some(most)) = (values.first().copied(), values.last().copied()) else { return Vec::new() };
+    let (Some(least), Some(most)) = (values.first().copied(), values.last().copied()) else {
+        return Vec::new();
+    };
     // The reported position of a stage at rest still varies slightly.
     let apart = 1e-3 * (most - least).max(least.abs()).max(most.abs()).max(1.0);
     let quantiles = (0..KNOTS).map(|knot| values[knot * (values.len() - 1) / (KNOTS - 1)]);

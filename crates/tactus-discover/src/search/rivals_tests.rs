@@ -5,7 +5,8 @@ fn hats_add_up_to_one_and_interpolate() {
     let values: Vec<f64> = (0..101).map(|k| f64::from(k) / 10.0).collect();
     let among = vec![true; 101];
     let hats = hats(&values, &among);
-    let knots: Vec<f64> = hats.iter().map(|hat| values[hat.iter().position(|one| *one >= 1.0 - 1e-12).unwrap()]).collect();
+    let knots: Vec<f64> =
+        hats.iter().map(|hat| values[hat.iter().position(|one| *one >= 1.0 - 1e-12).unwrap()]).collect();
     for (bin, value) in values.iter().enumerate() {
         let sum: f64 = hats.iter().map(|hat| hat[bin]).sum();
         assert!((sum - 1.0).abs() < 1e-12, "{value}: {sum}");

@@ -234,12 +234,15 @@ impl Score {
             }
         }
         let scored = |row: &Vec<(usize, f64)>| {
-            let sum = |block: usize| row.iter().map(|(number, share)| share * grams.along(*number)[block]).sum();
+            let sum =
+                |block: usize| row.iter().map(|(number, share)| share * grams.along(*number)[block]).sum();
             let wanted: Vec<f64> = (0..blocks).map(sum).collect();
             // The blocks' shares of a sum of directions: those of its parts.
-            let sizes: f64 = row.iter().map(|(number, share)| share * share * products[(*number, *number)]).sum();
+            let sizes: f64 =
+                row.iter().map(|(number, share)| share * share * products[(*number, *number)]).sum();
             let square = |block: usize| {
-                row.iter().map(|(number, share)| share * share * grams.squares(*number)[block]).sum::<f64>() / sizes
+                row.iter().map(|(number, share)| share * share * grams.squares(*number)[block]).sum::<f64>()
+                    / sizes
             };
             let variance: Vec<f64> = (0..blocks).map(square).collect();
             standardised(&wanted, &variance)

@@ -17,6 +17,8 @@ use crate::search::{
     not_shown, q_values, sign_flip_p, without,
 };
 
+/// The held-out presses confirm an effect if noise alone would let it gain as much on them with at most this probability.
+const CONFIRMED_P: f64 = 0.05;
 /// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests,
 const SEEN_NOISE: f64 = 2.0;
 /// and for the verdict `Explained` whatever the tests say.
@@ -29,6 +31,7 @@ pub(crate) struct SearchOutcome {
     pub(crate) grown: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
+    pub(crate) tentative: Vec<AddedEffect>,
     /// p-value of the largest score of all additions to the grown model.
     pub(crate) p_left: f64,
     /// Where the base model and the data disagree, and where the grown model still does.
@@ -58,6 +61,27 @@ impl HeldOutResidual {
     }
 }
 
+/// A model with those of its added effects that the held-out presses confirm, and the others.
+pub(crate) fn confirmed(
+    search: &Search<'_>,
+    grown: Fitted,
+    equivalent: &mut Equivalent,
+) -> Result<(Fitted, Vec<AddedEffect>), DiscoverError> {
+    let names = names(&grown.parameters, search.known_terms);
+    let added = search.steps(&grown, equivalent, search.problem)?.into_iter();
+    let tentative: Vec<AddedEffect> =
+        added.filter(|step| names.contains(&step.effect) && step.p_value > CONFIRMED_P).collect();
+    if tentative.is_empty() {
+        return Ok((grown, tentative));
+    }
+    let mut firm = grown.parameters;
+    for step in &tentative {
+        equivalent.remove(step.effect);
+        firm = without(&firm, step.effect, search.known_terms);
+    }
+    Ok((search.problem.fit_from(firm, POLISH_ROUNDS)?, tentative))
+}
+
 /// Decides the verdict and builds the report of a search.
 pub(crate) fn conclude(
     prepared: &Prepared<'_>,
@@ -66,7 +90,7 @@ pub(crate) fn conclude(
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
-    let SearchOutcome { lacking, base, grown, rounds, equivalent, p_left, before, after } = found;
+    let SearchOutcome { lacking, base, grown, rounds, equivalent, tentative, p_left, before, after } = found;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
@@ -121,6 +145,7 @@ pub(crate) fn conclude(
         elements: of_base.elements_beside(&of_grown),
         rounds: rounds.into_iter().map(|tried| tried.round).collect(),
         steps,
+        tentative,
         final_: Final {
             level: grown_level,
             // By chance the remainder may be smaller than the noise.
@@ -260,6 +285,7 @@ impl Prepared<'_> {
             elements: of_base.elements_rms_counts.iter().map(element).collect(),
             rounds: Vec::new(),
             steps: Vec::new(),
+            tentative: Vec::new(),
             final_: Final { level, shrink: None },
             verdict: Verdict::CannotJudge,
             unexplained: Unexplained { depends_on: Vec::new(), share: 1.0 },

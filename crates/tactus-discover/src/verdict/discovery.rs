@@ -43,6 +43,8 @@ pub struct Discovery {
     pub rounds: Vec<Round>,
     /// The effects that were added, in the order in which they were found; one entry for each name.
     pub steps: Vec<AddedEffect>,
+    /// Effects that the fitted presses show and the held-out presses do not confirm. They are not in the grown model.
+    pub tentative: Vec<AddedEffect>,
     /// How far the grown model is from the held-out presses.
     pub final_: Final,
     /// The result in one word.

@@ -48,6 +48,7 @@ struct ReportJson<'a> {
     elements: Vec<ElementJson>,
     rounds: Vec<RoundJson<'a>>,
     steps: Vec<StepJson<'a>>,
+    tentative: Vec<StepJson<'a>>,
     #[serde(rename = "final")]
     grown: GrownJson,
     verdict: &'static str,
@@ -270,6 +271,7 @@ impl<'a> ReportJson<'a> {
                 .collect(),
             rounds: found.rounds.iter().map(RoundJson::of).collect(),
             steps: found.steps.iter().map(StepJson::of).collect(),
+            tentative: found.tentative.iter().map(StepJson::of).collect(),
             grown: GrownJson {
                 level: LevelJson::of(found.final_.level, found.floor),
                 shrink: found.final_.shrink,

@@ -7,6 +7,15 @@ use super::faulty;
 use crate::numbers::{digits, short};
 use crate::plot::number;
 
+/// What the fitted presses show and the held-out presses do not confirm.
+fn tentative(found: &Discovery) -> Option<String> {
+    let names = list(found.tentative.iter().map(|step| step.effect));
+    let of = || {
+        format!("Tentative: {names}. The fitted presses show it, and the held-out presses do not confirm it.")
+    };
+    (!found.tentative.is_empty()).then(of)
+}
+
 /// The verdict in a sentence or two, with its numbers.
 pub fn in_words(found: &Discovery) -> String {
     let before = digits(found.base.heldout_rms_counts, 3);
@@ -55,7 +64,7 @@ pub fn in_words(found: &Discovery) -> String {
             left(found)
         ),
     };
-    [verdict].into_iter().chain(faulty::in_words(found)).collect::<Vec<_>>().join(" ")
+    [verdict].into_iter().chain(tentative(found)).chain(faulty::in_words(found)).collect::<Vec<_>>().join(" ")
 }
 
 /// What is structured in the grown model's residual.

@@ -61,6 +61,7 @@ pub(crate) fn explained() -> Discovery {
             })
             .collect(),
         rounds: rounds(),
+        tentative: vec![],
         steps: vec![
             AddedEffect {
                 effect: "hysteresis",
@@ -135,6 +136,7 @@ pub(crate) fn nothing_missing() -> Discovery {
         elements: vec![ElementGap { before_rms_counts: 2.0, after_rms_counts: 2.0 }; 48],
         rounds: vec![],
         steps: vec![],
+        tentative: vec![],
         final_: Final { level: level(2.01), shrink: None },
         verdict: Verdict::NothingMissing,
         unexplained: Unexplained { depends_on: vec![], share: 0.0 },
@@ -162,6 +164,7 @@ pub(crate) fn faulty() -> Discovery {
         ],
         elements,
         steps: whole.steps[1..].to_vec(),
+        tentative: whole.steps[..1].to_vec(),
         verdict: Verdict::Explained,
         effects: vec![],
         ..nothing_missing()
@@ -177,6 +180,7 @@ pub(crate) fn unexplained() -> Discovery {
         final_: Final { level: whole.base, shrink: Some(0.0) },
         rounds: vec![Round { taken: None, ..whole.rounds[0].clone() }],
         steps: vec![],
+        tentative: vec![],
         verdict: Verdict::Unexplained,
         unexplained: Unexplained { depends_on: vec!["time since contact", "depth"], share: 1.0 },
         next_experiments: vec![],
