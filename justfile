@@ -231,6 +231,7 @@ discovery-evidence: bench-discovery
     target/dist/tactus-bench evidence run --seeds sealed --size ablation --work target/evidence/sealed/work/peers/bic \
         --with=--ablation --with=bic
     target/dist/tactus-bench evidence run --seeds sealed
+    target/dist/tactus-bench evidence separate --seeds sealed
     target/dist/tactus-bench evidence score --seeds sealed --ablation target/evidence/sealed/work --costs target/evidence/costs.json \
         --document docs/discovery-evidence.md --images docs/images
 

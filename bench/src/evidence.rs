@@ -8,11 +8,13 @@
 mod ablation;
 mod campaign;
 mod document;
+mod forms;
 mod outcome;
 mod picture;
 mod rate;
 mod run;
 mod score;
+mod separate;
 mod summary;
 mod timing;
 mod twins;
@@ -20,14 +22,16 @@ mod twins;
 pub use ablation::{Ablation, ablations};
 pub use campaign::{Campaign, Planned, Seeds, Sizes, campaigns};
 pub use document::{Costs, Part, document, into_document, misses};
+pub use forms::{Form, forms_table};
 pub use outcome::{Named, Outcome, Truth, read};
 pub use picture::pictures;
 pub use rate::{Rate, normal_share, quantile};
 pub use run::{Places, Progress, Ran, Workflow, run};
 pub use score::{
     Band, Cell, EffectScore, ORACLE_LEVEL, OutsideScore, PowerPoint, Scores, SetSize, Several, Shrink,
-    Spread, Z_DETECTABLE, Z_SEPARATE,
+    Spread, Z_DETECTABLE, Z_NAMEABLE, Z_SEPARATE,
 };
+pub use separate::separate;
 pub use summary::summary;
 pub use timing::{Cost, Timing};
 pub use twins::{BUDGET_MIN, Chosen, Decision, TWINS, Twins, Undecided, twins_table};

@@ -131,13 +131,13 @@ impl Sizes {
             physics: within().collect(),
             separations: vec![2.0, 4.0, 8.0, 16.0, 40.0],
             strengths: vec![0.3, 1.0],
-            name_seeds: 2,
+            name_seeds: 1,
             pairs: 100,
             triples: 60,
             outside: outside().collect(),
-            outside_separations: vec![15.0, 40.0],
-            outside_strengths: vec![1.0],
-            outside_seeds: 3,
+            outside_separations: vec![15.0, 40.0, 100.0],
+            outside_strengths: Vec::new(),
+            outside_seeds: 2,
             frames: None,
         }
     }
@@ -162,10 +162,10 @@ impl Sizes {
     pub fn quick() -> Self {
         Self {
             false_alarms: 8,
-            physics: FREE_FORMS.iter().flat_map(|effect| instances(effect).take(2)).collect(),
+            physics: FREE_FORMS.iter().flat_map(|effect| foreign(effect).take(2)).collect(),
             pairs: 6,
             triples: 4,
-            outside: outside().take(10).collect(),
+            outside: outside().step_by(2).take(10).collect(),
             ..Self::glance()
         }
     }
@@ -281,8 +281,9 @@ fn outside() -> impl Iterator<Item = &'static Definition> {
     CATALOGUE.iter().copied().filter(|definition| definition.effect.is_none())
 }
 
-fn instances(effect: &str) -> impl Iterator<Item = &'static Definition> {
-    CATALOGUE.iter().copied().filter(move |definition| definition.effect == Some(effect))
+/// Forms of an effect that the library does not have.
+fn foreign(effect: &str) -> impl Iterator<Item = &'static Definition> {
+    within().filter(move |definition| definition.effect == Some(effect) && !definition.is_library_point)
 }
 
 /// The first physics of each effect.

@@ -16,7 +16,7 @@ fn a_missed_target_says_by_how_much() {
     let right = set(&[Some("backlash")], &[("backlash", &[])], "explained");
     let wrong = set(&[Some("backlash")], &[("imprint", &[])], "explained");
     let text = document(&Scores::new(&[right.clone(), right, wrong.clone(), wrong]), &[], None);
-    let line = text.lines().find(|line| line.contains("named exactly")).unwrap_or_default();
+    let line = text.lines().find(|line| line.contains("16 and more: named exactly")).unwrap_or_default();
     assert!(line.contains("| 50.0 % |") && line.ends_with("| **missed by 45.0 points** |"), "{line}");
     let none = text.lines().find(|line| line.contains("both named")).unwrap_or_default();
     assert!(none.contains("| - |") && none.ends_with("| - |"), "{none}");

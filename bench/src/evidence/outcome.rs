@@ -8,6 +8,7 @@ use tactus_sets::Label;
 
 use super::campaign::{Campaign, Planned};
 use super::run::{Places, Ran};
+use super::score::SHRINK_ERROR_MAX;
 
 /// The truth of a set, and what was reported.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,8 +48,14 @@ pub struct Truth {
     pub physics: String,
     /// The effect of the library that it is an instance of; `None` outside the library.
     pub effect: Option<String>,
+    /// True if it is a point of that effect's own parameters.
+    pub is_library_point: bool,
     /// Separation from the base model after gains, offsets and spread are fitted.
     pub z: f64,
+    /// Separation from the nearest wrong effect ([`ClassFits::z_name`](tactus_sets::ClassFits::z_name)), if it is computed.
+    pub z_name: Option<f64>,
+    /// Share of the gap that the effect's own best fit closes without noise, if it is computed.
+    pub own_shrink: Option<f64>,
 }
 
 /// A named effect.
@@ -97,9 +104,25 @@ impl Outcome {
         self.named.iter().filter(|named| !is_true(named)).map(|named| named.effect.as_str()).collect()
     }
 
-    /// The shrink over that of the first hidden effect, fitted alone.
+    /// The shrink, 0 without a report, over that of the first hidden effect, fitted alone: without noise, or else in the report.
     pub fn shrink_to_own_fit(&self) -> Option<f64> {
-        Some(self.shrink? / self.alone_shrink.filter(|alone| *alone > 0.0)?)
+        let own = self.truths.first().and_then(|truth| truth.own_shrink).or(self.alone_shrink);
+        Some(self.known_shrink()? / own.filter(|own| *own > 0.0)?)
+    }
+
+    /// The shrink if the gap is known within a tenth; 0 without a report.
+    pub fn known_shrink(&self) -> Option<f64> {
+        if self.has_failed() { Some(0.0) } else { self.shrink.filter(|_| self.gap_error <= SHRINK_ERROR_MAX) }
+    }
+
+    /// True if a hidden physics is a point of the library's own parameters.
+    pub fn is_library_point(&self) -> bool {
+        self.truths.iter().any(|truth| truth.is_library_point)
+    }
+
+    /// Separation of the hidden physics from the nearest wrong effect, of the least separate one; `None` if it is not computed.
+    pub fn z_name(&self) -> Option<f64> {
+        self.truths.iter().map(|truth| truth.z_name).reduce(|one, other| Some(one?.min(other?)))?
     }
 
     /// Separation of the weakest hidden physics; infinite if there is none.
@@ -187,10 +210,16 @@ fn one(set: &Planned, places: &Places) -> Result<Outcome> {
 }
 
 fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryReport>) -> Outcome {
-    let truth = |dosed: &tactus_sets::PhysicsLabel| Truth {
-        physics: dosed.id.clone(),
-        effect: dosed.effect.clone(),
-        z: dosed.z_beyond_spread,
+    let truth = |dosed: &tactus_sets::PhysicsLabel| {
+        let of = dosed.class_fits().zip(dosed.effect.as_deref());
+        Truth {
+            physics: dosed.id.clone(),
+            effect: dosed.effect.clone(),
+            is_library_point: dosed.is_library_point,
+            z: dosed.z_beyond_spread,
+            z_name: of.as_ref().and_then(|(fits, effect)| fits.z_name(effect)),
+            own_shrink: of.as_ref().and_then(|(fits, effect)| fits.shrink(effect)),
+        }
     };
     let first_effect = label.physics.first().and_then(|dosed| dosed.effect.as_deref());
     let alone_shrink = report.as_ref().and_then(|report| {

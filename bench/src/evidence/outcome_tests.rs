@@ -13,8 +13,14 @@ fn named(names: &[(&str, &[&str])]) -> Vec<Named> {
 
 /// A set with hidden effects, and a report with names.
 pub(crate) fn set(truths: &[Option<&str>], names: &[(&str, &[&str])], verdict: &str) -> Outcome {
-    let truth =
-        |effect: Option<&str>| Truth { physics: "made-up".into(), effect: effect.map(Into::into), z: 40.0 };
+    let truth = |effect: Option<&str>| Truth {
+        physics: "made-up".into(),
+        effect: effect.map(Into::into),
+        is_library_point: false,
+        z: 40.0,
+        z_name: Some(20.0),
+        own_shrink: None,
+    };
     Outcome {
         id: "names/made-up".into(),
         campaign: Campaign::Names,
@@ -118,4 +124,24 @@ fn labels_and_reports_are_read_from_files() -> Result<()> {
     let set = Planned { id, campaign: Campaign::Names, recipe: Recipe::new(3) };
     assert!(read(&[set], &places)?[0].has_failed());
     Ok(())
+}
+
+#[test]
+fn a_shrink_is_over_that_of_the_own_fit_without_noise() {
+    let mut right = set(&[Some("backlash")], &[("backlash", &[])], "explained");
+    right.alone_shrink = Some(0.5);
+    assert!(right.shrink_to_own_fit().is_some_and(|shrink| (shrink - 1.8).abs() < 1e-12));
+    right.truths[0].own_shrink = Some(0.9);
+    assert!(right.shrink_to_own_fit().is_some_and(|shrink| (shrink - 1.0).abs() < 1e-12));
+    assert_eq!(Outcome { verdict: "failed".into(), ..right.clone() }.shrink_to_own_fit(), Some(0.0));
+    assert_eq!(Outcome { gap_error: 0.2, ..right }.shrink_to_own_fit(), None);
+}
+
+#[test]
+fn the_least_separate_effect_counts_and_one_without_a_figure_leaves_none() {
+    let mut two = set(&[Some("backlash"), Some("imprint")], &[], "nothing-missing");
+    two.truths[1].z_name = Some(3.0);
+    assert_eq!(two.z_name(), Some(3.0));
+    two.truths[0].z_name = None;
+    assert_eq!(two.z_name(), None);
 }

@@ -12,6 +12,8 @@ use super::rate::{Rate, normal_share, quantile};
 pub const Z_DETECTABLE: f64 = 4.0;
 /// The separation from which on effects should be named exactly.
 pub const Z_SEPARATE: f64 = 16.0;
+/// The separation from the nearest wrong effect from which on a name is asked for.
+pub const Z_NAMEABLE: f64 = 5.0;
 /// Level of the oracle's test, equal to the allowed share of false alarms.
 pub const ORACLE_LEVEL: f64 = 0.028;
 /// The `1 - ORACLE_LEVEL` quantile of the normal distribution.
@@ -36,9 +38,13 @@ pub struct Scores {
     pub failed: Vec<String>,
     /// False alarms by noise: `all`, `white`, `coloured`, `quantised`.
     pub false_alarms: BTreeMap<String, Rate>,
-    /// Sets with one effect, by separation.
+    /// Sets with one effect in a form that the library does not have, by separation.
     pub bands: Vec<Band>,
-    /// Sets with one effect, by effect, from [`Z_SEPARATE`] on.
+    /// Those at least [`Z_NAMEABLE`] from the nearest wrong effect, where that is computed.
+    pub nameable: Band,
+    /// Sets with one effect that are points of the library's own parameters, by separation.
+    pub library_points: Vec<Band>,
+    /// Sets with one effect in a foreign form, by effect, from [`Z_SEPARATE`] on.
     pub effects: Vec<EffectScore>,
     /// Power curve of each effect.
     pub power: BTreeMap<String, Vec<PowerPoint>>,
@@ -98,9 +104,9 @@ pub struct Band {
     pub set_size: SetSize,
     /// A named effect is neither hidden nor equivalent to a hidden one; of all sets.
     pub wrong: Rate,
-    /// Shrink of the sets in which the effect is named and the gap is known within a tenth.
+    /// Shrink of the sets in which the gap is known within a tenth, whatever was named.
     pub shrink: Shrink,
-    /// The same over the shrink of the true effect, fitted alone.
+    /// The same over the shrink of the true effect, fitted alone; without noise where that is computed.
     pub shrink_to_own_fit: Shrink,
 }
 
@@ -193,7 +199,13 @@ impl Scores {
             *sets.entry(outcome.campaign).or_default() += 1;
         }
         let failed = outcomes.iter().filter(|outcome| outcome.has_failed()).map(|outcome| outcome.id.clone());
-        let bands = BANDS.iter().map(|(name, range)| Band::new(name, &within(&names, *range)));
+        let (points, names): (Vec<&Outcome>, Vec<&Outcome>) =
+            names.into_iter().partition(|set| set.is_library_point());
+        let bands = |sets: &[&Outcome]| {
+            BANDS.iter().map(|(name, range)| Band::new(name, &within(sets, *range))).collect()
+        };
+        let is_nameable = |set: &&&Outcome| set.z_name().is_some_and(|z| z >= Z_NAMEABLE);
+        let nameable: Vec<&Outcome> = names.iter().filter(is_nameable).copied().collect();
         let separate = within(&names, BANDS[3].1);
         let effect = |(effect, sets): (String, Vec<&Outcome>)| {
             let band = Band::new("", &sets);
@@ -203,7 +215,9 @@ impl Scores {
             sets,
             failed: failed.collect(),
             false_alarms: by_noise(&false_alarms),
-            bands: bands.collect(),
+            bands: bands(&names),
+            nameable: Band::new("", &nameable),
+            library_points: bands(&points),
             effects: by_effect(&separate).into_iter().map(effect).collect(),
             power: by_effect(&names).into_iter().map(|(effect, sets)| (effect, power(&sets))).collect(),
             confusion: confusion(&[&separate[..], &outside[..], &false_alarms[..]].concat()),
@@ -220,7 +234,6 @@ impl Scores {
 
 impl Band {
     fn new(name: &str, sets: &[&Outcome]) -> Self {
-        let known = || sets.iter().filter(|set| set.names_all() && set.gap_error <= SHRINK_ERROR_MAX);
         Self {
             name: name.into(),
             detected: Rate::of(sets, |set| set.is_detected()),
@@ -228,8 +241,8 @@ impl Band {
             in_set: Rate::of(sets, |set| set.holds_all()),
             set_size: SetSize::new(sets),
             wrong: Rate::of(sets, |set| !set.wrong_names().is_empty()),
-            shrink: Shrink::new(known().filter_map(|set| set.shrink)),
-            shrink_to_own_fit: Shrink::new(known().filter_map(|set| set.shrink_to_own_fit())),
+            shrink: Shrink::new(sets.iter().filter_map(|set| set.known_shrink())),
+            shrink_to_own_fit: Shrink::new(sets.iter().filter_map(|set| set.shrink_to_own_fit())),
         }
     }
 }
@@ -265,7 +278,6 @@ impl Shrink {
 
 impl Several {
     fn new(sets: &[&Outcome]) -> Self {
-        let known = sets.iter().filter(|set| set.gap_error <= SHRINK_ERROR_MAX);
         let hidden = sets.iter().flat_map(|set| set.truths.iter().map(move |truth| (set, truth)));
         let names = sets.iter().flat_map(|set| set.named.iter().map(move |named| (set, named)));
         Self {
@@ -279,7 +291,7 @@ impl Several {
             exact: Rate::of(sets, |set| set.is_exact()),
             in_set: Rate::of(sets, |set| set.holds_all()),
             wrong: Rate::of(sets, |set| !set.wrong_names().is_empty()),
-            shrink: Shrink::new(known.filter_map(|set| set.shrink)),
+            shrink: Shrink::new(sets.iter().filter_map(|set| set.known_shrink())),
         }
     }
 }

@@ -50,7 +50,7 @@ fn names_count_among_all_sets_also_where_nothing_was_detected() {
 fn a_shrink_counts_only_where_the_gap_is_known() {
     let known = set(&[Some("backlash")], &[("backlash", &[])], "explained");
     let unknown = Outcome { shrink: Some(-3.0), gap_error: 0.4, ..known.clone() };
-    let own = Outcome { alone_shrink: Some(0.6), ..known.clone() };
+    let own = Outcome { alone_shrink: Some(0.6), named: Vec::new(), ..known.clone() };
     let band = &Scores::new(&[known, unknown, own]).bands[0];
     assert_eq!((band.shrink.of, band.shrink.median), (2, Some(0.9)));
     assert_eq!(band.shrink_to_own_fit.of, 1);
@@ -110,4 +110,16 @@ fn outside_the_library_the_verdict_counts() {
     let all = &scores.outside["all"];
     assert_eq!((all.unexplained.hits, all.wrong.hits, all.partly.hits, all.missed.hits), (2, 1, 1, 1));
     assert_eq!(scores.outside["made-up"].unexplained.of, 4);
+}
+
+#[test]
+fn library_points_and_sets_that_nobody_could_name_are_counted_apart() {
+    let right = set(&[Some("backlash")], &[("backlash", &[])], "explained");
+    let [mut point, mut twin, mut unknown] = [right.clone(), right.clone(), right.clone()];
+    point.truths[0].is_library_point = true;
+    twin.truths[0].z_name = Some(4.0);
+    unknown.truths[0].z_name = None;
+    let scores = Scores::new(&[right, point, twin, unknown]);
+    assert_eq!((scores.bands[0].exact.of, scores.library_points[0].exact.of), (3, 1));
+    assert_eq!(scores.nameable.exact.of, 1);
 }

@@ -1,9 +1,9 @@
 //! The search for effects that, together with the base model, leave only noise.
 //!
-//! At the residual of a model, every effect of the library is a candidate ([`candidates`]). The derivatives of the prediction by its
-//! parameters, less what recalibration takes up, give its [`score`]; the largest of all scores is compared with those of data sets in
-//! which the signs of whole blocks are flipped. If it is significant, the best candidates are fitted, and one is added; effects that the
-//! held-out presses do not support are removed, and each is compared with others in its place ([`grow`]). Random walks have a score of
+//! At a model, one pass over the data gives the products of the derivatives by every shape of every effect ([`candidates`]) and of rivals
+//! without a name ([`rivals`]). From the products follow a [`score`] of each effect, whose largest is compared with those of data sets in
+//! which the signs of whole blocks are flipped, and the odds of sets of effects ([`evidence`]). The classes of the best sets are fitted, and
+//! one is added; in the end each must hold its place against no effect, rivals and other classes ([`grow`]). Random walks have a score of
 //! their own ([`drift`]), and pairs of elements are proposed by the residual ([`wiring`]).
 //!
 //! [`locate`] applies the same test to covariates in place of effects: it tells where a model and the data disagree, in words that do

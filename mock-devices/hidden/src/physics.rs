@@ -33,7 +33,7 @@ pub struct Definition {
     pub id: &'static str,
     /// The library's effect that it is an instance of; `None` if there is none.
     pub effect: Option<&'static str>,
-    /// True if the effect of the library can do exactly this at some values of its parameters: a set with it says nothing about other forms.
+    /// True if the library's effect does exactly this at some values of its parameters. Sets with it say nothing about other forms.
     pub is_library_point: bool,
     /// What it does: equation and source.
     pub about: &'static str,
@@ -94,9 +94,12 @@ pub static CATALOGUE: &[&Definition] = &[
     &hardening::QUADRATIC,
     &hardening::LIMIT,
     &hardening::TWO_LAYERS,
+    &hardening::STEP,
+    &hardening::OWN_KNEE,
     &spread::LAYERED_TAIL,
     &spread::EXPONENTIAL_TAIL,
     &spread::POWER_TAIL,
+    &spread::PLATE_TAIL,
     &spread::STRETCHED,
     &spread::SLANTED,
     &spread::STRETCHED_BY_DEPTH,
@@ -104,6 +107,7 @@ pub static CATALOGUE: &[&Definition] = &[
     &spread::WIDER_WITH_DEPTH,
     &spread::NARROWER_AT_FIRST,
     &spread::WIDER_BEYOND,
+    &spread::WIDER_CUBED,
     &spread::SOFT_EDGE,
     &spread::SEAM,
     &spread::SOFT_CORNERS,
@@ -112,6 +116,7 @@ pub static CATALOGUE: &[&Definition] = &[
     &relaxation::POWER_LAW,
     &relaxation::LOGARITHMIC,
     &relaxation::STRETCHED,
+    &relaxation::BY_LOAD,
     &hysteresis::PRANDTL_ISHLINSKII,
     &hysteresis::PREISACH,
     &hysteresis::BOUC_WEN,
@@ -145,6 +150,8 @@ pub static CATALOGUE: &[&Definition] = &[
     &drift::GAIN_WALK,
     &drift::GAIN_TEMPERATURE,
     &drift::GAIN_WARMTH,
+    &drift::GAIN_CYCLE,
+    &drift::GAIN_JUMPS,
     &readout::SECOND_ORDER,
     &readout::MOVING_AVERAGE,
     &readout::UNEVEN,

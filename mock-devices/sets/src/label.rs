@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::nearest::ClassFits;
 use crate::noise::Noise;
 use crate::plan::Plan;
 
@@ -43,18 +44,32 @@ pub struct PhysicsLabel {
     pub id: String,
     /// The library's effect that it is an instance of; `None` outside the library.
     pub effect: Option<String>,
+    /// True if it is a point of that effect's own parameters.
+    pub is_library_point: bool,
     /// Strength of its dose.
     pub strength: f64,
     /// [`Separation::z`](crate::Separation::z) of this physics alone.
     pub z: f64,
     /// [`Separation::z_beyond_spread`](crate::Separation::z_beyond_spread) of this physics alone.
     pub z_beyond_spread: f64,
+    /// How far each effect of the library, fitted to this physics alone, stays from it
+    /// ([`ClassFits::effects`](crate::ClassFits::effects)); empty until it is computed.
+    #[serde(default)]
+    pub z_of_effects: BTreeMap<String, f64>,
     /// False if no strength gives the requested separation; the strength is then that of the nearest.
     pub reached: bool,
     /// Seed of its shape.
     pub seed: u64,
     /// Its parameters, by name.
     pub parameters: BTreeMap<String, f64>,
+}
+
+impl PhysicsLabel {
+    /// The fits of the library's effects to it, if they are computed.
+    pub fn class_fits(&self) -> Option<ClassFits> {
+        let effects = self.z_of_effects.clone();
+        (!effects.is_empty()).then_some(ClassFits { base: self.z_beyond_spread, effects })
+    }
 }
 
 impl Label {

@@ -1,5 +1,7 @@
 //! From a recipe to a data set.
 
+use std::collections::BTreeMap;
+
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -213,6 +215,8 @@ impl Recipe {
             let dosed = PhysicsLabel {
                 id: physics.id.into(),
                 effect: physics.effect.map(Into::into),
+                is_library_point: physics.is_library_point,
+                z_of_effects: BTreeMap::new(),
                 strength: dose.strength,
                 z: separation.z,
                 z_beyond_spread: separation.z_beyond_spread,

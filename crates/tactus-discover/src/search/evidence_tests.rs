@@ -28,7 +28,7 @@ fn ln_density(y: &DVector<f64>, covariance: DMatrix<f64>) -> f64 {
 fn odds_are_the_ratio_of_two_normal_densities_of_the_readings() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let x = DMatrix::from_fn(60, 5, |_, _| rng.random_range(-1.0..1.0));
-    let y = DVector::from_fn(60, |_, _| rng.random_range(-2.0..2.0)) + x.column(0) * 1.5 + x.column(3) * 0.8;
+    let y = DVector::from_fn(60, |_, _| rng.random_range(-2.0..2.0)) + x.column(0) * 1.5 + x.column(3) * 1.5;
     let mut all = x.clone().resize_horizontally(6, 0.0);
     all.set_column(5, &y);
     let products = all.transpose() * &all;

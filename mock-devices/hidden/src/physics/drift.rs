@@ -1,8 +1,11 @@
 //! Readout: drift of baselines and gains.
 
+use std::f64::consts::TAU;
+
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use super::wiring::telegraph;
 use super::{Definition, PipelineHook, left, shift};
 
 pub(super) const COMMON_WALK: Definition = Definition {
@@ -119,6 +122,32 @@ pub(super) const GAIN_WARMTH: Definition = Definition {
             *now_c += (temperature_c - *now_c) * (1.0 - left(dt_s, time_s));
             per_k * (*now_c - *first_c)
         })
+    },
+};
+
+pub(super) const GAIN_CYCLE: Definition = Definition {
+    id: "gain-cycle",
+    effect: Some("gain-drift"),
+    is_library_point: false,
+    about: "s' = s (1 + a sin(2 pi t/P)): a thermostat near the electronics cycles",
+    is_fine: false,
+    make: |knobs| {
+        let period_s = knobs.between("period_s", 20.0, 50.0);
+        let swing = knobs.scaled("swing", 0.04);
+        gain(knobs.baselines_counts(), move |t_s, _, _| swing * (TAU * t_s / period_s).sin())
+    },
+};
+
+pub(super) const GAIN_JUMPS: Definition = Definition {
+    id: "gain-jumps",
+    effect: Some("gain-drift"),
+    is_library_point: false,
+    about: "s' = s (1 + a) now and then, else s: the excitation changes between two levels (random telegraph)",
+    is_fine: false,
+    make: |knobs| {
+        let change = knobs.sign("side") * knobs.scaled("change", 0.05);
+        let mut is_on = telegraph(knobs);
+        gain(knobs.baselines_counts(), move |_, dt_s, _| if is_on(dt_s) { change } else { 0.0 })
     },
 };
 

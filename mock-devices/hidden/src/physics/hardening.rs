@@ -62,3 +62,38 @@ pub(super) const TWO_LAYERS: Definition = Definition {
         PipelineHook::depth(move |_, depth_mm| depth_mm + stiffer * (depth_mm - from_mm).max(0.0))
     },
 };
+
+pub(super) const STEP: Definition = Definition {
+    id: "hardening-step",
+    effect: Some("hardening"),
+    is_library_point: false,
+    about: "depth' = depth + k w ln((1 + exp((depth - d0)/w)) / (1 + exp((depth - d1)/w))): stiffer between d0 and d1, as foam while its cells close",
+    is_fine: false,
+    make: |knobs| {
+        let from_mm = knobs.between("from_mm", 0.15, 0.25);
+        let to_mm = knobs.between("to_mm", 0.3, 0.4);
+        let stiffer = knobs.scaled("stiffer", 0.8);
+        PipelineHook::depth(move |_, depth_mm| {
+            let beyond_mm = |from_mm: f64| WIDTH_MM * ((depth_mm - from_mm) / WIDTH_MM).exp().ln_1p();
+            let at_rest_mm = |from_mm: f64| WIDTH_MM * (-from_mm / WIDTH_MM).exp().ln_1p();
+            let more_mm = beyond_mm(from_mm) - beyond_mm(to_mm) - at_rest_mm(from_mm) + at_rest_mm(to_mm);
+            depth_mm + stiffer * more_mm
+        })
+    },
+};
+
+/// Width of the ends of [`STEP`].
+const WIDTH_MM: f64 = 0.02;
+
+pub(super) const OWN_KNEE: Definition = Definition {
+    id: "hardening-own-knee",
+    effect: Some("hardening"),
+    is_library_point: false,
+    about: "u' = u + k max(0, u - u0) of every element's own indentation: a stiffer skin on each electrode",
+    is_fine: false,
+    make: |knobs| {
+        let from_mm = knobs.between("from_mm", 0.08, 0.16);
+        let stiffer = knobs.scaled("stiffer", 0.6);
+        PipelineHook::Covering(PipelineHook::each(move |u_mm| u_mm + stiffer * (u_mm - from_mm).max(0.0)))
+    },
+};

@@ -67,6 +67,24 @@ pub(super) const STRETCHED: Definition = Definition {
     },
 };
 
+pub(super) const BY_LOAD: Definition = Definition {
+    id: "relaxation-by-load",
+    effect: Some("relaxation"),
+    is_library_point: false,
+    about: "u' = u (1 - g (depth/t) (1 - exp(-t_c/T))), t_c the time in contact: the more it is loaded, the more it flows (Schapery 1969)",
+    is_fine: false,
+    make: |knobs| {
+        let time_s = knobs.decade("time_constant_s", 0.5, 3.0);
+        let share = knobs.scaled("share_at_thickness", 0.4);
+        let thickness_mm = knobs.sensor.covering.thickness_mm;
+        let mut in_contact_s = 0.0;
+        PipelineHook::depth(move |now, depth_mm| {
+            in_contact_s = if depth_mm > 0.0 { in_contact_s + now.dt_s } else { 0.0 };
+            depth_mm * (1.0 - share * depth_mm / thickness_mm * (1.0 - left(in_contact_s, time_s)))
+        })
+    },
+};
+
 /// Parallel branches that each follow their input with a time constant; exact while the input is a straight line.
 #[derive(Debug)]
 pub(super) struct Branches {

@@ -46,6 +46,23 @@ pub(super) const POWER_TAIL: Definition = Definition {
     },
 };
 
+pub(super) const PLATE_TAIL: Definition = Definition {
+    id: "plate-tail",
+    effect: Some("heavy-tail"),
+    is_library_point: false,
+    about: "G' = (1 - w) G + w / (pi R^2) within R: a stiff plate of radius R on the covering takes part of the press",
+    is_fine: false,
+    make: |knobs| {
+        let radius_mm = knobs.between("radius_mm", 5.0, 8.0);
+        tail(
+            knobs,
+            |distance_mm| {
+                if distance_mm < radius_mm { 1.0 / (PI * radius_mm * radius_mm) } else { 0.0 }
+            },
+        )
+    },
+};
+
 pub(super) const STRETCHED: Definition = Definition {
     id: "stretched-spread",
     effect: Some("anisotropic-spread"),
@@ -128,6 +145,22 @@ pub(super) const WIDER_WITH_DEPTH: Definition = Definition {
         PipelineHook::tool(move |now, tool| {
             let widened = (1.0 + growth * now.touch.depth_mm.clamp(0.0, thickness_mm) / thickness_mm).sqrt();
             tool.sigma_mm = tool.sigma_mm.map(|sigma_mm| sigma_mm * widened);
+        })
+    },
+};
+
+pub(super) const WIDER_CUBED: Definition = Definition {
+    id: "wider-cubed",
+    effect: Some("depth-dependent-spread"),
+    is_library_point: false,
+    about: "sigma' = sigma (1 + a (depth/t)^3): a deep press pushes the covering aside, a light one does not",
+    is_fine: false,
+    make: |knobs| {
+        let growth = knobs.scaled("growth", 0.8);
+        let thickness_mm = knobs.sensor.covering.thickness_mm;
+        PipelineHook::tool(move |now, tool| {
+            let share = now.touch.depth_mm.clamp(0.0, thickness_mm) / thickness_mm;
+            tool.sigma_mm = tool.sigma_mm.map(|sigma_mm| sigma_mm * (1.0 + growth * share.powi(3)));
         })
     },
 };

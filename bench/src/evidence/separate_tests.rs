@@ -1,0 +1,30 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use tactus_sets::{Content, Recipe};
+
+use super::super::campaign::Campaign;
+use super::*;
+
+#[test]
+fn a_label_gets_its_separation_once() -> Result<()> {
+    let folder = std::env::temp_dir().join(format!("tactus-separate-{}", std::process::id()));
+    let places = Places { work: folder.join("work"), labels: folder.join("labels") };
+    let content = Content { physics: vec!["late-touch".into()], ..Content::default() };
+    let recipe = Recipe { frames: Some(400), content, ..Recipe::new(3) };
+    let set = Planned { id: "names/one".into(), campaign: Campaign::Names, recipe };
+    let path = places.label(&set.id);
+    fs::create_dir_all(path.parent().context("a folder")?)?;
+    fs::write(&path, serde_json::to_string(&set.recipe.make()?.label)?)?;
+    let done = AtomicUsize::new(0);
+    for _ in 0..2 {
+        separate(std::slice::from_ref(&set), &places, 1, &|_| _ = done.fetch_add(1, Ordering::Relaxed))?;
+    }
+    let label: Label = parsed(&path)?;
+    fs::remove_dir_all(&folder)?;
+    let fits = label.physics[0].class_fits().context("it has them")?;
+    assert_eq!(done.into_inner(), 1);
+    assert_eq!(fits.effects.len(), tactus_model::effect::REGISTRY.len());
+    let nearest = fits.z_name("surface-offset").context("it is an effect")?;
+    assert!(nearest > 0.0 && nearest <= 1.001 * fits.base, "{nearest} of {}", fits.base);
+    Ok(())
+}
