@@ -55,7 +55,7 @@ enum Surface {
 /// In which state of the rig or the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Condition {
-    /// The tip holds 0.2 mm in the covering. So it does in all conditions but the next two.
+    /// The tip holds 0.1 mm in the covering. So it does in all conditions but the next two.
     Contact,
     /// The sensor does not exist, so the service is not ready.
     NoSensor,
@@ -264,8 +264,7 @@ impl Scene {
     /// Brings the rig into the state in which it is stopped.
     fn prepare(&mut self, nth: usize) {
         match self.condition {
-            // Time for the controller to restart after the last stop.
-            Condition::NoSensor => self.bench.stage.pass(Duration::from_millis(150)),
+            Condition::NoSensor => {}
             Condition::Homing => {
                 self.resetting = Some(self.bench.send(Command::Reset));
                 self.bench.stage.until("homing", |_, seen| matches!(seen, Seen::Home).then_some(()));
@@ -346,7 +345,14 @@ impl Scene {
                 let reply = self.bench.runtime.block_on(reset).unwrap().unwrap();
                 assert!(!reply.ok, "homing was stopped");
             }
-            (None, Condition::NoSensor) => {}
+            // The first report may be older than the controller's restart.
+            (None, Condition::NoSensor) => {
+                for _ in 0..2 {
+                    self.bench
+                        .stage
+                        .until("a report", |_, seen| matches!(seen, Seen::Report { .. }).then_some(()));
+                }
+            }
             (None, _) => self.bench.until_finished(),
         }
     }
