@@ -170,6 +170,8 @@ impl Bench {
         self.stage.forget();
         let args = ["--config", "tactusd.toml"];
         let daemon = (self.options.start)("tactusd", self.folder.path(), &args);
+        // Most boards restart when their port is opened, and the service need not wait for a banner that does not come.
+        self.mock.type_line("stage reset");
         self.pin(&daemon);
         self.daemon = Some(daemon);
         self.stage.until("a report", |_, seen| matches!(seen, Seen::Report { .. }).then_some(()));

@@ -111,6 +111,12 @@ pub enum StageError {
         "the stage was stopped at {position_mm:?} mm: the frames and the stage were not watched for 0.08 s"
     )]
     Unwatched { position_mm: [f64; 3] },
+    /// No report or reply came during a motion, and the stage was stopped.
+    #[error(
+        "the stage did not answer for {waited_s:.1} s of {command:?}, and was stopped: this computer is too busy, or the link \
+         loses bytes"
+    )]
+    Unanswered { command: String, waited_s: f64 },
     /// The link or the device failed.
     #[error(transparent)]
     Device(#[from] DeviceError),

@@ -20,7 +20,7 @@ const TROUBLES_MAX: u32 = 5;
 /// Greatest number of stops that one retract outlasts. Somebody who stops it more often is told that the tip is not up.
 const STOPS_MAX: u32 = 200;
 
-/// Greatest number of tries for one move that ends because nobody watched it.
+/// Greatest number of tries for one move that ends because nobody watched it, or because the stage did not tell of it.
 const UNWATCHED_MAX: u32 = 5;
 
 /// Greatest number of homings for one reset.
@@ -234,7 +234,11 @@ impl Shared {
             match moved {
                 // Nothing was sent. With a fast sensor and a slow computer permits are often too old.
                 Err(StageError::Void(Void::Expired)) if self.clock.now().mono < deadline => {}
-                Err(StageError::Unwatched { .. }) if tries < UNWATCHED_MAX => {}
+                Err(StageError::Unwatched { .. } | StageError::Unanswered { .. })
+                    if tries < UNWATCHED_MAX =>
+                {
+                    tracing::warn!(tries, "a move was broken off: it goes on with a new permit");
+                }
                 moved => return Ok(moved?),
             }
         }

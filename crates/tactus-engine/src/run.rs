@@ -128,7 +128,7 @@ impl Run {
         let run_id = run.order.run_id.clone();
         let opened = run.shared.acquisition.tell(move |live| live.open_recording(record, run_id)).await;
         let result = match opened {
-            Ok(()) => run.perform_all().await,
+            Ok(()) => run.run_to_end().await,
             Err(gone) => Err(gone.into()),
         };
         if !run.is_prepared {
@@ -162,7 +162,7 @@ impl Run {
     }
 
     /// From the first check to the end of the script.
-    async fn perform_all(&mut self) -> Result<(), Broken> {
+    async fn run_to_end(&mut self) -> Result<(), Broken> {
         self.set_state(pb::RunPhase::Preparing, "preparing").await;
         self.emit(Event::Started(self.describe_start())).await;
         self.admit().await?;

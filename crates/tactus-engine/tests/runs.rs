@@ -520,6 +520,18 @@ async fn zeros_far_from_the_baseline_refuse_the_run_and_cannot_ratchet() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_move_of_which_no_report_came_goes_on_a_few_times_and_then_fails() {
+    for (unanswered, status) in [(4, ExitStatus::Done), (5, ExitStatus::Failed)] {
+        let bench = Bench::start(|rig| rig);
+        bench.trouble.lock().unwrap().unanswered = unanswered;
+        let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+        assert_eq!(outcome.exit_status, status, "{outcome:?}");
+        assert_eq!(outcome.dwells, if status == ExitStatus::Done { 2 } else { 0 });
+        assert!(*bench.deepest_mm.lock().unwrap() < 0.4 + 1e-9);
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_dwell_in_which_the_stage_lost_its_place_is_not_told_as_done() {
     let mut bench = Bench::start(|rig| rig);
     let memory = Memory::default();

@@ -196,8 +196,8 @@ impl EvaluationContext {
         Ok(line)
     }
 
-    /// Has the host perform a step.
-    pub(crate) fn perform(&self, step: Step, eval: &Evaluator<'_, '_, '_>) -> Result<Reply, Halt> {
+    /// Asks the host for a step, and waits for its result.
+    pub(crate) fn ask(&self, step: Step, eval: &Evaluator<'_, '_, '_>) -> Result<Reply, Halt> {
         if self.part.get() != ScriptSection::Run {
             return Err(Halt::Failed(
                 "only run(rig) may do something: the top level declares parameters".into(),

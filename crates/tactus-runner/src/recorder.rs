@@ -357,8 +357,8 @@ impl ThreadRecorder {
         )
     }
 
-    fn queue(&mut self, entry: Entry, at: MonoTime) -> Result<(), RecordFailure> {
-        let (bytes, is_frame) = (entry.bytes(), matches!(entry, Entry::Frame(_)));
+    fn queue(&mut self, entry: Entry) -> Result<(), RecordFailure> {
+        let (at, bytes, is_frame) = (entry.at(), entry.bytes(), matches!(entry, Entry::Frame(_)));
         let refusal = self.entries.try_send(entry).err();
         if refusal.is_some() {
             self.refused = self.refused.plus(Missing::message(is_frame));
@@ -393,23 +393,23 @@ impl ThreadRecorder {
 
 impl Record for ThreadRecorder {
     fn sensor_info(&mut self, info: &pb::SensorInfo, at: TimeStamp) -> Result<(), RecordFailure> {
-        self.queue(Entry::SensorInfo(info.clone(), at), at.mono)
+        self.queue(Entry::SensorInfo(info.clone(), at))
     }
 
     fn frame(&mut self, frame: &Frame) -> Result<(), RecordFailure> {
-        self.queue(Entry::Frame(frame.clone()), frame.received.mono)
+        self.queue(Entry::Frame(frame.clone()))
     }
 
     fn stage(&mut self, state: &pb::StageState) -> Result<(), RecordFailure> {
-        self.queue(Entry::Stage(*state), MonoTime::from_ns(state.t_mono_ns))
+        self.queue(Entry::Stage(*state))
     }
 
     fn event(&mut self, event: &pb::RunEvent) -> Result<(), RecordFailure> {
-        self.queue(Entry::Event(event.clone()), MonoTime::from_ns(event.t_mono_ns))
+        self.queue(Entry::Event(event.clone()))
     }
 
     fn safety(&mut self, event: &pb::SafetyEvent) -> Result<(), RecordFailure> {
-        self.queue(Entry::Safety(event.clone()), MonoTime::from_ns(event.t_mono_ns))
+        self.queue(Entry::Safety(event.clone()))
     }
 
     fn check(&mut self, now: MonoTime) -> Result<(), RecordFailure> {

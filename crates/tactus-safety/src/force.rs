@@ -81,8 +81,9 @@ impl Elements {
         self.tare = None;
     }
 
-    /// Takes a frame. Elements that were not read are ignored: their value in the frame is an earlier one.
-    pub(crate) fn take(&mut self, frame: &Frame) {
+    /// Takes a frame. Elements that were not read are ignored: their value in the frame is an earlier one. False if it reads
+    /// no watched element: it shows no load, and counts as none.
+    pub(crate) fn take(&mut self, frame: &Frame) -> bool {
         let at = frame.received.mono;
         let unread = ElementState { counts: 0.0, last_read: None, is_read: false };
         self.states.resize(frame.counts.len(), unread);
@@ -97,13 +98,15 @@ impl Elements {
             }
         }
         let unwatched = &self.rig.unwatched;
+        let mut is_one = false;
         for (element, state) in self.states.iter_mut().enumerate().filter(|(_, state)| state.is_read) {
             state.last_read = Some(at);
-            if !unwatched.contains(&element) {
-                // A frame that reads no element shows no load: it is none.
-                self.last_frame = Some(at);
-            }
+            is_one |= !unwatched.contains(&element);
         }
+        if is_one {
+            self.last_frame = Some(at);
+        }
+        is_one
     }
 
     /// Sets the run's first zero, which is the tare, too.

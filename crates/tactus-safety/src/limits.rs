@@ -19,8 +19,8 @@ const SILENT_PERIODS_MAX: f64 = 3.0;
 /// a question that was not answered.
 pub(crate) const REPORT_AGE_MAX_S: f64 = 0.5;
 
-/// Shortest of the supervisor's times. Links deliver in batches of up to 16 ms and timers are coarse, so that three periods of a
-/// sensor of more than 100 Hz are no silence.
+/// Shortest of the supervisor's times. Links deliver in batches of up to 16 ms and timers are coarse: three periods of a sensor of
+/// more than 100 Hz are no silence, and a question to the controller outlasts one period of more than 33 Hz.
 const SHORTEST_S: f64 = 0.03;
 
 /// What the supervisor holds motion and readings against.
@@ -47,7 +47,7 @@ impl Limits {
         (SILENT_PERIODS_MAX * self.sample_period_s).max(SHORTEST_S)
     }
 
-    /// How long a permit down is valid: a sample period.
+    /// How long a permit down is valid: a sample period, but not less than a driver takes to ask the controller before a move.
     pub(crate) fn permit_s(&self) -> f64 {
         self.sample_period_s.max(SHORTEST_S)
     }

@@ -90,8 +90,9 @@ impl Supervisor {
 
     /// Checks a frame.
     pub fn on_frame(&mut self, frame: &Frame) -> Option<Violation> {
-        self.elements.take(frame);
-        self.z_at_frame_mm = self.z_mm;
+        if self.elements.take(frame) {
+            self.z_at_frame_mm = self.z_mm;
+        }
         let position_mm = self.position_mm();
         let is_standing = self.status() == StageStatus::Idle;
         let response = position_mm

@@ -235,7 +235,10 @@ fn standing(z_mm: f64) -> pb::StageState {
 
 /// Over the array at a height, with a zero and a frame at 1 s.
 fn ready(z_mm: f64) -> Supervisor {
-    let mut supervisor = supervisor();
+    ready_with(supervisor(), z_mm)
+}
+
+fn ready_with(mut supervisor: Supervisor, z_mm: f64) -> Supervisor {
     assert_eq!(supervisor.on_frame(&frame(1000, &[100.0; 48])), None);
     supervisor.set_reference(&[100.0; 48]).unwrap();
     assert_eq!(supervisor.on_report(&standing(z_mm)), None);
@@ -251,6 +254,14 @@ fn a_permit_down_lasts_one_sample_period_and_one_up_lasts() {
     assert_eq!(down.check(at_ms(1044)), Err(Void::Expired));
     let up = supervisor.permit(to(2.0), at_ms(1010)).unwrap();
     assert_eq!(up.check(at_ms(100_000)), Ok(()));
+}
+
+#[test]
+fn a_permit_down_of_a_fast_sensor_lasts_long_enough_for_a_question_to_the_controller() {
+    let mut supervisor = ready_with(changed(|rig| rig.replace("rate_hz = 30.0", "rate_hz = 1000.0")), 0.1);
+    let down = supervisor.permit(to(0.0), at_ms(1010)).unwrap();
+    assert_eq!(down.check(at_ms(1040)), Ok(()));
+    assert_eq!(down.check(at_ms(1041)), Err(Void::Expired));
 }
 
 #[test]
@@ -456,6 +467,9 @@ fn however_slow_the_sensor_is_two_steps_down_are_the_most_without_a_frame() {
     }
     let denied = supervisor.permit(to(0.0), at_ms(1010)).unwrap_err();
     assert!(denied.may_pass() && matches!(denied, Denied::NoFreshFrame { .. }), "{denied}");
+    assert_eq!(supervisor.on_frame(&frame(1020, &[f32::NAN; 48])), None);
+    let denied = supervisor.permit(to(0.0), at_ms(1021)).unwrap_err();
+    assert!(matches!(denied, Denied::NoFreshFrame { .. }), "a frame that reads no element is none: {denied}");
     assert_eq!(supervisor.on_frame(&frame(1033, &[100.0; 48])), None);
     supervisor.permit(to(0.0), at_ms(1040)).unwrap();
 }

@@ -473,6 +473,9 @@ fn stage_error(failure: Failure, active: &Active) -> StageError {
         Failure::Withheld => active.void.unwrap_or(Void::Revoked).into(),
         Failure::Stopped { position_mm } => StageError::Stopped { position_mm },
         Failure::Refused { command, reason } => StageError::Refused { command, reason },
+        Failure::Unanswered { command, waited } => {
+            StageError::Unanswered { command, waited_s: waited.as_secs_f64() }
+        }
         Failure::Alarm(alarm) => StageError::Alarm {
             code: alarm.code.into(),
             name: alarm.name(),

@@ -26,6 +26,8 @@ pub(crate) struct Trouble {
     pub(crate) absent: Option<&'static str>,
     /// The next question to the stage below the surface panics.
     pub(crate) look_panics: bool,
+    /// Moves down that the stage will break off half-way, because no report came, before the next one.
+    pub(crate) unanswered: u32,
     /// Epoch of the stage's position.
     pub(crate) epoch: u32,
     /// Number of the stage's alarm, if it is in one.
@@ -196,9 +198,17 @@ impl Stage for FakeStage {
             let moved = self.clock.now().mono.since(start).saturating_sub(STARTING);
             let share = if lasts.is_zero() { 1.0 } else { moved.as_secs_f64() / lasts.as_secs_f64() };
             let share = if stopped { share.min(1.0) } else { 1.0 };
+            let is_unanswered = !stopped && way[2] < 0.0 && {
+                let unanswered = &mut self.trouble.lock().unwrap().unanswered;
+                std::mem::replace(unanswered, unanswered.saturating_sub(1)) > 0
+            };
+            let share = if is_unanswered { 0.5 } else { share };
             let at: Vec<_> = from.iter().zip(&way).map(|(from, way)| from + way * share).collect();
-            let at = if stopped { [at[0], at[1], at[2]] } else { target.position_mm };
+            let at = if share < 1.0 { [at[0], at[1], at[2]] } else { target.position_mm };
             self.report(at, pb::StageStatus::Idle).await;
+            if is_unanswered {
+                return Err(StageError::Unanswered { command: "G1".into(), waited_s: 0.3 });
+            }
             if stopped { Err(StageError::Stopped { position_mm: at }) } else { Ok(at) }
         }
         .boxed()

@@ -32,7 +32,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
             height_mm.into_option().map(|UnpackFloat(height)| finite("height_mm", height)).transpose()?;
         let speed_mm_per_s = speed(speed_mm_per_s)?;
         let step = Step::Move { to: place(&x_mm, &y_mm)?, height_mm, speed_mm_per_s };
-        perform(step, eval)
+        ask(step, eval)
     }
 
     /// Presses once: comes down, holds each depth in turn while it reads, goes up again.
@@ -59,12 +59,12 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
             speed_mm_per_s: speed(speed_mm_per_s)?,
             approach_from_mm: approach_from_mm.into_option().map(aside).transpose()?,
         });
-        perform(step, eval)
+        ask(step, eval)
     }
 
     /// Stays where the tip is and averages readings, after the rig's settling time. Gives a reading.
     fn dwell<'v>(duration_s: UnpackFloat, eval: &mut Evaluator<'v, '_, '_>) -> starlark::Result<Value<'v>> {
-        perform(Step::Dwell { duration_s: positive("duration_s", duration_s.0)? }, eval)
+        ask(Step::Dwell { duration_s: positive("duration_s", duration_s.0)? }, eval)
     }
 
     /// Averages readings at once. Gives a reading: `counts`, `signal` (above the tare) and `rms` have one number
@@ -73,7 +73,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         #[starlark(default = UnpackFloat(0.25))] duration_s: UnpackFloat,
         eval: &mut Evaluator<'v, '_, '_>,
     ) -> starlark::Result<Value<'v>> {
-        perform(Step::Read { duration_s: positive("duration_s", duration_s.0)? }, eval)
+        ask(Step::Read { duration_s: positive("duration_s", duration_s.0)? }, eval)
     }
 
     /// Makes the present reading the zero of later signals. Not while pressing.
@@ -81,12 +81,12 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         #[starlark(default = UnpackFloat(0.5))] duration_s: UnpackFloat,
         eval: &mut Evaluator<'v, '_, '_>,
     ) -> starlark::Result<Value<'v>> {
-        perform(Step::Tare { duration_s: positive("duration_s", duration_s.0)? }, eval)
+        ask(Step::Tare { duration_s: positive("duration_s", duration_s.0)? }, eval)
     }
 
     /// Lets time pass.
     fn wait<'v>(duration_s: UnpackFloat, eval: &mut Evaluator<'v, '_, '_>) -> starlark::Result<Value<'v>> {
-        perform(Step::Wait { duration_s: positive("duration_s", duration_s.0)? }, eval)
+        ask(Step::Wait { duration_s: positive("duration_s", duration_s.0)? }, eval)
     }
 
     /// Has another covering put in place: a simulated rig changes it itself, a real one asks and waits.
@@ -94,7 +94,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         thickness_mm: UnpackFloat,
         eval: &mut Evaluator<'v, '_, '_>,
     ) -> starlark::Result<Value<'v>> {
-        perform(Step::Covering { thickness_mm: positive("thickness_mm", thickness_mm.0)? }, eval)
+        ask(Step::Covering { thickness_mm: positive("thickness_mm", thickness_mm.0)? }, eval)
     }
 
     /// Writes a line into the run's events. Values are separated by spaces, numbers rounded to a millionth. Only 4 KiB of a
@@ -104,7 +104,7 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
         eval: &mut Evaluator<'v, '_, '_>,
     ) -> starlark::Result<Value<'v>> {
         let message = context::current()?.log_line(line_of(values)?)?;
-        perform(Step::Log { message }, eval)
+        ask(Step::Log { message }, eval)
     }
 
     /// Ends the run as failed, with the values as its message.
@@ -113,8 +113,8 @@ pub(super) fn functions(builder: &mut GlobalsBuilder) {
     }
 }
 
-fn perform<'v>(step: Step, eval: &mut Evaluator<'v, '_, '_>) -> starlark::Result<Value<'v>> {
-    let reply = context::current()?.perform(step, eval)?;
+fn ask<'v>(step: Step, eval: &mut Evaluator<'v, '_, '_>) -> starlark::Result<Value<'v>> {
+    let reply = context::current()?.ask(step, eval)?;
     let heap = eval.heap();
     Ok(match reply {
         Reply::Done => Value::new_none(),

@@ -180,6 +180,7 @@ fn describe(now: Duration, action: &Action) -> String {
         Action::Done(Err(failure)) => match failure {
             Failure::Stopped { position_mm } => format!("= stopped {}", place(*position_mm)),
             Failure::Refused { reason, .. } => format!("= refused {reason}"),
+            Failure::Unanswered { waited, .. } => format!("= unanswered for {waited:?}"),
             Failure::Alarm(alarm) => format!("= alarm {}", alarm.name()),
             Failure::Unhomed => "= unhomed".to_owned(),
             Failure::Withheld => "= withheld".to_owned(),

@@ -104,6 +104,13 @@ pub enum Failure {
         /// Why, in words.
         reason: String,
     },
+    /// No report or reply came during a motion. The stage was stopped, and stands.
+    Unanswered {
+        /// The motion's command.
+        command: String,
+        /// Time without an answer.
+        waited: Duration,
+    },
     /// The controller is in alarm.
     Alarm(Alarm),
     /// The position is not known.
@@ -180,9 +187,12 @@ impl Failure {
             Self::Stopped { .. } => Self::Stopped { position_mm },
             Self::Overdue { target_mm, waited, .. } => Self::Overdue { target_mm, position_mm, waited },
             Self::Interrupted { axis, meaning, .. } => Self::Interrupted { axis, meaning, position_mm },
-            Self::Withheld | Self::Refused { .. } | Self::Alarm(_) | Self::Unhomed | Self::NotIdle { .. } => {
-                self
-            }
+            Self::Withheld
+            | Self::Refused { .. }
+            | Self::Unanswered { .. }
+            | Self::Alarm(_)
+            | Self::Unhomed
+            | Self::NotIdle { .. } => self,
             Self::NotThere { target_mm, .. } => Self::NotThere { target_mm, position_mm },
             Self::Astray { target_mm, .. } => Self::Astray { target_mm, position_mm },
         }

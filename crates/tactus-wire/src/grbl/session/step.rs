@@ -187,9 +187,8 @@ impl Session {
     /// Stops a stage that moves without reports.
     pub(super) fn hold_unwatched(&mut self, now: Duration) {
         if let Phase::Moving(travel) = &self.phase {
-            let reason = format!("it gave no report for {UNWATCHED_MAX:?} of the move, and was stopped");
-            let failure = Failure::Refused { command: travel.line().to_owned(), reason };
-            self.hold(now, Some(failure));
+            let command = travel.line().to_owned();
+            self.hold(now, Some(Failure::Unanswered { command, waited: UNWATCHED_MAX }));
         }
     }
 

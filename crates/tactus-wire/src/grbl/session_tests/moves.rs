@@ -299,7 +299,7 @@ fn a_stage_that_moves_without_reports_is_stopped() {
         1620 > ?
         1625 < <Idle|MPos:3.000,1.000,5.000|FS:0,0>
         1625 = Idle 3.000 1.000 5.000
-        1625 = refused it gave no report for 300ms of the move, and was stopped",
+        1625 = unanswered for 300ms",
     );
 }
 

@@ -8,7 +8,7 @@ use crate::zaber::Flag;
 const REPLY_TIMEOUT: Duration = Duration::from_millis(250);
 
 /// After this, it is unknown whether an unanswered move or homing has arrived.
-const MOTION_REPLY_TIMEOUT: Duration = Duration::from_millis(500);
+pub(super) const MOTION_REPLY_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// A device that has left a request unanswered for this long is gone.
 const SILENCE_MAX: Duration = Duration::from_secs(2);

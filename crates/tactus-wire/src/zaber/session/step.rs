@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use super::phase::{Phase, Stop};
-use super::request::{Pending, Request, SlotRequest};
+use super::request::{MOTION_REPLY_TIMEOUT, Pending, Request, SlotRequest};
 use super::{Action, Failure, Session, SessionError};
 use crate::stage::{Alarm, Report, Session as _, Status};
 use crate::zaber::HostCommand;
@@ -130,10 +130,8 @@ impl Session {
         let Some(pending) = self.pending else { return };
         let SlotRequest { slot, request } = pending.request;
         if request.moves() {
-            return self.halt_all(
-                now,
-                Some(Failure::refused(&request.text(), "no answer came; the stage was stopped")),
-            );
+            let failure = Failure::Unanswered { command: request.text(), waited: MOTION_REPLY_TIMEOUT };
+            return self.halt_all(now, Some(failure));
         }
         if pending.is_silent(now) {
             let device = self.device_of(slot);

@@ -154,7 +154,9 @@ fn a_move_that_is_not_confirmed_is_not_sent_again_but_stopped() {
     play.run(5);
     play.stage.lost_replies = 1;
     play.run(1000);
-    assert!(matches!(play.result(), Err(Failure::Refused { reason, .. }) if reason.contains("no answer")));
+    assert!(
+        matches!(play.result(), Err(Failure::Unanswered { command, .. }) if command.contains("move abs 0"))
+    );
     assert_eq!(play.commands()[3..], [speed, "/1 1 move abs 0", "/0 0 stop"]);
     assert!(!play.stage.axes[0].is_busy());
     assert_eq!(play.status(), Status::Idle);
