@@ -143,7 +143,7 @@ impl<'a> Fitter<'a> {
         let rest: Vec<f64> = self.with.iter().zip(&counts).map(|(with, counts)| with - counts).collect();
         let mut columns = Vec::new();
         let mut moved: Vec<(Option<usize>, f64)> = Vec::new();
-        for free in self.free(at.definition).map(Some).chain([None]) {
+        for free in free(at.definition).map(Some).chain([None]) {
             let mut nudged = at.clone();
             let by = nudged.nudge(free);
             let column: Vec<f64> =
@@ -163,14 +163,6 @@ impl<'a> Fitter<'a> {
             next.shift(moved[place].0, step[place]);
         }
         Some(self.judged(next))
-    }
-
-    /// Parameters that a fit varies.
-    fn free(&self, definition: &'static Definition) -> impl Iterator<Item = usize> + use<> {
-        let parameters = definition.parameters.iter().enumerate();
-        parameters
-            .filter(|(_, one)| one.kind == ParameterKind::Real && one.name != "duration_s")
-            .map(|(place, _)| place)
     }
 
     fn judged(&self, mut guess: Guess) -> Guess {
@@ -370,6 +362,14 @@ fn strongest_hz(series: &[f64], rate_hz: f64) -> f64 {
     let lines = (4..series.len()).map(|line| (line, power(line)));
     let (line, _) = lines.max_by(|one, other| one.1.total_cmp(&other.1)).unwrap_or((4, 0.0));
     line as f64 * rate_hz / (2 * series.len()) as f64
+}
+
+/// Parameters that a fit varies.
+fn free(definition: &'static Definition) -> impl Iterator<Item = usize> {
+    let parameters = definition.parameters.iter().enumerate();
+    parameters
+        .filter(|(_, one)| one.kind == ParameterKind::Real && one.name != "duration_s")
+        .map(|(place, _)| place)
 }
 
 #[cfg(test)]

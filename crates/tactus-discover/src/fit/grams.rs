@@ -173,11 +173,12 @@ impl Problem<'_> {
                 let mut parts: Vec<(usize, Range<usize>)> = Vec::new();
                 for bin in range.filter(|bin| self.train[*bin] > 0.0) {
                     let key = (bins.block[bin] / joined, segments.of_bin[bin]);
-                    match parts.last_mut() {
-                        Some((block, part)) if (*block, segments.of_bin[part.start]) == key => {
-                            part.end = bin + 1
-                        }
-                        _ => parts.push((key.0, bin..bin + 1)),
+                    let same = |part: &&mut (usize, Range<usize>)| {
+                        part.0 == key.0 && segments.of_bin[part.1.start] == key.1
+                    };
+                    match parts.last_mut().filter(same) {
+                        Some((_, part)) => part.end = bin + 1,
+                        None => parts.push((key.0, bin..bin + 1)),
                     }
                 }
                 let sum = |(number, part): &(usize, Range<usize>)| {
@@ -198,15 +199,13 @@ impl Problem<'_> {
         let count = chunk.columns.len() + 1;
         let weighed: Vec<usize> =
             (0..elements).filter(|element| self.element_weight[*element] > 0.0).collect();
-        let readings: Vec<(usize, usize, f64)> = part
-            .clone()
-            .filter(|bin| self.train[*bin] > 0.0)
-            .flat_map(|bin| {
-                let of_bin = self.train[bin];
-                weighed.iter().map(move |element| (bin, *element, (of_bin, *element)))
-            })
-            .map(|(bin, element, (of_bin, _))| (bin, element, (of_bin * self.element_weight[element]).sqrt()))
-            .collect();
+        // Bin, element and the root of the weight.
+        let of_bin = |bin: usize| {
+            let root = move |element: &usize| (self.train[bin] * self.element_weight[*element]).sqrt();
+            weighed.iter().map(move |element| (bin, *element, root(element)))
+        };
+        let readings: Vec<(usize, usize, f64)> =
+            part.clone().filter(|bin| self.train[*bin] > 0.0).flat_map(of_bin).collect();
         let place = |bin: usize, element: usize| (bin - chunk.bins.start) * elements + element;
         let mut sums = Sums {
             segment: segments.of_bin[part.start],

@@ -102,13 +102,13 @@ impl Stream<'_> {
             let frame = bins.first[bin];
             let (run, tool, covering_mm) = (bins.run[bin], frames.indenter[frame], frames.covering_mm[frame]);
             let covering = Covering { thickness_mm: covering_mm };
-            let running = match self.running.take().filter(|one| (one.run, one.tool) == (run, tool)) {
-                Some(running) => running,
-                None => {
-                    let pipeline =
-                        self.predictor.pipeline(&self.parameters, run, tool, covering, &self.effects)?;
-                    Running { run, tool, covering_mm, pipeline }
-                }
+            let same = self.running.take().filter(|one| (one.run, one.tool) == (run, tool));
+            let running = if let Some(running) = same {
+                running
+            } else {
+                let pipeline =
+                    self.predictor.pipeline(&self.parameters, run, tool, covering, &self.effects)?;
+                Running { run, tool, covering_mm, pipeline }
             };
             let running = self.running.insert(running);
             if running.covering_mm.to_bits() != covering_mm.to_bits() {

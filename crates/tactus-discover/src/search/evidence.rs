@@ -15,7 +15,7 @@
 //! A name has a prior probability of 1 in 20, shared among its shapes.
 //!
 //! # Source
-//! D. J. C. MacKay, *Neural Comput.* 4 (1992) 415 (evidence, one variance a group); R. E. Kass and A. E. Raftery, *J. Am. Stat.
+//! D. J. C. `MacKay`, *Neural Comput.* 4 (1992) 415 (evidence, one variance a group); R. E. Kass and A. E. Raftery, *J. Am. Stat.
 //! Assoc.* 90 (1995) 773 (what a ratio of likelihoods says).
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -100,6 +100,22 @@ impl Signs {
     }
 }
 
+impl Set {
+    /// The set with one more addition.
+    fn with(&self, addition: usize, gain: &Gain) -> Self {
+        let mut with = self.clone();
+        with.members.push(addition);
+        with.ln_odds += gain.ln_odds;
+        for (direction, precision) in &gain.active {
+            let pivot = with.products[(*direction, *direction)] + precision;
+            let row = with.products.row(*direction).transpose();
+            with.products.ger(-1.0 / pivot, &row, &row, 1.0);
+            with.swept.push((*direction, *precision));
+        }
+        with
+    }
+}
+
 impl Evidence<'_> {
     /// No additions.
     pub(crate) fn none(&self) -> Set {
@@ -167,23 +183,9 @@ impl Evidence<'_> {
         (shapes as f64).ln() + if is_again { ODDS_AGAINST_AGAIN.ln() } else { ODDS_AGAINST.ln() }
     }
 
-    /// A set with one more addition.
-    pub(crate) fn with(&self, set: &Set, addition: usize, gain: &Gain) -> Set {
-        let mut with = set.clone();
-        with.members.push(addition);
-        with.ln_odds += gain.ln_odds;
-        for (direction, precision) in &gain.active {
-            let pivot = with.products[(*direction, *direction)] + precision;
-            let row = with.products.row(*direction).clone_owned();
-            with.products.ger(-1.0 / pivot, &row.transpose(), &row.transpose(), 1.0);
-            with.swept.push((*direction, *precision));
-        }
-        with
-    }
-
     /// The set of some additions, each made after those before it.
     pub(crate) fn set(&self, members: impl IntoIterator<Item = usize>) -> Set {
-        members.into_iter().fold(self.none(), |set, member| self.with(&set, member, &self.gain(&set, member)))
+        members.into_iter().fold(self.none(), |set, member| set.with(member, &self.gain(&set, member)))
     }
 
     /// The sets with the greatest odds among the additions that `among` selects, best first: the empty one is among them.
@@ -204,7 +206,7 @@ impl Evidence<'_> {
                         others != members
                     };
                     if next.iter().all(is_new) {
-                        next.push(self.with(set, addition, &gain));
+                        next.push(set.with(addition, &gain));
                     }
                 }
             }
@@ -254,7 +256,7 @@ impl Evidence<'_> {
             let others: Vec<usize> = best.members.iter().copied().filter(|one| *one != leaving).collect();
             let less = self.set(others);
             let entering = self.steps(&less, among).into_iter().next();
-            let next = entering.map_or_else(|| less.clone(), |(one, gain)| self.with(&less, one, &gain));
+            let next = entering.map_or_else(|| less.clone(), |(one, gain)| less.with(one, &gain));
             for next in [less, next] {
                 if next.ln_odds > best.ln_odds + 1e-9 {
                     best = next;

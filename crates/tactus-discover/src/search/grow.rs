@@ -296,13 +296,6 @@ impl Search<'_> {
                 None
             };
             tried.round.taken = taken.as_ref().map(|taken| taken.name);
-            if std::env::var("TD").is_ok() {
-                eprintln!(
-                    "ROUND {index} p {} {:?}",
-                    tried.p_value,
-                    tried.round.candidates.iter().take(4).map(|c| (c.effect, c.score)).collect::<Vec<_>>()
-                );
-            }
             grown.rounds.push(tried);
             match taken {
                 Some(taken) => {
@@ -404,23 +397,6 @@ impl Search<'_> {
             propose(&evidence.set([one]), Some(ln_odds));
         }
         starts.truncate(FITTED_MAX);
-        if std::env::var("TD").is_ok() {
-            for set in [&best, &named].into_iter().flatten() {
-                eprintln!(
-                    "set {:?} {:.1}",
-                    set.members.iter().map(|m| pass.class_of(*m)).collect::<Vec<_>>(),
-                    set.ln_odds
-                );
-            }
-            eprintln!(
-                "alone {:?}",
-                alone.iter().take(8).map(|(one, l)| (pass.class_of(*one), l.round())).collect::<Vec<_>>()
-            );
-            for r in (0..pass.additions.len()).filter(|one| !pass.is_named(*one)) {
-                eprintln!("rival {} {:.1}", pass.class_of(r), evidence.gain(&none, r).ln_odds);
-            }
-            eprintln!("walk {:?}", pass.walk.as_ref().map(|w| w.promise));
-        }
         if let Some(walk) = &pass.walk {
             let ln_odds = 0.5 * walk.promise - ODDS_AGAINST.ln();
             if ln_odds > LN_ODDS_LEAST.max(PROMISE_SHARE * most) {
@@ -434,9 +410,6 @@ impl Search<'_> {
         };
         // A rival without a name explains more than any class.
         let rival = pass.best_rival();
-        if std::env::var("TD").is_ok() {
-            eprintln!("TAKEN {} {:.1} rival {rival:.1}", taken.name, taken.ln_odds);
-        }
         let is_beaten = rival > taken.ln_odds + RIVAL_LN_ODDS;
         let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
         Ok(Some(taken).filter(|taken| taken.ln_odds > LN_ODDS_LEAST && (best_has_names || !is_beaten)))
@@ -448,12 +421,11 @@ impl Search<'_> {
         let of = |direction: &usize| {
             coefficients.iter().find(|(one, _)| one == direction).map_or(0.0, |(_, coefficient)| *coefficient)
         };
-        let term = |member: &usize| match &pass.kinds[*member] {
-            Kind::Term { candidate, shape } if pass.class_of(*member) == name => {
-                let steps: Vec<f64> = pass.additions[*member].directions.iter().map(of).collect();
-                Some(self.candidates[*candidate].start(self.problem, shape, &steps))
-            }
-            _ => None,
+        let term = |member: &usize| {
+            let Kind::Term { candidate, shape } = &pass.kinds[*member] else { return None };
+            let steps: Vec<f64> = pass.additions[*member].directions.iter().map(of).collect();
+            let start = || self.candidates[*candidate].start(self.problem, shape, &steps);
+            (pass.class_of(*member) == name).then(start)
         };
         set.members.iter().filter_map(term).collect()
     }
@@ -507,9 +479,6 @@ impl Search<'_> {
             let lesses: Vec<Fitted> =
                 parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
             let odds: Vec<f64> = lesses.iter().map(|less| self.ln_odds(less, &grown.at)).collect();
-            if std::env::var("TD").is_ok() {
-                eprintln!("HOLD {names:?} {odds:.1?}");
-            }
             let worth = |(index, less): (usize, &Fitted)| self.worth(&grown.at, less, index, &names, &odds);
             let worths: Vec<f64> = lesses.iter().enumerate().map(worth).collect();
             let weakest = worths.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
@@ -530,13 +499,6 @@ impl Search<'_> {
                     continue 'again;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
-                if std::env::var("TD").is_ok() {
-                    eprintln!(
-                        "IN PLACE OF {name} {ln_odds:.1}: rival {:.1} others {:?}",
-                        pass.best_rival(),
-                        others.iter().map(|o| (o.name, o.ln_odds.round())).collect::<Vec<_>>()
-                    );
-                }
                 let best = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
                 let better =
                     best.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);

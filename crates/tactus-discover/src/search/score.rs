@@ -229,7 +229,9 @@ impl Score {
             let square: f64 = row.iter().map(product).sum();
             let whole = products[(*one, *one)];
             if square > 1e-6 * whole && square > 0.0 {
-                row.iter_mut().for_each(|(_, share)| *share /= square.sqrt());
+                for (_, share) in &mut row {
+                    *share /= square.sqrt();
+                }
                 independent.push(row);
             }
         }

@@ -69,8 +69,11 @@ pub(crate) fn confirmed(
 ) -> Result<(Fitted, Vec<AddedEffect>), DiscoverError> {
     let names = names(&grown.parameters, search.known_terms);
     let added = search.steps(&grown, equivalent, search.problem)?.into_iter();
-    let tentative: Vec<AddedEffect> =
-        added.filter(|step| names.contains(&step.effect) && step.p_value > CONFIRMED_P).collect();
+    // A miswired element acts on its own readings, of which few may be held out.
+    let is_tentative = |step: &AddedEffect| {
+        names.contains(&step.effect) && step.effect != MISWIRED && step.p_value > CONFIRMED_P
+    };
+    let tentative: Vec<AddedEffect> = added.filter(is_tentative).collect();
     if tentative.is_empty() {
         return Ok((grown, tentative));
     }
