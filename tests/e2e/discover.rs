@@ -225,7 +225,7 @@ fn interrupted(folder: &Path) -> String {
     let (told, opened) = mpsc::channel();
     let to_open = pipe.clone();
     let opening = thread::spawn(move || told.send(fs::File::options().write(true).open(to_open)));
-    let _writer = opened.recv_timeout(Duration::from_secs(60)).expect("the table is read").unwrap();
+    let _writer = opened.recv_timeout(Duration::from_mins(1)).unwrap().unwrap();
     opening.join().unwrap().unwrap();
     let partial = format!("partial-{}", run.id());
     let is_there = [folder.join(format!("found.{partial}")), folder.join("found").join(&partial)];

@@ -150,17 +150,15 @@ fn listen() -> anyhow::Result<()> {
         runtime.block_on(async {
             loop {
                 let ending = signals.next().await;
-                match &mut *run() {
-                    Some(run) => {
-                        run.came = Some(ending);
-                        run.stop();
-                    }
-                    None => {
-                        // Held to the end, so that nobody makes or finishes anything meanwhile.
-                        let unfinished = unfinished();
-                        unfinished.iter().for_each(|folder| remove(folder));
-                        process::exit(ending.exit_code())
-                    }
+                let mut run = run();
+                if let Some(run) = &mut *run {
+                    run.came = Some(ending);
+                    run.stop();
+                } else {
+                    // Held to the end, so that nobody makes or finishes anything meanwhile.
+                    let unfinished = unfinished();
+                    unfinished.iter().for_each(|folder| remove(folder));
+                    process::exit(ending.exit_code())
                 }
             }
         })
