@@ -133,11 +133,13 @@ fn surfaces_that_are_no_plane_change_the_depth_at_a_place() {
     near(&folded, &plain(&base, mirrored_mm, DEPTH_MM + drawn("slope") * beyond_mm.max(0.0)), 1e-12);
 }
 
+/// The depth that a form makes of the tool's.
+type Law = fn(&Drawn, f64) -> f64;
+
 #[test]
 fn forms_of_the_depth_alone_scale_the_image() {
     let base = base();
     let at_mm = place(&base);
-    type Law = fn(&Drawn, f64) -> f64;
     let laws: [(&str, Law); 4] = [
         ("toe", |drawn, depth| (depth * depth + drawn("toe_mm").powi(2)).sqrt() - drawn("toe_mm")),
         ("hardening-limit", |drawn, depth| depth / (1.0 - depth * drawn("inverse_length_per_mm"))),
