@@ -22,7 +22,7 @@ use super::rivals::rivals;
 use super::score::{Fitting, Score, flipped, largest, p_value};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Direction, Fitted, Free, Grams, Parameters, Problem, RANDOM_WALK, Scale, Term};
-use crate::numbers::parallel;
+use crate::numbers::{median, parallel};
 
 /// A round of the search.
 #[derive(Debug, Clone, PartialEq)]
@@ -258,6 +258,8 @@ impl Search<'_> {
             }
         }
         let scores = parallel::map(&additions, |one| Score::of_grams(&grams, &one.directions));
+        // The errors of a coarse converter's rounding differ from press to press, and are no noise.
+        let excess = median(&scores.iter().map(|score| score.excess).collect::<Vec<_>>());
         let names = names(&at.parameters, self.known_terms);
         let present = (0..classes.len()).filter(|class| names.contains(&classes[*class])).collect();
         let walk = if classes.contains(&RANDOM_WALK.name) {
@@ -274,7 +276,7 @@ impl Search<'_> {
             grams,
             walk,
             present,
-            variance: problem.variance,
+            variance: problem.variance * if self.rounds { excess } else { 1.0 },
         })
     }
 

@@ -41,6 +41,8 @@ const EXCESS_OF_FEW: f64 = 1.5;
 pub(crate) struct Score {
     /// On the scale of the standard normal distribution, not negative.
     pub(crate) z: f64,
+    /// Mean excess of the blocks' scatter over that of their noise.
+    pub(crate) excess: f64,
     /// For each direction, the part of each block, clipped.
     parts: Vec<Vec<f32>>,
     chi_square: ChiSquare,
@@ -143,16 +145,10 @@ impl<'a> Fitting<'a> {
                 independent.push(column);
             }
         }
-        let scores: Vec<(f64, Vec<f32>)> = independent.iter().map(|column| self.score_of(column)).collect();
-        let squares: f64 = scores.iter().map(|(z, _)| z * z).sum();
-        Score {
-            z: deviate(squares, scores.len() as f64),
-            chi_square: ChiSquare { times: 1.0, freedom: scores.len() as f64 },
-            parts: scores.into_iter().map(|(_, parts)| parts).collect(),
-        }
+        Score::of(independent.iter().map(|column| self.score_of(column)).collect())
     }
 
-    fn score_of(&self, column: &[f64]) -> (f64, Vec<f32>) {
+    fn score_of(&self, column: &[f64]) -> Standardised {
         let bins = self.problem.predictor.bins;
         let elements = bins.elements;
         let mut wanted = vec![0.0; bins.blocks];
@@ -176,11 +172,20 @@ impl<'a> Fitting<'a> {
     }
 }
 
+/// A direction's score: what a test needs of it.
+struct Standardised {
+    z: f64,
+    /// Excess of the blocks' scatter over that of their noise.
+    excess: f64,
+    /// The part of each block, clipped.
+    parts: Vec<f32>,
+}
+
 /// A direction's score and its blocks' parts from the blocks' products with the residual and with themselves.
-fn standardised(wanted: &[f64], variance: &[f64]) -> (f64, Vec<f32>) {
+fn standardised(wanted: &[f64], variance: &[f64]) -> Standardised {
     let total: f64 = variance.iter().sum();
     if !(total > 0.0 && total.is_finite()) {
-        return (0.0, vec![0.0; wanted.len()]);
+        return Standardised { z: 0.0, excess: 1.0, parts: vec![0.0; wanted.len()] };
     }
     let common = wanted.iter().sum::<f64>() / total;
     // Blocks with hardly any weight in the direction say nothing about the scatter.
@@ -202,7 +207,7 @@ fn standardised(wanted: &[f64], variance: &[f64]) -> (f64, Vec<f32>) {
         let part = (wanted.clamp(-most, most) / deviation) as f32;
         part
     });
-    (wanted.iter().sum::<f64>() / deviation, parts.collect())
+    Standardised { z: wanted.iter().sum::<f64>() / deviation, excess, parts: parts.collect() }
 }
 
 impl Score {
@@ -249,12 +254,17 @@ impl Score {
             let variance: Vec<f64> = (0..blocks).map(square).collect();
             standardised(&wanted, &variance)
         };
-        let scores: Vec<(f64, Vec<f32>)> = independent.iter().map(scored).collect();
-        let freedom = scores.len() as f64;
+        Self::of(independent.iter().map(scored).collect())
+    }
+
+    /// The combined score of orthonormal directions.
+    fn of(directions: Vec<Standardised>) -> Self {
+        let freedom = directions.len() as f64;
         Self {
-            z: deviate(scores.iter().map(|(z, _)| z * z).sum(), freedom),
+            z: deviate(directions.iter().map(|one| one.z * one.z).sum(), freedom),
+            excess: directions.iter().map(|one| one.excess).sum::<f64>() / freedom.max(1.0),
             chi_square: ChiSquare { times: 1.0, freedom },
-            parts: scores.into_iter().map(|(_, parts)| parts).collect(),
+            parts: directions.into_iter().map(|one| one.parts).collect(),
         }
     }
 
@@ -273,7 +283,12 @@ impl Score {
     pub(crate) fn of_products(products: &DMatrix<f64>, blocks: &[usize], all_blocks: usize) -> Self {
         let mean = products.trace();
         let variance = 2.0 * (products.norm_squared() - products.diagonal().norm_squared());
-        let none = Self { z: 0.0, parts: Vec::new(), chi_square: ChiSquare { times: 1.0, freedom: 0.0 } };
+        let none = Self {
+            z: 0.0,
+            excess: 1.0,
+            parts: Vec::new(),
+            chi_square: ChiSquare { times: 1.0, freedom: 0.0 },
+        };
         // The diagonal does not depend on signs, so a small addition for the factorisation does no harm.
         let firm = DMatrix::from_diagonal_element(blocks.len(), blocks.len(), 1e-9 * mean);
         let Some(factors) = (products + firm).cholesky().filter(|_| variance > 0.0) else { return none };
@@ -289,6 +304,7 @@ impl Score {
         };
         Self {
             z: deviate(products.sum() / chi_square.times, chi_square.freedom),
+            excess: 1.0,
             parts: (0..blocks.len()).map(part).collect(),
             chi_square,
         }
