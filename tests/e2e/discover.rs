@@ -309,7 +309,7 @@ fn lost_motion_and_hysteresis_are_undecided_by_the_papers_corners_and_decided_by
     let said = tactus(folder, &[&corners[..], &rig].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
     let recording = said.json()["recording"].as_str().unwrap().to_owned();
-    // The seed draws the held-out presses. Of the seeds 1 to 6, one round decides under 1, 2 and 5.
+    // The seed draws the held-out presses. Of the seeds 1 to 6, one round decides under 1, 2, 5 and 6.
     let active =
         ["--json", "discover", &recording, "--active", "--rounds", "1", "--budget-min", "3", "--seed", "1"];
     let said = tactus(folder, &[&active[..], &rig].concat());

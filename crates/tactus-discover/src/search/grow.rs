@@ -318,6 +318,11 @@ impl Search<'_> {
         Ok(self.tested(&self.pass(grown)?, grown, 2 * NAMES_MAX + 1).p_value)
     }
 
+    /// True if the residual of a model depends on any covariate.
+    fn leaves_something(&self, at: &Fitted) -> Result<bool, DiscoverError> {
+        Ok(self.locate(at)?.p_value <= ALPHA)
+    }
+
     /// Tests all additions at once: the largest score against those under flipped signs.
     pub(crate) fn tested(&self, pass: &Pass, at: &Fitted, index: usize) -> Tried {
         // Rivals get no names, so they are no part of the test for one.
@@ -471,6 +476,8 @@ impl Search<'_> {
     fn hold(&self, grown: &mut Grown) -> Result<(), DiscoverError> {
         let mut exchanges_left = EXCHANGES_MAX;
         'again: loop {
+            // Whether the model leaves something, once that is asked.
+            let mut leaves: Option<bool> = None;
             grown.equivalent.clear();
             let names = names(&grown.at.parameters, self.known_terms);
             let without = |name: &&'static str| {
@@ -509,7 +516,17 @@ impl Search<'_> {
                     grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
                     continue 'again;
                 }
-                let same = credible(ln_odds, others);
+                let mut same = Vec::new();
+                for (other, fitted) in credible(ln_odds, others) {
+                    let model_leaves = match leaves {
+                        Some(known) => known,
+                        None => *leaves.insert(self.leaves_something(&grown.at)?),
+                    };
+                    // Its form is no excuse for a class that leaves something where the model leaves nothing.
+                    if model_leaves || !self.leaves_something(&fitted)? {
+                        same.push((other, fitted));
+                    }
+                }
                 grown.equivalent.insert(name, Alike { without: less, same });
             }
             return Ok(());

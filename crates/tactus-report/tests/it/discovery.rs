@@ -96,6 +96,7 @@ fn the_json_keeps_its_form_to_the_byte() {
     discovery.elements.truncate(2);
     discovery.heldout_frames.clear();
     discovery.faulty = faulty().faulty;
+    discovery.tentative = discovery.steps[..1].to_vec();
     discovery.global = discovery.global.map(|global| GlobalTest { statistic: f64::NAN, ..global });
     discovery.base.heldout_chi2 = Some(f64::INFINITY);
     let undecided = |equivalent| AmbiguousEffect { effect: "hysteresis", equivalent };
@@ -117,6 +118,16 @@ fn the_json_keeps_its_form_to_the_byte() {
         fs::write(path, &text).unwrap();
     }
     assert_eq!(text, include_str!("golden/discovery.json"));
+}
+
+#[test]
+fn what_held_out_presses_do_not_confirm_is_tentative() {
+    let mut discovery = explained();
+    assert!(!in_words(&discovery).contains("Tentative"));
+    discovery.tentative = vec![discovery.steps.remove(0)];
+    let name = discovery.tentative[0].effect;
+    let text = in_words(&discovery);
+    assert!(text.contains(&format!("Tentative: {name}.")), "{text}");
 }
 
 #[test]

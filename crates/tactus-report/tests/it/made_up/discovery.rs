@@ -164,7 +164,7 @@ pub(crate) fn faulty() -> Discovery {
         ],
         elements,
         steps: whole.steps[1..].to_vec(),
-        tentative: whole.steps[..1].to_vec(),
+        tentative: vec![],
         verdict: Verdict::Explained,
         effects: vec![],
         ..nothing_missing()
