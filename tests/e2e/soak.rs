@@ -28,9 +28,8 @@ const PRESSES: &str = "def run(rig):
 /// Without the variable: enough for a run.
 const SHORT: Duration = Duration::from_secs(10);
 
-/// Memory is compared with what it was after this time. Until then the allocator's arenas, one for each thread, get their size: each
-/// in the first dry run that happens on its thread.
-const WARM: Duration = Duration::from_mins(20);
+/// Memory is compared with what it was after this time, in which buffers have got their size.
+const WARM: Duration = Duration::from_mins(5);
 
 /// More growth fails the test.
 const GROWTH_MAX_KIB: u64 = 10 * 1024;

@@ -24,7 +24,7 @@ use crate::{BusError, command::drop_on_blocking_thread, queue::Queue};
 const WAITING_HISTORY_QUERIES: usize = 64;
 
 /// Messages that are kept of one topic, in bytes; the last one is kept in any case.
-const KEPT_BYTES_MAX: usize = 16 << 20;
+const KEPT_BYTES_MAX: usize = 4 << 20;
 
 /// Keeps the last messages of one publisher.
 #[derive(Debug)]

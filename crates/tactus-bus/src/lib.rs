@@ -7,8 +7,10 @@
 //! | topic | kept for late joiners |
 //! |---|---|
 //! | `sensor/frame` | the last 300 (10 s) |
-//! | `run/event` | the last 65,536 |
+//! | `run/event` | the last 16,384 |
 //! | all others | the last one |
+//!
+//! Of each topic at most 4 MiB are kept.
 //!
 //! A client that cannot keep up misses messages and fetches those that are still kept; nobody waits for it. A client that
 //! asks for something and does not read the answer is disconnected after 100 ms. Frames and other messages have separate

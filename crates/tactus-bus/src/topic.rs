@@ -60,7 +60,7 @@ impl Policy {
     pub(crate) const fn of(topic: Topic) -> Self {
         match topic {
             Topic::SensorFrame => Self { lane: Lane::Frames, history: 300, priority: Priority::DataHigh },
-            Topic::RunEvent => Self::update(65_536),
+            Topic::RunEvent => Self::update(16_384),
             Topic::SensorInfo | Topic::StageState | Topic::RunState | Topic::Health | Topic::SafetyState => {
                 Self::update(1)
             }

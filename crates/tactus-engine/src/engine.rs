@@ -568,10 +568,27 @@ impl Claim {
                 Ok(outcome) => outcome,
                 Err(panic) => rescue(&shared, order, &panic).await,
             };
-            drop(self);
+            self.finish(&outcome);
             outcome
         });
         run.await.unwrap_or_else(|panic| RunOutcome::defect(run_id, experiment, panic.to_string()))
+    }
+
+    /// Gives the right back and tells that the run is finished. Whoever is told can begin the next run, and nothing of that
+    /// one is told before: its first state waits for this one.
+    fn finish(self, outcome: &RunOutcome) {
+        let shared = Arc::clone(&self.0);
+        shared.state.send_modify(|state| {
+            drop(self);
+            state.phase = pb::RunPhase::Finished.into();
+            state.exit_status = outcome.exit_status.into();
+            state.message.clone_from(&outcome.message);
+            state.frames = outcome.frames;
+            state.frames_lost = outcome.frames_lost;
+            state.elapsed_s = outcome.duration_s;
+            state.remaining_s = 0.0;
+            shared.publish.state(state);
+        });
     }
 
     /// Checks whether the run was stopped already.

@@ -337,15 +337,6 @@ impl Run {
             Err(failure) => (pb::ExitStatus::Failed, failure.to_string()),
         };
         info!(run = self.order.run_id, exit_status = exit_status.as_str_name(), message, "run ends");
-        self.shared.state.send_modify(|state| {
-            state.phase = pb::RunPhase::Finished.into();
-            state.exit_status = exit_status.into();
-            state.message.clone_from(&message);
-            state.frames = finished.frames;
-            state.frames_lost = finished.frames_lost;
-            state.elapsed_s = duration_s;
-            state.remaining_s = 0.0;
-        });
         if let Err(gone) = self.shared.acquisition.ask(Acquisition::refresh_state).await {
             error!("{gone}");
         }

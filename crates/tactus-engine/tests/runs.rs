@@ -95,6 +95,20 @@ async fn a_press_is_approached_loaded_held_unloaded_and_retracted() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn who_is_told_that_a_run_is_finished_can_begin_the_next() {
+    let bench = Bench::start(|rig| rig);
+    let engine = bench.engine.clone();
+    let next = tokio::spawn(async move {
+        engine.state().wait_for(|state| state.phase() == RunPhase::Finished).await.unwrap();
+        engine.claim()
+    });
+    let outcome = bench.engine.run(bench.order(PRESS), Memory::default().sink()).await.unwrap();
+    assert_eq!(outcome.exit_status, ExitStatus::Done, "{outcome:?}");
+    let next = next.await.unwrap();
+    assert!(next.is_ok(), "{next:?}");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_step_outside_the_envelope_ends_the_run_with_its_line_and_is_not_begun() {
     let bench = Bench::start(|rig| rig);
     let memory = Memory::default();

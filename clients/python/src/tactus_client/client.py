@@ -98,7 +98,7 @@ class Client:
         return FrameStream(self._session, self._key("sensor/frame"), history, shape, self._believes)
 
     def events(self, history: int | None = None) -> Stream:
-        """Events of runs (``RunEvent``), past ones first, as in ``frames``. The service keeps the last 65,536."""
+        """Events of runs (``RunEvent``), past ones first, as in ``frames``. The service keeps the last 16,384."""
         return Stream(self._session, self._key("run/event"), messages.RunEvent, history, EVENT_CAPACITY, self._believes)
 
     def states(self) -> Stream:
