@@ -291,12 +291,17 @@ impl Search<'_> {
             let mut tried = self.tested(&pass, &grown.at, index);
             let is_full =
                 names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
-            let taken = if 2.0 * tried.p_value <= ALPHA && !is_full {
-                // What is small beside the gain of another class may be an error of that one's form.
-                self.next(&grown.at, &pass)?.filter(|taken| taken.ln_odds > FORM_SHARE * strongest)
+            let fits = if 2.0 * tried.p_value <= ALPHA && !is_full {
+                self.next(&grown.at, &pass)?
             } else {
-                None
+                Vec::new()
             };
+            for fit in &fits {
+                self.tell(fit, base, &mut tried.round);
+            }
+            // What is small beside the gain of another class may be an error of that one's form.
+            let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
+            let taken = fits.into_iter().next().filter(|best| best.ln_odds > least);
             tried.round.taken = taken.as_ref().map(|taken| taken.name);
             grown.rounds.push(tried);
             match taken {
@@ -373,25 +378,31 @@ impl Search<'_> {
         }
     }
 
-    /// The class to add: of those in the best sets, the one with the greatest odds once fitted.
-    fn next(&self, at: &Fitted, pass: &Pass) -> Result<Option<Beside>, DiscoverError> {
+    /// Figures of a fitted class on the held-out presses, for the report alone.
+    fn tell(&self, fit: &Beside, base: &Fitted, round: &mut Round) {
+        let gap = |fitted: &Fitted| self.problem.heldout_gap(&fitted.predicted).value;
+        if let Some(tried) = round.candidates.iter_mut().find(|one| one.effect == fit.name) {
+            tried.heldout_rms_counts = Some(self.problem.heldout_rms_counts(&fit.fitted.predicted));
+            tried.shrink = Some(1.0 - gap(&fit.fitted) / gap(base)).filter(|_| gap(base) > 0.0);
+        }
+    }
+
+    /// The classes of the best sets, fitted, the one with the greatest odds first; none if a rival without a name explains more.
+    fn next(&self, at: &Fitted, pass: &Pass) -> Result<Vec<Beside>, DiscoverError> {
         let evidence = pass.evidence();
         let best = evidence.sets(|_| true).into_iter().next();
         let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
         let none = evidence.none();
-        let mut starts: Vec<(&'static str, f64, Vec<Term>)> = Vec::new();
-        let mut propose = |set: &Set, promise: Option<f64>| {
+        let mut starts: Vec<(&'static str, Vec<Term>)> = Vec::new();
+        let mut propose = |set: &Set| {
             for member in set.members.iter().copied().filter(|member| pass.is_named(*member)) {
                 let name = pass.class_of(member);
                 if starts.iter().all(|(known, ..)| *known != name) {
-                    let alone = promise.unwrap_or(f64::INFINITY);
-                    starts.push((name, alone, self.starts(pass, &evidence, set, name)));
+                    starts.push((name, self.starts(pass, &evidence, set, name)));
                 }
             }
         };
-        for set in best.iter().chain(&named) {
-            propose(set, None);
-        }
+        best.iter().chain(&named).for_each(&mut propose);
         let mut alone: Vec<(usize, f64)> = pass
             .among(|_| true)
             .into_iter()
@@ -400,26 +411,24 @@ impl Search<'_> {
             .collect();
         alone.sort_by(|a, b| b.1.total_cmp(&a.1));
         let most = alone.first().map_or(0.0, |(_, ln_odds)| *ln_odds);
-        for (one, ln_odds) in alone.iter().copied().filter(|(_, ln_odds)| *ln_odds > PROMISE_SHARE * most) {
-            propose(&evidence.set([one]), Some(ln_odds));
+        for (one, _) in alone.iter().filter(|(_, ln_odds)| *ln_odds > PROMISE_SHARE * most) {
+            propose(&evidence.set([*one]));
         }
         starts.truncate(FITTED_MAX);
         if let Some(walk) = &pass.walk {
             let ln_odds = 0.5 * walk.promise - ODDS_AGAINST.ln();
             if ln_odds > LN_ODDS_LEAST.max(PROMISE_SHARE * most) {
-                starts.push((RANDOM_WALK.name, ln_odds, vec![walk.start.clone()]));
+                starts.push((RANDOM_WALK.name, vec![walk.start.clone()]));
             }
         }
-        let starts = starts.into_iter().map(|(name, _, terms)| (name, terms)).collect::<Vec<_>>();
-        let fits = self.fits(at, &starts)?;
-        let Some(taken) = fits.into_iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds)) else {
-            return Ok(None);
-        };
-        // A rival without a name explains more than any class.
-        let rival = pass.best_rival();
-        let is_beaten = rival > taken.ln_odds + RIVAL_LN_ODDS;
+        let mut fits = self.fits(at, &starts)?;
+        fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
         let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
-        Ok(Some(taken).filter(|taken| taken.ln_odds > LN_ODDS_LEAST && (best_has_names || !is_beaten)))
+        let is_beaten = fits.first().is_some_and(|one| pass.best_rival() > one.ln_odds + RIVAL_LN_ODDS);
+        if is_beaten && !best_has_names {
+            fits.clear();
+        }
+        Ok(fits)
     }
 
     /// The terms of a class from which a fit starts: its members of a set.

@@ -21,8 +21,8 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
     writeln!(
         f,
         "<p class=\"lead\">In each round every effect that the data can show is scored on the fitted presses: would a small amount of it \
-         reduce the residual? The best are then fitted jointly with the base model and the effects added before, and compared on \
-         held-out presses.</p>"
+         reduce the residual? The best are then fitted jointly with the base model and the effects added before, and the one with the \
+         greatest odds on the fitted presses is taken. The figures of held-out presses are for the reader; they choose nothing.</p>"
     )?;
     for (nth, round) in found.rounds.iter().enumerate() {
         self::round(f, nth + 1, round)?;
