@@ -15,6 +15,7 @@ use tokio::sync::mpsc;
 use zenoh::{
     Wait,
     liveliness::LivelinessToken,
+    qos::CongestionControl,
     query::{ConsolidationMode, QueryTarget},
     sample::Locality,
 };
@@ -223,7 +224,9 @@ async fn behind_a_router_frames_of_another_publisher_are_dropped_and_counted() {
     let session = raw_session(&endpoint).await;
     let fake = pb::Frame::from(&frame(666)).encode_to_vec();
     // The rogue waits until it is heard: then the fakes go before the service's frame.
-    let publisher = session.declare_publisher("tactus/bench/sensor/frame").await.unwrap();
+    let publisher = session.declare_publisher("tactus/bench/sensor/frame");
+    // On a busy machine none may be dropped on the way.
+    let publisher = publisher.congestion_control(CongestionControl::Block).await.unwrap();
     let matching = publisher.matching_listener().await.unwrap();
     while !publisher.matching_status().await.unwrap().matching() {
         matching.recv_async().await.unwrap();
