@@ -23,7 +23,7 @@ use std::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
-    thread,
+    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
@@ -50,6 +50,8 @@ pub(crate) struct StopSocket {
     socket: Arc<Socket>,
     closed: Arc<AtomicBool>,
     path: Option<PathBuf>,
+    /// The thread that takes stops.
+    taking: Option<JoinHandle<()>>,
 }
 
 /// Who sent a stop.
@@ -91,7 +93,7 @@ impl StopSocket {
         socket.limit_answers()?;
         let socket = Arc::new(socket);
         let closed = Arc::new(AtomicBool::new(false));
-        thread::Builder::new().name("bus-stop".to_owned()).spawn({
+        let taking = thread::Builder::new().name("bus-stop".to_owned()).spawn({
             let (socket, closed, rig) = (socket.clone(), closed.clone(), rig.to_owned());
             move || {
                 while !closed.load(Ordering::Acquire) {
@@ -106,7 +108,7 @@ impl StopSocket {
                 }
             }
         })?;
-        Ok(Some(Self { socket, closed, path }))
+        Ok(Some(Self { socket, closed, path, taking: Some(taking) }))
     }
 }
 
@@ -118,6 +120,11 @@ impl Drop for StopSocket {
             (Socket::Unix(socket), Some(path)) => socket.send_to(&[], path),
             (Socket::Unix(_), None) => Ok(0),
         };
+        // Until the thread has ended, the place is taken.
+        let taking = self.taking.take().filter(|_| woken.is_ok());
+        if taking.is_some_and(|taking| taking.join().is_err()) {
+            tracing::error!("the thread that takes stops panicked");
+        }
         let removed = self.path.as_ref().map_or(Ok(()), fs::remove_file);
         if let Err(error) = woken.map(drop).and(removed) {
             tracing::warn!(%error, "the socket for stops did not close cleanly");
