@@ -17,7 +17,7 @@ pub enum DiscoverError {
     /// The operating system could not start the threads.
     #[error("cannot start {threads} threads: {reason}")]
     Threads {
-        /// [`Options::threads`].
+        /// `Options::threads`.
         threads: usize,
         /// From the operating system.
         reason: String,
