@@ -68,15 +68,15 @@ fn discover_on_threads(
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
-    let (grown, tentative) = confirmed(&search, grown, &mut equivalent)?;
+    let confirmed = confirmed(&prepared, &search, grown, &mut equivalent)?;
     reporter.report("locating what remains", 0.9);
-    let p_left = search.p_left(&grown)?;
-    let after = search.locate(&grown)?;
+    let p_left = search.p_left(&confirmed.grown)?;
+    let after = search.locate(&confirmed.grown)?;
     reporter.report("planning what to measure next", 0.95);
     let told = conclude(
         &prepared,
         &search,
-        SearchOutcome { lacking, base, grown, rounds, equivalent, tentative, p_left, before, after },
+        SearchOutcome { lacking, base, confirmed, rounds, equivalent, p_left, before, after },
         options,
     )?;
     reporter.report("done", 1.0);

@@ -20,6 +20,7 @@
 //! Goodnight, *Am. Stat.* 33 (1979) 149.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -56,6 +57,12 @@ pub(crate) struct Grams {
     along: Vec<Vec<f64>>,
     /// Each block's product of the direction with itself.
     squares: Vec<Vec<f64>>,
+}
+
+/// A direction during a pass.
+enum Running<'a> {
+    Towards { stream: Box<Mutex<Stream<'a>>>, per_step: f64 },
+    Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
 }
 
 /// The directions' values at the bins of a chunk, and the gains'.
@@ -109,92 +116,61 @@ impl Problem<'_> {
         let mut all: Vec<Direction<'_>> =
             own.iter().map(|free| self.towards(&at.parameters, *free)).collect();
         all.extend(directions);
+        let mut more = at.parameters.clone();
+        more.sensitivity.iter_mut().for_each(|gain| *gain *= 1.0 + GAIN_SHARE);
+        all.push(Direction::Towards { parameters: more, step: GAIN_SHARE });
         let segments = Segments::of(self, &at.parameters);
-        let total = self.sums(at, &all, own.len(), &segments)?;
+        let total = self.sums(at, all, own.len(), &segments)?;
         let elimination = Elimination::of(self, &total, &segments, &at.parameters);
         Ok(elimination.grams(&total.blocks, own.len()))
     }
 
+    /// Sums over all data. The last direction is that of the gains.
     fn sums(
         &self,
         at: &Fitted,
-        directions: &[Direction<'_>],
+        directions: Vec<Direction<'_>>,
         own: usize,
         segments: &Segments,
     ) -> Result<Total, DiscoverError> {
-        let (predictor, bins) = (&self.predictor, self.predictor.bins);
+        let bins = self.predictor.bins;
         let standing = self.standing(&at.parameters, &at.predicted);
-        let mut more = at.parameters.clone();
-        more.sensitivity.iter_mut().for_each(|gain| *gain *= 1.0 + GAIN_SHARE);
-        let stream = |direction: &Direction<'_>| match direction {
-            Direction::Towards { parameters, .. } => predictor.stream(parameters.clone()).map(Some),
-            Direction::Column(_) => Ok(None),
-        };
-        let mut streams: Vec<std::sync::Mutex<Option<Stream<'_>>>> = Vec::with_capacity(directions.len());
-        for direction in directions {
-            streams.push(std::sync::Mutex::new(stream(direction)?));
-        }
-        let mut of_gain = predictor.stream(more)?;
         let joined = bins.blocks.div_ceil(BLOCKS_MAX).max(1);
-        let mut total = Total::new(directions.len() + 1, bins.elements, segments.run.len());
-        let mut first = 0;
-        while first < bins.len() {
-            let end = (first + CHUNK_BINS).min(bins.len());
-            let range = first..end;
-            let is_used = self.train[range.clone()].iter().any(|weight| *weight > 0.0);
-            let numbers: Vec<usize> = (0..directions.len()).collect();
-            let column = |number: &usize| -> Result<Vec<f64>, DiscoverError> {
-                let mut stream = streams[*number].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                match (&directions[*number], stream.as_mut()) {
-                    (Direction::Towards { step, .. }, Some(stream)) => {
-                        let mut column = Vec::with_capacity(range.len() * bins.elements);
-                        stream.take(range.len(), &mut column)?;
-                        let now = &at.predicted[first * bins.elements..end * bins.elements];
-                        // A parameter that cannot move has no derivative.
-                        let per_step = if *step == 0.0 { 0.0 } else { 1.0 / step };
-                        column
-                            .iter_mut()
-                            .zip(now)
-                            .for_each(|(value, now)| *value = (*value - now) * per_step);
-                        Ok(column)
-                    }
-                    (Direction::Column(values), _) if is_used => Ok(values(range.clone())),
-                    _ => Ok(vec![0.0; range.len() * bins.elements]),
-                }
-            };
-            let columns: Vec<Vec<f64>> =
-                parallel::map(&numbers, column).into_iter().collect::<Result<_, DiscoverError>>()?;
-            let mut by_gain = Vec::with_capacity(range.len() * bins.elements);
-            of_gain.take(range.len(), &mut by_gain)?;
-            let now = &at.predicted[first * bins.elements..end * bins.elements];
-            by_gain.iter_mut().zip(now).for_each(|(value, now)| *value = (*value - now) / GAIN_SHARE);
-            if is_used {
-                let chunk = Chunk { bins: range.clone(), columns, by_gain };
-                let mut parts: Vec<(usize, Range<usize>)> = Vec::new();
-                for bin in range.filter(|bin| self.train[*bin] > 0.0) {
-                    let key = (bins.block[bin] / joined, segments.of_bin[bin]);
-                    let same = |part: &&mut (usize, Range<usize>)| {
-                        part.0 == key.0 && segments.of_bin[part.1.start] == key.1
-                    };
-                    match parts.last_mut().filter(same) {
-                        Some((_, part)) => part.end = bin + 1,
-                        None => parts.push((key.0, bin..bin + 1)),
-                    }
-                }
-                let sum = |(number, part): &(usize, Range<usize>)| {
-                    (*number, self.sums_of(&chunk, part.clone(), &standing, segments))
-                };
-                for (number, sums) in parallel::map(&parts, sum) {
-                    total.add(number, own, &sums);
-                }
+        let mut total = Total::new(directions.len(), bins.elements, segments.run.len());
+        let running: Vec<Running<'_>> =
+            directions.into_iter().map(|one| self.running(one)).collect::<Result<_, DiscoverError>>()?;
+        for first in (0..bins.len()).step_by(CHUNK_BINS) {
+            let range = first..(first + CHUNK_BINS).min(bins.len());
+            let column = |direction: &Running<'_>| direction.values(range.clone(), &at.predicted);
+            let mut columns: Vec<Vec<f64>> =
+                parallel::map(&running, column).into_iter().collect::<Result<_, DiscoverError>>()?;
+            let by_gain = columns.pop().unwrap_or_default();
+            let chunk = Chunk { bins: range.clone(), columns, by_gain };
+            // The chunk's parts of one block and one segment each.
+            let key = |bin: usize| (bins.block[bin] / joined, segments.of_bin[bin]);
+            let used: Vec<usize> = range.filter(|bin| self.train[*bin] > 0.0).collect();
+            let parts: Vec<&[usize]> = used.chunk_by(|one, next| key(*one) == key(*next)).collect();
+            let sums = parallel::map(&parts, |part| self.sums_of(&chunk, part, &standing, segments));
+            for (part, sums) in parts.iter().zip(&sums) {
+                total.add(bins.block[part[0]] / joined, own, sums);
             }
-            first = end;
         }
         Ok(total)
     }
 
+    fn running<'a>(&'a self, direction: Direction<'a>) -> Result<Running<'a>, DiscoverError> {
+        Ok(match direction {
+            Direction::Towards { parameters, step } => Running::Towards {
+                stream: Box::new(Mutex::new(self.predictor.stream(parameters)?)),
+                // A parameter that cannot move has no derivative.
+                per_step: if step == 0.0 { 0.0 } else { 1.0 / step },
+            },
+            Direction::Column(values) => Running::Column(values),
+        })
+    }
+
     /// Sums over the bins of a chunk that belong to one block.
-    fn sums_of(&self, chunk: &Chunk, part: Range<usize>, standing: &[f64], segments: &Segments) -> Sums {
+    fn sums_of(&self, chunk: &Chunk, part: &[usize], standing: &[f64], segments: &Segments) -> Sums {
         let elements = self.predictor.bins.elements;
         let count = chunk.columns.len() + 1;
         let weighed: Vec<usize> =
@@ -204,11 +180,10 @@ impl Problem<'_> {
             let root = move |element: &usize| (self.train[bin] * self.element_weight[*element]).sqrt();
             weighed.iter().map(move |element| (bin, *element, root(element)))
         };
-        let readings: Vec<(usize, usize, f64)> =
-            part.clone().filter(|bin| self.train[*bin] > 0.0).flat_map(of_bin).collect();
+        let readings: Vec<(usize, usize, f64)> = part.iter().copied().flat_map(of_bin).collect();
         let place = |bin: usize, element: usize| (bin - chunk.bins.start) * elements + element;
         let mut sums = Sums {
-            segment: segments.of_bin[part.start],
+            segment: segments.of_bin[part[0]],
             products: DMatrix::zeros(count, count),
             border: Border::new(count, elements),
         };
@@ -253,6 +228,22 @@ impl Problem<'_> {
 
 /// Step of the derivative by the gains.
 const GAIN_SHARE: f64 = 1e-3;
+
+impl Running<'_> {
+    /// Its values at the next bins.
+    fn values(&self, bins: Range<usize>, predicted: &[f64]) -> Result<Vec<f64>, DiscoverError> {
+        let (stream, per_step) = match self {
+            Self::Column(values) => return Ok(values(bins)),
+            Self::Towards { stream, per_step } => (stream, per_step),
+        };
+        let mut stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut column = Vec::new();
+        stream.take(bins.len(), &mut column)?;
+        let now = predicted.chunks_exact(column.len() / bins.len()).skip(bins.start).flatten();
+        column.iter_mut().zip(now).for_each(|(value, now)| *value = (*value - now) * per_step);
+        Ok(column)
+    }
+}
 
 impl Border {
     fn new(count: usize, elements: usize) -> Self {

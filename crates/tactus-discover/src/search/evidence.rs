@@ -21,7 +21,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Prior odds against a class.
-const ODDS_AGAINST: f64 = 20.0;
+pub(crate) const ODDS_AGAINST: f64 = 20.0;
 /// Prior odds against one more term of a class.
 const ODDS_AGAINST_AGAIN: f64 = 4.0;
 /// Values of `tau`: from the least in factors of two.
@@ -196,7 +196,7 @@ impl Evidence<'_> {
         for _ in 0..SIZE_MAX {
             let mut next: Vec<Set> = Vec::new();
             for set in &beam {
-                for (addition, gain) in self.steps(set, &among) {
+                for (addition, gain) in self.best_of_classes(set, &among, GAIN_LEAST).into_iter().take(BEAM) {
                     let mut members = set.members.clone();
                     members.push(addition);
                     members.sort_unstable();
@@ -230,12 +230,17 @@ impl Evidence<'_> {
         found
     }
 
-    /// For each class, the shape that gains most beside a set.
-    fn steps(&self, set: &Set, among: &[usize]) -> Vec<(usize, Gain)> {
+    /// For each class, the shape that gains most beside a set, if its odds are greater than `ln_odds_least`; greatest odds first.
+    pub(crate) fn best_of_classes(
+        &self,
+        set: &Set,
+        among: &[usize],
+        ln_odds_least: f64,
+    ) -> Vec<(usize, Gain)> {
         let mut best: Vec<(usize, Gain)> = Vec::new();
         for addition in among.iter().copied().filter(|one| !set.members.contains(one)) {
             let gain = self.gain(set, addition);
-            if gain.ln_odds < GAIN_LEAST {
+            if gain.ln_odds <= ln_odds_least {
                 continue;
             }
             let class = self.additions[addition].class;
@@ -246,7 +251,6 @@ impl Evidence<'_> {
             }
         }
         best.sort_by(|a, b| b.1.ln_odds.total_cmp(&a.1.ln_odds));
-        best.truncate(BEAM);
         best
     }
 
@@ -255,7 +259,7 @@ impl Evidence<'_> {
             let Some(leaving) = best.members.get(place).copied() else { break };
             let others: Vec<usize> = best.members.iter().copied().filter(|one| *one != leaving).collect();
             let less = self.set(others);
-            let entering = self.steps(&less, among).into_iter().next();
+            let entering = self.best_of_classes(&less, among, GAIN_LEAST).into_iter().next();
             let next = entering.map_or_else(|| less.clone(), |(one, gain)| less.with(one, &gain));
             for next in [less, next] {
                 if next.ln_odds > best.ln_odds + 1e-9 {

@@ -11,12 +11,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
 use tactus_model::effect::{Definition, ParameterKind};
 
 use super::candidates::Candidate;
 use super::drift::TriedWalk;
-use super::evidence::{Addition, Evidence, Set, Signs};
+use super::evidence::{Addition, Evidence, Gain, ODDS_AGAINST, Set, Signs};
 use super::options::Options;
 use super::rivals::rivals;
 use super::score::{Fitting, Score, flipped, largest, p_value};
@@ -84,8 +83,6 @@ const FORM_SHARE: f64 = 0.07;
 const BLOCKS_Z: f64 = 2.0;
 /// Probability of a reported set of classes.
 const SET_PROBABILITY: f64 = 0.95;
-/// Prior odds against a class.
-const ODDS_AGAINST: f64 = 20.0;
 
 /// Data, candidates and options of a search.
 pub(crate) struct Search<'a> {
@@ -139,7 +136,6 @@ pub(crate) struct Pass {
     /// Names of the classes.
     classes: Vec<&'static str>,
     scores: Vec<Score>,
-    products: DMatrix<f64>,
     grams: Grams,
     walk: Option<TriedWalk>,
     /// Classes of the model.
@@ -158,7 +154,6 @@ enum Kind {
 }
 
 /// A class that was fitted beside a model.
-#[derive(Clone)]
 pub(crate) struct Beside {
     pub(crate) name: &'static str,
     pub(crate) fitted: Fitted,
@@ -170,7 +165,7 @@ impl Pass {
     fn evidence(&self) -> Evidence<'_> {
         Evidence {
             additions: &self.additions,
-            products: &self.products,
+            products: self.grams.reduced(),
             variance: self.variance,
             present: &self.present,
         }
@@ -246,9 +241,8 @@ impl Search<'_> {
             kinds.push(Kind::Rival);
         }
         let grams = problem.grams(at, directions)?;
-        let products = grams.reduced().clone();
-        let last = products.nrows() - 1;
-        let residual = products[(last, last)].sqrt();
+        let last = grams.reduced().nrows() - 1;
+        let residual = grams.reduced()[(last, last)].sqrt();
         for (addition, kind) in additions.iter_mut().zip(&kinds) {
             if matches!(kind, Kind::Rival) {
                 // As a rival has no range: what would make the whole residual.
@@ -272,7 +266,6 @@ impl Search<'_> {
             kinds,
             classes,
             scores,
-            products,
             grams,
             walk,
             present,
@@ -392,7 +385,6 @@ impl Search<'_> {
         let evidence = pass.evidence();
         let best = evidence.sets(|_| true).into_iter().next();
         let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
-        let none = evidence.none();
         let mut starts: Vec<(&'static str, Vec<Term>)> = Vec::new();
         let mut propose = |set: &Set| {
             for member in set.members.iter().copied().filter(|member| pass.is_named(*member)) {
@@ -403,15 +395,9 @@ impl Search<'_> {
             }
         };
         best.iter().chain(&named).for_each(&mut propose);
-        let mut alone: Vec<(usize, f64)> = pass
-            .among(|_| true)
-            .into_iter()
-            .map(|one| (one, evidence.gain(&none, one).ln_odds))
-            .filter(|(_, ln_odds)| *ln_odds > 0.0)
-            .collect();
-        alone.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let most = alone.first().map_or(0.0, |(_, ln_odds)| *ln_odds);
-        for (one, _) in alone.iter().filter(|(_, ln_odds)| *ln_odds > PROMISE_SHARE * most) {
+        let alone = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), 0.0);
+        let most = alone.first().map_or(0.0, |(_, gain)| gain.ln_odds);
+        for (one, _) in alone.iter().filter(|(_, gain)| gain.ln_odds > PROMISE_SHARE * most) {
             propose(&evidence.set([*one]));
         }
         starts.truncate(FITTED_MAX);
@@ -570,23 +556,14 @@ impl Search<'_> {
         ln_odds_least: f64,
     ) -> Result<Vec<Beside>, DiscoverError> {
         let evidence = pass.evidence();
-        let none = evidence.none();
-        let mut best: Vec<(&'static str, usize, f64)> = Vec::new();
-        for one in pass.among(|name| !names.contains(&name)) {
-            let (name, ln_odds) = (pass.class_of(one), evidence.gain(&none, one).ln_odds);
-            match best.iter_mut().find(|(known, ..)| *known == name) {
-                Some(known) if known.2 < ln_odds => *known = (name, one, ln_odds),
-                Some(_) => {}
-                None => best.push((name, one, ln_odds)),
-            }
-        }
-        best.retain(|(.., ln_odds)| *ln_odds > ln_odds_least);
-        best.sort_by(|a, b| b.2.total_cmp(&a.2));
+        let among = pass.among(|name| !names.contains(&name));
+        let mut best = evidence.best_of_classes(&evidence.none(), &among, ln_odds_least);
         best.truncate(OTHERS_MAX);
-        let starts: Vec<(&'static str, Vec<Term>)> = best
-            .into_iter()
-            .map(|(name, one, _)| (name, self.starts(pass, &evidence, &evidence.set([one]), name)))
-            .collect();
+        let start = |(one, _): (usize, Gain)| {
+            let name = pass.class_of(one);
+            (name, self.starts(pass, &evidence, &evidence.set([one]), name))
+        };
+        let starts: Vec<(&'static str, Vec<Term>)> = best.into_iter().map(start).collect();
         self.fits(less, &starts)
     }
 

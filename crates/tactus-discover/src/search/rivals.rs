@@ -91,21 +91,16 @@ pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result
 fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
     let kept = values.iter().zip(among).filter(|(value, among)| **among && value.is_finite());
     let knots = knots(kept.map(|(value, _)| *value).collect());
+    // Beyond the first and the last knot the function is constant.
+    let slope =
+        |value: f64, from: Option<f64>, knot: f64| from.map_or(1.0, |from| (value - from) / (knot - from));
     let hat = |knot: usize| {
+        let (below, above) = (knot.checked_sub(1).map(|below| knots[below]), knots.get(knot + 1).copied());
         let of = |(value, among): (&f64, &bool)| {
             if !among || !value.is_finite() {
                 return 0.0;
             }
-            let value = value.clamp(knots[0], knots[knots.len() - 1]);
-            let below = knot.checked_sub(1).map_or(f64::NEG_INFINITY, |below| knots[below]);
-            let above = knots.get(knot + 1).copied().unwrap_or(f64::INFINITY);
-            if value <= knots[knot] {
-                if below.is_finite() { ((value - below) / (knots[knot] - below)).max(0.0) } else { 1.0 }
-            } else if above.is_finite() {
-                ((above - value) / (above - knots[knot])).max(0.0)
-            } else {
-                1.0
-            }
+            slope(*value, below, knots[knot]).min(slope(*value, above, knots[knot])).clamp(0.0, 1.0)
         };
         values.iter().zip(among).map(of).collect()
     };

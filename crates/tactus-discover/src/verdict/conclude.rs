@@ -28,10 +28,9 @@ pub(crate) struct SearchOutcome {
     /// Effects that were not tried, because the data cannot show them.
     pub(crate) lacking: Vec<NotShown>,
     pub(crate) base: Fitted,
-    pub(crate) grown: Fitted,
+    pub(crate) confirmed: Confirmed,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
-    pub(crate) tentative: Vec<AddedEffect>,
     /// p-value of the largest score of all additions to the grown model.
     pub(crate) p_left: f64,
     /// Where the base model and the data disagree, and where the grown model still does.
@@ -61,28 +60,41 @@ impl HeldOutResidual {
     }
 }
 
-/// A model with those of its added effects that the held-out presses confirm, and the others.
+/// A grown model whose effects the held-out presses confirm.
+pub(crate) struct Confirmed {
+    pub(crate) grown: Fitted,
+    /// Its added effects.
+    pub(crate) steps: Vec<AddedEffect>,
+    /// Those that are not confirmed.
+    pub(crate) tentative: Vec<AddedEffect>,
+}
+
+/// A model with those of its added effects that the held-out presses confirm.
 pub(crate) fn confirmed(
+    prepared: &Prepared<'_>,
     search: &Search<'_>,
     grown: Fitted,
     equivalent: &mut Equivalent,
-) -> Result<(Fitted, Vec<AddedEffect>), DiscoverError> {
+) -> Result<Confirmed, DiscoverError> {
+    let with_silent = prepared.problem_with_silent();
     let names = names(&grown.parameters, search.known_terms);
-    let added = search.steps(&grown, equivalent, search.problem)?.into_iter();
+    let steps = search.steps(&grown, equivalent, &with_silent)?;
     // A miswired element acts on its own readings, of which few may be held out.
     let is_tentative = |step: &AddedEffect| {
         names.contains(&step.effect) && step.effect != MISWIRED && step.p_value > CONFIRMED_P
     };
-    let tentative: Vec<AddedEffect> = added.filter(is_tentative).collect();
-    if tentative.is_empty() {
-        return Ok((grown, tentative));
+    if !steps.iter().any(is_tentative) {
+        return Ok(Confirmed { grown, steps, tentative: Vec::new() });
     }
+    let tentative: Vec<AddedEffect> = steps.into_iter().filter(is_tentative).collect();
     let mut firm = grown.parameters;
     for step in &tentative {
         equivalent.remove(step.effect);
         firm = without(&firm, step.effect, search.known_terms);
     }
-    Ok((search.problem.fit_from(firm, POLISH_ROUNDS)?, tentative))
+    let grown = search.problem.fit_from(firm, POLISH_ROUNDS)?;
+    let steps = search.steps(&grown, equivalent, &with_silent)?;
+    Ok(Confirmed { grown, steps, tentative })
 }
 
 /// Decides the verdict and builds the report of a search.
@@ -93,7 +105,8 @@ pub(crate) fn conclude(
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
-    let SearchOutcome { lacking, base, grown, rounds, equivalent, tentative, p_left, before, after } = found;
+    let SearchOutcome { lacking, base, confirmed, rounds, equivalent, p_left, before, after } = found;
+    let Confirmed { grown, mut steps, tentative } = confirmed;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
@@ -122,7 +135,6 @@ pub(crate) fn conclude(
 
     let mut not_shown = lacking;
     not_shown.extend(first.map_or_else(Vec::new, |round| not_shown::out_of_sight(&round.reach)));
-    let mut steps = search.steps(&grown, &equivalent, &prepared.problem_with_silent())?;
     let mut effects = grown.parameters.effects()?;
     if let Some((step_counts, p_value)) = lattice {
         effects.push(Effect::new("quantisation", [("step_counts", *step_counts)])?);

@@ -1,6 +1,6 @@
 //! Covering: response that depends on the speed of loading.
 
-use super::{Definition, PipelineHook};
+use super::{Definition, Now, PipelineHook};
 
 pub(super) const POWER: Definition = Definition {
     id: "rate-power",
@@ -12,8 +12,7 @@ pub(super) const POWER: Definition = Definition {
         let exponent = knobs.between("exponent", 0.25, 0.6);
         let share = knobs.scaled("share_at_1_mm_per_s", 0.12);
         PipelineHook::depth(move |now, depth_mm| {
-            let inward_mm_per_s = (-now.velocity_mm_per_s[2]).max(0.0);
-            depth_mm * (1.0 + share * inward_mm_per_s.powf(exponent))
+            depth_mm * (1.0 + share * inward_mm_per_s(now).powf(exponent))
         })
     },
 };
@@ -27,14 +26,9 @@ pub(super) const LOGARITHMIC: Definition = Definition {
     make: |knobs| {
         let scale_mm_per_s = knobs.decade("scale_mm_per_s", 0.05, 0.5);
         let share = knobs.scaled("share", 0.05);
-        let mut loaded_mm_per_s = 0.0;
+        let mut loading = Loading::default();
         PipelineHook::depth(move |now, depth_mm| {
-            let inward_mm_per_s = -now.velocity_mm_per_s[2];
-            if depth_mm <= 0.0 {
-                loaded_mm_per_s = 0.0;
-            } else if inward_mm_per_s > 0.0 {
-                loaded_mm_per_s = inward_mm_per_s;
-            }
+            let loaded_mm_per_s = loading.mm_per_s(now, depth_mm);
             depth_mm * (1.0 + share * (loaded_mm_per_s / scale_mm_per_s).ln_1p())
         })
     },
@@ -50,8 +44,7 @@ pub(super) const EYRING: Definition = Definition {
         let scale_mm_per_s = knobs.decade("scale_mm_per_s", 0.1, 1.0);
         let share = knobs.scaled("share", 0.06);
         PipelineHook::depth(move |now, depth_mm| {
-            let inward_mm_per_s = (-now.velocity_mm_per_s[2]).max(0.0);
-            depth_mm * (1.0 + share * (inward_mm_per_s / scale_mm_per_s).asinh())
+            depth_mm * (1.0 + share * (inward_mm_per_s(now) / scale_mm_per_s).asinh())
         })
     },
 };
@@ -65,15 +58,33 @@ pub(super) const SATURATING: Definition = Definition {
     make: |knobs| {
         let scale_mm_per_s = knobs.decade("scale_mm_per_s", 0.3, 2.0);
         let share = knobs.scaled("share", 0.15);
-        let mut loaded_mm_per_s = 0.0;
+        let mut loading = Loading::default();
         PipelineHook::depth(move |now, depth_mm| {
-            let inward_mm_per_s = -now.velocity_mm_per_s[2];
-            if depth_mm <= 0.0 {
-                loaded_mm_per_s = 0.0;
-            } else if inward_mm_per_s > 0.0 {
-                loaded_mm_per_s = inward_mm_per_s;
-            }
+            let loaded_mm_per_s = loading.mm_per_s(now, depth_mm);
             depth_mm * (1.0 + share * loaded_mm_per_s / (loaded_mm_per_s + scale_mm_per_s))
         })
     },
 };
+
+/// The speed at which the tip goes into the covering; 0 while it rests or goes out.
+fn inward_mm_per_s(now: &Now) -> f64 {
+    (-now.velocity_mm_per_s[2]).max(0.0)
+}
+
+/// The speed of the present contact's last loading.
+#[derive(Default)]
+struct Loading {
+    last_mm_per_s: f64,
+}
+
+impl Loading {
+    fn mm_per_s(&mut self, now: &Now, depth_mm: f64) -> f64 {
+        let inward_mm_per_s = inward_mm_per_s(now);
+        if depth_mm <= 0.0 {
+            self.last_mm_per_s = 0.0;
+        } else if inward_mm_per_s > 0.0 {
+            self.last_mm_per_s = inward_mm_per_s;
+        }
+        self.last_mm_per_s
+    }
+}
