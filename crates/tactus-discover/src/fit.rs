@@ -11,6 +11,8 @@
 //!
 //! Each file names its sources.
 
+mod elimination;
+mod gains;
 mod grams;
 mod heldout;
 mod linear;
@@ -20,8 +22,9 @@ mod prepare;
 mod problem;
 mod random_walk;
 mod scale;
+mod sums;
 
-pub(crate) use grams::{Direction, Grams};
+pub(crate) use grams::Grams;
 pub(crate) use heldout::LOUD;
 pub(crate) use linear::Linear;
 pub(crate) use parameters::{Parameters, Term};
@@ -31,3 +34,4 @@ pub(crate) use problem::{Fitted, Free, Problem, dot};
 pub use random_walk::RunWalks;
 pub(crate) use random_walk::{RANDOM_WALK, RandomWalk, is_random_walk};
 pub(crate) use scale::Scale;
+pub(crate) use sums::Direction;

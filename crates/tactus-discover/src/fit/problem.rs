@@ -12,16 +12,17 @@
 //! Variable projection: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413. Damping: Levenberg and
 //! Marquardt.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::ParameterKind;
 
-use super::grams::Direction;
-use super::linear::Linear;
+use super::elimination::Elimination;
 use super::parameters::{Parameters, Term};
 use super::predictor::Predictor;
 use super::scale::Scale;
+use super::sums::Direction;
 use crate::data::{Contacts, DiscoverError, Noise};
 use crate::numbers::parallel;
 
@@ -31,10 +32,6 @@ const COST_SHARE_LEAST: f64 = 1e-4;
 
 /// Gains and baselines are fitted first if they alone remove this share of the cost.
 const TAKEN_UP_LEAST: f64 = 0.1;
-
-/// Least share of a derivative's square that counts as the parameter's own in the damping. A parameter whose action gains
-/// and baselines can nearly replace is thus kept from long steps.
-const OWN_SHARE_LEAST: f64 = 1e-3;
 
 /// A knot is undetermined if the data determine it by less than this share of the knot before.
 const UNSEEN_SHARE: f64 = 0.1;
@@ -87,6 +84,39 @@ pub(crate) enum Free {
     SigmaIntercept,
     SigmaSlope,
     Of { term: usize, parameter: usize },
+}
+
+/// For each free parameter, its derivative if it is a knot of a curve.
+type Knots = Vec<Option<Arc<Stretch>>>;
+
+/// A derivative that is 0 outside a stretch of bins.
+#[derive(Debug)]
+struct Stretch {
+    elements: usize,
+    /// The first bin.
+    first: usize,
+    values: Vec<f32>,
+}
+
+impl Stretch {
+    fn of(column: &[f64], elements: usize) -> Self {
+        let acts = |value: &f64| *value != 0.0;
+        let first = column.iter().position(acts).unwrap_or(0) / elements;
+        let end = column.iter().rposition(acts).map_or(first, |last| last / elements + 1);
+        #[expect(clippy::cast_possible_truncation, reason = "a derivative for steps of a fit")]
+        let values = column[first * elements..end * elements].iter().map(|value| *value as f32).collect();
+        Self { elements, first, values }
+    }
+
+    fn direction(self: Arc<Self>) -> Direction<'static> {
+        Direction::Column(Box::new(move |bins: Range<usize>| {
+            let value = |place: usize| {
+                let place = place.checked_sub(self.first * self.elements);
+                place.and_then(|place| self.values.get(place)).map_or(0.0, |value| f64::from(*value))
+            };
+            (bins.start * self.elements..bins.end * self.elements).map(value).collect()
+        }))
+    }
 }
 
 impl<'a> Problem<'a> {
@@ -165,11 +195,6 @@ impl<'a> Problem<'a> {
             .sum()
     }
 
-    /// Weighted sum of the squares of a column in the fitted bins.
-    fn weighed_square(&self, column: &[f64]) -> f64 {
-        column.iter().zip(self.weights()).map(|(value, weight)| weight * value * value).sum()
-    }
-
     pub(crate) fn residuals<'b>(&'b self, predicted: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
         self.predictor.bins.counts.iter().zip(predicted).map(|(counts, predicted)| counts - predicted)
     }
@@ -245,52 +270,31 @@ impl<'a> Problem<'a> {
         let free = self.free(&start);
         let mut at = self.with_walk(start)?;
         let mut predicted = self.predict(&at)?;
-        let mut linear = self.linear(&at, &predicted)?;
-        if let Some((better, of_better)) = self.taken_up(&linear, &at, &predicted)? {
-            linear = self.linear(&better, &of_better)?;
+        let knots = self.knots(&at, &predicted, &free)?;
+        let mut normal = self.normal(&at, &predicted, &free, &knots)?;
+        if let Some((better, of_better)) = self.taken_up(&normal, &at, &predicted)? {
+            normal = self.normal(&better, &of_better, &free, &knots)?;
             (at, predicted) = (better, of_better);
         }
         let mut cost = self.cost(&predicted);
         let mut damping = 1e-3;
-        let mut kept: Vec<Option<Arc<Vec<f64>>>> = vec![None; free.len()];
         let mut covariance = None;
         for round in 0..rounds {
             if round > 0 {
-                linear = self.linear(&at, &predicted)?;
+                normal = self.normal(&at, &predicted, &free, &knots)?;
             }
-            let mut residual = self.standing(&at, &predicted);
-            let raw = residual.clone();
-            linear.project(&mut residual);
-            let places: Vec<usize> = (0..free.len()).collect();
-            let column = |place: &usize| match &kept[*place] {
-                Some(column) => Ok(Arc::clone(column)),
-                None => self.slope(&at, &predicted, free[*place]).map(Arc::new),
-            };
-            let columns: Vec<Arc<Vec<f64>>> =
-                parallel::map(&places, column).into_iter().collect::<Result<_, DiscoverError>>()?;
-            for ((kept, column), one) in kept.iter_mut().zip(&columns).zip(&free) {
-                if matches!(one, Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY) {
-                    kept.get_or_insert_with(|| Arc::clone(column));
-                }
-            }
-            let (gram, right) = self.normal(&linear, &columns, &residual);
-            let own = |(index, column): (usize, &Arc<Vec<f64>>)| {
-                gram[(index, index)].max(OWN_SHARE_LEAST * self.weighed_square(column))
-            };
-            let squares: Vec<f64> = columns.iter().enumerate().map(own).collect();
-            covariance = Some(gram.clone());
+            let (gram, right, squares) = normal.equations();
             let mut improved = false;
             let mut promise = 0.0;
             while damping < 1e8 {
                 let step = solve(&gram, &right, damping, &squares);
                 promise = step.dot(&right);
-                let next = self.stepped(&at, &free, &step, &linear, &raw, &columns);
-                let next_predicted = self.predict(&next)?;
-                let next_cost = self.cost(&next_predicted);
+                let (next, of_next) = self.settled(self.stepped(&at, &free, &step, &normal))?;
+                let next_cost = self.cost(&of_next);
                 if next_cost < cost {
                     damping = (damping / 10.0).max(1e-9);
                     promise = cost - next_cost;
-                    (at, predicted, cost) = (next, next_predicted, next_cost);
+                    (at, predicted, cost) = (next, of_next, next_cost);
                     improved = true;
                     break;
                 }
@@ -299,6 +303,7 @@ impl<'a> Problem<'a> {
                 }
                 damping *= 10.0;
             }
+            covariance = Some(gram);
             if !improved || promise < COST_LEAST.max(COST_SHARE_LEAST * cost) {
                 break;
             }
@@ -313,50 +318,49 @@ impl<'a> Problem<'a> {
         Ok(Fitted { parameters: at, predicted, cost, errors })
     }
 
-    /// The normal equations of columns, less what gains and baselines fit, and of a residual that is already less that.
+    /// The derivatives by the knots among the free parameters.
+    fn knots(&self, at: &Parameters, predicted: &[f64], free: &[Free]) -> Result<Knots, DiscoverError> {
+        let elements = self.predictor.bins.elements;
+        let knot = |one: &Free| match one {
+            Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY => {
+                let slope = self.slope(at, predicted, *one)?;
+                Ok(Some(Arc::new(Stretch::of(&slope, elements))))
+            }
+            _ => Ok(None),
+        };
+        parallel::map(free, knot).into_iter().collect()
+    }
+
+    /// What gains and baselines fit of the free parameters' directions and of the residual, and what is left.
     fn normal(
         &self,
-        linear: &Linear<'_>,
-        columns: &[Arc<Vec<f64>>],
-        residual: &[f64],
-    ) -> (DMatrix<f64>, DVector<f64>) {
-        let project = |column: &Arc<Vec<f64>>| {
-            let mut projected = column.to_vec();
-            linear.project(&mut projected);
-            projected
+        at: &Parameters,
+        predicted: &[f64],
+        free: &[Free],
+        knots: &Knots,
+    ) -> Result<Elimination, DiscoverError> {
+        let direction = |(one, knot): (&Free, &Option<Arc<Stretch>>)| match knot {
+            Some(knot) => Arc::clone(knot).direction(),
+            None => self.towards(at, *one),
         };
-        let projected: Vec<Vec<f64>> = columns.iter().map(project).collect();
-        let count = columns.len();
-        let mut gram = DMatrix::zeros(count, count);
-        let mut right = DVector::zeros(count);
-        for (i, column) in projected.iter().enumerate() {
-            let weighted: Vec<f64> = column.iter().zip(self.weights()).map(|(c, w)| c * w).collect();
-            right[i] = dot(&weighted, residual);
-            for (j, other) in projected.iter().enumerate().take(i + 1) {
-                gram[(i, j)] = dot(&weighted, other);
-                gram[(j, i)] = gram[(i, j)];
-            }
-        }
-        (gram, right)
+        self.eliminated(at, predicted, free.iter().zip(knots).map(direction).collect())
     }
 
     /// The parameters with refitted gains and baselines, and their prediction, if this reduces the cost by much. A start whose
     /// effects are not neutral needs it, because its gains are those of a model without these effects.
     fn taken_up(
         &self,
-        linear: &Linear<'_>,
+        normal: &Elimination,
         at: &Parameters,
         predicted: &[f64],
     ) -> Result<Option<(Parameters, Vec<f64>)>, DiscoverError> {
-        let raw = self.standing(at, predicted);
-        let mut residual = raw.clone();
-        linear.project(&mut residual);
-        if self.weighed_square(&residual) > (1.0 - TAKEN_UP_LEAST) * self.weighed_square(&raw) {
+        let [before, after] = normal.residual_squares();
+        if after > (1.0 - TAKEN_UP_LEAST) * before {
             return Ok(None);
         }
         let mut next = at.clone();
-        linear.take_up(&raw, &mut next);
-        let of_next = self.predict(&next)?;
+        self.take_up(normal, &[], &mut next);
+        let (next, of_next) = self.settled(next)?;
         Ok((self.cost(&of_next) < self.cost(predicted)).then_some((next, of_next)))
     }
 
@@ -365,9 +369,7 @@ impl<'a> Problem<'a> {
         at: &Parameters,
         free: &[Free],
         step: &DVector<f64>,
-        linear: &Linear<'_>,
-        residual: &[f64],
-        columns: &[Arc<Vec<f64>>],
+        normal: &Elimination,
     ) -> Parameters {
         let mut next = at.clone();
         let mut taken = Vec::with_capacity(free.len());
@@ -394,13 +396,7 @@ impl<'a> Problem<'a> {
             });
         }
         // The elements' own gains and baselines fit what the other parameters leave.
-        let mut left = residual.to_vec();
-        for (column, taken) in columns.iter().zip(taken) {
-            for (left, slope) in left.iter_mut().zip(column.iter()) {
-                *left -= taken * slope;
-            }
-        }
-        linear.take_up(&left, &mut next);
+        self.take_up(normal, &taken, &mut next);
         next
     }
 

@@ -199,15 +199,10 @@ impl<'a> Baselines<'a> {
         Self { problem, weights, knot_s, knots, stiffness, grams }
     }
 
-    /// Subtracts from a column what the baselines fit. Returns that part, run by run, knot by knot, element by element.
-    pub(crate) fn centre(&self, column: &mut [f64]) -> Vec<Vec<f64>> {
-        let (taken, _) = self.taken(column);
-        RandomWalk { knot_s: self.knot_s, runs: taken.clone() }.add(
-            self.problem.predictor.bins,
-            -1.0,
-            column,
-        );
-        taken
+    /// Subtracts from a column what the baselines fit.
+    pub(crate) fn centre(&self, column: &mut [f64]) {
+        let (runs, _) = self.taken(column);
+        RandomWalk { knot_s: self.knot_s, runs }.add(self.problem.predictor.bins, -1.0, column);
     }
 
     /// The baselines fitted to a column, and by how much walks reduce the cost below constants.
@@ -342,13 +337,13 @@ impl Problem<'_> {
 
 impl Baselines<'_> {
     /// Fits the baselines of a model to the residual of its constant baselines.
-    fn settle(&self, residual: &[f64], at: &mut Parameters) {
+    pub(super) fn settle(&self, residual: &[f64], at: &mut Parameters) {
         let (taken, _) = self.taken(residual);
         self.put(taken, at);
     }
 
     /// Adds a fit's first knot to the constant baselines, and makes the remainder the random walk.
-    pub(crate) fn put(&self, mut taken: Vec<Vec<f64>>, at: &mut Parameters) {
+    fn put(&self, mut taken: Vec<Vec<f64>>, at: &mut Parameters) {
         let elements = self.problem.predictor.bins.elements;
         for (baseline, taken) in at.baseline.iter_mut().zip(&mut taken) {
             let first = taken[..elements].to_vec();

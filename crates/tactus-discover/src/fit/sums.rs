@@ -1,0 +1,363 @@
+//! Sums of products of many directions, from one pass over the data.
+//!
+//! A direction is the derivative of the prediction by one number: a free parameter of the model, an amplitude of a term that the
+//! model does not have, or a column that belongs to no effect. All directions are computed together, a few hundred bins at a
+//! time, and only their products are kept:
+//!
+//! ```text
+//! A = sum over bins and elements of w x x'        x: all directions, and the residual as the last
+//! ```
+//!
+//! Beside them stand the products with each element's baseline and gain, segment by segment of the time, which
+//! [`super::elimination`] needs. Memory does not grow with the number of bins.
+
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use nalgebra::DMatrix;
+
+use super::parameters::Parameters;
+use super::predictor::Stream;
+use super::problem::Problem;
+use super::random_walk::is_random_walk;
+use crate::data::DiscoverError;
+use crate::numbers::parallel;
+
+/// Bins of which all directions are held at a time.
+const CHUNK_BINS: usize = 256;
+/// Greatest number of blocks whose signs are flipped apart; more are joined.
+const BLOCKS_MAX: usize = 400;
+/// Step of the derivative by the gains.
+const GAIN_SHARE: f64 = 1e-3;
+
+/// A direction.
+pub(crate) enum Direction<'a> {
+    /// Finite difference towards a changed model, divided by a step.
+    Towards { parameters: Parameters, step: f64 },
+    /// Values of any bins, bin by bin, element by element.
+    Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
+}
+
+/// Which products a pass keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kept {
+    /// Those of all directions, for steps of a fit.
+    All,
+    /// Also the part of each block.
+    AllAndBlocks,
+    /// Those of each direction with itself, with the model's own and with the residual; and the part of each block.
+    OwnAndBlocks,
+}
+
+/// Sums over all data.
+pub(super) struct Total {
+    /// Products of all directions, and of the residual as the last.
+    pub(super) products: DMatrix<f64>,
+    pub(super) segments: Vec<Border>,
+    pub(super) blocks: Vec<Block>,
+}
+
+/// Products with each element's baseline and gain.
+#[derive(Clone)]
+pub(super) struct Border {
+    /// Element by element, direction by direction.
+    pub(super) by_baseline: DMatrix<f64>,
+    pub(super) by_gain: DMatrix<f64>,
+    /// Of each element: baseline with itself, with gain, and gain with itself.
+    pub(super) own: Vec<[f64; 3]>,
+}
+
+/// What is kept of a block, in single precision: parts of a test's statistic.
+pub(super) struct Block {
+    number: usize,
+    pub(super) segment: usize,
+    /// Products of the model's own directions and the residual with all directions.
+    pub(super) rows: DMatrix<f32>,
+    pub(super) diagonal: Vec<f32>,
+    pub(super) by_baseline: DMatrix<f32>,
+    pub(super) by_gain: DMatrix<f32>,
+    pub(super) own: Vec<[f64; 3]>,
+}
+
+/// Stretches of time that have a baseline of their own: runs, or the parts of a walk.
+pub(super) struct Segments {
+    of_bin: Vec<usize>,
+    /// The run of each.
+    pub(super) run: Vec<usize>,
+    /// Precision of the difference between neighbours of one run, in counts^-2; 0 without a walk.
+    pub(super) stiffness: f64,
+}
+
+/// A direction during a pass.
+enum Running<'a> {
+    Towards { stream: Box<Mutex<Stream<'a>>>, per_step: f64 },
+    Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
+}
+
+/// The directions' values at the bins of a chunk, and the gains'.
+struct Chunk {
+    bins: Range<usize>,
+    columns: Vec<Vec<f64>>,
+    by_gain: Vec<f64>,
+}
+
+/// Sums over bins of one segment.
+struct Sums {
+    segment: usize,
+    /// The directions that do something there, in order.
+    active: Vec<usize>,
+    /// Products of those: in the rows of the pivots and of the residual, and on the diagonal.
+    products: DMatrix<f64>,
+    border: Border,
+}
+
+impl Problem<'_> {
+    /// Sums over all data at a model, of which the first `own` directions are its own.
+    pub(super) fn sums(
+        &self,
+        at: &Parameters,
+        predicted: &[f64],
+        directions: Vec<Direction<'_>>,
+        own: usize,
+        kept: Kept,
+        segments: &Segments,
+    ) -> Result<Total, DiscoverError> {
+        let bins = self.predictor.bins;
+        let standing = self.standing(at, predicted);
+        let joined = bins.blocks.div_ceil(BLOCKS_MAX).max(1);
+        let count = directions.len() + 1;
+        let mut total = Total::new(count, bins.elements, segments.run.len());
+        let mut running: Vec<Running<'_>> =
+            directions.into_iter().map(|one| self.running(one)).collect::<Result<_, DiscoverError>>()?;
+        running.push(self.running(by_gain(at))?);
+        for first in (0..bins.len()).step_by(CHUNK_BINS) {
+            let range = first..(first + CHUNK_BINS).min(bins.len());
+            let column = |direction: &Running<'_>| direction.values(range.clone(), predicted);
+            let mut columns: Vec<Vec<f64>> =
+                parallel::map(&running, column).into_iter().collect::<Result<_, DiscoverError>>()?;
+            let by_gain = columns.pop().unwrap_or_default();
+            let chunk = Chunk { bins: range.clone(), columns, by_gain };
+            // The chunk's parts of one block and one segment each.
+            let key = |bin: usize| (bins.block[bin] / joined, segments.of_bin[bin]);
+            let used: Vec<usize> = range.filter(|bin| self.train[*bin] > 0.0).collect();
+            let parts: Vec<&[usize]> = used.chunk_by(|one, next| key(*one) == key(*next)).collect();
+            let pivots = if kept == Kept::OwnAndBlocks { own } else { count };
+            let sums = parallel::map(&parts, |part| self.sums_of(&chunk, part, &standing, segments, pivots));
+            for (part, sums) in parts.iter().zip(&sums) {
+                total.add(bins.block[part[0]] / joined, own, sums, kept);
+            }
+        }
+        Ok(total)
+    }
+
+    fn running<'a>(&'a self, direction: Direction<'a>) -> Result<Running<'a>, DiscoverError> {
+        Ok(match direction {
+            Direction::Towards { parameters, step } => Running::Towards {
+                stream: Box::new(Mutex::new(self.predictor.stream(parameters)?)),
+                // A parameter that cannot move has no derivative.
+                per_step: if step == 0.0 { 0.0 } else { 1.0 / step },
+            },
+            Direction::Column(values) => Running::Column(values),
+        })
+    }
+
+    /// Sums over the bins of a chunk that belong to one block. The products are those of the first `pivots` directions and of the
+    /// residual with all, and of each with itself.
+    fn sums_of(
+        &self,
+        chunk: &Chunk,
+        part: &[usize],
+        standing: &[f64],
+        segments: &Segments,
+        pivots: usize,
+    ) -> Sums {
+        let elements = self.predictor.bins.elements;
+        let count = chunk.columns.len() + 1;
+        let weighed: Vec<usize> =
+            (0..elements).filter(|element| self.element_weight[*element] > 0.0).collect();
+        // Bin, element and the root of the weight.
+        let of_bin = |bin: usize| {
+            let root = move |element: &usize| (self.train[bin] * self.element_weight[*element]).sqrt();
+            weighed.iter().map(move |element| (bin, *element, root(element)))
+        };
+        let readings: Vec<(usize, usize, f64)> = part.iter().copied().flat_map(of_bin).collect();
+        let place = |bin: usize, element: usize| (bin - chunk.bins.start) * elements + element;
+        let mut border = Border::new(count, elements);
+        let gains: Vec<f64> =
+            readings.iter().map(|(bin, element, root)| root * chunk.by_gain[place(*bin, *element)]).collect();
+        for ((_, element, root), gain) in readings.iter().zip(&gains) {
+            let [one, mixed, square] = &mut border.own[*element];
+            *one += root * root;
+            *mixed += root * gain;
+            *square += gain * gain;
+        }
+        // Directions that do nothing here, such as those of contact far from it, take no part.
+        let mut active: Vec<usize> = Vec::new();
+        let mut values: Vec<f64> = Vec::new();
+        for number in 0..count {
+            let value = |(bin, element, root): &(usize, usize, f64)| match chunk.columns.get(number) {
+                Some(column) => root * column[place(*bin, *element)],
+                None => root * standing[bin * elements + element],
+            };
+            let at = values.len();
+            values.extend(readings.iter().map(value));
+            if values[at..].iter().all(|value| *value == 0.0) {
+                values.truncate(at);
+                continue;
+            }
+            active.push(number);
+            for ((value, gain), (_, element, root)) in values[at..].iter().zip(&gains).zip(&readings) {
+                border.by_baseline[(*element, number)] += value * root;
+                border.by_gain[(*element, number)] += value * gain;
+            }
+        }
+        let values = DMatrix::from_vec(readings.len(), active.len(), values);
+        let first = active.iter().take_while(|number| **number < pivots).count();
+        let mut products = DMatrix::zeros(active.len(), active.len());
+        products.rows_mut(0, first).gemm_tr(1.0, &values.columns(0, first), &values, 0.0);
+        let has_residual = active.last() == Some(&(count - 1));
+        for (place, column) in values.column_iter().enumerate().skip(first) {
+            products[(place, place)] = column.norm_squared();
+            if has_residual {
+                let residual = active.len() - 1;
+                products[(residual, place)] = column.dot(&values.column(residual));
+            }
+        }
+        if has_residual && first < active.len() {
+            for place in 0..first {
+                products[(active.len() - 1, place)] = products[(place, active.len() - 1)];
+            }
+        }
+        Sums { segment: segments.of_bin[part[0]], active, products, border }
+    }
+}
+
+/// The direction of all gains by the same share.
+fn by_gain(at: &Parameters) -> Direction<'static> {
+    let mut more = at.clone();
+    more.sensitivity.iter_mut().for_each(|gain| *gain *= 1.0 + GAIN_SHARE);
+    Direction::Towards { parameters: more, step: GAIN_SHARE }
+}
+
+impl Running<'_> {
+    /// Its values at the next bins.
+    fn values(&self, bins: Range<usize>, predicted: &[f64]) -> Result<Vec<f64>, DiscoverError> {
+        let (stream, per_step) = match self {
+            Self::Column(values) => return Ok(values(bins)),
+            Self::Towards { stream, per_step } => (stream, per_step),
+        };
+        let mut stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut column = Vec::new();
+        stream.take(bins.len(), &mut column)?;
+        let now = predicted.chunks_exact(column.len() / bins.len()).skip(bins.start).flatten();
+        column.iter_mut().zip(now).for_each(|(value, now)| *value = (*value - now) * per_step);
+        Ok(column)
+    }
+}
+
+impl Border {
+    fn new(count: usize, elements: usize) -> Self {
+        let zeros = || DMatrix::zeros(elements, count);
+        Self { by_baseline: zeros(), by_gain: zeros(), own: vec![[0.0; 3]; elements] }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.by_baseline += &other.by_baseline;
+        self.by_gain += &other.by_gain;
+        add(&mut self.own, &other.own);
+    }
+}
+
+fn add(to: &mut [[f64; 3]], of: &[[f64; 3]]) {
+    for (to, of) in to.iter_mut().flatten().zip(of.iter().flatten()) {
+        *to += of;
+    }
+}
+
+impl Total {
+    fn new(count: usize, elements: usize, segments: usize) -> Self {
+        Self {
+            products: DMatrix::zeros(count, count),
+            segments: vec![Border::new(count, elements); segments],
+            blocks: Vec::new(),
+        }
+    }
+
+    /// Adds the sums over a part of a block; parts come in order of time.
+    fn add(&mut self, number: usize, own: usize, sums: &Sums, kept: Kept) {
+        for (place, column) in sums.active.iter().enumerate() {
+            for (row, product) in sums.active.iter().zip(sums.products.column(place).iter()) {
+                self.products[(*row, *column)] += product;
+            }
+        }
+        self.segments[sums.segment].add(&sums.border);
+        if kept == Kept::All {
+            return;
+        }
+        let elements = sums.border.own.len();
+        let is_same = |last: &&mut Block| (last.number, last.segment) == (number, sums.segment);
+        if self.blocks.last_mut().filter(is_same).is_none() {
+            self.blocks.push(Block::new(number, sums.segment, own, self.products.ncols(), elements));
+        }
+        if let Some(block) = self.blocks.last_mut() {
+            block.add(own, sums);
+        }
+    }
+}
+
+impl Block {
+    fn new(number: usize, segment: usize, own: usize, count: usize, elements: usize) -> Self {
+        Self {
+            number,
+            segment,
+            rows: DMatrix::zeros(own + 1, count),
+            diagonal: vec![0.0; count],
+            by_baseline: DMatrix::zeros(elements, count),
+            by_gain: DMatrix::zeros(elements, count),
+            own: vec![[0.0; 3]; elements],
+        }
+    }
+
+    fn add(&mut self, own: usize, Sums { active, products, border, .. }: &Sums) {
+        let residual = self.rows.ncols() - 1;
+        #[expect(clippy::cast_possible_truncation, reason = "parts of a test's statistic")]
+        let single = |value: f64| value as f32;
+        let rows = |(_, number): &(usize, &usize)| **number < own || **number == residual;
+        for (place, number) in active.iter().enumerate().filter(rows) {
+            for (other, product) in active.iter().zip(products.row(place).iter()) {
+                self.rows[((*number).min(own), *other)] += single(*product);
+            }
+        }
+        for (place, number) in active.iter().enumerate() {
+            self.diagonal[*number] += single(products[(place, place)]);
+        }
+        self.by_baseline.zip_apply(&border.by_baseline, |to, of| *to += single(of));
+        self.by_gain.zip_apply(&border.by_gain, |to, of| *to += single(of));
+        add(&mut self.own, &border.own);
+    }
+}
+
+impl Segments {
+    pub(super) fn of(problem: &Problem<'_>, at: &Parameters) -> Self {
+        let bins = problem.predictor.bins;
+        let walk =
+            at.terms.iter().find(|term| is_random_walk(term)).map(|term| [term.values[0], term.values[1]]);
+        let walk = walk.filter(|[rate, knot_s]| *rate > 0.0 && *knot_s > 0.0);
+        let (mut of_bin, mut run) = (Vec::with_capacity(bins.len()), Vec::new());
+        let mut key = None;
+        for bin in 0..bins.len() {
+            #[expect(clippy::cast_possible_truncation, reason = "a number of segments")]
+            let part = walk.map_or(0, |[_, knot_s]| (bins.t_s[bin] / knot_s) as i64);
+            // A block has one segment.
+            let is_new = key.is_none_or(|(before_run, before)| before_run != bins.run[bin] || before != part);
+            let starts = bin == 0 || bins.block[bin] != bins.block[bin - 1];
+            if is_new && starts {
+                key = Some((bins.run[bin], part));
+                run.push(bins.run[bin]);
+            }
+            of_bin.push(run.len().saturating_sub(1));
+        }
+        let stiffness = walk.map_or(0.0, |[rate, knot_s]| 1.0 / (rate * rate * knot_s));
+        Self { of_bin, run, stiffness }
+    }
+}
