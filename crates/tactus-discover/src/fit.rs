@@ -4,8 +4,9 @@
 //! cost = sum over bins b and elements e of w_b w_e (counts_be - predicted_be)^2        w = 1 / variance of the bin's mean
 //! ```
 //!
-//! [`predictor`] computes the prediction with the pipeline of `tactus-model`. [`linear`] eliminates gains and baselines in closed form,
-//! where baselines may follow a [`random_walk`]. [`problem`] takes damped Gauss-Newton steps in the spread and in the parameters of the
+//! [`predictor`] computes the prediction with the pipeline of `tactus-model`. One pass over the data gives the [`sums`] of products of all
+//! derivatives; [`elimination`] takes off what [`gains`] and baselines fit, where baselines may follow a [`random_walk`]; [`grams`] are what
+//! is left. [`problem`] takes damped Gauss-Newton steps in the spread and in the parameters of the
 //! effects, each on its own [`scale`]. [`heldout`] measures a fitted model on the presses that were not fitted. [`prepare`] splits the
 //! data and fits the base model, from which the search starts.
 //!
@@ -15,7 +16,6 @@ mod elimination;
 mod gains;
 mod grams;
 mod heldout;
-mod linear;
 mod parameters;
 mod predictor;
 mod prepare;
@@ -26,11 +26,10 @@ mod sums;
 
 pub(crate) use grams::Grams;
 pub(crate) use heldout::LOUD;
-pub(crate) use linear::Linear;
 pub(crate) use parameters::{Parameters, Term};
 pub(crate) use predictor::Predictor;
 pub(crate) use prepare::Prepared;
-pub(crate) use problem::{Fitted, Free, Problem, dot};
+pub(crate) use problem::{Fitted, Free, Problem};
 pub use random_walk::RunWalks;
 pub(crate) use random_walk::{RANDOM_WALK, RandomWalk, is_random_walk};
 pub(crate) use scale::Scale;

@@ -21,9 +21,9 @@ mod design;
 use tactus_model::effect::{Definition, ParameterKind};
 
 use crate::data::{Bins, DiscoverError, Frames, HeldOut, Known, Noise};
-use crate::fit::{Free, Parameters, Predictor, Problem, Term};
+use crate::fit::{Direction, Free, Parameters, Predictor, Problem, Term};
 use crate::numbers::parallel;
-use crate::search::{Fitting, NotShown};
+use crate::search::NotShown;
 use design::{Design, DesignSpace};
 
 /// An experiment that would distinguish two explanations.
@@ -188,10 +188,10 @@ impl Planner<'_> {
                 [&pair.of[0].parameters, &pair.of[1].parameters, &pair.without].map(once);
             let predicted = [problem.predict(&one)?, problem.predict(&other)?, problem.predict(&without)?];
             let wrong = |at: &Parameters, predicted: &[f64], right: &[f64]| {
-                let mut difference: Vec<f64> = right.iter().zip(predicted).map(|(a, b)| a - b).collect();
-                let fitting = Fitting::at(problem, at, predicted)?;
-                fitting.free(&mut difference);
-                Ok::<f64, DiscoverError>(fitting.size(&difference))
+                let difference: Vec<f64> = right.iter().zip(predicted).map(|(a, b)| a - b).collect();
+                let sizes =
+                    problem.sizes(at, predicted, vec![Direction::of(difference, self.frames.elements)])?;
+                Ok::<f64, DiscoverError>(sizes.iter().sum())
             };
             let z =
                 wrong(&one, &predicted[0], &predicted[1])?.min(wrong(&other, &predicted[1], &predicted[0])?);
@@ -210,23 +210,23 @@ impl Planner<'_> {
         self.on(design, |problem| {
             let at = once(at);
             let predicted = problem.predict(&at)?;
-            let fitting = Fitting::at(problem, &at, &predicted)?;
             let signal = largest(&predicted, &at.baseline[0]);
             let mut with = at.clone();
             with.terms.push(Term::neutral(definition));
             let term = with.terms.len() - 1;
-            let mut best = 0.0_f64;
+            let mut columns = Vec::new();
             for (parameter, known) in definition.parameters.iter().enumerate() {
                 if known.kind != ParameterKind::Real {
                     continue;
                 }
-                let mut column = problem.slope(&with, &predicted, Free::Of { term, parameter })?;
+                let column = problem.slope(&with, &predicted, Free::Of { term, parameter })?;
                 let reach = column.iter().map(|slope| slope.abs()).fold(0.0, f64::max);
                 if reach > 0.0 {
-                    fitting.free(&mut column);
-                    best = best.max(fitting.size(&column) * SMALL_SHARE * signal / reach);
+                    let small = column.iter().map(|slope| slope * SMALL_SHARE * signal / reach).collect();
+                    columns.push(Direction::of(small, self.frames.elements));
                 }
             }
+            let best = problem.sizes(&at, &predicted, columns)?.into_iter().fold(0.0, f64::max);
             // There is no other explanation that would close any of it.
             Ok(Expected { z: best, share: 1.0 })
         })

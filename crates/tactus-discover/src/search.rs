@@ -31,4 +31,4 @@ pub(crate) use locate::Located;
 pub use locate::{Curve, Gap, Point};
 pub use not_shown::NotShown;
 pub use options::{Options, Rule};
-pub(crate) use score::{Fitting, q_values, sign_flip_p};
+pub(crate) use score::{q_values, sign_flip_p};

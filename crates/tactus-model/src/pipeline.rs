@@ -74,6 +74,21 @@ struct Pressed {
     of_one_mm: Vec<f64>,
 }
 
+/// A moment, and the time since the one before.
+#[derive(Debug, Clone, Copy)]
+struct Elapsed {
+    t_s: f64,
+    dt_s: f64,
+    temperature_c: Option<f64>,
+}
+
+impl Elapsed {
+    fn now(self, base: BaseModel<'_>) -> Now<'_> {
+        let Self { t_s, dt_s, temperature_c } = self;
+        Now { t_s, dt_s, temperature_c, base }
+    }
+}
+
 /// Sources of images that need not be computed.
 #[derive(Debug, Clone, Copy)]
 struct Ready<'a> {
@@ -132,30 +147,70 @@ impl Pipeline {
     /// `path`: the tip in the robot frame, z up; a fixed position, a [`Trajectory`](crate::Trajectory), a
     /// [`Trail`](crate::Trail) of the positions so far, or a function of time.
     pub fn step(&mut self, moment: Moment, path: &impl Path) -> &[f64] {
-        let Moment { t_s, temperature_c } = moment;
+        let moment = self.elapse(moment);
+        self.press(moment, path);
+        self.cover(moment, |_| ());
+        self.respond(moment)
+    }
+
+    /// The first part of a step. Appends to `signals_mm` the signal that reaches the elements, before the effects of the covering and
+    /// after each of them: row-major, in mm. [`Pipeline::contact`] is that of the moment. [`Pipeline::step_on`] of other pipelines goes
+    /// on from there.
+    pub fn reach(&mut self, moment: Moment, path: &impl Path, signals_mm: &mut Vec<f64>) {
+        let moment = self.elapse(moment);
+        self.press(moment, path);
+        signals_mm.extend(&self.signal_mm);
+        self.cover(moment, |signal_mm| signals_mm.extend(signal_mm));
+    }
+
+    /// As [`Pipeline::step`], from a contact and a signal of another pipeline at this moment, which has done the first part of the
+    /// step for both. Effects that act before the signal ([`Effect::acts_before_signal`]) take no part.
+    pub fn step_on(&mut self, moment: Moment, contact: &Contact, signal_mm: &[f64]) -> &[f64] {
+        let moment = self.elapse(moment);
+        self.pressed.contact.clone_from(contact);
+        self.signal_mm.copy_from_slice(signal_mm);
+        self.cover(moment, |_| ());
+        self.respond(moment)
+    }
+
+    /// Advances the time.
+    fn elapse(&mut self, Moment { t_s, temperature_c }: Moment) -> Elapsed {
         let dt_s = self.last_s.map_or(0.0, |last_s| (t_s - last_s).max(0.0));
         self.last_s = Some(self.last_s.map_or(t_s, |last_s| last_s.max(t_s)));
-        let base = BaseModel { model: &self.model, covering: self.covering };
-        let now = Now { t_s, dt_s, temperature_c, base };
+        Elapsed { t_s, dt_s, temperature_c }
+    }
 
-        let instant_s = self.stages.motion.iter().fold(t_s, |t_s, effect| effect.instant_s(t_s));
+    /// Motion and contact: the signal that reaches the elements.
+    fn press(&mut self, moment: Elapsed, path: &impl Path) {
+        let base = BaseModel { model: &self.model, covering: self.covering };
+        let instant_s = self.stages.motion.iter().fold(moment.t_s, |t_s, effect| effect.instant_s(t_s));
         let mut tip = TipState {
             tip_mm: path.at(instant_s),
             registration: self.registration,
             surface_mm: self.surface_mm,
         };
         for effect in &mut self.stages.motion {
-            effect.place(now, &mut tip);
+            effect.place(moment.now(base), &mut tip);
         }
         let ready = Ready { table: self.table.as_ref(), images: self.images.as_deref() };
         self.pressed.press(&tip, &self.indenter, base, &self.stages, ready);
-
         for (signal, reached) in self.signal_mm.iter_mut().zip(&self.pressed.reached_mm) {
             *signal = self.stiffness * reached;
         }
+    }
+
+    /// The effects of the covering; `after` each of them.
+    fn cover(&mut self, moment: Elapsed, mut after: impl FnMut(&[f64])) {
+        let now = moment.now(BaseModel { model: &self.model, covering: self.covering });
         for effect in &mut self.stages.covering {
             effect.signal(now, &self.pressed.contact, &mut self.signal_mm);
+            after(&self.signal_mm);
         }
+    }
+
+    /// Elements and readout.
+    fn respond(&mut self, moment: Elapsed) -> &[f64] {
+        let base = BaseModel { model: &self.model, covering: self.covering };
         self.counts.copy_from_slice(&self.signal_mm);
         for effect in &self.stages.element {
             effect.signal(base, &self.signal_mm, &mut self.counts);
@@ -165,7 +220,7 @@ impl Pipeline {
             effect.counts(base, &mut self.counts);
         }
         for effect in &mut self.stages.readout {
-            effect.counts(now, &mut self.counts);
+            effect.counts(moment.now(base), &mut self.counts);
         }
         &self.counts
     }

@@ -117,6 +117,36 @@ fn strong(definition: &'static Definition) -> Effect {
 }
 
 #[test]
+fn a_step_on_what_another_pipeline_reached_is_the_whole_step_to_the_bit() {
+    let shared = || [effect("surface-offset", [("offset_mm", 0.02)]), strong(find("relaxation"))];
+    for definition in REGISTRY {
+        let added = strong(definition);
+        if added.acts_before_signal() {
+            continue;
+        }
+        let after = [added, strong(find("saturation")), strong(find("low-pass"))];
+        let trunk = simulator(shared());
+        let way = way(&trunk);
+        let mut trunk = Pipeline::new(&trunk).unwrap();
+        let mut branch = Pipeline::new(&simulator(after.clone())).unwrap();
+        let mut whole = Pipeline::new(&simulator(shared().into_iter().chain(after))).unwrap();
+        for k in 0..60 {
+            let moment = Moment::at(f64::from(k) / 20.0);
+            let mut signals_mm = Vec::new();
+            trunk.reach(moment, &way, &mut signals_mm);
+            assert_eq!(signals_mm.len(), 2 * 48, "before and after relaxation");
+            let counts = branch.step_on(moment, trunk.contact(), &signals_mm[48..]);
+            assert_eq!(counts, whole.step(moment, &way), "{} at moment {k}", definition.name);
+        }
+    }
+    assert!(strong(find("heavy-tail")).acts_before_signal());
+}
+
+fn find(name: &str) -> &'static Definition {
+    Definition::find(name).unwrap()
+}
+
+#[test]
 fn changes_of_covering_surface_and_stiffness_show_under_a_resting_tip() {
     let plain = simulator([]);
     let tip_mm = upon(&plain, 21, 0.5);

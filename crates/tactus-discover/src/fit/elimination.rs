@@ -108,6 +108,17 @@ impl Elimination {
         [self.whole[last], self.reduced[(last, last)]]
     }
 
+    /// What gain and baseline fit of the residual less `taken` times each direction, in a segment for an element.
+    pub(super) fn fitted<'a>(&'a self, taken: &'a [f64]) -> impl Fn(usize, usize) -> [f64; 2] + 'a {
+        let residual = self.gains.ncols() - 1;
+        move |segment, element| {
+            let gain = Self::left(&self.gains, residual, element, taken);
+            let baselines = &self.baselines[segment];
+            let baseline = Self::left(baselines, residual, element, taken);
+            [gain, baseline - gain * baselines[(element, residual + 1)]]
+        }
+    }
+
     /// What a matrix of coefficients has for the residual less `taken` times each direction, for an element.
     pub(super) fn left(coefficients: &DMatrix<f64>, residual: usize, element: usize, taken: &[f64]) -> f64 {
         let of = |(number, taken): (usize, &f64)| taken * coefficients[(element, number)];

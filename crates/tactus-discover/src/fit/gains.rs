@@ -80,4 +80,27 @@ impl Problem<'_> {
         }
         Ok((at, predicted))
     }
+
+    /// Moves the baselines of elements without weight to the mean of their readings, less what the model predicts of them.
+    pub(super) fn centre_weightless(&self, parameters: &mut Parameters, predicted: &mut [f64]) {
+        let bins = self.predictor.bins;
+        let elements = bins.elements;
+        for element in (0..elements).filter(|element| self.element_weight[*element] == 0.0) {
+            let mut sums = vec![[0.0; 2]; bins.paths.len()];
+            for (bin, weight) in self.train.iter().enumerate() {
+                let place = bin * elements + element;
+                let [sum, weights] = &mut sums[bins.run[bin]];
+                *sum += weight * (bins.counts[place] - predicted[place]);
+                *weights += weight;
+            }
+            let means: Vec<f64> =
+                sums.iter().map(|[sum, weights]| if *weights > 0.0 { sum / weights } else { 0.0 }).collect();
+            for (baseline, mean) in parameters.baseline.iter_mut().zip(&means) {
+                baseline[element] += mean;
+            }
+            for (of_bin, run) in predicted.chunks_exact_mut(elements).zip(&bins.run) {
+                of_bin[element] += means[*run];
+            }
+        }
+    }
 }

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use super::elimination::{Elimination, Parts};
 use super::parameters::Parameters;
 use super::problem::{Fitted, Problem};
-use super::sums::{Direction, Kept, Segments};
+use super::sums::{Direction, Kept, Segments, with_more_gain};
 use crate::data::DiscoverError;
 
 /// Products of directions at a model.
@@ -60,6 +60,51 @@ impl Problem<'_> {
             }
         }
         Ok(Grams { reduced, whole: elimination.whole.split_off(own), parts })
+    }
+
+    /// Sizes of directions at a model, less what gains, baselines and its own parameters fit: how many standard errors each is from 0.
+    pub(crate) fn sizes(
+        &self,
+        at: &Parameters,
+        predicted: &[f64],
+        directions: Vec<Direction<'_>>,
+    ) -> Result<Vec<f64>, DiscoverError> {
+        let mut all = self.own(at);
+        let own = all.len();
+        all.extend(directions);
+        let mut elimination = self.eliminated(at, predicted, all)?;
+        elimination.sweep(own);
+        let last = elimination.reduced.nrows() - 1;
+        Ok((own..last).map(|one| elimination.reduced[(one, one)].max(0.0).sqrt()).collect())
+    }
+
+    /// The residual of a model less what its own parameters, gains and baselines still fit of it: bin by bin, element by element. 0 for
+    /// readings that are not fitted.
+    pub(crate) fn left(&self, at: &Fitted) -> Result<Vec<f64>, DiscoverError> {
+        let free = self.free(&at.parameters);
+        let mut elimination = self.eliminated(&at.parameters, &at.predicted, self.own(&at.parameters))?;
+        let coefficients = elimination.sweep(free.len());
+        let taken: Vec<f64> = coefficients.column(free.len()).iter().copied().collect();
+        let mut left = self.standing(&at.parameters, &at.predicted);
+        for (one, taken) in free.iter().zip(&taken) {
+            let slope = self.slope(&at.parameters, &at.predicted, *one)?;
+            left.iter_mut().zip(slope).for_each(|(left, slope)| *left -= taken * slope);
+        }
+        let segments = Segments::of(self, &at.parameters);
+        let (more, step) = with_more_gain(&at.parameters);
+        let mut by_gain = self.predict(&more)?;
+        by_gain.iter_mut().zip(&at.predicted).for_each(|(more, now)| *more = (*more - now) / step);
+        let elements = self.predictor.bins.elements;
+        let fitted = elimination.fitted(&taken);
+        for (bin, left) in left.chunks_exact_mut(elements).enumerate() {
+            for (element, left) in left.iter_mut().enumerate() {
+                let [gain, baseline] = fitted(segments.of_bin[bin], element);
+                let is_fitted = self.train[bin] > 0.0 && self.element_weight[element] > 0.0;
+                *left -= gain * by_gain[bin * elements + element] + baseline;
+                *left *= f64::from(u8::from(is_fitted));
+            }
+        }
+        Ok(left)
     }
 
     /// The directions of a model's free parameters.

@@ -1,6 +1,6 @@
 //! Parameters of the whole model during a fit.
 
-use tactus_model::effect::Definition;
+use tactus_model::effect::{Definition, PipelineStage};
 use tactus_model::{Effect, Psf};
 
 use super::random_walk::{RandomWalk, is_random_walk};
@@ -24,6 +24,12 @@ pub(crate) struct Parameters {
 pub(crate) struct Term {
     pub(crate) definition: &'static Definition,
     pub(crate) values: Vec<f64>,
+}
+
+impl PartialEq for Term {
+    fn eq(&self, other: &Self) -> bool {
+        self.definition.name == other.definition.name && self.values == other.values
+    }
 }
 
 impl Term {
@@ -66,6 +72,29 @@ impl Parameters {
         let mut with = self.clone();
         with.terms.push(term);
         with
+    }
+
+    /// After how many effects of the covering this model first differs from another; `None` if it differs before the signal that
+    /// reaches the elements.
+    pub(crate) fn shared(&self, other: &Self) -> Result<Option<usize>, DiscoverError> {
+        let before = |of: &Self| -> Result<Vec<Term>, DiscoverError> {
+            let mut before = Vec::new();
+            for term in &of.terms {
+                if term.effect()?.acts_before_signal() {
+                    before.push(term.clone());
+                }
+            }
+            Ok(before)
+        };
+        if self.psf != other.psf || before(self)? != before(other)? {
+            return Ok(None);
+        }
+        let covering = |of: &'_ Self| -> Vec<Term> {
+            let terms = of.terms.iter();
+            terms.filter(|term| term.definition.stage() == PipelineStage::Covering).cloned().collect()
+        };
+        let both = covering(self).into_iter().zip(covering(other));
+        Ok(Some(both.take_while(|(one, other)| one == other).count()))
     }
 
     /// Baselines of the elements, the mean over the runs.

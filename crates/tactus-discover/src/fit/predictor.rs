@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
-use tactus_model::{Covering, Effect, ForwardModel, Images, Indenter, Moment, Pipeline, Response, Simulator};
+use tactus_model::effect::PipelineStage;
+use tactus_model::{
+    Contact, Covering, Effect, ForwardModel, Images, Indenter, Moment, Pipeline, Response, Simulator,
+};
 
 use super::parameters::{Parameters, Term};
 use crate::data::{Bins, DiscoverError, Frames, Known};
@@ -37,7 +40,27 @@ impl<'a> Predictor<'a> {
     /// The prediction of a model, to be taken part by part.
     pub(crate) fn stream(&self, parameters: Parameters) -> Result<Stream<'_>, DiscoverError> {
         let effects = parameters.terms.iter().map(Term::effect).collect::<Result<Vec<_>, _>>()?;
-        Ok(Stream { predictor: self, parameters, effects, bin: 0, running: None })
+        Ok(Stream { predictor: self, parameters, effects, from: None, bin: 0, running: None })
+    }
+
+    /// As [`Self::stream`], on what the first stages of `trunk` reach, if the model differs from it only in what follows.
+    pub(crate) fn branch(
+        &self,
+        parameters: Parameters,
+        trunk: &Parameters,
+    ) -> Result<Stream<'_>, DiscoverError> {
+        let Some(from) = parameters.shared(trunk)? else { return self.stream(parameters) };
+        let mut covers = 0;
+        let mut effects = Vec::new();
+        for term in &parameters.terms {
+            let effect = term.effect()?;
+            let is_covering = term.definition.stage() == PipelineStage::Covering;
+            covers += usize::from(is_covering);
+            if !effect.acts_before_signal() && !(is_covering && covers <= from) {
+                effects.push(effect);
+            }
+        }
+        Ok(Stream { predictor: self, parameters, effects, from: Some(from), bin: 0, running: None })
     }
 
     fn pipeline(
@@ -68,6 +91,12 @@ impl<'a> Predictor<'a> {
         Ok(pipeline)
     }
 
+    fn moment(&self, bin: usize) -> Moment {
+        let Self { frames, bins, .. } = self;
+        let temperature_c = f64::from(frames.temperature_c[bins.first[bin]]);
+        Moment { t_s: bins.t_s[bin], temperature_c: Some(temperature_c).filter(|c| c.is_finite()) }
+    }
+
     fn indenter(&self, tool: u16) -> Result<Indenter, DiscoverError> {
         let id = &self.frames.indenters[usize::from(tool)];
         let unknown = || DiscoverError::TooLittle(format!("the rig describes no indenter {id:?}"));
@@ -79,10 +108,21 @@ impl<'a> Predictor<'a> {
 pub(crate) struct Stream<'a> {
     predictor: &'a Predictor<'a>,
     parameters: Parameters,
+    /// The effects that its pipelines have.
     effects: Vec<Effect>,
+    /// If it goes on from a trunk: from the signal after so many of the trunk's effects of the covering.
+    from: Option<usize>,
     /// The next bin.
     bin: usize,
     running: Option<Running>,
+}
+
+/// What the first stages of a model's pipeline give for some bins. The streams of models that differ only in what follows go on from
+/// there.
+pub(crate) struct Reached {
+    contacts: Vec<Contact>,
+    /// Bin by bin: before the effects of the covering and after each of them.
+    signals_mm: Vec<f64>,
 }
 
 /// The pipeline of a run and a tool.
@@ -96,39 +136,84 @@ struct Running {
 impl Stream<'_> {
     /// Appends the counts of so many more bins.
     pub(crate) fn take(&mut self, count: usize, predicted: &mut Vec<f64>) -> Result<(), DiscoverError> {
-        let Predictor { known, frames, bins, .. } = *self.predictor;
-        let (first_bin, first) = (self.bin, predicted.len());
+        let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
         for bin in first_bin..first_bin + count {
-            let frame = bins.first[bin];
-            let (run, tool, covering_mm) = (bins.run[bin], frames.indenter[frame], frames.covering_mm[frame]);
-            let covering = Covering { thickness_mm: covering_mm };
-            let same = self.running.take().filter(|one| (one.run, one.tool) == (run, tool));
-            let running = if let Some(running) = same {
-                running
-            } else {
+            let path = &predictor.bins.paths[predictor.bins.run[bin]];
+            predicted.extend(self.pipeline(bin)?.step(predictor.moment(bin), path));
+        }
+        self.finish(first_bin, &mut predicted[first..]);
+        Ok(())
+    }
+
+    /// As [`Self::take`], on what a trunk has reached for these bins, where the model allows it.
+    pub(crate) fn take_on(
+        &mut self,
+        count: usize,
+        reached: &Reached,
+        predicted: &mut Vec<f64>,
+    ) -> Result<(), DiscoverError> {
+        let Some(from) = self.from else { return self.take(count, predicted) };
+        let (predictor, first_bin, first) = (self.predictor, self.bin, predicted.len());
+        let elements = predictor.bins.elements;
+        let of_bins = reached.signals_mm.chunks_exact(reached.signals_mm.len() / count);
+        for ((bin, contact), signals_mm) in (first_bin..first_bin + count).zip(&reached.contacts).zip(of_bins)
+        {
+            let signal_mm = &signals_mm[from * elements..(from + 1) * elements];
+            predicted.extend(self.pipeline(bin)?.step_on(predictor.moment(bin), contact, signal_mm));
+        }
+        self.finish(first_bin, &mut predicted[first..]);
+        Ok(())
+    }
+
+    /// The first stages for so many more bins.
+    pub(crate) fn reach(&mut self, count: usize) -> Result<Reached, DiscoverError> {
+        let predictor = self.predictor;
+        let mut reached = Reached { contacts: Vec::with_capacity(count), signals_mm: Vec::new() };
+        for bin in self.bin..self.bin + count {
+            let path = &predictor.bins.paths[predictor.bins.run[bin]];
+            let pipeline = self.pipeline(bin)?;
+            pipeline.reach(predictor.moment(bin), path, &mut reached.signals_mm);
+            reached.contacts.push(pipeline.contact().clone());
+        }
+        self.bin += count;
+        Ok(reached)
+    }
+
+    /// The pipeline at a bin: a new one for another run or tool.
+    fn pipeline(&mut self, bin: usize) -> Result<&mut Pipeline, DiscoverError> {
+        let Predictor { frames, bins, .. } = self.predictor;
+        let frame = bins.first[bin];
+        let (run, tool, covering_mm) = (bins.run[bin], frames.indenter[frame], frames.covering_mm[frame]);
+        let covering = Covering { thickness_mm: covering_mm };
+        let same = self.running.take().filter(|one| (one.run, one.tool) == (run, tool));
+        let running = match same {
+            Some(running) => running,
+            None => {
                 let pipeline =
                     self.predictor.pipeline(&self.parameters, run, tool, covering, &self.effects)?;
                 Running { run, tool, covering_mm, pipeline }
-            };
-            let running = self.running.insert(running);
-            if running.covering_mm.to_bits() != covering_mm.to_bits() {
-                running.pipeline.set_covering(covering);
-                running.covering_mm = covering_mm;
             }
-            let temperature_c = Some(f64::from(frames.temperature_c[frame])).filter(|c| c.is_finite());
-            let moment = Moment { t_s: bins.t_s[bin], temperature_c };
-            predicted.extend(running.pipeline.step(moment, &bins.paths[run]));
+        };
+        let running = self.running.insert(running);
+        if running.covering_mm.to_bits() != covering_mm.to_bits() {
+            running.pipeline.set_covering(covering);
+            running.covering_mm = covering_mm;
         }
-        self.bin += count;
+        Ok(&mut running.pipeline)
+    }
+
+    /// What follows the pipeline for the bins from `first_bin` on: walks of the baselines, and the converter's range.
+    fn finish(&mut self, first_bin: usize, predicted: &mut [f64]) {
+        let Predictor { known, bins, .. } = self.predictor;
+        self.bin = first_bin + predicted.len() / bins.elements;
         if let Some(walk) = &self.parameters.walk {
-            walk.add_from(bins, first_bin, 1.0, &mut predicted[first..]);
+            walk.add_from(bins, first_bin, 1.0, predicted);
         }
         let full_scale_counts = known.array.full_scale_counts();
         let is_positive = self.parameters.sensitivity.iter().all(|one| *one >= 0.0);
         let least = if is_positive { 0.0 } else { f64::NEG_INFINITY };
-        for counts in &mut predicted[first..] {
+        for counts in predicted {
             *counts = counts.clamp(least, full_scale_counts);
         }
-        Ok(())
     }
 }

@@ -258,12 +258,6 @@ impl<'a> Problem<'a> {
         Scale::of(known, self.duration_s)
     }
 
-    /// Derivatives of every reading by each free parameter.
-    pub(crate) fn columns(&self, at: &Parameters, predicted: &[f64]) -> Result<Vec<Vec<f64>>, DiscoverError> {
-        let free = self.free(at);
-        parallel::map(&free, |one| self.slope(at, predicted, *one)).into_iter().collect()
-    }
-
     /// The best parameters near a start, in at most `rounds` rounds. Derivatives by the parameters of effects with many
     /// parameters, such as the knots of a curve, are taken once, because the counts are nearly linear in them.
     pub(crate) fn fit_from(&self, start: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
@@ -311,6 +305,7 @@ impl<'a> Problem<'a> {
         if covariance.as_ref().is_some_and(|gram| follow(&mut at, &free, gram)) {
             predicted = self.predict(&at)?;
         }
+        self.centre_weightless(&mut at, &mut predicted);
         if at.walk.is_some() {
             cost = self.cost_with_walk(&at, &predicted);
         }
@@ -441,10 +436,6 @@ fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
         }
     }
     any
-}
-
-pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {
-    one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
 /// A step of the damped normal equations. The damping of each parameter is relative to its entry in `squares`.

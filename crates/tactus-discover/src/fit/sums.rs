@@ -17,7 +17,7 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::DMatrix;
 
 use super::parameters::Parameters;
-use super::predictor::Stream;
+use super::predictor::{Reached, Stream};
 use super::problem::Problem;
 use super::random_walk::is_random_walk;
 use crate::data::DiscoverError;
@@ -36,6 +36,13 @@ pub(crate) enum Direction<'a> {
     Towards { parameters: Parameters, step: f64 },
     /// Values of any bins, bin by bin, element by element.
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
+}
+
+impl Direction<'static> {
+    /// The values of all bins, bin by bin, element by element.
+    pub(crate) fn of(values: Vec<f64>, elements: usize) -> Self {
+        Self::Column(Box::new(move |bins| values[bins.start * elements..bins.end * elements].to_vec()))
+    }
 }
 
 /// Which products a pass keeps.
@@ -81,7 +88,7 @@ pub(super) struct Block {
 
 /// Stretches of time that have a baseline of their own: runs, or the parts of a walk.
 pub(super) struct Segments {
-    of_bin: Vec<usize>,
+    pub(super) of_bin: Vec<usize>,
     /// The run of each.
     pub(super) run: Vec<usize>,
     /// Precision of the difference between neighbours of one run, in counts^-2; 0 without a walk.
@@ -128,11 +135,14 @@ impl Problem<'_> {
         let count = directions.len() + 1;
         let mut total = Total::new(count, bins.elements, segments.run.len());
         let mut running: Vec<Running<'_>> =
-            directions.into_iter().map(|one| self.running(one)).collect::<Result<_, DiscoverError>>()?;
-        running.push(self.running(by_gain(at))?);
+            directions.into_iter().map(|one| self.running(one, at)).collect::<Result<_, DiscoverError>>()?;
+        let (parameters, step) = with_more_gain(at);
+        running.push(self.running(Direction::Towards { parameters, step }, at)?);
+        let mut trunk = self.predictor.stream(at.clone())?;
         for first in (0..bins.len()).step_by(CHUNK_BINS) {
             let range = first..(first + CHUNK_BINS).min(bins.len());
-            let column = |direction: &Running<'_>| direction.values(range.clone(), predicted);
+            let reached = trunk.reach(range.len())?;
+            let column = |direction: &Running<'_>| direction.values(range.clone(), &reached, predicted);
             let mut columns: Vec<Vec<f64>> =
                 parallel::map(&running, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             let by_gain = columns.pop().unwrap_or_default();
@@ -150,10 +160,14 @@ impl Problem<'_> {
         Ok(total)
     }
 
-    fn running<'a>(&'a self, direction: Direction<'a>) -> Result<Running<'a>, DiscoverError> {
+    fn running<'a>(
+        &'a self,
+        direction: Direction<'a>,
+        trunk: &Parameters,
+    ) -> Result<Running<'a>, DiscoverError> {
         Ok(match direction {
             Direction::Towards { parameters, step } => Running::Towards {
-                stream: Box::new(Mutex::new(self.predictor.stream(parameters)?)),
+                stream: Box::new(Mutex::new(self.predictor.branch(parameters, trunk)?)),
                 // A parameter that cannot move has no derivative.
                 per_step: if step == 0.0 { 0.0 } else { 1.0 / step },
             },
@@ -214,7 +228,7 @@ impl Problem<'_> {
         let values = DMatrix::from_vec(readings.len(), active.len(), values);
         let first = active.iter().take_while(|number| **number < pivots).count();
         let mut products = DMatrix::zeros(active.len(), active.len());
-        products.rows_mut(0, first).gemm_tr(1.0, &values.columns(0, first), &values, 0.0);
+        products.rows_mut(0, first).gemm(1.0, &values.columns(0, first).transpose(), &values, 0.0);
         let has_residual = active.last() == Some(&(count - 1));
         for (place, column) in values.column_iter().enumerate().skip(first) {
             products[(place, place)] = column.norm_squared();
@@ -232,23 +246,28 @@ impl Problem<'_> {
     }
 }
 
-/// The direction of all gains by the same share.
-fn by_gain(at: &Parameters) -> Direction<'static> {
+/// A model whose gains are greater by a small share.
+pub(super) fn with_more_gain(at: &Parameters) -> (Parameters, f64) {
     let mut more = at.clone();
     more.sensitivity.iter_mut().for_each(|gain| *gain *= 1.0 + GAIN_SHARE);
-    Direction::Towards { parameters: more, step: GAIN_SHARE }
+    (more, GAIN_SHARE)
 }
 
 impl Running<'_> {
     /// Its values at the next bins.
-    fn values(&self, bins: Range<usize>, predicted: &[f64]) -> Result<Vec<f64>, DiscoverError> {
+    fn values(
+        &self,
+        bins: Range<usize>,
+        reached: &Reached,
+        predicted: &[f64],
+    ) -> Result<Vec<f64>, DiscoverError> {
         let (stream, per_step) = match self {
             Self::Column(values) => return Ok(values(bins)),
             Self::Towards { stream, per_step } => (stream, per_step),
         };
         let mut stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
         let mut column = Vec::new();
-        stream.take(bins.len(), &mut column)?;
+        stream.take_on(bins.len(), reached, &mut column)?;
         let now = predicted.chunks_exact(column.len() / bins.len()).skip(bins.start).flatten();
         column.iter_mut().zip(now).for_each(|(value, now)| *value = (*value - now) * per_step);
         Ok(column)

@@ -50,11 +50,13 @@ pub(crate) struct Feature {
     pub(crate) factor: Factor,
 }
 
-/// Factor of a form, for each bin or for each reading.
+/// Factor of a form.
 #[derive(Debug, Clone)]
 pub(crate) enum Factor {
-    Bins(Vec<f64>),
-    Readings(Vec<f64>),
+    /// For each bin.
+    Bins(Arc<Vec<f64>>),
+    /// 1 where the element's own signal is in this range and not 0, else 0.
+    Within([f64; 2]),
     /// For each bin, of one element; 0 for the others.
     Element(usize, Arc<Vec<f64>>),
 }
@@ -65,8 +67,8 @@ pub(crate) struct Forms {
     signal: Vec<f64>,
     along: [Vec<f64>; 2],
     neighbours: Vec<f64>,
-    place: Vec<f64>,
-    last_place: Vec<f64>,
+    /// Images of imagined presses at the tip's place and at the last pressed one, if they are wanted.
+    places: Option<[Vec<f64>; 2]>,
     history: History,
 }
 
@@ -92,17 +94,21 @@ impl Forms {
         if let Some(walk) = &at.walk {
             walk.add(bins, -1.0, &mut signal);
         }
-        let history = History::of(problem.predictor.frames, bins);
-        let here: Vec<Option<[f64; 2]>> =
-            (0..bins.len()).map(|bin| Some([history.place_mm[0][bin], history.place_mm[1][bin]])).collect();
         Ok(Self {
             signal,
             along: [slope("misregistration", 0)?, slope("misregistration", 1)?],
             neighbours: slope("crosstalk", 0)?,
-            place: images(problem, at, &here)?,
-            last_place: images(problem, at, &history.last_place_mm)?,
-            history,
+            places: None,
+            history: History::of(problem.predictor.frames, bins),
         })
+    }
+
+    /// The same with the forms [`Form::Place`] and [`Form::LastPlace`].
+    pub(crate) fn with_places(self, problem: &Problem<'_>, at: &Parameters) -> Result<Self, DiscoverError> {
+        let [x_mm, y_mm] = &self.history.place_mm;
+        let here: Vec<Option<[f64; 2]>> = x_mm.iter().zip(y_mm).map(|(x, y)| Some([*x, *y])).collect();
+        let places = [images(problem, at, &here)?, images(problem, at, &self.history.last_place_mm)?];
+        Ok(Self { places: Some(places), ..self })
     }
 
     /// A feature's column.
@@ -118,12 +124,12 @@ impl Forms {
             Form::AlongX => Some(&self.along[0]),
             Form::AlongY => Some(&self.along[1]),
             Form::Neighbours => Some(&self.neighbours),
-            Form::Place => Some(&self.place),
-            Form::LastPlace => Some(&self.last_place),
+            Form::Place => self.places.as_ref().map(|[here, _]| here),
+            Form::LastPlace => self.places.as_ref().map(|[_, last]| last),
         };
         let factor = |reading: usize| match &feature.factor {
             Factor::Bins(of_bin) => of_bin[reading / elements],
-            Factor::Readings(of_reading) => of_reading[reading],
+            Factor::Within(range) => f64::from(u8::from(is_within(*range, self.signal[reading]))),
             Factor::Element(element, of_bin) if reading % elements == *element => of_bin[reading / elements],
             Factor::Element(..) => 0.0,
         };
@@ -140,6 +146,10 @@ impl Forms {
     pub(crate) fn signal(&self) -> &[f64] {
         &self.signal
     }
+}
+
+fn is_within([least, most]: [f64; 2], signal: f64) -> bool {
+    signal != 0.0 && signal >= least && signal < most
 }
 
 /// Images of imagined presses at the places, in counts above the baseline; 0 where there is no place.
@@ -194,6 +204,7 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     let free: Vec<bool> = deep.iter().map(|deep| !deep).collect();
     let every = vec![true; bins.len()];
     let (signal, offset, along) = ([Signal], [Offset], [AlongX, AlongY]);
+    let with_offset = |form: Form| if forms.places.is_some() { vec![form, Offset] } else { vec![Offset] };
     let mut made = Vec::new();
     let mut add = |covariate, unit, values: &[f64], among: &[bool], parts: usize, forms: &[Form]| {
         let kept: Vec<f64> =
@@ -202,18 +213,18 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
             let within = |(value, among): (&f64, &bool)| {
                 f64::from(u8::from(*among && *value >= range[0] && *value < range[1]))
             };
-            let factor: Vec<f64> = values.iter().zip(among).map(within).collect();
+            let factor: Arc<Vec<f64>> = Arc::new(values.iter().zip(among).map(within).collect());
             for form in forms {
-                let factor = Factor::Bins(factor.clone());
+                let factor = Factor::Bins(Arc::clone(&factor));
                 made.push(Feature { covariate, unit, form: *form, range: closed(range, &kept), factor });
             }
         }
     };
     add("time", "s", &bins.t_s, &every, 8, &[Offset, Signal]);
     add("time since contact", "s", &history.since_contact_s, &deep, 6, &signal);
-    add("time since release", "s", &history.since_release_s, &free, 6, &[LastPlace, Offset]);
+    add("time since release", "s", &history.since_release_s, &free, 6, &with_offset(LastPlace));
     add("depth", "mm", &history.depth_mm, &deep, 8, &signal);
-    add("height above the surface", "mm", &negative(&history.depth_mm), &free, 4, &[Place, Offset]);
+    add("height above the surface", "mm", &negative(&history.depth_mm), &free, 4, &with_offset(Place));
     add("largest past depth", "mm", &history.deepest_before_mm, &deep, 5, &signal);
     add("direction of motion", "", &history.upward, &deep, 2, &signal);
     add("direction of approach along x", "", &history.aside[0], &deep, 2, &[Signal, AlongX]);
@@ -251,14 +262,11 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
         unit: "counts",
         form: Neighbours,
         range: closed(range, &forms.signal),
-        factor: Factor::Bins(vec![1.0; bins.len()]),
+        factor: Factor::Bins(Arc::new(vec![1.0; bins.len()])),
     });
     let strong: Vec<bool> = forms.signal.iter().map(|signal| signal.abs() > 0.0).collect();
     for range in ranges(&forms.signal, &strong, 8) {
-        let within =
-            |signal: &f64| f64::from(u8::from(*signal != 0.0 && *signal >= range[0] && *signal < range[1]));
-        let factor = Factor::Readings(forms.signal.iter().map(within).collect());
-        let range = closed(range, &forms.signal);
+        let (factor, range) = (Factor::Within(range), closed(range, &forms.signal));
         made.push(Feature { covariate: "signal", unit: "counts", form: Signal, range, factor });
     }
     made.extend(of_elements(forms, &deep, bins.elements));

@@ -15,9 +15,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::score::{Fitting, Score};
-use crate::data::interval_s;
-use crate::fit::{Parameters, Problem, RANDOM_WALK, Term, is_random_walk};
+use super::score::Score;
+use crate::data::{DiscoverError, interval_s};
+use crate::fit::{Fitted, Problem, RANDOM_WALK, Term, is_random_walk};
 
 /// A correlation of the noise that makes no blocks alike.
 const FORGOTTEN: f64 = 0.01;
@@ -39,16 +39,17 @@ pub(crate) struct TriedWalk {
 impl Problem<'_> {
     /// A random walk at the residual of a model; `None` if the model has one. The residual without contact must show it too,
     /// because in contact any missing effect resembles a walk.
-    pub(crate) fn tried_walk(&self, fitting: &Fitting<'_>, at: &Parameters) -> Option<TriedWalk> {
-        if at.terms.iter().any(is_random_walk) {
-            return None;
+    pub(crate) fn tried_walk(&self, at: &Fitted) -> Result<Option<TriedWalk>, DiscoverError> {
+        if at.parameters.terms.iter().any(is_random_walk) {
+            return Ok(None);
         }
-        let residual = fitting.residual();
+        let residual = self.left(at)?;
         let walk = self.estimate_walk(&residual, &self.slow);
         let clear = self.estimate_walk(&residual, &self.slow_and_clear);
         let mut start = Term::neutral(&RANDOM_WALK);
         start.values[..2].copy_from_slice(&[walk.counts_per_root_s, walk.knot_s]);
-        Some(TriedWalk { scores: self.alike(&residual), promise: walk.gain.min(clear.gain), start })
+        let promise = walk.gain.min(clear.gain);
+        Ok(Some(TriedWalk { scores: self.alike(&residual), promise, start }))
     }
 
     /// Scores for each kernel whether blocks that are near in time are alike.

@@ -1,9 +1,10 @@
+use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
 
-use super::{Fitting, Score};
-use crate::fit::{Free, Prepared, Term};
+use super::{Score, standardised};
+use crate::fit::{Fitted, Free, Prepared, Problem, Term};
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
 
 /// The same products from whole columns, orthogonal to gains, baselines and the model's own parameters one by one.
@@ -30,29 +31,84 @@ fn products_are_those_of_whole_columns_that_are_projected_one_by_one() {
     let directions = tried.iter().map(|(start, free)| problem.towards(start, *free)).collect();
     let grams = problem.grams(&at, directions).unwrap();
 
-    let fitting = Fitting::at(&problem, &at.parameters, &at.predicted).unwrap();
-    let columns: Vec<Vec<f64>> = tried
-        .iter()
-        .map(|(start, free)| {
-            let mut column = problem.slope(start, &at.predicted, *free).unwrap();
-            fitting.free(&mut column);
-            column
-        })
-        .collect();
-    let last = columns.len();
-    for (i, one) in columns.iter().enumerate() {
+    let columns: Vec<Vec<f64>> =
+        tried.iter().map(|(start, free)| problem.slope(start, &at.predicted, *free).unwrap()).collect();
+    let whole = Whole::of(&problem, &at, columns);
+    let last = whole.columns.len();
+    for (i, one) in whole.columns.iter().enumerate() {
         let near = |found: f64, wanted: f64, scale: f64| {
             assert!((found - wanted).abs() < 1e-5 * scale, "{i}: {found} {wanted} {scale}");
         };
-        for (j, other) in columns.iter().enumerate() {
-            let scale = fitting.size(one) * fitting.size(other);
-            near(grams.reduced()[(i, j)], fitting.inner(one, other), scale);
+        for (j, other) in whole.columns.iter().enumerate() {
+            near(grams.reduced()[(i, j)], one.dot(other), one.norm() * other.norm());
         }
-        near(grams.reduced()[(i, last)], fitting.wanted(one), fitting.size(one) * 100.0);
-        let (of_grams, of_columns) =
-            (Score::of_grams(&grams, &[i]).z, fitting.score(std::slice::from_ref(one)).z);
+        near(grams.reduced()[(i, last)], one.dot(&whole.residual), one.norm() * 100.0);
+        let (of_grams, of_columns) = (Score::of_grams(&grams, &[i]).z, whole.score(&problem, one));
         assert!((of_grams - of_columns).abs() < 1e-2 * of_columns.max(1.0), "{i}: {of_grams} {of_columns}");
     }
-    let (of_grams, of_columns) = (Score::of_grams(&grams, &[0, 1, 2]).z, fitting.score(&columns).z);
-    assert!((of_grams - of_columns).abs() < 0.1 * of_columns, "{of_grams} {of_columns}");
+    let left = problem.left(&at).unwrap();
+    for ((left, weight), wanted) in left.iter().zip(problem.weights()).zip(whole.residual.iter()) {
+        assert!((left * weight.sqrt() - wanted).abs() < 1e-4, "{left} {wanted}");
+    }
+}
+
+/// Columns and the residual, times the root of the weight, orthogonal to the columns of every baseline, gain and parameter of the model.
+struct Whole {
+    columns: Vec<DVector<f64>>,
+    residual: DVector<f64>,
+}
+
+impl Whole {
+    fn of(problem: &Problem<'_>, at: &Fitted, columns: Vec<Vec<f64>>) -> Self {
+        let weigh = |column: Vec<f64>| -> DVector<f64> {
+            let readings = column.len();
+            DVector::from_iterator(
+                readings,
+                column.iter().zip(problem.weights()).map(|(value, weight)| value * weight.sqrt()),
+            )
+        };
+        let mut more = at.parameters.clone();
+        more.sensitivity.iter_mut().for_each(|gain| *gain *= 1.001);
+        let more = problem.predict(&more).unwrap();
+        let by_gain: Vec<f64> =
+            more.iter().zip(&at.predicted).map(|(more, now)| (more - now) / 1e-3).collect();
+        let elements = ELEMENTS;
+        let of_element = |element: usize, value: &dyn Fn(usize) -> f64| -> DVector<f64> {
+            let only = |place: usize| if place % elements == element { value(place) } else { 0.0 };
+            weigh((0..by_gain.len()).map(only).collect())
+        };
+        let mut taken: Vec<DVector<f64>> = Vec::new();
+        let baselines = (0..elements).map(|element| of_element(element, &|_| 1.0));
+        let gains = (0..elements).map(|element| of_element(element, &|place| by_gain[place]));
+        let own = problem.free(&at.parameters).into_iter();
+        let own = own.map(|free| weigh(problem.slope(&at.parameters, &at.predicted, free).unwrap()));
+        for mut column in baselines.chain(gains).chain(own) {
+            orthogonal(&mut column, &taken);
+            taken.push(column.normalize());
+        }
+        let project = |column: Vec<f64>| {
+            let mut column = weigh(column);
+            orthogonal(&mut column, &taken);
+            column
+        };
+        let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
+        Self { columns: columns.into_iter().map(project).collect(), residual: project(residual) }
+    }
+
+    fn score(&self, problem: &Problem<'_>, column: &DVector<f64>) -> f64 {
+        let bins = problem.predictor.bins;
+        let (mut along, mut squares) = (vec![0.0; bins.blocks], vec![0.0; bins.blocks]);
+        for (place, (value, residual)) in column.iter().zip(self.residual.iter()).enumerate() {
+            let block = bins.block[place / ELEMENTS];
+            along[block] += value * residual;
+            squares[block] += value * value;
+        }
+        Score::of(vec![standardised(&along, &squares)]).z
+    }
+}
+
+fn orthogonal(column: &mut DVector<f64>, to: &[DVector<f64>]) {
+    for other in to {
+        column.axpy(-other.dot(column), other, 1.0);
+    }
 }

@@ -18,7 +18,7 @@ use super::drift::TriedWalk;
 use super::evidence::{Addition, Evidence, Gain, ODDS_AGAINST, Set, Signs};
 use super::options::Options;
 use super::rivals::rivals;
-use super::score::{Fitting, Score, flipped, largest, p_value};
+use super::score::{Score, flipped, largest, p_value};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Direction, Fitted, Free, Grams, Parameters, Problem, RANDOM_WALK, Scale, Term};
 use crate::numbers::{median, parallel};
@@ -256,11 +256,7 @@ impl Search<'_> {
         let excess = median(&scores.iter().map(|score| score.excess).collect::<Vec<_>>());
         let names = names(&at.parameters, self.known_terms);
         let present = (0..classes.len()).filter(|class| names.contains(&classes[*class])).collect();
-        let walk = if classes.contains(&RANDOM_WALK.name) {
-            problem.tried_walk(&self.fitting(at)?, &at.parameters)
-        } else {
-            None
-        };
+        let walk = if classes.contains(&RANDOM_WALK.name) { problem.tried_walk(at)? } else { None };
         Ok(Pass {
             additions,
             kinds,
@@ -565,11 +561,6 @@ impl Search<'_> {
         };
         let starts: Vec<(&'static str, Vec<Term>)> = best.into_iter().map(start).collect();
         self.fits(less, &starts)
-    }
-
-    /// The model's tangent space and residual.
-    pub(crate) fn fitting(&self, at: &Fitted) -> Result<Fitting<'_>, DiscoverError> {
-        Fitting::at(self.problem, &at.parameters, &at.predicted)
     }
 }
 

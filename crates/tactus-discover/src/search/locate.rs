@@ -4,7 +4,7 @@ use super::covariates::{Factor, Feature, Form, Forms, features};
 use super::grow::{FLIPS, Search};
 use super::score::{Score, flipped, largest, p_value, q_values};
 use crate::data::DiscoverError;
-use crate::fit::Fitted;
+use crate::fit::{Direction, Fitted};
 use crate::numbers::parallel;
 
 /// A covariate on which the residual depends.
@@ -68,23 +68,25 @@ impl Search<'_> {
     /// Tests on which covariates the residual of a model depends.
     pub(crate) fn locate(&self, at: &Fitted) -> Result<Located, DiscoverError> {
         let problem = self.problem;
-        let fitting = self.fitting(at)?;
-        let forms = Forms::of(problem, &at.parameters, &at.predicted)?;
-        let features = features(problem, &forms);
         let elements = problem.predictor.bins.elements;
-        let scored = |feature: &Feature| {
-            let mut column = forms.column(feature, elements);
-            let readings = column.iter().filter(|value| **value != 0.0).count();
-            let whole = fitting.size(&column);
-            fitting.free(&mut column);
-            // What recalibration takes up is no feature, such as the signal of an element whose gain is fitted.
-            if fitting.size(&column) < OWN_LEAST * whole {
-                column.fill(0.0);
-            }
-            let z = fitting.wanted(&column) / fitting.size(&column).max(f64::MIN_POSITIVE);
-            (fitting.score(&[column]), z, readings)
+        let forms =
+            Forms::of(problem, &at.parameters, &at.predicted)?.with_places(problem, &at.parameters)?;
+        let features = features(problem, &forms);
+        let column = |feature: &Feature| -> Direction<'_> {
+            let (forms, feature) = (&forms, feature.clone());
+            Direction::Column(Box::new(move |bins| forms.values(&feature, bins, elements)))
         };
-        let scored = parallel::map(&features, scored);
+        let grams = problem.grams_of_each(at, features.iter().map(column).collect())?;
+        let scored = |index: usize| {
+            let size = grams.size(index);
+            // What recalibration takes up is no feature, such as the signal of an element whose gain is fitted.
+            if size < OWN_LEAST * grams.whole(index) || size == 0.0 {
+                return (Score::of_grams(&grams, &[]), 0.0);
+            }
+            (Score::of_grams(&grams, &[index]), grams.wanted(index) / size)
+        };
+        let indices: Vec<usize> = (0..features.len()).collect();
+        let scored = parallel::map(&indices, |index| scored(*index));
         let mut covariates: Vec<&'static str> = features.iter().map(|feature| feature.covariate).collect();
         covariates.dedup();
         let of = |covariate: &str| -> Vec<usize> {
@@ -105,13 +107,15 @@ impl Search<'_> {
             let Some(strongest) = strongest.filter(|_| q_value <= Q_MAX && *statistic > 0.0) else {
                 continue;
             };
-            let (_, z, readings) = &scored[strongest];
+            let (_, z) = &scored[strongest];
             let feature = &features[strongest];
+            let column = forms.column(feature, elements);
+            let readings = column.iter().filter(|value| **value != 0.0).count();
             gap.push(Gap {
                 covariate,
                 unit: feature.unit,
                 range: feature.range,
-                effect_size: z.abs() / (*readings as f64).sqrt(),
+                effect_size: z.abs() / (readings.max(1) as f64).sqrt(),
                 q_value,
             });
         }

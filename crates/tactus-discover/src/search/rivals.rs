@@ -58,7 +58,7 @@ pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result
     };
     let sums: Vec<f64> = forms.signal().chunks_exact(elements).map(|signal| signal.iter().sum()).collect();
     let smooth = |values: &[f64], among: &[bool], form: Form| -> Vec<Direction<'static>> {
-        hats(values, among).into_iter().map(|hat| column(Factor::Bins(hat), form)).collect()
+        hats(values, among).into_iter().map(|hat| column(Factor::Bins(Arc::new(hat)), form)).collect()
     };
     let both = |of: &dyn Fn(usize) -> Vec<f64>| -> Vec<Direction<'static>> {
         [0, 1].into_iter().flat_map(|axis| smooth(&of(axis), &deep, Form::Signal)).collect()
@@ -66,8 +66,8 @@ pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result
     let aside = [0, 1].into_iter().flat_map(|axis| {
         let side = &history.aside[axis];
         let only = side.iter().zip(&deep).map(|(side, deep)| if *deep { *side } else { 0.0 });
-        let only: Vec<f64> = only.collect();
-        [Form::Signal, Form::AlongX, Form::AlongY].map(|form| column(Factor::Bins(only.clone()), form))
+        let only: Arc<Vec<f64>> = Arc::new(only.collect());
+        [Form::Signal, Form::AlongX, Form::AlongY].map(|form| column(Factor::Bins(Arc::clone(&only)), form))
     });
     let mut found = vec![
         Rival { name: "sum of signals", columns: smooth(&sums, &deep, Form::Signal) },

@@ -24,8 +24,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::data::DiscoverError;
-use crate::fit::{Grams, Linear, Parameters, Problem, dot};
+use crate::fit::Grams;
 use crate::numbers::{Rng, median, parallel};
 
 /// Median of the squared standard normal distribution.
@@ -53,123 +52,6 @@ pub(crate) struct Score {
 struct ChiSquare {
     times: f64,
     freedom: f64,
-}
-
-/// The tangent space of the fitted parameters, and the residual orthogonal to it.
-pub(crate) struct Fitting<'a> {
-    problem: &'a Problem<'a>,
-    linear: Linear<'a>,
-    /// Orthonormal under the weights.
-    directions: Vec<Vec<f64>>,
-    /// The residual orthogonal to the tangent space, times its weight.
-    weighted_residual: Vec<f64>,
-    weights: Vec<f64>,
-}
-
-impl<'a> Fitting<'a> {
-    /// The tangent space and residual at a point.
-    pub(crate) fn at(
-        problem: &'a Problem<'a>,
-        parameters: &Parameters,
-        predicted: &[f64],
-    ) -> Result<Self, DiscoverError> {
-        let linear = problem.linear(parameters, predicted)?;
-        let columns = problem.columns(parameters, predicted)?;
-        let mut residual = problem.standing(parameters, predicted);
-        linear.project(&mut residual);
-        let weights: Vec<f64> = problem.weights().collect();
-        let mut fitting =
-            Self { problem, linear, directions: Vec::new(), weighted_residual: residual, weights };
-        for mut column in columns {
-            let whole = fitting.size(&column);
-            fitting.free(&mut column);
-            let size = fitting.size(&column);
-            // Skips a direction that the others contain.
-            if size > 1e-4 * whole && size > 0.0 {
-                shorten(&mut column, size);
-                let along = fitting.inner(&column, &fitting.weighted_residual);
-                take_off(&mut fitting.weighted_residual, along, &column);
-                fitting.directions.push(column);
-            }
-        }
-        for (residual, weight) in fitting.weighted_residual.iter_mut().zip(&fitting.weights) {
-            *residual *= weight;
-        }
-        Ok(fitting)
-    }
-
-    /// Removes from a column its part in the tangent space.
-    pub(crate) fn free(&self, column: &mut [f64]) {
-        self.linear.project(column);
-        self.free_of(column, &self.directions);
-    }
-
-    /// Removes from a column its part along orthonormal directions.
-    fn free_of(&self, column: &mut [f64], directions: &[Vec<f64>]) {
-        for direction in directions {
-            take_off(column, self.inner(direction, column), direction);
-        }
-    }
-
-    /// Product of two columns under the weights.
-    pub(crate) fn inner(&self, one: &[f64], other: &[f64]) -> f64 {
-        one.iter().zip(other).zip(&self.weights).map(|((a, b), w)| a * b * w).sum()
-    }
-
-    /// Length of a column under the weights: its inverse is the standard error of the column's coefficient.
-    pub(crate) fn size(&self, column: &[f64]) -> f64 {
-        self.inner(column, column).sqrt()
-    }
-
-    /// Inner product of the residual and a column from which the tangent space was removed.
-    pub(crate) fn wanted(&self, column: &[f64]) -> f64 {
-        dot(&self.weighted_residual, column)
-    }
-
-    /// The residual orthogonal to the tangent space; 0 for readings that are not fitted.
-    pub(crate) fn residual(&self) -> Vec<f64> {
-        let of = |(weighted, weight): (&f64, &f64)| if *weight > 0.0 { weighted / weight } else { 0.0 };
-        self.weighted_residual.iter().zip(&self.weights).map(of).collect()
-    }
-
-    /// The combined score of columns from which the tangent space was removed.
-    pub(crate) fn score(&self, columns: &[Vec<f64>]) -> Score {
-        let mut independent: Vec<Vec<f64>> = Vec::new();
-        for column in columns {
-            let mut column = column.clone();
-            let whole = self.size(&column);
-            self.free_of(&mut column, &independent);
-            let size = self.size(&column);
-            if size > 1e-3 * whole && size > 0.0 {
-                shorten(&mut column, size);
-                independent.push(column);
-            }
-        }
-        Score::of(independent.iter().map(|column| self.score_of(column)).collect())
-    }
-
-    fn score_of(&self, column: &[f64]) -> Standardised {
-        let bins = self.problem.predictor.bins;
-        let elements = bins.elements;
-        let mut wanted = vec![0.0; bins.blocks];
-        let mut variance = vec![0.0; bins.blocks];
-        for bin in 0..bins.len() {
-            if self.problem.train[bin] == 0.0 {
-                continue;
-            }
-            let at = bin * elements..(bin + 1) * elements;
-            let (mut sum, mut squares) = (0.0, 0.0);
-            for ((value, residual), weight) in
-                column[at.clone()].iter().zip(&self.weighted_residual[at.clone()]).zip(&self.weights[at])
-            {
-                sum += value * residual;
-                squares += value * value * weight;
-            }
-            wanted[bins.block[bin]] += sum;
-            variance[bins.block[bin]] += squares;
-        }
-        standardised(&wanted, &variance)
-    }
 }
 
 /// A direction's score: what a test needs of it.
@@ -308,20 +190,6 @@ impl Score {
             parts: (0..blocks.len()).map(part).collect(),
             chi_square,
         }
-    }
-}
-
-/// Subtracts a multiple of a direction from a column.
-fn take_off(column: &mut [f64], along: f64, direction: &[f64]) {
-    for (value, direction) in column.iter_mut().zip(direction) {
-        *value -= along * direction;
-    }
-}
-
-/// Scales a column of this size to unit size.
-fn shorten(column: &mut [f64], size: f64) {
-    for value in column {
-        *value /= size;
     }
 }
 

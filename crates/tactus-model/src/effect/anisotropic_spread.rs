@@ -34,6 +34,10 @@ struct AnisotropicSpread {
 }
 
 impl OnCovering for AnisotropicSpread {
+    fn spreads(&self) -> bool {
+        true
+    }
+
     fn spread(&self, _: BaseModel<'_>, loads: &mut Vec<Load>) {
         for Load { sigma_mm: [x, y], .. } in loads {
             *x *= self.ratio.sqrt();

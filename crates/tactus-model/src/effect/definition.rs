@@ -260,6 +260,15 @@ impl Effect {
         parameters.any(|(parameter, value)| parameter.names_element(*value))
     }
 
+    /// True if it acts before the signal that reaches the elements is known: on motion, contact or spread.
+    pub fn acts_before_signal(&self) -> bool {
+        match self.definition.make {
+            Make::Motion(_) | Make::Contact(_) => true,
+            Make::Covering(make) => make(&self.values).spreads(),
+            Make::Element(_) | Make::Readout(_) => false,
+        }
+    }
+
     /// Checks that the elements it names are the array's.
     ///
     /// # Errors

@@ -33,6 +33,10 @@ struct DepthDependentSpread {
 }
 
 impl OnCovering for DepthDependentSpread {
+    fn spreads(&self) -> bool {
+        true
+    }
+
     fn spread(&self, base: BaseModel<'_>, loads: &mut Vec<Load>) {
         for Load { contact, sigma_mm, .. } in loads {
             let depth_share = (contact.depth_mm / base.covering.thickness_mm).clamp(0.0, 1.0);

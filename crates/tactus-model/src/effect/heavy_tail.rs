@@ -37,6 +37,10 @@ struct HeavyTail {
 }
 
 impl OnCovering for HeavyTail {
+    fn spreads(&self) -> bool {
+        true
+    }
+
     fn spread(&self, _: BaseModel<'_>, loads: &mut Vec<Load>) {
         if self.tail_share == 0.0 {
             return;

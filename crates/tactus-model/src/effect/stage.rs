@@ -100,6 +100,11 @@ pub trait OnCovering: Debug + Send + Sync {
     /// of weight 1 with the base model's spread, the same along x and y.
     fn spread(&self, _base: BaseModel<'_>, _loads: &mut Vec<Load>) {}
 
+    /// True if it changes how the loads spread.
+    fn spreads(&self) -> bool {
+        false
+    }
+
     /// Changes the signal that reaches the elements: equivalent indentations in mm, row-major.
     fn signal(&mut self, _now: Now<'_>, _contact: &Contact, _signal_mm: &mut [f64]) {}
 
