@@ -342,3 +342,43 @@ fn lost_motion_and_hysteresis_are_undecided_by_the_papers_corners_and_decided_by
     .unwrap();
     assert!(frames > 300, "{frames}");
 }
+
+/// Data of a real device: a soft magnetic skin, pressed at one place (`../shared/data`). Other held-out presses must not contradict.
+#[test]
+fn a_measured_run_names_hardening_and_a_loop_with_its_causes() {
+    let data = repository("../shared/data/eflesh-normal-20250401_014340.parquet");
+    if !data.is_file() {
+        eprintln!("skipped: {} is not here", data.display());
+        return;
+    }
+    let found = |seed: &str| -> Value {
+        let folder = TempDir::new().unwrap();
+        let said = tactus(folder.path(), &["discover", data.to_str().unwrap(), "--seed", seed]);
+        assert_eq!(said.code, Some(0), "{said:?}");
+        serde_json::from_slice(&fs::read(folder.path().join("discovery/report.json")).unwrap()).unwrap()
+    };
+    let slots = |report: &Value| -> Vec<Vec<String>> {
+        let name = |value: &Value| value.as_str().unwrap().to_owned();
+        let slot = |step: &Value| {
+            let others = step["equivalent"].as_array().unwrap().iter().map(name);
+            std::iter::once(name(&step["effect"])).chain(others).collect()
+        };
+        report["steps"].as_array().unwrap().iter().map(slot).collect()
+    };
+    let reports = ["1", "3"].map(found);
+    for report in &reports {
+        assert_eq!(report["verdict"], "partly-explained");
+        let depends_on = report["unexplained"]["depends_on"].as_array().unwrap();
+        assert!(depends_on.contains(&"element and depth".into()), "{depends_on:?}");
+        let left = &report["final"]["structured"];
+        assert!(left["rms_noise"].as_f64().unwrap() > 5.0, "{left}");
+    }
+    let [one, other] = reports.each_ref().map(slots);
+    assert_eq!((&one[0], &other[0]), (&vec!["hardening".to_owned()], &vec!["hardening".to_owned()]));
+    // Ten strokes at one speed do not tell what makes the loop.
+    assert_eq!((one.len(), other.len()), (2, 2), "{one:?} {other:?}");
+    for set in [&one[1], &other[1]] {
+        assert!(set.len() > 1 && set.contains(&"hysteresis".to_owned()), "{set:?}");
+    }
+    assert!(one[1].iter().filter(|name| other[1].contains(name)).count() > 1, "{one:?} {other:?}");
+}

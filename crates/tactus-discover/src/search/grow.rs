@@ -77,6 +77,8 @@ const OTHERS_MAX: usize = 4;
 /// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
 /// `1 + MISFIT_SHARE x gain`.
 const MISFIT_SHARE: f64 = 0.02;
+/// As [`MISFIT_SHARE`], of what the model leaves beyond the noise: a form that misses so much may be another's.
+const LEFT_SHARE: f64 = 0.1;
 /// A class with less than this share of the strongest one's odds may be an error of that one's form.
 const FORM_SHARE: f64 = 0.07;
 /// A class must gain so many standard errors, from the scatter of blocks.
@@ -508,7 +510,7 @@ impl Search<'_> {
                     continue 'again;
                 }
                 let mut same = Vec::new();
-                for (other, fitted) in credible(ln_odds, others) {
+                for (other, fitted) in credible(ln_odds, self.unit(ln_odds, &grown.at), others) {
                     let model_leaves = match leaves {
                         Some(known) => known,
                         None => *leaves.insert(self.leaves_something(&grown.at)?),
@@ -562,11 +564,17 @@ impl Search<'_> {
         let starts: Vec<(&'static str, Vec<Term>)> = best.into_iter().map(start).collect();
         self.fits(less, &starts)
     }
+
+    /// What counts as one in differences of the logarithm of the odds between classes in one place.
+    fn unit(&self, ln_odds: f64, at: &Fitted) -> f64 {
+        let readings = self.problem.weights().filter(|weight| *weight > 0.0).count() as f64;
+        let left = (at.cost - readings).max(0.0) / (2.0 * self.problem.variance);
+        1.0 + MISFIT_SHARE * ln_odds.max(0.0) + LEFT_SHARE * left
+    }
 }
 
 /// The other classes of the smallest set that has, with a class of these odds, the wanted probability.
-fn credible(ln_odds: f64, mut others: Vec<Beside>) -> Vec<(&'static str, Fitted)> {
-    let unit = 1.0 + MISFIT_SHARE * ln_odds.max(0.0);
+fn credible(ln_odds: f64, unit: f64, mut others: Vec<Beside>) -> Vec<(&'static str, Fitted)> {
     let weight = |one: f64| ((one - ln_odds) / unit).exp();
     let total: f64 = 1.0 + others.iter().map(|other| weight(other.ln_odds)).sum::<f64>();
     others.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));

@@ -63,8 +63,15 @@ fn lacks(
 ) -> Option<&'static str> {
     match effect {
         _ if contacts.count() == 0 => Some("nothing is pressed"),
-        "misregistration" | "surface-tilt" | "indenter-tilt" | "edge-effect" | "heavy-tail"
-        | "anisotropic-spread" | "crosstalk" | "indenter-size"
+        "misregistration"
+        | "surface-tilt"
+        | "indenter-tilt"
+        | "edge-effect"
+        | "heavy-tail"
+        | "anisotropic-spread"
+        | "depth-dependent-spread"
+        | "crosstalk"
+        | "indenter-size"
             if contacts.distinct_places() < 3 =>
         {
             Some("fewer than three places were pressed")
