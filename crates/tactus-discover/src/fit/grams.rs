@@ -132,6 +132,13 @@ impl Grams {
         &self.reduced
     }
 
+    /// The reduced products of the first directions, and with the residual as the last row and column.
+    pub(crate) fn first(&self, directions: usize) -> DMatrix<f64> {
+        let last = self.reduced.nrows() - 1;
+        let place = |number: usize| if number < directions { number } else { last };
+        DMatrix::from_fn(directions + 1, directions + 1, |i, j| self.reduced[(place(i), place(j))])
+    }
+
     /// A direction's size before the elimination.
     pub(crate) fn whole(&self, direction: usize) -> f64 {
         self.whole[direction].sqrt()

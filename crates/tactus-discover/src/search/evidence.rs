@@ -124,10 +124,20 @@ impl Evidence<'_> {
 
     /// What an addition gains beside a set.
     pub(crate) fn gain(&self, set: &Set, addition: usize) -> Gain {
-        let Addition { class, directions, widths, signs } = &self.additions[addition];
-        let last = set.products.nrows() - 1;
+        self.gain_of(&set.products, addition, self.charge(set, self.additions[addition].class))
+    }
+
+    /// What an addition gains by itself, against these logarithmic prior odds.
+    pub(crate) fn gain_alone(&self, addition: usize, charge: f64) -> Gain {
+        self.gain_of(self.products, addition, charge)
+    }
+
+    /// What an addition gains where these products are left.
+    fn gain_of(&self, left: &DMatrix<f64>, addition: usize, charge: f64) -> Gain {
+        let Addition { directions, widths, signs, .. } = &self.additions[addition];
+        let last = left.nrows() - 1;
         let mut places: Vec<usize> = (0..directions.len())
-            .filter(|place| set.products[(directions[*place], directions[*place])] > 0.0)
+            .filter(|place| left[(directions[*place], directions[*place])] > 0.0)
             .collect();
         let mut found = Gain { ln_likelihood: 0.0, ln_odds: f64::NEG_INFINITY, active: Vec::new() };
         loop {
@@ -137,10 +147,10 @@ impl Evidence<'_> {
             }
             let products = DMatrix::from_fn(count, count, |i, j| {
                 let (a, b) = (places[i], places[j]);
-                widths[a] * widths[b] * set.products[(directions[a], directions[b])] / self.variance
+                widths[a] * widths[b] * left[(directions[a], directions[b])] / self.variance
             });
             let wanted = DVector::from_fn(count, |i, _| {
-                widths[places[i]] * set.products[(directions[places[i]], last)] / self.variance
+                widths[places[i]] * left[(directions[places[i]], last)] / self.variance
             });
             let SymmetricEigen { eigenvectors, eigenvalues } = products.symmetric_eigen();
             let along = eigenvectors.transpose() * &wanted;
@@ -166,7 +176,7 @@ impl Evidence<'_> {
                 continue;
             }
             found.ln_likelihood = ln_likelihood;
-            found.ln_odds = ln_likelihood - self.charge(set, *class);
+            found.ln_odds = ln_likelihood - charge;
             found.active = places
                 .iter()
                 .map(|place| (directions[*place], self.variance / (tau * widths[*place]).powi(2)))

@@ -11,6 +11,7 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
 use tactus_model::effect::{Definition, ParameterKind};
 
 use super::candidates::Candidate;
@@ -139,6 +140,8 @@ pub(crate) struct Pass {
     classes: Vec<&'static str>,
     scores: Vec<Score>,
     grams: Grams,
+    /// The products of named additions, whose directions come first, and of the residual.
+    named: DMatrix<f64>,
     walk: Option<TriedWalk>,
     /// Classes of the model.
     present: Vec<usize>,
@@ -164,13 +167,13 @@ pub(crate) struct Beside {
 }
 
 impl Pass {
+    /// The evidence for named additions.
     fn evidence(&self) -> Evidence<'_> {
-        Evidence {
-            additions: &self.additions,
-            products: self.grams.reduced(),
-            variance: self.variance,
-            present: &self.present,
-        }
+        self.evidence_on(&self.named)
+    }
+
+    fn evidence_on<'a>(&'a self, products: &'a DMatrix<f64>) -> Evidence<'a> {
+        Evidence { additions: &self.additions, products, variance: self.variance, present: &self.present }
     }
 
     fn is_named(&self, addition: usize) -> bool {
@@ -188,10 +191,11 @@ impl Pass {
 
     /// Logarithm of the odds of the best rival without a name.
     fn best_rival(&self) -> f64 {
-        let evidence = self.evidence();
-        let none = evidence.none();
+        let evidence = self.evidence_on(self.grams.reduced());
         let rivals = (0..self.additions.len()).filter(|one| !self.is_named(*one));
-        rivals.map(|one| evidence.gain(&none, one).ln_odds).fold(f64::NEG_INFINITY, f64::max)
+        rivals
+            .map(|one| evidence.gain_alone(one, ODDS_AGAINST.ln()).ln_odds)
+            .fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -229,6 +233,7 @@ impl Search<'_> {
                 }
             }
         }
+        let named = directions.len();
         for rival in rivals(problem, at, self.rounds)? {
             let first = directions.len();
             let count = rival.columns.len();
@@ -264,6 +269,7 @@ impl Search<'_> {
             kinds,
             classes,
             scores,
+            named: grams.first(named),
             grams,
             walk,
             present,
@@ -380,7 +386,7 @@ impl Search<'_> {
 
     /// The classes of the best sets, fitted, the one with the greatest odds first; none if a rival without a name explains more.
     fn next(&self, at: &Fitted, pass: &Pass) -> Result<Vec<Beside>, DiscoverError> {
-        let evidence = pass.evidence();
+        let evidence = pass.evidence_on(pass.grams.reduced());
         let best = evidence.sets(|_| true).into_iter().next();
         let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
         let mut starts: Vec<(&'static str, Vec<Term>)> = Vec::new();
