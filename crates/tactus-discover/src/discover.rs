@@ -70,13 +70,13 @@ fn discover_on_threads(
     };
     let confirmed = confirmed(&prepared, &search, grown, &mut equivalent)?;
     reporter.report("locating what remains", 0.9);
-    let p_left = search.p_left(&confirmed.grown)?;
+    let left = search.left(&confirmed.grown)?;
     let after = search.locate(&confirmed.grown)?;
     reporter.report("planning what to measure next", 0.95);
     let told = conclude(
         &prepared,
         &search,
-        SearchOutcome { lacking, base, confirmed, rounds, equivalent, p_left, before, after },
+        SearchOutcome { lacking, base, confirmed, rounds, equivalent, left, before, after },
         options,
     )?;
     reporter.report("done", 1.0);

@@ -25,7 +25,9 @@ mod score;
 mod wiring;
 
 pub(crate) use candidates::Candidate;
-pub(crate) use grow::{ALPHA, Alike, Equivalent, FLIPS, Grown, POLISH_ROUNDS, Search, Tried, names, without};
+pub(crate) use grow::{
+    ALPHA, Alike, Equivalent, FLIPS, Grown, Left, POLISH_ROUNDS, Search, Tried, names, without,
+};
 pub use grow::{Round, TriedEffect};
 pub(crate) use locate::Located;
 pub use locate::{Curve, Gap, Point};

@@ -108,6 +108,16 @@ pub(crate) struct Alike {
     pub(crate) without: Fitted,
     /// The models with another in its place.
     pub(crate) same: Vec<(&'static str, Fitted)>,
+    /// Probability of the effect and of each other in its place, given that one of them is there; those not listed have hardly any.
+    pub(crate) probabilities: Vec<(&'static str, f64)>,
+}
+
+/// What a grown model may still lack.
+pub(crate) struct Left {
+    /// p-value of the largest score of all additions.
+    pub(crate) p_value: f64,
+    /// Probability that each effect is missing; for one that the model has, that there is more of it.
+    pub(crate) probabilities: Vec<(&'static str, f64)>,
 }
 
 /// Results of one round.
@@ -315,9 +325,20 @@ impl Search<'_> {
         Ok(grown)
     }
 
-    /// p-value of the largest score of all additions to a grown model.
-    pub(crate) fn p_left(&self, grown: &Fitted) -> Result<f64, DiscoverError> {
-        Ok(self.tested(&self.pass(grown)?, grown, 2 * NAMES_MAX + 1).p_value)
+    /// What a grown model may still lack.
+    pub(crate) fn left(&self, grown: &Fitted) -> Result<Left, DiscoverError> {
+        let pass = self.pass(grown)?;
+        let p_value = self.tested(&pass, grown, 2 * NAMES_MAX + 1).p_value;
+        let (evidence, unit) = (pass.evidence(), self.unit(0.0, grown));
+        let gains = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), f64::NEG_INFINITY);
+        // Where nothing is gained, the odds are those before the data.
+        let nothing = 1.0 / (1.0 + ODDS_AGAINST);
+        let probability = |name: &str| {
+            let gain = gains.iter().find(|(one, _)| pass.class_of(*one) == name);
+            gain.map_or(nothing, |(_, gain)| 1.0 / (1.0 + (-gain.ln_odds / unit).exp()))
+        };
+        let names = self.candidates.iter().map(|candidate| candidate.definition.name);
+        Ok(Left { p_value, probabilities: names.map(|name| (name, probability(name))).collect() })
     }
 
     /// True if the residual of a model depends on any covariate.
@@ -516,7 +537,9 @@ impl Search<'_> {
                     continue 'again;
                 }
                 let mut same = Vec::new();
-                for (other, fitted) in credible(ln_odds, self.unit(ln_odds, &grown.at), others) {
+                let unit = self.unit(ln_odds, &grown.at);
+                let probabilities = probabilities(name, ln_odds, unit, &others);
+                for (other, fitted) in credible(&probabilities, others) {
                     let model_leaves = match leaves {
                         Some(known) => known,
                         None => *leaves.insert(self.leaves_something(&grown.at)?),
@@ -526,7 +549,7 @@ impl Search<'_> {
                         same.push((other, fitted));
                     }
                 }
-                grown.equivalent.insert(name, Alike { without: less, same });
+                grown.equivalent.insert(name, Alike { without: less, same, probabilities });
             }
             return Ok(());
         }
@@ -579,19 +602,27 @@ impl Search<'_> {
     }
 }
 
-/// The other classes of the smallest set that has, with a class of these odds, the wanted probability.
-fn credible(ln_odds: f64, unit: f64, mut others: Vec<Beside>) -> Vec<(&'static str, Fitted)> {
-    let weight = |one: f64| ((one - ln_odds) / unit).exp();
-    let total: f64 = 1.0 + others.iter().map(|other| weight(other.ln_odds)).sum::<f64>();
-    others.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
-    let mut reached = 1.0 / total;
+/// Probabilities of a class with these odds, and of others in its place; likeliest others first.
+fn probabilities(name: &'static str, ln_odds: f64, unit: f64, others: &[Beside]) -> Vec<(&'static str, f64)> {
+    let mut weights = vec![(name, 1.0)];
+    weights.extend(others.iter().map(|other| (other.name, ((other.ln_odds - ln_odds) / unit).exp())));
+    weights[1..].sort_by(|a, b| b.1.total_cmp(&a.1));
+    let total: f64 = weights.iter().map(|(_, weight)| weight).sum();
+    weights.into_iter().map(|(name, weight)| (name, weight / total)).collect()
+}
+
+/// The other classes of the smallest set that has, with the first class, the wanted probability.
+fn credible(probabilities: &[(&'static str, f64)], mut others: Vec<Beside>) -> Vec<(&'static str, Fitted)> {
+    let mut reached = 0.0;
     let mut same = Vec::new();
-    for other in others {
+    for (place, (name, probability)) in probabilities.iter().enumerate() {
         if reached >= SET_PROBABILITY {
             break;
         }
-        reached += weight(other.ln_odds) / total;
-        same.push((other.name, other.fitted));
+        reached += probability;
+        if let Some(other) = others.iter().position(|other| place > 0 && other.name == *name) {
+            same.push((*name, others.swap_remove(other).fitted));
+        }
     }
     same
 }

@@ -11,7 +11,6 @@
 //! | direction of approach | the side from which the tool came, x and y | the signal, its slopes along x and y |
 //! | speed of travel | the speed of the stage without contact | 1 |
 //! | height above the surface | the tip's height without contact | the image of a press at the tip's place |
-//! | press | the press, each by itself | the element's own signal |
 //! | contact | the element, while the tool touches | 1 |
 
 use std::ops::Range;
@@ -24,8 +23,6 @@ use crate::fit::{Direction, Fitted, Problem};
 /// Knots of a function of one covariate.
 const KNOTS: usize = 5;
 
-/// Greatest number of presses that have a factor of their own.
-const PRESSES_MAX: f64 = 100.0;
 /// Greatest height from which something may be felt without contact.
 const LOW_MM: f64 = 2.0;
 
@@ -86,12 +83,6 @@ pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result
         Rival { name: "direction of approach", columns: aside.collect() },
         Rival { name: "speed of travel", columns: smooth(&history.travel_mm_per_s, &free, Form::Offset) },
         Rival { name: "height above the surface", columns: smooth(&height_mm, &low, Form::Place) },
-        Rival {
-            name: "press",
-            columns: presses(&history.press, &deep)
-                .map(|press| column(Factor::Bins(press), Form::Signal))
-                .collect(),
-        },
     ];
     if !rounds {
         let in_contact: Arc<Vec<f64>> =
@@ -101,21 +92,6 @@ pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result
     }
     found.retain(|rival| !rival.columns.is_empty());
     Ok(found)
-}
-
-/// For each press, 1 in its bins; consecutive ones together if there are more than [`PRESSES_MAX`].
-fn presses(press: &[f64], deep: &[bool]) -> impl Iterator<Item = Arc<Vec<f64>>> {
-    let last = press.iter().copied().fold(0.0, f64::max);
-    let joined = (last / PRESSES_MAX).ceil().max(1.0);
-    let number = move |press: f64| (press / joined).floor();
-    let mut numbers: Vec<f64> =
-        press.iter().zip(deep).filter(|(_, deep)| **deep).map(|(press, _)| number(*press)).collect();
-    numbers.sort_by(f64::total_cmp);
-    numbers.dedup();
-    numbers.into_iter().map(move |of| {
-        let within = |(press, deep): (&f64, &bool)| f64::from(u8::from(*deep && number(*press) == of));
-        Arc::new(press.iter().zip(deep).map(within).collect())
-    })
 }
 
 /// For each knot, the weight of its value in a function that is straight between knots; 0 for bins that are not among those. No knots if

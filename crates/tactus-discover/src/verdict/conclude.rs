@@ -5,16 +5,16 @@ use std::ops::Range;
 use tactus_model::{Effect, Response};
 
 use super::discovery::{
-    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Level, Split, Unexplained,
-    Verdict,
+    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Inclusion, Level, Split,
+    Unexplained, Verdict,
 };
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
 use crate::fit::{Fitted, LOUD, Parameters, Predictor, Prepared, Problem, RandomWalk, Term};
 use crate::next::{Explanation, Pair, Planner};
 use crate::search::{
-    ALPHA, Alike, Equivalent, FLIPS, Located, NotShown, Options, POLISH_ROUNDS, Rule, Search, Tried, names,
-    not_shown, q_values, sign_flip_p, without,
+    ALPHA, Alike, Equivalent, FLIPS, Left, Located, NotShown, Options, POLISH_ROUNDS, Rule, Search, Tried,
+    names, not_shown, q_values, sign_flip_p, without,
 };
 
 /// The held-out presses confirm an effect if noise alone would let it gain as much on them with at most this probability.
@@ -31,8 +31,8 @@ pub(crate) struct SearchOutcome {
     pub(crate) confirmed: Confirmed,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
-    /// p-value of the largest score of all additions to the grown model.
-    pub(crate) p_left: f64,
+    /// What the grown model may still lack.
+    pub(crate) left: Left,
     /// Where the base model and the data disagree, and where the grown model still does.
     pub(crate) before: Located,
     pub(crate) after: Located,
@@ -105,13 +105,13 @@ pub(crate) fn conclude(
     options: Options,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
-    let SearchOutcome { lacking, base, confirmed, rounds, equivalent, p_left, before, after } = found;
+    let SearchOutcome { lacking, base, confirmed, rounds, equivalent, left, before, after } = found;
     let Confirmed { grown, mut steps, tentative } = confirmed;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
     let share = search.share_left(&base, &grown);
-    let left = 2.0 * p_left.min(after.p_value) <= ALPHA;
+    let is_left = 2.0 * left.p_value.min(after.p_value) <= ALPHA;
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
     let floor = prepared.floor_of(&of_grown);
@@ -120,7 +120,7 @@ pub(crate) fn conclude(
     let evidence = Evidence {
         is_named: named || lattice.is_some() || !faulty.effects.is_empty(),
         is_missing: p_value <= ALPHA && options.rule == Rule::Protocol,
-        is_left: left,
+        is_left,
         upper_noise,
         tolerance_noise: options
             .tolerance_counts
@@ -159,6 +159,7 @@ pub(crate) fn conclude(
         curves: search.curves(&base, &grown)?,
         elements: of_base.elements_beside(&of_grown),
         rounds: rounds.into_iter().map(|tried| tried.round).collect(),
+        inclusions: inclusions(&steps, &equivalent, &left),
         steps,
         tentative,
         final_: Final {
@@ -168,7 +169,7 @@ pub(crate) fn conclude(
         },
         verdict,
         unexplained: Unexplained {
-            depends_on: if left && !is_clean {
+            depends_on: if is_left && !is_clean {
                 after.gap.iter().map(|gap| gap.covariate).collect()
             } else {
                 Vec::new()
@@ -196,11 +197,34 @@ pub(crate) fn cannot_judge(prepared: &Prepared<'_>, options: Options) -> Result<
     Ok(Discovery { next_experiments: vec![prepared.planner().repeats()], ..unjudged })
 }
 
+/// The probability of each effect: in any place of an added one, or missing beside them.
+fn inclusions(steps: &[AddedEffect], equivalent: &Equivalent, left: &Left) -> Vec<Inclusion> {
+    let in_place = |of: &Alike, name: &str| {
+        of.probabilities.iter().find(|(one, _)| *one == name).map_or(0.0, |(_, probability)| *probability)
+    };
+    let probability = |name: &str, missing: f64| {
+        let is_added = steps.iter().any(|step| step.effect == name);
+        if is_added && !equivalent.contains_key(name) {
+            // Nothing else acts like it.
+            return 1.0;
+        }
+        let missing = if is_added { 0.0 } else { missing };
+        1.0 - equivalent.values().map(|of| 1.0 - in_place(of, name)).product::<f64>() * (1.0 - missing)
+    };
+    let of = |(effect, missing): &(&'static str, f64)| Inclusion {
+        effect,
+        probability: probability(effect, *missing),
+    };
+    let mut inclusions: Vec<Inclusion> = left.probabilities.iter().map(of).collect();
+    inclusions.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    inclusions
+}
+
 /// The added effects, each with an effect that the data do not distinguish from it.
 fn undecided(equivalent: &Equivalent, grown: &Fitted) -> Vec<Pair> {
     let explained =
         |name: &'static str, fitted: &Fitted| Explanation { name, parameters: fitted.parameters.clone() };
-    let pairs = equivalent.iter().flat_map(|(name, Alike { without, same })| {
+    let pairs = equivalent.iter().flat_map(|(name, Alike { without, same, .. })| {
         same.iter().map(move |(rival, fitted)| Pair {
             of: [explained(name, grown), explained(rival, fitted)],
             without: without.parameters.clone(),
@@ -301,6 +325,7 @@ impl Prepared<'_> {
             rounds: Vec::new(),
             steps: Vec::new(),
             tentative: Vec::new(),
+            inclusions: Vec::new(),
             final_: Final { level, shrink: None },
             verdict: Verdict::CannotJudge,
             unexplained: Unexplained { depends_on: Vec::new(), share: 1.0 },

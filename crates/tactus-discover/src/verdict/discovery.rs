@@ -57,6 +57,8 @@ pub struct Discovery {
     pub recalibrated: BaseModel,
     /// The base of the grown model, recalibrated together with its effects.
     pub grown: BaseModel,
+    /// How probable each effect of the library is, the most probable first; those that these data cannot show are left out.
+    pub inclusions: Vec<Inclusion>,
     /// The effects of the grown model; those that it had before come first. An effect may act more than once.
     pub effects: Vec<Effect>,
 }
@@ -135,6 +137,16 @@ pub struct AddedEffect {
     pub heldout_rms_after_counts: f64,
     /// Effects that these data cannot distinguish from this one.
     pub equivalent: Vec<&'static str>,
+}
+
+/// How probable an effect is, given the data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inclusion {
+    /// Its name.
+    pub effect: &'static str,
+    /// Probability that it acts: in the place of an added effect or beside them. An effect of which the data say nothing has that
+    /// before the data, 1 in 21.
+    pub probability: f64,
 }
 
 /// A parameter of an effect.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{AddedEffect, Discovery, Estimated};
+use tactus_discover::{AddedEffect, Discovery, Estimated, Inclusion};
 use tactus_model::{Effect, effect::Definition};
 
 use super::words::{self, list};
@@ -11,6 +11,9 @@ use crate::{
     markup::Text,
     numbers::{digits, short, with_error},
 };
+
+/// A probability worth a line of its own.
+const SAID_LEAST: f64 = 0.1;
 
 pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
     writeln!(f, "<section>\n<h2>What was added</h2>")?;
@@ -26,7 +29,37 @@ pub(super) fn section(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Res
     if !known.is_empty() {
         writeln!(f, "<p>Already in the model, and fitted again with the rest: {}.</p>", Text(list(known)))?;
     }
+    inclusions(f, found)?;
     writeln!(f, "</section>")
+}
+
+/// How probable each effect is.
+fn inclusions(f: &mut fmt::Formatter<'_>, found: &Discovery) -> fmt::Result {
+    let is_likely = |one: &&Inclusion| {
+        one.probability >= SAID_LEAST || found.steps.iter().any(|step| step.effect == one.effect)
+    };
+    let (likely, other): (Vec<&Inclusion>, Vec<&Inclusion>) = found.inclusions.iter().partition(is_likely);
+    if found.inclusions.is_empty() {
+        return Ok(());
+    }
+    writeln!(f, "<h3>How probable each effect is</h3>")?;
+    if !likely.is_empty() {
+        let mut table = Table::new(&[Column::Name("effect"), Column::Number("probability")]);
+        for Inclusion { effect, probability } in likely {
+            table.row([(*effect).to_owned(), words::percent(*probability)]);
+        }
+        writeln!(f, "{table}")?;
+    }
+    let most = other.iter().map(|one| one.probability).fold(0.0, f64::max);
+    if !other.is_empty() {
+        writeln!(
+            f,
+            "<p>Of the other {} effects that these data can show, each has at most {}; before the data it was 5 %.</p>",
+            other.len(),
+            words::percent(most)
+        )?;
+    }
+    Ok(())
 }
 
 fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {

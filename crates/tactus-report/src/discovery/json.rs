@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tactus_discover::{
-    AddedEffect, Curve, Discovery, Estimated, FaultyElement, Floor, Gap, GlobalTest, Level, NextExperiment,
-    Round, Structured, TriedEffect,
+    AddedEffect, Curve, Discovery, Estimated, FaultyElement, Floor, Gap, GlobalTest, Inclusion, Level,
+    NextExperiment, Round, Structured, TriedEffect,
 };
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
@@ -49,6 +49,7 @@ struct ReportJson<'a> {
     rounds: Vec<RoundJson<'a>>,
     steps: Vec<StepJson<'a>>,
     tentative: Vec<StepJson<'a>>,
+    inclusions: Vec<InclusionJson<'a>>,
     #[serde(rename = "final")]
     grown: GrownJson,
     verdict: &'static str,
@@ -194,6 +195,12 @@ struct StepJson<'a> {
 }
 
 #[derive(Serialize)]
+struct InclusionJson<'a> {
+    effect: &'a str,
+    probability: f64,
+}
+
+#[derive(Serialize)]
 struct EstimateJson {
     value: f64,
     se: Option<f64>,
@@ -272,6 +279,7 @@ impl<'a> ReportJson<'a> {
             rounds: found.rounds.iter().map(RoundJson::of).collect(),
             steps: found.steps.iter().map(StepJson::of).collect(),
             tentative: found.tentative.iter().map(StepJson::of).collect(),
+            inclusions: found.inclusions.iter().map(InclusionJson::of).collect(),
             grown: GrownJson {
                 level: LevelJson::of(found.final_.level, found.floor),
                 shrink: found.final_.shrink,
@@ -385,6 +393,12 @@ impl<'a> CandidateJson<'a> {
             heldout_rms_counts: candidate.heldout_rms_counts,
             shrink: candidate.shrink,
         }
+    }
+}
+
+impl<'a> InclusionJson<'a> {
+    fn of(Inclusion { effect, probability }: &'a Inclusion) -> Self {
+        Self { effect, probability: *probability }
     }
 }
 

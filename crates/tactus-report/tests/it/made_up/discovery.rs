@@ -2,8 +2,8 @@
 
 use tactus_discover::{
     AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement, Final, Floor,
-    Gap, GlobalTest, Level, NextExperiment, NotShown, Point, Round, Split, Structured, TriedEffect,
-    Unexplained, Verdict,
+    Gap, GlobalTest, Inclusion, Level, NextExperiment, NotShown, Point, Round, Split, Structured,
+    TriedEffect, Unexplained, Verdict,
 };
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
 use tactus_report::discovery::{DataSource, DiscoveryReport};
@@ -62,6 +62,9 @@ pub(crate) fn explained() -> Discovery {
             .collect(),
         rounds: rounds(),
         tentative: vec![],
+        inclusions: [("hysteresis", 0.93), ("relaxation", 0.12), ("saturation", 0.031)]
+            .map(|(effect, probability)| Inclusion { effect, probability })
+            .to_vec(),
         steps: vec![
             AddedEffect {
                 effect: "hysteresis",
@@ -137,6 +140,7 @@ pub(crate) fn nothing_missing() -> Discovery {
         rounds: vec![],
         steps: vec![],
         tentative: vec![],
+        inclusions: vec![],
         final_: Final { level: level(2.01), shrink: None },
         verdict: Verdict::NothingMissing,
         unexplained: Unexplained { depends_on: vec![], share: 0.0 },
@@ -181,6 +185,7 @@ pub(crate) fn unexplained() -> Discovery {
         rounds: vec![Round { taken: None, ..whole.rounds[0].clone() }],
         steps: vec![],
         tentative: vec![],
+        inclusions: vec![],
         verdict: Verdict::Unexplained,
         unexplained: Unexplained { depends_on: vec!["time since contact", "depth"], share: 1.0 },
         next_experiments: vec![],

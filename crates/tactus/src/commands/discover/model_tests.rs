@@ -74,6 +74,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
         elements: Vec::new(),
         rounds: Vec::new(),
         tentative: vec![],
+        inclusions: vec![],
         steps: vec![AddedEffect {
             effect: "miswired",
             terms: vec![term(miswired(18.0, 19.0)), term(miswired(19.0, 18.0))],
