@@ -55,6 +55,7 @@
 //!     parameters: &[Parameter::real("lost_share", 0.0, [0.0, 1.0])],
 //!     near_twins: &[],
 //!     shown_by: &["element-centres"],
+//!     curve: None,
 //!     make: Make::Element(|values| Box::new(Loss { lost_share: values[0] })),
 //! };
 //!
@@ -90,6 +91,7 @@ mod hysteresis;
 mod imprint;
 mod indenter_size;
 mod indenter_tilt;
+mod knots;
 mod lag;
 mod low_pass;
 mod misregistration;
@@ -112,6 +114,7 @@ mod time_lag;
 struct AddingAnEffect;
 
 pub use definition::{Definition, Effect, EffectError, Make, Parameter, ParameterKind, PipelineStage};
+pub use knots::{CurveKind, FreeCurve, KNOTS_MAX, Knots, Values};
 pub use stage::{
     BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Shift, TipState,
 };

@@ -51,6 +51,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["backlash", "softening", "relaxation", "imprint", "time-lag", "rate-stiffening"],
     shown_by: &["ladder", "repeats"],
+    curve: None,
     make: Make::Covering(|values| {
         let [loss_share, threshold_mm, growth, by_depth] = [values[0], values[1], values[2], values[3]];
         Box::new(Hysteresis { loss_share, threshold_mm, growth, by_depth, plays: Vec::new() })

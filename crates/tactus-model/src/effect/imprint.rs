@@ -35,6 +35,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["baseline-drift", "relaxation", "hysteresis", "low-pass"],
     shown_by: &["hold", "repeats"],
+    curve: None,
     make: Make::Covering(|values| {
         let [set_share, recovery_s, spread_ratio] = [values[0], values[1], values[2]];
         Box::new(Imprint { set_share, recovery_s, spread_ratio, dents: Vec::new() })

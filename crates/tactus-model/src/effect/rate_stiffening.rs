@@ -34,6 +34,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["relaxation", "low-pass", "time-lag", "hysteresis"],
     shown_by: &["rates"],
+    curve: None,
     make: Make::Covering(|values| {
         Box::new(RateStiffening {
             stiffening_share: values[0],

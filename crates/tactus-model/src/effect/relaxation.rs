@@ -59,6 +59,7 @@ pub(super) static DEFINITION: Definition = Definition {
         "softening",
     ],
     shown_by: &["hold", "rates", "repeats"],
+    curve: None,
     make: Make::Covering(|values| {
         Box::new(Relaxation {
             relaxed_share: values[0],

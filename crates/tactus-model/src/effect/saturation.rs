@@ -33,6 +33,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["hardening", "surface-offset", "depth-dependent-spread", "quadratic_per_mm"],
     shown_by: &["ladder", "element-centres"],
+    curve: None,
     make: Make::Element(|values| Box::new(Saturation::new(values[0], values[1]))),
 };
 

@@ -33,6 +33,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["hysteresis", "relaxation", "gain-drift"],
     shown_by: &["repeats", "ladder"],
+    curve: None,
     make: Make::Covering(|values| {
         Box::new(Softening { softened_share: values[0], width_share: values[1], greatest_mm: Vec::new() })
     }),
