@@ -119,6 +119,28 @@ impl Knots {
         self.between(place, share)
     }
 
+    /// Weights at given places for parts at any: each part's weight is divided among its two neighbours on a `scale`.
+    pub(super) fn divided(
+        parts: impl IntoIterator<Item = (f64, f64)>,
+        places: &[f64],
+        scale: fn(f64) -> f64,
+    ) -> Vec<f64> {
+        let mut weights = vec![0.0; places.len()];
+        for (place, weight) in parts {
+            let next = places.partition_point(|at| *at <= place);
+            let (low, high) = (next.saturating_sub(1), next.min(places.len() - 1));
+            let share = if low < high && next > 0 {
+                let [from, to] = [low, high].map(|index| scale(places[index]));
+                (scale(place) - from) / (to - from)
+            } else {
+                0.0
+            };
+            weights[low] += (1.0 - share) * weight;
+            weights[high] += share * weight;
+        }
+        weights
+    }
+
     /// The value at a place; `share` is how far it is from one knot to the next, 0 to 1.
     fn between(&self, place: f64, share: impl Fn(f64, f64) -> f64) -> f64 {
         let next = self.at.partition_point(|at| *at <= place);
