@@ -127,6 +127,35 @@ fn frames_follow_a_path() {
 }
 
 #[test]
+fn a_model_with_knots_gives_what_they_say_along_a_path() {
+    let folder = TempDir::new().unwrap();
+    let effect = "\n[[effect]]\nname = \"hardening\"\nparameters = { own_share = 0.0 }\n\
+                  knots = { at_mm = [0.2, 0.4], growth = [0.0, 0.3] }\n";
+    let shipped = fs::read_to_string(repository("config/models/digitacts.toml")).unwrap();
+    fs::write(folder.path().join("model.toml"), shipped + effect).unwrap();
+    fs::write(folder.path().join("path.csv"), "t_s,x_mm,y_mm,z_mm\n0,2.9,4.9,0.1\n1,2.9,4.9,-0.5\n").unwrap();
+    let args = ["simulate", "--model", "model.toml", "--scene", "cylinder", "--trajectory", "path.csv"];
+    let said = tactus(folder.path(), &[&args[..], &["--rate-hz", "10"]].concat());
+    assert_eq!(said.code, Some(0), "{said:?}");
+    for (frame, line) in said.out.lines().skip(1).enumerate() {
+        let counts: f64 = line.split(',').nth(4 + 17).unwrap().parse().unwrap();
+        let depth_mm = (0.06 * frame as f64 - 0.1).max(0.0);
+        // Nothing up to 0.2 mm, and from 0.4 mm on three tenths more.
+        let growth = (1.5 * (depth_mm - 0.2)).clamp(0.0, 0.3);
+        let want = 100.0 + 1000.0 * depth_mm * (1.0 + growth);
+        assert!((counts - want).abs() < 1e-6, "frame {frame}: {counts} {want}");
+    }
+    assert_eq!(said.out.lines().count(), 1 + 11);
+    let falling =
+        fs::read_to_string(folder.path().join("model.toml")).unwrap().replace("[0.0, 0.3]", "[0.3, 0.0]");
+    fs::write(folder.path().join("falling.toml"), falling).unwrap();
+    let said = tactus(folder.path(), &["simulate", "--model", "falling.toml", "--scene", "cylinder"]);
+    let error =
+        "falling.toml: effect[0]: hardening: knots.growth[1] must be not below the value before, 0.3, not 0";
+    assert!(said.code != Some(0) && said.err.contains(error), "{said:?}");
+}
+
+#[test]
 fn live_frames_come_like_a_real_sensors() {
     let folder = TempDir::new().unwrap();
     let endpoint = free_endpoint();

@@ -7,7 +7,7 @@ use tactus_model::Effect;
 
 use crate::data::{Bins, DiscoverError, Floor, Frames, Known};
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
-use crate::search::{Candidate, Grown, Options, Rule, Search, not_shown};
+use crate::search::{Candidate, Formed, Grown, Options, Rule, Search, not_shown};
 use crate::verdict::{BaseModel, Discovery, SearchOutcome, cannot_judge, conclude, confirmed};
 
 /// Progress of a discovery.
@@ -68,7 +68,11 @@ fn discover_on_threads(
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
-    let confirmed = confirmed(&prepared, &search, grown, &mut equivalent)?;
+    let formed = match options.rule {
+        Rule::Protocol => search.formed(grown)?,
+        Rule::Bic => Formed::from(grown),
+    };
+    let confirmed = confirmed(&prepared, &search, formed, &mut equivalent)?;
     reporter.report("locating what remains", 0.9);
     let left = search.left(&confirmed.grown)?;
     let after = search.locate(&confirmed.grown)?;

@@ -7,8 +7,8 @@
 //! [`predictor`] computes the prediction with the pipeline of `tactus-model`. One pass over the data gives the [`sums`] of products of all
 //! derivatives; [`elimination`] takes off what [`gains`] and baselines fit, where baselines may follow a [`random_walk`]; [`grams`] are what
 //! is left. [`problem`] takes damped Gauss-Newton steps in the spread and in the parameters of the
-//! effects, each on its own [`scale`]. [`heldout`] measures a fitted model on the presses that were not fitted. [`prepare`] splits the
-//! data and fits the base model, from which the search starts.
+//! effects, each on its own [`scale`]; [`knots`] of free curves stay within their class. [`heldout`] measures a fitted model on the presses
+//! that were not fitted. [`prepare`] splits the data and fits the base model, from which the search starts.
 //!
 //! Each file names its sources.
 
@@ -16,6 +16,7 @@ mod elimination;
 mod gains;
 mod grams;
 mod heldout;
+mod knots;
 mod parameters;
 mod predictor;
 mod prepare;
@@ -26,6 +27,7 @@ mod sums;
 
 pub(crate) use grams::Grams;
 pub(crate) use heldout::LOUD;
+pub(crate) use knots::{of_formulas, places};
 pub(crate) use parameters::{Parameters, Term};
 pub(crate) use predictor::Predictor;
 pub(crate) use prepare::Prepared;

@@ -21,6 +21,6 @@ pub use next::NextExperiment;
 pub use search::{Curve, Gap, NotShown, Options, Point, Round, Rule, TriedEffect};
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 pub use verdict::{
-    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Inclusion, Level, Split,
-    Structured, Unexplained, Verdict,
+    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
+    Inclusion, Level, Split, Structured, Unexplained, Verdict,
 };

@@ -3,7 +3,8 @@
 //! At a model, one pass over the data gives the products of the derivatives by every shape of every effect ([`candidates`]) and of rivals
 //! without a name ([`rivals`]). From the products follow a [`score`] of each effect, whose largest is compared with those of data sets in
 //! which the signs of whole blocks are flipped, and the odds of sets of effects ([`evidence`]). The classes of the best sets are fitted, and
-//! one is added; in the end each must hold its place against no effect, rivals and other classes ([`grow`]). Random walks have a score of
+//! one is added; in the end each must hold its place against no effect, rivals and other classes ([`grow`]), and then has knots in place of
+//! its formula if the data refute that ([`forms`]). Random walks have a score of
 //! their own ([`drift`]), and pairs of elements are proposed by the residual ([`wiring`]).
 //!
 //! [`locate`] applies the same test to covariates in place of effects: it tells where a model and the data disagree, in words that do
@@ -16,6 +17,7 @@ mod candidates;
 mod covariates;
 mod drift;
 mod evidence;
+mod forms;
 mod grow;
 mod locate;
 pub(crate) mod not_shown;
@@ -25,6 +27,7 @@ mod score;
 mod wiring;
 
 pub(crate) use candidates::Candidate;
+pub(crate) use forms::{Formed, Refuted, RefutedFormula};
 pub(crate) use grow::{
     ALPHA, Alike, Equivalent, FLIPS, Grown, Left, POLISH_ROUNDS, Search, Tried, names, without,
 };

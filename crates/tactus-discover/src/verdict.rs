@@ -16,7 +16,7 @@ mod structured;
 
 pub(crate) use conclude::{SearchOutcome, cannot_judge, conclude, confirmed};
 pub use discovery::{
-    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Inclusion, Level, Split,
-    Unexplained, Verdict,
+    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
+    Inclusion, Level, Split, Unexplained, Verdict,
 };
 pub use structured::Structured;

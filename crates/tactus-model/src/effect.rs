@@ -4,7 +4,7 @@
 //! motion -> contact -> covering -> element -> readout
 //! ```
 //!
-//! An [`Effect`] is a [`Definition`] with a value for each of its parameters. What it does is one object behind
+//! An [`Effect`] is a [`Definition`] with a value for each of its parameters, or with knots in place of its formula. What it does is one object behind
 //! the trait of its stage, and the trait says what an effect of that stage may touch:
 //!
 //! | stage | trait | may change |
@@ -19,6 +19,20 @@
 //! are listed. History lives in the effect; `reset` clears it. Between two moments an effect with memory takes its input as
 //! a straight line, so that calls at a higher rate give the same result. At neutral parameters an effect changes nothing,
 //! to the bit.
+//!
+//! **Knots.** The name of an effect stands for a class, and its formula is one member. Where [`Definition::curve`] allows it, an effect has
+//! [`Knots`] in place of the formula: a [`FreeCurve`], held to the class by its range and by whether it may fall.
+//!
+//! ```
+//! use tactus_model::Effect;
+//! use tactus_model::effect::{Definition, Knots};
+//!
+//! // A stiffer layer bears from 0.2 mm on, which no power of depth is.
+//! let layer = Knots { at: vec![0.2, 0.6], values: vec![0.0, 0.5] };
+//! let hardening = Effect::of_knots(Definition::find("hardening")?, [("own_share", 0.0)], layer)?;
+//! assert_eq!(hardening.value("exponent"), None);
+//! # Ok::<(), tactus_model::effect::EffectError>(())
+//! ```
 //!
 //! **Derivatives.** Where a closed form exists, `slope` gives the derivative of the effect's own output by one of
 //! its parameters at the same input, with that of the memory; `None` or `false` where there is none. Fits do not call it:
@@ -55,6 +69,7 @@
 //!     parameters: &[Parameter::real("lost_share", 0.0, [0.0, 1.0])],
 //!     near_twins: &[],
 //!     shown_by: &["element-centres"],
+//!     curve: None,
 //!     make: Make::Element(|values| Box::new(Loss { lost_share: values[0] })),
 //! };
 //!
@@ -90,6 +105,7 @@ mod hysteresis;
 mod imprint;
 mod indenter_size;
 mod indenter_tilt;
+mod knots;
 mod lag;
 mod low_pass;
 mod misregistration;
@@ -112,6 +128,7 @@ mod time_lag;
 struct AddingAnEffect;
 
 pub use definition::{Definition, Effect, EffectError, Make, Parameter, ParameterKind, PipelineStage};
+pub use knots::{CurveKind, FreeCurve, KNOTS_MAX, Knots, Values};
 pub use stage::{
     BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Shift, TipState,
 };

@@ -3,7 +3,7 @@
 use super::*;
 use crate::Trajectory;
 use crate::effect::bench::{THIN, effect, simulator, still, upon};
-use crate::effect::{Definition, Effect, REGISTRY};
+use crate::effect::{Definition, Effect, Knots, REGISTRY};
 
 /// A press with a slide, on both sides of the surface.
 fn way(simulator: &Simulator) -> Trajectory {
@@ -70,7 +70,8 @@ fn neutral_effects_change_nothing_to_the_bit() {
     let plain = simulator([]);
     let way = way(&plain);
     let mut without = Pipeline::new(&plain).unwrap();
-    let neutral = REGISTRY.iter().map(|definition| Effect::neutral(definition));
+    let neutral =
+        REGISTRY.iter().map(|definition| Effect::neutral(definition)).chain(REGISTRY.iter().filter_map(flat));
     let mut pipelines: Vec<Pipeline> =
         neutral.clone().map(|effect| Pipeline::new(&simulator([effect])).unwrap()).collect();
     pipelines.push(Pipeline::new(&simulator(neutral)).unwrap());
@@ -99,7 +100,25 @@ fn every_effect_that_is_not_neutral_changes_something() {
             simulator(effects).run(&way, 30.0, 80, || 0.0).unwrap().map(|image| image.counts).collect()
         };
         assert_ne!(images(vec![strong(definition)]), images(vec![]), "{}", definition.name);
+        if let Some(free) = with_knots(definition, |at| 0.5 * at) {
+            assert_ne!(images(vec![free]), images(vec![]), "{} with knots", definition.name);
+        }
     }
+}
+
+/// An effect with knots that are all 0, if it may have knots.
+fn flat(definition: &&'static Definition) -> Option<Effect> {
+    with_knots(definition, |_| 0.0)
+}
+
+/// An effect at the neutral values of its parameters with knots, if it may have knots.
+fn with_knots(definition: &'static Definition, value: impl Fn(f64) -> f64) -> Option<Effect> {
+    let curve = definition.curve.as_ref()?;
+    let at = vec![0.05, 0.2, 0.4];
+    let values = at.iter().map(|at| value(*at)).collect();
+    let kept = definition.parameters.iter().filter(|one| !curve.replaces.contains(&one.name));
+    let parameters = kept.map(|one| (one.name, one.neutral));
+    Some(Effect::of_knots(definition, parameters, Knots { at, values }).unwrap())
 }
 
 /// An effect at a tenth of its range.
@@ -181,6 +200,7 @@ fn a_path_that_is_late_is_asked_for_an_earlier_instant() {
         parameters: &[crate::effect::Parameter::real("lag_s", 0.0, [-1.0, 1.0])],
         near_twins: &[],
         shown_by: &[],
+        curve: None,
         make: Make::Motion(|values| Box::new(Late(values[0]))),
     };
     let plain = simulator([]);
@@ -219,7 +239,8 @@ fn time_that_goes_back_stands_still() {
 fn a_place_that_is_no_number_does_not_panic() {
     let neutral = simulator(REGISTRY.iter().map(|definition| Effect::neutral(definition)));
     let strong = simulator(REGISTRY.iter().map(|definition| strong(definition)));
-    for everything in [neutral, strong] {
+    let free = simulator(REGISTRY.iter().filter_map(|definition| with_knots(definition, |at| 0.5 * at)));
+    for everything in [neutral, strong, free] {
         let mut pipeline = Pipeline::new(&everything).unwrap();
         for tip_mm in [[f64::NAN; 3], [f64::INFINITY; 3], [1e300, -1e300, -1e300]] {
             pipeline.step(Moment::at(f64::NAN), &tip_mm);

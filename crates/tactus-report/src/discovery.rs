@@ -29,7 +29,7 @@ use crate::{
 };
 
 pub use active::{ActiveRun, AmbiguousEffect, command};
-pub use figures::{element_maps, levels, residual_against};
+pub use figures::{element_maps, free_curve, levels, residual_against};
 pub use json::discovery_json;
 pub use next::{Proposal, proposals};
 pub use words::in_words;

@@ -2,6 +2,16 @@
 //!
 //! Simulators, virtual devices and the discovery of effects read it; discovery writes it. Unknown keys, effects and
 //! parameters are refused.
+//!
+//! An effect has its formula, with a value for each parameter, or a free curve in place of the formula: `knots`, with places and values under
+//! the keys that the effect's page gives ([`tactus_model::effect::FreeCurve`]), and the parameters that the knots do not replace.
+//!
+//! ```toml
+//! [[effect]]
+//! name = "hardening"
+//! parameters = { own_share = 0.0 }
+//! knots = { at_mm = [0.2, 0.4, 0.6], growth = [0.0, 0.3, 0.4] }
+//! ```
 
 mod file;
 

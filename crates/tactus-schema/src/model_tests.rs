@@ -72,6 +72,70 @@ fn what_is_written_reads_back_to_the_bit() {
     }
 }
 
+const FREE: &str = r#"
+[[effect]]
+name = "hardening"
+parameters = { own_share = 0.25 }
+knots = { at_mm = [0.1, 0.30000000000000004, 0.6], growth = [0.0, 0.1, 0.3333333333333333] }
+
+[[effect]]
+name = "saturation"
+knots = { at_mm = [0.4], lost_share = [1e-17] }
+"#;
+
+#[test]
+fn an_effect_may_have_knots_in_place_of_its_formula() {
+    let model = Model::from_toml(&format!("{DIGITACTS}{FREE}")).unwrap();
+    let [hardening, saturation] = &model.effects[..] else { panic!("two effects") };
+    let knots = hardening.effect.knots().unwrap();
+    assert_eq!(knots.at, [0.1, 0.1 + 0.2, 0.6]);
+    assert_eq!(knots.values, [0.0, 0.1, 1.0 / 3.0]);
+    assert_eq!((hardening.effect.value("own_share"), hardening.effect.value("exponent")), (Some(0.25), None));
+    assert_eq!(saturation.effect.parameters().count(), 0);
+    let text = model.to_toml().unwrap();
+    assert_eq!(Model::from_toml(&text).unwrap(), model, "to the bit: {text}");
+}
+
+#[test]
+fn knots_that_break_the_rules_of_the_effects_curve_are_refused() {
+    let refused = |from: &str, to: &str| {
+        let text = format!("{DIGITACTS}{FREE}");
+        assert!(text.contains(from), "there is no {from:?}");
+        Model::from_toml(&text.replacen(from, to, 1)).unwrap_err().to_string()
+    };
+    for (from, to, error) in [
+        (
+            "at_mm = [0.1,",
+            "at_s = [0.1,",
+            "effect[0].knots: those of hardening have at_mm and growth and nothing else",
+        ),
+        (
+            "lost_share",
+            "growth",
+            "effect[1].knots: those of saturation have at_mm and lost_share and nothing else",
+        ),
+        (
+            "own_share = 0.25",
+            "own_share = 0.25, exponent = 2",
+            "effect[0]: hardening: exponent is replaced by the knots",
+        ),
+        ("own_share = 0.25", "", "effect[0]: hardening: own_share is missing"),
+        (
+            "growth = [0.0, 0.1",
+            "growth = [0.2, 0.1",
+            "effect[0]: hardening: knots.growth[1] must be not below",
+        ),
+        ("[0.0, 0.1", "[-0.1, 0.1", "effect[0]: hardening: knots.growth[0] must be from 0 to 20, not -0.1"),
+        ("at_mm = [0.1", "at_mm = [0.7", "effect[0]: hardening: knots.at_mm[1] must be finite and above 0.7"),
+        ("at_mm = [0.4]", "at_mm = [inf]", "effect[1]: saturation: knots.at_mm[0] must be finite"),
+        ("[1e-17]", "[]", "effect[1]: saturation: knots must be 1 to 64"),
+        ("\"saturation\"", "\"backlash\"", "effect[1]: backlash: has no knots"),
+    ] {
+        let said = refused(from, to);
+        assert!(said.starts_with(error), "{said:?} does not start with {error:?}");
+    }
+}
+
 #[test]
 fn a_misspelt_key_is_refused_with_its_line() {
     for key in ["noise_rms_counts", "element_mm", "sigma_per_mm", "shape", "evidence", "data"] {

@@ -66,6 +66,18 @@ impl Problem<'_> {
         gain(&of(less), &of(more))
     }
 
+    /// By how much `more` is nearer to the fitted bins than `less`, in every other block and in the others.
+    pub(crate) fn fitted_halves(&self, less: &Fitted, more: &Fitted) -> [f64; 2] {
+        let of = |fitted: &Fitted| self.blocks_of(&fitted.predicted, |bin| self.train[bin] > 0.0);
+        let [less, more] = [of(less), of(more)];
+        let fitted = less.iter().zip(&more).filter(|([_, readings], _)| *readings > 0.0);
+        let mut halves = [0.0; 2];
+        for (block, ([less, _], [more, _])) in fitted.enumerate() {
+            halves[block % 2] += less - more;
+        }
+        halves
+    }
+
     /// Coefficient of a column in the residual of all bins, and its standard error from the scatter of blocks.
     pub(crate) fn share(&self, column: &[f64], predicted: &[f64]) -> Option<[f64; 2]> {
         let bins = self.predictor.bins;

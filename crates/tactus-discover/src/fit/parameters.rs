@@ -1,6 +1,6 @@
 //! Parameters of the whole model during a fit.
 
-use tactus_model::effect::{Definition, PipelineStage};
+use tactus_model::effect::{Definition, Knots, ParameterKind, PipelineStage};
 use tactus_model::{Effect, Psf};
 
 use super::random_walk::{RandomWalk, is_random_walk};
@@ -23,30 +23,53 @@ pub(crate) struct Parameters {
 #[derive(Debug, Clone)]
 pub(crate) struct Term {
     pub(crate) definition: &'static Definition,
+    /// One for each parameter; those that knots replace do not act.
     pub(crate) values: Vec<f64>,
+    /// The free curve in place of its formula, if it has one.
+    pub(crate) knots: Option<Knots>,
 }
 
 impl PartialEq for Term {
     fn eq(&self, other: &Self) -> bool {
-        self.definition.name == other.definition.name && self.values == other.values
+        (self.definition.name, &self.values, &self.knots)
+            == (other.definition.name, &other.values, &other.knots)
     }
 }
 
 impl Term {
     pub(crate) fn neutral(definition: &'static Definition) -> Self {
-        Self { definition, values: definition.parameters.iter().map(|one| one.neutral).collect() }
+        let values = definition.parameters.iter().map(|one| one.neutral).collect();
+        Self { definition, values, knots: None }
     }
 
     pub(crate) fn effect(&self) -> Result<Effect, DiscoverError> {
-        let names = self.definition.parameters.iter().map(|parameter| parameter.name);
-        Ok(Effect::of(self.definition, names.zip(self.values.iter().copied()))?)
+        let known = self.definition.parameters.iter().enumerate();
+        let acting = known.filter(|(parameter, _)| self.acts(*parameter));
+        let parameters = acting.map(|(parameter, known)| (known.name, self.values[parameter]));
+        Ok(match &self.knots {
+            None => Effect::of(self.definition, parameters)?,
+            Some(knots) => Effect::of_knots(self.definition, parameters, knots.clone())?,
+        })
     }
 
     pub(crate) fn of(effect: &Effect) -> Self {
-        Self {
-            definition: effect.definition(),
-            values: effect.parameters().map(|(_, value)| value).collect(),
+        let mut term = Self { knots: effect.knots().cloned(), ..Self::neutral(effect.definition()) };
+        for (known, value) in term.definition.parameters.iter().zip(&mut term.values) {
+            *value = effect.value(known.name).unwrap_or(known.neutral);
         }
+        term
+    }
+
+    /// True unless knots replace a parameter.
+    pub(crate) fn acts(&self, parameter: usize) -> bool {
+        self.knots.is_none() || !self.definition.replaces(self.definition.parameters[parameter].name)
+    }
+
+    /// Number of real numbers that make it.
+    pub(crate) fn numbers(&self) -> usize {
+        let parameters = self.definition.parameters.iter().enumerate();
+        let reals = parameters.filter(|(at, known)| known.kind == ParameterKind::Real && self.acts(*at));
+        reals.count() + self.knots.as_ref().map_or(0, |knots| knots.values.len())
     }
 
     /// The element whose signal this term replaces, if it is a term of that kind.

@@ -19,6 +19,7 @@ use nalgebra::{DMatrix, DVector};
 use tactus_model::effect::ParameterKind;
 
 use super::elimination::Elimination;
+use super::knots::bounded;
 use super::parameters::{Parameters, Term};
 use super::predictor::Predictor;
 use super::scale::Scale;
@@ -83,7 +84,15 @@ pub(crate) struct Fitted {
 pub(crate) enum Free {
     SigmaIntercept,
     SigmaSlope,
-    Of { term: usize, parameter: usize },
+    Of {
+        term: usize,
+        parameter: usize,
+    },
+    /// A knot of a term's free curve.
+    Knot {
+        term: usize,
+        knot: usize,
+    },
 }
 
 /// For each free parameter, its derivative if it is a knot of a curve.
@@ -154,6 +163,11 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// By how much a fit that ended may still be above the least cost.
+    pub(crate) fn undone(&self, cost: f64) -> f64 {
+        COST_LEAST.max(COST_SHARE_LEAST * cost)
+    }
+
     /// The parameters that a fit of a model varies.
     pub(crate) fn free(&self, parameters: &Parameters) -> Vec<Free> {
         let mut free = Vec::new();
@@ -164,7 +178,7 @@ impl<'a> Problem<'a> {
             }
         }
         for (term, at) in parameters.terms.iter().enumerate() {
-            let Term { definition, values } = at;
+            let Term { definition, values, knots } = at;
             if at.rewires().is_some_and(|element| self.element_weight[element] == 0.0) {
                 // Nothing shows the shares of an element without weight.
                 continue;
@@ -175,10 +189,12 @@ impl<'a> Problem<'a> {
                 continue;
             }
             for (parameter, known) in definition.parameters.iter().enumerate() {
-                if known.kind == ParameterKind::Real && known.name != "duration_s" {
+                if known.kind == ParameterKind::Real && known.name != "duration_s" && at.acts(parameter) {
                     free.push(Free::Of { term, parameter });
                 }
             }
+            let knots = knots.as_ref().map_or(0, |knots| knots.values.len());
+            free.extend((0..knots).map(|knot| Free::Knot { term, knot }));
         }
         free
     }
@@ -249,6 +265,10 @@ impl<'a> Problem<'a> {
                 // Towards a bound the step may be cut short.
                 scale.distance(value, moved.terms[term].values[parameter])
             }
+            Free::Knot { term, knot } => {
+                let step = at.terms[term].small_step(knot);
+                moved.terms[term].move_knot(knot, step)
+            }
         };
         (moved, step)
     }
@@ -278,10 +298,11 @@ impl<'a> Problem<'a> {
                 normal = self.normal(&at, &predicted, &free, &knots)?;
             }
             let (gram, right, squares) = normal.equations();
+            let least: Vec<f64> = free.iter().map(|one| least_step(&at, *one)).collect();
             let mut improved = false;
             let mut promise = 0.0;
             while damping < 1e8 {
-                let step = solve(&gram, &right, damping, &squares);
+                let step = bounded(&gram, &right, damping, &squares, &least);
                 promise = step.dot(&right);
                 let (next, of_next) = self.settled(self.stepped(&at, &free, &step, &normal))?;
                 let next_cost = self.cost(&of_next);
@@ -292,13 +313,13 @@ impl<'a> Problem<'a> {
                     improved = true;
                     break;
                 }
-                if promise < COST_LEAST.max(COST_SHARE_LEAST * cost) && damping > 1e-3 {
+                if promise < self.undone(cost) && damping > 1e-3 {
                     break;
                 }
                 damping *= 10.0;
             }
             covariance = Some(gram);
-            if !improved || promise < COST_LEAST.max(COST_SHARE_LEAST * cost) {
+            if !improved || promise < self.undone(cost) {
                 break;
             }
         }
@@ -388,6 +409,7 @@ impl<'a> Problem<'a> {
                     *value = scale.forward(old, scale.bounded(*step));
                     scale.distance(old, *value)
                 }
+                Free::Knot { term, knot } => next.terms[*term].move_knot(*knot, *step),
             });
         }
         // The elements' own gains and baselines fit what the other parameters leave.
@@ -396,13 +418,27 @@ impl<'a> Problem<'a> {
     }
 
     fn errors(&self, at: &Parameters, free: &[Free], gram: Option<DMatrix<f64>>) -> Vec<Vec<f64>> {
-        let mut errors: Vec<Vec<f64>> =
-            at.terms.iter().map(|term| vec![f64::NAN; term.values.len()]).collect();
+        let numbers = |term: &Term| term.values.len() + term.knots.as_ref().map_or(0, |of| of.at.len());
+        let mut errors: Vec<Vec<f64>> = at.terms.iter().map(|term| vec![f64::NAN; numbers(term)]).collect();
         let Some(gram) = gram else { return errors };
         let size = gram.nrows();
         let scaled = scaled(&gram, 1e-9);
         let Some(inverse) = scaled.try_inverse() else { return errors };
         for (index, one) in free.iter().enumerate().take(size) {
+            if let Free::Knot { term, knot } = one {
+                let of = &at.terms[*term];
+                // A value that is a sum of increments has the variance of the sum.
+                let first =
+                    if of.curve().is_some_and(|curve| curve.increasing) { index - knot } else { index };
+                let covariance =
+                    |(i, j)| inverse[(i, j)] / (positive_root(gram[(i, i)]) * positive_root(gram[(j, j)]));
+                let seen = || (first..=index).filter(|i| gram[(*i, *i)] > 0.0);
+                let pairs = seen().flat_map(|i| seen().map(move |j| (i, j)));
+                let variance: f64 = pairs.map(covariance).sum();
+                if gram[(index, index)] > 0.0 && variance > 0.0 {
+                    errors[*term][of.values.len() + knot] = variance.sqrt();
+                }
+            }
             if let Free::Of { term, parameter } = one {
                 let diagonal = gram[(index, index)];
                 let variance = inverse[(index, index)] / diagonal;
@@ -417,6 +453,14 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// The least step of a free parameter that its class allows.
+fn least_step(at: &Parameters, free: Free) -> f64 {
+    match free {
+        Free::Knot { term, knot } => at.terms[term].least_step(knot),
+        Free::SigmaIntercept | Free::SigmaSlope | Free::Of { .. } => f64::NEG_INFINITY,
+    }
+}
+
 /// Sets undetermined knots of a curve to the value of the knot before, so that the curve stays constant without data.
 /// Returns true if there are such knots.
 fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
@@ -425,7 +469,7 @@ fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
         let [Free::Of { term, parameter: before }, Free::Of { term: same, parameter: knot }] = pair else {
             continue;
         };
-        let Term { definition, values } = &mut at.terms[*term];
+        let Term { definition, values, .. } = &mut at.terms[*term];
         let family = |parameter: usize| {
             definition.parameters[parameter].name.replace(|letter: char| letter.is_ascii_digit(), "")
         };

@@ -34,6 +34,7 @@ pub(crate) static RANDOM_WALK: Definition = Definition {
     ],
     near_twins: &["imprint", "relaxation", "gain-drift"],
     shown_by: &["drift"],
+    curve: None,
     make: Make::Readout(|_| Box::new(BesidePipeline)),
 };
 

@@ -12,7 +12,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
-use tactus_model::effect::{Definition, ParameterKind};
+use tactus_model::effect::Definition;
 
 use super::candidates::Candidate;
 use super::drift::TriedWalk;
@@ -481,12 +481,7 @@ impl Search<'_> {
     /// Logarithm of the odds of a model with further terms, against the model without. Each of their numbers is charged as if its
     /// prior were as wide as its part of the gain allows.
     fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
-        let numbers = |fitted: &Fitted| -> usize {
-            let reals = |term: &Term| {
-                term.definition.parameters.iter().filter(|one| one.kind == ParameterKind::Real).count()
-            };
-            fitted.parameters.terms.iter().map(reals).sum()
-        };
+        let numbers = |fitted: &Fitted| -> usize { fitted.parameters.terms.iter().map(Term::numbers).sum() };
         let gain = (less.cost - more.cost) / (2.0 * self.problem.variance);
         let count = numbers(more).saturating_sub(numbers(less)).max(1) as f64;
         gain - 0.5 * count * (2.0 * gain.max(0.0) / count).ln_1p() - ODDS_AGAINST.ln()

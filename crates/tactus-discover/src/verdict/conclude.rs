@@ -5,16 +5,16 @@ use std::ops::Range;
 use tactus_model::{Effect, Response};
 
 use super::discovery::{
-    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, GlobalTest, Inclusion, Level, Split,
-    Unexplained, Verdict,
+    AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
+    Inclusion, Level, Split, Unexplained, Verdict,
 };
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
 use crate::fit::{Fitted, LOUD, Parameters, Predictor, Prepared, Problem, RandomWalk, Term};
 use crate::next::{Explanation, Pair, Planner};
 use crate::search::{
-    ALPHA, Alike, Equivalent, FLIPS, Left, Located, NotShown, Options, POLISH_ROUNDS, Rule, Search, Tried,
-    names, not_shown, q_values, sign_flip_p, without,
+    ALPHA, Alike, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS, Refuted,
+    RefutedFormula, Rule, Search, Tried, names, not_shown, q_values, sign_flip_p, without,
 };
 
 /// The held-out presses confirm an effect if noise alone would let it gain as much on them with at most this probability.
@@ -73,12 +73,13 @@ pub(crate) struct Confirmed {
 pub(crate) fn confirmed(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
-    grown: Fitted,
+    formed: Formed,
     equivalent: &mut Equivalent,
 ) -> Result<Confirmed, DiscoverError> {
+    let Formed { at: grown, refuted } = formed;
     let with_silent = prepared.problem_with_silent();
     let names = names(&grown.parameters, search.known_terms);
-    let steps = search.steps(&grown, equivalent, &with_silent)?;
+    let steps = search.steps(&grown, equivalent, &refuted, &with_silent)?;
     // A miswired element acts on its own readings, of which few may be held out.
     let is_tentative = |step: &AddedEffect| {
         names.contains(&step.effect) && step.effect != MISWIRED && step.p_value > CONFIRMED_P
@@ -93,7 +94,7 @@ pub(crate) fn confirmed(
         firm = without(&firm, step.effect, search.known_terms);
     }
     let grown = search.problem.fit_from(firm, POLISH_ROUNDS)?;
-    let steps = search.steps(&grown, equivalent, &with_silent)?;
+    let steps = search.steps(&grown, equivalent, &refuted, &with_silent)?;
     Ok(Confirmed { grown, steps, tentative })
 }
 
@@ -274,6 +275,7 @@ fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffec
         // It does not change a mean.
         heldout_rms_before_counts: heldout_rms_counts,
         heldout_rms_after_counts: heldout_rms_counts,
+        curve: None,
         equivalent: Vec::new(),
     }
 }
@@ -486,6 +488,7 @@ impl Search<'_> {
         &self,
         grown: &Fitted,
         equivalent: &Equivalent,
+        refuted: &Refuted,
         with_silent: &Problem<'_>,
     ) -> Result<Vec<AddedEffect>, DiscoverError> {
         let known_terms = self.problem.predictor.known.effects.len();
@@ -503,7 +506,9 @@ impl Search<'_> {
                     .iter()
                     .zip(&term.values)
                     .zip(errors)
-                    .map(|((known, value), error)| Estimated {
+                    .enumerate()
+                    .filter(|(parameter, _)| term.acts(*parameter))
+                    .map(|(_, ((known, value), error))| Estimated {
                         name: known.name,
                         value: *value,
                         // An error greater than the range means that the data do not determine it.
@@ -512,6 +517,7 @@ impl Search<'_> {
                     })
                     .collect()
             };
+            let curve = refuted.get(name).and_then(|formula| fitted_curve(grown, name, formula));
             let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
             steps.push(AddedEffect {
                 effect: name,
@@ -520,6 +526,7 @@ impl Search<'_> {
                 q_value: p_value,
                 heldout_rms_before_counts: problem.heldout_rms_counts(&before.predicted),
                 heldout_rms_after_counts: problem.heldout_rms_counts(&grown.predicted),
+                curve,
                 equivalent: equivalent
                     .get(name)
                     .into_iter()
@@ -533,6 +540,27 @@ impl Search<'_> {
         }
         Ok(steps)
     }
+}
+
+/// The knots of an effect, beside its formula's values at their places.
+fn fitted_curve(grown: &Fitted, name: &str, formula: &RefutedFormula) -> Option<FittedCurve> {
+    let mut terms = grown.parameters.terms.iter().zip(&grown.errors);
+    let (term, errors) = terms.find(|(term, _)| term.definition.name == name && term.knots.is_some())?;
+    let (curve, knots) = term.curve().zip(term.knots.as_ref())?;
+    let errors = errors.iter().skip(term.values.len());
+    let values = knots.at.iter().zip(&knots.values).zip(errors).zip(&formula.values);
+    let knot = |(((at, value), error), formula): (((&f64, &f64), &f64), &f64)| FittedKnot {
+        at: *at,
+        value: *value,
+        standard_error: Some(*error).filter(|error| error.is_finite()),
+        formula: *formula,
+    };
+    Some(FittedCurve {
+        at: curve.at,
+        of: curve.of,
+        knots: values.map(knot).collect(),
+        heldout_rms_formula_counts: formula.heldout_rms_counts,
+    })
 }
 
 #[cfg(test)]

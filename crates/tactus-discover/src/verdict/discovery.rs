@@ -135,6 +135,8 @@ pub struct AddedEffect {
     pub heldout_rms_before_counts: f64,
     /// The same for the whole grown model.
     pub heldout_rms_after_counts: f64,
+    /// The free curve that it has in place of its formula, which the data refute; `None` if it has its formula.
+    pub curve: Option<FittedCurve>,
     /// Effects that these data cannot distinguish from this one.
     pub equivalent: Vec<&'static str>,
 }
@@ -147,6 +149,32 @@ pub struct Inclusion {
     /// Probability that it acts: in the place of an added effect or beside them. An effect of which the data say nothing has that
     /// before the data, 1 in 21.
     pub probability: f64,
+}
+
+/// A free curve of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedCurve {
+    /// Key of the places in the model file, with their unit.
+    pub at: &'static str,
+    /// Key of the values.
+    pub of: &'static str,
+    /// Its knots, in order of their places.
+    pub knots: Vec<FittedKnot>,
+    /// Root mean square of the held-out residuals with the formula in its place.
+    pub heldout_rms_formula_counts: f64,
+}
+
+/// A knot of a curve, beside the formula that it replaces.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FittedKnot {
+    /// Its place.
+    pub at: f64,
+    /// The value there.
+    pub value: f64,
+    /// `None` where the data do not determine it.
+    pub standard_error: Option<f64>,
+    /// The value of the best formula there.
+    pub formula: f64,
 }
 
 /// A parameter of an effect.

@@ -25,6 +25,7 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[Parameter::real("ratio", 1.0, [0.2, 5.0])],
     near_twins: &["crosstalk", "indenter-size", "misregistration", "sigma_intercept_mm"],
     shown_by: &["grid-sweep", "element-centres"],
+    curve: None,
     make: Make::Covering(|values| Box::new(AnisotropicSpread { ratio: values[0] })),
 };
 

@@ -31,6 +31,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["hysteresis", "misregistration", "surface-offset", "time-lag"],
     shown_by: &["approach", "ladder"],
+    curve: None,
     make: Make::Motion(|values| Box::new(Backlash { axes: [0, 1, 2].map(|axis| Axis::new(values[axis])) })),
 };
 

@@ -52,6 +52,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["imprint", "relaxation", "gain-drift", "periodic-interference"],
     shown_by: &["drift"],
+    curve: None,
     make: Make::Readout(|values| {
         Box::new(BaselineDrift {
             element: element(values[0]),

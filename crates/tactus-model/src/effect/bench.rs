@@ -1,6 +1,6 @@
 //! Test helpers: a sensor with known parameters, and a comparison of derivatives with finite differences.
 
-use super::{BaseModel, Effect, Make, Now, TipState};
+use super::{BaseModel, Definition, Effect, Knots, Make, Now, TipState};
 use crate::{
     Array, Contact, Covering, ForwardModel, Indenter, Moment, Pipeline, Psf, Registration, Response,
     Simulator,
@@ -35,6 +35,17 @@ pub(crate) fn simulator(effects: impl IntoIterator<Item = Effect>) -> Simulator 
 
 pub(crate) fn effect<const N: usize>(name: &str, parameters: [(&str, f64); N]) -> Effect {
     Effect::new(name, parameters).unwrap()
+}
+
+/// An effect with a free curve: places, and the values there.
+pub(crate) fn free<const N: usize>(
+    name: &str,
+    parameters: [(&str, f64); N],
+    at: &[f64],
+    values: &[f64],
+) -> Effect {
+    let knots = Knots { at: at.to_vec(), values: values.to_vec() };
+    Effect::of_knots(Definition::find(name).unwrap(), parameters, knots).unwrap()
 }
 
 /// As [`simulator`], with elements that answer in proportion and rest at 0.

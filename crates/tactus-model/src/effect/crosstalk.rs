@@ -37,6 +37,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["heavy-tail", "miswired", "anisotropic-spread", "sigma_intercept_mm"],
     shown_by: &["element-centres", "grid-sweep"],
+    curve: None,
     make: Make::Element(|values| Box::new(Crosstalk { shares: std::array::from_fn(|share| values[share]) })),
 };
 

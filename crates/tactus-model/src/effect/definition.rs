@@ -1,5 +1,6 @@
 //! Definitions of effects: name, parameters and their values.
 
+use super::knots::{FreeCurve, KNOTS_MAX, Knots, Values};
 use super::{OnContact, OnCovering, OnElement, OnMotion, OnReadout, REGISTRY};
 use crate::Array;
 
@@ -16,7 +17,9 @@ pub struct Definition {
     pub near_twins: &'static [&'static str],
     /// Experiments, or parts of `diagnose`, that show it.
     pub shown_by: &'static [&'static str],
-    /// Creates the effect's object at its stage from one value for each parameter.
+    /// The free curve that may stand in place of its formula, if there is one.
+    pub curve: Option<FreeCurve>,
+    /// Creates the effect's object at its stage from its values.
     pub make: Make,
 }
 
@@ -59,22 +62,22 @@ pub enum PipelineStage {
     Readout,
 }
 
-/// Creates an effect's object at its stage from one value for each parameter.
+/// Creates an effect's object at its stage from its values.
 #[derive(Debug, Clone, Copy)]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Make {
-    Motion(fn(&[f64]) -> Box<dyn OnMotion>),
-    Contact(fn(&[f64]) -> Box<dyn OnContact>),
-    Covering(fn(&[f64]) -> Box<dyn OnCovering>),
-    Element(fn(&[f64]) -> Box<dyn OnElement>),
-    Readout(fn(&[f64]) -> Box<dyn OnReadout>),
+    Motion(fn(&Values) -> Box<dyn OnMotion>),
+    Contact(fn(&Values) -> Box<dyn OnContact>),
+    Covering(fn(&Values) -> Box<dyn OnCovering>),
+    Element(fn(&Values) -> Box<dyn OnElement>),
+    Readout(fn(&Values) -> Box<dyn OnReadout>),
 }
 
-/// A definition with a value for each parameter, each within its range.
+/// A definition with a value for each parameter, each within its range; or with knots in place of its formula.
 #[derive(Debug, Clone)]
 pub struct Effect {
     definition: &'static Definition,
-    values: Vec<f64>,
+    values: Values,
 }
 
 /// Why a name and parameters do not make an effect.
@@ -96,6 +99,18 @@ pub enum EffectError {
     /// A value is out of its range.
     #[error("{effect}: {parameter} must lie from {} to {}, not at {value}", range[0], range[1])]
     Range { effect: &'static str, parameter: &'static str, range: [f64; 2], value: f64 },
+    /// Knots for an effect that has its formula only.
+    #[error("{effect}: has no knots, only its parameters")]
+    NoKnots { effect: &'static str },
+    /// A parameter is given beside knots that replace it.
+    #[error("{effect}: {parameter} is replaced by the knots; leave it out")]
+    Replaced { effect: &'static str, parameter: &'static str },
+    /// Places and values are not as many.
+    #[error("{effect}: knots must be 1 to {KNOTS_MAX}, with as many {of} as {at}, not {values} and {places}")]
+    KnotsNumber { effect: &'static str, at: &'static str, of: &'static str, places: usize, values: usize },
+    /// A place or a value of the knots breaks the rules of the effect's curve.
+    #[error("{effect}: knots.{key}[{index}] must be {want}, not {value}")]
+    Knot { effect: &'static str, key: &'static str, index: usize, value: f64, want: String },
     /// An index is not that of an element of the array.
     #[error("{effect}: {parameter} must be one of the elements 0 to {last}, not {value}")]
     Element { effect: &'static str, parameter: &'static str, last: usize, value: f64 },
@@ -120,6 +135,11 @@ impl Definition {
             Make::Element(_) => PipelineStage::Element,
             Make::Readout(_) => PipelineStage::Readout,
         }
+    }
+
+    /// True if knots in place of the formula replace a parameter.
+    pub fn replaces(&self, parameter: &str) -> bool {
+        self.curve.as_ref().is_some_and(|curve| curve.replaces.contains(&parameter))
     }
 
     fn check(&self, parameter: &Parameter, value: f64) -> Result<f64, EffectError> {
@@ -199,39 +219,69 @@ impl Effect {
         definition: &'static Definition,
         parameters: impl IntoIterator<Item = (&'a str, f64)>,
     ) -> Result<Self, EffectError> {
+        Self::checked(definition, parameters, None)
+    }
+
+    /// An effect with knots in place of its formula, and a value for each parameter that they do not replace.
+    ///
+    /// # Errors
+    /// As [`Effect::new`]; [`EffectError::NoKnots`], [`EffectError::Replaced`], [`EffectError::KnotsNumber`] and [`EffectError::Knot`].
+    pub fn of_knots<'a>(
+        definition: &'static Definition,
+        parameters: impl IntoIterator<Item = (&'a str, f64)>,
+        knots: Knots,
+    ) -> Result<Self, EffectError> {
+        Self::checked(definition, parameters, Some(knots))
+    }
+
+    fn checked<'a>(
+        definition: &'static Definition,
+        parameters: impl IntoIterator<Item = (&'a str, f64)>,
+        knots: Option<Knots>,
+    ) -> Result<Self, EffectError> {
         let effect = definition.name;
+        if let Some(knots) = &knots {
+            knots.check(effect, definition.curve.as_ref().ok_or(EffectError::NoKnots { effect })?)?;
+        }
+        let is_replaced = |parameter: &Parameter| knots.is_some() && definition.replaces(parameter.name);
         let mut given = vec![None; definition.parameters.len()];
         for (name, value) in parameters {
             let Some(index) = definition.parameters.iter().position(|one| one.name == name) else {
                 let known = names(definition.parameters.iter().map(|one| one.name));
                 return Err(EffectError::NoParameter { effect, parameter: name.into(), known });
             };
+            let parameter = &definition.parameters[index];
+            if is_replaced(parameter) {
+                return Err(EffectError::Replaced { effect, parameter: parameter.name });
+            }
             if given[index].replace(value).is_some() {
-                return Err(EffectError::Twice { effect, parameter: definition.parameters[index].name });
+                return Err(EffectError::Twice { effect, parameter: parameter.name });
             }
         }
         let value = |(parameter, value): (&Parameter, Option<f64>)| match value {
             Some(value) => definition.check(parameter, value),
-            None if parameter.is_optional => Ok(parameter.neutral),
+            None if parameter.is_optional || is_replaced(parameter) => Ok(parameter.neutral),
             None => Err(EffectError::Missing { effect, parameter: parameter.name }),
         };
         let values = definition.parameters.iter().zip(given).map(value).collect::<Result<_, _>>()?;
-        Ok(Self { definition, values })
+        Ok(Self { definition, values: Values { parameters: values, knots } })
     }
 
     /// The effect that changes nothing.
     pub fn neutral(definition: &'static Definition) -> Self {
-        Self { definition, values: definition.parameters.iter().map(|one| one.neutral).collect() }
+        let parameters = definition.parameters.iter().map(|one| one.neutral).collect();
+        Self { definition, values: Values { parameters, knots: None } }
     }
 
     /// The same effect with another value of one parameter.
     ///
     /// # Errors
-    /// [`EffectError::NoParameter`] and [`EffectError::Range`].
+    /// [`EffectError::NoParameter`], [`EffectError::Range`] and [`EffectError::Replaced`].
     pub fn with(&self, parameter: &str, value: f64) -> Result<Self, EffectError> {
         let replaced = |(name, old)| (name, if name == parameter { value } else { old });
         let unknown = self.parameters().all(|(name, _)| name != parameter).then_some((parameter, value));
-        Self::of(self.definition, self.parameters().map(replaced).chain(unknown))
+        let knots = self.values.knots.clone();
+        Self::checked(self.definition, self.parameters().map(replaced).chain(unknown), knots)
     }
 
     /// What it is.
@@ -244,19 +294,26 @@ impl Effect {
         self.definition.name
     }
 
-    /// Its parameters with their values.
+    /// Its parameters with their values, less those that knots replace.
     pub fn parameters(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.definition.parameters.iter().map(|parameter| parameter.name).zip(self.values.iter().copied())
+        let names = self.definition.parameters.iter().map(|parameter| parameter.name);
+        let all = names.zip(self.values.iter().copied());
+        all.filter(|(name, _)| self.knots().is_none() || !self.definition.replaces(name))
     }
 
-    /// A parameter's value.
+    /// The knots in place of its formula; `None` if it has its formula.
+    pub fn knots(&self) -> Option<&Knots> {
+        self.values.knots()
+    }
+
+    /// A parameter's value; `None` if there is no such parameter, or if knots replace it.
     pub fn value(&self, parameter: &str) -> Option<f64> {
         self.parameters().find(|(name, _)| *name == parameter).map(|(_, value)| value)
     }
 
     /// True if it names elements, and so belongs to one array.
     pub fn names_elements(&self) -> bool {
-        let mut parameters = self.definition.parameters.iter().zip(&self.values);
+        let mut parameters = self.definition.parameters.iter().zip(self.values.iter());
         parameters.any(|(parameter, value)| parameter.names_element(*value))
     }
 
@@ -275,7 +332,7 @@ impl Effect {
     /// [`EffectError::Element`].
     pub fn fits(&self, array: &Array) -> Result<(), EffectError> {
         let last = array.elements() - 1;
-        for (parameter, &value) in self.definition.parameters.iter().zip(&self.values) {
+        for (parameter, &value) in self.definition.parameters.iter().zip(self.values.iter()) {
             let is_element = value.fract() == 0.0 && (0.0..=last as f64).contains(&value);
             if parameter.names_element(value) && !is_element {
                 let (effect, parameter) = (self.name(), parameter.name);
@@ -285,8 +342,8 @@ impl Effect {
         Ok(())
     }
 
-    /// One value for each parameter.
-    pub(crate) fn values(&self) -> &[f64] {
+    /// What its object is made from.
+    pub(crate) fn values(&self) -> &Values {
         &self.values
     }
 }

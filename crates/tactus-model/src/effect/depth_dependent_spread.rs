@@ -24,6 +24,7 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[Parameter::real("growth_share", 0.0, [-0.9, 5.0])],
     near_twins: &["hardening", "saturation", "quadratic_per_mm"],
     shown_by: &["grid-sweep", "ladder", "tilt"],
+    curve: None,
     make: Make::Covering(|values| Box::new(DepthDependentSpread { growth_share: values[0] })),
 };
 

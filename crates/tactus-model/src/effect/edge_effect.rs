@@ -33,6 +33,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["surface-tilt", "misregistration", "sensitivity_counts_per_mm"],
     shown_by: &["element-centres", "tilt", "corners"],
+    curve: None,
     make: Make::Covering(|values| {
         Box::new(EdgeEffect { shares: [values[0], values[1]], reach_mm: values[2] })
     }),

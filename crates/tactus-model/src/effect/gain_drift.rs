@@ -38,6 +38,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["misregistration", "surface-tilt", "softening", "baseline-drift"],
     shown_by: &["repeats", "element-centres"],
+    curve: None,
     make: Make::Readout(|values| {
         Box::new(GainDrift {
             rate_per_k: values[0],

@@ -1,7 +1,9 @@
 //! `hardening`: the covering answers more than in proportion to depth.
 //!
 //! ```text
-//! u_e -> u_e (1 + growth_at_1_mm (a_e / 1 mm)^exponent)          a_e = (1 - own_share) depth + own_share max(0, u_e)
+//! u_e -> u_e (1 + growth(a_e))          a_e = (1 - own_share) depth + own_share max(0, u_e)
+//!
+//! growth(a) = growth_at_1_mm (a / 1 mm)^exponent, or through knots
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
@@ -10,6 +12,11 @@
 //! | `exponent` | - | 2 | 0.25 to 6 | power of `a_e`: 1 adds the square of depth, 2 its cube |
 //! | `own_share` | - | 0 | 0 to 1 | what hardens the covering: 0 the tool's depth, 1 the element's own signal; between, their mixture |
 //!
+//! | knots | unit | range | meaning |
+//! |---|---|---|---|
+//! | `at_mm` | mm | above 0 | places on the axis of `a_e` |
+//! | `growth` | - | 0 to 20, never falling | `growth` there, in straight lines from 0 at 0 and constant after the last; replaces `growth_at_1_mm` and `exponent` |
+//!
 //! `depth` is that of the tool, from 0 to the covering's thickness. With an `own_share` of 0 the covering hardens under the
 //! tool and spreads the result as before: all elements gain by the same factor. With 1 each element gains by its own signal,
 //! as in the base model's quadratic term. The effect only grows; a response that levels off is `saturation`.
@@ -17,14 +24,14 @@
 //! With a free gain, an `own_share` of 0 and depths to 0.6 mm it follows the elastic laws `exp(a depth) - 1` (`a` from 1 to 6
 //! per mm) and `depth^p` (`p` from 1.2 to 2) within 0.5 % rms of the greatest response, and `depth^3` within 2 %.
 //!
-//! Derivatives in closed form. Cost: a power for each element.
+//! Derivatives in closed form, but for knots. Cost: a power for each element.
 //!
 //! # Source
 //! The paper's Sec. 6: at large deformation the response grows nonlinearly by elastic hardening. The first odd term
 //! of an elastic law, as in a Duffing spring, is an exponent of 2; the power law of a contact, K. L. Johnson, *Contact
 //! Mechanics* (1985), chapter 4, gives others.
 
-use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -37,24 +44,36 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["saturation", "surface-offset", "depth-dependent-spread", "quadratic_per_mm"],
     shown_by: &["ladder", "element-centres"],
-    make: Make::Covering(|values| {
-        let [growth_at_1_mm, exponent, own_share] = [values[0], values[1], values[2]];
-        Box::new(Hardening { growth_at_1_mm, exponent, own_share })
+    curve: Some(FreeCurve {
+        at: "at_mm",
+        of: "growth",
+        kind: CurveKind::Line,
+        range: [0.0, 20.0],
+        increasing: true,
+        replaces: &["growth_at_1_mm", "exponent"],
+        formula: |values, at_mm| at_mm.iter().map(|at_mm| values[0] * at_mm.powf(values[1])).collect(),
     }),
+    make: Make::Covering(|values| Box::new(Hardening { growth: Growth::of(values), own_share: values[2] })),
 };
 
 #[derive(Debug)]
 struct Hardening {
-    growth_at_1_mm: f64,
-    exponent: f64,
+    growth: Growth,
     own_share: f64,
+}
+
+/// By what share a signal grows.
+#[derive(Debug)]
+enum Growth {
+    Power { at_1_mm: f64, exponent: f64 },
+    Free(Knots),
 }
 
 impl OnCovering for Hardening {
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
         let depth_mm = depth_mm(now.base, contact);
         for u in signal_mm {
-            *u *= 1.0 + self.growth_at_1_mm * self.argument_mm(depth_mm, *u).powf(self.exponent);
+            *u *= 1.0 + self.growth.at(self.argument_mm(depth_mm, *u));
         }
     }
 
@@ -66,18 +85,19 @@ impl OnCovering for Hardening {
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
+        let Growth::Power { at_1_mm, exponent } = self.growth else { return false };
         if parameter > 2 {
             return false;
         }
         let depth_mm = depth_mm(base, contact);
         for (slope, u) in slope_mm.iter_mut().zip(before_mm) {
             let argument_mm = self.argument_mm(depth_mm, *u);
-            let power = argument_mm.powf(self.exponent);
+            let power = argument_mm.powf(exponent);
             *slope = u * match parameter {
                 0 => power,
                 _ if argument_mm == 0.0 => 0.0,
-                1 => self.growth_at_1_mm * power * argument_mm.ln(),
-                _ => self.growth_at_1_mm * self.exponent * power / argument_mm * (u.max(0.0) - depth_mm),
+                1 => at_1_mm * power * argument_mm.ln(),
+                _ => at_1_mm * exponent * power / argument_mm * (u.max(0.0) - depth_mm),
             };
         }
         true
@@ -88,6 +108,20 @@ impl Hardening {
     /// What the covering hardens with.
     fn argument_mm(&self, depth_mm: f64, u: f64) -> f64 {
         (1.0 - self.own_share) * depth_mm + self.own_share * u.max(0.0)
+    }
+}
+
+impl Growth {
+    fn of(values: &Values) -> Self {
+        let power = || Self::Power { at_1_mm: values[0], exponent: values[1] };
+        values.knots().cloned().map_or_else(power, Self::Free)
+    }
+
+    fn at(&self, argument_mm: f64) -> f64 {
+        match self {
+            Self::Power { at_1_mm, exponent } => at_1_mm * argument_mm.powf(*exponent),
+            Self::Free(knots) => knots.line(argument_mm),
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{THIN, assert_slopes, effect, simulator, still, upon};
+use crate::effect::bench::{THIN, assert_slopes, effect, free, signals_mm, simulator, still, upon};
 
 fn hard(growth_at_1_mm: f64, exponent: f64) -> Effect {
     effect("hardening", [("growth_at_1_mm", growth_at_1_mm), ("exponent", exponent), ("own_share", 0.0)])
@@ -48,5 +48,21 @@ fn derivatives_are_those_of_differences() {
     for exponent in [0.7, 2.0, 4.5] {
         let between = hard(0.5, exponent).with("own_share", 0.3).unwrap();
         assert_slopes(&between, &["growth_at_1_mm", "exponent", "own_share"]);
+    }
+}
+
+#[test]
+fn knots_give_a_growth_of_any_shape() {
+    // A stiffer layer bears from 0.2 mm on, which no power of depth is.
+    let layered =
+        |own_share| free("hardening", [("own_share", own_share)], &[0.2, 0.4, 0.6], &[0.0, 0.3, 0.4]);
+    let depths_mm = [0.1, 0.2, 0.3, 0.4, 0.55, 0.6, 0.9];
+    let growth = [0.0, 0.0, 0.15, 0.3, 0.375, 0.4, 0.4];
+    for own_share in [0.0, 1.0] {
+        // Over its centre an element's own signal is the depth.
+        let signals = signals_mm(&layered(own_share), depths_mm.map(|depth_mm| (0.0, depth_mm)));
+        for ((signal, depth_mm), growth) in signals.iter().zip(depths_mm).zip(growth) {
+            assert!((signal - depth_mm * (1.0 + growth)).abs() < 1e-9, "at {depth_mm} mm: {signal}");
+        }
     }
 }

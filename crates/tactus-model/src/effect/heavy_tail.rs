@@ -27,6 +27,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["crosstalk", "sigma_intercept_mm"],
     shown_by: &["grid-sweep", "element-centres"],
+    curve: None,
     make: Make::Covering(|values| Box::new(HeavyTail { tail_share: values[0], width_ratio: values[1] })),
 };
 

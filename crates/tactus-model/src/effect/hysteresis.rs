@@ -3,7 +3,9 @@
 //! ```text
 //! l   =  (1 - by_depth) max(0, u) + by_depth depth
 //! q_k -> max((l - s_k threshold) / (1 + s_k growth), min((l + s_k threshold) / (1 - s_k growth), q_k))
-//! u   -> u - loss_share (u / l) (mean of q_k - l)          not below 0;  s_k = 1/8, 3/8, 5/8, 1
+//! u   -> u - (u / l) sum of w_k (q_k - l)          not below 0
+//!
+//! w_k = loss_share / 4,  s_k = 1/8, 3/8, 5/8, 1, or w_k and s_k threshold from knots
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
@@ -13,8 +15,13 @@
 //! | `threshold_growth` | - | 0.1 | 0 to 0.9 | `growth`: by how much that half width grows for each mm that the play holds |
 //! | `by_depth` | - | 0 | 0 to 1 | the load `l` that the plays follow: 0 the element's own signal, 1 the tool's depth; between, their mixture |
 //!
+//! | knots | unit | range | meaning |
+//! |---|---|---|---|
+//! | `at_mm` | mm | above 0 | half width of each play at no load; the last is `threshold` |
+//! | `loss_share` | - | 0 to 5 | weight `w_k` of each play; replaces `loss_share` and `threshold_mm` |
+//!
 //! `depth` is that of the tool, from 0 to the covering's thickness. `u / l` is 1 with a `by_depth` of 0, and else 0 where there
-//! is no load. Each element has four plays `q_k`, which begin at 0. A play keeps its value until the load is further from it
+//! is no load. Each element has four plays `q_k`, or one for each knot, which begin at 0. A play keeps its value until the load is further from it
 //! than `s_k (threshold + growth q_k)`: friction that grows with the load. After a turn the response is faster until the load
 //! has crossed the plays, one by one. The loop is closed at any speed. A negative share makes the response late instead, and
 //! leaves a rest after release.
@@ -30,14 +37,15 @@
 //! | the same of stops, 0.1 mm | 0.98 |
 //! | Preisach, Gaussian of 0.1 and 0.25 mm, and even density | 0.79, 0.96, 0.97 |
 //!
-//! Derivatives in closed form, with memory, but for `by_depth`. Cost: eight comparisons for each element.
+//! Derivatives in closed form, with memory, but for `by_depth` and knots. Cost: two comparisons for each play of each
+//! element.
 //!
 //! # Source
 //! The Prandtl-Ishlinskii operator, a weighted sum of plays: M. Brokate and J. Sprekels, *Hysteresis and Phase
 //! Transitions* (1996), chapter 2; plays between two curves, M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with
 //! Hysteresis* (1989), chapter 1.
 
-use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -51,10 +59,19 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["backlash", "softening", "relaxation", "imprint", "time-lag", "rate-stiffening"],
     shown_by: &["ladder", "repeats"],
-    make: Make::Covering(|values| {
-        let [loss_share, threshold_mm, growth, by_depth] = [values[0], values[1], values[2], values[3]];
-        Box::new(Hysteresis { loss_share, threshold_mm, growth, by_depth, plays: Vec::new() })
+    curve: Some(FreeCurve {
+        at: "at_mm",
+        of: "loss_share",
+        kind: CurveKind::Weights,
+        range: [0.0, 5.0],
+        increasing: false,
+        replaces: &["loss_share", "threshold_mm"],
+        formula: |values, at_mm| {
+            let parts = SHARES.map(|share| (share * values[1], values[0] / 4.0));
+            Knots::divided(parts, at_mm, |at_mm| at_mm)
+        },
     }),
+    make: Make::Covering(|values| Box::new(Hysteresis::of(values))),
 };
 
 /// Half the width of each play, as a share of the widest.
@@ -66,8 +83,11 @@ struct Hysteresis {
     threshold_mm: f64,
     growth: f64,
     by_depth: f64,
-    /// Of each element.
-    plays: Vec<[Play; 4]>,
+    /// Half the width of each play, as a share of the widest, and its share of the loss.
+    kinds: Vec<[f64; 2]>,
+    is_free: bool,
+    /// Element by element, kind by kind.
+    plays: Vec<Play>,
 }
 
 /// What holds on to the signal, and by how much that changes with the threshold and its growth.
@@ -80,15 +100,15 @@ struct Play {
 
 impl OnCovering for Hysteresis {
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
-        self.plays.resize(signal_mm.len(), <[Play; 4]>::default());
+        self.plays.resize(signal_mm.len() * self.kinds.len(), Play::default());
         let [by_depth, by_own] = [self.by_depth, 1.0 - self.by_depth];
         let depth_mm = contact.depth_mm.clamp(0.0, now.base.covering.thickness_mm);
-        for (u, plays) in signal_mm.iter_mut().zip(&mut self.plays) {
+        for (u, plays) in signal_mm.iter_mut().zip(self.plays.chunks_exact_mut(self.kinds.len())) {
             let load_mm = by_own * u.max(0.0) + by_depth * depth_mm;
-            for (play, share) in plays.iter_mut().zip(SHARES) {
-                play.follow(load_mm, share * self.threshold_mm, share * self.growth, share);
+            for (play, [share, _]) in plays.iter_mut().zip(&self.kinds) {
+                play.follow(load_mm, share * self.threshold_mm, share * self.growth, *share);
             }
-            let lost = self.loss_share * mean(plays.map(|play| play.held_mm - load_mm));
+            let lost = self.loss_share * mean(&self.kinds, plays, |play| play.held_mm - load_mm);
             *u = left(*u, of_own(self.by_depth, *u, load_mm) * lost);
         }
     }
@@ -101,19 +121,22 @@ impl OnCovering for Hysteresis {
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
-        if parameter > 2 {
+        if parameter > 2 || self.is_free {
             return false;
         }
+        let mean = |plays: &[Play], of: fn(&Play) -> f64| mean(&self.kinds, plays, of);
         let depth_mm = contact.depth_mm.clamp(0.0, base.covering.thickness_mm);
-        for ((slope, u), plays) in slope_mm.iter_mut().zip(before_mm).zip(&self.plays) {
+        for ((slope, u), plays) in
+            slope_mm.iter_mut().zip(before_mm).zip(self.plays.chunks_exact(self.kinds.len()))
+        {
             let load_mm = (1.0 - self.by_depth) * u.max(0.0) + self.by_depth * depth_mm;
             let of_own = of_own(self.by_depth, *u, load_mm);
-            let lost = of_own * mean(plays.map(|play| play.held_mm - load_mm));
+            let lost = of_own * (mean(plays, |play| play.held_mm) - load_mm);
             *slope = match parameter {
                 _ if u - self.loss_share * lost < u.min(0.0) => 0.0,
                 0 => -lost,
-                1 => -self.loss_share * of_own * mean(plays.map(|play| play.by_threshold)),
-                _ => -self.loss_share * of_own * mean(plays.map(|play| play.by_growth)),
+                1 => -self.loss_share * of_own * mean(plays, |play| play.by_threshold),
+                _ => -self.loss_share * of_own * mean(plays, |play| play.by_growth),
             };
         }
         true
@@ -121,6 +144,25 @@ impl OnCovering for Hysteresis {
 
     fn reset(&mut self) {
         self.plays.clear();
+    }
+}
+
+impl Hysteresis {
+    fn of(values: &Values) -> Self {
+        let [loss_share, threshold_mm, growth, by_depth] = [values[0], values[1], values[2], values[3]];
+        let formula = Self {
+            loss_share,
+            threshold_mm,
+            growth,
+            by_depth,
+            kinds: SHARES.map(|share| [share, 1.0 / SHARES.len() as f64]).to_vec(),
+            is_free: false,
+            plays: Vec::new(),
+        };
+        let Some(Knots { at, values: weights }) = values.knots() else { return formula };
+        let widest_mm = at.last().copied().unwrap_or_default();
+        let kinds = at.iter().zip(weights).map(|(at_mm, weight)| [at_mm / widest_mm, *weight]).collect();
+        Self { loss_share: 1.0, threshold_mm: widest_mm, kinds, is_free: true, ..formula }
     }
 }
 
@@ -154,8 +196,9 @@ fn left(u: f64, lost: f64) -> f64 {
     (u - lost).max(u.min(0.0))
 }
 
-fn mean(values: [f64; 4]) -> f64 {
-    values.iter().sum::<f64>() / 4.0
+/// The mean over an element's plays, each with its share of the loss.
+fn mean(kinds: &[[f64; 2]], plays: &[Play], of: impl Fn(&Play) -> f64) -> f64 {
+    kinds.iter().zip(plays).map(|([_, share], play)| share * of(play)).sum()
 }
 
 #[cfg(test)]

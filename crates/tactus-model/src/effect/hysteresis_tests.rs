@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, signals_mm};
+use crate::effect::bench::{assert_slopes, effect, free, signals_mm};
 
 fn lossy(loss_share: f64, threshold_mm: f64) -> Effect {
     growing(loss_share, threshold_mm, 0.0)
@@ -71,6 +71,26 @@ fn an_inner_loop_leads_back_to_the_outer_one() {
     assert_near([inner], [outer]);
     let [first, _, again] = signals_mm(&lossy(0.4, 0.2), [(0.0, 0.5), (1.0, 0.2), (2.0, 0.5)]);
     assert_near([again], [first]);
+}
+
+#[test]
+fn knots_are_the_weights_of_plays() {
+    // Two plays of their own weights: at 0.5 mm they hold 0.4 and 0.2, at 0.15 mm the first is crossed and holds 0.25.
+    let kept = [("threshold_growth", 0.0), ("by_depth", 0.0)];
+    let two = free("hysteresis", kept, &[0.1, 0.3], &[0.5, 0.2]);
+    let got = signals_mm(&two, [(0.0, 0.0), (1.0, 0.5), (2.0, 0.15)]);
+    let lost = |u: f64, held: [f64; 2]| 0.5 * (held[0] - u) + 0.2 * (held[1] - u);
+    assert_near(got, [0.0, 0.5 - lost(0.5, [0.4, 0.2]), 0.15 - lost(0.15, [0.25, 0.2])]);
+}
+
+#[test]
+fn the_formula_is_four_of_many_plays() {
+    let one = growing(0.4, 0.16, 0.2);
+    let at_mm = [0.02, 0.04, 0.06, 0.1, 0.16];
+    let weights = (one.definition().curve.as_ref().unwrap().formula)(one.values(), &at_mm);
+    let kept = [("threshold_growth", 0.2), ("by_depth", 0.0)];
+    let depths = [(0.0, 0.3), (1.0, 0.6), (2.0, 0.4), (3.0, 0.45), (4.0, 0.1)];
+    assert_near(signals_mm(&free("hysteresis", kept, &at_mm, &weights), depths), signals_mm(&one, depths));
 }
 
 #[test]

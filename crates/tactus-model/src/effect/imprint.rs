@@ -2,7 +2,9 @@
 //!
 //! ```text
 //! m_k(t) = greatest over the past s of u(s) exp(-(t - s) / tau_k)
-//! u     -> u + set_share mean(m_k - u)                         tau = recovery {1 / spread_ratio, 1, spread_ratio}
+//! u     -> u + sum of w_k (m_k - u)
+//!
+//! w = set_share / 3,  tau = recovery {1 / spread_ratio, 1, spread_ratio}, or both from knots
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
@@ -11,18 +13,23 @@
 //! | `recovery_s` | s | 60 | 0.1 to 100000 | the middle one of the three recovery times |
 //! | `spread_ratio` | - | 4 | 1 to 100 | ratio of one recovery time to the next; at 1 all three are equal |
 //!
+//! | knots | unit | range | meaning |
+//! |---|---|---|---|
+//! | `at_s` | s | above 0 | recovery times `tau_k` |
+//! | `set_share` | - | 0 to 1 | weight `w_k` of each; replaces all parameters |
+//!
 //! Each element keeps its own dent, a share of its deepest signal. With a ratio of 1 the dent recovers exponentially; with larger
 //! ratios it follows power laws and series, as `relaxation` does. The dent adds to lighter presses. A press as deep as the one
 //! before shows nothing of it, since `m_k` is then `u`.
 //!
-//! Derivatives in closed form, with memory. Cost: three exponentials a moment.
+//! Derivatives in closed form, with memory, but for knots. Cost: three exponentials a moment, or one for each knot.
 //!
 //! # Source
 //! Compression set of rubber, as ISO 815 measures it; the Kelvin-Voigt element's recovery, J. D. Ferry, *Viscoelastic
 //! Properties of Polymers* (1980), chapter 1.
 
 use super::lag::{mean, spread};
-use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -35,9 +42,24 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["baseline-drift", "relaxation", "hysteresis", "low-pass"],
     shown_by: &["hold", "repeats"],
-    make: Make::Covering(|values| {
-        let [set_share, recovery_s, spread_ratio] = [values[0], values[1], values[2]];
-        Box::new(Imprint { set_share, recovery_s, spread_ratio, dents: Vec::new() })
+    curve: Some(FreeCurve {
+        at: "at_s",
+        of: "set_share",
+        kind: CurveKind::Weights,
+        range: [0.0, 1.0],
+        increasing: false,
+        replaces: &["set_share", "recovery_s", "spread_ratio"],
+        formula: |values, at_s| {
+            let parts = spread(values[1], values[2]).map(|recovery_s| (recovery_s, values[0] / 3.0));
+            Knots::divided(parts, at_s, f64::ln)
+        },
+    }),
+    make: Make::Covering(|values| match values.knots() {
+        Some(knots) => Box::new(FreeImprint { parts: knots.clone(), dents: Vec::new() }),
+        None => {
+            let [set_share, recovery_s, spread_ratio] = [values[0], values[1], values[2]];
+            Box::new(Imprint { set_share, recovery_s, spread_ratio, dents: Vec::new() })
+        }
     }),
 };
 
@@ -105,6 +127,35 @@ impl OnCovering for Imprint {
 impl Imprint {
     fn recoveries_s(&self) -> [f64; 3] {
         spread(self.recovery_s, self.spread_ratio)
+    }
+}
+
+#[derive(Debug)]
+struct FreeImprint {
+    /// Recovery times and their weights.
+    parts: Knots,
+    /// Element by element, part by part.
+    dents: Vec<Dent>,
+}
+
+impl OnCovering for FreeImprint {
+    fn signal(&mut self, now: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
+        let Knots { at, values } = &self.parts;
+        self.dents.resize(signal_mm.len() * at.len(), Dent::default());
+        let parts: Vec<[f64; 3]> =
+            at.iter().zip(values).map(|(at_s, weight)| [*at_s, *weight, (-now.dt_s / at_s).exp()]).collect();
+        for (u, dents) in signal_mm.iter_mut().zip(self.dents.chunks_exact_mut(parts.len())) {
+            let mut rise_mm = 0.0;
+            for (dent, [recovery_s, weight, left]) in dents.iter_mut().zip(&parts) {
+                dent.follow(*u, now.dt_s, *left, *recovery_s);
+                rise_mm += weight * (dent.left_mm - u.max(0.0));
+            }
+            *u += rise_mm;
+        }
+    }
+
+    fn reset(&mut self) {
+        self.dents.clear();
     }
 }
 

@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, signals_mm};
+use crate::effect::bench::{assert_slopes, effect, free, signals_mm};
 
 fn dented(recovery_s: f64) -> Effect {
     dented_for(recovery_s, 1.0)
@@ -42,6 +42,27 @@ fn three_dents_recover_in_equal_shares() {
     let got = signals_mm(&dented_for(20.0, 4.0), [(0.0, 0.6), (0.0, -1.0), (7.0, -1.0), (90.0, -1.0)]);
     let left = |t_s: f64| 0.02 * [5.0, 20.0, 80.0].map(|tau_s: f64| (-t_s / tau_s).exp()).iter().sum::<f64>();
     assert_near(got, [0.6, left(0.0), left(7.0), left(90.0)]);
+}
+
+#[test]
+fn knots_are_the_weights_of_recoveries() {
+    let [taus_s, weights] = [[2.0, 15.0, 300.0], [0.04, 0.0, 0.1]];
+    let got = signals_mm(
+        &free("imprint", [], &taus_s, &weights),
+        [(0.0, 0.6), (0.0, -1.0), (7.0, -1.0), (90.0, -1.0)],
+    );
+    let left =
+        |t_s: f64| 0.6 * taus_s.iter().zip(weights).map(|(tau, w)| w * (-t_s / tau).exp()).sum::<f64>();
+    assert_near(got, [0.6, left(0.0), left(7.0), left(90.0)]);
+}
+
+#[test]
+fn the_formula_is_three_of_many_recoveries() {
+    let one = dented_for(20.0, 4.0);
+    let at_s = [2.0, 5.0, 20.0, 40.0, 80.0];
+    let weights = (one.definition().curve.as_ref().unwrap().formula)(one.values(), &at_s);
+    let depths = [(0.0, 0.6), (2.0, 0.1), (7.0, -1.0), (9.0, 0.2), (90.0, -1.0)];
+    assert_near(signals_mm(&free("imprint", [], &at_s, &weights), depths), signals_mm(&one, depths));
 }
 
 #[test]

@@ -25,6 +25,7 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[Parameter::real("ratio", 1.0, [0.2, 5.0])],
     near_twins: &["indenter-tilt", "anisotropic-spread", "sigma_intercept_mm", "sensitivity_counts_per_mm"],
     shown_by: &["grid-sweep", "element-centres"],
+    curve: None,
     make: Make::Contact(|values| Box::new(IndenterSize { ratio: values[0] })),
 };
 

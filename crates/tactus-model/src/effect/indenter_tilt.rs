@@ -34,6 +34,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["misregistration", "surface-offset", "surface-tilt", "indenter-size"],
     shown_by: &["element-centres", "grid-sweep"],
+    curve: None,
     make: Make::Contact(|values| {
         Box::new(IndenterTilt { tilt_deg: [values[0], values[1]], touched_share: values[2] })
     }),

@@ -20,6 +20,7 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[Parameter::real("time_constant_s", 0.0, [0.0, 10.0])],
     near_twins: &["time-lag", "relaxation", "scan-skew", "rate-stiffening", "imprint"],
     shown_by: &["rates", "ladder"],
+    curve: None,
     make: Make::Readout(|values| Box::new(LowPass { lag: Lag::new(values[0]) })),
 };
 

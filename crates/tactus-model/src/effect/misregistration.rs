@@ -43,6 +43,7 @@ pub(super) static DEFINITION: Definition = Definition {
         "anisotropic-spread",
     ],
     shown_by: &["corners", "element-centres", "grid-sweep"],
+    curve: None,
     make: Make::Motion(|values| {
         Box::new(Misregistration {
             offset_mm: [values[0], values[1]],

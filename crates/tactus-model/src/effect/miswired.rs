@@ -31,6 +31,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["crosstalk", "sensitivity_counts_per_mm"],
     shown_by: &["element-centres"],
+    curve: None,
     make: Make::Element(|values| {
         Box::new(Miswired {
             element: index(values[0]),

@@ -36,6 +36,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["baseline-drift", "noise_rms_counts"],
     shown_by: &["drift", "hold"],
+    curve: None,
     make: Make::Readout(|values| {
         let [sine_counts, cosine_counts, frequency_hz] = [values[0], values[1], values[2]];
         let phase_per_column = values[3].to_radians();

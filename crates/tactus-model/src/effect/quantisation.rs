@@ -19,6 +19,7 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[Parameter::real("step_counts", 0.0, [0.0, 1000.0])],
     near_twins: &["noise_rms_counts"],
     shown_by: &["drift", "hold"],
+    curve: None,
     make: Make::Readout(|values| Box::new(Quantisation { step_counts: values[0] })),
 };
 

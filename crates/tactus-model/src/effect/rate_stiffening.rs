@@ -1,8 +1,10 @@
 //! `rate-stiffening`: the response depends on the speed of loading.
 //!
 //! ```text
-//! u_e -> u_e (1 + stiffening_share ln(1 + v / speed))
+//! u_e -> u_e (1 + growth(v))
 //! v(t) = greatest of the speed of loading and v before, fallen by exp(-dt / recovery)
+//!
+//! growth(v) = stiffening_share ln(1 + v / speed), or through knots
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
@@ -11,17 +13,22 @@
 //! | `speed_mm_per_s` | mm/s | 1 | 0.001 to 100 | speed from which on stiffening shows |
 //! | `recovery_s` | s | 1 | 0.001 to 100000 | time in which the speed that still acts falls to 1/e |
 //!
+//! | knots | unit | range | meaning |
+//! |---|---|---|---|
+//! | `at_mm_per_s` | mm/s | above 0 | speeds |
+//! | `growth` | - | -0.9 to 20 | `growth` there, in straight lines over the logarithm of the speed; from 0 at 0 to the first a straight line, constant after the last; replaces `stiffening_share` and `speed_mm_per_s` |
+//!
 //! The speed of loading is the rate at which depth grows while the tool is in the covering. Without loading the stiffening dies
 //! away with the recovery time: with a short one it acts on the way down only, with a long one as long as the tool is in the
 //! covering. It is gone once the tool has left.
 //!
-//! Derivatives in closed form. Cost: none.
+//! Derivatives in closed form, but for knots. Cost: none.
 //!
 //! # Source
 //! The strain-rate factor of G. R. Johnson and W. H. Cook, *Proc. 7th Int. Symp. on Ballistics* (1983), with 1 added
 //! to the ratio of speeds, so that rest is the base model's.
 
-use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -34,22 +41,32 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["relaxation", "low-pass", "time-lag", "hysteresis"],
     shown_by: &["rates"],
+    curve: Some(FreeCurve {
+        at: "at_mm_per_s",
+        of: "growth",
+        kind: CurveKind::LogLine,
+        range: [-0.9, 20.0],
+        increasing: false,
+        replaces: &["stiffening_share", "speed_mm_per_s"],
+        formula: |values, at| at.iter().map(|speed| values[0] * (speed / values[1]).ln_1p()).collect(),
+    }),
     make: Make::Covering(|values| {
-        Box::new(RateStiffening {
-            stiffening_share: values[0],
-            speed_mm_per_s: values[1],
-            recovery_s: values[2],
-            past: None,
-        })
+        Box::new(RateStiffening { growth: Growth::of(values), recovery_s: values[2], past: None })
     }),
 };
 
 #[derive(Debug)]
 struct RateStiffening {
-    stiffening_share: f64,
-    speed_mm_per_s: f64,
+    growth: Growth,
     recovery_s: f64,
     past: Option<Previous>,
+}
+
+/// By what share a speed of loading raises the signal.
+#[derive(Debug)]
+enum Growth {
+    Logarithm { share: f64, speed_mm_per_s: f64 },
+    Free(Knots),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -75,7 +92,7 @@ impl OnCovering for RateStiffening {
             Previous { depth_mm, loading_mm_per_s: fallen, age_s: past.age_s + now.dt_s }
         };
         self.past = Some(past);
-        let factor = 1.0 + self.stiffening_share * self.efolds(past);
+        let factor = 1.0 + self.growth.at(past.loading_mm_per_s);
         for u in signal_mm {
             *u *= factor;
         }
@@ -90,9 +107,10 @@ impl OnCovering for RateStiffening {
         slope_mm: &mut [f64],
     ) -> bool {
         let Some(past) = self.past else { return false };
-        let (share, v, v0) = (self.stiffening_share, past.loading_mm_per_s, self.speed_mm_per_s);
+        let Growth::Logarithm { share, speed_mm_per_s: v0 } = self.growth else { return false };
+        let v = past.loading_mm_per_s;
         let factor = match parameter {
-            0 => self.efolds(past),
+            0 => (v / v0).ln_1p(),
             1 => -share * v / (v0 * (v0 + v)),
             2 => share * v * past.age_s / (self.recovery_s.powi(2) * (v0 + v)),
             _ => return false,
@@ -108,9 +126,17 @@ impl OnCovering for RateStiffening {
     }
 }
 
-impl RateStiffening {
-    fn efolds(&self, past: Previous) -> f64 {
-        (past.loading_mm_per_s / self.speed_mm_per_s).ln_1p()
+impl Growth {
+    fn of(values: &Values) -> Self {
+        let logarithm = || Self::Logarithm { share: values[0], speed_mm_per_s: values[1] };
+        values.knots().cloned().map_or_else(logarithm, Self::Free)
+    }
+
+    fn at(&self, mm_per_s: f64) -> f64 {
+        match self {
+            Self::Logarithm { share, speed_mm_per_s } => share * (mm_per_s / speed_mm_per_s).ln_1p(),
+            Self::Free(knots) => knots.log_line(mm_per_s),
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, signals_mm};
+use crate::effect::bench::{assert_slopes, effect, free, signals_mm};
 
 fn stiff(recovery_s: f64) -> Effect {
     effect(
@@ -45,6 +45,17 @@ fn a_press_in_more_steps_reads_the_same() {
         [signals_mm(&stiff(0.7), fine)[60]],
         [signals_mm(&stiff(0.7), [fine[0], fine[30], fine[60]])[2]],
     );
+}
+
+#[test]
+fn knots_give_a_growth_over_the_logarithm_of_the_speed() {
+    // Stiffest at 1 mm/s, which no logarithm is.
+    let hump = free("rate-stiffening", [("recovery_s", 1.0)], &[0.1, 1.0, 10.0], &[0.1, 0.4, 0.2]);
+    for (mm_per_s, growth) in [(0.05, 0.05), (0.1, 0.1), (10.0_f64.powf(-0.5), 0.25), (1.0, 0.4), (1e3, 0.2)]
+    {
+        let [_, got] = signals_mm(&hump, [(0.0, -0.1), (0.6 / mm_per_s, 0.5)]);
+        assert_near([got], [0.5 * (1.0 + growth)]);
+    }
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! `relaxation`: the response falls while a depth is held, and comes back after release.
 //!
 //! ```text
-//! u -> u - relaxed_share (q_1 + q_2 + q_3) / 3          q_k' = (u - q_k) / tau_k,  q_k = 0 before the first moment
-//!                                                       tau = time_constant {1 / spread_ratio, 1, spread_ratio}
+//! u -> u - sum of w_k q_k          q_k' = (u - q_k) / tau_k,  q_k = 0 before the first moment
+//!
+//! w = relaxed_share / 3,  tau = time_constant {1 / spread_ratio, 1, spread_ratio}, or both from knots
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
@@ -12,6 +13,11 @@
 //! | `spread_ratio` | - | 4 | 1 to 100 | ratio of one time constant to the next; at 1 all three are equal |
 //! | `after_release` | - | 0.5 | 0 to 1 | share of the change that still shows without contact |
 //! | `recovery_ratio` | - | 1.5 | 1 to 1000 | speed of the recovery without contact, over that of the relaxation |
+//!
+//! | knots | unit | range | meaning |
+//! |---|---|---|---|
+//! | `at_s` | s | above 0 | time constants `tau_k` |
+//! | `relaxed_share` | - | 0 to 1 | weight `w_k` of each: the share that a long hold loses by it; replaces `relaxed_share`, `time_constant_s` and `spread_ratio` |
 //!
 //! While the tool touches, the result is not below 0, since a covering does not pull. After release the share
 //! `after_release` of the change still shows: 0 where the covering is no longer touched, so that the change shows only in the
@@ -29,14 +35,14 @@
 //! | stretched exponential, exponent 0.5 | 0.976 | 0.999 |
 //! | logarithm | 0.957 | 0.998 |
 //!
-//! Derivatives in closed form, with memory. Cost: three exponentials a moment, some operations an element.
+//! Derivatives in closed form, with memory, but for knots. Cost: three exponentials a moment, or one for each knot; some operations an element.
 //!
 //! # Source
 //! The generalised Maxwell solid (a Prony series, here of three terms), in stress under prescribed strain: J. D. Ferry,
 //! *Viscoelastic Properties of Polymers* (1980), chapter 1.
 
-use super::lag::SpreadLag;
-use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
+use super::lag::{Lag, SpreadLag, spread};
+use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -59,10 +65,21 @@ pub(super) static DEFINITION: Definition = Definition {
         "softening",
     ],
     shown_by: &["hold", "rates", "repeats"],
+    curve: Some(FreeCurve {
+        at: "at_s",
+        of: "relaxed_share",
+        kind: CurveKind::Weights,
+        range: [0.0, 1.0],
+        increasing: false,
+        replaces: &["relaxed_share", "time_constant_s", "spread_ratio"],
+        formula: |values, at_s| {
+            let parts = spread(values[1], values[2]).map(|tau_s| (tau_s, values[0] / 3.0));
+            Knots::divided(parts, at_s, f64::ln)
+        },
+    }),
     make: Make::Covering(|values| {
         Box::new(Relaxation {
-            relaxed_share: values[0],
-            relaxed: SpreadLag::new(values[1], values[2]),
+            relaxed: Relaxed::of(values),
             after_release: values[3],
             recovery_ratio: values[4],
         })
@@ -71,24 +88,26 @@ pub(super) static DEFINITION: Definition = Definition {
 
 #[derive(Debug)]
 struct Relaxation {
-    relaxed_share: f64,
-    relaxed: SpreadLag,
+    relaxed: Relaxed,
     after_release: f64,
     recovery_ratio: f64,
+}
+
+/// What has relaxed.
+#[derive(Debug)]
+enum Relaxed {
+    Three { share: f64, lag: SpreadLag },
+    Free(Vec<(f64, Lag)>),
 }
 
 impl OnCovering for Relaxation {
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
         let haste = if contact.depth_mm > 0.0 { 1.0 } else { self.recovery_ratio };
-        if self.relaxed.has_begun() {
-            self.relaxed.follow(haste * now.dt_s, signal_mm);
-        } else {
-            self.relaxed.begin(&vec![0.0; signal_mm.len()], signal_mm);
-        }
+        self.relaxed.follow(haste * now.dt_s, signal_mm);
         for (element, u) in signal_mm.iter_mut().enumerate() {
-            let lost = self.relaxed_share * self.relaxed.output(element);
+            let lost = self.relaxed.lost(element);
             *u = if contact.depth_mm > 0.0 {
-                self.left(*u, self.relaxed.output(element)).unwrap_or(u.min(0.0))
+                left(*u, lost).unwrap_or(u.min(0.0))
             } else {
                 *u - self.after_release * lost
             };
@@ -103,19 +122,19 @@ impl OnCovering for Relaxation {
         before_mm: &[f64],
         slope_mm: &mut [f64],
     ) -> bool {
+        let Relaxed::Three { share, lag } = &self.relaxed else { return false };
         let touches = contact.depth_mm > 0.0;
         let shows = if touches { 1.0 } else { self.after_release };
         for (element, (slope, u)) in slope_mm.iter_mut().zip(before_mm).enumerate() {
-            let relaxed = &self.relaxed;
             let of_all = match parameter {
-                0 => -relaxed.output(element),
-                1 => -self.relaxed_share * relaxed.by_tau(element),
-                2 => -self.relaxed_share * relaxed.by_ratio(element),
+                0 => -lag.output(element),
+                1 => -share * lag.by_tau(element),
+                2 => -share * lag.by_ratio(element),
                 3 if touches => 0.0,
-                3 => -self.relaxed_share * relaxed.output(element) / shows.max(f64::MIN_POSITIVE),
+                3 => -share * lag.output(element) / shows.max(f64::MIN_POSITIVE),
                 _ => return false,
             };
-            let pulls = touches && self.left(*u, relaxed.output(element)).is_none();
+            let pulls = touches && left(*u, share * lag.output(element)).is_none();
             *slope = if pulls { 0.0 } else { shows * of_all };
         }
         true
@@ -126,12 +145,53 @@ impl OnCovering for Relaxation {
     }
 }
 
-impl Relaxation {
-    /// What is left of `u`; `None` if the covering would have to pull.
-    fn left(&self, u: f64, q: f64) -> Option<f64> {
-        let left = u - self.relaxed_share * q;
-        (left >= u.min(0.0)).then_some(left)
+impl Relaxed {
+    fn of(values: &Values) -> Self {
+        let three = || Self::Three { share: values[0], lag: SpreadLag::new(values[1], values[2]) };
+        let free = |knots: &Knots| {
+            let lags = knots.at.iter().zip(&knots.values).map(|(tau_s, weight)| (*weight, Lag::new(*tau_s)));
+            Self::Free(lags.collect())
+        };
+        values.knots().map_or_else(three, free)
     }
+
+    fn follow(&mut self, dt_s: f64, signal_mm: &[f64]) {
+        let none = || vec![0.0; signal_mm.len()];
+        match self {
+            Self::Three { lag, .. } if lag.has_begun() => lag.follow(dt_s, signal_mm),
+            Self::Three { lag, .. } => lag.begin(&none(), signal_mm),
+            Self::Free(lags) => {
+                for (_, lag) in lags {
+                    if lag.has_begun() {
+                        lag.follow(dt_s, signal_mm);
+                    } else {
+                        lag.begin(&none(), signal_mm);
+                    }
+                }
+            }
+        }
+    }
+
+    /// What an element has lost, in mm.
+    fn lost(&self, element: usize) -> f64 {
+        match self {
+            Self::Three { share, lag } => share * lag.output(element),
+            Self::Free(lags) => lags.iter().map(|(weight, lag)| weight * lag.output()[element]).sum(),
+        }
+    }
+
+    fn reset(&mut self) {
+        match self {
+            Self::Three { lag, .. } => lag.reset(),
+            Self::Free(lags) => lags.iter_mut().for_each(|(_, lag)| lag.reset()),
+        }
+    }
+}
+
+/// What is left of `u`; `None` if the covering would have to pull.
+fn left(u: f64, lost: f64) -> Option<f64> {
+    let left = u - lost;
+    (left >= u.min(0.0)).then_some(left)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 #![expect(clippy::float_cmp, reason = "these values are exact")]
 
-use crate::effect::bench::{assert_slopes, signals_mm, simulator, upon};
+use crate::effect::bench::{assert_slopes, free, signals_mm, simulator, upon};
 use crate::{Effect, Moment, Pipeline, Simulator, Trajectory};
 
 fn relaxing(time_constant_s: f64, spread_ratio: f64) -> Effect {
@@ -84,6 +84,38 @@ fn three_times_relax_in_equal_shares() {
     let times_s = [0.0, 0.3, 2.0, 20.0];
     let signals = signals_mm(&relaxing(2.0, 4.0), times_s.map(|t_s| (t_s, 0.5)));
     assert!(signals.iter().zip(times_s).all(|(got, t_s)| (got - at(t_s)).abs() < 1e-9), "{signals:?}");
+}
+
+#[test]
+fn knots_are_a_prony_series() {
+    let [taus_s, weights] = [[0.1, 1.0, 8.0, 40.0], [0.05, 0.2, 0.0, 0.1]];
+    let series = free("relaxation", [("after_release", 0.0), ("recovery_ratio", 1.0)], &taus_s, &weights);
+    let relaxed =
+        |t_s: f64| taus_s.iter().zip(weights).map(|(tau_s, w)| w * -(-t_s / tau_s).exp_m1()).sum::<f64>();
+    let times_s = [0.0, 0.05, 0.7, 6.0, 50.0];
+    let signals = signals_mm(&series, times_s.map(|t_s| (t_s, 0.5)));
+    for (got, t_s) in signals.iter().zip(times_s) {
+        assert!((got - 0.5 * (1.0 - relaxed(t_s))).abs() < 1e-9, "after {t_s} s: {got}");
+    }
+}
+
+#[test]
+fn the_formula_is_three_of_many_times() {
+    let one = relaxing(2.0, 4.0);
+    let curve = one.definition().curve.as_ref().unwrap();
+    let at_s = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+    let weights = (curve.formula)(one.values(), &at_s);
+    let kept = [("after_release", 0.0), ("recovery_ratio", 1.0)];
+    let depths = [(0.0, 0.5), (0.3, 0.5), (2.0, 0.2), (30.0, 0.4)];
+    let [three, many] = [one, free("relaxation", kept, &at_s, &weights)].map(|one| signals_mm(&one, depths));
+    assert!(three.iter().zip(many).all(|(a, b)| (a - b).abs() < 1e-12), "{three:?} {many:?}");
+    // Between two times a part belongs to both, by their logarithms.
+    let weights = (curve.formula)(relaxing(2.0_f64.sqrt(), 1.0).values(), &at_s);
+    let near = |got: f64, want: f64| (got - want).abs() < 1e-12;
+    assert!(
+        near(weights[2], 0.15) && near(weights[3], 0.15) && near(weights.iter().sum(), 0.3),
+        "{weights:?}"
+    );
 }
 
 #[test]

@@ -1,13 +1,20 @@
 //! `saturation`: the response levels off at the top.
 //!
 //! ```text
-//! u_e -> u_e (1 + q (u_e / 1 mm)^knee)^(-1 / knee)          q = (1 - loss_at_1_mm)^(-knee) - 1
+//! u_e -> u_e (1 - lost_share(u_e))
+//!
+//! lost_share(u) = 1 - (1 + q (u / 1 mm)^knee)^(-1 / knee), or through knots          q = (1 - loss_at_1_mm)^(-knee) - 1
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
 //! | `loss_at_1_mm` | - | 0 | 0 to 0.99 | share that a signal of 1 mm loses |
 //! | `knee` | - | 2 | 0.5 to 12 | how sharply the response turns off |
+//!
+//! | knots | unit | range | meaning |
+//! |---|---|---|---|
+//! | `at_mm` | mm | above 0 | signals |
+//! | `lost_share` | - | 0 to 0.99, never falling | `lost_share` there, in straight lines from 0 at 0 and constant after the last; replaces both parameters |
 //!
 //! Small signals stay as they are; the largest end at the ceiling `q^(-1 / knee)` mm. With a knee of 1 the curve is the
 //! hyperbola of Michaelis and Menten, with 2 nearly a tanh, with 12 nearly a kink at the ceiling. The effect acts before
@@ -17,12 +24,12 @@
 //! Other forms that lose up to half of the signal, to 0.6 mm and with a free gain: of what the gain alone leaves, 0.02 %
 //! stays unexplained for tanh, exponential, arctan and logarithm, and 1.1 % for a kink at 0.4 mm.
 //!
-//! Derivatives in closed form. Cost: two powers for each element with a signal.
+//! Derivatives in closed form, but for knots. Cost: two powers for each element with a signal.
 //!
 //! # Source
 //! The compression of an amplifier: C. Rapp, *Effects of HPA-Nonlinearity on a 4-DPSK/OFDM-Signal* (1991).
 
-use super::{BaseModel, Definition, Make, OnElement, Parameter};
+use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, OnElement, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "saturation",
@@ -33,7 +40,22 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["hardening", "surface-offset", "depth-dependent-spread", "quadratic_per_mm"],
     shown_by: &["ladder", "element-centres"],
-    make: Make::Element(|values| Box::new(Saturation::new(values[0], values[1]))),
+    curve: Some(FreeCurve {
+        at: "at_mm",
+        of: "lost_share",
+        kind: CurveKind::Line,
+        range: [0.0, 0.99],
+        increasing: true,
+        replaces: &["loss_at_1_mm", "knee"],
+        formula: |values, at_mm| {
+            let formula = Saturation::new(values[0], values[1]);
+            at_mm.iter().map(|u| 1.0 - formula.bend(*u).powf(-1.0 / formula.knee)).collect()
+        },
+    }),
+    make: Make::Element(|values| match values.knots() {
+        Some(knots) => Box::new(FreeSaturation { lost_share: knots.clone() }),
+        None => Box::new(Saturation::new(values[0], values[1])),
+    }),
 };
 
 #[derive(Debug)]
@@ -93,6 +115,19 @@ impl Saturation {
         let (bend, power) = (self.bend(u), u.powf(self.knee));
         let bend_by_knee = power * (self.q * u.ln() - (1.0 + self.q) * self.kept_log);
         u * bend.powf(-1.0 / self.knee) * (bend.ln() / self.knee - bend_by_knee / bend) / self.knee
+    }
+}
+
+#[derive(Debug)]
+struct FreeSaturation {
+    lost_share: Knots,
+}
+
+impl OnElement for FreeSaturation {
+    fn signal(&self, _: BaseModel<'_>, _: &[f64], signal_mm: &mut [f64]) {
+        for u in signal_mm.iter_mut().filter(|u| **u > 0.0) {
+            *u *= 1.0 - self.lost_share.line(*u);
+        }
     }
 }
 

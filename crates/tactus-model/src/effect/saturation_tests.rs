@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, signals_mm};
+use crate::effect::bench::{assert_slopes, effect, free, signals_mm};
 
 fn level(loss_at_1_mm: f64, knee: f64) -> Effect {
     effect("saturation", [("loss_at_1_mm", loss_at_1_mm), ("knee", knee)])
@@ -29,6 +29,14 @@ fn a_sharp_knee_is_a_kink_at_the_ceiling() {
 fn a_fit_can_start_from_none() {
     let [none, some] = [0.0, 1e-6].map(|loss| signals_mm(&level(loss, 2.0), [(0.0, 0.5)]));
     assert_near([(none[0] - some[0]) / 1e-6], [0.5_f64.powi(3)], 1e-5);
+}
+
+#[test]
+fn knots_give_a_loss_of_any_shape() {
+    // Only what lies between 0.2 and 0.4 mm is lost in part, which no knee can do.
+    let step = free("saturation", [], &[0.2, 0.4], &[0.0, 0.3]);
+    let got = signals_mm(&step, [(0.0, 0.1), (0.0, 0.3), (0.0, 0.4), (0.0, 0.9)]);
+    assert_near(got, [0.1, 0.3 * 0.85, 0.4 * 0.7, 0.9 * 0.7], 1e-12);
 }
 
 #[test]

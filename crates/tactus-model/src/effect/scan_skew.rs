@@ -34,6 +34,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["time-lag", "low-pass"],
     shown_by: &["rates"],
+    curve: None,
     make: Make::Readout(|values| {
         let times_s = [values[0], values[1]];
         Box::new(ScanSkew { times_s, history: VecDeque::new(), slope_counts: [const { Vec::new() }; 2] })

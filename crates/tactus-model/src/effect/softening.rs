@@ -1,7 +1,9 @@
 //! `softening`: the response is weaker up to the greatest earlier signal (Mullins effect).
 //!
 //! ```text
-//! u -> u (1 - softened_share erf((1 - u^2 / m^2) / width_share))          m = greatest u so far
+//! u -> u (1 - lost_share(1 - u / m))          m = greatest u so far
+//!
+//! lost_share(x) = softened_share erf((1 - (1 - x)^2) / width_share), or through knots
 //! ```
 //!
 //! | parameter | unit | neutral | range | meaning |
@@ -9,10 +11,15 @@
 //! | `softened_share` | - | 0 | -1 to 1 | share of the signal that is lost far below the greatest signal so far |
 //! | `width_share` | - | 1 | 0.01 to 10 | width of the transition below `m`, as a share of the energy `m^2` |
 //!
+//! | knots | unit | range | meaning |
+//! |---|---|---|---|
+//! | `at_share` | - | above 0 | how far below the greatest the signal is: `1 - u / m`, to 1 |
+//! | `lost_share` | - | 0 to 1, never falling | `lost_share` there, in straight lines from 0 at 0 and constant after the last; replaces both parameters |
+//!
 //! Each element has its own past. A first loading follows the base model, and so does loading beyond the greatest signal so
 //! far. Below that, unloading and every later press follow the same weaker curve. The covering does not recover.
 //!
-//! Derivatives in closed form. Cost: an error function for each element.
+//! Derivatives in closed form, but for knots. Cost: an error function for each element.
 //!
 //! # Source
 //! The Mullins effect in the pseudo-elastic form of R. W. Ogden and D. G. Roxburgh, *Proc. R. Soc. Lond. A* 455 (1999),
@@ -21,7 +28,7 @@
 use libm::erf;
 use std::f64::consts::FRAC_2_SQRT_PI;
 
-use super::{BaseModel, Definition, Make, Now, OnCovering, Parameter};
+use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -33,8 +40,23 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["hysteresis", "relaxation", "gain-drift"],
     shown_by: &["repeats", "ladder"],
-    make: Make::Covering(|values| {
-        Box::new(Softening { softened_share: values[0], width_share: values[1], greatest_mm: Vec::new() })
+    curve: Some(FreeCurve {
+        at: "at_share",
+        of: "lost_share",
+        kind: CurveKind::Line,
+        range: [0.0, 1.0],
+        increasing: true,
+        replaces: &["softened_share", "width_share"],
+        formula: |values, at| {
+            let lost = |below: &f64| values[0] * erf(widths_below(1.0 - below, 1.0, values[1]));
+            at.iter().map(lost).collect()
+        },
+    }),
+    make: Make::Covering(|values| match values.knots() {
+        Some(knots) => Box::new(FreeSoftening { lost_share: knots.clone(), greatest_mm: Vec::new() }),
+        None => {
+            Box::new(Softening { softened_share: values[0], width_share: values[1], greatest_mm: Vec::new() })
+        }
     }),
 };
 
@@ -75,6 +97,28 @@ impl OnCovering for Softening {
             };
         }
         true
+    }
+
+    fn reset(&mut self) {
+        self.greatest_mm.clear();
+    }
+}
+
+#[derive(Debug)]
+struct FreeSoftening {
+    lost_share: Knots,
+    greatest_mm: Vec<f64>,
+}
+
+impl OnCovering for FreeSoftening {
+    fn signal(&mut self, _: Now<'_>, _: &Contact, signal_mm: &mut [f64]) {
+        self.greatest_mm.resize(signal_mm.len(), 0.0);
+        for (u, greatest_mm) in signal_mm.iter_mut().zip(&mut self.greatest_mm) {
+            *greatest_mm = greatest_mm.max(*u);
+            if *greatest_mm > 0.0 {
+                *u *= 1.0 - self.lost_share.line((1.0 - *u / *greatest_mm).min(1.0));
+            }
+        }
     }
 
     fn reset(&mut self) {

@@ -21,6 +21,7 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[Parameter::real("offset_mm", 0.0, [-2.0, 2.0])],
     near_twins: &["saturation", "hardening", "backlash", "indenter-tilt"],
     shown_by: &["corners", "element-centres", "ladder"],
+    curve: None,
     make: Make::Motion(|values| Box::new(SurfaceOffset { offset_mm: values[0] })),
 };
 

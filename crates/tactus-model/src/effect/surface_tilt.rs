@@ -30,6 +30,7 @@ pub(super) static DEFINITION: Definition = Definition {
     ],
     near_twins: &["misregistration", "gain-drift", "indenter-tilt", "edge-effect"],
     shown_by: &["tilt", "element-centres"],
+    curve: None,
     make: Make::Motion(|values| {
         let (slope_mm_per_mm, touched_mm) = ([values[0], values[1]], [values[2], values[3]]);
         Box::new(SurfaceTilt { slope_mm_per_mm, touched_mm })

@@ -25,6 +25,7 @@ pub(super) static DEFINITION: Definition = Definition {
     parameters: &[Parameter::real("lag_s", 0.0, [-1.0, 1.0])],
     near_twins: &["low-pass", "relaxation", "scan-skew", "backlash", "hysteresis", "rate-stiffening"],
     shown_by: &["rates", "ladder"],
+    curve: None,
     make: Make::Motion(|values| Box::new(TimeLag { lag_s: values[0] })),
 };
 

@@ -2,9 +2,10 @@
 
 use std::fmt;
 
-use tactus_discover::{AddedEffect, Discovery, Estimated, Inclusion};
+use tactus_discover::{AddedEffect, Discovery, Estimated, FittedCurve, Inclusion};
 use tactus_model::{Effect, effect::Definition};
 
+use super::free_curve;
 use super::words::{self, list};
 use crate::{
     document::{Column, Table},
@@ -70,6 +71,9 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {
     // Terms of one effect may have different parameters.
     for terms in step.terms.chunk_by(|one, other| names(one).eq(names(other))) {
         let parameters = terms.first().map_or(&[][..], Vec::as_slice);
+        if parameters.is_empty() {
+            continue;
+        }
         let columns: Vec<Column> =
             [Column::Name("")].into_iter().chain(names(parameters).map(Column::Number)).collect();
         let mut table = Table::new(&columns);
@@ -83,6 +87,9 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {
             table.row(["possible range".to_owned()].into_iter().chain(parameters.iter().map(range)));
         }
         writeln!(f, "{table}")?;
+    }
+    if let Some(curve) = &step.curve {
+        self::curve(f, step.effect, curve)?;
     }
     writeln!(
         f,
@@ -103,6 +110,27 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {
             Text(either(&step.equivalent))
         )
     }
+}
+
+/// A free curve in place of a formula, in a table and a figure.
+fn curve(f: &mut fmt::Formatter<'_>, effect: &str, curve: &FittedCurve) -> fmt::Result {
+    let (at, of) = (curve.at, curve.of);
+    writeln!(
+        f,
+        "<p>The fitted presses refute its formula, so the model has a free curve through knots in its place. With the formula the residual on \
+         held-out presses would be {} counts rms.</p>",
+        digits(curve.heldout_rms_formula_counts, 3)
+    )?;
+    let columns = [Column::Number(at), Column::Number(of), Column::Number("by the formula")];
+    let mut table = Table::new(&columns);
+    for knot in &curve.knots {
+        let value = match knot.standard_error {
+            Some(error) => with_error(knot.value, error),
+            None => short(knot.value, 6),
+        };
+        table.row([short(knot.at, 4), value, short(knot.formula, 4)]);
+    }
+    writeln!(f, "{table}\n{}", free_curve(effect, curve))
 }
 
 fn names(term: &[Estimated]) -> impl Iterator<Item = &'static str> {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{Curve, Discovery, ElementGap, Point};
+use tactus_discover::{Curve, Discovery, ElementGap, FittedCurve, FittedKnot, Point};
 use tactus_model::Array;
 
 use crate::{
@@ -39,6 +39,26 @@ pub fn residual_against(curve: &Curve) -> Figure {
     }
     let [bars, dots] = means(curve, |point| point.after);
     figure.with(bars.ink(Ink::Blue)).with(dots.ink(Ink::Blue).label(AFTER))
+}
+
+/// A free curve with the standard errors of its knots, beside the formula that it replaces.
+pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
+    let unit = curve.at.trim_start_matches("at_").replace("_per_", "/");
+    let (x, y) = (Axis::new("place", unit).tight(), Axis::new(curve.of.replace('_', " "), "").from_zero());
+    let line = |of: fn(&FittedKnot) -> f64| {
+        let knots = curve.knots.iter().map(|knot| [knot.at, of(knot)]);
+        Series::line([[0.0; 2]].into_iter().chain(knots).collect())
+    };
+    let bars = curve.knots.iter().filter_map(|knot| {
+        let error = knot.standard_error?;
+        Some([knot.at, knot.value - error, knot.value + error])
+    });
+    let dots = curve.knots.iter().map(|knot| [knot.at, knot.value]).collect();
+    Figure::new(format!("Free curve of {effect}"), x, y)
+        .size_px(CURVE_PX)
+        .with(line(|knot| knot.formula).ink(Ink::Muted).dashed().label("formula"))
+        .with(Series::bars(bars).width_px(1.2).ink(Ink::Blue))
+        .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label("knots"))
 }
 
 /// Root mean square residual of each element, of the base model and, if different, of the grown model, on one scale: in

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tactus_discover::{
-    AddedEffect, Curve, Discovery, Estimated, FaultyElement, Floor, Gap, GlobalTest, Inclusion, Level,
-    NextExperiment, Round, Structured, TriedEffect,
+    AddedEffect, Curve, Discovery, Estimated, FaultyElement, FittedCurve, Floor, Gap, GlobalTest, Inclusion,
+    Level, NextExperiment, Round, Structured, TriedEffect,
 };
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
@@ -191,7 +191,27 @@ struct StepJson<'a> {
     q_value: f64,
     heldout_rms_before: f64,
     heldout_rms_after: f64,
+    /// `formula` or `knots`.
+    form: &'static str,
+    knots: Option<KnotsJson<'a>>,
     equivalent: &'a [&'static str],
+}
+
+/// A free curve; the keys of places and values are those of the model file.
+#[derive(Serialize)]
+struct KnotsJson<'a> {
+    at: &'a str,
+    of: &'a str,
+    points: Vec<KnotJson>,
+    heldout_rms_formula: f64,
+}
+
+#[derive(Serialize)]
+struct KnotJson {
+    at: f64,
+    value: f64,
+    se: Option<f64>,
+    formula: f64,
 }
 
 #[derive(Serialize)]
@@ -417,7 +437,26 @@ impl<'a> StepJson<'a> {
             q_value: step.q_value,
             heldout_rms_before: step.heldout_rms_before_counts,
             heldout_rms_after: step.heldout_rms_after_counts,
+            form: if step.curve.is_some() { "knots" } else { "formula" },
+            knots: step.curve.as_ref().map(KnotsJson::of),
             equivalent: &step.equivalent,
+        }
+    }
+}
+
+impl<'a> KnotsJson<'a> {
+    fn of(curve: &'a FittedCurve) -> Self {
+        let points = curve.knots.iter().map(|knot| KnotJson {
+            at: knot.at,
+            value: knot.value,
+            se: knot.standard_error,
+            formula: knot.formula,
+        });
+        Self {
+            at: curve.at,
+            of: curve.of,
+            points: points.collect(),
+            heldout_rms_formula: curve.heldout_rms_formula_counts,
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::made_up::discovery::{
     cannot_judge, data, empty, explained, faulty, nothing_missing, report, unexplained,
 };
 use serde_json::Value;
-use tactus_discover::{Discovery, GlobalTest, NextExperiment, Unexplained, Verdict};
+use tactus_discover::{Discovery, FittedCurve, FittedKnot, GlobalTest, NextExperiment, Unexplained, Verdict};
 use tactus_model::Array;
 use tactus_report::discovery::{
     ActiveRun, AmbiguousEffect, DiscoveryReport, discovery_html, discovery_json, element_maps, in_words,
@@ -83,6 +83,27 @@ fn the_json_has_every_field_of_its_schema_where_it_belongs() {
         assert_eq!(is, value, "{place}");
     }
     assert_eq!(found["data"][0]["sha256"].as_str().unwrap().len(), 64);
+}
+
+#[test]
+fn an_effect_with_knots_has_them_beside_its_formula() {
+    let mut discovery = explained();
+    let knot = |at: f64, value: f64, standard_error| FittedKnot { at, value, standard_error, formula: at };
+    discovery.steps[0].curve = Some(FittedCurve {
+        at: "at_mm",
+        of: "loss_share",
+        knots: vec![knot(0.05, 0.31, Some(0.02)), knot(0.4, 0.77, None)],
+        heldout_rms_formula_counts: 3.45,
+    });
+    let (page, json) = (html(&discovery), json(&discovery));
+    show("knots.html", &page);
+    for part in ["refute its formula", "would be 3.45 counts", "at_mm", "0.31", "Free curve of hysteresis"] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert_eq!((&json["steps"][0]["form"], &json["steps"][1]["form"]), (&"knots".into(), &"formula".into()));
+    let knots = &json["steps"][0]["knots"];
+    assert_eq!(knots["points"][0].to_string(), r#"{"at":0.05,"formula":0.05,"se":0.02,"value":0.31}"#);
+    assert_eq!((&knots["at"], &knots["heldout_rms_formula"]), (&"at_mm".into(), &3.45.into()));
 }
 
 /// A discovery with every kind of field filled, compared byte for byte with `golden/discovery.json`.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use tactus_model::effect::{Definition, Knots};
 use tactus_model::{Array, Covering, Effect, Psf, Response};
 
 use super::{BaseModel, Evidence, KnownEffect, Model, ModelFileError};
@@ -63,7 +64,11 @@ struct RawReference {
 #[serde(deny_unknown_fields)]
 struct RawEffect {
     name: String,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     parameters: BTreeMap<String, f64>,
+    /// Places and values, by the keys of the effect's curve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    knots: Option<BTreeMap<String, Vec<f64>>>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     standard_errors: BTreeMap<String, f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -190,9 +195,14 @@ impl RawPsf {
 
 impl RawEffect {
     fn of(known: &KnownEffect) -> Self {
+        let curve = known.effect.definition().curve.as_ref();
+        let knots = known.effect.knots().zip(curve).map(|(Knots { at, values }, curve)| {
+            [(curve.at.to_owned(), at.clone()), (curve.of.to_owned(), values.clone())].into()
+        });
         Self {
             name: known.effect.name().into(),
             parameters: known.effect.parameters().map(|(name, value)| (name.into(), value)).collect(),
+            knots,
             standard_errors: known.standard_errors.clone(),
             evidence: known.evidence.as_ref().map(|evidence| RawEvidence {
                 data: evidence.data.clone(),
@@ -203,10 +213,14 @@ impl RawEffect {
     }
 
     fn check(self, index: usize, array: &Array) -> Result<KnownEffect, ModelFileError> {
+        let wrong_effect = |source| ModelFileError::Effect { index, source };
         let parameters = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
-        let effect = Effect::new(&self.name, parameters)
-            .and_then(|effect| effect.fits(array).map(|()| effect))
-            .map_err(|source| ModelFileError::Effect { index, source })?;
+        let definition = Definition::find(&self.name).map_err(wrong_effect)?;
+        let effect = match &self.knots {
+            None => Effect::of(definition, parameters),
+            Some(raw) => Effect::of_knots(definition, parameters, knots(raw, index, definition)?),
+        };
+        let effect = effect.and_then(|effect| effect.fits(array).map(|()| effect)).map_err(wrong_effect)?;
         for (name, se) in &self.standard_errors {
             let field = format!("effect[{index}].standard_errors.{name}");
             if effect.value(name).is_none() {
@@ -216,6 +230,22 @@ impl RawEffect {
         }
         let evidence = self.evidence.map(|evidence| evidence.check(index)).transpose()?;
         Ok(KnownEffect { effect, standard_errors: self.standard_errors, evidence })
+    }
+}
+
+/// Places and values of an effect's curve. An effect without a curve refuses any knots.
+fn knots(
+    raw: &BTreeMap<String, Vec<f64>>,
+    index: usize,
+    definition: &Definition,
+) -> Result<Knots, WrongField> {
+    let Some(curve) = &definition.curve else { return Ok(Knots::default()) };
+    match (raw.get(curve.at), raw.get(curve.of)) {
+        (Some(at), Some(values)) if raw.len() == 2 => Ok(Knots { at: at.clone(), values: values.clone() }),
+        _ => Err(wrong(
+            format!("effect[{index}].knots"),
+            format!("those of {} have {} and {} and nothing else", definition.name, curve.at, curve.of),
+        )),
     }
 }
 

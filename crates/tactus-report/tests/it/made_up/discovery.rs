@@ -76,6 +76,7 @@ pub(crate) fn explained() -> Discovery {
                 q_value: 0.001_7,
                 heldout_rms_before_counts: 9.12,
                 heldout_rms_after_counts: 2.08,
+                curve: None,
                 equivalent: vec!["backlash"],
             },
             AddedEffect {
@@ -94,6 +95,7 @@ pub(crate) fn explained() -> Discovery {
                 q_value: 0.000_3,
                 heldout_rms_before_counts: 4.31,
                 heldout_rms_after_counts: 2.08,
+                curve: None,
                 equivalent: vec![],
             },
         ],

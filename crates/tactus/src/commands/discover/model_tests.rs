@@ -82,6 +82,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
             q_value: 1e-4,
             heldout_rms_before_counts: 8.0,
             heldout_rms_after_counts: 2.0,
+            curve: None,
             equivalent: Vec::new(),
         }],
         final_: Final { level, shrink: Some(1.0) },

@@ -1,0 +1,87 @@
+use tactus_model::effect::Definition;
+
+use super::*;
+
+fn term(effect: &str, at: &[f64], values: &[f64]) -> Term {
+    let knots = Knots { at: at.to_vec(), values: values.to_vec() };
+    Term { knots: Some(knots), ..Term::neutral(Definition::find(effect).unwrap()) }
+}
+
+fn values(term: &Term) -> Vec<f64> {
+    term.knots.clone().unwrap().values
+}
+
+fn assert_near(got: &[f64], want: &[f64]) {
+    let near = got.len() == want.len() && got.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-12);
+    assert!(near, "{got:?} {want:?}");
+}
+
+#[test]
+fn a_curve_that_must_not_fall_moves_from_a_knot_on() {
+    let mut hardening = term("hardening", &[0.1, 0.2, 0.3], &[0.1, 0.3, 0.3]);
+    assert_near(&[hardening.move_knot(1, 0.5)], &[0.5]);
+    assert_near(&values(&hardening), &[0.1, 0.8, 0.8]);
+    // Not below the knot before.
+    assert_near(&[hardening.least_step(1), hardening.move_knot(1, -2.0)], &[-0.7, -0.7]);
+    assert_near(&values(&hardening), &[0.1, 0.1, 0.1]);
+    assert_near(&[hardening.move_knot(0, 100.0)], &[19.9]);
+    assert!(hardening.effect().is_ok());
+}
+
+#[test]
+fn weights_move_one_by_one_and_stay_above_0() {
+    let mut relaxation = term("relaxation", &[0.1, 1.0], &[0.2, 0.3]);
+    assert_near(&[relaxation.move_knot(0, -0.5), relaxation.move_knot(1, 0.1)], &[-0.2, 0.1]);
+    assert_near(&values(&relaxation), &[0.0, 0.4]);
+    assert!(relaxation.effect().is_ok());
+}
+
+#[test]
+fn a_bounded_step_is_the_best_within_the_bounds() {
+    // Independent: each by itself.
+    let identity = DMatrix::identity(3, 3);
+    let right = DVector::from_row_slice(&[1.0, -1.0, -1.0]);
+    let free = f64::NEG_INFINITY;
+    let step = bounded(&identity, &right, 0.0, &[1.0; 3], &[0.0, 0.0, free]);
+    assert!((step - DVector::from_row_slice(&[1.0, 0.0, -1.0])).norm() < 1e-6);
+    // Two that nearly do the same: all goes to the one that may rise. By hand, 1.9 = 2 x with the other at 0.
+    let twins = DMatrix::from_row_slice(2, 2, &[2.0, 1.9, 1.9, 2.0]);
+    let step = bounded(&twins, &DVector::from_row_slice(&[1.9, 1.5]), 0.0, &[2.0; 2], &[0.0, 0.0]);
+    assert!((step - DVector::from_row_slice(&[0.95, 0.0])).norm() < 1e-6);
+}
+
+#[test]
+fn a_bounded_step_leaves_nothing_to_gain() {
+    // The conditions of Kuhn and Tucker for products of columns that are far from independent.
+    let columns =
+        DMatrix::from_fn(40, 9, |row, k| 1.0 - (-(row as f64) / 2.0_f64.powf(k as f64 - 1.0)).exp());
+    let target = DVector::from_fn(40, |row, _| ((row * row) as f64 * 0.37).sin() + 0.02 * row as f64);
+    let (gram, right) = (columns.transpose() * &columns, columns.transpose() * target);
+    let squares: Vec<f64> = gram.diagonal().iter().copied().collect();
+    let damping = 1e-6;
+    let step = bounded(&gram, &right, damping, &squares, &[-0.1; 9]);
+    for index in 0..9 {
+        let pull = (&right - &gram * &step)[index] - damping * squares[index] * step[index];
+        let is_held = step[index] <= -0.1 + 1e-9;
+        assert!(step[index] > -0.1 - 1e-9, "{index}: {}", step[index]);
+        assert!(if is_held { pull < 1e-5 } else { pull.abs() < 1e-5 }, "{index}: {pull} at {}", step[index]);
+    }
+}
+
+#[test]
+fn terms_of_a_class_add_to_one_curve_within_its_rules() {
+    let hardening = Definition::find("hardening").unwrap();
+    let curve = hardening.curve.as_ref().unwrap();
+    let power = |growth: f64, exponent: f64| {
+        let mut term = Term::neutral(hardening);
+        term.values[..2].copy_from_slice(&[growth, exponent]);
+        term
+    };
+    let knots = of_formulas(curve, &[power(1.0, 1.0), power(2.0, 2.0)], &[0.1, 0.5]);
+    assert_near(&knots.values, &[0.12, 1.0]);
+    let relaxation = Definition::find("relaxation").unwrap();
+    let mut rising = Term::neutral(relaxation);
+    rising.values[0] = -0.3;
+    let none = of_formulas(relaxation.curve.as_ref().unwrap(), &[rising], &[1.0, 10.0]);
+    assert_near(&none.values, &[0.0, 0.0]);
+}

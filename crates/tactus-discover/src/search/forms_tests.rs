@@ -1,0 +1,69 @@
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use tactus_model::Effect;
+use tactus_model::effect::{Definition, Knots};
+
+use crate::fixtures::{ELEMENTS, found, known, measured};
+use crate::{Discovery, FittedKnot};
+
+const NOISE_COUNTS: f64 = 2.0;
+
+/// What discovery finds in presses of a sensor with an effect and white noise.
+fn discovered(effect: Effect) -> Discovery {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let noise: Vec<Vec<f64>> =
+        (0..30 * ELEMENTS).map(|_| (0..ELEMENTS).map(|_| NOISE_COUNTS * normal()).collect()).collect();
+    found(&known(), &measured(&known(), &[effect], &noise))
+}
+
+fn free(name: &str, parameters: &[(&str, f64)], at: Vec<f64>, value: impl Fn(f64) -> f64) -> Effect {
+    let values = at.iter().map(|at| value(*at)).collect();
+    let definition = Definition::find(name).unwrap();
+    Effect::of_knots(definition, parameters.iter().copied(), Knots { at, values }).unwrap()
+}
+
+#[test]
+fn a_form_that_no_formula_has_is_found_as_knots() {
+    // Chains that come to the end of their length (Gent 1996): no power of depth.
+    let at_mm: Vec<f64> = (1..=60).map(|k| 0.01 * f64::from(k)).collect();
+    let growth = |at_mm: f64| 1.0 / (1.0 - 1.4 * at_mm) - 1.0;
+    let found = discovered(free("hardening", &[("own_share", 0.0)], at_mm, growth));
+    let step = found
+        .steps
+        .iter()
+        .find(|step| step.effect == "hardening")
+        .unwrap_or_else(|| panic!("{:?}", found.steps));
+    let curve = step.curve.as_ref().unwrap_or_else(|| panic!("{step:?}"));
+    // A factor of all depths is the elements' gain, so only the shape is determined.
+    let shape = |of: fn(&FittedKnot) -> f64| {
+        let at = |at_mm: f64| curve.knots.iter().find(|knot| (knot.at - at_mm).abs() < 1e-9).map(of).unwrap();
+        [0.3, 0.5].map(|at_mm| (1.0 + at(at_mm)) / (1.0 + at(0.2)))
+    };
+    let want = [0.3, 0.5].map(|at_mm| (1.0 + growth(at_mm)) / (1.0 + growth(0.2)));
+    let apart =
+        |got: [f64; 2]| got.iter().zip(want).map(|(got, want)| (got / want - 1.0).abs()).fold(0.0, f64::max);
+    let [knots, formula] = [apart(shape(|knot| knot.value)), apart(shape(|knot| knot.formula))];
+    assert!(knots < 0.02 && knots < formula, "{knots} {formula}: {curve:?}");
+    let effect = found.effects.iter().find(|effect| effect.name() == "hardening").unwrap();
+    assert_eq!(effect.knots().unwrap().values, curve.knots.iter().map(|knot| knot.value).collect::<Vec<_>>());
+    let [of_formula, of_knots] = [curve.heldout_rms_formula_counts, step.heldout_rms_after_counts];
+    assert!(of_knots < NOISE_COUNTS * 1.02 && of_formula > of_knots + 0.05, "{of_formula} {of_knots}");
+}
+
+#[test]
+fn what_the_formula_explains_keeps_it() {
+    let effects = [
+        Effect::new("hardening", [("growth_at_1_mm", 1.5), ("exponent", 2.0), ("own_share", 0.0)]).unwrap(),
+        Effect::new("saturation", [("loss_at_1_mm", 0.5), ("knee", 2.0)]).unwrap(),
+    ];
+    for effect in effects {
+        let name = effect.name();
+        let found = discovered(effect);
+        assert!(!found.steps.is_empty(), "{name} is seen");
+        for step in &found.steps {
+            assert!(step.curve.is_none(), "{name}: {step:?}");
+        }
+    }
+}
