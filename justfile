@@ -14,7 +14,7 @@ ci:
     .ci/run
 
 # What CI is too short for: the programs as a lab gets them, whole suites instead of their slices, a bare machine. Some hours.
-nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials soak mutants systemd-boot tls vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
+nightly: (fault-schedules "100000") (simulate-faults "2000") (simulated-days "30") kill-trials hung-disk soak mutants systemd-boot tls vm discovery-slice gpu (fuzz "600") (truth "20") bare advisories
 
 # Under a minute once it is warm: formatting, lints and unit tests of the crates that differ from the last commit.
 quick:
@@ -344,6 +344,10 @@ stop-trials trials="200": build
         'TACTUS_ROWS="{}" cargo test --workspace --test e2e stop_trials:: -- --nocapture > "target/stop-trials/{}.log" 2>&1' || failed=1
     grep -hE '^(condition|[a-z1].* [0-9]+\.[0-9]$)|not measured|later than|panicked' target/stop-trials/*.log | awk '!shown[$0]++'
     exit $failed
+
+# STOP at each surface after a disk has hung for a minute; some ten minutes. As root.
+hung-disk: build
+    TACTUS_TRIALS=1 TACTUS_HANG_S=60 TACTUS_ROWS="disk hangs" cargo test --workspace --test e2e stop_trials:: -- --nocapture
 
 # kill -9 at so many random instants of a run in real time; TACTUS_SEED chooses others.
 kill-trials trials="200": build

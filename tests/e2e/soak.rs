@@ -13,7 +13,7 @@ use std::fs;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use tactus_e2e::repository;
+use tactus_e2e::{Process, repository};
 use tactus_schema::key::Command;
 use tactus_schema::pb;
 
@@ -68,7 +68,7 @@ fn memory_frames_and_clock_hold_as_long_as_the_service_runs() {
     let whole = hours.map_or(SHORT, |hours| Duration::from_secs_f64(hours * 3600.0));
     let period = (whole / 12).clamp(Duration::from_secs(1), Duration::from_mins(5));
     let rig = fs::read_to_string(repository("config/rigs/pty.toml")).unwrap();
-    let mut bench = Bench::start(Options { rig, ..Options::default() });
+    let mut bench = Bench::start(Options { rig, start: Process::start_as_unit, ..Options::default() });
     let got = Arc::new(Mutex::new(Got::default()));
     let mut frames = bench.subscribe::<pb::Frame>();
     bench.runtime.spawn({

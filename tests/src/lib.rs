@@ -103,7 +103,17 @@ impl Process {
     /// # Panics
     /// If it cannot be started.
     pub fn start(name: &str, folder: &Path, args: &[&str]) -> Self {
-        Self::start_with(name, folder, args, Stdio::piped(), None)
+        Self::start_with(name, folder, args, &[], Stdio::piped(), None)
+    }
+
+    /// As [`Self::start`], with the variables that the service's unit sets.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start_as_unit(name: &str, folder: &Path, args: &[&str]) -> Self {
+        let unit = fs::read_to_string(repository("systemd/tactusd.service")).expect("the service's unit");
+        let variables: Vec<_> = unit.lines().filter_map(|line| line.strip_prefix("Environment=")).collect();
+        Self::start_with(name, folder, args, &variables, Stdio::piped(), None)
     }
 
     /// As [`Self::start`], with a standard error that is full and that nobody reads.
@@ -135,13 +145,22 @@ impl Process {
         while stderr.write(&[b'.'; 4096]).is_ok() {}
         while stderr.write(b".").is_ok() {}
         fcntl_setfl(&stderr, flags).expect("an output can wait");
-        Self::start_with(name, folder, args, stderr.into(), Some(unread))
+        Self::start_with(name, folder, args, &[], stderr.into(), Some(unread))
     }
 
-    fn start_with(name: &str, folder: &Path, args: &[&str], stderr: Stdio, unread: Option<OwnedFd>) -> Self {
+    /// `variables` are written as `NAME=VALUE`.
+    fn start_with(
+        name: &str,
+        folder: &Path,
+        args: &[&str],
+        variables: &[&str],
+        stderr: Stdio,
+        unread: Option<OwnedFd>,
+    ) -> Self {
         // Whoever runs the tests may ignore signals, as `nohup` does.
         let mut child = Command::new("env")
             .args(["--default-signal=HUP,INT,QUIT,TERM"])
+            .args(variables)
             .arg(binary(name))
             .args(args)
             .current_dir(folder)

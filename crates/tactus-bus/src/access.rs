@@ -6,7 +6,7 @@
 use serde_json::{Value, json};
 use tactus_schema::key::{Command, Keys, STOP_EVERY_RIG, Topic};
 
-use crate::{BusConfig, config::TlsConfig};
+use crate::{BusConfig, config::TlsConfig, topic::heard};
 
 /// Every key: `**` does not match zenoh-ext's keys, which have `@`.
 const EVERYTHING: [&str; 2] = ["**", "**/@adv/**"];
@@ -65,7 +65,7 @@ const ALL_MESSAGES: [&str; 9] = [
 
 /// What anybody may ask: the history of topics, the state, a stop.
 fn readable(keys: &Keys) -> impl Iterator<Item = String> {
-    let histories = Topic::ALL.map(|topic| format!("{}/@adv/**", keys.topic(topic)));
+    let histories = Topic::ALL.map(|topic| format!("{}/@adv/**", heard(&keys.topic(topic))));
     histories.into_iter().chain([keys.command(Command::Status), keys.command(Command::Stop)])
 }
 

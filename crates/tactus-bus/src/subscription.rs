@@ -24,7 +24,7 @@ use crate::{
     liveness::Trust,
     merge::{Merge, Numbered},
     queue::Queue,
-    topic::{Policy, encoding},
+    topic::{Policy, encoding, heard},
 };
 
 /// Time limit for the history; later replies are ignored.
@@ -100,7 +100,7 @@ impl<M: Published> Subscription<M> {
         });
         let receiver = Receiver(reception.clone(), trust.clone());
         let builder =
-            session.declare_subscriber(key.clone()).callback(move |sample| receiver.hear(sample)).advanced();
+            session.declare_subscriber(heard(&key)).callback(move |sample| receiver.hear(sample)).advanced();
         let recovery = RecoveryConfig::default().heartbeat();
         let subscriber = if history == History::None { builder } else { builder.recovery(recovery) }
             .await

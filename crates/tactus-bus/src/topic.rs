@@ -72,6 +72,15 @@ impl Policy {
     }
 }
 
+/// What a client subscribes to in order to hear the messages on `key`. The service has no other key that it matches.
+///
+/// Not the key itself: a client that subscribes to a key without a wild card gives it a number, under which zenoh then sends to
+/// it. With access control, zenoh 1.10.2 looks such a number up while another of its threads may change the table. A client
+/// that connected or left in that moment ended the service with a segmentation fault.
+pub(crate) fn heard(key: &str) -> String {
+    format!("{key}$*")
+}
+
 /// The encoding that names a message, such as `application/protobuf;tactus.v1.Frame`.
 pub(crate) fn encoding(message_name: &str) -> Encoding {
     Encoding::APPLICATION_PROTOBUF.with_schema(message_name)

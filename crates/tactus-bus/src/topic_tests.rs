@@ -1,7 +1,10 @@
-use tactus_schema::{key::Topic, pb};
-use zenoh::qos::Priority;
+use tactus_schema::{
+    key::{Keys, Topic},
+    pb,
+};
+use zenoh::{key_expr::keyexpr, qos::Priority};
 
-use super::{Lane, Policy, Published, encoding, message_name};
+use super::{Lane, Policy, Published, encoding, heard, message_name};
 
 #[test]
 fn every_topic_names_the_message_of_the_contract() {
@@ -35,5 +38,20 @@ fn frames_and_news_travel_apart_and_neither_with_answers_for_history() {
         assert_eq!(policy.lane == Lane::Frames, is_frame, "{topic:?}");
         assert_eq!(policy.priority == frames.priority, is_frame, "{topic:?}");
         assert_ne!(policy.priority, Priority::Data, "{topic:?}");
+    }
+}
+
+#[test]
+fn who_hears_a_topic_hears_no_other_and_does_not_number_its_key() {
+    let keys = Keys::new("bench");
+    for topic in Topic::ALL {
+        let heard = heard(&keys.topic(topic));
+        let heard = keyexpr::new(&heard).unwrap();
+        // Zenoh numbers a key up to the part with the first wild card.
+        assert!(heard.is_wild());
+        for other in Topic::ALL {
+            let key = keys.topic(other);
+            assert_eq!(heard.intersects(keyexpr::new(&key).unwrap()), other == topic, "{heard}, {key}");
+        }
     }
 }

@@ -30,11 +30,13 @@ use tactus_engine::{Engine, EngineError, StopOrder};
 use tactus_log::LogFormat;
 use tactus_runner::config::{ConfigError, RigFiles, ServiceConfig, TlsSection};
 use tactus_runner::covering_file::CoveringFile;
+use tactus_runner::crashed::{self, Crashed};
+use tactus_runner::devices;
 use tactus_runner::embedded::Truth;
 use tactus_runner::signals::EndingSignals;
-use tactus_runner::{crashed, devices};
 use tactus_schema::key::Keys;
 use tokio::runtime::Handle;
+use tokio::task::JoinHandle;
 use tokio::time::timeout;
 use tracing::{error, info};
 
@@ -114,11 +116,7 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     let mut signals = EndingSignals::listen().map_err(system("signals"))?;
 
     let systemd = Systemd::start().map_err(system("thread"))?;
-    let clock = Clock::real();
-    let RigFiles { rig, codec, .. } = config.rig.clone();
-    let Some(rig_service) = rig.service.clone() else {
-        return Err(EngineError::NoService { rig: rig.name }.into());
-    };
+    let rig = &config.rig.rig;
     let keys = Keys::new(rig.name.clone());
     info!(rig = rig.name, simulated = rig.simulated, recordings = %config.recordings.display(), "tactusd starts");
     let endpoints = BusConfig {
@@ -130,6 +128,28 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     let recordings = config.recordings.clone();
     let closing = tokio::task::spawn_blocking(move || crashed::close_all(&recordings));
     let (bus, calls) = Bus::open(&endpoints, keys).await?;
+    let served = attend(config, &bus, calls, &systemd, &mut signals, closing).await;
+    // Whatever has happened: no thread of ours may be in the bus's library when the process ends.
+    bus.close().await?;
+    info!("closed");
+    served
+}
+
+/// Acquires frames and answers commands until a signal ends the service.
+async fn attend(
+    config: ServiceConfig,
+    bus: &Bus,
+    Calls { stops, commands }: Calls,
+    systemd: &Systemd,
+    signals: &mut EndingSignals,
+    closing: JoinHandle<Vec<Crashed>>,
+) -> Result<(), ServiceError> {
+    let system = |what| move |source| ServiceError::System { what, source };
+    let clock = Clock::real();
+    let RigFiles { rig, codec, .. } = config.rig.clone();
+    let Some(rig_service) = rig.service.clone() else {
+        return Err(EngineError::NoService { rig: rig.name }.into());
+    };
     let truth = || Truth::of_rig(&rig, clock.now().wall.ns().unsigned_abs());
     let mut opened = devices::open(&rig, &rig_service, codec, truth, clock);
     if opened.devices.change_covering.is_none() {
@@ -139,7 +159,6 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     }
     let engine = Engine::start(rig, opened.devices, clock, Arc::new(BusPublisher(bus.publisher())))?;
 
-    let Calls { stops, commands } = calls;
     let desk = Arc::new(CommandDesk::new(engine.clone(), config, bus.publisher()));
     // A thread of its own: no task that waits or computes can keep it from running. It ends with the bus.
     let (stop_desk, runtime) = (Arc::clone(&desk), Handle::current());
@@ -179,8 +198,6 @@ async fn serve(config: ServiceConfig) -> Result<(), ServiceError> {
     for task in tasks {
         task.abort();
     }
-    bus.close().await?;
-    info!("closed");
     closed
 }
 

@@ -1,5 +1,10 @@
 //! A run from start to end, and everything that can end it, in virtual time.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on fails")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test that cannot go on fails; a measurement is printed"
+)]
 
 mod continued;
 mod rig;
@@ -13,7 +18,7 @@ use pb::run_event::Event;
 use rig::{Bench, Memory};
 use tactus_engine::{CoveringMemory, Fault, ResumeError, RunOrder, StopOrder};
 use tactus_schema::pb::{self, RunPhase, StageStatus};
-use tokio::time::{sleep, timeout};
+use tokio::time::{Instant, sleep, timeout};
 
 const PRESS: &str = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2, 0.4])\n";
 const PRESSES: &str =
@@ -37,6 +42,25 @@ async fn until_deep(bench: &mut Bench, depth_mm: f64) {
 
 async fn until_phase(bench: &Bench, phase: RunPhase) {
     bench.engine.state().wait_for(|state| state.phase() == phase).await.unwrap();
+}
+
+/// How long the stage goes without a stop, and how long the tip then needs to the safe height.
+async fn until_stopped_and_up(bench: &mut Bench) -> [Duration; 2] {
+    let begin = Instant::now();
+    bench.stops.changed().await.unwrap();
+    let stopped = begin.elapsed();
+    bench.stage.wait_for(|stage| stage.z_mm > 2.0 - 1e-9).await.unwrap();
+    [stopped, begin.elapsed()]
+}
+
+fn print_greatest(what: &str, times: &[[Duration; 2]]) {
+    let [stopped, up] = [0, 1].map(|part| times.iter().map(|time| time[part]).max().unwrap().as_secs_f64());
+    println!(
+        "{what}: stopped after {:.0} ms, up after {:.0} ms at most of {}",
+        stopped * 1e3,
+        up * 1e3,
+        times.len()
+    );
 }
 
 fn height_mm(bench: &Bench) -> f64 {
@@ -287,6 +311,46 @@ async fn too_much_force_stops_retracts_and_refuses() {
     assert_eq!(outcome.exit_status, ExitStatus::Refused, "{outcome:?}");
     assert_eq!(memory.safety.lock().unwrap()[0].rule, "element-force");
     assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+}
+
+/// Milliseconds into a sample period at which something begins.
+const PHASES_MS: [u64; 11] = [0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30];
+
+#[tokio::test(start_paused = true)]
+async fn too_much_force_stops_within_one_frame() {
+    let mut times = Vec::new();
+    for phase_ms in PHASES_MS {
+        let mut bench = Bench::start(|rig| rig);
+        let run = start(&bench, HOLD, &Memory::default());
+        until_deep(&mut bench, 0.3).await;
+        sleep(Duration::from_millis(1000 + phase_ms)).await;
+        bench.stops.mark_unchanged();
+        bench.trouble.lock().unwrap().push_counts = 2500.0;
+        times.push(until_stopped_and_up(&mut bench).await);
+        assert_eq!(run.await.unwrap().exit_status, ExitStatus::Refused);
+    }
+    print_greatest("too much force", &times);
+    // A sample period, at 30 Hz.
+    assert!(times.iter().all(|[stopped, _]| *stopped <= Duration::from_millis(34)), "{times:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn three_periods_without_a_frame_stop() {
+    let mut times = Vec::new();
+    for phase_ms in PHASES_MS {
+        let mut bench = Bench::start(|rig| rig);
+        let run = start(&bench, HOLD, &Memory::default());
+        until_deep(&mut bench, 0.3).await;
+        sleep(Duration::from_millis(1000 + phase_ms)).await;
+        bench.stops.mark_unchanged();
+        bench.trouble.lock().unwrap().silent = true;
+        times.push(until_stopped_and_up(&mut bench).await);
+        bench.trouble.lock().unwrap().silent = false;
+        assert_eq!(run.await.unwrap().exit_status, ExitStatus::Degraded);
+    }
+    print_greatest("no frame", &times);
+    // Three periods, and one until the supervisor looks at its clock.
+    assert!(times.iter().all(|[stopped, _]| *stopped <= Duration::from_millis(134)), "{times:?}");
 }
 
 #[tokio::test(start_paused = true)]

@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 use std::io;
+use std::iter;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -239,6 +240,46 @@ fn a_disk_error_is_the_runs_error_at_the_next_message() {
     assert!(text.contains("cannot write /runs/r1/recording.mcap: Input/output error (os error 5)"), "{text}");
     let text = recorder.finish_within(Duration::from_mins(1)).unwrap_err().to_string();
     assert!(text.contains("(os error 5)") && text.contains("are missing"), "{text}");
+}
+
+/// A disk that makes the recorder's thread panic after the beginning of the file.
+struct PanickingDisk {
+    has_begun: bool,
+}
+
+impl Storage for PanickingDisk {
+    fn append(&mut self, _: &[u8]) -> io::Result<()> {
+        assert!(!std::mem::replace(&mut self.has_begun, true), "a recorder that panics, for a test");
+        Ok(())
+    }
+
+    fn keep_reserve(&mut self, _: u64) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn release_reserve(&mut self) {}
+
+    fn sync_handle(&self) -> io::Result<Box<dyn SyncHandle>> {
+        Ok(Box::new(Sync(SyncKind::Works)))
+    }
+
+    fn close(&mut self) -> Result<u64, RecordError> {
+        Ok(0)
+    }
+}
+
+#[test]
+fn a_recorder_that_panics_is_the_runs_error_at_the_next_message() {
+    let gauge = Gauge::default();
+    let disk = PanickingDisk { has_begun: false };
+    let mut recorder = ThreadRecorder::start_with(begin(&path(), disk), gauge.clone()).unwrap();
+    // The seventeenth frame closes a chunk.
+    (0..=16).for_each(|seq| recorder.frame(&frame(seq)).unwrap());
+    assert!(recorder.ended.recv().is_err(), "the thread has ended without a result");
+    // Of the same time, so that none is late.
+    let error = iter::repeat_with(|| recorder.frame(&frame(16))).find_map(Result::err).unwrap();
+    assert!(error.to_string().contains("the recording's thread ended early"), "{error}");
+    assert_eq!(gauge.sign_of_life(), None, "the watchdog has nobody to wait for");
 }
 
 #[test]

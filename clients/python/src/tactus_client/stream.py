@@ -44,9 +44,11 @@ class Stream:
         self.unreadable = 0
         #: Messages that were not from the rig's service.
         self.foreign = 0
+        # ``$*`` matches no other key. Zenoh gives a key without a wild card a number, and a service with access control may
+        # crash when a client that has given one connects or leaves (zenoh 1.10.2).
         self._subscriber = zenoh.ext.declare_advanced_subscriber(
             session,
-            key,
+            f"{key}$*",
             zenoh.handlers.Callback(self._hear, self._end),
             recovery=zenoh.ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
         )

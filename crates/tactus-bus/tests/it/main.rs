@@ -1,6 +1,7 @@
 //! The bus, through its public interface and raw zenoh clients.
 
 mod access;
+mod churn;
 mod commands;
 mod history;
 mod lab;

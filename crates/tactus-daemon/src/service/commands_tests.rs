@@ -128,6 +128,35 @@ async fn of_twenty_clients_one_gets_the_lease_and_only_its_commands_move_anythin
     tokio::task::spawn_blocking(|| stopping.join()).await.unwrap().unwrap();
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn of_two_clients_that_race_for_the_lease_one_gets_it_each_time() {
+    let endpoint: Endpoint = free_endpoint();
+    let (bus, calls, desk) = lab(vec![endpoint.clone()]).await;
+    let answering = tokio::spawn(Arc::new(desk).answer_commands(calls.commands));
+    let clients = [
+        Client::connect(&endpoint, Some("sim")).await.unwrap(),
+        Client::connect(&endpoint, Some("sim")).await.unwrap(),
+    ];
+    let mut wins = [0, 0];
+    for _ in 0..200 {
+        let (one, other) = tokio::join!(clients[0].hold("one", None), clients[1].hold("other", None));
+        match (one.unwrap(), other.unwrap()) {
+            (Hold::Held(held), Hold::Refused(_)) => {
+                wins[0] += 1;
+                held.release().await.unwrap();
+            }
+            (Hold::Refused(_), Hold::Held(held)) => {
+                wins[1] += 1;
+                held.release().await.unwrap();
+            }
+            both_or_none => panic!("{both_or_none:?}"),
+        }
+    }
+    println!("races of two clients for the lease: {wins:?} wins");
+    answering.abort();
+    bus.close().await.unwrap();
+}
+
 fn free_endpoint() -> Endpoint {
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     format!("tcp/127.0.0.1:{port}").parse().unwrap()

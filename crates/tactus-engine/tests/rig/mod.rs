@@ -43,6 +43,8 @@ pub(crate) struct Bench {
     pub(crate) trouble: Arc<Mutex<Trouble>>,
     pub(crate) deepest_mm: Arc<Mutex<f64>>,
     pub(crate) stage: watch::Receiver<pb::StageState>,
+    /// Rises with each stop that the stage gets.
+    pub(crate) stops: watch::Receiver<u64>,
     hand: Arc<FakeStage>,
 }
 
@@ -283,7 +285,7 @@ impl Bench {
             told: false,
             pending: None,
         };
-        let state = stage.state();
+        let (state, stops) = (stage.state(), stage.stops.subscribe());
         tokio::spawn(Arc::clone(&stage).repeat_reports());
         let hand = Arc::clone(&stage);
         let devices = Devices {
@@ -294,7 +296,7 @@ impl Bench {
             covering_memory,
         };
         let engine = Engine::start(rig, devices, clock, Arc::new(Unpublished)).unwrap();
-        Self { engine, trouble, deepest_mm, stage: state, hand }
+        Self { engine, trouble, deepest_mm, stage: state, stops, hand }
     }
 
     /// The stage is gone, and its driver says why.
