@@ -34,13 +34,6 @@
 //! # Ok::<(), tactus_model::effect::EffectError>(())
 //! ```
 //!
-//! **Derivatives.** Where a closed form exists, `slope` gives the derivative of the effect's own output by one of
-//! its parameters at the same input, with that of the memory; `None` or `false` where there is none. Fits do not call it:
-//! `tactus discover` differences the predictions of two pipelines, and [`Effect::with`] makes the second one. A program that
-//! wants counts multiplies by what follows: a [`Shift`] of the contact through
-//! [`ForwardModel::gradient`](crate::ForwardModel::gradient), a change of signal times `sensitivity (1 + 2 k u)`, a change of
-//! counts by 1; this holds for the last effect of the pipeline.
-//!
 //! **The library**, in [`REGISTRY`]; these names are a contract of reports and model files:
 //!
 //! | stage | effects |
@@ -129,9 +122,7 @@ struct AddingAnEffect;
 
 pub use definition::{Definition, Effect, EffectError, Make, Parameter, ParameterKind, PipelineStage};
 pub use knots::{CurveKind, FreeCurve, KNOTS_MAX, Knots, Values};
-pub use stage::{
-    BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, Shift, TipState,
-};
+pub use stage::{BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, TipState};
 
 /// Every effect of the library, in the order of the stages.
 pub static REGISTRY: &[&Definition] = &[

@@ -11,7 +11,7 @@
 //! The area of the spread stays the same. The axes are the sensor's, because a Gaussian along other axes is not a product of
 //! one along x and one along y.
 //!
-//! No derivative in closed form. Cost: one image.
+//! Cost: one image.
 //!
 //! # Source
 //! A sheet that was drawn in one direction, or lies on electrodes that run in one direction: the Gaussian of an orthotropic

@@ -1,4 +1,4 @@
-use crate::effect::bench::{assert_slopes, effect, fine, still, upon};
+use crate::effect::bench::{effect, fine, still, upon};
 
 #[test]
 fn a_point_is_spread_by_a_gaussian_of_two_widths() {
@@ -11,9 +11,4 @@ fn a_point_is_spread_by_a_gaussian_of_two_widths() {
             assert!((got / want - 1.0).abs() < 1e-5, "{ratio}, element {element}: {got} {want}");
         }
     }
-}
-
-#[test]
-fn there_is_no_closed_form_of_the_derivative() {
-    assert_slopes(&effect("anisotropic-spread", [("ratio", 1.2)]), &[]);
 }

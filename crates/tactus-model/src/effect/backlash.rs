@@ -14,12 +14,12 @@
 //! rests for the whole play after the stage turns. The mean of two opposite approaches is the position of the registration,
 //! or of the surface. The tip begins in the middle of its play.
 //!
-//! Derivative in closed form, with memory. Cost: none.
+//! Cost: none.
 //!
 //! # Source
 //! The play operator: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (1989).
 
-use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
+use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "backlash",
@@ -44,8 +44,8 @@ struct Backlash {
 #[derive(Debug)]
 struct Axis {
     half_mm: f64,
-    /// Position of the tip, and its derivative by the play.
-    at: Option<(f64, f64)>,
+    /// Position of the tip.
+    at_mm: Option<f64>,
 }
 
 impl OnMotion for Backlash {
@@ -55,37 +55,22 @@ impl OnMotion for Backlash {
         }
     }
 
-    fn slope(&self, parameter: usize, _: BaseModel<'_>, before: &TipState) -> Option<Shift> {
-        let (_, by_play) = self.axes.get(parameter)?.at?;
-        let (sin, cos) = before.registration.rotation_deg.to_radians().sin_cos();
-        Some(match parameter {
-            0 => Shift { position_mm: [by_play * cos, -by_play * sin], ..Shift::default() },
-            1 => Shift { position_mm: [by_play * sin, by_play * cos], ..Shift::default() },
-            _ => Shift { depth_mm: -by_play, ..Shift::default() },
-        })
-    }
-
     fn reset(&mut self) {
         for axis in &mut self.axes {
-            axis.at = None;
+            axis.at_mm = None;
         }
     }
 }
 
 impl Axis {
     fn new(play_mm: f64) -> Self {
-        Self { half_mm: play_mm / 2.0, at: None }
+        Self { half_mm: play_mm / 2.0, at_mm: None }
     }
 
     fn follow(&mut self, stage_mm: f64) -> f64 {
         let (least, most) = (stage_mm - self.half_mm, stage_mm + self.half_mm);
-        let (at_mm, by_play) = match self.at {
-            None => (stage_mm, 0.0),
-            Some((at_mm, _)) if at_mm < least => (least, -0.5),
-            Some((at_mm, _)) if at_mm > most => (most, 0.5),
-            Some(at) => at,
-        };
-        self.at = Some((at_mm, by_play));
+        let at_mm = self.at_mm.unwrap_or(stage_mm).clamp(least, most);
+        self.at_mm = Some(at_mm);
         at_mm
     }
 }

@@ -1,4 +1,4 @@
-use crate::effect::bench::{THIN, assert_slopes, effect, model, simulator};
+use crate::effect::bench::{THIN, effect, model, simulator};
 use crate::effect::{BaseModel, Make, Now, TipState};
 use crate::{Moment, Pipeline, Registration};
 
@@ -62,10 +62,4 @@ fn without_play_a_little_would_leave_the_tip_behind_the_last_move() {
         let by_play = backlash.slope(2, base, &tip).unwrap().depth_mm;
         assert!((by_play - want).abs() < 1e-12, "{z_mm}: {by_play}");
     }
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    let names = ["play_x_mm", "play_y_mm", "play_z_mm"];
-    assert_slopes(&effect("backlash", [(names[0], 0.2), (names[1], 0.1), (names[2], 0.15)]), &names);
 }

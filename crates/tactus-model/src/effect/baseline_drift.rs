@@ -17,7 +17,7 @@
 //! that is faster than a sixteenth of the duration takes several effects, each starting where the one before ends. Elements
 //! that drift independently need one effect each.
 //!
-//! Derivatives in closed form. Cost: none.
+//! Cost: none.
 //!
 //! # Source
 //! Linear splines: C. de Boor, *A Practical Guide to Splines* (2001), chapter 3. Zero drift of an instrument: A. S.
@@ -94,17 +94,6 @@ impl OnReadout for BaselineDrift {
         for count in self.own(counts) {
             *count += drift_counts;
         }
-    }
-
-    fn slope(&self, parameter: usize, slope_counts: &mut [f64]) -> bool {
-        let slope = match parameter {
-            2 => self.zero_counts.by_duration(self.t_s.max(0.0)),
-            3..=18 => self.zero_counts.by_knot(parameter - 3, self.t_s),
-            _ => return false,
-        };
-        slope_counts.fill(0.0);
-        self.own(slope_counts).fill(slope);
-        true
     }
 }
 

@@ -1,5 +1,5 @@
 use super::DEFINITION;
-use crate::effect::bench::{assert_slopes, simulator, still, upon};
+use crate::effect::bench::{simulator, still, upon};
 use crate::{Effect, Moment, Pipeline};
 
 /// A zero that is at 20 counts after 300 s, at -10 after 1200 s and from 1500 s on, and at 0 at the knots between.
@@ -47,12 +47,4 @@ fn without_an_element_it_is_that_of_all() {
     assert!(!given.names_elements());
     let one = given.with("element", 48.0).unwrap();
     assert!(one.names_elements() && one.fits(simulator([]).model.array()).is_err());
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    let known: Vec<_> = DEFINITION.parameters.iter().skip(2).map(|parameter| parameter.name).collect();
-    for duration_s in [30.0, 90.0, 1600.0] {
-        assert_slopes(&drift().with("duration_s", duration_s).unwrap(), &known);
-    }
 }

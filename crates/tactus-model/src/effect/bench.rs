@@ -1,4 +1,4 @@
-//! Test helpers: a sensor with known parameters, and a comparison of derivatives with finite differences.
+//! Test helpers: a sensor with known parameters.
 
 use super::{BaseModel, Definition, Effect, Knots, Make, Now, TipState};
 use crate::{
@@ -87,91 +87,4 @@ pub(crate) fn upon(simulator: &Simulator, element: usize, depth_mm: f64) -> [f64
 /// Counts under a tip that rests at a position from the start.
 pub(crate) fn still(simulator: &Simulator, tip_mm: [f64; 3]) -> Vec<f64> {
     Pipeline::new(simulator).unwrap().step(Moment::at(0.0), &tip_mm).to_vec()
-}
-
-/// Checks that the derivatives by `known` are those of central differences, and that there are no others. Not all of
-/// them may be 0.
-pub(crate) fn assert_slopes(effect: &Effect, known: &[&str]) {
-    let mut changes = known.is_empty();
-    for (index, (name, value)) in effect.parameters().enumerate() {
-        let slope = output(effect, Some(index));
-        assert_eq!(slope.is_some(), known.contains(&name), "{name}");
-        let Some(slope) = slope else { continue };
-        let step = 1e-4 * value.abs().max(0.1);
-        let at = |value| output(&effect.with(name, value).unwrap(), None).unwrap();
-        let (less, more) = (at(value - step), at(value + step));
-        let largest = slope.iter().fold(0.0_f64, |largest, one| largest.max(one.abs()));
-        changes |= largest > 0.0;
-        for ((slope, less), more) in slope.iter().zip(less).zip(more) {
-            let want = (more - less) / (2.0 * step);
-            assert!((slope - want).abs() <= 1e-6 * largest, "{name}: {slope} {want}");
-        }
-    }
-    assert!(changes);
-}
-
-/// What the effect makes of a short history, or the derivative of its last output by a parameter.
-fn output(effect: &Effect, by: Option<usize>) -> Option<Vec<f64>> {
-    let model = model();
-    let base = BaseModel { model: &model, covering: THIN };
-    let values = effect.values();
-    let history = |k: u32| -> (Now<'_>, Vec<f64>) {
-        let temperature_c = Some(20.0 + 0.3 * f64::from(k));
-        let now = Now { t_s: f64::from(k * k), dt_s: f64::from(2 * k) / 10.0, temperature_c, base };
-        (now, (0..48).map(|element| (0.3 + f64::from(element * k)).sin()).collect())
-    };
-    let contact = Contact { indenter: CYLINDER, position_mm: [6.0, 5.0], rotation_deg: 10.0, depth_mm: 0.45 };
-    let mut slope = vec![0.0; 48];
-    match effect.definition().make {
-        Make::Motion(make) => {
-            let registration = Registration { origin_mm: [20.0, 15.0], rotation_deg: 3.0 };
-            let before = TipState { tip_mm: [24.0, 22.0, -0.3], registration, surface_mm: 0.1 };
-            let (mut motion, mut tip) = (make(values), before);
-            for k in 0..6 {
-                // Up to the place, from both sides.
-                let aside_mm = 0.3 * (f64::from(5 - k) * 1.3).sin();
-                tip = TipState { tip_mm: before.tip_mm.map(|tip_mm| tip_mm + aside_mm), ..before };
-                motion.place(history(k).0, &mut tip);
-            }
-            if let Some(parameter) = by {
-                let shift = motion.slope(parameter, base, &before)?;
-                let [x, y] = shift.position_mm;
-                return Some(vec![x, y, shift.rotation_deg, shift.depth_mm]);
-            }
-            let Contact { position_mm: [x, y], rotation_deg, depth_mm, .. } = tip.contact(CYLINDER);
-            Some(vec![x, y, rotation_deg, depth_mm])
-        }
-        Make::Contact(_) => by.is_none().then_some(slope),
-        Make::Covering(make) => {
-            let mut covering = make(values);
-            let (mut before, mut signal) = (Vec::new(), Vec::new());
-            for k in 0..6 {
-                let (now, input) = history(k);
-                (before, signal) = (input.clone(), input);
-                // Ever more slowly down to the contact.
-                let depth_mm = contact.depth_mm - 0.3 / f64::from(k + 1) + 0.05;
-                covering.signal(now, &Contact { depth_mm, ..contact.clone() }, &mut signal);
-            }
-            let Some(parameter) = by else { return Some(signal) };
-            covering.slope(parameter, base, &contact, &before, &mut slope).then_some(slope)
-        }
-        Make::Element(make) => {
-            let (element, (_, input), (_, mut signal)) = (make(values), history(1), history(2));
-            let Some(parameter) = by else {
-                element.signal(base, &input, &mut signal);
-                return Some(signal);
-            };
-            element.slope(parameter, base, &input, &signal, &mut slope).then_some(slope)
-        }
-        Make::Readout(make) => {
-            let (mut readout, mut counts) = (make(values), Vec::new());
-            for k in 0..6 {
-                let (now, input) = history(k);
-                counts = input;
-                readout.counts(now, &mut counts);
-            }
-            let Some(parameter) = by else { return Some(counts) };
-            readout.slope(parameter, &mut slope).then_some(slope)
-        }
-    }
 }

@@ -59,19 +59,6 @@ impl OnElement for Crosstalk {
             *u += added;
         }
     }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        base: BaseModel<'_>,
-        _: &[f64],
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        let Some(sum) = SUMS.get(parameter) else { return false };
-        slope_mm.copy_from_slice(&sum(base.model.array().cols(), before_mm));
-        true
-    }
 }
 
 /// For every element the sum over some others; the first argument is the number of columns.

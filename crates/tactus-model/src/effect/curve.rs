@@ -29,26 +29,6 @@ impl<const K: usize> Curve<K> {
         (1.0 - share) * self.knot(before) + share * self.knot(before + 1)
     }
 
-    /// Derivative of its value by the knot of an index, of 0 to `K - 1`.
-    pub(super) fn by_knot(&self, index: usize, t_s: f64) -> f64 {
-        let (before, share) = self.place(t_s);
-        if index == before {
-            share
-        } else if index + 1 == before {
-            1.0 - share
-        } else {
-            0.0
-        }
-    }
-
-    /// Derivative of its value by the duration, per s.
-    pub(super) fn by_duration(&self, t_s: f64) -> f64 {
-        let (before, _) = self.place(t_s);
-        let is_over = before == K;
-        let rise = if is_over { 0.0 } else { self.knot(before + 1) - self.knot(before) };
-        -rise * K as f64 * t_s / self.duration_s.powi(2)
-    }
-
     /// The knot before, of 0 to `K`, and how far on to the next.
     #[expect(
         clippy::cast_possible_truncation,

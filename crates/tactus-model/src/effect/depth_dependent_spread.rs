@@ -10,7 +10,7 @@
 //!
 //! The volume is conserved: the peak falls as the width grows.
 //!
-//! No derivative in closed form. Cost: one image.
+//! Cost: one image.
 //!
 //! # Source
 //! The paper's Sec. 3 and Fig. 5a measure sigma at three depths under each covering and fit all with one line in

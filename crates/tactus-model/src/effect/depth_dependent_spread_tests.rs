@@ -1,4 +1,4 @@
-use crate::effect::bench::{assert_slopes, effect, fine, still, upon};
+use crate::effect::bench::{effect, fine, still, upon};
 
 #[test]
 fn a_deeper_point_is_spread_wider() {
@@ -19,9 +19,4 @@ fn a_press_through_the_covering_is_as_wide_as_at_its_foot() {
     let one = fine(effect("depth-dependent-spread", [("growth_share", 0.5)]));
     let (foot, beyond) = (still(&one, upon(&one, 0, 1.016)), still(&one, upon(&one, 0, 1.5)));
     assert!(foot.iter().zip(beyond).all(|(foot, beyond)| (foot - beyond).abs() < 1e-9));
-}
-
-#[test]
-fn there_is_no_closed_form_of_the_derivative() {
-    assert_slopes(&effect("depth-dependent-spread", [("growth_share", 0.3)]), &[]);
 }

@@ -14,7 +14,7 @@
 //! the line in the middle of x, where the paper's two sensors meet. A factor that depends on the element's own place would be
 //! part of its sensitivity.
 //!
-//! Derivatives in closed form. Cost: none.
+//! Cost: none.
 //!
 //! # Source
 //! The paper's Fig. 1: two sensors side by side. The disturbance of an edge dies away exponentially within about a
@@ -53,30 +53,6 @@ impl OnCovering for EdgeEffect {
         for u in signal_mm {
             *u *= 1.0 + added;
         }
-    }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        base: BaseModel<'_>,
-        contact: &Contact,
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        let nearness = self.nearness(base, contact);
-        let by_reach = |place: usize| {
-            let distance_mm = distances_mm(base, contact)[place];
-            self.shares[place] * nearness[place] * distance_mm / self.reach_mm.powi(2)
-        };
-        let factor = match parameter {
-            0 | 1 => nearness[parameter],
-            2 => by_reach(0) + by_reach(1),
-            _ => return false,
-        };
-        for (slope, u) in slope_mm.iter_mut().zip(before_mm) {
-            *slope = u * factor;
-        }
-        true
     }
 }
 

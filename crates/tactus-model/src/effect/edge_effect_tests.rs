@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, linear, still};
+use crate::effect::bench::{effect, linear, still};
 
 fn edge(edge_share: f64, seam_share: f64, reach_mm: f64) -> Effect {
     effect("edge-effect", [("edge_share", edge_share), ("seam_share", seam_share), ("reach_mm", reach_mm)])
@@ -24,9 +24,4 @@ fn all_elements_gain_by_the_tools_distance_from_edge_and_seam() {
             assert!((with / without - want).abs() < 1e-9, "at {at_mm:?}: {} {want}", with / without);
         }
     }
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    assert_slopes(&edge(-0.2, 0.3, 2.5), &["edge_share", "seam_share", "reach_mm"]);
 }

@@ -14,7 +14,7 @@
 //! The curve starts at 0, since the gain there is the base model's. Least squares leave 10 % of the variance of a random walk.
 //! `T_0` is the first known temperature; without one, temperature has no effect.
 //!
-//! Derivatives in closed form. Cost: none.
+//! Cost: none.
 //!
 //! # Source
 //! Sensitivity drift of an instrument: A. S. Morris and R. Langari, *Measurement and Instrumentation* (2012),
@@ -80,19 +80,6 @@ impl OnReadout for GainDrift {
         for (count, rise) in counts.iter_mut().zip(&self.rise_counts) {
             *count += rise * gain;
         }
-    }
-
-    fn slope(&self, parameter: usize, slope_counts: &mut [f64]) -> bool {
-        let by = match parameter {
-            0 => self.warmer_k,
-            1 => self.gain.by_duration(self.t_s),
-            2..=7 => self.gain.by_knot(parameter - 2, self.t_s),
-            _ => return false,
-        };
-        for (slope, rise) in slope_counts.iter_mut().zip(&self.rise_counts) {
-            *slope = rise * by;
-        }
-        true
     }
 
     fn reset(&mut self) {

@@ -24,7 +24,7 @@
 //! With a free gain, an `own_share` of 0 and depths to 0.6 mm it follows the elastic laws `exp(a depth) - 1` (`a` from 1 to 6
 //! per mm) and `depth^p` (`p` from 1.2 to 2) within 0.5 % rms of the greatest response, and `depth^3` within 2 %.
 //!
-//! Derivatives in closed form, but for knots. Cost: a power for each element.
+//! Cost: a power for each element.
 //!
 //! # Source
 //! The paper's Sec. 6: at large deformation the response grows nonlinearly by elastic hardening. The first odd term
@@ -75,32 +75,6 @@ impl OnCovering for Hardening {
         for u in signal_mm {
             *u *= 1.0 + self.growth.at(self.argument_mm(depth_mm, *u));
         }
-    }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        base: BaseModel<'_>,
-        contact: &Contact,
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        let Growth::Power { at_1_mm, exponent } = self.growth else { return false };
-        if parameter > 2 {
-            return false;
-        }
-        let depth_mm = depth_mm(base, contact);
-        for (slope, u) in slope_mm.iter_mut().zip(before_mm) {
-            let argument_mm = self.argument_mm(depth_mm, *u);
-            let power = argument_mm.powf(exponent);
-            *slope = u * match parameter {
-                0 => power,
-                _ if argument_mm == 0.0 => 0.0,
-                1 => at_1_mm * power * argument_mm.ln(),
-                _ => at_1_mm * exponent * power / argument_mm * (u.max(0.0) - depth_mm),
-            };
-        }
-        true
     }
 }
 

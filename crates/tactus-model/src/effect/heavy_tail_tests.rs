@@ -1,4 +1,4 @@
-use crate::effect::bench::{assert_slopes, effect, fine, model, simulator, still, upon};
+use crate::effect::bench::{effect, fine, model, simulator, still, upon};
 use crate::{Array, Blur, Covering, ForwardModel, Psf, Response};
 
 fn tail(tail_share: f64, width_ratio: f64) -> crate::Effect {
@@ -53,9 +53,4 @@ fn a_wide_tail_takes_from_the_peak_what_blur_says() {
     let sigma_mm = Psf::PAPER.sigma_mm(Covering { thickness_mm: 1.016 });
     let want = 0.75 + 0.25 * share(3.0 * sigma_mm) / share(sigma_mm);
     assert!((rise(&wide) / rise(&plain) / want - 1.0).abs() < 0.005);
-}
-
-#[test]
-fn there_is_no_closed_form_of_the_derivatives() {
-    assert_slopes(&tail(0.2, 2.0), &[]);
 }

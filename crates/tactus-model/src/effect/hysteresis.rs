@@ -37,7 +37,7 @@
 //! | the same of stops, 0.1 mm | 0.98 |
 //! | Preisach, Gaussian of 0.1 and 0.25 mm, and even density | 0.79, 0.96, 0.97 |
 //!
-//! Derivatives in closed form, with memory, but for `by_depth` and knots. Cost: two comparisons for each play of each
+//! Cost: two comparisons for each play of each
 //! element.
 //!
 //! # Source
@@ -111,35 +111,6 @@ impl OnCovering for Hysteresis {
             let lost = self.loss_share * mean(&self.kinds, plays, |play| play.held_mm - load_mm);
             *u = left(*u, of_own(self.by_depth, *u, load_mm) * lost);
         }
-    }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        base: BaseModel<'_>,
-        contact: &Contact,
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        if parameter > 2 || self.is_free {
-            return false;
-        }
-        let mean = |plays: &[Play], of: fn(&Play) -> f64| mean(&self.kinds, plays, of);
-        let depth_mm = contact.depth_mm.clamp(0.0, base.covering.thickness_mm);
-        for ((slope, u), plays) in
-            slope_mm.iter_mut().zip(before_mm).zip(self.plays.chunks_exact(self.kinds.len()))
-        {
-            let load_mm = (1.0 - self.by_depth) * u.max(0.0) + self.by_depth * depth_mm;
-            let of_own = of_own(self.by_depth, *u, load_mm);
-            let lost = of_own * (mean(plays, |play| play.held_mm) - load_mm);
-            *slope = match parameter {
-                _ if u - self.loss_share * lost < u.min(0.0) => 0.0,
-                0 => -lost,
-                1 => -self.loss_share * of_own * mean(plays, |play| play.by_threshold),
-                _ => -self.loss_share * of_own * mean(plays, |play| play.by_growth),
-            };
-        }
-        true
     }
 
     fn reset(&mut self) {

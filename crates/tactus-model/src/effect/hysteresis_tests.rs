@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, free, signals_mm};
+use crate::effect::bench::{effect, free, signals_mm};
 
 fn lossy(loss_share: f64, threshold_mm: f64) -> Effect {
     growing(loss_share, threshold_mm, 0.0)
@@ -109,9 +109,4 @@ fn a_loop_encloses_the_area_of_its_plays() {
     let want =
         [0.0125, 0.0375, 0.0625, 0.1].map(|r: f64| 0.3 * 2.0 * r * (0.4 - 2.0 * r)).iter().sum::<f64>() / 4.0;
     assert!((area - want).abs() < 1e-4 * want, "{area} {want}");
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    assert_slopes(&growing(0.3, 0.7, 0.2), &["loss_share", "threshold_mm", "threshold_growth"]);
 }

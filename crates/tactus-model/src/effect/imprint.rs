@@ -22,7 +22,7 @@
 //! ratios it follows power laws and series, as `relaxation` does. The dent adds to lighter presses. A press as deep as the one
 //! before shows nothing of it, since `m_k` is then `u`.
 //!
-//! Derivatives in closed form, with memory, but for knots. Cost: three exponentials a moment, or one for each knot.
+//! Cost: three exponentials a moment, or one for each knot.
 //!
 //! # Source
 //! Compression set of rubber, as ISO 815 measures it; the Kelvin-Voigt element's recovery, J. D. Ferry, *Viscoelastic
@@ -92,31 +92,6 @@ impl OnCovering for Imprint {
             }
             *u += self.set_share * (left_mm(dents) - u.max(0.0));
         }
-    }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        _: BaseModel<'_>,
-        _: &Contact,
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        if parameter > 2 {
-            return false;
-        }
-        let recoveries_s = self.recoveries_s();
-        for ((slope, u), dents) in slope_mm.iter_mut().zip(before_mm).zip(&self.dents) {
-            // By the logarithm of either recovery.
-            let [short, middle, long] =
-                std::array::from_fn(|k| self.set_share * dents[k].left_mm * dents[k].age_s / recoveries_s[k]);
-            *slope = match parameter {
-                0 => left_mm(dents) - u.max(0.0),
-                1 => mean([short, middle, long]) / self.recovery_s,
-                _ => mean([-short, 0.0, long]) / self.spread_ratio,
-            };
-        }
-        true
     }
 
     fn reset(&mut self) {

@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, free, signals_mm};
+use crate::effect::bench::{effect, free, signals_mm};
 
 fn dented(recovery_s: f64) -> Effect {
     dented_for(recovery_s, 1.0)
@@ -63,9 +63,4 @@ fn the_formula_is_three_of_many_recoveries() {
     let weights = (one.definition().curve.as_ref().unwrap().formula)(one.values(), &at_s);
     let depths = [(0.0, 0.6), (2.0, 0.1), (7.0, -1.0), (9.0, 0.2), (90.0, -1.0)];
     assert_near(signals_mm(&free("imprint", [], &at_s, &weights), depths), signals_mm(&one, depths));
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    assert_slopes(&dented_for(5.0, 1.5), &["set_share", "recovery_s", "spread_ratio"]);
 }

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use crate::effect::bench::{CYLINDER, assert_slopes, effect, simulator, still, upon};
+use crate::effect::bench::{CYLINDER, effect, simulator, still, upon};
 use crate::{Indenter, Mesh};
 
 fn square(side_mm: f64) -> Indenter {
@@ -34,9 +34,4 @@ fn a_small_flat_tool_gives_a_signal_in_proportion_to_its_area() {
     // Far off, where the response is linear and the spread is the same over the tool.
     let rise = |one: &_| still(one, upon(&plain, 21, 0.4))[23] - 100.0;
     assert!((rise(&wide) / rise(&plain) / 1.44 - 1.0).abs() < 0.02);
-}
-
-#[test]
-fn there_is_no_closed_form_of_the_derivative() {
-    assert_slopes(&effect("indenter-size", [("ratio", 1.1)]), &[]);
 }

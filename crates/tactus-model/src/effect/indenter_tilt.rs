@@ -16,7 +16,7 @@
 //! lowest point, which finds the surface in a touch. The effect acts on tools with a flat face and on meshes, not on spheres and
 //! cones.
 //!
-//! No derivative in closed form. Cost: one image, in four to five times its time.
+//! Cost: one image, in four to five times its time.
 //!
 //! # Source
 //! A rigid flat punch that is turned about an axis in the plane: K. L. Johnson, *Contact Mechanics* (1985).

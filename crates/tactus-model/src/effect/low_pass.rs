@@ -39,14 +39,6 @@ impl OnReadout for LowPass {
         counts.copy_from_slice(self.lag.output());
     }
 
-    fn slope(&self, parameter: usize, slope_counts: &mut [f64]) -> bool {
-        let known = parameter == 0 && self.lag.has_begun();
-        if known {
-            slope_counts.copy_from_slice(self.lag.by_tau());
-        }
-        known
-    }
-
     fn reset(&mut self) {
         self.lag.reset();
     }

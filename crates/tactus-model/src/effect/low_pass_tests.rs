@@ -1,6 +1,6 @@
 #![expect(clippy::float_cmp, reason = "these values are exact")]
 
-use crate::effect::bench::{assert_slopes, effect, simulator, upon};
+use crate::effect::bench::{effect, simulator, upon};
 use crate::{Moment, Pipeline};
 
 #[test]
@@ -15,9 +15,4 @@ fn a_jump_is_followed_exponentially_from_a_settled_start() {
         let want = full + (100.0 - full) * (-t_s / 0.2_f64).exp();
         assert!((pipeline.step(Moment::at(t_s), &down)[21] - want).abs() < 1e-9, "after {t_s} s");
     }
-}
-
-#[test]
-fn the_derivative_is_that_of_differences() {
-    assert_slopes(&effect("low-pass", [("time_constant_s", 0.7)]), &["time_constant_s"]);
 }

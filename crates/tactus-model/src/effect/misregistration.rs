@@ -22,7 +22,7 @@
 //! # Source
 //! The paper's Sec. 2.1: two touches near opposite corners define the registration, which inherits their errors.
 
-use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
+use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "misregistration",
@@ -66,33 +66,6 @@ struct Misregistration {
 impl OnMotion for Misregistration {
     fn place(&mut self, _: Now<'_>, tip: &mut TipState) {
         self.displace(tip);
-    }
-
-    fn slope(&self, parameter: usize, _: BaseModel<'_>, before: &TipState) -> Option<Shift> {
-        let mut tip = *before;
-        self.displace(&mut tip);
-        let scale = 1.0 + self.scale_error;
-        let (sin, cos) = tip.registration.rotation_deg.to_radians().sin_cos();
-        let [x, y] = tip.position_mm();
-        let degree = 1.0_f64.to_radians();
-        let along_y_mm = sin * x + cos * y;
-        let widening = degree * (1.0 + self.lean * self.lean);
-        match parameter {
-            0 => Some(Shift { position_mm: [-scale * cos, scale * sin], ..Shift::default() }),
-            1 => Some(Shift {
-                position_mm: [-scale * (sin + self.lean * cos), -scale * (cos - self.lean * sin)],
-                ..Shift::default()
-            }),
-            2 => {
-                Some(Shift { position_mm: [degree * y, -degree * x], rotation_deg: -1.0, ..Shift::default() })
-            }
-            3 => Some(Shift { position_mm: [x / scale, y / scale], ..Shift::default() }),
-            4 => Some(Shift {
-                position_mm: [widening * along_y_mm * cos, -widening * along_y_mm * sin],
-                ..Shift::default()
-            }),
-            _ => None,
-        }
     }
 }
 

@@ -1,5 +1,5 @@
 use crate::Registration;
-use crate::effect::bench::{assert_slopes, effect, simulator, still, upon};
+use crate::effect::bench::{effect, simulator, still, upon};
 
 #[test]
 fn a_shift_and_a_turn_are_those_of_the_registration() {
@@ -51,12 +51,4 @@ fn a_stage_that_is_not_square_goes_along_x_as_it_goes_along_y() {
 fn a_model_file_from_before_it_had_a_squareness_is_one_of_a_square_stage() {
     let named = [("offset_x_mm", 0.3), ("offset_y_mm", -0.2), ("rotation_deg", 1.5), ("scale_error", 0.01)];
     assert_eq!(effect("misregistration", named).value("squareness_deg"), Some(0.0));
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    let names = ["offset_x_mm", "offset_y_mm", "rotation_deg", "scale_error", "squareness_deg"];
-    let values = [0.2, -0.1, 2.0, 0.05, 3.0];
-    let all: [_; 4] = std::array::from_fn(|k| (names[k], values[k]));
-    assert_slopes(&effect("misregistration", all), &names);
 }

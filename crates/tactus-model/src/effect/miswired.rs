@@ -56,25 +56,6 @@ impl OnElement for Miswired {
             *u = self.own_share * *u + self.other_share * other;
         }
     }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        _: BaseModel<'_>,
-        input_mm: &[f64],
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        let of = match parameter {
-            2 => before_mm.get(self.element),
-            3 => input_mm.get(self.answers_for),
-            _ => None,
-        };
-        let (Some(of), Some(_)) = (of, slope_mm.get(self.element)) else { return false };
-        slope_mm.fill(0.0);
-        slope_mm[self.element] = *of;
-        true
-    }
 }
 
 #[expect(

@@ -1,6 +1,6 @@
 #![expect(clippy::float_cmp, reason = "these values are exact")]
 
-use crate::effect::bench::{assert_slopes, effect, simulator, still, upon};
+use crate::effect::bench::{effect, simulator, still, upon};
 use crate::{Effect, Pipeline};
 
 fn wired(element: f64, answers_for: f64, own_share: f64, other_share: f64) -> Effect {
@@ -36,9 +36,4 @@ fn two_elements_that_are_exchanged_each_answer_for_the_other_in_either_order() {
 #[test]
 fn an_element_that_is_not_there_makes_no_pipeline() {
     assert!(Pipeline::new(&simulator([wired(48.0, 0.0, 1.0, 0.0)])).is_err());
-}
-
-#[test]
-fn derivatives_by_the_shares_are_those_of_differences() {
-    assert_slopes(&wired(18.0, 19.0, 0.5, 0.5), &["own_share", "other_share"]);
 }

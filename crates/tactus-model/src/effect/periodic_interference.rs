@@ -15,7 +15,7 @@
 //! may differ. Sine and cosine replace amplitude and phase because they act linearly. A tone above half the frame rate
 //! shows as its alias below it.
 //!
-//! Derivatives in closed form. Cost: a sine and a cosine for each column.
+//! Cost: a sine and a cosine for each column.
 //!
 //! # Source
 //! Pick-up of the mains and its alias under uniform sampling: W. Kester (ed.), *The Data Conversion Handbook* (2005),
@@ -70,21 +70,6 @@ impl OnReadout for PeriodicInterference {
         for (count, tone) in counts.iter_mut().zip(tones.collect::<Vec<_>>().iter().cycle()) {
             *count += tone;
         }
-    }
-
-    fn slope(&self, parameter: usize, slope_counts: &mut [f64]) -> bool {
-        let by_angle = |sin: f64, cos: f64| self.sine_counts * cos - self.cosine_counts * sin;
-        let slope = |(col, sin, cos)| match parameter {
-            0 => sin,
-            1 => cos,
-            2 => by_angle(sin, cos) * TAU * self.t_s,
-            _ => by_angle(sin, cos) * col * 1.0_f64.to_radians(),
-        };
-        let slopes: Vec<f64> = self.columns().map(slope).collect();
-        for (out, slope) in slope_counts.iter_mut().zip(slopes.iter().cycle()) {
-            *out = *slope;
-        }
-        parameter < 4
     }
 }
 

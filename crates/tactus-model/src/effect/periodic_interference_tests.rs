@@ -1,4 +1,4 @@
-use crate::effect::bench::{assert_slopes, effect, simulator, upon};
+use crate::effect::bench::{effect, simulator, upon};
 use crate::{Effect, Moment, Pipeline};
 
 fn tone(sine: f64, cosine: f64, frequency_hz: f64, phase_per_column_deg: f64) -> Effect {
@@ -46,10 +46,4 @@ fn the_mains_show_as_their_alias() {
     for (mains, alias) in mains.iter().flatten().zip(alias.iter().flatten()) {
         assert!((mains - alias).abs() < 1e-9, "{mains} {alias}");
     }
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    let names = ["sine_counts", "cosine_counts", "frequency_hz", "phase_per_column_deg"];
-    assert_slopes(&tone(3.0, -2.0, 0.013, 25.0), &names);
 }

@@ -1,7 +1,7 @@
 #![expect(clippy::float_cmp, reason = "these values are exact")]
 
 use crate::Pipeline;
-use crate::effect::bench::{assert_slopes, effect, simulator};
+use crate::effect::bench::{effect, simulator};
 
 fn read(step_counts: f64, counts: f64, noise_counts: f64) -> f64 {
     let coarse = simulator([effect("quantisation", [("step_counts", step_counts)])]);
@@ -14,9 +14,4 @@ fn readings_come_in_coarse_steps_after_the_noise() {
     assert_eq!(read(4.0, 101.6, 0.5), 104.0);
     assert_eq!(read(4.0, -3.0, 0.0), 0.0);
     assert_eq!(read(4.0, 1e6, 0.0), 4095.0, "the declared converter ends where it did");
-}
-
-#[test]
-fn there_is_no_derivative() {
-    assert_slopes(&effect("quantisation", [("step_counts", 4.0)]), &[]);
 }

@@ -22,7 +22,7 @@
 //! away with the recovery time: with a short one it acts on the way down only, with a long one as long as the tool is in the
 //! covering. It is gone once the tool has left.
 //!
-//! Derivatives in closed form, but for knots. Cost: none.
+//! Cost: none.
 //!
 //! # Source
 //! The strain-rate factor of G. R. Johnson and W. H. Cook, *Proc. 7th Int. Symp. on Ballistics* (1983), with 1 added
@@ -96,29 +96,6 @@ impl OnCovering for RateStiffening {
         for u in signal_mm {
             *u *= factor;
         }
-    }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        _: BaseModel<'_>,
-        _: &Contact,
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        let Some(past) = self.past else { return false };
-        let Growth::Logarithm { share, speed_mm_per_s: v0 } = self.growth else { return false };
-        let v = past.loading_mm_per_s;
-        let factor = match parameter {
-            0 => (v / v0).ln_1p(),
-            1 => -share * v / (v0 * (v0 + v)),
-            2 => share * v * past.age_s / (self.recovery_s.powi(2) * (v0 + v)),
-            _ => return false,
-        };
-        for (slope, u) in slope_mm.iter_mut().zip(before_mm) {
-            *slope = u * factor;
-        }
-        true
     }
 
     fn reset(&mut self) {

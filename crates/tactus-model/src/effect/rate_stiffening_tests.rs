@@ -1,5 +1,5 @@
 use crate::Effect;
-use crate::effect::bench::{assert_slopes, effect, free, signals_mm};
+use crate::effect::bench::{effect, free, signals_mm};
 
 fn stiff(recovery_s: f64) -> Effect {
     effect(
@@ -56,9 +56,4 @@ fn knots_give_a_growth_over_the_logarithm_of_the_speed() {
         let [_, got] = signals_mm(&hump, [(0.0, -0.1), (0.6 / mm_per_s, 0.5)]);
         assert_near([got], [0.5 * (1.0 + growth)]);
     }
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    assert_slopes(&stiff(2.0), &["stiffening_share", "speed_mm_per_s", "recovery_s"]);
 }

@@ -35,7 +35,7 @@
 //! | stretched exponential, exponent 0.5 | 0.976 | 0.999 |
 //! | logarithm | 0.957 | 0.998 |
 //!
-//! Derivatives in closed form, with memory, but for knots. Cost: three exponentials a moment, or one for each knot; some operations an element.
+//! Cost: three exponentials a moment, or one for each knot; some operations an element.
 //!
 //! # Source
 //! The generalised Maxwell solid (a Prony series, here of three terms), in stress under prescribed strain: J. D. Ferry,
@@ -112,32 +112,6 @@ impl OnCovering for Relaxation {
                 *u - self.after_release * lost
             };
         }
-    }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        _: BaseModel<'_>,
-        contact: &Contact,
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        let Relaxed::Three { share, lag } = &self.relaxed else { return false };
-        let touches = contact.depth_mm > 0.0;
-        let shows = if touches { 1.0 } else { self.after_release };
-        for (element, (slope, u)) in slope_mm.iter_mut().zip(before_mm).enumerate() {
-            let of_all = match parameter {
-                0 => -lag.output(element),
-                1 => -share * lag.by_tau(element),
-                2 => -share * lag.by_ratio(element),
-                3 if touches => 0.0,
-                3 => -share * lag.output(element) / shows.max(f64::MIN_POSITIVE),
-                _ => return false,
-            };
-            let pulls = touches && left(*u, share * lag.output(element)).is_none();
-            *slope = if pulls { 0.0 } else { shows * of_all };
-        }
-        true
     }
 
     fn reset(&mut self) {

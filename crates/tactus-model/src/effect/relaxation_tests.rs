@@ -1,6 +1,6 @@
 #![expect(clippy::float_cmp, reason = "these values are exact")]
 
-use crate::effect::bench::{assert_slopes, free, signals_mm, simulator, upon};
+use crate::effect::bench::{free, signals_mm, simulator, upon};
 use crate::{Effect, Moment, Pipeline, Simulator, Trajectory};
 
 fn relaxing(time_constant_s: f64, spread_ratio: f64) -> Effect {
@@ -116,10 +116,4 @@ fn the_formula_is_three_of_many_times() {
         near(weights[2], 0.15) && near(weights[3], 0.15) && near(weights.iter().sum(), 0.3),
         "{weights:?}"
     );
-}
-
-#[test]
-fn derivatives_are_those_of_differences() {
-    let shown = relaxing(0.8, 3.0).with("after_release", 0.4).unwrap();
-    assert_slopes(&shown, &["relaxed_share", "time_constant_s", "spread_ratio", "after_release"]);
 }

@@ -24,7 +24,7 @@
 //! Other forms that lose up to half of the signal, to 0.6 mm and with a free gain: of what the gain alone leaves, 0.02 %
 //! stays unexplained for tanh, exponential, arctan and logarithm, and 1.1 % for a kink at 0.4 mm.
 //!
-//! Derivatives in closed form, but for knots. Cost: two powers for each element with a signal.
+//! Cost: two powers for each element with a signal.
 //!
 //! # Source
 //! The compression of an amplifier: C. Rapp, *Effects of HPA-Nonlinearity on a 4-DPSK/OFDM-Signal* (1991).
@@ -73,25 +73,6 @@ impl OnElement for Saturation {
                 *u *= self.bend(*u).powf(-1.0 / self.knee);
             }
         }
-    }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        _: BaseModel<'_>,
-        _: &[f64],
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        let by = match parameter {
-            0 => Self::by_loss,
-            1 => Self::by_knee,
-            _ => return false,
-        };
-        for (slope, u) in slope_mm.iter_mut().zip(before_mm) {
-            *slope = if *u > 0.0 { by(self, *u) } else { 0.0 };
-        }
-        true
     }
 }
 

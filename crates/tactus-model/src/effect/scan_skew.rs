@@ -15,7 +15,7 @@
 //! first. On average the elements are late by half a scan, which is also a `time-lag`; but here the first ones are later than
 //! the last.
 //!
-//! Derivatives in closed form. Cost: a short history, as long as a scan.
+//! Cost: a short history, as long as a scan.
 //!
 //! # Source
 //! Sequential sampling of a multiplexed converter: W. Kester (ed.), *The Data Conversion Handbook* (2005).
@@ -78,14 +78,6 @@ impl OnReadout for ScanSkew {
                 slopes.push(-places * per_s);
             }
         }
-    }
-
-    fn slope(&self, parameter: usize, slope_counts: &mut [f64]) -> bool {
-        let Some(slopes) = self.slope_counts.get(parameter).filter(|slopes| !slopes.is_empty()) else {
-            return false;
-        };
-        slope_counts.copy_from_slice(slopes);
-        true
     }
 
     fn reset(&mut self) {

@@ -19,7 +19,7 @@
 //! Each element has its own past. A first loading follows the base model, and so does loading beyond the greatest signal so
 //! far. Below that, unloading and every later press follow the same weaker curve. The covering does not recover.
 //!
-//! Derivatives in closed form, but for knots. Cost: an error function for each element.
+//! Cost: an error function for each element.
 //!
 //! # Source
 //! The Mullins effect in the pseudo-elastic form of R. W. Ogden and D. G. Roxburgh, *Proc. R. Soc. Lond. A* 455 (1999),
@@ -75,28 +75,6 @@ impl OnCovering for Softening {
             let below = widths_below(*u, *greatest_mm, self.width_share);
             *u *= 1.0 - self.softened_share * erf(below);
         }
-    }
-
-    fn slope(
-        &self,
-        parameter: usize,
-        _: BaseModel<'_>,
-        _: &Contact,
-        before_mm: &[f64],
-        slope_mm: &mut [f64],
-    ) -> bool {
-        if parameter > 1 {
-            return false;
-        }
-        for ((slope, u), greatest_mm) in slope_mm.iter_mut().zip(before_mm).zip(&self.greatest_mm) {
-            let z = widths_below(*u, *greatest_mm, self.width_share);
-            *slope = if parameter == 0 {
-                -u * erf(z)
-            } else {
-                u * self.softened_share * FRAC_2_SQRT_PI * (-z * z).exp() * z / self.width_share
-            };
-        }
-        true
     }
 
     fn reset(&mut self) {

@@ -37,17 +37,6 @@ pub struct TipState {
     pub surface_mm: f64,
 }
 
-/// Derivative of a contact by a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Shift {
-    /// Of the tool's axis, sensor frame.
-    pub position_mm: [f64; 2],
-    /// Of the tool's rotation.
-    pub rotation_deg: f64,
-    /// Of its depth.
-    pub depth_mm: f64,
-}
-
 /// A contact and how the covering spreads it; what the elements measure is the weighted sum of all loads.
 ///
 /// The spread conserves volume: a load with another width has the same volume.
@@ -72,11 +61,6 @@ pub trait OnMotion: Debug + Send + Sync {
 
     /// Changes the position of the tip, the registration or the surface.
     fn place(&mut self, _now: Now<'_>, _tip: &mut TipState) {}
-
-    /// Derivative of the contact by the parameter of an index; `before` is what [`OnMotion::place`] was last given.
-    fn slope(&self, _parameter: usize, _base: BaseModel<'_>, _before: &TipState) -> Option<Shift> {
-        None
-    }
 
     /// Forgets the past.
     fn reset(&mut self) {}
@@ -108,19 +92,6 @@ pub trait OnCovering: Debug + Send + Sync {
     /// Changes the signal that reaches the elements: equivalent indentations in mm, row-major.
     fn signal(&mut self, _now: Now<'_>, _contact: &Contact, _signal_mm: &mut [f64]) {}
 
-    /// Derivative of what [`OnCovering::signal`] last gave by the parameter of an index, at the input `before`, in
-    /// mm per unit. False, and `slope_mm` as it was, where there is no closed form.
-    fn slope(
-        &self,
-        _parameter: usize,
-        _base: BaseModel<'_>,
-        _contact: &Contact,
-        _before_mm: &[f64],
-        _slope_mm: &mut [f64],
-    ) -> bool {
-        false
-    }
-
     /// Forgets the past.
     fn reset(&mut self) {}
 }
@@ -133,19 +104,6 @@ pub trait OnElement: Debug + Send + Sync {
 
     /// Changes counts after the response.
     fn counts(&self, _base: BaseModel<'_>, _counts: &mut [f64]) {}
-
-    /// Derivative of what [`OnElement::signal`] gives by the parameter of an index, at the input `before`, in mm
-    /// per unit. False, and `slope_mm` as it was, where there is no closed form.
-    fn slope(
-        &self,
-        _parameter: usize,
-        _base: BaseModel<'_>,
-        _input_mm: &[f64],
-        _before_mm: &[f64],
-        _slope_mm: &mut [f64],
-    ) -> bool {
-        false
-    }
 }
 
 /// An effect in the readout.
@@ -156,12 +114,6 @@ pub trait OnReadout: Debug + Send + Sync {
     /// Changes a noisy reading before the converter.
     fn convert(&self, counts: f64) -> f64 {
         counts
-    }
-
-    /// Derivative of what [`OnReadout::counts`] last gave by the parameter of an index, in counts per unit. False,
-    /// and `slope_counts` as it was, where there is no closed form.
-    fn slope(&self, _parameter: usize, _slope_counts: &mut [f64]) -> bool {
-        false
     }
 
     /// Forgets the past.

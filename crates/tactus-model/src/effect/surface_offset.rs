@@ -13,7 +13,7 @@
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
-use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
+use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-offset",
@@ -33,10 +33,6 @@ struct SurfaceOffset {
 impl OnMotion for SurfaceOffset {
     fn place(&mut self, _: Now<'_>, tip: &mut TipState) {
         tip.surface_mm += self.offset_mm;
-    }
-
-    fn slope(&self, parameter: usize, _: BaseModel<'_>, _: &TipState) -> Option<Shift> {
-        (parameter == 0).then_some(Shift { depth_mm: 1.0, ..Shift::default() })
     }
 }
 

@@ -1,6 +1,6 @@
 #![expect(clippy::float_cmp, reason = "these values are exact")]
 
-use crate::effect::bench::{assert_slopes, effect, simulator, still, upon};
+use crate::effect::bench::{effect, simulator, still, upon};
 
 #[test]
 fn a_surface_that_stands_higher_is_pressed_deeper() {
@@ -9,9 +9,4 @@ fn a_surface_that_stands_higher_is_pressed_deeper() {
     assert_eq!(still(&higher, at), still(&simulator([]), deeper));
     let lower = simulator([effect("surface-offset", [("offset_mm", -0.25)])]);
     assert!(still(&lower, at).iter().all(|counts| *counts == 100.0), "a threshold of contact");
-}
-
-#[test]
-fn the_derivative_is_that_of_differences() {
-    assert_slopes(&effect("surface-offset", [("offset_mm", 0.1)]), &["offset_mm"]);
 }

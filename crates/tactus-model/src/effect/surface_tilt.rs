@@ -17,7 +17,7 @@
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
-use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, Shift, TipState};
+use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-tilt",
@@ -52,16 +52,6 @@ impl OnMotion for SurfaceTilt {
         {
             tip.surface_mm += slope * (from_mm - touched_mm);
         }
-    }
-
-    fn slope(&self, parameter: usize, base: BaseModel<'_>, before: &TipState) -> Option<Shift> {
-        let from_middle_mm = from_middle_mm(base, before);
-        let depth_mm = match parameter {
-            0 | 1 => from_middle_mm[parameter] - self.touched_mm[parameter],
-            2 | 3 => -self.slope_mm_per_mm[parameter - 2],
-            _ => return None,
-        };
-        Some(Shift { depth_mm, ..Shift::default() })
     }
 }
 

@@ -11,7 +11,7 @@
 //! The path is looked up at another instant. A negative lag needs a path that knows its future. Where positions arrive one by
 //! one, a [`Trail`](crate::Trail) of them is the path.
 //!
-//! No derivative: it would need the tip's velocity, which only the path knows. Cost: none.
+//! Cost: none.
 //!
 //! # Source
 //! Transport delay, the factor `exp(-s lag)` of a linear system: K. J. Astrom and R. M. Murray, *Feedback Systems*

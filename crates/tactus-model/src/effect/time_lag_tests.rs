@@ -1,4 +1,4 @@
-use crate::effect::bench::{assert_slopes, effect, simulator, still, upon};
+use crate::effect::bench::{effect, simulator, still, upon};
 use crate::{Moment, Pipeline, Trail, Trajectory};
 
 #[test]
@@ -25,9 +25,4 @@ fn a_device_that_knows_no_future_is_late_by_its_trail() {
     }
     let want = still(&simulator([]), upon(&late, 21, depth_mm(0.9)));
     assert!((pipeline.counts()[21] - want[21]).abs() < 1e-9);
-}
-
-#[test]
-fn there_is_no_derivative_without_the_path() {
-    assert_slopes(&effect("time-lag", [("lag_s", 0.1)]), &[]);
 }
