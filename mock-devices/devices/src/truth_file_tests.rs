@@ -97,6 +97,23 @@ fn pressed(truth: &Truth, covering: Covering, [x_mm, y_mm]: &[f64; 2]) -> Vec<f6
 }
 
 #[test]
+fn a_model_with_knots_is_what_the_devices_hide() {
+    let rig = sim_rig();
+    let knots = with(
+        "[[effect]]\nname = \"hardening\"\nparameters = { own_share = 0 }\nknots = { at_mm = [0.2], growth = [0.5] }",
+    );
+    let [plain, hard] = [DIGITACTS, &knots].map(|text| {
+        let truth = TruthFile::from_toml(text).unwrap().behind(&rig, 1).unwrap();
+        pressed(&truth, rig.covering, &rig.registration.to_robot([5.0, 5.0]))
+    });
+    // Deeper than the only knot all elements rise by half as much again.
+    for (hard, plain) in hard.iter().zip(&plain) {
+        assert!((hard - 100.0 - 1.5 * (plain - 100.0)).abs() < 1e-9, "{hard} {plain}");
+    }
+    assert!(plain.iter().any(|counts| *counts > 150.0), "pressed: {plain:?}");
+}
+
+#[test]
 fn wrong_physics_is_refused_with_the_entry_and_what_would_be_right() {
     let wrong = |from: &str, to: &str| refused(&RELAXING.replace(from, to));
     assert_eq!(

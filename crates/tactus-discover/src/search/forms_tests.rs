@@ -5,17 +5,22 @@ use tactus_model::Effect;
 use tactus_model::effect::{Definition, Knots};
 
 use crate::fixtures::{ELEMENTS, found, known, measured};
-use crate::{Discovery, FittedKnot};
+use crate::{Discovery, FittedKnot, Known, Verdict};
 
 const NOISE_COUNTS: f64 = 2.0;
 
 /// What discovery finds in presses of a sensor with an effect and white noise.
 fn discovered(effect: Effect) -> Discovery {
+    discovered_by(&known(), effect)
+}
+
+/// What it finds with a model that may have effects already.
+fn discovered_by(model: &Known, effect: Effect) -> Discovery {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let noise: Vec<Vec<f64>> =
         (0..30 * ELEMENTS).map(|_| (0..ELEMENTS).map(|_| NOISE_COUNTS * normal()).collect()).collect();
-    found(&known(), &measured(&known(), &[effect], &noise))
+    found(model, &measured(&known(), &[effect], &noise))
 }
 
 fn free(name: &str, parameters: &[(&str, f64)], at: Vec<f64>, value: impl Fn(f64) -> f64) -> Effect {
@@ -66,4 +71,21 @@ fn what_the_formula_explains_keeps_it() {
             assert!(step.curve.is_none(), "{name}: {step:?}");
         }
     }
+}
+
+#[test]
+fn knots_of_a_known_effect_are_fitted_again() {
+    let layer = |growth: f64| {
+        let growth = move |at_mm: f64| if at_mm < 0.25 { 0.0 } else { growth };
+        free("hardening", &[("own_share", 0.0)], vec![0.2, 0.3, 0.5], growth)
+    };
+    let model = Known { effects: vec![layer(0.3)], ..known() };
+    let found = discovered_by(&model, layer(0.5));
+    assert_eq!((found.verdict, found.steps.len()), (Verdict::NothingMissing, 0));
+    let [effect] = &found.effects[..] else { panic!("{:?}", found.effects) };
+    let knots = effect.knots().unwrap();
+    // The elements' gains may take a factor of all depths.
+    let ratio = (1.0 + knots.values[2]) / (1.0 + knots.values[0]);
+    assert!((ratio - 1.5).abs() < 0.01, "{knots:?}");
+    assert_eq!(knots.at, [0.2, 0.3, 0.5]);
 }
