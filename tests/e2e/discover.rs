@@ -289,6 +289,23 @@ fn nothing_is_missing_of_a_rig_that_hides_nothing() {
     assert_eq!(said.json()["verdict"], "nothing-missing", "{}", said.json()["gap"]);
 }
 
+#[test]
+fn active_says_why_it_runs_nothing() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    hide(folder, "hum-sine", 1.0);
+    let recording = diagnosed(folder, &[], "1");
+    let active = ["discover", &recording, "--active", "--embedded", "--rig-file", "rig.toml"];
+    let said = tactus(folder, &active);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let why = "Round 1 of 1 runs nothing: no two explanations are undecided.";
+    assert!(said.out.lines().any(|line| line == why), "{said:?}");
+    let report: Value =
+        serde_json::from_str(&fs::read_to_string(folder.join("discovery/report.json")).unwrap()).unwrap();
+    assert_eq!(report["active_ended"], why);
+    assert!(!folder.join("discovery/runs").exists());
+}
+
 /// The named effects, and those that the data could not distinguish from them.
 fn explanations(run: &Value, when: &str) -> Vec<(String, Vec<String>)> {
     let of = |step: &Value| {
@@ -309,16 +326,44 @@ fn lost_motion_and_hysteresis_are_undecided_by_the_papers_corners_and_decided_by
     let said = tactus(folder, &[&corners[..], &rig].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
     let recording = said.json()["recording"].as_str().unwrap().to_owned();
+    // The lab has a script that fails, and one that goes beyond the envelope.
+    fs::create_dir(folder.join("lab")).unwrap();
+    for (name, step) in [("failing.star", "fail(\"no sample\")"), ("outside.star", "press(90.0, 5.9, [0.3])")]
+    {
+        fs::write(folder.join("lab").join(name), format!("def run(rig):\n    {step}\n")).unwrap();
+    }
     // The seed draws the held-out presses. Of the seeds 1 to 6, one round decides under 1, 2, 5 and 6.
-    let active =
-        ["--json", "discover", &recording, "--active", "--rounds", "1", "--budget-min", "3", "--seed", "1"];
+    let active = [
+        "discover",
+        &recording,
+        "--active",
+        "--rounds",
+        "1",
+        "--budget-min",
+        "3",
+        "--seed",
+        "1",
+        "--experiments",
+        "lab",
+    ];
     let said = tactus(folder, &[&active[..], &rig].concat());
     assert_eq!(said.code, Some(0), "{said:?}");
-    let report = said.json();
+    assert!(said.out.contains("Round 1 of 1:\ntactus run "), "{said:?}");
+    assert!(said.out.contains(": to distinguish backlash from hysteresis, by "), "{said:?}");
+    let report: Value =
+        serde_json::from_str(&fs::read_to_string(folder.join("discovery/report.json")).unwrap()).unwrap();
     let [run] = &report["active"].as_array().unwrap()[..] else { panic!("one run: {}", report["active"]) };
     assert_eq!(explanations(run, "before_equivalent"), [("backlash".into(), vec!["hysteresis".into()])]);
     assert_eq!(explanations(run, "after_equivalent"), [("backlash".into(), vec![])]);
     assert!(run["duration_s"].as_f64().unwrap() < 180.0, "{run}");
+    // The run took as long as its rehearsal.
+    let told = said.out.lines().find(|line| line.starts_with("tactus run ")).unwrap();
+    let [minutes, seconds] = ["min", "s"].map(|unit| {
+        let words: Vec<&str> = told.split_whitespace().collect();
+        let at = words.iter().position(|word| *word == unit).unwrap_or_else(|| panic!("{told}"));
+        words[at - 1].parse::<f64>().unwrap()
+    });
+    assert!((60.0 * minutes + seconds - run["duration_s"].as_f64().unwrap()).abs() < 1.0, "{told}: {run}");
 
     // The run is recorded, and all its presses are within the rig's envelope.
     let runs = fs::read_dir(folder.join("discovery/runs")).unwrap();

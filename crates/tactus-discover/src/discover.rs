@@ -7,6 +7,7 @@ use tactus_model::Effect;
 
 use crate::data::{Bins, DiscoverError, Floor, Frames, Known};
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
+use crate::next::Experiments;
 use crate::search::{Candidate, Formed, Grown, Options, Rule, Search, not_shown};
 use crate::verdict::{BaseModel, Discovery, SearchOutcome, cannot_judge, conclude, confirmed};
 
@@ -19,7 +20,7 @@ pub struct Progress {
     pub share: f64,
 }
 
-/// Finds which effects a model lacks, by the whole protocol.
+/// Finds which effects a model lacks, by the whole protocol. Next experiments are chosen from those of the rig.
 ///
 /// # Errors
 /// [`DiscoverError`] if the data do not suffice, the model is invalid or threads cannot be started.
@@ -27,6 +28,7 @@ pub fn discover(
     known: &Known,
     frames: &Frames,
     options: Options,
+    experiments: &dyn Experiments,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Discovery, DiscoverError> {
     let threads = options.threads.max(1);
@@ -34,20 +36,21 @@ pub fn discover(
         .num_threads(threads)
         .build()
         .map_err(|error| DiscoverError::Threads { threads, reason: error.to_string() })?;
-    pool.install(|| discover_on_threads(known, frames, options, progress))
+    pool.install(|| discover_on_threads(known, frames, options, experiments, progress))
 }
 
 fn discover_on_threads(
     known: &Known,
     frames: &Frames,
     options: Options,
+    experiments: &dyn Experiments,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Discovery, DiscoverError> {
     let reporter = ProgressReport { progress, share: Mutex::new(0.0) };
     reporter.report("recalibrating the base model", 0.02);
     let prepared = Prepared::new(known, frames, options.seed)?;
     if prepared.floor == Floor::None {
-        return cannot_judge(&prepared, options);
+        return cannot_judge(&prepared, options, experiments);
     }
     let problem = prepared.problem();
     let base = prepared.base.clone();
@@ -82,6 +85,7 @@ fn discover_on_threads(
         &search,
         SearchOutcome { lacking, base, confirmed, rounds, equivalent, left, before, after },
         options,
+        experiments,
     )?;
     reporter.report("done", 1.0);
     Ok(told)

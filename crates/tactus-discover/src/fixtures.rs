@@ -1,11 +1,23 @@
 //! Simulated measurements for tests.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Registration, Response};
+use tactus_plan::{Arguments, InThisProcess, Script};
+use tactus_runner::order::{self, RunRequest};
+use tactus_runner::{embedded, experiments, rehearsal};
+use tactus_schema::pb::ExitStatus;
 use tactus_schema::table::{Phase, RowView};
+use tactus_schema::{Rig, WallTime};
 
-use crate::{BaseModel, Discovery, Frames, Known, Options, Rule, discover, predict};
+use crate::{
+    BaseModel, Discovery, Experiments, Frames, Known, Options, Rehearsal, RehearsalOrder, Rule, discover,
+    predict,
+};
 
 pub(crate) const ELEMENTS: usize = 48;
 pub(crate) const INTERVAL_S: f64 = 0.1;
@@ -93,5 +105,71 @@ pub(crate) const OPTIONS: Options =
     Options { seed: 5, threads: 2, rule: Rule::Protocol, tolerance_counts: None };
 
 pub(crate) fn found(known: &Known, frames: &Frames) -> Discovery {
-    discover(known, frames, OPTIONS, &|_| {}).unwrap()
+    discover(known, frames, OPTIONS, &ShippedRig::new(1.0), &|_| {}).unwrap()
+}
+
+/// The shipped simulated rig, with the lab's scripts.
+pub(crate) struct ShippedRig {
+    rig: Rig,
+    names: Vec<String>,
+    scripts: Vec<(&'static str, &'static str)>,
+}
+
+impl ShippedRig {
+    /// With this speed of loading.
+    pub(crate) fn new(load_mm_per_s: f64) -> Self {
+        let mut rig = Rig::from_toml(embedded::SIMULATED_RIG).unwrap();
+        rig.service.as_mut().unwrap().motion.load_speed_mm_per_s = load_mm_per_s;
+        Self { rig, names: Vec::new(), scripts: Vec::new() }
+    }
+
+    /// With scripts: their names and texts.
+    pub(crate) fn with_scripts(self, scripts: &[(&'static str, &'static str)]) -> Self {
+        let names = scripts.iter().map(|(name, _)| (*name).to_owned()).collect();
+        Self { names, scripts: scripts.to_vec(), ..self }
+    }
+
+    fn script(&self, name: &str) -> Result<Script, String> {
+        match self.scripts.iter().find(|(own, _)| *own == name) {
+            Some((_, text)) => {
+                Script::parse(name.trim_end_matches(".star"), text).map_err(|error| error.to_string())
+            }
+            None => experiments::find(name, None).map_err(|error| error.to_string()),
+        }
+    }
+}
+
+impl Experiments for ShippedRig {
+    fn covering_mm(&self) -> f64 {
+        self.rig.covering.thickness_mm
+    }
+
+    fn own(&self) -> &[String] {
+        &self.names
+    }
+
+    fn rehearse(&self, order: RehearsalOrder<'_>) -> Result<Rehearsal, String> {
+        let mut arguments = Arguments::default();
+        for (name, value) in order.parameters {
+            arguments.set(&format!("{name}={value}")).unwrap();
+        }
+        let request = RunRequest {
+            script: self.script(order.experiment)?,
+            arguments,
+            seed: Some(order.seed),
+            who: "test".into(),
+            evaluator: Arc::new(InThisProcess),
+            earlier: None,
+        };
+        let order = order::order(request, &self.rig, WallTime::default(), &|| false).unwrap();
+        let longest = Duration::from_hours(1);
+        let rehearsal = rehearsal::rehearse(&self.rig, BTreeMap::new(), order, longest, &|| false)
+            .map_err(|error| error.to_string())?;
+        if rehearsal.outcome.exit_status != ExitStatus::Done {
+            return Err(rehearsal.outcome.message);
+        }
+        let mut frames = Frames::new(self.rig.array.elements());
+        rehearsal.visit(|row| frames.push(row)).unwrap();
+        Ok(Rehearsal { frames, duration_s: rehearsal.outcome.duration_s })
+    }
 }

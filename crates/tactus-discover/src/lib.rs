@@ -17,7 +17,9 @@ mod verdict;
 pub use data::{DiscoverError, Floor, Frames, Known};
 pub use discover::{Progress, discover, predict};
 pub use fit::RunWalks;
-pub use next::NextExperiment;
+pub use next::{
+    Experiments, LeftOut, NextExperiment, OpenQuestion, Plan, Rehearsal, RehearsalOrder, WORTH_Z,
+};
 pub use search::{Curve, Gap, NotShown, Options, Point, Round, Rule, TriedEffect};
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 pub use verdict::{

@@ -1,6 +1,7 @@
 //! The next experiment: which one would distinguish two explanations that the data do not.
 //!
-//! Each explanation predicts the frames of every experiment that the rig could make ([`design`]). The difference of the two
+//! Each experiment of the [`catalogue`] is rehearsed: its own script tells when and where the tip would be ([`Experiments`]). Those
+//! beyond the [`reach`] of the data are left out. Each explanation predicts the frames of the others. The difference of the two
 //! predictions counts only as far as a fit of the wrong explanation, with its gains, baselines, spread and effects free,
 //! cannot reproduce it:
 //!
@@ -11,35 +12,28 @@
 //! Either explanation may be the wrong one, so the smaller `z` of the two is taken. The fit uses only the new frames; with
 //! the old data the distinction is no worse. Real physics has neither form exactly, so a wrong explanation must also leave a
 //! good share of the gap in old and new frames together. The experiment with the greatest share comes first. Experiments
-//! that an effect's definition names as showing it come before all others.
+//! that an effect's definition names as showing it, and the lab's own, come before all others.
 //!
 //! # Source
 //! Designs that discriminate between models: A. C. Atkinson and V. V. Fedorov, *Biometrika* 62 (1975) 57 (T-optimality).
 
-mod design;
+mod catalogue;
+mod experiments;
+mod plan;
+mod reach;
+mod rehearsals;
 
+use tactus_calibrate::FaultyElement;
 use tactus_model::effect::{Definition, ParameterKind};
 
 use crate::data::{Bins, DiscoverError, Frames, HeldOut, Known, Noise};
 use crate::fit::{Direction, Free, Parameters, Predictor, Problem, Term};
 use crate::numbers::parallel;
 use crate::search::NotShown;
-use design::{Design, DesignSpace};
-
-/// An experiment that would distinguish two explanations.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NextExperiment {
-    /// Name of the experiment for `tactus run`.
-    pub experiment: &'static str,
-    /// Its parameters and their values for `tactus run --param`.
-    pub parameters: Vec<(&'static str, String)>,
-    /// Approximate duration on the rig.
-    pub duration_s: f64,
-    /// The two explanations.
-    pub separates: [String; 2],
-    /// By how many standard errors their predictions would differ; `None` if that cannot be predicted.
-    pub expected_z: Option<f64>,
-}
+use catalogue::{Candidate, FLOOR};
+pub use experiments::{Experiments, Rehearsal, RehearsalOrder};
+pub use plan::{LeftOut, NextExperiment, OpenQuestion, Plan, WORTH_Z};
+use rehearsals::{Design, Rehearsals};
 
 /// A model that may explain the data.
 #[derive(Debug, Clone)]
@@ -60,6 +54,17 @@ pub(crate) struct Pair {
     pub(crate) gain: f64,
 }
 
+/// What the data leave open.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Open<'a> {
+    pub(crate) pairs: &'a [Pair],
+    /// Effects that the data cannot show, and the model to which they would be added.
+    pub(crate) not_shown: &'a [NotShown],
+    pub(crate) at: &'a Parameters,
+    /// The data do not suffice for a verdict: repeats are proposed first.
+    pub(crate) lacks_repeats: bool,
+}
+
 /// Expected result of an experiment.
 #[derive(Debug, Clone, Copy)]
 struct Expected {
@@ -68,121 +73,77 @@ struct Expected {
     share: f64,
 }
 
-/// Least `z` of a proposal.
-const WORTH_Z: f64 = 2.0;
 /// Greatest number of proposals for one pair.
 const PROPOSALS_MAX: usize = 3;
 /// Assumed size of an effect that was not shown, as a share of the experiment's largest signal.
 const SMALL_SHARE: f64 = 0.02;
 
-/// Parts of `diagnose` that rest, and that repeat a press.
-const FLOOR_PARTS: [&str; 2] = ["drift", "repeats"];
+/// What rehearsed experiments answer to a question.
+#[derive(Debug)]
+struct Answer {
+    /// Those that are worth their time, best first.
+    next: Vec<NextExperiment>,
+    /// The one with the greatest `z`.
+    best: Option<NextExperiment>,
+}
 
 /// Plans the next experiments from the data and their noise.
 #[derive(Clone, Copy)]
 pub(crate) struct Planner<'a> {
     pub(crate) known: &'a Known,
-    /// The data. No design goes deeper or loads faster than they do.
+    /// The data. No experiment is proposed that goes deeper or loads faster than they do.
     pub(crate) frames: &'a Frames,
     pub(crate) noise: &'a Noise,
+    pub(crate) faulty: &'a [FaultyElement],
+    pub(crate) experiments: &'a dyn Experiments,
+    pub(crate) seed: u64,
 }
 
 impl Planner<'_> {
-    /// For each pair, the experiments that distinguish it: first the one with the greatest share, then shorter ones.
-    pub(crate) fn propose(self, pairs: &[Pair]) -> Result<Vec<NextExperiment>, DiscoverError> {
-        if pairs.is_empty() {
-            return Ok(Vec::new());
+    /// What to measure next: first repeats if they are needed; then what distinguishes each pair, first the experiment with the greatest
+    /// share, then shorter ones; then what shows each effect that the data cannot show, even if it is small.
+    pub(crate) fn plan(self, open: Open<'_>) -> Result<Plan, DiscoverError> {
+        let rehearsals = Rehearsals::of(self);
+        let mut plan = Plan::default();
+        if open.lacks_repeats {
+            plan.next.extend(Self::repeats(&rehearsals));
         }
-        let designs = DesignSpace::of(self.known, self.frames).designs();
-        let mut proposals = Vec::new();
-        for pair in pairs {
+        for pair in open.pairs {
             let separates = pair.of.each_ref().map(|one| one.name.to_owned());
             let [one, other] = pair.of.each_ref().map(|one| Definition::find(one.name));
             let shown_by = [one?.shown_by, other?.shown_by].concat();
-            // Experiments that definitions name for either effect. The linear prediction promises too much of the others.
-            let (own, others): (Vec<&Design>, Vec<&Design>) =
-                designs.iter().partition(|design| shown_by.contains(&design.name));
-            for designs in [own, others] {
-                let best = Self::best(&designs, &separates, |design| self.separation(design, pair))?;
-                if !best.is_empty() {
-                    proposals.extend(best);
-                    break;
-                }
+            // The linear prediction promises too much of what the definitions do not name.
+            let is_first = |one: &Candidate| one.is_own || shown_by.contains(&one.name.as_str());
+            let is_other = |one: &Candidate| !is_first(one) && one.name != FLOOR;
+            let mut answer =
+                rehearsals.answer(&separates, is_first, |design| self.separation(design, pair))?;
+            if answer.next.is_empty() {
+                let other =
+                    rehearsals.answer(&separates, is_other, |design| self.separation(design, pair))?;
+                answer = answer.or(other);
             }
+            plan.take(answer, separates, PROPOSALS_MAX);
         }
-        Ok(proposals)
-    }
-
-    /// For each effect that the data cannot show, an experiment that would show it even if it is small.
-    pub(crate) fn show(
-        self,
-        not_shown: &[NotShown],
-        at: &Parameters,
-    ) -> Result<Vec<NextExperiment>, DiscoverError> {
-        if not_shown.is_empty() {
-            return Ok(Vec::new());
-        }
-        let designs = DesignSpace::of(self.known, self.frames).designs();
-        let mut proposals = Vec::new();
-        for NotShown { effect, .. } in not_shown {
-            let definition = Definition::find(effect)?;
-            let own: Vec<&Design> =
-                designs.iter().filter(|design| definition.shown_by.contains(&design.name)).collect();
+        for NotShown { effect, .. } in open.not_shown {
             let separates = [(*effect).to_owned(), "nothing".to_owned()];
-            let best = Self::best(&own, &separates, |design| self.visibility(design, definition, at))?;
-            proposals.extend(best.into_iter().take(1));
+            let definition = Definition::find(effect)?;
+            let shows = |one: &Candidate| one.is_own || definition.shown_by.contains(&one.name.as_str());
+            let expect = |design: &Design<'_>| self.visibility(design, definition, open.at);
+            plan.take(rehearsals.answer(&separates, shows, expect)?, separates, 1);
         }
-        Ok(proposals)
+        plan.left_out = rehearsals.left_out();
+        Ok(plan)
     }
 
-    /// The experiment that gives data a floor: it rests, and presses one place many times.
-    pub(crate) fn repeats(self) -> NextExperiment {
-        let designs = DesignSpace::of(self.known, self.frames).designs();
-        let of = |name: &str| designs.iter().find(|one| one.name == name && one.is_whole());
-        let parts = FLOOR_PARTS.map(of);
-        let depth = parts.iter().flatten().flat_map(|one| &one.parameters).find(|(key, _)| *key != "parts");
-        NextExperiment {
-            experiment: "diagnose",
-            parameters: [("parts", FLOOR_PARTS.join(","))].into_iter().chain(depth.cloned()).collect(),
-            duration_s: parts.iter().flatten().map(|one| one.duration_s).sum(),
-            separates: ["what is missing".to_owned(), "noise".to_owned()],
-            expected_z: None,
-        }
-    }
-
-    fn best(
-        designs: &[&Design],
-        separates: &[String; 2],
-        expect: impl Fn(&Design) -> Result<Expected, DiscoverError> + Sync,
-    ) -> Result<Vec<NextExperiment>, DiscoverError> {
-        let mut found: Vec<(&Design, Expected)> = Vec::new();
-        let expected = parallel::map(designs, |design| expect(design));
-        for (design, expected) in designs.iter().zip(expected) {
-            found.push((design, expected?));
-        }
-        found.retain(|(_, expected)| expected.z >= WORTH_Z);
-        found.sort_by(|(_, one), (_, other)| {
-            other.share.total_cmp(&one.share).then(other.z.total_cmp(&one.z))
-        });
-        // An experiment with a smaller share must take less time.
-        let mut shortest_s = f64::INFINITY;
-        found.retain(|(design, _)| {
-            let is_shorter = design.duration_s < shortest_s;
-            shortest_s = shortest_s.min(design.duration_s);
-            is_shorter
-        });
-        let proposals = found.into_iter().take(PROPOSALS_MAX).map(|(design, expected)| NextExperiment {
-            experiment: design.experiment,
-            parameters: design.parameters.clone(),
-            duration_s: design.duration_s,
-            separates: separates.clone(),
-            expected_z: Some(expected.z),
-        });
-        Ok(proposals.collect())
+    /// The experiment that gives data a floor.
+    fn repeats(rehearsals: &Rehearsals<'_>) -> Option<NextExperiment> {
+        let separates = ["what is missing".to_owned(), "noise".to_owned()];
+        let designs = rehearsals.designs(|one| one.name == FLOOR);
+        designs.first().map(|design| design.proposed(&separates, None))
     }
 
     /// How well a design distinguishes a pair.
-    fn separation(self, design: &Design, pair: &Pair) -> Result<Expected, DiscoverError> {
+    fn separation(self, design: &Design<'_>, pair: &Pair) -> Result<Expected, DiscoverError> {
         self.on(design, |problem| {
             let [one, other, without] =
                 [&pair.of[0].parameters, &pair.of[1].parameters, &pair.without].map(once);
@@ -203,7 +164,7 @@ impl Planner<'_> {
     /// How well a design shows a small effect, by the parameter that it shows best.
     fn visibility(
         self,
-        design: &Design,
+        design: &Design<'_>,
         definition: &'static Definition,
         at: &Parameters,
     ) -> Result<Expected, DiscoverError> {
@@ -235,14 +196,66 @@ impl Planner<'_> {
     /// Calls `work` with the least-squares problem of the design's frames.
     fn on<R>(
         self,
-        design: &Design,
+        design: &Design<'_>,
         work: impl FnOnce(&Problem<'_>) -> Result<R, DiscoverError>,
     ) -> Result<R, DiscoverError> {
-        let frames = &design.frames;
+        let frames = &design.rehearsal.frames;
         let mut bins = Bins::of(frames, true)?;
         let all = HeldOut { frames: vec![false; frames.len()], ..HeldOut::default() };
         bins.weigh(frames, self.noise, &all);
         work(&Problem::new(Predictor::new(self.known, frames, &bins), self.noise))
+    }
+}
+
+impl Rehearsals<'_> {
+    /// What some of the candidates would answer.
+    fn answer(
+        &self,
+        separates: &[String; 2],
+        is_wanted: impl Fn(&Candidate) -> bool,
+        expect: impl Fn(&Design<'_>) -> Result<Expected, DiscoverError> + Sync,
+    ) -> Result<Answer, DiscoverError> {
+        let designs = self.designs(is_wanted);
+        let mut found: Vec<(&Design<'_>, Expected)> = Vec::new();
+        let expected = parallel::map(&designs, |design| expect(design));
+        for (design, expected) in designs.iter().zip(expected) {
+            found.push((design, expected?));
+        }
+        let proposed =
+            |(design, expected): &(&Design<'_>, Expected)| design.proposed(separates, Some(expected.z));
+        let best = found.iter().max_by(|(_, one), (_, other)| one.z.total_cmp(&other.z)).map(proposed);
+        found.retain(|(_, expected)| expected.z >= WORTH_Z);
+        found.sort_by(|(_, one), (_, other)| {
+            other.share.total_cmp(&one.share).then(other.z.total_cmp(&one.z))
+        });
+        // An experiment with a smaller share must take less time.
+        let mut shortest_s = f64::INFINITY;
+        found.retain(|(design, _)| {
+            let is_shorter = design.rehearsal.duration_s < shortest_s;
+            shortest_s = shortest_s.min(design.rehearsal.duration_s);
+            is_shorter
+        });
+        Ok(Answer { next: found.iter().map(proposed).collect(), best })
+    }
+}
+
+impl Answer {
+    /// The other answer if this one proposes nothing, with the better of both where neither does.
+    fn or(self, other: Self) -> Self {
+        let better = |one: NextExperiment, two: NextExperiment| {
+            if two.expected_z > one.expected_z { two } else { one }
+        };
+        Self { best: self.best.into_iter().chain(other.best).reduce(better), next: other.next }
+    }
+}
+
+impl Plan {
+    /// Takes the first proposals of an answer, or the question if there are none.
+    fn take(&mut self, answer: Answer, separates: [String; 2], proposals_max: usize) {
+        if answer.next.is_empty() {
+            self.open.push(OpenQuestion { separates, best: answer.best });
+        }
+        self.next.extend(answer.next.into_iter().take(proposals_max));
     }
 }
 

@@ -93,6 +93,25 @@ pub fn readings<P: AsRef<Path>>(paths: &[P]) -> Result<(Source, Readings), RowsE
     Ok((source, readings))
 }
 
+/// Calls `take` for the rows of a run that was not recorded, from its timeline and its frames, in order: the rows that its recording
+/// would give.
+///
+/// # Errors
+/// [`RowsError::NoStage`] if the stage never told its position.
+pub fn visit_frames(
+    timeline: &Timeline,
+    frames: &[Frame],
+    mut take: impl FnMut(RowView<'_>),
+) -> Result<(), RowsError> {
+    let mut rows = RowMaker::new(timeline, None);
+    for frame in frames {
+        if let Some(row) = rows.row(frame)? {
+            take(row);
+        }
+    }
+    Ok(())
+}
+
 /// The files read so far: of one rig, with each run once.
 #[derive(Debug, Default)]
 pub(crate) struct RowSources {
@@ -132,17 +151,8 @@ impl RowSources {
         if timeline.stage().is_empty() {
             return Err(RowsError::NoStage { path: path.to_owned() });
         }
-        let mut frames = RowMaker {
-            timeline,
-            last: None,
-            moved: 0,
-            by_arrival: 0,
-            bad_elements: BTreeSet::new(),
-            partly_read: 0,
-            untold: 0,
-            done_again_from: self.taken_over.get(&run.run_id).map(|taken| taken.first_press),
-            done_again: 0,
-        };
+        let done_again_from = self.taken_over.get(&run.run_id).map(|taken| taken.first_press);
+        let mut frames = RowMaker::new(timeline, done_again_from);
         let mut checker = Checker::new(timeline.rig());
         let mut index = 0;
         let (_, reader) = read_run(path)?;
@@ -245,7 +255,21 @@ struct RowMaker<'a> {
     done_again: u64,
 }
 
-impl RowMaker<'_> {
+impl<'t> RowMaker<'t> {
+    fn new(timeline: &'t Timeline, done_again_from: Option<i32>) -> Self {
+        Self {
+            timeline,
+            last: None,
+            moved: 0,
+            by_arrival: 0,
+            bad_elements: BTreeSet::new(),
+            partly_read: 0,
+            untold: 0,
+            done_again_from,
+            done_again: 0,
+        }
+    }
+
     /// The row of a frame; `None` if it is left out.
     fn row<'a>(&'a mut self, frame: &'a Frame) -> Result<Option<RowView<'a>>, RowsError> {
         let timeline = self.timeline;

@@ -16,7 +16,7 @@ use tactus_schema::{
 };
 
 use crate::{
-    Completeness, EpochClock, NoClock, RecordError, RunMetadata, Tally,
+    Completeness, EpochClock, Message, NoClock, RecordError, RunMetadata, Tally,
     reader::{io_error, read_run},
 };
 
@@ -84,6 +84,18 @@ impl Timeline {
         }
         let completeness = reader.completeness().cloned().unwrap_or(Completeness::Complete);
         builder.into_timeline(path, run, completeness)
+    }
+
+    /// The timeline of a run that was not recorded, such as a rehearsal, from the messages that its recording would hold. Its path is
+    /// the run's id.
+    pub fn of_messages(run: RunMetadata, rig: Rig, messages: impl IntoIterator<Item = Message>) -> Self {
+        let mut builder = TimelineBuilder::default();
+        for message in messages {
+            builder.message(message);
+        }
+        let rig_json = rig.to_json();
+        let path = PathBuf::from(&run.run_id);
+        builder.finish(&path, run, (rig, rig_json), Completeness::Complete)
     }
 
     /// Path of the recording.

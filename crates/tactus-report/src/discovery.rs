@@ -31,7 +31,7 @@ use crate::{
 pub use active::{ActiveRun, AmbiguousEffect, command};
 pub use figures::{element_maps, free_curve, levels, residual_against};
 pub use json::discovery_json;
-pub use next::{Proposal, proposals};
+pub use next::{Proposal, not_proposed, nothing_open, open, proposals};
 pub use words::in_words;
 
 /// A discovery and its data.
@@ -49,6 +49,8 @@ pub struct DiscoveryReport<'a> {
     pub notes: &'a [String],
     /// Experiments that were run to decide between explanations, in order; their recordings are among the data.
     pub active: &'a [ActiveRun],
+    /// Why no further experiment was run, although there was a round for it.
+    pub active_ended: Option<&'a str>,
     /// What discovery found, to be shown.
     pub discovery: &'a Discovery,
 }
@@ -80,7 +82,7 @@ pub fn discovery_html(report: &DiscoveryReport<'_>) -> String {
         gap::section(f, report)?;
         tried::section(f, report.discovery)?;
         added::section(f, report.discovery)?;
-        active::section(f, report.active)?;
+        active::section(f, report)?;
         after::sections(f, report.discovery)?;
         basis::section(f, report)
     });

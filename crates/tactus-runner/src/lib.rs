@@ -12,6 +12,7 @@
 //! | [`script_process`] | evaluates each script in a process of its own |
 //! | [`signals`] | the signals that end a program, in order |
 //! | [`twin`] | the dry run on a simulated twin |
+//! | [`rehearsal`] | a dry run that keeps what a run would record |
 //! | [`embedded`] | one run in this process, without a service |
 //! | [`stage_check`] | a check of a rig's stage alone: its identity, and whether it moves as it reports |
 
@@ -24,6 +25,7 @@ pub mod embedded;
 pub mod experiments;
 pub mod order;
 pub mod recorder;
+pub mod rehearsal;
 pub mod script_process;
 pub mod signals;
 pub mod stage_check;

@@ -5,7 +5,7 @@ use std::thread;
 use std::time::Duration;
 
 use tactus_device::{Clock, SensorCodec};
-use tactus_engine::{Engine, Planned, RunOrder, RunOutcome, StopOrder, Unpublished, Unrecorded};
+use tactus_engine::{Engine, Planned, Record, RunOrder, RunOutcome, StopOrder, Unpublished, Unrecorded};
 use tactus_schema::rig::Transport;
 use tactus_schema::{Rig, pb};
 use tactus_virtual::{Truth, twin_of};
@@ -15,7 +15,7 @@ use tracing::subscriber::NoSubscriber;
 use crate::devices;
 use crate::virtual_time;
 
-/// No experiment lasts longer.
+/// No run lasts longer.
 const LONGEST: Duration = Duration::from_hours(72);
 
 /// How often a dry run asks whether it shall stop.
@@ -37,9 +37,9 @@ pub enum TwinError {
     /// The rig describes data, not a service.
     #[error(transparent)]
     Engine(#[from] tactus_engine::EngineError),
-    /// The experiment would take longer than any run may.
-    #[error("the experiment would take more than {} h", LONGEST.as_secs() / 3600)]
-    TooLong,
+    /// The experiment would take longer than this one may.
+    #[error("the experiment would take more than {:.0} min", .0.as_secs_f64() / 60.0)]
+    TooLong(Duration),
     /// The dry run's thread panicked.
     #[error("the dry run panicked; this is a defect of Tactus")]
     Panicked,
@@ -71,8 +71,19 @@ impl DryRun {
 ///
 /// # Errors
 /// [`TwinError`] if there was no dry run. A refused step is no error: the [`DryRun`] is then not possible.
-pub fn dry_run(rig: &Rig, mut order: RunOrder, stopped: &dyn Fn() -> bool) -> Result<DryRun, TwinError> {
-    let mut twin = twin_of(rig);
+pub fn dry_run(rig: &Rig, order: RunOrder, stopped: &dyn Fn() -> bool) -> Result<DryRun, TwinError> {
+    let outcome = run_on(twin_of(rig), order, LONGEST, Box::new(Unrecorded), stopped)?;
+    Ok(DryRun { outcome })
+}
+
+/// Runs an experiment on a twin in virtual time, for at most `longest` of it. As [`dry_run`] otherwise.
+pub(crate) fn run_on(
+    mut twin: Rig,
+    mut order: RunOrder,
+    longest: Duration,
+    record: Box<dyn Record>,
+    stopped: &dyn Fn() -> bool,
+) -> Result<RunOutcome, TwinError> {
     order.resets = true;
     if let Some(service) = &mut twin.service {
         service.sensor.transport = Transport::Embedded;
@@ -84,9 +95,7 @@ pub fn dry_run(rig: &Rig, mut order: RunOrder, stopped: &dyn Fn() -> bool) -> Re
     let thread = thread::Builder::new().name("twin".into()).spawn(move || {
         // The twin's log entries are no events of the service.
         tracing::subscriber::with_default(NoSubscriber::new(), || {
-            let runtime = virtual_time::runtime()?;
-            let outcome = runtime.block_on(run(twin, order, &started))?;
-            Ok(DryRun { outcome })
+            virtual_time::runtime()?.block_on(run(twin, order, longest, record, &started))
         })
     })?;
     stop_when_asked(&engines, stopped);
@@ -110,7 +119,13 @@ fn stop_when_asked(engines: &Receiver<Engine>, stopped: &dyn Fn() -> bool) {
     }
 }
 
-async fn run(twin: Rig, order: RunOrder, started: &SyncSender<Engine>) -> Result<RunOutcome, TwinError> {
+async fn run(
+    twin: Rig,
+    order: RunOrder,
+    longest: Duration,
+    record: Box<dyn Record>,
+    started: &SyncSender<Engine>,
+) -> Result<RunOutcome, TwinError> {
     let clock = Clock::paused();
     let Some(service) = twin.service.clone() else {
         return Err(tactus_engine::EngineError::NoService { rig: twin.name }.into());
@@ -121,9 +136,9 @@ async fn run(twin: Rig, order: RunOrder, started: &SyncSender<Engine>) -> Result
     let engine = Engine::start(twin, opened.devices, clock, std::sync::Arc::new(Unpublished))?;
     // There is room: this is the only message. The receiver waits for the thread's end.
     let _told = started.try_send(engine.clone());
-    match timeout(LONGEST, engine.run(order, Box::new(Unrecorded))).await {
+    match timeout(longest, engine.run(order, record)).await {
         Ok(Ok(outcome)) => Ok(outcome),
         Ok(Err(busy)) => unreachable!("a new engine has no other run: {busy}"),
-        Err(_) => Err(TwinError::TooLong),
+        Err(_) => Err(TwinError::TooLong(longest)),
     }
 }

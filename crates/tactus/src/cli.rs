@@ -298,6 +298,9 @@ pub(crate) struct DiscoverArgs {
     /// effects count as the explanation.
     #[arg(long, value_name = "COUNTS")]
     pub(crate) tolerance: Option<f64>,
+    /// Folder of the lab's own experiments (.star), which may be proposed beside the built-in ones.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) experiments: Option<PathBuf>,
     /// Run the experiments that distinguish the remaining explanations, and analyse again with their recordings. Without
     /// a service they run on the embedded simulated rig; without files the first run is `diagnose`.
     #[arg(long)]

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use tactus_schema::Rig;
 use tactus_schema::rig::{RegistrationError, SimulatedStage, Simulation};
 
-/// The virtual stage's travel reaches this far beyond the rig's envelope.
+/// The virtual stage's travel reaches this far beyond the rig's envelope, but not above it: it homes there, and no run may begin
+/// outside of the envelope.
 const MARGIN_MM: f64 = 10.0;
 
 /// A simulated rig that behaves exactly as this one's description says: no noise, no scatter of gains, no errors.
@@ -38,8 +39,9 @@ fn ideal(rig: &Rig) -> Simulation {
 /// The paper's stage (platen-forcer, 3 um and 1 um), with travel for the rig's envelope.
 fn stage_for(rig: &Rig) -> SimulatedStage {
     let wider = |[least, greatest]: [f64; 2]| [least - MARGIN_MM, greatest + MARGIN_MM];
+    let deeper = |[least, greatest]: [f64; 2]| [least - MARGIN_MM, greatest];
     let deepest_mm = -rig.covering.thickness_mm;
-    let (within_mm, speed_max_mm_per_s) = if let Some(service) = &rig.service {
+    let ([x_mm, y_mm, z_mm], speed_max_mm_per_s) = if let Some(service) = &rig.service {
         let envelope = &service.envelope;
         ([envelope.x_mm, envelope.y_mm, [deepest_mm, envelope.z_max_mm]], envelope.speed_max_mm_per_s)
     } else {
@@ -51,7 +53,7 @@ fn stage_for(rig: &Rig) -> SimulatedStage {
         vertical_step_mm: 0.001,
         acceleration_mm_per_s2: 500.0,
         speed_max_mm_per_s,
-        travel_mm: within_mm.map(wider),
+        travel_mm: [wider(x_mm), wider(y_mm), deeper(z_mm)],
     }
 }
 

@@ -2,6 +2,8 @@
 
 use tactus_schema::table::{Phase, RowView};
 
+use super::motion::load_speed_mm_per_s;
+
 /// Frames of one or more runs, stored by column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frames {
@@ -71,6 +73,11 @@ impl Frames {
     /// True if there is no frame.
     pub fn is_empty(&self) -> bool {
         self.t_s.is_empty()
+    }
+
+    /// The speed at which presses are loaded; none if no load has two frames.
+    pub fn load_speed_mm_per_s(&self) -> Option<f64> {
+        load_speed_mm_per_s(self)
     }
 
     /// The frames as rows of the measurement table, in order; the time is since the run's first frame.

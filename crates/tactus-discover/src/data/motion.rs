@@ -3,6 +3,7 @@
 use tactus_model::Phase;
 
 use super::frames::Frames;
+use crate::numbers::median;
 
 /// A smaller movement counts as none.
 pub(crate) const STILL_MM: f64 = 0.001;
@@ -56,6 +57,55 @@ pub(crate) fn interval_s(frames: &Frames) -> f64 {
         frames.t_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|dt| *dt > 0.0).collect();
     intervals.sort_by(f64::total_cmp);
     intervals.get(intervals.len() / 2).copied().unwrap_or(1.0 / 30.0)
+}
+
+/// Mean speed of each load: of one press, while the tip goes down. Near the covering that is less than what was commanded, because the
+/// tip stands between two steps.
+pub(crate) fn load_speeds_mm_per_s(frames: &Frames) -> impl Iterator<Item = f64> {
+    let mut loads: Vec<Fall> = Vec::new();
+    for fall in falls(frames) {
+        match loads.last_mut() {
+            // Numbers of presses begin anew with each run, but no two presses with the same number follow each other.
+            Some(load) if load.press == fall.press => {
+                load.way_mm += fall.way_mm;
+                load.time_s += fall.time_s;
+            }
+            _ => loads.push(fall),
+        }
+    }
+    loads.into_iter().map(Fall::speed_mm_per_s)
+}
+
+/// The speed at which the tip mostly goes down in loads: what was commanded. None if no load has two frames.
+pub(crate) fn load_speed_mm_per_s(frames: &Frames) -> Option<f64> {
+    let speeds: Vec<f64> = falls(frames).map(Fall::speed_mm_per_s).collect();
+    (!speeds.is_empty()).then(|| median(&speeds))
+}
+
+/// The way of the tip down from one frame of a load to the next.
+#[derive(Debug, Clone, Copy)]
+struct Fall {
+    press: i32,
+    way_mm: f64,
+    time_s: f64,
+}
+
+impl Fall {
+    fn speed_mm_per_s(self) -> f64 {
+        self.way_mm / self.time_s
+    }
+}
+
+fn falls(frames: &Frames) -> impl Iterator<Item = Fall> {
+    (1..frames.len()).filter_map(|later| {
+        let pair = [later - 1, later];
+        let is_load = pair.iter().all(|one| frames.phase[*one] == Phase::Load);
+        let [press, press_later] = pair.map(|one| frames.press[one]);
+        let way_mm = frames.position_mm[later - 1][2] - frames.position_mm[later][2];
+        let time_s = frames.t_s[later] - frames.t_s[later - 1];
+        let falls = is_load && press == press_later && way_mm > STILL_MM && time_s > 0.0;
+        falls.then_some(Fall { press, way_mm, time_s })
+    })
 }
 
 /// True between the first load and the end of the unload.

@@ -11,7 +11,7 @@ use super::discovery::{
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
 use crate::fit::{Fitted, LOUD, Parameters, Predictor, Prepared, Problem, RandomWalk, Term};
-use crate::next::{Explanation, Pair, Planner};
+use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
     ALPHA, Alike, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS, Refuted,
     RefutedFormula, Rule, Search, Tried, names, not_shown, q_values, sign_flip_p, without,
@@ -104,6 +104,7 @@ pub(crate) fn conclude(
     search: &Search<'_>,
     found: SearchOutcome,
     options: Options,
+    experiments: &dyn Experiments,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
     let SearchOutcome { lacking, base, confirmed, rounds, equivalent, left, before, after } = found;
@@ -142,12 +143,12 @@ pub(crate) fn conclude(
         steps.push(coarse(*step_counts, *p_value, grown_level.heldout_rms_counts));
     }
     let pairs = if named { undecided(&equivalent, &grown) } else { Vec::new() };
-    let planner = prepared.planner();
-    let mut next_experiments = planner.propose(&pairs)?;
-    next_experiments.extend(planner.show(&not_shown, &grown.parameters)?);
-    if verdict == Verdict::CannotJudge {
-        next_experiments.insert(0, planner.repeats());
-    }
+    let plan = prepared.planner(experiments, options).plan(Open {
+        pairs: &pairs,
+        not_shown: &not_shown,
+        at: &grown.parameters,
+        lacks_repeats: verdict == Verdict::CannotJudge,
+    })?;
 
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     let mut warnings = prepared.warnings.clone();
@@ -183,7 +184,7 @@ pub(crate) fn conclude(
                 Verdict::Explained | Verdict::PartlyExplained => share,
             },
         },
-        next_experiments,
+        plan,
         effects,
         grown: base_of(prepared, &grown.parameters),
         gap: before.gap,
@@ -192,10 +193,15 @@ pub(crate) fn conclude(
 }
 
 /// The report of data without a floor: figures of the base model in counts, no names, and what to measure next.
-pub(crate) fn cannot_judge(prepared: &Prepared<'_>, options: Options) -> Result<Discovery, DiscoverError> {
+pub(crate) fn cannot_judge(
+    prepared: &Prepared<'_>,
+    options: Options,
+    experiments: &dyn Experiments,
+) -> Result<Discovery, DiscoverError> {
     let of_base = prepared.held(&prepared.base.parameters)?;
     let unjudged = prepared.unjudged(&of_base, prepared.level(&of_base, prepared.floor), options)?;
-    Ok(Discovery { next_experiments: vec![prepared.planner().repeats()], ..unjudged })
+    let nothing = Open { pairs: &[], not_shown: &[], at: &prepared.base.parameters, lacks_repeats: true };
+    Ok(Discovery { plan: prepared.planner(experiments, options).plan(nothing)?, ..unjudged })
 }
 
 /// The probability of each effect: in any place of an added one, or missing beside them.
@@ -331,7 +337,7 @@ impl Prepared<'_> {
             final_: Final { level, shrink: None },
             verdict: Verdict::CannotJudge,
             unexplained: Unexplained { depends_on: Vec::new(), share: 1.0 },
-            next_experiments: Vec::new(),
+            plan: Plan::default(),
             grown: recalibrated.clone(),
             recalibrated,
             effects: self.base.parameters.effects()?,
@@ -465,8 +471,15 @@ impl Prepared<'_> {
             .collect()
     }
 
-    fn planner(&self) -> Planner<'_> {
-        Planner { known: self.known, frames: self.frames, noise: &self.noise }
+    fn planner<'p>(&'p self, experiments: &'p dyn Experiments, options: Options) -> Planner<'p> {
+        Planner {
+            known: self.known,
+            frames: self.frames,
+            noise: &self.noise,
+            faulty: &self.faulty.elements,
+            experiments,
+            seed: options.seed,
+        }
     }
 }
 

@@ -3,7 +3,7 @@ use rand_chacha::ChaCha8Rng;
 use tactus_schema::table::{Phase, RowView};
 
 use super::*;
-use crate::fixtures::{ELEMENTS, known, measured, processes};
+use crate::fixtures::{ELEMENTS, ShippedRig, known, measured, processes};
 use crate::{Frames, discover};
 
 /// Effects were named, a test rejects the base model, and none the grown one.
@@ -66,7 +66,7 @@ fn one_frame_a_press(repeats: usize, noise_counts: f64) -> Frames {
 
 fn judged(frames: &Frames) -> Discovery {
     let options = Options { seed: 1, threads: 2, rule: Rule::Protocol, tolerance_counts: Some(5.0) };
-    discover(&known(), frames, options, &|_| {}).unwrap()
+    discover(&known(), frames, options, &ShippedRig::new(1.0), &|_| {}).unwrap()
 }
 
 #[test]
@@ -76,8 +76,8 @@ fn without_repeats_nothing_is_judged_and_what_to_run_is_said() {
     assert!(found.steps.is_empty() && found.rounds.is_empty() && found.gap.is_empty());
     assert_eq!((found.global, found.base.heldout_chi2, found.base.structured), (None, None, None));
     assert!(found.base.heldout_rms_counts > 30.0);
-    let [next] = &found.next_experiments[..] else { panic!("{:?}", found.next_experiments) };
-    assert_eq!((next.experiment, &*next.parameters[0].1), ("diagnose", "drift,repeats"));
+    let [next] = &found.plan.next[..] else { panic!("{:?}", found.plan) };
+    assert_eq!((&*next.experiment, &*next.parameters[0].1), ("diagnose", "drift,repeats"));
     assert!(next.duration_s > 200.0, "{}", next.duration_s);
 }
 

@@ -6,7 +6,7 @@ use tactus_model::{Effect, Psf, Response};
 use super::structured::Structured;
 use crate::data::Floor;
 use crate::fit::RunWalks;
-use crate::next::NextExperiment;
+use crate::next::Plan;
 use crate::search::{Curve, Gap, NotShown, Round};
 
 /// What the data say about a model, and what they add to it.
@@ -51,8 +51,8 @@ pub struct Discovery {
     pub verdict: Verdict,
     /// What the grown model leaves unexplained.
     pub unexplained: Unexplained,
-    /// Experiments that would decide what these data leave open.
-    pub next_experiments: Vec<NextExperiment>,
+    /// Which experiments would decide what these data leave open.
+    pub plan: Plan,
     /// The base model, recalibrated without added effects.
     pub recalibrated: BaseModel,
     /// The base of the grown model, recalibrated together with its effects.

@@ -19,7 +19,7 @@
 //! # Source
 //! The play operator: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (1989).
 
-use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, TipState};
+use super::{Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "backlash",
@@ -69,7 +69,11 @@ impl Axis {
 
     fn follow(&mut self, stage_mm: f64) -> f64 {
         let (least, most) = (stage_mm - self.half_mm, stage_mm + self.half_mm);
-        let at_mm = self.at_mm.unwrap_or(stage_mm).clamp(least, most);
+        let at_mm = match self.at_mm.unwrap_or(stage_mm) {
+            at_mm if at_mm < least => least,
+            at_mm if at_mm > most => most,
+            at_mm => at_mm,
+        };
         self.at_mm = Some(at_mm);
         at_mm
     }

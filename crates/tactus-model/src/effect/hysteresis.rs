@@ -45,7 +45,7 @@
 //! Transitions* (1996), chapter 2; plays between two curves, M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with
 //! Hysteresis* (1989), chapter 1.
 
-use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -85,17 +85,14 @@ struct Hysteresis {
     by_depth: f64,
     /// Half the width of each play, as a share of the widest, and its share of the loss.
     kinds: Vec<[f64; 2]>,
-    is_free: bool,
     /// Element by element, kind by kind.
     plays: Vec<Play>,
 }
 
-/// What holds on to the signal, and by how much that changes with the threshold and its growth.
+/// What holds on to the signal.
 #[derive(Debug, Clone, Copy, Default)]
 struct Play {
     held_mm: f64,
-    by_threshold: f64,
-    by_growth: f64,
 }
 
 impl OnCovering for Hysteresis {
@@ -106,7 +103,7 @@ impl OnCovering for Hysteresis {
         for (u, plays) in signal_mm.iter_mut().zip(self.plays.chunks_exact_mut(self.kinds.len())) {
             let load_mm = by_own * u.max(0.0) + by_depth * depth_mm;
             for (play, [share, _]) in plays.iter_mut().zip(&self.kinds) {
-                play.follow(load_mm, share * self.threshold_mm, share * self.growth, *share);
+                play.follow(load_mm, share * self.threshold_mm, share * self.growth);
             }
             let lost = self.loss_share * mean(&self.kinds, plays, |play| play.held_mm - load_mm);
             *u = left(*u, of_own(self.by_depth, *u, load_mm) * lost);
@@ -127,13 +124,12 @@ impl Hysteresis {
             growth,
             by_depth,
             kinds: SHARES.map(|share| [share, 1.0 / SHARES.len() as f64]).to_vec(),
-            is_free: false,
             plays: Vec::new(),
         };
         let Some(Knots { at, values: weights }) = values.knots() else { return formula };
         let widest_mm = at.last().copied().unwrap_or_default();
         let kinds = at.iter().zip(weights).map(|(at_mm, weight)| [at_mm / widest_mm, *weight]).collect();
-        Self { loss_share: 1.0, threshold_mm: widest_mm, kinds, is_free: true, ..formula }
+        Self { loss_share: 1.0, threshold_mm: widest_mm, kinds, ..formula }
     }
 }
 
@@ -149,15 +145,13 @@ fn of_own(by_depth: f64, u: f64, load_mm: f64) -> f64 {
 }
 
 impl Play {
-    fn follow(&mut self, u: f64, threshold_mm: f64, growth: f64, share: f64) {
+    fn follow(&mut self, u: f64, threshold_mm: f64, growth: f64) {
         let least_mm = (u - threshold_mm) / (1.0 + growth);
         let most_mm = (u + threshold_mm) / (1.0 - growth);
         if self.held_mm < least_mm {
-            let by_threshold = -share / (1.0 + growth);
-            *self = Self { held_mm: least_mm, by_threshold, by_growth: by_threshold * least_mm };
+            self.held_mm = least_mm;
         } else if self.held_mm > most_mm {
-            let by_threshold = share / (1.0 - growth);
-            *self = Self { held_mm: most_mm, by_threshold, by_growth: by_threshold * most_mm };
+            self.held_mm = most_mm;
         }
     }
 }

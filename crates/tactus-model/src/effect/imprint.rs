@@ -29,7 +29,7 @@
 //! Properties of Polymers* (1980), chapter 1.
 
 use super::lag::{mean, spread};
-use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {

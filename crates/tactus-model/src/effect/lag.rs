@@ -62,14 +62,13 @@ impl Lag {
 /// The mean of three lags, on a scale of ratios: of `tau / ratio`, `tau` and `tau ratio`.
 #[derive(Debug)]
 pub(super) struct SpreadLag {
-    ratio: f64,
     lags: [Lag; 3],
 }
 
 impl SpreadLag {
     /// With a time constant that is not negative, and a ratio of at least 1, at which all three are one.
     pub(super) fn new(tau_s: f64, ratio: f64) -> Self {
-        Self { ratio, lags: spread(tau_s, ratio).map(Lag::new) }
+        Self { lags: spread(tau_s, ratio).map(Lag::new) }
     }
 
     /// As [`Lag::has_begun`].

@@ -22,7 +22,7 @@
 //! # Source
 //! The paper's Sec. 2.1: two touches near opposite corners define the registration, which inherits their errors.
 
-use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, TipState};
+use super::{Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "misregistration",

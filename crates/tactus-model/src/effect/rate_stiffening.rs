@@ -28,7 +28,7 @@
 //! The strain-rate factor of G. R. Johnson and W. H. Cook, *Proc. 7th Int. Symp. on Ballistics* (1983), with 1 added
 //! to the ratio of speeds, so that rest is the base model's.
 
-use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {

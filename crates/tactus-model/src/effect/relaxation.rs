@@ -42,7 +42,7 @@
 //! *Viscoelastic Properties of Polymers* (1980), chapter 1.
 
 use super::lag::{Lag, SpreadLag, spread};
-use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {

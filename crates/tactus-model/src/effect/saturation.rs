@@ -60,8 +60,6 @@ pub(super) static DEFINITION: Definition = Definition {
 
 #[derive(Debug)]
 struct Saturation {
-    /// `ln (1 - loss_at_1_mm)`.
-    kept_log: f64,
     knee: f64,
     q: f64,
 }
@@ -79,23 +77,12 @@ impl OnElement for Saturation {
 impl Saturation {
     fn new(loss_at_1_mm: f64, knee: f64) -> Self {
         let kept_log = (-loss_at_1_mm).ln_1p();
-        Self { kept_log, knee, q: (-knee * kept_log).exp_m1() }
+        Self { knee, q: (-knee * kept_log).exp_m1() }
     }
 
     /// `1 + q u^knee`: near 1 for small signals.
     fn bend(&self, u: f64) -> f64 {
         1.0 + self.q * u.powf(self.knee)
-    }
-
-    fn by_loss(&self, u: f64) -> f64 {
-        let power = self.knee + 1.0;
-        -u.powf(power) * self.bend(u).powf(-power / self.knee) * (-power * self.kept_log).exp()
-    }
-
-    fn by_knee(&self, u: f64) -> f64 {
-        let (bend, power) = (self.bend(u), u.powf(self.knee));
-        let bend_by_knee = power * (self.q * u.ln() - (1.0 + self.q) * self.kept_log);
-        u * bend.powf(-1.0 / self.knee) * (bend.ln() / self.knee - bend_by_knee / bend) / self.knee
     }
 }
 

@@ -26,9 +26,8 @@
 //! with the strain energy of a linear spring and a width in proportion to the greatest energy.
 
 use libm::erf;
-use std::f64::consts::FRAC_2_SQRT_PI;
 
-use super::{BaseModel, CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {

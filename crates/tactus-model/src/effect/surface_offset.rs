@@ -13,7 +13,7 @@
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
-use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, TipState};
+use super::{Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-offset",

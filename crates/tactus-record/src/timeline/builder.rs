@@ -39,6 +39,10 @@ impl TimelineBuilder {
             }
             Entry::Message { message, .. } => message,
         };
+        self.message(message);
+    }
+
+    pub(super) fn message(&mut self, message: Message) {
         self.tally.take(&message);
         #[expect(
             clippy::wildcard_enum_match_arm,
@@ -99,8 +103,9 @@ impl TimelineBuilder {
         self.events.push(event);
     }
 
+    /// The timeline of a recording, whose rig is among its attachments.
     pub(super) fn into_timeline(
-        mut self,
+        self,
         path: &Path,
         run: RunMetadata,
         completeness: Completeness,
@@ -111,6 +116,17 @@ impl TimelineBuilder {
         };
         let rig =
             Rig::from_json(&rig_json).map_err(|source| RecordError::Rig { path: path.to_owned(), source })?;
+        Ok(self.finish(path, run, (rig, rig_json), completeness))
+    }
+
+    /// The timeline of a run on a rig, which is given as its text in JSON as well.
+    pub(super) fn finish(
+        mut self,
+        path: &Path,
+        run: RunMetadata,
+        (rig, rig_json): (Rig, String),
+        completeness: Completeness,
+    ) -> Timeline {
         let lost_chunks = matches!(&completeness, Completeness::Damaged(damage) if damage.chunks > 0);
         if lost_chunks && self.tally.finished().is_none() {
             // Nothing tells whether the last event here was the last.
@@ -137,7 +153,7 @@ impl TimelineBuilder {
                 (epoch, ticks.and_then(|ticks| EpochClock::estimate(epoch, tick_ns, ticks)))
             })
             .collect();
-        Ok(Timeline {
+        Timeline {
             path: path.to_owned(),
             run,
             rig,
@@ -151,6 +167,6 @@ impl TimelineBuilder {
             events: self.events,
             tally: self.tally,
             completeness,
-        })
+        }
     }
 }

@@ -2,9 +2,10 @@
 
 use std::fmt;
 
-use super::words::list;
+use super::{DiscoveryReport, words::list};
 use crate::{
     document::{Column, Table},
+    markup::Text,
     numbers::digits,
 };
 
@@ -58,11 +59,18 @@ pub fn command(experiment: &str, parameters: &[(&'static str, String)]) -> Strin
     format!("tactus run {experiment}{}", parameters.collect::<String>())
 }
 
-pub(super) fn section(f: &mut fmt::Formatter<'_>, runs: &[ActiveRun]) -> fmt::Result {
-    if runs.is_empty() {
+pub(super) fn section(f: &mut fmt::Formatter<'_>, report: &DiscoveryReport<'_>) -> fmt::Result {
+    let runs = report.active;
+    if runs.is_empty() && report.active_ended.is_none() {
         return Ok(());
     }
     writeln!(f, "<section>\n<h2>Experiments that were run to decide</h2>")?;
+    if let Some(why) = report.active_ended {
+        writeln!(f, "<p>{}</p>", Text(why))?;
+    }
+    if runs.is_empty() {
+        return writeln!(f, "</section>");
+    }
     let mut table = Table::new(&[
         Column::Name("experiment"),
         Column::Name("to distinguish"),

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tactus_discover::{
     AddedEffect, Curve, Discovery, Estimated, FaultyElement, FittedCurve, Floor, Gap, GlobalTest, Inclusion,
-    Level, NextExperiment, Round, Structured, TriedEffect,
+    LeftOut, Level, NextExperiment, OpenQuestion, Round, Structured, TriedEffect,
 };
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
@@ -56,7 +56,10 @@ struct ReportJson<'a> {
     verdict_text: String,
     unexplained: UnexplainedJson<'a>,
     next_experiments: Vec<NextExperimentJson<'a>>,
+    open_questions: Vec<OpenQuestionJson<'a>>,
+    left_out: Vec<LeftOutJson<'a>>,
     active: Vec<ActiveRunJson<'a>>,
+    active_ended: Option<&'a str>,
 }
 
 #[derive(Serialize)]
@@ -236,9 +239,23 @@ struct UnexplainedJson<'a> {
 struct NextExperimentJson<'a> {
     experiment: &'a str,
     parameters: BTreeMap<&'a str, &'a str>,
+    seed: u64,
     duration_s: f64,
     separates: &'a [String; 2],
     expected_z: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct OpenQuestionJson<'a> {
+    separates: &'a [String; 2],
+    best: Option<NextExperimentJson<'a>>,
+}
+
+#[derive(Serialize)]
+struct LeftOutJson<'a> {
+    experiment: &'a str,
+    parameters: BTreeMap<&'a str, &'a str>,
+    reason: &'a str,
 }
 
 #[derive(Serialize)]
@@ -310,8 +327,11 @@ impl<'a> ReportJson<'a> {
                 depends_on: &found.unexplained.depends_on,
                 share: found.unexplained.share,
             },
-            next_experiments: found.next_experiments.iter().map(NextExperimentJson::of).collect(),
+            next_experiments: found.plan.next.iter().map(NextExperimentJson::of).collect(),
+            open_questions: found.plan.open.iter().map(OpenQuestionJson::of).collect(),
+            left_out: found.plan.left_out.iter().map(LeftOutJson::of).collect(),
             active: report.active.iter().map(ActiveRunJson::of).collect(),
+            active_ended: report.active_ended,
         }
     }
 }
@@ -470,12 +490,25 @@ impl EstimateJson {
 impl<'a> NextExperimentJson<'a> {
     fn of(next: &'a NextExperiment) -> Self {
         Self {
-            experiment: next.experiment,
+            experiment: &next.experiment,
             parameters: by_name(&next.parameters),
+            seed: next.seed,
             duration_s: next.duration_s,
             separates: &next.separates,
             expected_z: next.expected_z,
         }
+    }
+}
+
+impl<'a> OpenQuestionJson<'a> {
+    fn of(question: &'a OpenQuestion) -> Self {
+        Self { separates: &question.separates, best: question.best.as_ref().map(NextExperimentJson::of) }
+    }
+}
+
+impl<'a> LeftOutJson<'a> {
+    fn of(one: &'a LeftOut) -> Self {
+        Self { experiment: &one.experiment, parameters: by_name(&one.parameters), reason: &one.reason }
     }
 }
 

@@ -96,8 +96,8 @@ fn tolerance(found: &Discovery) -> String {
 
 /// The first proposed experiment.
 fn runs(found: &Discovery) -> String {
-    found.next_experiments.first().map_or_else(String::new, |next| {
-        format!(", such as `{}`", command(next.experiment, &next.parameters))
+    found.plan.next.first().map_or_else(String::new, |next| {
+        format!(", such as `{}`", command(&next.experiment, &next.parameters))
     })
 }
 

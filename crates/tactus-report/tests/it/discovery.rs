@@ -10,11 +10,13 @@ use crate::made_up::discovery::{
     cannot_judge, data, empty, explained, faulty, nothing_missing, report, unexplained,
 };
 use serde_json::Value;
-use tactus_discover::{Discovery, FittedCurve, FittedKnot, GlobalTest, NextExperiment, Unexplained, Verdict};
+use tactus_discover::{
+    Discovery, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, Unexplained, Verdict,
+};
 use tactus_model::Array;
 use tactus_report::discovery::{
     ActiveRun, AmbiguousEffect, DiscoveryReport, discovery_html, discovery_json, element_maps, in_words,
-    levels, not_shown, proposals, residual_against,
+    levels, not_proposed, not_shown, proposals, residual_against,
 };
 
 const HOSTILE: &str = "<img src=x onerror='alert(\"1\")'>";
@@ -73,6 +75,10 @@ fn the_json_has_every_field_of_its_schema_where_it_belongs() {
         ("/next_experiments/0/experiment", "\"diagnose\""),
         ("/next_experiments/0/separates", "[\"hysteresis\",\"backlash\"]"),
         ("/next_experiments/0/expected_z", "11.3"),
+        ("/next_experiments/0/seed", "2718281828"),
+        ("/open_questions/0/separates", "[\"miswired\",\"crosstalk\"]"),
+        ("/left_out/0/reason", "\"deep.star:7: no sample\""),
+        ("/active_ended", "null"),
         ("/not_shown/2/effect", "\"imprint\""),
         ("/rounds/2/taken", "null"),
         ("/curves/11/points/15/se", "0.00296875"),
@@ -390,7 +396,8 @@ fn text_from_outside_is_escaped() {
     let mut hostile = explained();
     hostile.not_shown[0].reason = HOSTILE.into();
     hostile.warnings = vec![HOSTILE.into()];
-    hostile.next_experiments[0].separates = [HOSTILE.into(), HOSTILE.into()];
+    hostile.plan.left_out[0].reason = HOSTILE.into();
+    hostile.plan.next[0].separates = [HOSTILE.into(), HOSTILE.into()];
     let mut data = data();
     (data[0].id, data[1].sha256) = (HOSTILE.into(), HOSTILE.into());
     let (array, notes) = (Array::digitacts(), [HOSTILE.to_owned()]);
@@ -425,10 +432,10 @@ fn figures_draw_what_was_found() {
 #[test]
 fn an_experiment_that_answers_several_questions_is_proposed_once() {
     let mut found = explained();
-    let first = found.next_experiments[0].clone();
+    let first = found.plan.next[0].clone();
     let separates = |one: &str, other: &str| [one.to_owned(), other.to_owned()];
     let parameters = vec![("parts", "hold".to_owned())];
-    found.next_experiments.extend([
+    found.plan.next.extend([
         NextExperiment { separates: separates("imprint", "nothing"), parameters, ..first.clone() },
         NextExperiment { separates: separates("imprint", "nothing"), expected_z: Some(4.0), ..first.clone() },
         NextExperiment { separates: separates("relaxation", "nothing"), expected_z: Some(5.0), ..first },
@@ -445,4 +452,38 @@ fn an_experiment_that_answers_several_questions_is_proposed_once() {
             ["tactus run diagnose -p parts=hold", "shows imprint (z = 11)"],
         ]
     );
+}
+
+#[test]
+fn why_nothing_is_proposed_is_told() {
+    let said = |found: &Discovery| not_proposed(found).join(" ");
+    assert_eq!(said(&nothing_missing()), "No experiment is proposed: no two explanations are undecided.");
+    assert!(said(&unexplained()).contains("what remains is no effect of the library"));
+    let mut found = explained();
+    assert_eq!(
+        said(&found),
+        "No experiment would distinguish miswired from crosstalk: none of those that would could be rehearsed. Left out: `tactus run \
+         lab/deep.star`: deep.star:7: no sample."
+    );
+    let weak = NextExperiment { expected_z: Some(1.24), ..found.plan.next[0].clone() };
+    found.plan.open[0].best = Some(weak);
+    let same = LeftOut { experiment: "other.star".into(), ..found.plan.left_out[0].clone() };
+    found.plan.left_out.push(same);
+    assert_eq!(
+        said(&found),
+        "No experiment would distinguish miswired from crosstalk: the best, `tactus run diagnose -p parts=approach`, would show 1.2 \
+         standard errors, and less than 2 is not worth its time. Left out: `tactus run lab/deep.star` and `tactus run other.star`: \
+         deep.star:7: no sample."
+    );
+    assert!(html(&found).contains("Left out: `tactus run lab/deep.star`"));
+}
+
+#[test]
+fn a_page_tells_why_no_further_experiment_was_run() {
+    let (array, data, found) = (Array::digitacts(), data(), explained());
+    let report =
+        DiscoveryReport { active_ended: Some("the budget is <spent>"), ..report(&array, &data, &found) };
+    assert!(discovery_html(&report).contains("<p>the budget is &lt;spent&gt;</p>"));
+    let json: Value = serde_json::from_str(&discovery_json(&report)).unwrap();
+    assert_eq!(json["active_ended"], "the budget is <spent>");
 }

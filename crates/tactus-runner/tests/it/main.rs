@@ -4,6 +4,7 @@
 
 mod days;
 mod embedded;
+mod rehearsal;
 mod schedules;
 
 use std::collections::BTreeMap;

@@ -5,6 +5,7 @@ mod measurements;
 mod model;
 mod print;
 mod residuals;
+mod twin_experiments;
 mod unfinished;
 
 use std::fs;
@@ -22,6 +23,7 @@ use crate::exit::{Exit, Failure};
 use crate::output;
 use crate::progress::ComputationProgress;
 use measurements::Measurements;
+use twin_experiments::TwinExperiments;
 use unfinished::UnfinishedFolder;
 
 /// What a discovery writes: the report, its numbers, the grown model and the residuals.
@@ -36,6 +38,16 @@ struct Discovered {
     discovery: Discovery,
     /// Experiments that `--active` ran.
     active: Vec<ActiveRun>,
+    /// Why `--active` ran no further experiment, although there was a round for it.
+    active_ended: Option<String>,
+}
+
+/// The rig on which experiments would run.
+#[derive(Debug)]
+struct LiveRig {
+    name: String,
+    /// Its file; `None` of a service's rig.
+    rig: Option<Rig>,
 }
 
 pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<Exit> {
@@ -47,7 +59,7 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     let declared = args.model.as_deref().map(declared).transpose()?;
     let folder = UnfinishedFolder::create(&args.out)?;
     let analyse =
-        |files: &[PathBuf], of: Option<&str>| analysed(args, declared.clone(), files, of, &progress);
+        |files: &[PathBuf], live: Option<&LiveRig>| analysed(args, declared.clone(), files, live, &progress);
     let discovered = if args.active {
         active::discover(common, args, &progress, analyse)?
     } else {
@@ -67,20 +79,20 @@ pub(crate) fn discover(common: &Common, args: &DiscoverArgs) -> anyhow::Result<E
     Ok(if discovered.measured.notes.is_empty() { Exit::Done } else { Exit::Degraded })
 }
 
-/// Analyses files, which must be of the rig `of` if that is given.
+/// Analyses files, which must be of the rig `live` if that is given.
 fn analysed(
     args: &DiscoverArgs,
     declared: Option<Model>,
     files: &[PathBuf],
-    of: Option<&str>,
+    live: Option<&LiveRig>,
     progress: &ComputationProgress,
 ) -> anyhow::Result<Discovered> {
     progress.show("reading", 0.0);
     let measured = Measurements::read(files)?;
-    if let Some(live) = of.filter(|live| *live != measured.rig.name) {
+    if let Some(live) = live.filter(|live| live.name != measured.rig.name) {
         let error = format!(
-            "the data are of rig {:?}, but experiments would run on rig {live:?}: name the rig of the data with --rig or --rig-file",
-            measured.rig.name
+            "the data are of rig {:?}, but experiments would run on rig {:?}: name the rig of the data with --rig or --rig-file",
+            measured.rig.name, live.name
         );
         return Err(Failure::new(Exit::Usage, error).into());
     }
@@ -97,7 +109,9 @@ fn analysed(
         Some(Ablation::Bic) => Rule::Bic,
     };
     let options = Options { seed: args.seed, threads, rule, tolerance_counts: args.tolerance };
-    let found = tactus_discover::discover(&known, &measured.frames, options, &|now| {
+    let live = live.and_then(|live| live.rig.as_ref());
+    let experiments = TwinExperiments::of(&measured, live, args.experiments.as_deref())?;
+    let found = tactus_discover::discover(&known, &measured.frames, options, &experiments, &|now| {
         progress.show(&now.what, now.share);
     });
     let discovery = found.map_err(|error| match error {
@@ -106,7 +120,7 @@ fn analysed(
         }
         DiscoverError::Model(_) | DiscoverError::Effect(_) | DiscoverError::Threads { .. } => error.into(),
     })?;
-    Ok(Discovered { measured, model, known, discovery, active: Vec::new() })
+    Ok(Discovered { measured, model, known, discovery, active: Vec::new(), active_ended: None })
 }
 
 impl Discovered {
@@ -131,6 +145,7 @@ impl Discovered {
             data: &self.measured.data,
             notes: &self.measured.notes,
             active: &self.active,
+            active_ended: self.active_ended.as_deref(),
             discovery: &self.discovery,
         }
     }

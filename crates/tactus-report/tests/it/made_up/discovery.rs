@@ -2,8 +2,8 @@
 
 use tactus_discover::{
     AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement, Final, Floor,
-    Gap, GlobalTest, Inclusion, Level, NextExperiment, NotShown, Point, Round, Split, Structured,
-    TriedEffect, Unexplained, Verdict,
+    Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NotShown, OpenQuestion, Plan, Point, Round,
+    Split, Structured, TriedEffect, Unexplained, Verdict,
 };
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
 use tactus_report::discovery::{DataSource, DiscoveryReport};
@@ -102,13 +102,22 @@ pub(crate) fn explained() -> Discovery {
         final_: Final { level: level(2.08), shrink: Some(0.996_1) },
         verdict: Verdict::Explained,
         unexplained: Unexplained { depends_on: vec![], share: 0.003_9 },
-        next_experiments: vec![NextExperiment {
-            experiment: "diagnose",
-            parameters: vec![("parts", "approach".into())],
-            duration_s: 60.0,
-            separates: ["hysteresis".into(), "backlash".into()],
-            expected_z: Some(11.3),
-        }],
+        plan: Plan {
+            next: vec![NextExperiment {
+                experiment: "diagnose".into(),
+                parameters: vec![("parts", "approach".into())],
+                seed: 2_718_281_828,
+                duration_s: 60.0,
+                separates: ["hysteresis".into(), "backlash".into()],
+                expected_z: Some(11.3),
+            }],
+            open: vec![OpenQuestion { separates: ["miswired".into(), "crosstalk".into()], best: None }],
+            left_out: vec![LeftOut {
+                experiment: "lab/deep.star".into(),
+                parameters: vec![],
+                reason: "deep.star:7: no sample".into(),
+            }],
+        },
         recalibrated: base(),
         grown: base(),
         effects: vec![
@@ -146,7 +155,7 @@ pub(crate) fn nothing_missing() -> Discovery {
         final_: Final { level: level(2.01), shrink: None },
         verdict: Verdict::NothingMissing,
         unexplained: Unexplained { depends_on: vec![], share: 0.0 },
-        next_experiments: vec![],
+        plan: Plan::default(),
         effects: vec![],
         ..whole
     }
@@ -190,7 +199,7 @@ pub(crate) fn unexplained() -> Discovery {
         inclusions: vec![],
         verdict: Verdict::Unexplained,
         unexplained: Unexplained { depends_on: vec!["time since contact", "depth"], share: 1.0 },
-        next_experiments: vec![],
+        plan: Plan::default(),
         effects: vec![],
         ..whole
     }
@@ -207,13 +216,17 @@ pub(crate) fn cannot_judge() -> Discovery {
         verdict: Verdict::CannotJudge,
         unexplained: Unexplained { depends_on: vec![], share: 1.0 },
         curves: vec![],
-        next_experiments: vec![NextExperiment {
-            experiment: "diagnose",
-            parameters: vec![("parts", "drift,repeats".into())],
-            duration_s: 270.0,
-            separates: ["what is missing".into(), "noise".into()],
-            expected_z: None,
-        }],
+        plan: Plan {
+            next: vec![NextExperiment {
+                experiment: "diagnose".into(),
+                parameters: vec![("parts", "drift,repeats".into())],
+                seed: 1,
+                duration_s: 270.0,
+                separates: ["what is missing".into(), "noise".into()],
+                expected_z: None,
+            }],
+            ..Plan::default()
+        },
         ..nothing_missing()
     }
 }
@@ -253,7 +266,16 @@ pub(crate) fn report<'a>(
     data: &'a [DataSource],
     discovery: &'a Discovery,
 ) -> DiscoveryReport<'a> {
-    DiscoveryReport { rig: "sim", simulated: true, array, data, notes: &[], active: &[], discovery }
+    DiscoveryReport {
+        rig: "sim",
+        simulated: true,
+        array,
+        data,
+        notes: &[],
+        active: &[],
+        active_ended: None,
+        discovery,
+    }
 }
 
 fn rounds() -> Vec<Round> {

@@ -1,11 +1,14 @@
+use tactus_discover::{OpenQuestion, Plan};
+
 use super::*;
 
 use crate::commands::discover::model::tests::{before, found};
 
 fn next(experiment: &'static str, part: &str, separates: [&str; 2], duration_s: f64) -> NextExperiment {
     NextExperiment {
-        experiment,
+        experiment: experiment.to_owned(),
         parameters: vec![("parts", part.to_owned())],
+        seed: 11,
         duration_s,
         separates: separates.map(Into::into),
         expected_z: Some(9.0),
@@ -13,7 +16,7 @@ fn next(experiment: &'static str, part: &str, separates: [&str; 2], duration_s: 
 }
 
 fn undecided_between(next_experiments: Vec<NextExperiment>) -> Discovery {
-    Discovery { next_experiments, ..found(&before()) }
+    Discovery { plan: Plan { next: next_experiments, ..Plan::default() }, ..found(&before()) }
 }
 
 fn parts(chosen: &[ChosenExperiment]) -> Vec<&str> {
@@ -29,7 +32,9 @@ fn one_experiment_is_chosen_for_each_question_and_each_once() {
         next("diagnose", "wide", ["heavy-tail", "crosstalk"], 300.0),
         next("diagnose", "drift", ["baseline-drift", "nothing"], 10.0),
     ]);
-    assert_eq!(parts(&choose(&found, 1000.0, &[])), ["rests", "wide"]);
+    let chosen = choose(&found, 1000.0, &[]).unwrap();
+    assert_eq!(parts(&chosen), ["rests", "wide"]);
+    assert!(chosen.iter().all(|one| one.seed == Some(11)), "as rehearsed");
 }
 
 #[test]
@@ -39,7 +44,7 @@ fn what_takes_too_long_gives_way_to_what_does_not() {
         next("diagnose", "rests", ["relaxation", "imprint"], 100.0),
         next("diagnose", "wide", ["heavy-tail", "crosstalk"], 60.0),
     ]);
-    assert_eq!(parts(&choose(&found, 150.0, &[])), ["rests"]);
+    assert_eq!(parts(&choose(&found, 150.0, &[]).unwrap()), ["rests"]);
 }
 
 #[test]
@@ -55,14 +60,33 @@ fn an_experiment_that_was_made_is_not_made_again() {
         before: Vec::new(),
         after: Vec::new(),
     };
-    assert!(choose(&found, 1000.0, &[done]).is_empty());
+    let why = choose(&found, 1000.0, &[done]).unwrap_err();
+    assert_eq!(why, "`tactus run diagnose -p parts=rests` was run already");
 }
 
 #[test]
 fn what_is_unexplained_is_diagnosed_within_the_time_there_is() {
     let unexplained = Discovery { verdict: Verdict::Unexplained, ..undecided_between(Vec::new()) };
-    let chosen = choose(&unexplained, 0.5 * DIAGNOSE_S, &[]);
+    let chosen = choose(&unexplained, 0.5 * DIAGNOSE_S, &[]).unwrap();
     assert_eq!(chosen, [ChosenExperiment::diagnose(0.5)]);
-    assert!(choose(&unexplained, 30.0, &[]).is_empty(), "too short to tell anything");
-    assert!(choose(&undecided_between(Vec::new()), 1e4, &[]).is_empty(), "nothing is left to tell");
+    let why = choose(&unexplained, 30.0, &[]).unwrap_err();
+    assert!(why.ends_with("too short for `tactus run diagnose`"), "{why}");
+}
+
+#[test]
+fn why_nothing_is_run_is_told() {
+    let decided = Discovery { verdict: Verdict::Explained, ..undecided_between(Vec::new()) };
+    assert_eq!(choose(&decided, 1e4, &[]).unwrap_err(), "no two explanations are undecided");
+    let shows = next("diagnose", "drift", ["baseline-drift", "nothing"], 10.0);
+    let decided = Discovery { plan: Plan { next: vec![shows], ..Plan::default() }, ..decided };
+    assert_eq!(choose(&decided, 1e4, &[]).unwrap_err(), "no two explanations are undecided");
+    let long = next("diagnose", "wide", ["heavy-tail", "crosstalk"], 300.0);
+    let question = OpenQuestion { separates: ["imprint".into(), "relaxation".into()], best: None };
+    let plan = Plan { next: vec![long], open: vec![question], left_out: Vec::new() };
+    let undecided = Discovery { plan, ..decided };
+    assert_eq!(
+        choose(&undecided, 60.0, &[]).unwrap_err(),
+        "no experiment would distinguish imprint from relaxation: none of those that would could be rehearsed; `tactus run diagnose \
+         -p parts=wide` takes 5 min 00 s, and 1 min 00 s of the budget are left"
+    );
 }

@@ -20,13 +20,23 @@ pub(super) struct Measurements {
     /// Defects of the files.
     pub(super) notes: Vec<String>,
     pub(super) frames: Frames,
+    /// Thickness of the covering in the last frame.
+    pub(super) covering_mm: f64,
+    /// Id of the tool in the last frame.
+    pub(super) indenter: String,
 }
 
 impl Measurements {
     pub(super) fn read(files: &[PathBuf]) -> anyhow::Result<Self> {
         let mut frames: Option<Frames> = None;
         let mut runs: BTreeMap<String, (u64, BTreeSet<i32>)> = BTreeMap::new();
+        let mut covering_mm = 0.0;
+        let mut indenter = String::new();
         let source = rows::visit(files, |rig, row| {
+            covering_mm = row.covering_mm;
+            if indenter != row.indenter {
+                row.indenter.clone_into(&mut indenter);
+            }
             frames.get_or_insert_with(|| Frames::new(rig.array.elements())).push(row);
             if !runs.contains_key(row.run) {
                 runs.insert(row.run.to_owned(), Default::default());
@@ -51,7 +61,7 @@ impl Measurements {
         let data = data.collect();
         let simulated = source.rig.simulated || source.runs.iter().any(|run| run.simulated);
         let (rig, notes) = (source.rig, [source.warnings, source.notes].concat());
-        Ok(Self { files: files.to_owned(), rig, simulated, data, notes, frames })
+        Ok(Self { files: files.to_owned(), rig, simulated, data, notes, frames, covering_mm, indenter })
     }
 
     /// The run ids, as evidence names them.

@@ -1,4 +1,4 @@
-use tactus_discover::{Final, Floor, GlobalTest, Level, Split, Unexplained, Verdict};
+use tactus_discover::{Final, Floor, GlobalTest, Level, Plan, Split, Unexplained, Verdict};
 use tactus_model::effect::Definition;
 use tactus_schema::Rig;
 
@@ -88,7 +88,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
         final_: Final { level, shrink: Some(1.0) },
         verdict: Verdict::Explained,
         unexplained: Unexplained { depends_on: Vec::new(), share: 0.0 },
-        next_experiments: Vec::new(),
+        plan: Plan::default(),
         recalibrated: base,
         grown,
         effects: vec![

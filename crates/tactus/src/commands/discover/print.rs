@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tactus_calibrate::Estimate;
 use tactus_discover::{AddedEffect, Estimated, Level};
 use tactus_report::discovery::{
-    AmbiguousEffect, DiscoveryReport, Proposal, command, in_words, not_shown, proposals,
+    AmbiguousEffect, DiscoveryReport, Proposal, command, in_words, not_proposed, not_shown, proposals,
 };
 
 use crate::commands::calibrate::{estimate, faulty};
@@ -47,12 +47,13 @@ pub(super) fn discovered(report: &DiscoveryReport<'_>, paths: &[PathBuf]) {
         let [before, after] = [&run.before, &run.after].map(|undecided| AmbiguousEffect::in_words(undecided));
         say(&format!("{}: {before} -> {after}", command(&run.experiment, &run.parameters)));
     }
+    say("");
     let proposals = proposals(found);
-    if !proposals.is_empty() {
-        say("");
-    }
     for Proposal { command, duration_s, decides } in proposals {
         say(&format!("next: {command}  ({})\n      {decides}", duration(duration_s)));
+    }
+    for sentence in not_proposed(found) {
+        say(&sentence);
     }
     say("");
     for path in paths {
