@@ -31,7 +31,7 @@ pub(crate) use knots::{of_formulas, places};
 pub(crate) use parameters::{Parameters, Term};
 pub(crate) use predictor::Predictor;
 pub(crate) use prepare::Prepared;
-pub(crate) use problem::{Fitted, Free, Problem};
+pub(crate) use problem::{Fitted, Free, Problem, undone};
 pub use random_walk::RunWalks;
 pub(crate) use random_walk::{RANDOM_WALK, RandomWalk, is_random_walk};
 pub(crate) use scale::Scale;

@@ -40,7 +40,9 @@ impl Term {
         let last = moved.last().copied().unwrap_or_default();
         let taken = step.max(least_step).min((most - last).max(0.0));
         // Rounding must not bring a value out of its range, or below the one before.
-        moved.iter_mut().for_each(|value| *value = (*value + taken).clamp(least, most));
+        for value in &mut moved {
+            *value = (*value + taken).clamp(least, most);
+        }
         if curve.increasing {
             for knot in knot.max(1)..knots.values.len() {
                 knots.values[knot] = knots.values[knot].max(knots.values[knot - 1]);

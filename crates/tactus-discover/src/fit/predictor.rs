@@ -56,7 +56,7 @@ impl<'a> Predictor<'a> {
             let effect = term.effect()?;
             let is_covering = term.definition.stage() == PipelineStage::Covering;
             covers += usize::from(is_covering);
-            if !effect.acts_before_signal() && !(is_covering && covers <= from) {
+            if !(effect.acts_before_signal() || is_covering && covers <= from) {
                 effects.push(effect);
             }
         }
@@ -186,13 +186,11 @@ impl Stream<'_> {
         let (run, tool, covering_mm) = (bins.run[bin], frames.indenter[frame], frames.covering_mm[frame]);
         let covering = Covering { thickness_mm: covering_mm };
         let same = self.running.take().filter(|one| (one.run, one.tool) == (run, tool));
-        let running = match same {
-            Some(running) => running,
-            None => {
-                let pipeline =
-                    self.predictor.pipeline(&self.parameters, run, tool, covering, &self.effects)?;
-                Running { run, tool, covering_mm, pipeline }
-            }
+        let running = if let Some(running) = same {
+            running
+        } else {
+            let pipeline = self.predictor.pipeline(&self.parameters, run, tool, covering, &self.effects)?;
+            Running { run, tool, covering_mm, pipeline }
         };
         let running = self.running.insert(running);
         if running.covering_mm.to_bits() != covering_mm.to_bits() {

@@ -163,11 +163,6 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// By how much a fit that ended may still be above the least cost.
-    pub(crate) fn undone(&self, cost: f64) -> f64 {
-        COST_LEAST.max(COST_SHARE_LEAST * cost)
-    }
-
     /// The parameters that a fit of a model varies.
     pub(crate) fn free(&self, parameters: &Parameters) -> Vec<Free> {
         let mut free = Vec::new();
@@ -313,13 +308,13 @@ impl<'a> Problem<'a> {
                     improved = true;
                     break;
                 }
-                if promise < self.undone(cost) && damping > 1e-3 {
+                if promise < undone(cost) && damping > 1e-3 {
                     break;
                 }
                 damping *= 10.0;
             }
             covariance = Some(gram);
-            if !improved || promise < self.undone(cost) {
+            if !improved || promise < undone(cost) {
                 break;
             }
         }
@@ -342,7 +337,7 @@ impl<'a> Problem<'a> {
                 let slope = self.slope(at, predicted, *one)?;
                 Ok(Some(Arc::new(Stretch::of(&slope, elements))))
             }
-            _ => Ok(None),
+            Free::SigmaIntercept | Free::SigmaSlope | Free::Of { .. } | Free::Knot { .. } => Ok(None),
         };
         parallel::map(free, knot).into_iter().collect()
     }
@@ -459,6 +454,11 @@ fn least_step(at: &Parameters, free: Free) -> f64 {
         Free::Knot { term, knot } => at.terms[term].least_step(knot),
         Free::SigmaIntercept | Free::SigmaSlope | Free::Of { .. } => f64::NEG_INFINITY,
     }
+}
+
+/// By how much a fit that ended may still be above the least cost.
+pub(crate) fn undone(cost: f64) -> f64 {
+    COST_LEAST.max(COST_SHARE_LEAST * cost)
 }
 
 /// Sets undetermined knots of a curve to the value of the knot before, so that the curve stays constant without data.

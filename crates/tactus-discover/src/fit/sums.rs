@@ -314,8 +314,8 @@ impl Total {
             return;
         }
         let elements = sums.border.own.len();
-        let is_same = |last: &&mut Block| (last.number, last.segment) == (number, sums.segment);
-        if self.blocks.last_mut().filter(is_same).is_none() {
+        let is_other = |last: &Block| (last.number, last.segment) != (number, sums.segment);
+        if self.blocks.last().is_none_or(is_other) {
             self.blocks.push(Block::new(number, sums.segment, own, self.products.ncols(), elements));
         }
         if let Some(block) = self.blocks.last_mut() {

@@ -1,6 +1,6 @@
 //! The experiments that may be proposed: the parts of `diagnose`, two experiments of the paper, and the lab's own.
 
-use super::reach::Reach;
+use super::reach::{Reach, is_within};
 
 /// An experiment that may be proposed.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,13 +82,13 @@ fn diagnose(part: &str, scale: f64, reach: &Reach) -> Candidate {
         parameters.push(("scale", scale.to_string()));
     }
     let share = reach.deepest_mm() / (LADDER * reach.covering_mm);
-    if !reach.is_within(DEPTH_SHARE, share) {
+    if !is_within(DEPTH_SHARE, share) {
         // The script takes no less.
         parameters.push(("depth_share", ((100.0 * share).floor() / 100.0).max(0.05).to_string()));
     }
     let [slowest, ..] = SPEEDS_MM_PER_S;
     let fastest = reach.fastest_mm_per_s.unwrap_or(slowest).max(slowest);
-    let speeds = SPEEDS_MM_PER_S.into_iter().filter(|speed| reach.is_within(*speed, fastest));
+    let speeds = SPEEDS_MM_PER_S.into_iter().filter(|speed| is_within(*speed, fastest));
     let speeds: Vec<f64> = speeds.collect();
     if part == "rates" && speeds.len() < SPEEDS_MM_PER_S.len() {
         parameters.push(("speeds_mm_per_s", list(&speeds)));
@@ -99,7 +99,7 @@ fn diagnose(part: &str, scale: f64, reach: &Reach) -> Candidate {
 fn element_centres(reach: &Reach) -> Candidate {
     let [.., deepest_mm] = ELEMENT_DEPTHS_MM;
     let mut parameters = Vec::new();
-    if !reach.is_within(deepest_mm, reach.deepest_mm()) {
+    if !is_within(deepest_mm, reach.deepest_mm()) {
         let by = reach.deepest_mm() / deepest_mm;
         let depths_mm =
             ELEMENT_DEPTHS_MM.map(|depth_mm| ((1000.0 * by * depth_mm).floor() / 1000.0).max(0.001));
@@ -117,7 +117,7 @@ fn grid_sweep(reach: &Reach) -> Candidate {
     ];
     let share = reach.deepest_mm() / reach.covering_mm;
     let [.., deepest] = SWEEP_SHARES;
-    if !reach.is_within(deepest, share) {
+    if !is_within(deepest, share) {
         let shares = SWEEP_SHARES.map(|one| ((100.0 * one.min(share)).floor() / 100.0).max(0.01));
         parameters.push(("depth_shares", list(&shares)));
     }

@@ -30,11 +30,6 @@ impl Reach {
         self.under(self.covering_mm)
     }
 
-    /// True if a depth, a share or a speed is nearly reached.
-    pub(super) fn is_within(&self, wanted: f64, reached: f64) -> bool {
-        wanted <= NEARLY * reached
-    }
-
     /// Why rehearsed frames go beyond; `None` if they do not.
     pub(super) fn is_left_by(&self, rehearsed: &Frames) -> Option<String> {
         for (covering_mm, depth_mm) in deepest_mm(rehearsed) {
@@ -42,7 +37,7 @@ impl Reach {
             if depth_mm > 0.0 && reached_mm == 0.0 {
                 return Some(format!("these data have no press under the covering of {covering_mm} mm"));
             }
-            if !self.is_within(depth_mm, reached_mm) {
+            if !is_within(depth_mm, reached_mm) {
                 return Some(format!(
                     "it presses {depth_mm:.3} mm deep under the covering of {covering_mm} mm, and these data only {reached_mm:.3} mm"
                 ));
@@ -75,4 +70,9 @@ fn deepest_mm(frames: &Frames) -> Vec<(f64, f64)> {
 /// Greatest speed of a load, averaged over the load's time: near the covering the tip moves in steps.
 fn fastest_mm_per_s(frames: &Frames) -> Option<f64> {
     load_speeds_mm_per_s(frames).reduce(f64::max)
+}
+
+/// True if a depth, a share or a speed is nearly reached.
+pub(super) fn is_within(wanted: f64, reached: f64) -> bool {
+    wanted <= NEARLY * reached
 }

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 
 use super::grow::{POLISH_ROUNDS, Search, names};
 use crate::data::DiscoverError;
-use crate::fit::{Fitted, Parameters, Term, of_formulas, places};
+use crate::fit::{Fitted, Parameters, Term, of_formulas, places, undone};
 
 /// So many standard deviations of a gain by chance.
 const REFUTED_Z: f64 = 2.0;
@@ -98,7 +98,7 @@ impl Search<'_> {
         let freedom = numbers(free).saturating_sub(numbers(formula)).max(1) as f64;
         let gain = formula.cost - free.cost;
         let chance = freedom + REFUTED_Z * (2.0 * freedom).sqrt();
-        let undone = self.problem.undone(formula.cost);
+        let undone = undone(formula.cost);
         if gain <= (chance * self.problem.variance).max(undone) {
             return false;
         }

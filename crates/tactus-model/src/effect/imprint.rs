@@ -54,12 +54,12 @@ pub(super) static DEFINITION: Definition = Definition {
             Knots::divided(parts, at_s, f64::ln)
         },
     }),
-    make: Make::Covering(|values| match values.knots() {
-        Some(knots) => Box::new(FreeImprint { parts: knots.clone(), dents: Vec::new() }),
-        None => {
-            let [set_share, recovery_s, spread_ratio] = [values[0], values[1], values[2]];
-            Box::new(Imprint { set_share, recovery_s, spread_ratio, dents: Vec::new() })
+    make: Make::Covering(|values| {
+        if let Some(knots) = values.knots() {
+            return Box::new(FreeImprint { parts: knots.clone(), dents: Vec::new() });
         }
+        let [set_share, recovery_s, spread_ratio] = [values[0], values[1], values[2]];
+        Box::new(Imprint { set_share, recovery_s, spread_ratio, dents: Vec::new() })
     }),
 };
 
