@@ -94,7 +94,7 @@ impl Record for Kept {
     }
 
     fn stage(&mut self, state: &pb::StageState) -> Result<(), RecordFailure> {
-        self.messages().push(Message::Stage(state.clone()));
+        self.messages().push(Message::Stage(*state));
         Ok(())
     }
 

@@ -40,7 +40,7 @@ impl Term {
         let last = moved.last().copied().unwrap_or_default();
         let taken = step.max(least_step).min((most - last).max(0.0));
         // Rounding must not bring a value out of its range, or below the one before.
-        for value in &mut moved {
+        for value in moved {
             *value = (*value + taken).clamp(least, most);
         }
         if curve.increasing {

@@ -62,9 +62,7 @@ pub(crate) fn explained() -> Discovery {
             .collect(),
         rounds: rounds(),
         tentative: vec![],
-        inclusions: [("hysteresis", 0.93), ("relaxation", 0.12), ("saturation", 0.031)]
-            .map(|(effect, probability)| Inclusion { effect, probability })
-            .to_vec(),
+        inclusions: inclusions(),
         steps: vec![
             AddedEffect {
                 effect: "hysteresis",
@@ -128,6 +126,12 @@ pub(crate) fn explained() -> Discovery {
                 .unwrap(),
         ],
     }
+}
+
+fn inclusions() -> Vec<Inclusion> {
+    [("hysteresis", 0.93), ("relaxation", 0.12), ("saturation", 0.031)]
+        .map(|(effect, probability)| Inclusion { effect, probability })
+        .to_vec()
 }
 
 /// Nothing is missing from the base model.
