@@ -243,13 +243,13 @@ fn a_rig_that_loads_faster_than_the_data_did_is_told_so() {
 /// Three deep presses that are held, each with a rest: shorter than the part `hold`, and deeper.
 const LONG_PRESSES: (&str, &str) = (
     "long-presses.star",
-    r#"
+    r"
 def run(rig):
     tare()
     for x_mm in (5.1, 9.1, 13.3):
         press(x_mm, 4.9, [0.6], dwell_s = 20.0)
         wait(20.0)
-"#,
+",
 );
 
 #[test]
