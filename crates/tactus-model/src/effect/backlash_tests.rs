@@ -1,5 +1,4 @@
-use crate::effect::bench::{THIN, effect, model, simulator};
-use crate::effect::{BaseModel, Make, Now, TipState};
+use crate::effect::bench::{effect, simulator};
 use crate::{Moment, Pipeline, Registration};
 
 /// Places where the tip truly is, robot frame, after each where the stage says it is; the surface stands at 0.
@@ -45,21 +44,4 @@ fn a_way_in_more_steps_ends_at_the_same_place() {
     };
     let last = |steps| ways([0.1, 0.2, 0.3], &line(steps))[2 * steps + 1];
     assert_near(&[last(1)], &[last(50)]);
-}
-
-#[test]
-fn without_play_a_little_would_leave_the_tip_behind_the_last_move() {
-    let none = effect("backlash", [("play_x_mm", 0.0), ("play_y_mm", 0.0), ("play_z_mm", 0.0)]);
-    let Make::Motion(make) = none.definition().make else { panic!("an effect of motion") };
-    let (mut backlash, model) = (make(none.values()), model());
-    let base = BaseModel { model: &model, covering: THIN };
-    let now = Now { t_s: 0.0, dt_s: 0.0, temperature_c: None, base };
-    let registration = Registration { origin_mm: [0.0; 2], rotation_deg: 0.0 };
-    // Down, then a rest, then up.
-    for (z_mm, want) in [(0.0, 0.0), (-0.5, -0.5), (-0.5, -0.5), (-0.2, 0.5)] {
-        let mut tip = TipState { tip_mm: [0.0, 0.0, z_mm], registration, surface_mm: 0.0 };
-        backlash.place(now, &mut tip);
-        let by_play = backlash.slope(2, base, &tip).unwrap().depth_mm;
-        assert!((by_play - want).abs() < 1e-12, "{z_mm}: {by_play}");
-    }
 }

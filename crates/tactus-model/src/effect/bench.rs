@@ -1,9 +1,8 @@
 //! Test helpers: a sensor with known parameters.
 
-use super::{BaseModel, Definition, Effect, Knots, Make, Now, TipState};
+use super::{Definition, Effect, Knots};
 use crate::{
-    Array, Contact, Covering, ForwardModel, Indenter, Moment, Pipeline, Psf, Registration, Response,
-    Simulator,
+    Array, Covering, ForwardModel, Indenter, Moment, Pipeline, Psf, Registration, Response, Simulator,
 };
 
 pub(crate) const THIN: Covering = Covering { thickness_mm: 1.016 };
