@@ -71,7 +71,7 @@ fn neutral_effects_change_nothing_to_the_bit() {
     let way = way(&plain);
     let mut without = Pipeline::new(&plain).unwrap();
     let neutral =
-        REGISTRY.iter().map(|definition| Effect::neutral(definition)).chain(REGISTRY.iter().filter_map(flat));
+        REGISTRY.iter().map(|definition| Effect::neutral(definition)).chain(REGISTRY.iter().filter_map(|definition| flat(definition)));
     let mut pipelines: Vec<Pipeline> =
         neutral.clone().map(|effect| Pipeline::new(&simulator([effect])).unwrap()).collect();
     pipelines.push(Pipeline::new(&simulator(neutral)).unwrap());
@@ -107,7 +107,7 @@ fn every_effect_that_is_not_neutral_changes_something() {
 }
 
 /// An effect with knots that are all 0, if it may have knots.
-fn flat(definition: &&'static Definition) -> Option<Effect> {
+fn flat(definition: &'static Definition) -> Option<Effect> {
     with_knots(definition, |_| 0.0)
 }
 
