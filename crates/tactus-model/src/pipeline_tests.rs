@@ -70,8 +70,10 @@ fn neutral_effects_change_nothing_to_the_bit() {
     let plain = simulator([]);
     let way = way(&plain);
     let mut without = Pipeline::new(&plain).unwrap();
-    let neutral =
-        REGISTRY.iter().map(|definition| Effect::neutral(definition)).chain(REGISTRY.iter().filter_map(|definition| flat(definition)));
+    let neutral = REGISTRY
+        .iter()
+        .map(|definition| Effect::neutral(definition))
+        .chain(REGISTRY.iter().filter_map(|definition| flat(definition)));
     let mut pipelines: Vec<Pipeline> =
         neutral.clone().map(|effect| Pipeline::new(&simulator([effect])).unwrap()).collect();
     pipelines.push(Pipeline::new(&simulator(neutral)).unwrap());
