@@ -301,8 +301,10 @@ impl ThreadRecorder {
             Writer { recording, gauge: gauge.clone(), sync_to, wished: None, at: MonoTime::default() };
         thread::Builder::new().name("recorder".into()).spawn(move || {
             let _living = living;
+            // `write_all` owns the queue: also after a panic, who sees that the thread has ended finds that it takes no message.
+            let result = writer.write_all(queue);
             // Nobody may wait for the result any more.
-            let _told = end.send(writer.write_all(&queue));
+            let _told = end.send(result);
         })?;
         Ok(Self { entries, backlog: Backlog::default(), refused: Missing::default(), gauge, ended, path })
     }
@@ -461,7 +463,7 @@ struct Writer<S> {
 
 impl<S: Storage> Writer<S> {
     /// Writes until the queue ends. After a failure it takes what comes nevertheless: the recording keeps what it can.
-    fn write_all(mut self, queue: &Receiver<Entry>) -> Result<(), RecordError> {
+    fn write_all(mut self, queue: Receiver<Entry>) -> Result<(), RecordError> {
         loop {
             self.gauge.0.life.beat();
             let written = match queue.recv_timeout(IDLE) {
