@@ -23,11 +23,15 @@ pub(crate) struct Predictor<'a> {
 /// Greatest number of cached images of 48 elements, about 130 MB.
 const IMAGES_MAX: usize = 200_000;
 
+/// An empty cache of images, with the same number of values for every array.
+pub(crate) fn no_images(elements: usize) -> Arc<Images> {
+    Arc::new(Images::new(IMAGES_MAX * 48 / elements.max(1)))
+}
+
 impl<'a> Predictor<'a> {
+    /// With a cache of images of its own.
     pub(crate) fn new(known: &'a Known, frames: &'a Frames, bins: &'a Bins) -> Self {
-        // The same number of values for every array.
-        let images = Arc::new(Images::new(IMAGES_MAX * 48 / bins.elements.max(1)));
-        Self { known, frames, bins, images }
+        Self { known, frames, bins, images: no_images(bins.elements) }
     }
 
     /// Counts of every bin and element, without noise and rounding.

@@ -1,7 +1,11 @@
 //! Preparation of a search: split, noise, bins, recalibrated base model, and lines in the spectrum.
 
+use std::sync::Arc;
+
+use tactus_model::Images;
+
 use super::parameters::{Parameters, Term};
-use super::predictor::Predictor;
+use super::predictor::{Predictor, no_images};
 use super::problem::{Fitted, Problem};
 use crate::data::{
     Bins, DiscoverError, Faulty, Floor, Frames, HeldOut, Known, Noise, lattice, spectrum, still,
@@ -39,6 +43,8 @@ pub(crate) struct Prepared<'a> {
     /// Frequencies of lines in the spectrum of the base model's residual; a grid of frequencies would miss them.
     pub(crate) frequencies_hz: Vec<f64>,
     pub(crate) warnings: Vec<String>,
+    /// One cache for all predictions of these data.
+    images: Arc<Images>,
 }
 
 impl<'a> Prepared<'a> {
@@ -72,13 +78,15 @@ impl<'a> Prepared<'a> {
         let whole = Bins::of(frames, false)?;
         let mut bins = Bins::of(frames, true)?;
         bins.weigh(frames, &noise, &heldout);
-        let mut base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise), &faulty)?;
-        let frequencies_hz = lines_hz(&Predictor::new(known, frames, &whole), &base, &faulty)?;
+        let images = no_images(frames.elements);
+        let predictor = |bins| Predictor { known, frames, bins, images: Arc::clone(&images) };
+        let mut base = recalibrated(&Problem::new(predictor(&bins), &noise), &faulty)?;
+        let frequencies_hz = lines_hz(&predictor(&whole), &base, &faulty)?;
         if !frequencies_hz.is_empty() {
             // Averaging over several frames would remove a tone.
             bins = Bins::of(frames, false)?;
             bins.weigh(frames, &noise, &heldout);
-            base = recalibrated(&Problem::new(Predictor::new(known, frames, &bins), &noise), &faulty)?;
+            base = recalibrated(&Problem::new(predictor(&bins), &noise), &faulty)?;
         }
         Ok(Self {
             known,
@@ -97,17 +105,23 @@ impl<'a> Prepared<'a> {
             base,
             frequencies_hz,
             warnings,
+            images,
         })
+    }
+
+    /// Predictions for some bins.
+    pub(crate) fn predictor<'b>(&'b self, bins: &'b Bins) -> Predictor<'b> {
+        Predictor { known: self.known, frames: self.frames, bins, images: Arc::clone(&self.images) }
     }
 
     /// The least-squares problem of the bins.
     pub(crate) fn problem(&self) -> Problem<'_> {
-        Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise)
+        Problem::new(self.predictor(&self.bins), &self.noise)
     }
 
     /// The same, with dead and stuck elements weighted as the others.
     pub(crate) fn problem_with_silent(&self) -> Problem<'_> {
-        Problem::new(Predictor::new(self.known, self.frames, &self.bins), &self.noise_of_silent)
+        Problem::new(self.predictor(&self.bins), &self.noise_of_silent)
     }
 }
 

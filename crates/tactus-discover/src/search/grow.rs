@@ -531,14 +531,17 @@ impl Search<'_> {
                     grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
                     continue 'again;
                 }
-                let mut same = Vec::new();
                 let unit = self.unit(ln_odds, &grown.at);
-                let probabilities = probabilities(name, ln_odds, unit, &others);
+                let model_leaves = match leaves {
+                    Some(known) => known,
+                    None if others.is_empty() => true,
+                    None => *leaves.insert(self.leaves_something(&grown.at)?),
+                };
+                // Where the model leaves nothing, its form is right, and only the other class needs another form than its own.
+                let form_odds = if model_leaves { 1.0 } else { unit.sqrt() };
+                let probabilities = probabilities(name, ln_odds, unit, form_odds, &others);
+                let mut same = Vec::new();
                 for (other, fitted) in credible(&probabilities, others) {
-                    let model_leaves = match leaves {
-                        Some(known) => known,
-                        None => *leaves.insert(self.leaves_something(&grown.at)?),
-                    };
                     // Its form is no excuse for a class that leaves something where the model leaves nothing.
                     if model_leaves || !self.leaves_something(&fitted)? {
                         same.push((other, fitted));
@@ -598,9 +601,17 @@ impl Search<'_> {
 }
 
 /// Probabilities of a class with these odds, and of others in its place; likeliest others first.
-fn probabilities(name: &'static str, ln_odds: f64, unit: f64, others: &[Beside]) -> Vec<(&'static str, f64)> {
+fn probabilities(
+    name: &'static str,
+    ln_odds: f64,
+    unit: f64,
+    form_odds: f64,
+    others: &[Beside],
+) -> Vec<(&'static str, f64)> {
     let mut weights = vec![(name, 1.0)];
-    weights.extend(others.iter().map(|other| (other.name, ((other.ln_odds - ln_odds) / unit).exp())));
+    weights.extend(
+        others.iter().map(|other| (other.name, ((other.ln_odds - ln_odds) / unit).exp() / form_odds)),
+    );
     weights[1..].sort_by(|a, b| b.1.total_cmp(&a.1));
     let total: f64 = weights.iter().map(|(_, weight)| weight).sum();
     weights.into_iter().map(|(name, weight)| (name, weight / total)).collect()

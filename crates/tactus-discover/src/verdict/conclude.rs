@@ -10,7 +10,7 @@ use super::discovery::{
 };
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
-use crate::fit::{Fitted, LOUD, Parameters, Predictor, Prepared, Problem, RandomWalk, Term};
+use crate::fit::{Fitted, LOUD, Parameters, Prepared, Problem, RandomWalk, Term};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
     ALPHA, Alike, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS, Refuted,
@@ -346,8 +346,8 @@ impl Prepared<'_> {
 
     /// The residual of a model on the held-out frames.
     fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
-        let Self { known, frames, heldout, noise, whole, .. } = self;
-        let predicted = Predictor::new(known, frames, whole).predict(parameters)?;
+        let Self { frames, heldout, noise, whole, .. } = self;
+        let predicted = self.predictor(whole).predict(parameters)?;
         let elements = frames.elements;
         let mut squares = vec![0.0; elements];
         let mut count = 0.0_f64;
