@@ -35,7 +35,7 @@ pub struct Outcome {
     pub gap_error: f64,
     /// Shrink of the first hidden effect, fitted alone in the first round; `None` if it was not fitted.
     pub alone_shrink: Option<f64>,
-    /// Wall time in s.
+    /// Time of the processor in s, on one thread.
     pub seconds: f64,
     /// Greatest resident memory in MiB.
     pub peak_mib: f64,
@@ -243,7 +243,7 @@ fn outcome(set: &Planned, label: &Label, ran: &Ran, report: Option<DiscoveryRepo
             .flat_map(|report| &report.rounds)
             .filter_map(|round| round.taken.clone())
             .collect(),
-        seconds: ran.seconds,
+        seconds: ran.processor_s,
         peak_mib: ran.peak_mib,
         verdict: report.as_ref().map_or_else(|| "failed".into(), |report| report.verdict.clone()),
         named: report.map_or_else(Vec::new, |report| report.steps),

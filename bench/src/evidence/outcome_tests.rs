@@ -92,7 +92,7 @@ fn labels_and_reports_are_read_from_files() -> Result<()> {
 
     let label = set.recipe.make()?.label;
     let ran =
-        Ran { program: String::new(), seconds: 2.5, peak_mib: 80.0, exit: Some(0), said: String::new() };
+        Ran { program: String::new(), seconds: 9.0, processor_s: 2.5, peak_mib: 80.0, exit: Some(0), said: String::new() };
     let report = json!({
         "split": { "frames": 3000, "train_presses": 20, "heldout_presses": 10 },
         "base": { "heldout_chi2": 1.5 },

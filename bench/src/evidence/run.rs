@@ -58,6 +58,9 @@ pub struct Ran {
     pub program: String,
     /// Wall time on one thread, while the other jobs run.
     pub seconds: f64,
+    /// Time of the processor in s. Other programs hardly change it.
+    #[serde(default)]
+    pub processor_s: f64,
     /// Greatest resident memory in MiB.
     pub peak_mib: f64,
     /// Exit code; `None` if a signal ended the program.
@@ -166,7 +169,7 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
     discover.args(["--json", "discover", "--threads", "1", "--seed"]).arg(DISCOVERY_SEED.to_string());
     discover.args(&workflow.more).arg("--out").arg(&out).arg(&table);
     discover.stdout(Stdio::null()).stderr(File::create(&log).with_context(|| at(&log))?);
-    let Watched { exit, seconds, peak_mib } = watched(&mut discover)?;
+    let Watched { exit, seconds, processor_s, peak_mib } = watched(&mut discover)?;
     let told =
         || fs::read(&log).map(|text| String::from_utf8_lossy(&text).into_owned()).with_context(|| at(&log));
     // Wrong arguments are an error of the campaign, not a result of a set.
@@ -185,7 +188,7 @@ fn one(set: &Planned, places: &Places, workflow: &Workflow, program: &str) -> Re
     } else {
         told()?
     };
-    let ran = Ran { program: program.into(), seconds, peak_mib, exit: exit.code(), said };
+    let ran = Ran { program: program.into(), seconds, processor_s, peak_mib, exit: exit.code(), said };
     let path = places.ran(&set.id);
     write(&path, &serde_json::to_string_pretty(&ran).with_context(|| at(&path))?)?;
     fs::remove_dir_all(&folder).with_context(|| at(&folder))

@@ -33,6 +33,9 @@ pub struct Cost {
     pub frames: usize,
     /// Median of the runs, from start to files written.
     pub seconds: f64,
+    /// Median of the processor's time on all cores. Other programs hardly change it.
+    #[serde(default)]
+    pub processor_s: f64,
     /// Greatest resident memory of any run.
     pub peak_mib: f64,
 }
@@ -69,9 +72,15 @@ impl Timing {
             let costs = (0..runs).map(|_| cost(tactus, &table, &out)).collect::<Result<Vec<_>>>()?;
             fs::rename(out.join("residuals.parquet"), place("residuals", "parquet"))?;
             fs::rename(out.join("report.json"), place("reports", "json"))?;
-            let seconds = quantile(costs.iter().map(|cost| cost.0).collect(), 0.5).unwrap_or(f64::NAN);
-            let peak_mib = costs.iter().map(|cost| cost.1).fold(0.0, f64::max);
-            rows.push(Cost { frames: *frames, seconds, peak_mib });
+            let median = |of: fn(&Watched) -> f64| {
+                quantile(costs.iter().map(of).collect(), 0.5).unwrap_or(f64::NAN)
+            };
+            rows.push(Cost {
+                frames: *frames,
+                seconds: median(|cost| cost.seconds),
+                processor_s: median(|cost| cost.processor_s),
+                peak_mib: costs.iter().map(|cost| cost.peak_mib).fold(0.0, f64::max),
+            });
         }
         let points = rows.iter().map(|cost| [cost.frames as f64, cost.seconds]).collect();
         let exponent = Growth { what: "discover".into(), size_of: "frames", points }.exponent();
@@ -79,13 +88,13 @@ impl Timing {
     }
 }
 
-/// Seconds of a run, and its greatest resident memory in MiB.
-fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
+/// A run to its end.
+fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<Watched> {
     let mut discover = Command::new(tactus);
     discover.args(["--json", "discover", "--out"]).arg(out).arg(table).stdout(Stdio::null());
-    let Watched { exit, seconds, peak_mib } = watched(&mut discover)?;
-    ensure!(exit.success(), "{} {} failed: {exit}", tactus.display(), table.display());
-    Ok((seconds, peak_mib))
+    let ended = watched(&mut discover)?;
+    ensure!(ended.exit.success(), "{} {} failed: {}", tactus.display(), table.display(), ended.exit);
+    Ok(ended)
 }
 
 /// A program that was watched until its end.
@@ -93,6 +102,8 @@ fn cost(tactus: &Path, table: &Path, out: &Path) -> Result<(f64, f64)> {
 pub(super) struct Watched {
     pub(super) exit: ExitStatus,
     pub(super) seconds: f64,
+    /// Time of the processor on all cores.
+    pub(super) processor_s: f64,
     /// Greatest resident memory.
     pub(super) peak_mib: f64,
 }
@@ -101,15 +112,18 @@ pub(super) struct Watched {
 pub(super) fn watched(command: &mut Command) -> Result<Watched> {
     let started = Instant::now();
     let mut child = command.spawn().with_context(|| command.get_program().to_string_lossy().into_owned())?;
-    let status = format!("/proc/{}/status", child.id());
-    let mut peak_kib = 0.0_f64;
+    let process = child.id();
+    let about = |what: &str| fs::read_to_string(format!("/proc/{process}/{what}")).ok();
+    let (mut peak_kib, mut processor_s) = (0.0_f64, 0.0_f64);
     loop {
-        // The file is gone once the process has ended; the last value stays.
-        let most_kib = fs::read_to_string(&status).ok().and_then(|text| kib(&text, "VmHWM:"));
+        // The files are gone once the process has ended; the last values stay.
+        let most_kib = about("status").and_then(|text| kib(&text, "VmHWM:"));
         peak_kib = peak_kib.max(most_kib.unwrap_or(0.0));
+        let used_s = about("stat").and_then(|text| self::processor_s(&text));
+        processor_s = processor_s.max(used_s.unwrap_or(0.0));
         if let Some(exit) = child.try_wait()? {
             let seconds = started.elapsed().as_secs_f64();
-            return Ok(Watched { exit, seconds, peak_mib: peak_kib / 1024.0 });
+            return Ok(Watched { exit, seconds, processor_s, peak_mib: peak_kib / 1024.0 });
         }
         thread::sleep(LOOK_AGAIN);
     }
@@ -118,6 +132,15 @@ pub(super) fn watched(command: &mut Command) -> Result<Watched> {
 /// Memory that is available to programs.
 fn available_mib() -> Option<f64> {
     Some(kib(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")? / 1024.0)
+}
+
+/// Time of the processor in `/proc/PID/stat`: in user mode and in the kernel's, in hundredths of a second (proc(5), `USER_HZ`).
+fn processor_s(stat: &str) -> Option<f64> {
+    // The name of the program, in brackets, may have spaces.
+    let (_, after_name) = stat.rsplit_once(')')?;
+    let mut fields = after_name.split_whitespace().skip(11);
+    let mut hundredths = || fields.next()?.parse::<f64>().ok();
+    Some((hundredths()? + hundredths()?) / 100.0)
 }
 
 /// The value of a line of the kernel, such as `VmHWM:   231596 kB`.

@@ -8,7 +8,7 @@ use tactus_model::Effect;
 use crate::data::{Bins, DiscoverError, Floor, Frames, Known};
 use crate::fit::{Parameters, Predictor, Prepared, RandomWalk, Term};
 use crate::next::Experiments;
-use crate::search::{Candidate, Formed, Grown, Options, Rule, Search, not_shown};
+use crate::search::{Candidate, Formed, Grown, Memory, Options, Rule, Search, not_shown};
 use crate::verdict::{BaseModel, Discovery, SearchOutcome, cannot_judge, conclude, confirmed};
 
 /// Progress of a discovery.
@@ -54,7 +54,7 @@ fn discover_on_threads(
     }
     let problem = prepared.problem();
     let base = prepared.base.clone();
-    reporter.report("scoring the effects", 0.1);
+    reporter.report("scoring the effects", 0.06);
     let lacking = not_shown::lacking(&problem, prepared.replicates);
     let mut candidates = Candidate::all(&problem, &base, &prepared.frequencies_hz)?;
     candidates.retain(|one| lacking.iter().all(|lacking| lacking.effect != one.definition.name));
@@ -64,10 +64,11 @@ fn discover_on_threads(
         options,
         known_terms: known.effects.len() + prepared.faulty.effects.len(),
         rounds: prepared.lattice.is_some(),
-        progress: &|what| reporter.report(what, 0.0),
+        memory: Memory::default(),
+        progress: &|what, share| reporter.report(what, share),
     };
     let before = search.locate(&base)?;
-    let Grown { at: grown, rounds, mut equivalent } = match options.rule {
+    let Grown { at: grown, rounds, mut equivalent, .. } = match options.rule {
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };

@@ -20,6 +20,7 @@ mod evidence;
 mod forms;
 mod grow;
 mod locate;
+mod memory;
 pub(crate) mod not_shown;
 mod options;
 mod rivals;
@@ -33,6 +34,7 @@ pub(crate) use grow::{
 };
 pub use grow::{Round, TriedEffect};
 pub(crate) use locate::Located;
+pub(crate) use memory::Memory;
 pub use locate::{Curve, Gap, Point};
 pub use not_shown::NotShown;
 pub use options::{Options, Rule};

@@ -7,7 +7,7 @@ use super::random_walk::{RandomWalk, is_random_walk};
 use crate::data::{DiscoverError, Known, rewired};
 
 /// Parameters of the whole model.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Parameters {
     /// Counts per mm, one per element.
     pub(crate) sensitivity: Vec<f64>,
@@ -88,6 +88,14 @@ impl Parameters {
             psf: known.psf,
             terms: known.effects.iter().map(Term::of).collect(),
         }
+    }
+
+    /// True if the terms are those of another model in the same order, whatever their values.
+    pub(crate) fn has_terms_like(&self, other: &Self) -> bool {
+        let kinds = |of: &Self| -> Vec<(&'static str, bool)> {
+            of.terms.iter().map(|term| (term.definition.name, term.knots.is_some())).collect()
+        };
+        kinds(self) == kinds(other)
     }
 
     /// The same with one more term.

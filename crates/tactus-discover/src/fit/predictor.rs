@@ -31,7 +31,17 @@ pub(crate) fn no_images(elements: usize) -> Arc<Images> {
 impl<'a> Predictor<'a> {
     /// With a cache of images of its own.
     pub(crate) fn new(known: &'a Known, frames: &'a Frames, bins: &'a Bins) -> Self {
-        Self { known, frames, bins, images: no_images(bins.elements) }
+        Self::with_images(known, frames, bins, &no_images(bins.elements))
+    }
+
+    /// With a cache that others use, too.
+    pub(crate) fn with_images(
+        known: &'a Known,
+        frames: &'a Frames,
+        bins: &'a Bins,
+        images: &Arc<Images>,
+    ) -> Self {
+        Self { known, frames, bins, images: Arc::clone(images) }
     }
 
     /// Counts of every bin and element, without noise and rounding.

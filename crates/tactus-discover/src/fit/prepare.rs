@@ -79,14 +79,17 @@ impl<'a> Prepared<'a> {
         let mut bins = Bins::of(frames, true)?;
         bins.weigh(frames, &noise, &heldout);
         let images = no_images(frames.elements);
-        let predictor = |bins| Predictor { known, frames, bins, images: Arc::clone(&images) };
-        let mut base = recalibrated(&Problem::new(predictor(&bins), &noise), &faulty)?;
-        let frequencies_hz = lines_hz(&predictor(&whole), &base, &faulty)?;
+        let base_of = |bins: &Bins| {
+            recalibrated(&Problem::new(Predictor::with_images(known, frames, bins, &images), &noise), &faulty)
+        };
+        let mut base = base_of(&bins)?;
+        let frequencies_hz =
+            lines_hz(&Predictor::with_images(known, frames, &whole, &images), &base, &faulty)?;
         if !frequencies_hz.is_empty() {
             // Averaging over several frames would remove a tone.
             bins = Bins::of(frames, false)?;
             bins.weigh(frames, &noise, &heldout);
-            base = recalibrated(&Problem::new(predictor(&bins), &noise), &faulty)?;
+            base = base_of(&bins)?;
         }
         Ok(Self {
             known,
@@ -111,7 +114,7 @@ impl<'a> Prepared<'a> {
 
     /// Predictions for some bins.
     pub(crate) fn predictor<'b>(&'b self, bins: &'b Bins) -> Predictor<'b> {
-        Predictor { known: self.known, frames: self.frames, bins, images: Arc::clone(&self.images) }
+        Predictor::with_images(self.known, self.frames, bins, &self.images)
     }
 
     /// The least-squares problem of the bins.

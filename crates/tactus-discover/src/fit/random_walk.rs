@@ -58,7 +58,7 @@ pub struct RunWalks {
 }
 
 /// Random walks of the baselines of each run, knot by knot, element by element; they start at 0.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RandomWalk {
     pub(crate) knot_s: f64,
     pub(crate) runs: Vec<Vec<f64>>,

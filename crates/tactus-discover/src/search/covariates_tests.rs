@@ -4,6 +4,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::Gap;
 use crate::fit::Prepared;
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
+use crate::search::Memory;
 use crate::search::grow::{ALPHA, Search};
 
 const NOISE_COUNTS: f64 = 1.0;
@@ -29,11 +30,12 @@ fn gap(more: impl Fn(&[f64], f64) -> Vec<f64>) -> Vec<Gap> {
         options: OPTIONS,
         known_terms: 0,
         rounds: false,
-        progress: &|_| {},
+        memory: Memory::default(),
+        progress: &|_, _| {},
     };
     let located = search.locate(&prepared.base).unwrap();
     assert!(located.p_value <= ALPHA, "{}", located.p_value);
-    located.gap
+    located.gap.clone()
 }
 
 fn covariates(gap: &[Gap]) -> Vec<&'static str> {

@@ -51,7 +51,7 @@ impl Search<'_> {
         let mut formed = Formed::from(grown);
         for name in names(&formed.at.parameters, self.known_terms) {
             let Some(start) = self.with_knots(&formed.at, name) else { continue };
-            (self.progress)(&format!("fitting {name} with knots"));
+            (self.progress)(&format!("fitting {name} with knots"), 0.0);
             let values = start.knots.as_ref().map_or_else(Vec::new, |knots| knots.values.clone());
             let free = self.problem.fit_from(self.replaced(&formed.at, start), POLISH_ROUNDS)?;
             if self.refutes(&formed.at, &free) {

@@ -10,6 +10,7 @@
 //! All choices use the fitted presses only. The held-out presses give the figures of the report.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use tactus_model::effect::Definition;
@@ -17,6 +18,7 @@ use tactus_model::effect::Definition;
 use super::candidates::Candidate;
 use super::drift::TriedWalk;
 use super::evidence::{Addition, Evidence, Gain, ODDS_AGAINST, Set, Signs};
+use super::memory::Memory;
 use super::options::Options;
 use super::rivals::rivals;
 use super::score::{Score, flipped, largest, p_value};
@@ -87,6 +89,10 @@ const BLOCKS_Z: f64 = 2.0;
 /// Probability of a reported set of classes.
 const SET_PROBABILITY: f64 = 0.95;
 
+/// Estimated shares of a discovery that are done before the classes have to hold their places, and after.
+const SHARE_BEFORE_HOLD: f64 = 0.65;
+const SHARE_AFTER_HOLD: f64 = 0.85;
+
 /// Data, candidates and options of a search.
 pub(crate) struct Search<'a> {
     pub(crate) problem: &'a Problem<'a>,
@@ -96,7 +102,9 @@ pub(crate) struct Search<'a> {
     pub(crate) known_terms: usize,
     /// True if the steps of the converter are wider than declared.
     pub(crate) rounds: bool,
-    pub(crate) progress: &'a (dyn Fn(&str) + Sync),
+    pub(crate) memory: Memory,
+    /// Is told what is done, and the share of the whole discovery that is done then.
+    pub(crate) progress: &'a (dyn Fn(&str, f64) + Sync),
 }
 
 /// For each added effect, the others that explain the data as well in its place.
@@ -134,11 +142,20 @@ pub(crate) struct Grown {
     pub(crate) at: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
+    /// The models of the rounds: the base, and each with one more class.
+    path: Vec<Fitted>,
 }
 
 impl From<Fitted> for Grown {
     fn from(base: Fitted) -> Self {
-        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new() }
+        Self { path: vec![base.clone()], at: base, rounds: Vec::new(), equivalent: Equivalent::new() }
+    }
+}
+
+impl Grown {
+    /// The model of the path that has the same terms as this one, with other values.
+    fn passed(&self, model: &Parameters) -> Option<&Fitted> {
+        self.path.iter().find(|passed| passed.parameters.has_terms_like(model))
     }
 }
 
@@ -211,7 +228,11 @@ impl Pass {
 
 impl Search<'_> {
     /// The products of all additions at a model.
-    pub(crate) fn pass(&self, at: &Fitted) -> Result<Pass, DiscoverError> {
+    pub(crate) fn pass(&self, at: &Fitted) -> Result<Arc<Pass>, DiscoverError> {
+        self.memory.passes.at(&at.parameters, || self.pass_over(at).map(Arc::new))
+    }
+
+    fn pass_over(&self, at: &Fitted) -> Result<Pass, DiscoverError> {
         let problem = self.problem;
         let mut directions: Vec<Direction<'_>> = Vec::new();
         let (mut additions, mut kinds, mut classes) = (Vec::new(), Vec::new(), Vec::new());
@@ -293,7 +314,7 @@ impl Search<'_> {
         let mut strongest = 0.0_f64;
         loop {
             let index = grown.rounds.len();
-            (self.progress)(&format!("round {}: scoring the effects", index + 1));
+            (self.progress)(&format!("round {}: scoring the effects", index + 1), share_before(index));
             let pass = self.pass(&grown.at)?;
             let mut tried = self.tested(&pass, &grown.at, index);
             let is_full =
@@ -317,6 +338,7 @@ impl Search<'_> {
                         strongest = strongest.max(taken.ln_odds);
                     }
                     grown.at = self.problem.fit_from(taken.fitted.parameters, POLISH_ROUNDS)?;
+                    grown.path.push(grown.at.clone());
                 }
                 None => break,
             }
@@ -460,7 +482,7 @@ impl Search<'_> {
     /// Fits of a model with the terms of each class: first all in a few rounds, then the best to the end.
     fn fits(&self, at: &Fitted, starts: &[(&'static str, Vec<Term>)]) -> Result<Vec<Beside>, DiscoverError> {
         let fit = |(name, terms): &(&'static str, Vec<Term>)| {
-            (self.progress)(&format!("fitting {name}"));
+            (self.progress)(&format!("fitting {name}"), 0.0);
             let mut started = at.parameters.clone();
             started.terms.extend(terms.iter().cloned());
             let fitted = self.problem.fit_from(started, FIRST_ROUNDS)?;
@@ -496,9 +518,9 @@ impl Search<'_> {
             grown.equivalent.clear();
             let names = names(&grown.at.parameters, self.known_terms);
             let without = |name: &&'static str| {
-                (self.progress)(&format!("without {name}"));
+                (self.progress)(&format!("without {name}"), SHARE_BEFORE_HOLD);
                 let less = without(&grown.at.parameters, name, self.known_terms);
-                self.problem.fit_from(less, TRIAL_ROUNDS)
+                self.fitted(grown, less, TRIAL_ROUNDS)
             };
             let lesses: Vec<Fitted> =
                 parallel::map(&names, without).into_iter().collect::<Result<_, DiscoverError>>()?;
@@ -507,19 +529,22 @@ impl Search<'_> {
             let worths: Vec<f64> = lesses.iter().enumerate().map(worth).collect();
             let weakest = worths.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
             if let Some((weakest, _)) = weakest.filter(|(_, worth)| **worth < 1.0) {
-                let less = lesses[weakest].parameters.clone();
-                grown.at = self.problem.fit_from(less, POLISH_ROUNDS)?;
+                grown.at = self.fitted(grown, lesses[weakest].parameters.clone(), POLISH_ROUNDS)?;
                 continue 'again;
             }
-            for ((name, less), ln_odds) in names.iter().zip(lesses).zip(odds) {
+            for (nth, ((name, less), ln_odds)) in names.iter().zip(lesses).zip(odds).enumerate() {
                 if is_exact(name) {
                     // No other effect acts like miswired elements.
                     continue;
                 }
-                (self.progress)(&format!("comparing {name} with others in its place"));
+                let share = nth as f64 / names.len() as f64;
+                (self.progress)(
+                    &format!("comparing {name} with others in its place"),
+                    SHARE_BEFORE_HOLD + share * (SHARE_AFTER_HOLD - SHARE_BEFORE_HOLD),
+                );
                 let pass = self.pass(&less)?;
                 if pass.best_rival() > ln_odds + RIVAL_LN_ODDS {
-                    grown.at = self.problem.fit_from(less.parameters, POLISH_ROUNDS)?;
+                    grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
@@ -550,6 +575,14 @@ impl Search<'_> {
                 grown.equivalent.insert(name, Alike { without: less, same, probabilities });
             }
             return Ok(());
+        }
+    }
+
+    /// A model fitted from these values, or the one that the rounds passed.
+    fn fitted(&self, grown: &Grown, from: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
+        match grown.passed(&from) {
+            Some(passed) => Ok(passed.clone()),
+            None => self.problem.fit_from(from, rounds),
         }
     }
 
@@ -598,6 +631,11 @@ impl Search<'_> {
         let left = (at.cost - readings).max(0.0) / (2.0 * self.problem.variance);
         1.0 + MISFIT_SHARE * ln_odds.max(0.0) + LEFT_SHARE * left
     }
+}
+
+/// Estimated share of a discovery that is done before a round, the first being 0. Nobody knows how many will follow.
+fn share_before(round: usize) -> f64 {
+    1.0 - 0.9 * 0.7_f64.powf(round as f64)
 }
 
 /// Probabilities of a class with these odds, and of others in its place; likeliest others first.

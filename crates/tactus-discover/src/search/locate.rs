@@ -1,5 +1,7 @@
 //! Where a model and the data disagree: the covariates on which the residual depends.
 
+use std::sync::Arc;
+
 use super::covariates::{Factor, Feature, Form, Forms, features};
 use super::grow::{FLIPS, Search};
 use super::score::{Score, flipped, largest, p_value, q_values};
@@ -66,7 +68,11 @@ pub(crate) struct Located {
 
 impl Search<'_> {
     /// Tests on which covariates the residual of a model depends.
-    pub(crate) fn locate(&self, at: &Fitted) -> Result<Located, DiscoverError> {
+    pub(crate) fn locate(&self, at: &Fitted) -> Result<Arc<Located>, DiscoverError> {
+        self.memory.located.at(&at.parameters, || self.located(at).map(Arc::new))
+    }
+
+    fn located(&self, at: &Fitted) -> Result<Located, DiscoverError> {
         let problem = self.problem;
         let elements = problem.predictor.bins.elements;
         let forms =

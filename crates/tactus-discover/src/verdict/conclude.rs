@@ -1,6 +1,7 @@
 //! The verdict on a search, and the [`Discovery`] that reports it.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use tactus_model::{Effect, Response};
 
@@ -34,8 +35,8 @@ pub(crate) struct SearchOutcome {
     /// What the grown model may still lack.
     pub(crate) left: Left,
     /// Where the base model and the data disagree, and where the grown model still does.
-    pub(crate) before: Located,
-    pub(crate) after: Located,
+    pub(crate) before: Arc<Located>,
+    pub(crate) after: Arc<Located>,
 }
 
 /// The residual of a model on the held-out frames.
@@ -187,7 +188,7 @@ pub(crate) fn conclude(
         plan,
         effects,
         grown: base_of(prepared, &grown.parameters),
-        gap: before.gap,
+        gap: before.gap.clone(),
         ..prepared.unjudged(&of_base, base_level, options)?
     })
 }
@@ -510,7 +511,11 @@ impl Search<'_> {
         for name in names {
             let problem = if name == MISWIRED { with_silent } else { self.problem };
             let less = without(&grown.parameters, name, known_terms);
-            let before = problem.fit_from(less, POLISH_ROUNDS)?;
+            let held = equivalent.get(name).map(|alike| &alike.without);
+            let before = match held.filter(|held| held.parameters.has_terms_like(&less)) {
+                Some(held) => held.clone(),
+                None => problem.fit_from(less, POLISH_ROUNDS)?,
+            };
             let gains = problem.heldout_gains(&before.predicted, &grown.predicted);
             let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(known_terms);
             let estimated = |(term, errors): (&Term, &Vec<f64>)| {
