@@ -7,12 +7,13 @@
 //! [`predictor`] computes the prediction with the pipeline of `tactus-model`. One pass over the data gives the [`sums`] of products of all
 //! derivatives; [`elimination`] takes off what [`gains`] and baselines fit, where baselines may follow a [`random_walk`]; [`grams`] are what
 //! is left. [`problem`] takes damped Gauss-Newton steps in the spread and in the parameters of the
-//! effects, each on its own [`scale`]; [`knots`] of free curves stay within their class. [`heldout`] measures a fitted model on the presses
-//! that were not fitted. [`prepare`] splits the data and fits the base model, from which the search starts.
+//! effects, each on its own [`scale`]; [`knots`] of free curves stay within their class. [`folds`] measures a model on fitted presses that
+//! its parameters have not seen, [`heldout`] on those that were not fitted. [`prepare`] splits the data and fits the base model, from which the search starts.
 //!
 //! Each file names its sources.
 
 mod elimination;
+mod folds;
 mod gains;
 mod grams;
 mod heldout;

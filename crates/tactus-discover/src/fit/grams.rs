@@ -108,7 +108,7 @@ impl Problem<'_> {
     }
 
     /// The directions of a model's free parameters.
-    fn own(&self, at: &Parameters) -> Vec<Direction<'static>> {
+    pub(super) fn own(&self, at: &Parameters) -> Vec<Direction<'static>> {
         self.free(at).into_iter().map(|free| self.towards(at, free)).collect()
     }
 

@@ -77,6 +77,8 @@ pub(super) struct Border {
 /// What is kept of a block, in single precision: parts of a test's statistic.
 pub(super) struct Block {
     number: usize,
+    /// Its first bin that is fitted.
+    pub(super) first_bin: usize,
     pub(super) segment: usize,
     /// Products of the model's own directions and the residual with all directions.
     pub(super) rows: DMatrix<f32>,
@@ -154,7 +156,7 @@ impl Problem<'_> {
             let pivots = if kept == Kept::OwnAndBlocks { own } else { count };
             let sums = parallel::map(&parts, |part| self.sums_of(&chunk, part, &standing, segments, pivots));
             for (part, sums) in parts.iter().zip(&sums) {
-                total.add(bins.block[part[0]] / joined, own, sums, kept);
+                total.add(bins.block[part[0]] / joined, part[0], own, sums, kept);
             }
         }
         Ok(total)
@@ -275,7 +277,7 @@ impl Running<'_> {
 }
 
 impl Border {
-    fn new(count: usize, elements: usize) -> Self {
+    pub(super) fn new(count: usize, elements: usize) -> Self {
         let zeros = || DMatrix::zeros(elements, count);
         Self { by_baseline: zeros(), by_gain: zeros(), own: vec![[0.0; 3]; elements] }
     }
@@ -303,7 +305,7 @@ impl Total {
     }
 
     /// Adds the sums over a part of a block; parts come in order of time.
-    fn add(&mut self, number: usize, own: usize, sums: &Sums, kept: Kept) {
+    fn add(&mut self, number: usize, first_bin: usize, own: usize, sums: &Sums, kept: Kept) {
         for (place, column) in sums.active.iter().enumerate() {
             for (row, product) in sums.active.iter().zip(sums.products.column(place).iter()) {
                 self.products[(*row, *column)] += product;
@@ -316,7 +318,8 @@ impl Total {
         let elements = sums.border.own.len();
         let is_other = |last: &Block| (last.number, last.segment) != (number, sums.segment);
         if self.blocks.last().is_none_or(is_other) {
-            self.blocks.push(Block::new(number, sums.segment, own, self.products.ncols(), elements));
+            let of = Block::new([number, first_bin, sums.segment], own, self.products.ncols(), elements);
+            self.blocks.push(of);
         }
         if let Some(block) = self.blocks.last_mut() {
             block.add(own, sums);
@@ -325,9 +328,10 @@ impl Total {
 }
 
 impl Block {
-    fn new(number: usize, segment: usize, own: usize, count: usize, elements: usize) -> Self {
+    fn new([number, first_bin, segment]: [usize; 3], own: usize, count: usize, elements: usize) -> Self {
         Self {
             number,
+            first_bin,
             segment,
             rows: DMatrix::zeros(own + 1, count),
             diagonal: vec![0.0; count],

@@ -18,7 +18,8 @@ use crate::search::{
     RefutedFormula, Rule, Search, Tried, names, not_shown, q_values, sign_flip_p, without,
 };
 
-/// The held-out presses confirm an effect if noise alone would let it gain as much on them with at most this probability.
+/// An effect is confirmed if noise alone would let it gain as much, on fitted presses that its parameters have not seen, with at most this
+/// probability.
 const CONFIRMED_P: f64 = 0.05;
 /// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests,
 const SEEN_NOISE: f64 = 2.0;
@@ -61,7 +62,7 @@ impl HeldOutResidual {
     }
 }
 
-/// A grown model whose effects the held-out presses confirm.
+/// A grown model whose effects are confirmed.
 pub(crate) struct Confirmed {
     pub(crate) grown: Fitted,
     /// Its added effects.
@@ -70,7 +71,7 @@ pub(crate) struct Confirmed {
     pub(crate) tentative: Vec<AddedEffect>,
 }
 
-/// A model with those of its added effects that the held-out presses confirm.
+/// A model with those of its added effects that folds of the fitted presses confirm. The held-out presses have no say.
 pub(crate) fn confirmed(
     prepared: &Prepared<'_>,
     search: &Search<'_>,
@@ -81,9 +82,9 @@ pub(crate) fn confirmed(
     let with_silent = prepared.problem_with_silent();
     let names = names(&grown.parameters, search.known_terms);
     let steps = search.steps(&grown, equivalent, &refuted, &with_silent)?;
-    // A miswired element acts on its own readings, of which few may be held out.
+    // A miswired element acts on its own readings, of which a fold may have none.
     let is_tentative = |step: &AddedEffect| {
-        names.contains(&step.effect) && step.effect != MISWIRED && step.p_value > CONFIRMED_P
+        names.contains(&step.effect) && step.effect != MISWIRED && step.folds_p_value > CONFIRMED_P
     };
     if !steps.iter().any(is_tentative) {
         return Ok(Confirmed { grown, steps, tentative: Vec::new() });
@@ -279,6 +280,7 @@ fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffec
         terms: vec![vec![Estimated { name: "step_counts", value: step_counts, standard_error: None }]],
         p_value,
         q_value: p_value,
+        folds_p_value: p_value,
         // It does not change a mean.
         heldout_rms_before_counts: heldout_rms_counts,
         heldout_rms_after_counts: heldout_rms_counts,
@@ -537,11 +539,14 @@ impl Search<'_> {
             };
             let curve = refuted.get(name).and_then(|formula| fitted_curve(grown, name, formula));
             let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
+            let by_folds = self.problem.gains_by_folds(&before, grown)?;
             steps.push(AddedEffect {
                 effect: name,
                 terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
                 p_value,
                 q_value: p_value,
+                // Those of a random walk cannot be told: its odds alone speak for it.
+                folds_p_value: by_folds.map_or(0.0, |gains| sign_flip_p(&gains, FLIPS, self.options.seed)),
                 heldout_rms_before_counts: problem.heldout_rms_counts(&before.predicted),
                 heldout_rms_after_counts: problem.heldout_rms_counts(&grown.predicted),
                 curve,

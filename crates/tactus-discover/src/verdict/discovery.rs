@@ -43,7 +43,7 @@ pub struct Discovery {
     pub rounds: Vec<Round>,
     /// The effects that were added, in the order in which they were found; one entry for each name.
     pub steps: Vec<AddedEffect>,
-    /// Effects that the fitted presses show and the held-out presses do not confirm. They are not in the grown model.
+    /// Effects that a fit shows, and that fitted presses which their parameters have not seen do not confirm. They are not in the grown model.
     pub tentative: Vec<AddedEffect>,
     /// How far the grown model is from the held-out presses.
     pub final_: Final,
@@ -131,6 +131,8 @@ pub struct AddedEffect {
     pub p_value: f64,
     /// p-value, adjusted for the false-discovery rate over all added effects.
     pub q_value: f64,
+    /// The same probability on fitted presses, each predicted by a fit to others (five folds). It decides whether the effect is confirmed.
+    pub folds_p_value: f64,
     /// Root mean square of the held-out residuals of the grown model without this effect, refitted.
     pub heldout_rms_before_counts: f64,
     /// The same for the whole grown model.

@@ -94,11 +94,13 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {
     writeln!(
         f,
         "<p>On held-out presses the residual is {} counts rms without it (all else fitted again) and {} with it. The probability of such a \
-         gain by noise alone is {} (false-discovery rate {} over all effects tried in its round).</p>",
+         gain by noise alone is {} (false-discovery rate {} over all added effects). On fitted presses, each predicted by a fit to others, it is \
+         {}: this decides whether the effect is confirmed.</p>",
         digits(step.heldout_rms_before_counts, 3),
         digits(step.heldout_rms_after_counts, 3),
         words::probability(step.p_value),
-        words::probability(step.q_value)
+        words::probability(step.q_value),
+        words::probability(step.folds_p_value)
     )?;
     if step.equivalent.is_empty() {
         writeln!(f, "<p>The data distinguish it from every other effect that they can show.</p>")

@@ -192,6 +192,7 @@ struct StepJson<'a> {
     terms: Vec<BTreeMap<&'a str, EstimateJson>>,
     p_value: f64,
     q_value: f64,
+    folds_p_value: f64,
     heldout_rms_before: f64,
     heldout_rms_after: f64,
     /// `formula` or `knots`.
@@ -455,6 +456,7 @@ impl<'a> StepJson<'a> {
             terms: step.terms.iter().map(|one| term(one).collect()).collect(),
             p_value: step.p_value,
             q_value: step.q_value,
+            folds_p_value: step.folds_p_value,
             heldout_rms_before: step.heldout_rms_before_counts,
             heldout_rms_after: step.heldout_rms_after_counts,
             form: if step.curve.is_some() { "knots" } else { "formula" },

@@ -7,11 +7,11 @@ use super::faulty;
 use crate::numbers::{digits, short};
 use crate::plot::number;
 
-/// What the fitted presses show and the held-out presses do not confirm.
+/// What the fitted presses show, but do not confirm where they are predicted by each other.
 fn tentative(found: &Discovery) -> Option<String> {
     let names = list(found.tentative.iter().map(|step| step.effect));
     let of = || {
-        format!("Tentative: {names}. The fitted presses show it, and the held-out presses do not confirm it.")
+        format!("Tentative: {names}. A fit shows it, but presses that the fit has not seen do not confirm it.")
     };
     (!found.tentative.is_empty()).then(of)
 }
