@@ -25,6 +25,8 @@ use crate::numbers::parallel;
 
 /// Bins of which all directions are held at a time.
 const CHUNK_BINS: usize = 256;
+/// Directions whose products are computed together.
+const PANEL: usize = 64;
 /// Greatest number of blocks whose signs are flipped apart; more are joined.
 const BLOCKS_MAX: usize = 400;
 /// Step of the derivative by the gains.
@@ -191,46 +193,69 @@ impl Problem<'_> {
         let count = chunk.columns.len() + 1;
         let weighed: Vec<usize> =
             (0..elements).filter(|element| self.element_weight[*element] > 0.0).collect();
-        // Bin, element and the root of the weight.
-        let of_bin = |bin: usize| {
-            let root = move |element: &usize| (self.train[bin] * self.element_weight[*element]).sqrt();
-            weighed.iter().map(move |element| (bin, *element, root(element)))
+        // Each reading's place in the chunk, and the root of its weight: bin by bin, element by element.
+        let place = |bin: &usize| {
+            let start = (bin - chunk.bins.start) * elements;
+            weighed.iter().map(move |element| start + element)
         };
-        let readings: Vec<(usize, usize, f64)> = part.iter().copied().flat_map(of_bin).collect();
-        let place = |bin: usize, element: usize| (bin - chunk.bins.start) * elements + element;
+        let places: Vec<usize> = part.iter().flat_map(place).collect();
+        let root = |bin: &usize| {
+            let of_bin = self.train[*bin];
+            weighed.iter().map(move |element| (of_bin * self.element_weight[*element]).sqrt())
+        };
+        let roots: Vec<f64> = part.iter().flat_map(root).collect();
+        let standing = &standing[chunk.bins.start * elements..chunk.bins.end * elements];
         let mut border = Border::new(count, elements);
         let gains: Vec<f64> =
-            readings.iter().map(|(bin, element, root)| root * chunk.by_gain[place(*bin, *element)]).collect();
-        for ((_, element, root), gain) in readings.iter().zip(&gains) {
-            let [one, mixed, square] = &mut border.own[*element];
-            *one += root * root;
-            *mixed += root * gain;
-            *square += gain * gain;
+            places.iter().zip(&roots).map(|(place, root)| root * chunk.by_gain[*place]).collect();
+        let per_bin = weighed.len().max(1);
+        for (roots, gains) in roots.chunks_exact(per_bin).zip(gains.chunks_exact(per_bin)) {
+            for ((element, root), gain) in weighed.iter().zip(roots).zip(gains) {
+                let [one, mixed, square] = &mut border.own[*element];
+                *one += root * root;
+                *mixed += root * gain;
+                *square += gain * gain;
+            }
         }
         // Directions that do nothing here, such as those of contact far from it, take no part.
         let mut active: Vec<usize> = Vec::new();
         let mut values: Vec<f64> = Vec::new();
         for number in 0..count {
-            let value = |(bin, element, root): &(usize, usize, f64)| match chunk.columns.get(number) {
-                Some(column) => root * column[place(*bin, *element)],
-                None => root * standing[bin * elements + element],
-            };
-            let at = values.len();
-            values.extend(readings.iter().map(value));
-            if values[at..].iter().all(|value| *value == 0.0) {
-                values.truncate(at);
+            let column = chunk.columns.get(number).map_or(standing, |column| column);
+            if places.iter().all(|place| column[*place] == 0.0) {
                 continue;
             }
+            let at = values.len();
+            values.extend(places.iter().zip(&roots).map(|(place, root)| root * column[*place]));
             active.push(number);
-            for ((value, gain), (_, element, root)) in values[at..].iter().zip(&gains).zip(&readings) {
-                border.by_baseline[(*element, number)] += value * root;
-                border.by_gain[(*element, number)] += value * gain;
+            let (mut by_baseline, mut by_gain) =
+                (border.by_baseline.column_mut(number), border.by_gain.column_mut(number));
+            let of_bins = values[at..].chunks_exact(per_bin).zip(gains.chunks_exact(per_bin));
+            for ((values, gains), roots) in of_bins.zip(roots.chunks_exact(per_bin)) {
+                for (((element, value), gain), root) in weighed.iter().zip(values).zip(gains).zip(roots) {
+                    by_baseline[*element] += value * root;
+                    by_gain[*element] += value * gain;
+                }
             }
         }
-        let values = DMatrix::from_vec(readings.len(), active.len(), values);
+        let values = DMatrix::from_vec(places.len(), active.len(), values);
         let first = active.iter().take_while(|number| **number < pivots).count();
         let mut products = DMatrix::zeros(active.len(), active.len());
-        products.rows_mut(0, first).gemm(1.0, &values.columns(0, first).transpose(), &values, 0.0);
+        // The products of the pivots with each other are the same both ways, so only one half of them is computed, panel by panel.
+        for start in (0..first).step_by(PANEL) {
+            let (rows, after) = (PANEL.min(first - start), active.len() - start);
+            products.view_mut((start, start), (rows, after)).gemm(
+                1.0,
+                &values.columns(start, rows).transpose(),
+                &values.columns(start, after),
+                0.0,
+            );
+        }
+        for column in 0..first {
+            for row in column + 1..first {
+                products[(row, column)] = products[(column, row)];
+            }
+        }
         let has_residual = active.last() == Some(&(count - 1));
         for (place, column) in values.column_iter().enumerate().skip(first) {
             products[(place, place)] = column.norm_squared();

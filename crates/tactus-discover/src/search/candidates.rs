@@ -8,8 +8,8 @@ use super::wiring;
 use crate::data::DiscoverError;
 use crate::fit::{Fitted, Free, Problem, Scale, Term};
 
-/// Number of grid values of a shape parameter that spans orders of magnitude, and of any other.
-const VALUES_MANY: usize = 5;
+/// Number of grid values of a time that spans orders of magnitude, and of any other shape parameter.
+const TIMES_MANY: usize = 5;
 const VALUES_FEW: usize = 3;
 
 /// If an element's reading seems to contain more than this share of another's signal, or a negative share, the element may
@@ -126,7 +126,12 @@ fn cross(shapes: &[Term], parameter: usize, values: &[f64]) -> Vec<Term> {
 /// Values of a shape parameter at which fits start.
 fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> {
     let [mut least, mut most] = range;
-    if name.ends_with("_s") {
+    if name == "spread_ratio" {
+        // Several shapes with different times have any spread together.
+        return vec![neutral];
+    }
+    let is_time = name.ends_with("_s") && !name.ends_with("_per_s");
+    if is_time {
         // The data do not show anything faster than a frame or slower than their duration.
         most = most.min(duration_s);
         least = least.max(0.02).min(most);
@@ -138,7 +143,7 @@ fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> 
     if ratio < 1.0 + 1e-9 {
         return vec![least];
     }
-    let count = if ratio > 300.0 { VALUES_MANY } else { VALUES_FEW };
+    let count = if is_time && ratio > 300.0 { TIMES_MANY } else { VALUES_FEW };
     // The middles of equal parts of the logarithmic range.
     (0..count).map(|k| least * ratio.powf((k as f64 + 0.5) / count as f64)).collect()
 }

@@ -127,15 +127,34 @@ impl Forms {
             Form::Place => self.places.as_ref().map(|[here, _]| here),
             Form::LastPlace => self.places.as_ref().map(|[_, last]| last),
         };
-        let factor = |reading: usize| match &feature.factor {
-            Factor::Bins(of_bin) => of_bin[reading / elements],
-            Factor::Within(range) => f64::from(u8::from(is_within(*range, self.signal[reading]))),
-            Factor::Element(element, of_bin) if reading % elements == *element => of_bin[reading / elements],
-            Factor::Element(..) => 0.0,
-        };
-        (bins.start * elements..bins.end * elements)
-            .map(|reading| factor(reading) * form.map_or(1.0, |form| form[reading]))
-            .collect()
+        let (first, count) = (bins.start * elements, bins.len() * elements);
+        let mut values = vec![0.0; count];
+        let of = |reading: usize| form.map_or(1.0, |form| form[reading]);
+        match &feature.factor {
+            Factor::Bins(of_bin) => {
+                // Most features act in few bins.
+                let acting = bins.clone().filter(|bin| of_bin[*bin] != 0.0);
+                for bin in acting {
+                    for reading in bin * elements..(bin + 1) * elements {
+                        values[reading - first] = of_bin[bin] * of(reading);
+                    }
+                }
+            }
+            Factor::Within(range) => {
+                for (value, reading) in values.iter_mut().zip(first..) {
+                    if is_within(*range, self.signal[reading]) {
+                        *value = of(reading);
+                    }
+                }
+            }
+            Factor::Element(element, of_bin) => {
+                for bin in bins {
+                    let reading = bin * elements + element;
+                    values[reading - first] = of_bin[bin] * of(reading);
+                }
+            }
+        }
+        values
     }
 
     pub(crate) const fn history(&self) -> &History {
