@@ -75,6 +75,7 @@ fn discover_on_threads(
         Rule::Protocol => search.formed(grown)?,
         Rule::Bic => Formed::from(grown),
     };
+    let contests = search.contests(&formed, &equivalent)?;
     let confirmed = confirmed(&prepared, &search, formed, &mut equivalent)?;
     reporter.report("locating what remains", 0.9);
     let left = search.left(&confirmed.grown)?;
@@ -83,7 +84,7 @@ fn discover_on_threads(
     let told = conclude(
         &prepared,
         &search,
-        SearchOutcome { lacking, base, confirmed, rounds, equivalent, left, before, after },
+        SearchOutcome { lacking, base, confirmed, rounds, equivalent, contests, left, before, after },
         options,
         experiments,
     )?;

@@ -110,6 +110,8 @@ pub(crate) struct Alike {
     pub(crate) same: Vec<(&'static str, Fitted)>,
     /// Probability of the effect and of each other in its place, given that one of them is there; those not listed have hardly any.
     pub(crate) probabilities: Vec<(&'static str, f64)>,
+    /// Logarithm of the odds of each rival without a name in its place.
+    pub(crate) rivals: Vec<(&'static str, f64)>,
 }
 
 /// What a grown model may still lack.
@@ -199,13 +201,16 @@ impl Pass {
         (0..self.additions.len()).filter(|one| self.is_named(*one) && among(self.class_of(*one))).collect()
     }
 
-    /// Logarithm of the odds of the best rival without a name.
-    fn best_rival(&self) -> f64 {
+    /// Logarithm of the odds of each rival without a name.
+    pub(crate) fn rivals(&self) -> Vec<(&'static str, f64)> {
         let evidence = self.evidence_on(self.grams.reduced());
         let rivals = (0..self.additions.len()).filter(|one| !self.is_named(*one));
-        rivals
-            .map(|one| evidence.gain_alone(one, ODDS_AGAINST.ln()).ln_odds)
-            .fold(f64::NEG_INFINITY, f64::max)
+        rivals.map(|one| (self.class_of(one), evidence.gain_alone(one).ln_odds)).collect()
+    }
+
+    /// That of the best one.
+    fn best_rival(&self) -> f64 {
+        self.rivals().into_iter().map(|(_, ln_odds)| ln_odds).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -218,7 +223,8 @@ impl Search<'_> {
         for (candidate, of) in self.candidates.iter().enumerate() {
             let class = classes.len();
             classes.push(of.definition.name);
-            for shape in of.shapes(problem, at).iter() {
+            let shapes = of.shapes(problem, at);
+            for shape in shapes.iter() {
                 let start = at.parameters.with(shape.clone());
                 let term = start.terms.len() - 1;
                 let first = directions.len();
@@ -238,21 +244,24 @@ impl Search<'_> {
                 }
                 if first < directions.len() {
                     let directions = (first..directions.len()).collect();
-                    additions.push(Addition { class, directions, widths, signs });
+                    additions.push(Addition { class, directions, widths, signs, among: of.among(shapes.len()) });
                     kinds.push(Kind::Term { candidate, shape: shape.clone() });
                 }
             }
         }
         let named = directions.len();
         for rival in rivals(problem, at, self.rounds)? {
-            let first = directions.len();
-            let count = rival.columns.len();
+            let shared = classes.iter().position(|class| Some(*class) == rival.beside);
+            let shared = shared.and_then(|class| additions.iter().find(|one| one.class == class));
+            let mut own = shared.map_or_else(Vec::new, |of| of.directions.clone());
+            own.extend(directions.len()..directions.len() + rival.columns.len());
             directions.extend(rival.columns);
             additions.push(Addition {
                 class: classes.len(),
-                directions: (first..first + count).collect(),
-                widths: vec![1.0; count],
-                signs: vec![Signs::Both; count],
+                widths: vec![1.0; own.len()],
+                signs: vec![Signs::Both; own.len()],
+                directions: own,
+                among: rival.among,
             });
             classes.push(rival.name);
             kinds.push(Kind::Rival);
@@ -268,7 +277,12 @@ impl Search<'_> {
                 }
             }
         }
-        let scores = parallel::map(&additions, |one| Score::of_grams(&grams, &one.directions));
+        let shapes = |class: usize| additions.iter().filter(|one| one.class == class).count() as f64;
+        let score = |one: &Addition| {
+            let among = if one.among > 1.0 { one.among * shapes(one.class) } else { 1.0 };
+            Score::of_grams(&grams, &one.directions).picked_from(among)
+        };
+        let scores = parallel::map(&additions, score);
         // The errors of a coarse converter's rounding differ from press to press, and are no noise.
         let excess = median(&scores.iter().map(|score| score.excess).collect::<Vec<_>>());
         let names = names(&at.parameters, self.known_terms);
@@ -480,7 +494,7 @@ impl Search<'_> {
 
     /// Logarithm of the odds of a model with further terms, against the model without. Each of their numbers is charged as if its
     /// prior were as wide as its part of the gain allows.
-    fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
+    pub(crate) fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
         let numbers = |fitted: &Fitted| -> usize { fitted.parameters.terms.iter().map(Term::numbers).sum() };
         let gain = (less.cost - more.cost) / (2.0 * self.problem.variance);
         let count = numbers(more).saturating_sub(numbers(less)).max(1) as f64;
@@ -544,7 +558,7 @@ impl Search<'_> {
                         same.push((other, fitted));
                     }
                 }
-                grown.equivalent.insert(name, Alike { without: less, same, probabilities });
+                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals: pass.rivals() });
             }
             return Ok(());
         }
