@@ -67,7 +67,7 @@ fn discover_on_threads(
         progress: &|what| reporter.report(what, 0.0),
     };
     let before = search.locate(&base)?;
-    let Grown { at: grown, rounds, mut equivalent } = match options.rule {
+    let Grown { at: grown, rounds, mut equivalent, refused } = match options.rule {
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
@@ -75,7 +75,8 @@ fn discover_on_threads(
         Rule::Protocol => search.formed(grown)?,
         Rule::Bic => Formed::from(grown),
     };
-    let contests = search.contests(&formed, &equivalent)?;
+    let (formed, mut contests) = search.contested(formed, &mut equivalent)?;
+    contests.extend(refused);
     let confirmed = confirmed(&prepared, &search, formed, &mut equivalent)?;
     reporter.report("locating what remains", 0.9);
     let left = search.left(&confirmed.grown)?;

@@ -3,7 +3,9 @@ use super::of_picked;
 #[test]
 fn a_picked_deviate_is_that_of_its_probability_times_the_number() {
     // Upper 0.1, 1 and 5 % points of the normal distribution.
-    for (z, among, counts) in [(3.090_232, 10.0, 2.326_348), (3.090_232, 50.0, 1.644_854), (2.326_348, 1.0, 2.326_348)] {
+    for (z, among, counts) in
+        [(3.090_232, 10.0, 2.326_348), (3.090_232, 50.0, 1.644_854), (2.326_348, 1.0, 2.326_348)]
+    {
         assert!((of_picked(z, among) - counts).abs() < 1e-5, "{z} of {among}: {}", of_picked(z, among));
     }
     assert!(of_picked(2.0, 2000.0) <= 0.0);

@@ -1,8 +1,18 @@
 //! Each added class beside the rivals without a name, as it stands in the grown model.
+//!
+//! That no rival beats a class in its place is not enough: the class may be only the nearest form in the library of what a rival describes
+//! better in part. Then the rival has much of the class's odds in its place, and still explains much beside it, although the class was
+//! fitted to the end, with knots where the data ask for them. Such a class is no name. A physics of the class itself, in any form, leaves
+//! little to a rival that acts like it; what another physics leaves, a rival explains that hardly acts like the class.
 
 use super::forms::Formed;
-use super::grow::{Equivalent, Search, names};
+use super::grow::{Equivalent, LN_ODDS_LEAST, POLISH_ROUNDS, Search, names, without};
 use crate::data::DiscoverError;
+
+/// A rival acts like a class if it has more than this share of its odds (in logarithms) in its place.
+const INSTEAD_SHARE: f64 = 0.5;
+/// A class is only the nearest form if such a rival has more than this share of its odds beside it.
+const BESIDE_SHARE: f64 = 0.1;
 
 /// An added class and the rivals that compete with it.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +23,8 @@ pub struct Contest {
     pub ln_odds: f64,
     /// The rivals.
     pub rivals: Vec<Rivalry>,
+    /// False if it lost against one of them, so that it is no name.
+    pub kept: bool,
 }
 
 /// A rival without a name, against a class.
@@ -22,21 +34,39 @@ pub struct Rivalry {
     pub rival: &'static str,
     /// Logarithm of its odds in the place of the class.
     pub instead: f64,
-    /// Logarithm of its odds beside the class and all others.
+    /// Logarithm of its odds beside the class and all others; minus infinity if the class lost before that was asked.
     pub beside: f64,
 }
 
+impl Contest {
+    /// That of a class that lost against a rival in its place.
+    pub(super) fn refused(effect: &'static str, ln_odds: f64, rivals: Vec<(&'static str, f64)>) -> Self {
+        let rivalry = |(rival, instead)| Rivalry { rival, instead, beside: f64::NEG_INFINITY };
+        Self { effect, ln_odds, rivals: rivals.into_iter().map(rivalry).collect(), kept: false }
+    }
+
+    /// True if the class is only the nearest form of what a rival describes: one that has much of its odds in its place leaves its place
+    /// to it, and still has many beside it.
+    fn is_nearest_form(&self) -> bool {
+        self.rivals.iter().any(|rival| {
+            rival.instead > INSTEAD_SHARE * self.ln_odds
+                && rival.beside > LN_ODDS_LEAST.max(BESIDE_SHARE * self.ln_odds)
+        })
+    }
+}
+
 impl Search<'_> {
-    /// The contest of each added class.
-    pub(crate) fn contests(
+    /// The contest of each added class, and the model without those that lost.
+    pub(crate) fn contested(
         &self,
-        formed: &Formed,
-        equivalent: &Equivalent,
-    ) -> Result<Vec<Contest>, DiscoverError> {
+        mut formed: Formed,
+        equivalent: &mut Equivalent,
+    ) -> Result<(Formed, Vec<Contest>), DiscoverError> {
         let names = names(&formed.at.parameters, self.known_terms);
         if names.is_empty() {
-            return Ok(Vec::new());
+            return Ok((formed, Vec::new()));
         }
+        (self.progress)("comparing the names with what has none");
         let beside = self.pass(&formed.at)?.rivals();
         let contest = |effect: &'static str| {
             let alike = equivalent.get(effect)?;
@@ -45,12 +75,26 @@ impl Search<'_> {
                 instead: *instead,
                 beside: beside.iter().find(|(one, _)| one == rival).map_or(f64::NEG_INFINITY, |(_, of)| *of),
             };
-            Some(Contest {
-                effect,
-                ln_odds: self.ln_odds(&alike.without, &formed.at),
-                rivals: alike.rivals.iter().map(rivalry).collect(),
-            })
+            let ln_odds = self.ln_odds(&alike.without, &formed.at);
+            let rivals = alike.rivals.iter().map(rivalry).collect();
+            let contest = Contest { effect, ln_odds, rivals, kept: true };
+            Some(Contest { kept: !contest.is_nearest_form(), ..contest })
         };
-        Ok(names.into_iter().filter_map(contest).collect())
+        let contests: Vec<Contest> = names.into_iter().filter_map(contest).collect();
+        let lost: Vec<&'static str> =
+            contests.iter().filter(|contest| !contest.kept).map(|contest| contest.effect).collect();
+        if !lost.is_empty() {
+            let mut firm = formed.at.parameters.clone();
+            for name in lost {
+                equivalent.remove(name);
+                firm = without(&firm, name, self.known_terms);
+            }
+            formed.at = self.problem.fit_from(firm, POLISH_ROUNDS)?;
+        }
+        Ok((formed, contests))
     }
 }
+
+#[cfg(test)]
+#[path = "contests_tests.rs"]
+mod tests;

@@ -15,6 +15,7 @@ use nalgebra::DMatrix;
 use tactus_model::effect::Definition;
 
 use super::candidates::Candidate;
+use super::contests::Contest;
 use super::drift::TriedWalk;
 use super::evidence::{Addition, Evidence, Gain, ODDS_AGAINST, Set, Signs};
 use super::options::Options;
@@ -67,7 +68,7 @@ const FINISHED_MAX: usize = 2;
 /// A class is fitted if its first step promises this share of the best one's odds.
 const PROMISE_SHARE: f64 = 0.3;
 /// Logarithm of the odds with which a class is added and holds its place.
-const LN_ODDS_LEAST: f64 = 5.0;
+pub(super) const LN_ODDS_LEAST: f64 = 5.0;
 /// A rival without a name takes the place of a class if its odds are greater by this logarithm.
 const RIVAL_LN_ODDS: f64 = 5.0;
 /// Another class takes the place of one if its odds are greater by this logarithm.
@@ -136,11 +137,13 @@ pub(crate) struct Grown {
     pub(crate) at: Fitted,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
+    /// Classes that lost against a rival without a name.
+    pub(crate) refused: Vec<Contest>,
 }
 
 impl From<Fitted> for Grown {
     fn from(base: Fitted) -> Self {
-        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new() }
+        Self { at: base, rounds: Vec::new(), equivalent: Equivalent::new(), refused: Vec::new() }
     }
 }
 
@@ -244,7 +247,13 @@ impl Search<'_> {
                 }
                 if first < directions.len() {
                     let directions = (first..directions.len()).collect();
-                    additions.push(Addition { class, directions, widths, signs, among: of.among(shapes.len()) });
+                    additions.push(Addition {
+                        class,
+                        directions,
+                        widths,
+                        signs,
+                        among: of.among(shapes.len()),
+                    });
                     kinds.push(Kind::Term { candidate, shape: shape.clone() });
                 }
             }
@@ -312,11 +321,12 @@ impl Search<'_> {
             let mut tried = self.tested(&pass, &grown.at, index);
             let is_full =
                 names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
-            let fits = if 2.0 * tried.p_value <= ALPHA && !is_full {
+            let (fits, refused) = if 2.0 * tried.p_value <= ALPHA && !is_full {
                 self.next(&grown.at, &pass)?
             } else {
-                Vec::new()
+                (Vec::new(), None)
             };
+            grown.refused.extend(refused);
             for fit in &fits {
                 self.tell(fit, base, &mut tried.round);
             }
@@ -419,8 +429,9 @@ impl Search<'_> {
         }
     }
 
-    /// The classes of the best sets, fitted, the one with the greatest odds first; none if a rival without a name explains more.
-    fn next(&self, at: &Fitted, pass: &Pass) -> Result<Vec<Beside>, DiscoverError> {
+    /// The classes of the best sets, fitted, the one with the greatest odds first; none if a rival without a name explains more: then
+    /// the best one's contest.
+    fn next(&self, at: &Fitted, pass: &Pass) -> Result<(Vec<Beside>, Option<Contest>), DiscoverError> {
         let evidence = pass.evidence_on(pass.grams.reduced());
         let best = evidence.sets(|_| true).into_iter().next();
         let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
@@ -449,11 +460,13 @@ impl Search<'_> {
         let mut fits = self.fits(at, &starts)?;
         fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
         let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
-        let is_beaten = fits.first().is_some_and(|one| pass.best_rival() > one.ln_odds + RIVAL_LN_ODDS);
-        if is_beaten && !best_has_names {
+        let beaten = fits.first().filter(|one| pass.best_rival() > one.ln_odds + RIVAL_LN_ODDS);
+        let refused = beaten.filter(|_| !best_has_names);
+        let refused = refused.map(|one| Contest::refused(one.name, one.ln_odds, pass.rivals()));
+        if refused.is_some() {
             fits.clear();
         }
-        Ok(fits)
+        Ok((fits, refused))
     }
 
     /// The terms of a class from which a fit starts: its members of a set.
@@ -533,6 +546,7 @@ impl Search<'_> {
                 (self.progress)(&format!("comparing {name} with others in its place"));
                 let pass = self.pass(&less)?;
                 if pass.best_rival() > ln_odds + RIVAL_LN_ODDS {
+                    grown.refused.push(Contest::refused(name, ln_odds, pass.rivals()));
                     grown.at = self.problem.fit_from(less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
                 }
@@ -558,7 +572,9 @@ impl Search<'_> {
                         same.push((other, fitted));
                     }
                 }
-                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals: pass.rivals() });
+                grown
+                    .equivalent
+                    .insert(name, Alike { without: less, same, probabilities, rivals: pass.rivals() });
             }
             return Ok(());
         }

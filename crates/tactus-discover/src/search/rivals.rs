@@ -26,16 +26,13 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::covariates::{Factor, Feature, Form, Forms};
+use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
 use super::tones::{Point, Tone, clearest};
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Problem};
 
 /// Knots of a function of one covariate.
 const KNOTS: usize = 5;
-
-/// Greatest height from which something may be felt without contact.
-const LOW_MM: f64 = 2.0;
 
 /// Knots of a function of single readings lie where the signal is at least this share of the largest.
 const SIGNAL_SHARE: f64 = 0.02;
@@ -93,10 +90,8 @@ pub(crate) fn rivals<'a>(
     let (of_sum, of_places) = (hats(&sums, deep), both(&of_place));
     let (of_sum_apart, of_places_apart) = (unloading(&of_sum), unloading(&of_places));
     let alone = |name, columns| Rival { name, beside: None, columns, among: 1.0 };
-    let apart = |name, of: &'static str, hats| Rival {
-        beside: Some(of),
-        ..alone(name, smooth(hats, Form::Signal))
-    };
+    let apart =
+        |name, of: &'static str, hats| Rival { beside: Some(of), ..alone(name, smooth(hats, Form::Signal)) };
     let mut found = vec![
         alone("sum of signals", smooth(of_sum, Form::Signal)),
         apart("sum of signals, apart", "sum of signals", of_sum_apart),
@@ -198,7 +193,8 @@ type OfReading = fn(&Seen, usize, usize) -> f64;
 
 impl Seen {
     fn of(problem: &Problem<'_>, at: &Fitted) -> Result<Self, DiscoverError> {
-        let forms = Forms::of(problem, &at.parameters, &at.predicted)?.with_places(problem, &at.parameters)?;
+        let forms =
+            Forms::of(problem, &at.parameters, &at.predicted)?.with_places(problem, &at.parameters)?;
         let (bins, known) = (problem.predictor.bins, problem.predictor.known);
         let elements = bins.elements;
         let history = forms.history();
@@ -274,8 +270,8 @@ impl Seen {
                 let mut column = vec![0.0; bins.len() * seen.elements];
                 for (place, bin) in bins.enumerate().filter(|(_, bin)| seen.deep[*bin]) {
                     for element in 0..seen.elements {
-                        column[place * seen.elements + element] = times(&seen, bin, element)
-                            * weight(&knots, knot, value(&seen, bin, element));
+                        column[place * seen.elements + element] =
+                            times(&seen, bin, element) * weight(&knots, knot, value(&seen, bin, element));
                     }
                 }
                 column

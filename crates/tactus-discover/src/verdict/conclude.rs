@@ -13,8 +13,8 @@ use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
 use crate::fit::{Fitted, LOUD, Parameters, Predictor, Prepared, Problem, RandomWalk, Term};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
-    ALPHA, Alike, Contest, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS, Refuted,
-    RefutedFormula, Rule, Search, Tried, names, not_shown, q_values, sign_flip_p, without,
+    ALPHA, Alike, Contest, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS,
+    Refuted, RefutedFormula, Rule, Search, Tried, names, not_shown, q_values, sign_flip_p, without,
 };
 
 /// The held-out presses confirm an effect if noise alone would let it gain as much on them with at most this probability.

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tactus_discover::{
-    AddedEffect, Contest, Curve, Discovery, Estimated, FaultyElement, FittedCurve, Floor, Gap, GlobalTest, Inclusion,
-    LeftOut, Level, NextExperiment, OpenQuestion, Rivalry, Round, Structured, TriedEffect,
+    AddedEffect, Contest, Curve, Discovery, Estimated, FaultyElement, FittedCurve, Floor, Gap, GlobalTest,
+    Inclusion, LeftOut, Level, NextExperiment, OpenQuestion, Rivalry, Round, Structured, TriedEffect,
 };
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
@@ -223,6 +223,7 @@ struct ContestJson<'a> {
     effect: &'a str,
     ln_odds: f64,
     rivals: Vec<RivalryJson<'a>>,
+    kept: bool,
 }
 
 #[derive(Serialize)]
@@ -471,6 +472,7 @@ impl<'a> ContestJson<'a> {
             effect: contest.effect,
             ln_odds: contest.ln_odds,
             rivals: contest.rivals.iter().map(rivalry).collect(),
+            kept: contest.kept,
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
-    AddedEffect, BaseModel, Contest, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement, Final, Floor,
-    Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NotShown, OpenQuestion, Plan, Point, Rivalry, Round,
-    Split, Structured, TriedEffect, Unexplained, Verdict,
+    AddedEffect, BaseModel, Contest, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement,
+    Final, Floor, Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NotShown, OpenQuestion, Plan,
+    Point, Rivalry, Round, Split, Structured, TriedEffect, Unexplained, Verdict,
 };
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
 use tactus_report::discovery::{DataSource, DiscoveryReport};
@@ -140,7 +140,7 @@ fn contests() -> Vec<Contest> {
     let rivalry = |rival, instead, beside| Rivalry { rival, instead, beside };
     let rivals =
         vec![rivalry("sum of signals", 412.5, 3.25), rivalry("tone in counts", f64::NEG_INFINITY, -4.5)];
-    vec![Contest { effect: "hysteresis", ln_odds: 1530.25, rivals }]
+    vec![Contest { effect: "hysteresis", ln_odds: 1530.25, rivals, kept: true }]
 }
 
 /// Nothing is missing from the base model.
