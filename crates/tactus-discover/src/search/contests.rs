@@ -1,17 +1,26 @@
 //! Each added class beside the rivals without a name, as it stands in the grown model.
 //!
 //! That no rival beats a class in its place is not enough: the class may be only the nearest form in the library of what a rival describes
-//! better in part. Then the rival has much of the class's odds in its place, and still explains much beside it, although the class was
-//! fitted to the end, with knots where the data ask for them. Such a class is no name. A physics of the class itself, in any form, leaves
-//! little to a rival that acts like it; what another physics leaves, a rival explains that hardly acts like the class.
+//! better in part. Such a class is no name. With `E` the logarithm of the class's odds, `R` that of a rival in its place, and `B` that of the
+//! rival beside it,
+//!
+//! ```text
+//! (R - B) / E    the share of what the class explains that the rival would take over
+//! B / E          what the rival still explains beside the class, although that was fitted to the end
+//! ```
+//!
+//! If both are large for one rival, the class stands in part for what the rival describes. A physics of the class itself, in any form, leaves
+//! little to a rival that acts like it; what another physics leaves, a rival explains that hardly takes over from the class.
+//!
+//! The bounds of the two shares are chosen on tuning sets: `tactus-bench evidence contests` prints both of right and wrong names.
 
 use super::forms::Formed;
 use super::grow::{Equivalent, LN_ODDS_LEAST, POLISH_ROUNDS, Search, names, without};
 use crate::data::DiscoverError;
 
-/// A rival acts like a class if it has more than this share of its odds (in logarithms) in its place.
-const INSTEAD_SHARE: f64 = 0.5;
-/// A class is only the nearest form if such a rival has more than this share of its odds beside it.
+/// A rival acts like a class if it would take over more than this share.
+const TAKEN_SHARE: f64 = 0.3;
+/// A class is only the nearest form if such a rival explains more than this share beside it.
 const BESIDE_SHARE: f64 = 0.1;
 
 /// An added class and the rivals that compete with it.
@@ -45,11 +54,10 @@ impl Contest {
         Self { effect, ln_odds, rivals: rivals.into_iter().map(rivalry).collect(), kept: false }
     }
 
-    /// True if the class is only the nearest form of what a rival describes: one that has much of its odds in its place leaves its place
-    /// to it, and still has many beside it.
+    /// True if the class is only the nearest form of what a rival describes.
     fn is_nearest_form(&self) -> bool {
         self.rivals.iter().any(|rival| {
-            rival.instead > INSTEAD_SHARE * self.ln_odds
+            rival.instead - rival.beside.max(0.0) > TAKEN_SHARE * self.ln_odds
                 && rival.beside > LN_ODDS_LEAST.max(BESIDE_SHARE * self.ln_odds)
         })
     }
@@ -67,9 +75,9 @@ impl Search<'_> {
             return Ok((formed, Vec::new()));
         }
         (self.progress)("comparing the names with what has none");
-        let beside = self.pass(&formed.at)?.rivals();
+        let pass = self.pass(&formed.at)?;
         let contest = |effect: &'static str| {
-            let alike = equivalent.get(effect)?;
+            let (alike, beside) = (equivalent.get(effect)?, pass.beside(effect));
             let rivalry = |(rival, instead): &(&'static str, f64)| Rivalry {
                 rival,
                 instead: *instead,

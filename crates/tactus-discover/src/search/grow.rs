@@ -171,6 +171,8 @@ enum Kind {
         shape: Term,
     },
     Rival,
+    /// The free part of a class.
+    Free(&'static str),
 }
 
 /// A class that was fitted beside a model.
@@ -204,17 +206,43 @@ impl Pass {
         (0..self.additions.len()).filter(|one| self.is_named(*one) && among(self.class_of(*one))).collect()
     }
 
-    /// Logarithm of the odds of each rival without a name.
-    pub(crate) fn rivals(&self) -> Vec<(&'static str, f64)> {
-        let evidence = self.evidence_on(self.grams.reduced());
-        let rivals = (0..self.additions.len()).filter(|one| !self.is_named(*one));
-        rivals.map(|one| (self.class_of(one), evidence.gain_alone(one).ln_odds)).collect()
+    /// The additions that are the free part of a class.
+    fn free(&self, class: &str) -> Vec<usize> {
+        (0..self.additions.len())
+            .filter(|one| matches!(self.kinds[*one], Kind::Free(of) if of == class))
+            .collect()
     }
 
-    /// That of the best one.
-    fn best_rival(&self) -> f64 {
-        self.rivals().into_iter().map(|(_, ln_odds)| ln_odds).fold(f64::NEG_INFINITY, f64::max)
+    /// Logarithm of the odds of each rival of a class that has these odds: in the place of the class, and in that of its free part where
+    /// that is stronger.
+    fn rivalry(&self, class: &str, ln_odds: f64) -> (f64, Vec<(&'static str, f64)>) {
+        let evidence = self.evidence_on(self.grams.reduced());
+        let free = self.free(class).into_iter().map(|one| evidence.gain_alone(one).ln_odds);
+        (free.fold(ln_odds, f64::max), self.rivals(&evidence, &evidence.none(), class))
     }
+
+    /// Logarithm of the odds of each rival beside a model that has a class, and beside the free part of that.
+    pub(crate) fn beside(&self, class: &str) -> Vec<(&'static str, f64)> {
+        let evidence = self.evidence_on(self.grams.reduced());
+        let free = self.free(class).into_iter().filter(|one| evidence.gain_alone(*one).ln_odds > 0.0);
+        self.rivals(&evidence, &evidence.set(free), class)
+    }
+
+    /// Logarithm of the odds of each rival beside a set; that of which a class is a part is none of its rivals.
+    fn rivals(&self, evidence: &Evidence<'_>, set: &Set, class: &str) -> Vec<(&'static str, f64)> {
+        let own: Vec<&[usize]> =
+            self.free(class).into_iter().map(|one| &self.additions[one].directions[..]).collect();
+        let is_rival = |one: &usize| {
+            matches!(self.kinds[*one], Kind::Rival) && !own.contains(&&self.additions[*one].directions[..])
+        };
+        let rivals = (0..self.additions.len()).filter(is_rival);
+        rivals.map(|one| (self.class_of(one), evidence.gain(set, one).ln_odds)).collect()
+    }
+}
+
+/// The greatest odds.
+fn best(rivals: &[(&'static str, f64)]) -> f64 {
+    rivals.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max)
 }
 
 impl Search<'_> {
@@ -265,21 +293,25 @@ impl Search<'_> {
             let mut own = shared.map_or_else(Vec::new, |of| of.directions.clone());
             own.extend(directions.len()..directions.len() + rival.columns.len());
             directions.extend(rival.columns);
+            let (kind, signs) = match rival.free {
+                Some((class, signs)) => (Kind::Free(class), signs),
+                None => (Kind::Rival, vec![Signs::Both; own.len()]),
+            };
             additions.push(Addition {
                 class: classes.len(),
                 widths: vec![1.0; own.len()],
-                signs: vec![Signs::Both; own.len()],
+                signs,
                 directions: own,
                 among: rival.among,
             });
             classes.push(rival.name);
-            kinds.push(Kind::Rival);
+            kinds.push(kind);
         }
         let grams = problem.grams(at, directions)?;
         let last = grams.reduced().nrows() - 1;
         let residual = grams.reduced()[(last, last)].sqrt();
         for (addition, kind) in additions.iter_mut().zip(&kinds) {
-            if matches!(kind, Kind::Rival) {
+            if !matches!(kind, Kind::Term { .. }) {
                 // As a rival has no range: what would make the whole residual.
                 for (width, direction) in addition.widths.iter_mut().zip(&addition.directions) {
                     *width = residual / grams.whole(*direction).max(f64::MIN_POSITIVE);
@@ -433,7 +465,8 @@ impl Search<'_> {
     /// the best one's contest.
     fn next(&self, at: &Fitted, pass: &Pass) -> Result<(Vec<Beside>, Option<Contest>), DiscoverError> {
         let evidence = pass.evidence_on(pass.grams.reduced());
-        let best = evidence.sets(|_| true).into_iter().next();
+        let is_free = |one: usize| matches!(pass.kinds[one], Kind::Free(_));
+        let best_set = evidence.sets(|one| !is_free(one)).into_iter().next();
         let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
         let mut starts: Vec<(&'static str, Vec<Term>)> = Vec::new();
         let mut propose = |set: &Set| {
@@ -444,7 +477,7 @@ impl Search<'_> {
                 }
             }
         };
-        best.iter().chain(&named).for_each(&mut propose);
+        best_set.iter().chain(&named).for_each(&mut propose);
         let alone = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), 0.0);
         let most = alone.first().map_or(0.0, |(_, gain)| gain.ln_odds);
         for (one, _) in alone.iter().filter(|(_, gain)| gain.ln_odds > PROMISE_SHARE * most) {
@@ -459,10 +492,13 @@ impl Search<'_> {
         }
         let mut fits = self.fits(at, &starts)?;
         fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
-        let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
-        let beaten = fits.first().filter(|one| pass.best_rival() > one.ln_odds + RIVAL_LN_ODDS);
-        let refused = beaten.filter(|_| !best_has_names);
-        let refused = refused.map(|one| Contest::refused(one.name, one.ln_odds, pass.rivals()));
+        let best_has_names = best_set.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
+        let contest = |one: &Beside| {
+            let (strength, rivals) = pass.rivalry(one.name, one.ln_odds);
+            let is_beaten = best(&rivals) > strength + RIVAL_LN_ODDS && !best_has_names;
+            is_beaten.then(|| Contest::refused(one.name, one.ln_odds, rivals))
+        };
+        let refused = fits.first().and_then(contest);
         if refused.is_some() {
             fits.clear();
         }
@@ -545,15 +581,16 @@ impl Search<'_> {
                 }
                 (self.progress)(&format!("comparing {name} with others in its place"));
                 let pass = self.pass(&less)?;
-                if pass.best_rival() > ln_odds + RIVAL_LN_ODDS {
-                    grown.refused.push(Contest::refused(name, ln_odds, pass.rivals()));
+                let (strength, rivals) = pass.rivalry(name, ln_odds);
+                if best(&rivals) > strength + RIVAL_LN_ODDS {
+                    grown.refused.push(Contest::refused(name, ln_odds, rivals));
                     grown.at = self.problem.fit_from(less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
-                let best = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
+                let likeliest = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
                 let better =
-                    best.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
+                    likeliest.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
                 if let Some(better) = better {
                     exchanges_left -= 1;
                     grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
@@ -572,9 +609,7 @@ impl Search<'_> {
                         same.push((other, fitted));
                     }
                 }
-                grown
-                    .equivalent
-                    .insert(name, Alike { without: less, same, probabilities, rivals: pass.rivals() });
+                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals });
             }
             return Ok(());
         }

@@ -21,12 +21,17 @@
 //! | tone in x, in y | the tip's place | the element's own signal |
 //!
 //! The sum of signals and the place compete also with one function for loading and another for unloading.
+//!
+//! A class whose free part is a curve that model files cannot hold yet is as strong as that curve within the constraints of the class:
+//! `heavy-tail` is a function of the distance from the tip that is nowhere negative far out. Without them the curve is a rival of all
+//! classes but this one.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
 use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
+use super::evidence::Signs;
 use super::tones::{Point, Tone, clearest};
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Problem};
@@ -45,6 +50,8 @@ pub(crate) struct Rival<'a> {
     pub(crate) columns: Vec<Direction<'a>>,
     /// From how many alternatives the residual picked it.
     pub(crate) among: f64,
+    /// The class whose free part it is, with the signs that the class allows.
+    pub(crate) free: Option<(&'static str, Vec<Signs>)>,
 }
 
 /// The rivals at a model. `rounds` if the converter's steps are seen: then each element in contact has an offset of its own anyway.
@@ -89,9 +96,13 @@ pub(crate) fn rivals<'a>(
     let low: Vec<bool> = height_mm.iter().zip(&free).map(|(mm, free)| *free && *mm <= LOW_MM).collect();
     let (of_sum, of_places) = (hats(&sums, deep), both(&of_place));
     let (of_sum_apart, of_places_apart) = (unloading(&of_sum), unloading(&of_places));
-    let alone = |name, columns| Rival { name, beside: None, columns, among: 1.0 };
+    let alone = |name, columns| Rival { name, beside: None, columns, among: 1.0, free: None };
     let apart =
         |name, of: &'static str, hats| Rival { beside: Some(of), ..alone(name, smooth(hats, Form::Signal)) };
+    let of_distance = Seen::smooth(&seen, Seen::distance_mm, Seen::largest);
+    // Near the tip, gains and the spread take up what the curve loses to its tail.
+    let near = |knot| if knot < of_distance.len() / 2 { Signs::Both } else { Signs::Positive };
+    let tail_signs = (0..of_distance.len()).map(near).collect();
     let mut found = vec![
         alone("sum of signals", smooth(of_sum, Form::Signal)),
         apart("sum of signals, apart", "sum of signals", of_sum_apart),
@@ -100,7 +111,12 @@ pub(crate) fn rivals<'a>(
         apart("place, apart", "place", of_places_apart),
         alone("place in the element", smooth(both(&in_element), Form::Signal)),
         alone("direction of approach", aside.collect()),
-        alone("distance from the tip", Seen::smooth(&seen, Seen::distance_mm, Seen::largest)),
+        alone("distance from the tip", of_distance),
+        Rival {
+            beside: Some("distance from the tip"),
+            free: Some(("heavy-tail", tail_signs)),
+            ..alone("radial curve with more weight far out", Vec::new())
+        },
         alone("distance along the approach", Seen::smooth(&seen, Seen::ahead_mm, Seen::signal)),
         alone("speed of travel", smooth(hats(&history.travel_mm_per_s, &free), Form::Offset)),
         alone("height above the surface", smooth(hats(&height_mm, &low), Form::Place)),
@@ -113,7 +129,7 @@ pub(crate) fn rivals<'a>(
             |element| seen.column(Factor::Element(element, Arc::clone(&in_contact)), Form::Offset);
         found.push(alone("contact", (0..seen.elements).map(of_element).collect()));
     }
-    found.retain(|rival| !rival.columns.is_empty());
+    found.retain(|rival| !rival.columns.is_empty() || rival.free.is_some());
     Ok(found)
 }
 
@@ -128,6 +144,7 @@ fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>) -> Vec<
         beside: None,
         columns: columns.into(),
         among: tone.among,
+        free: None,
     };
     // Of all elements at a bin, with what the tone multiplies.
     let in_bins = |values: &[f64], carrier: &dyn Fn(usize) -> f64| -> Option<Tone> {
