@@ -7,6 +7,7 @@
 
 mod ablation;
 mod campaign;
+mod contests;
 mod document;
 mod forms;
 mod outcome;
@@ -21,6 +22,7 @@ mod twins;
 
 pub use ablation::{Ablation, ablations};
 pub use campaign::{Campaign, Planned, Seeds, Sizes, campaigns};
+pub use contests::{Contest, contests, contests_table};
 pub use document::{Costs, Part, document, into_document, misses};
 pub use forms::{Form, forms_table};
 pub use outcome::{Named, Outcome, Truth, read};

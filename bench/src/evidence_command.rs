@@ -9,8 +9,8 @@ use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use tactus_bench::evidence::{
     self, Ablation, Campaign, Costs, Form, Outcome, Places, Planned, Scores, Seeds, Sizes, TWINS, Timing,
-    Workflow, ablations, campaigns, document, forms_table, into_document, misses, pictures, quantile, read,
-    run, separate, summary, twins_table,
+    Workflow, ablations, campaigns, contests, contests_table, document, forms_table, into_document, misses,
+    pictures, quantile, read, run, separate, summary, twins_table,
 };
 
 #[derive(Debug, Args)]
@@ -28,6 +28,8 @@ enum Part {
     /// Writes into the labels of sets that have been run how far their physics is from the nearest wrong effect; continues an
     /// interrupted run.
     Separate(WhichArgs),
+    /// Prints how near rivals without a name come to the effects that are named, rightly and wrongly, in the tuning sets that have been run.
+    Contests(WhichArgs),
     /// Prints how well the library's effects follow each form of hidden physics.
     Forms(FormsArgs),
     /// Measures time and memory of `tactus discover`, by default for 9,000 to 144,000 frames; prints JSON.
@@ -185,6 +187,7 @@ impl EvidenceArgs {
             Part::Run(args) => args.run(),
             Part::Score(which) => which.score().map(drop),
             Part::Separate(which) => which.separate(),
+            Part::Contests(which) => which.contests(),
             Part::Forms(args) => args.run(),
             Part::Time(args) => args.run(),
             Part::Active(args) => args.run(),
@@ -282,6 +285,12 @@ impl WhichArgs {
     fn separate(&self) -> Result<()> {
         self.check_seeds()?;
         separate(&self.sets(), &self.places(), cores(), &|id| println!("{id}"))
+    }
+
+    fn contests(&self) -> Result<()> {
+        ensure!(self.seeds == Seeds::Tuning, "constants are chosen by this: take --seeds tuning");
+        println!("{}", contests_table(&contests(&self.sets(), &self.places())?));
+        Ok(())
     }
 
     /// Who looks at a part of the sealed sets could choose by them.

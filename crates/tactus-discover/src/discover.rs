@@ -68,7 +68,7 @@ fn discover_on_threads(
         progress: &|what, share| reporter.report(what, share),
     };
     let before = search.locate(&base)?;
-    let Grown { at: grown, rounds, mut equivalent, .. } = match options.rule {
+    let Grown { at: grown, rounds, mut equivalent, refused, .. } = match options.rule {
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
@@ -76,6 +76,8 @@ fn discover_on_threads(
         Rule::Protocol => search.formed(grown)?,
         Rule::Bic => Formed::from(grown),
     };
+    let (formed, mut contests) = search.contested(formed, &mut equivalent)?;
+    contests.extend(refused);
     let confirmed = confirmed(&prepared, &search, formed, &mut equivalent)?;
     reporter.report("locating what remains", 0.9);
     let left = search.left(&confirmed.grown)?;
@@ -84,7 +86,7 @@ fn discover_on_threads(
     let told = conclude(
         &prepared,
         &search,
-        SearchOutcome { lacking, base, confirmed, rounds, equivalent, left, before, after },
+        SearchOutcome { lacking, base, confirmed, rounds, equivalent, contests, left, before, after },
         options,
         experiments,
     )?;

@@ -4,10 +4,12 @@
 //! work keep the order of its items.
 
 mod median;
+mod normal;
 pub(crate) mod parallel;
 mod quantiles;
 mod rng;
 
 pub(crate) use median::median;
+pub(crate) use normal::of_picked;
 pub(crate) use quantiles::{Z_95, student_95};
 pub(crate) use rng::Rng;

@@ -14,6 +14,7 @@
 
 mod bic;
 mod candidates;
+mod contests;
 mod covariates;
 mod drift;
 mod evidence;
@@ -25,9 +26,11 @@ pub(crate) mod not_shown;
 mod options;
 mod rivals;
 mod score;
+mod tones;
 mod wiring;
 
 pub(crate) use candidates::Candidate;
+pub use contests::{Contest, Rivalry};
 pub(crate) use forms::{Formed, Refuted, RefutedFormula};
 pub(crate) use grow::{
     ALPHA, Alike, Equivalent, FLIPS, Grown, Left, POLISH_ROUNDS, Search, Tried, names, without,

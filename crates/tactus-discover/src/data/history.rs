@@ -11,6 +11,8 @@ const ASIDE_MM: f64 = 0.05;
 pub(crate) struct History {
     pub(crate) since_contact_s: Vec<f64>,
     pub(crate) since_release_s: Vec<f64>,
+    /// Since the stage started or stopped.
+    pub(crate) since_turn_s: Vec<f64>,
     pub(crate) depth_mm: Vec<f64>,
     pub(crate) deepest_before_mm: Vec<f64>,
     pub(crate) upward: Vec<f64>,
@@ -31,6 +33,7 @@ impl History {
         let mut history = Self {
             since_contact_s: empty(),
             since_release_s: empty(),
+            since_turn_s: empty(),
             depth_mm: empty(),
             deepest_before_mm: empty(),
             upward: empty(),
@@ -58,6 +61,7 @@ impl History {
             let t_s = bins.t_s[bin];
             history.since_contact_s.push(t_s - state.contact_s);
             history.since_release_s.push(state.release_s.map_or(f64::NAN, |release_s| t_s - release_s));
+            history.since_turn_s.push(t_s - state.turn_s);
             history.depth_mm.push(state.depth_mm);
             history.deepest_before_mm.push(state.deepest_before_mm);
             history.upward.push(f64::from(u8::from(state.upward)));
@@ -82,6 +86,8 @@ struct SensorHistory {
     depth_mm: f64,
     contact_s: f64,
     release_s: Option<f64>,
+    moves: bool,
+    turn_s: f64,
     upward: bool,
     speed_mm_per_s: f64,
     travel_mm_per_s: f64,
@@ -108,7 +114,11 @@ impl SensorHistory {
             }
             let aside = [at[0] - last[0], at[1] - last[1]];
             let far = aside[0].hypot(aside[1]);
-            self.travel_mm_per_s = far.max(fell_mm.abs()) / dt_s;
+            let moved_mm = far.max(fell_mm.abs());
+            self.travel_mm_per_s = moved_mm / dt_s;
+            if self.moves != (moved_mm > 1e-3) {
+                (self.moves, self.turn_s) = (!self.moves, t_s);
+            }
             for (held, moved) in self.aside.iter_mut().zip(aside) {
                 if moved.abs() > ASIDE_MM.min(far) && moved.abs() > 1e-3 {
                     *held = moved.signum();

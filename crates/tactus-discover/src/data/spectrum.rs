@@ -110,7 +110,7 @@ fn clearness(power: f64, around: &[f64]) -> f64 {
 ///
 /// # Source
 /// J. W. Cooley and J. W. Tukey, *Math. Comput.* 19 (1965) 297.
-fn transform(series: &mut [[f64; 2]]) {
+pub(crate) fn transform(series: &mut [[f64; 2]]) {
     let count = series.len();
     let bits = count.trailing_zeros();
     for index in 0..count {

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use tactus_model::effect::{Definition, ParameterKind, REGISTRY};
 
 use super::wiring;
-use crate::data::DiscoverError;
+use crate::data::{DiscoverError, interval_s};
 use crate::fit::{Fitted, Free, Problem, Scale, Term};
 
 /// Number of grid values of a time that spans orders of magnitude, and of any other shape parameter.
@@ -24,6 +24,8 @@ pub(crate) struct Candidate {
     amplitudes: Vec<usize>,
     /// Values of the others from which fits start.
     shapes: Shapes,
+    /// From how many shapes a residual picks: all pairs of elements, or all frequencies that the frames can tell apart. 1 for a grid.
+    alternatives: f64,
 }
 
 /// Where the values of an effect's shape parameters come from.
@@ -52,6 +54,7 @@ impl Candidate {
         frequencies_hz: &[f64],
     ) -> Result<Self, DiscoverError> {
         let mut amplitudes = Vec::new();
+        let mut alternatives = 1.0;
         let mut shapes = vec![Term::neutral(definition)];
         for (parameter, known) in definition.parameters.iter().enumerate() {
             if known.kind != ParameterKind::Real {
@@ -65,6 +68,7 @@ impl Candidate {
             let range = known.range;
             if known.name.ends_with("_hz") {
                 shapes = cross(&shapes, parameter, frequencies_hz);
+                alternatives = problem.duration_s / (2.0 * interval_s(problem.predictor.frames));
             } else if known.name == "duration_s" {
                 shapes = cross(&shapes, parameter, &[problem.duration_s.clamp(range[0], range[1])]);
             } else if acts {
@@ -75,8 +79,11 @@ impl Candidate {
             }
         }
         let wires = definition.parameters.iter().any(|known| known.kind == ParameterKind::Element);
+        if wires {
+            alternatives = (problem.predictor.bins.elements as f64).powi(2);
+        }
         let shapes = if wires { Shapes::Wiring } else { Shapes::Grid(shapes) };
-        Ok(Self { definition, amplitudes, shapes })
+        Ok(Self { definition, amplitudes, shapes, alternatives })
     }
 
     /// Starts of fits of this effect in addition to a model, with neutral amplitudes.
@@ -88,6 +95,11 @@ impl Candidate {
                 Cow::Owned(pairs.into_iter().filter_map(|pair| wired(self.definition, pair)).collect())
             }
         }
+    }
+
+    /// From how many alternatives the residual picked each of so many shapes: pairs of elements, or frequencies. 1 for a grid.
+    pub(crate) fn among(&self, shapes: usize) -> f64 {
+        (self.alternatives / shapes.max(1) as f64).max(1.0)
     }
 
     /// The parameters that change the prediction of a shape.

@@ -12,6 +12,8 @@ use crate::fit::{Free, Parameters, Problem, Term};
 /// Depth of the imagined press at a place that is not pressed.
 const LOOK_MM: f64 = 0.3;
 
+/// Greatest height from which something may be felt without contact.
+pub(super) const LOW_MM: f64 = 2.0;
 /// Greatest number of elements that are covariates by themselves: those with the most signal.
 const ELEMENTS_MAX: usize = 48;
 /// Ranges of the depth for each of them.
@@ -222,6 +224,12 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     let deep: Vec<bool> = history.depth_mm.iter().map(|depth| *depth > 0.0).collect();
     let free: Vec<bool> = deep.iter().map(|deep| !deep).collect();
     let every = vec![true; bins.len()];
+    let low = |upward: f64| -> Vec<bool> {
+        let is_low = |(depth_mm, up): (&f64, &f64)| {
+            *depth_mm <= 0.0 && *depth_mm >= -LOW_MM && up.total_cmp(&upward).is_eq()
+        };
+        history.depth_mm.iter().zip(&history.upward).map(is_low).collect()
+    };
     let (signal, offset, along) = ([Signal], [Offset], [AlongX, AlongY]);
     let with_offset = |form: Form| if forms.places.is_some() { vec![form, Offset] } else { vec![Offset] };
     let mut made = Vec::new();
@@ -241,9 +249,13 @@ pub(crate) fn features(problem: &Problem<'_>, forms: &Forms) -> Vec<Feature> {
     };
     add("time", "s", &bins.t_s, &every, 8, &[Offset, Signal]);
     add("time since contact", "s", &history.since_contact_s, &deep, 6, &signal);
+    add("time since a start or stop", "s", &history.since_turn_s, &deep, 6, &[Signal, Offset]);
     add("time since release", "s", &history.since_release_s, &free, 6, &with_offset(LastPlace));
     add("depth", "mm", &history.depth_mm, &deep, 8, &signal);
     add("height above the surface", "mm", &negative(&history.depth_mm), &free, 4, &with_offset(Place));
+    for (covariate, among) in [("height on the way down", low(0.0)), ("height on the way up", low(1.0))] {
+        add(covariate, "mm", &negative(&history.depth_mm), &among, 4, &with_offset(Place));
+    }
     add("largest past depth", "mm", &history.deepest_before_mm, &deep, 5, &signal);
     add("direction of motion", "", &history.upward, &deep, 2, &signal);
     add("direction of approach along x", "", &history.aside[0], &deep, 2, &[Signal, AlongX]);

@@ -12,7 +12,7 @@
 //! have the other, is left out. Once an addition is in, its directions are swept from the products with their prior precision, and the
 //! logarithms add up to that of the whole set.
 //!
-//! A name has a prior probability of 1 in 20, shared among its shapes.
+//! A name has a prior probability of 1 in 20, shared among its shapes, and among all those from which the residual picked a shape.
 //!
 //! # Source
 //! D. J. C. `MacKay`, *Neural Comput.* 4 (1992) 415 (evidence, one variance a group); R. E. Kass and A. E. Raftery, *J. Am. Stat.
@@ -39,6 +39,8 @@ pub(crate) struct Addition {
     pub(crate) widths: Vec<f64>,
     /// Signs that each coefficient may have.
     pub(crate) signs: Vec<Signs>,
+    /// From how many alternatives the residual picked it; 1 if it was not picked.
+    pub(crate) among: f64,
 }
 
 /// Signs that a coefficient may have.
@@ -124,12 +126,13 @@ impl Evidence<'_> {
 
     /// What an addition gains beside a set.
     pub(crate) fn gain(&self, set: &Set, addition: usize) -> Gain {
-        self.gain_of(&set.products, addition, self.charge(set, self.additions[addition].class))
+        let Addition { class, among, .. } = self.additions[addition];
+        self.gain_of(&set.products, addition, self.charge(set, class) + among.ln())
     }
 
-    /// What an addition gains by itself, against these logarithmic prior odds.
-    pub(crate) fn gain_alone(&self, addition: usize, charge: f64) -> Gain {
-        self.gain_of(self.products, addition, charge)
+    /// What an addition gains by itself.
+    pub(crate) fn gain_alone(&self, addition: usize) -> Gain {
+        self.gain_of(self.products, addition, ODDS_AGAINST.ln() + self.additions[addition].among.ln())
     }
 
     /// What an addition gains where these products are left.

@@ -13,6 +13,7 @@ fn additions(sizes: &[usize]) -> Vec<Addition> {
             directions: (first - size..first).collect(),
             widths: vec![1.0; *size],
             signs: vec![Signs::Both; *size],
+            among: 1.0,
         }
     };
     sizes.iter().enumerate().map(of).collect()

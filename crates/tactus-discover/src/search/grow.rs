@@ -16,6 +16,7 @@ use nalgebra::DMatrix;
 use tactus_model::effect::Definition;
 
 use super::candidates::Candidate;
+use super::contests::Contest;
 use super::drift::TriedWalk;
 use super::evidence::{Addition, Evidence, Gain, ODDS_AGAINST, Set, Signs};
 use super::memory::Memory;
@@ -69,7 +70,7 @@ const FINISHED_MAX: usize = 2;
 /// A class is fitted if its first step promises this share of the best one's odds.
 const PROMISE_SHARE: f64 = 0.3;
 /// Logarithm of the odds with which a class is added and holds its place.
-const LN_ODDS_LEAST: f64 = 5.0;
+pub(super) const LN_ODDS_LEAST: f64 = 5.0;
 /// A rival without a name takes the place of a class if its odds are greater by this logarithm.
 const RIVAL_LN_ODDS: f64 = 5.0;
 /// Another class takes the place of one if its odds are greater by this logarithm.
@@ -91,7 +92,7 @@ const SET_PROBABILITY: f64 = 0.95;
 
 /// Estimated shares of a discovery that are done before the classes have to hold their places, and after.
 const SHARE_BEFORE_HOLD: f64 = 0.65;
-const SHARE_AFTER_HOLD: f64 = 0.85;
+pub(super) const SHARE_AFTER_HOLD: f64 = 0.85;
 
 /// Data, candidates and options of a search.
 pub(crate) struct Search<'a> {
@@ -118,6 +119,8 @@ pub(crate) struct Alike {
     pub(crate) same: Vec<(&'static str, Fitted)>,
     /// Probability of the effect and of each other in its place, given that one of them is there; those not listed have hardly any.
     pub(crate) probabilities: Vec<(&'static str, f64)>,
+    /// Logarithm of the odds of each rival without a name in its place.
+    pub(crate) rivals: Vec<(&'static str, f64)>,
 }
 
 /// What a grown model may still lack.
@@ -144,11 +147,19 @@ pub(crate) struct Grown {
     pub(crate) equivalent: Equivalent,
     /// The models of the rounds: the base, and each with one more class.
     path: Vec<Fitted>,
+    /// Classes that lost against a rival without a name.
+    pub(crate) refused: Vec<Contest>,
 }
 
 impl From<Fitted> for Grown {
     fn from(base: Fitted) -> Self {
-        Self { path: vec![base.clone()], at: base, rounds: Vec::new(), equivalent: Equivalent::new() }
+        Self {
+            path: vec![base.clone()],
+            at: base,
+            rounds: Vec::new(),
+            equivalent: Equivalent::new(),
+            refused: Vec::new(),
+        }
     }
 }
 
@@ -183,6 +194,8 @@ enum Kind {
         shape: Term,
     },
     Rival,
+    /// The free part of a class.
+    Free(&'static str),
 }
 
 /// A class that was fitted beside a model.
@@ -216,14 +229,43 @@ impl Pass {
         (0..self.additions.len()).filter(|one| self.is_named(*one) && among(self.class_of(*one))).collect()
     }
 
-    /// Logarithm of the odds of the best rival without a name.
-    fn best_rival(&self) -> f64 {
-        let evidence = self.evidence_on(self.grams.reduced());
-        let rivals = (0..self.additions.len()).filter(|one| !self.is_named(*one));
-        rivals
-            .map(|one| evidence.gain_alone(one, ODDS_AGAINST.ln()).ln_odds)
-            .fold(f64::NEG_INFINITY, f64::max)
+    /// The additions that are the free part of a class.
+    fn free(&self, class: &str) -> Vec<usize> {
+        (0..self.additions.len())
+            .filter(|one| matches!(self.kinds[*one], Kind::Free(of) if of == class))
+            .collect()
     }
+
+    /// Logarithm of the odds of each rival of a class that has these odds: in the place of the class, and in that of its free part where
+    /// that is stronger.
+    fn rivalry(&self, class: &str, ln_odds: f64) -> (f64, Vec<(&'static str, f64)>) {
+        let evidence = self.evidence_on(self.grams.reduced());
+        let free = self.free(class).into_iter().map(|one| evidence.gain_alone(one).ln_odds);
+        (free.fold(ln_odds, f64::max), self.rivals(&evidence, &evidence.none(), class))
+    }
+
+    /// Logarithm of the odds of each rival beside a model that has a class, and beside the free part of that.
+    pub(crate) fn beside(&self, class: &str) -> Vec<(&'static str, f64)> {
+        let evidence = self.evidence_on(self.grams.reduced());
+        let free = self.free(class).into_iter().filter(|one| evidence.gain_alone(*one).ln_odds > 0.0);
+        self.rivals(&evidence, &evidence.set(free), class)
+    }
+
+    /// Logarithm of the odds of each rival beside a set; that of which a class is a part is none of its rivals.
+    fn rivals(&self, evidence: &Evidence<'_>, set: &Set, class: &str) -> Vec<(&'static str, f64)> {
+        let own: Vec<&[usize]> =
+            self.free(class).into_iter().map(|one| &self.additions[one].directions[..]).collect();
+        let is_rival = |one: &usize| {
+            matches!(self.kinds[*one], Kind::Rival) && !own.contains(&&self.additions[*one].directions[..])
+        };
+        let rivals = (0..self.additions.len()).filter(is_rival);
+        rivals.map(|one| (self.class_of(one), evidence.gain(set, one).ln_odds)).collect()
+    }
+}
+
+/// The greatest odds.
+fn best(rivals: &[(&'static str, f64)]) -> f64 {
+    rivals.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max)
 }
 
 impl Search<'_> {
@@ -239,7 +281,8 @@ impl Search<'_> {
         for (candidate, of) in self.candidates.iter().enumerate() {
             let class = classes.len();
             classes.push(of.definition.name);
-            for shape in of.shapes(problem, at).iter() {
+            let shapes = of.shapes(problem, at);
+            for shape in shapes.iter() {
                 let start = at.parameters.with(shape.clone());
                 let term = start.terms.len() - 1;
                 let first = directions.len();
@@ -259,37 +302,55 @@ impl Search<'_> {
                 }
                 if first < directions.len() {
                     let directions = (first..directions.len()).collect();
-                    additions.push(Addition { class, directions, widths, signs });
+                    additions.push(Addition {
+                        class,
+                        directions,
+                        widths,
+                        signs,
+                        among: of.among(shapes.len()),
+                    });
                     kinds.push(Kind::Term { candidate, shape: shape.clone() });
                 }
             }
         }
         let named = directions.len();
         for rival in rivals(problem, at, self.rounds)? {
-            let first = directions.len();
-            let count = rival.columns.len();
+            let shared = classes.iter().position(|class| Some(*class) == rival.beside);
+            let shared = shared.and_then(|class| additions.iter().find(|one| one.class == class));
+            let mut own = shared.map_or_else(Vec::new, |of| of.directions.clone());
+            own.extend(directions.len()..directions.len() + rival.columns.len());
             directions.extend(rival.columns);
+            let (kind, signs) = match rival.free {
+                Some((class, signs)) => (Kind::Free(class), signs),
+                None => (Kind::Rival, vec![Signs::Both; own.len()]),
+            };
             additions.push(Addition {
                 class: classes.len(),
-                directions: (first..first + count).collect(),
-                widths: vec![1.0; count],
-                signs: vec![Signs::Both; count],
+                widths: vec![1.0; own.len()],
+                signs,
+                directions: own,
+                among: rival.among,
             });
             classes.push(rival.name);
-            kinds.push(Kind::Rival);
+            kinds.push(kind);
         }
         let grams = problem.grams(at, directions)?;
         let last = grams.reduced().nrows() - 1;
         let residual = grams.reduced()[(last, last)].sqrt();
         for (addition, kind) in additions.iter_mut().zip(&kinds) {
-            if matches!(kind, Kind::Rival) {
+            if !matches!(kind, Kind::Term { .. }) {
                 // As a rival has no range: what would make the whole residual.
                 for (width, direction) in addition.widths.iter_mut().zip(&addition.directions) {
                     *width = residual / grams.whole(*direction).max(f64::MIN_POSITIVE);
                 }
             }
         }
-        let scores = parallel::map(&additions, |one| Score::of_grams(&grams, &one.directions));
+        let shapes = |class: usize| additions.iter().filter(|one| one.class == class).count() as f64;
+        let score = |one: &Addition| {
+            let among = if one.among > 1.0 { one.among * shapes(one.class) } else { 1.0 };
+            Score::of_grams(&grams, &one.directions).picked_from(among)
+        };
+        let scores = parallel::map(&additions, score);
         // The errors of a coarse converter's rounding differ from press to press, and are no noise.
         let excess = median(&scores.iter().map(|score| score.excess).collect::<Vec<_>>());
         let names = names(&at.parameters, self.known_terms);
@@ -319,16 +380,17 @@ impl Search<'_> {
             let mut tried = self.tested(&pass, &grown.at, index);
             let is_full =
                 names(&grown.at.parameters, self.known_terms).len() >= NAMES_MAX || index >= 2 * NAMES_MAX;
-            let fits = if 2.0 * tried.p_value <= ALPHA && !is_full {
-                self.next(&grown.at, &pass)?
+            // What is small beside the gain of another class may be an error of that one's form.
+            let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
+            let (fits, refused) = if 2.0 * tried.p_value <= ALPHA && !is_full {
+                self.next(&grown.at, &pass, least)?
             } else {
-                Vec::new()
+                (Vec::new(), None)
             };
+            grown.refused.extend(refused);
             for fit in &fits {
                 self.tell(fit, base, &mut tried.round);
             }
-            // What is small beside the gain of another class may be an error of that one's form.
-            let least = LN_ODDS_LEAST.max(FORM_SHARE * strongest);
             let taken = fits.into_iter().next().filter(|best| best.ln_odds > least);
             tried.round.taken = taken.as_ref().map(|taken| taken.name);
             grown.rounds.push(tried);
@@ -427,10 +489,17 @@ impl Search<'_> {
         }
     }
 
-    /// The classes of the best sets, fitted, the one with the greatest odds first; none if a rival without a name explains more.
-    fn next(&self, at: &Fitted, pass: &Pass) -> Result<Vec<Beside>, DiscoverError> {
+    /// The classes of the best sets, fitted, the one with the greatest odds first; none if a rival without a name explains more: then
+    /// the best one's contest. None are fitted if their first steps promise far less than `least`.
+    fn next(
+        &self,
+        at: &Fitted,
+        pass: &Pass,
+        least: f64,
+    ) -> Result<(Vec<Beside>, Option<Contest>), DiscoverError> {
         let evidence = pass.evidence_on(pass.grams.reduced());
-        let best = evidence.sets(|_| true).into_iter().next();
+        let is_free = |one: usize| matches!(pass.kinds[one], Kind::Free(_));
+        let best_set = evidence.sets(|one| !is_free(one)).into_iter().next();
         let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
         let mut starts: Vec<(&'static str, Vec<Term>)> = Vec::new();
         let mut propose = |set: &Set| {
@@ -441,13 +510,16 @@ impl Search<'_> {
                 }
             }
         };
-        best.iter().chain(&named).for_each(&mut propose);
+        best_set.iter().chain(&named).for_each(&mut propose);
         let alone = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), 0.0);
         let most = alone.first().map_or(0.0, |(_, gain)| gain.ln_odds);
         for (one, _) in alone.iter().filter(|(_, gain)| gain.ln_odds > PROMISE_SHARE * most) {
             propose(&evidence.set([*one]));
         }
         starts.truncate(FITTED_MAX);
+        if named.map_or(0.0, |set| set.ln_odds).max(most) < PROMISE_SHARE * least {
+            starts.clear();
+        }
         if let Some(walk) = &pass.walk {
             let ln_odds = 0.5 * walk.promise - ODDS_AGAINST.ln();
             if ln_odds > LN_ODDS_LEAST.max(PROMISE_SHARE * most) {
@@ -456,12 +528,17 @@ impl Search<'_> {
         }
         let mut fits = self.fits(at, &starts)?;
         fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
-        let best_has_names = best.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
-        let is_beaten = fits.first().is_some_and(|one| pass.best_rival() > one.ln_odds + RIVAL_LN_ODDS);
-        if is_beaten && !best_has_names {
+        let best_has_names = best_set.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
+        let contest = |one: &Beside| {
+            let (strength, rivals) = pass.rivalry(one.name, one.ln_odds);
+            let is_beaten = best(&rivals) > strength + RIVAL_LN_ODDS && !best_has_names;
+            is_beaten.then(|| Contest::refused(one.name, one.ln_odds, rivals))
+        };
+        let refused = fits.first().and_then(contest);
+        if refused.is_some() {
             fits.clear();
         }
-        Ok(fits)
+        Ok((fits, refused))
     }
 
     /// The terms of a class from which a fit starts: its members of a set.
@@ -502,7 +579,7 @@ impl Search<'_> {
 
     /// Logarithm of the odds of a model with further terms, against the model without. Each of their numbers is charged as if its
     /// prior were as wide as its part of the gain allows.
-    fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
+    pub(crate) fn ln_odds(&self, less: &Fitted, more: &Fitted) -> f64 {
         let numbers = |fitted: &Fitted| -> usize { fitted.parameters.terms.iter().map(Term::numbers).sum() };
         let gain = (less.cost - more.cost) / (2.0 * self.problem.variance);
         let count = numbers(more).saturating_sub(numbers(less)).max(1) as f64;
@@ -543,14 +620,16 @@ impl Search<'_> {
                     SHARE_BEFORE_HOLD + share * (SHARE_AFTER_HOLD - SHARE_BEFORE_HOLD),
                 );
                 let pass = self.pass(&less)?;
-                if pass.best_rival() > ln_odds + RIVAL_LN_ODDS {
+                let (strength, rivals) = pass.rivalry(name, ln_odds);
+                if best(&rivals) > strength + RIVAL_LN_ODDS {
+                    grown.refused.push(Contest::refused(name, ln_odds, rivals));
                     grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
-                let best = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
+                let likeliest = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
                 let better =
-                    best.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
+                    likeliest.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
                 if let Some(better) = better {
                     exchanges_left -= 1;
                     grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
@@ -572,7 +651,7 @@ impl Search<'_> {
                         same.push((other, fitted));
                     }
                 }
-                grown.equivalent.insert(name, Alike { without: less, same, probabilities });
+                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals });
             }
             return Ok(());
         }

@@ -1,97 +1,301 @@
 //! Rivals without a name: dependences that no effect of the library is, and that a name must beat.
 //!
 //! Each is a group of columns with free coefficients: a smooth function (straight lines between knots) of a covariate, or of two, times
-//! the signal or its slope. None is modelled after a known physics.
+//! the signal or its slope; or a tone in a covariate, whose frequency is the clearest of a periodogram ([`super::tones`]) and charged for
+//! this. None is modelled after a known physics.
 //!
 //! | rival | function of | times |
 //! |---|---|---|
 //! | sum of signals | the sum of all signals | the element's own signal |
+//! | share of the largest signal | the element's own signal over the largest | the element's own signal |
 //! | place | the tip's x and, apart, y | the element's own signal |
 //! | place in the element | the tip's x and y from the nearest centre | the element's own signal |
 //! | direction of approach | the side from which the tool came, x and y | the signal, its slopes along x and y |
+//! | distance from the tip | the distance of the element's centre from the tip | the largest signal |
+//! | distance along the approach | the element's centre less the tip, along the last move aside | the element's own signal |
 //! | speed of travel | the speed of the stage without contact | 1 |
 //! | height above the surface | the tip's height without contact | the image of a press at the tip's place |
 //! | contact | the element, while the tool touches | 1 |
+//! | tone in counts | the element's own counts | 1 |
+//! | tone in travel | the length of the tip's way | 1 |
+//! | tone in x, in y | the tip's place | the element's own signal |
+//!
+//! The sum of signals and the place compete also with one function for loading and another for unloading.
+//!
+//! A class whose free part is a curve that model files cannot hold yet is as strong as that curve within the constraints of the class:
+//! `heavy-tail` is a function of the distance from the tip that is nowhere negative far out. Without them the curve is a rival of all
+//! classes but this one.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::covariates::{Factor, Feature, Form, Forms};
+use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
+use super::evidence::Signs;
+use super::tones::{Point, Tone, clearest};
 use crate::data::DiscoverError;
 use crate::fit::{Direction, Fitted, Problem};
 
 /// Knots of a function of one covariate.
 const KNOTS: usize = 5;
 
-/// Greatest height from which something may be felt without contact.
-const LOW_MM: f64 = 2.0;
+/// Knots of a function of single readings lie where the signal is at least this share of the largest.
+const SIGNAL_SHARE: f64 = 0.02;
 
 /// A rival and its columns.
-pub(crate) struct Rival {
+pub(crate) struct Rival<'a> {
     pub(crate) name: &'static str,
-    pub(crate) columns: Vec<Direction<'static>>,
+    /// The earlier rival whose columns are its own too.
+    pub(crate) beside: Option<&'static str>,
+    pub(crate) columns: Vec<Direction<'a>>,
+    /// From how many alternatives the residual picked it.
+    pub(crate) among: f64,
+    /// The class whose free part it is, with the signs that the class allows.
+    pub(crate) free: Option<(&'static str, Vec<Signs>)>,
 }
 
 /// The rivals at a model. `rounds` if the converter's steps are seen: then each element in contact has an offset of its own anyway.
-pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result<Vec<Rival>, DiscoverError> {
-    let forms = Forms::of(problem, &at.parameters, &at.predicted)?.with_places(problem, &at.parameters)?;
-    let forms = Arc::new(forms);
-    let bins = problem.predictor.bins;
-    let elements = bins.elements;
-    let array = &problem.predictor.known.array;
-    let history = forms.history();
-    let column = |factor: Factor, form: Form| -> Direction<'static> {
-        let forms = Arc::clone(&forms);
-        let feature = Feature { covariate: "", unit: "", form, range: [0.0; 2], factor };
-        Direction::Column(Box::new(move |bins: Range<usize>| forms.values(&feature, bins, elements)))
-    };
-    let deep: Vec<bool> = history.depth_mm.iter().map(|depth_mm| *depth_mm > 0.0).collect();
+pub(crate) fn rivals<'a>(
+    problem: &'a Problem<'_>,
+    at: &'a Fitted,
+    rounds: bool,
+) -> Result<Vec<Rival<'a>>, DiscoverError> {
+    let seen = Arc::new(Seen::of(problem, at)?);
+    let history = seen.forms.history();
+    let (deep, upward) = (&seen.deep, &history.upward);
     let free: Vec<bool> = deep.iter().map(|deep| !deep).collect();
-    let place: Vec<[f64; 2]> = history.place_mm[0]
-        .iter()
-        .zip(&history.place_mm[1])
-        .map(|(x, y)| problem.predictor.known.registration.to_sensor([*x, *y]))
-        .collect();
-    let of_place = |axis: usize| -> Vec<f64> { place.iter().map(|place| place[axis]).collect() };
+    let of_place = |axis: usize| -> Vec<f64> { seen.place_mm.iter().map(|place| place[axis]).collect() };
     let in_element = |axis: usize| -> Vec<f64> {
+        let array = &problem.predictor.known.array;
         let centres = if axis == 0 { array.col_centres_mm() } else { array.row_centres_mm() };
         let from_nearest = |place: &[f64; 2]| {
             let from = centres.iter().map(|centre| place[axis] - centre);
             from.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
         };
-        place.iter().map(from_nearest).collect()
+        seen.place_mm.iter().map(from_nearest).collect()
     };
-    let sums: Vec<f64> = forms.signal().chunks_exact(elements).map(|signal| signal.iter().sum()).collect();
-    let smooth = |values: &[f64], among: &[bool], form: Form| -> Vec<Direction<'static>> {
-        hats(values, among).into_iter().map(|hat| column(Factor::Bins(Arc::new(hat)), form)).collect()
+    let sums: Vec<f64> =
+        seen.forms.signal().chunks_exact(seen.elements).map(|signal| signal.iter().sum()).collect();
+    let unloading = |hats: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        hats.iter().map(|hat| hat.iter().zip(upward).map(|(hat, up)| hat * up).collect()).collect()
     };
-    let both = |of: &dyn Fn(usize) -> Vec<f64>| -> Vec<Direction<'static>> {
-        [0, 1].into_iter().flat_map(|axis| smooth(&of(axis), &deep, Form::Signal)).collect()
+    let smooth = |hats: Vec<Vec<f64>>, form: Form| -> Vec<Direction<'a>> {
+        hats.into_iter().map(|hat| seen.column(Factor::Bins(Arc::new(hat)), form)).collect()
+    };
+    let both = |of: &dyn Fn(usize) -> Vec<f64>| -> Vec<Vec<f64>> {
+        [0, 1].into_iter().flat_map(|axis| hats(&of(axis), deep)).collect()
     };
     let aside = [0, 1].into_iter().flat_map(|axis| {
         let side = &history.aside[axis];
-        let only = side.iter().zip(&deep).map(|(side, deep)| if *deep { *side } else { 0.0 });
+        let only = side.iter().zip(deep).map(|(side, deep)| if *deep { *side } else { 0.0 });
         let only: Arc<Vec<f64>> = Arc::new(only.collect());
-        [Form::Signal, Form::AlongX, Form::AlongY].map(|form| column(Factor::Bins(Arc::clone(&only)), form))
+        [Form::Signal, Form::AlongX, Form::AlongY]
+            .map(|form| seen.column(Factor::Bins(Arc::clone(&only)), form))
     });
     let height_mm: Vec<f64> = history.depth_mm.iter().map(|depth_mm| -depth_mm).collect();
     let low: Vec<bool> = height_mm.iter().zip(&free).map(|(mm, free)| *free && *mm <= LOW_MM).collect();
+    let (of_sum, of_places) = (hats(&sums, deep), both(&of_place));
+    let (of_sum_apart, of_places_apart) = (unloading(&of_sum), unloading(&of_places));
+    let alone = |name, columns| Rival { name, beside: None, columns, among: 1.0, free: None };
+    let apart =
+        |name, of: &'static str, hats| Rival { beside: Some(of), ..alone(name, smooth(hats, Form::Signal)) };
+    let of_distance = Seen::smooth(&seen, Seen::distance_mm, Seen::largest);
+    // Near the tip, gains and the spread take up what the curve loses to its tail.
+    let near = |knot| if knot < of_distance.len() / 2 { Signs::Both } else { Signs::Positive };
+    let tail_signs = (0..of_distance.len()).map(near).collect();
     let mut found = vec![
-        Rival { name: "sum of signals", columns: smooth(&sums, &deep, Form::Signal) },
-        Rival { name: "place", columns: both(&of_place) },
-        Rival { name: "place in the element", columns: both(&in_element) },
-        Rival { name: "direction of approach", columns: aside.collect() },
-        Rival { name: "speed of travel", columns: smooth(&history.travel_mm_per_s, &free, Form::Offset) },
-        Rival { name: "height above the surface", columns: smooth(&height_mm, &low, Form::Place) },
+        alone("sum of signals", smooth(of_sum, Form::Signal)),
+        apart("sum of signals, apart", "sum of signals", of_sum_apart),
+        alone("share of the largest signal", Seen::smooth(&seen, Seen::share, Seen::signal)),
+        alone("place", smooth(of_places, Form::Signal)),
+        apart("place, apart", "place", of_places_apart),
+        alone("place in the element", smooth(both(&in_element), Form::Signal)),
+        alone("direction of approach", aside.collect()),
+        alone("distance from the tip", of_distance),
+        Rival {
+            beside: Some("distance from the tip"),
+            free: Some(("heavy-tail", tail_signs)),
+            ..alone("radial curve with more weight far out", Vec::new())
+        },
+        alone("distance along the approach", Seen::smooth(&seen, Seen::ahead_mm, Seen::signal)),
+        alone("speed of travel", smooth(hats(&history.travel_mm_per_s, &free), Form::Offset)),
+        alone("height above the surface", smooth(hats(&height_mm, &low), Form::Place)),
     ];
+    found.extend(tones(problem, at, &seen));
     if !rounds {
         let in_contact: Arc<Vec<f64>> =
             Arc::new(deep.iter().map(|deep| f64::from(u8::from(*deep))).collect());
-        let of_element = |element| column(Factor::Element(element, Arc::clone(&in_contact)), Form::Offset);
-        found.push(Rival { name: "contact", columns: (0..elements).map(of_element).collect() });
+        let of_element =
+            |element| seen.column(Factor::Element(element, Arc::clone(&in_contact)), Form::Offset);
+        found.push(alone("contact", (0..seen.elements).map(of_element).collect()));
     }
-    found.retain(|rival| !rival.columns.is_empty());
+    found.retain(|rival| !rival.columns.is_empty() || rival.free.is_some());
     Ok(found)
+}
+
+/// Tones in counts, in travel, in x and in y.
+fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>) -> Vec<Rival<'a>> {
+    let bins = problem.predictor.bins;
+    let elements = seen.elements;
+    let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
+    let weights: Vec<f64> = problem.weights().collect();
+    let rival = |name, tone: &Tone, columns: [Direction<'a>; 2]| Rival {
+        name,
+        beside: None,
+        columns: columns.into(),
+        among: tone.among,
+        free: None,
+    };
+    // Of all elements at a bin, with what the tone multiplies.
+    let in_bins = |values: &[f64], carrier: &dyn Fn(usize) -> f64| -> Option<Tone> {
+        let point = |bin: usize| {
+            let mut point = Point { value: values[bin], wanted: 0.0, square: 0.0 };
+            for reading in bin * elements..(bin + 1) * elements {
+                point.wanted += weights[reading] * residual[reading] * carrier(reading);
+                point.square += weights[reading] * carrier(reading).powi(2);
+            }
+            point
+        };
+        let points: Vec<Point> = (0..bins.len()).map(point).collect();
+        clearest(points.into_iter())
+    };
+    let of_bins = |name, values: Vec<f64>, form: Form, carrier: &dyn Fn(usize) -> f64| {
+        let tone = in_bins(&values, carrier)?;
+        let factor = |wave: fn(f64) -> f64| {
+            let waves = values.iter().map(|value| wave(TAU * tone.per_unit * value)).collect();
+            seen.column(Factor::Bins(Arc::new(waves)), form)
+        };
+        Some(rival(name, &tone, [factor(f64::sin), factor(f64::cos)]))
+    };
+    let in_counts = || {
+        let readings = residual.iter().zip(&weights).zip(&at.predicted);
+        let tone = clearest(readings.map(|((residual, weight), counts)| Point {
+            value: *counts,
+            wanted: weight * residual,
+            square: *weight,
+        }))?;
+        let column = |wave: fn(f64) -> f64| -> Direction<'a> {
+            Direction::Column(Box::new(move |bins: Range<usize>| {
+                let counts = &at.predicted[bins.start * elements..bins.end * elements];
+                counts.iter().map(|counts| wave(TAU * tone.per_unit * counts)).collect()
+            }))
+        };
+        Some(rival("tone in counts", &tone, [column(f64::sin), column(f64::cos)]))
+    };
+    let signal = |reading: usize| seen.signal(reading / elements, reading % elements);
+    let place = |axis: usize| seen.place_mm.iter().map(|place| place[axis]).collect();
+    let found = [
+        in_counts(),
+        of_bins("tone in travel", seen.travel_mm.clone(), Form::Offset, &|_| 1.0),
+        of_bins("tone in x", place(0), Form::Signal, &signal),
+        of_bins("tone in y", place(1), Form::Signal, &signal),
+    ];
+    found.into_iter().flatten().collect()
+}
+
+/// What rivals are functions of, at a model.
+struct Seen {
+    forms: Forms,
+    elements: usize,
+    centres_mm: Vec<[f64; 2]>,
+    /// For each bin: whether the tool touches, where the tip is on the sensor, how long its way was, and the largest signal.
+    deep: Vec<bool>,
+    place_mm: Vec<[f64; 2]>,
+    travel_mm: Vec<f64>,
+    largest: Vec<f64>,
+}
+
+/// A value of a reading, from its bin and its element.
+type OfReading = fn(&Seen, usize, usize) -> f64;
+
+impl Seen {
+    fn of(problem: &Problem<'_>, at: &Fitted) -> Result<Self, DiscoverError> {
+        let forms =
+            Forms::of(problem, &at.parameters, &at.predicted)?.with_places(problem, &at.parameters)?;
+        let (bins, known) = (problem.predictor.bins, problem.predictor.known);
+        let elements = bins.elements;
+        let history = forms.history();
+        let places = history.place_mm[0].iter().zip(&history.place_mm[1]);
+        let largest = |signal: &[f64]| signal.iter().copied().fold(0.0, f64::max);
+        let positions = &problem.predictor.frames.position_mm;
+        let mut way_mm = 0.0;
+        let mut ways_mm = vec![0.0];
+        ways_mm.extend(positions.windows(2).map(|two| {
+            way_mm += (0..3).map(|axis| (two[1][axis] - two[0][axis]).powi(2)).sum::<f64>().sqrt();
+            way_mm
+        }));
+        Ok(Self {
+            elements,
+            centres_mm: (0..elements).filter_map(|element| known.array.centre_mm(element)).collect(),
+            deep: history.depth_mm.iter().map(|depth_mm| *depth_mm > 0.0).collect(),
+            place_mm: places.map(|(x, y)| known.registration.to_sensor([*x, *y])).collect(),
+            travel_mm: bins.first[..bins.len()].iter().map(|frame| ways_mm[*frame]).collect(),
+            largest: forms.signal().chunks_exact(elements).map(largest).collect(),
+            forms,
+        })
+    }
+
+    fn signal(&self, bin: usize, element: usize) -> f64 {
+        self.forms.signal()[bin * self.elements + element]
+    }
+
+    fn largest(&self, bin: usize, _: usize) -> f64 {
+        self.largest[bin]
+    }
+
+    fn share(&self, bin: usize, element: usize) -> f64 {
+        self.signal(bin, element) / self.largest[bin].max(f64::MIN_POSITIVE)
+    }
+
+    fn from_tip_mm(&self, bin: usize, element: usize) -> [f64; 2] {
+        let (centre, tip) = (self.centres_mm[element], self.place_mm[bin]);
+        [centre[0] - tip[0], centre[1] - tip[1]]
+    }
+
+    fn distance_mm(&self, bin: usize, element: usize) -> f64 {
+        let [x, y] = self.from_tip_mm(bin, element);
+        x.hypot(y)
+    }
+
+    /// How far the element is from the tip, along the direction of the last move aside.
+    fn ahead_mm(&self, bin: usize, element: usize) -> f64 {
+        let [x, y] = self.from_tip_mm(bin, element);
+        let [along_x, along_y] = [0, 1].map(|axis: usize| self.forms.history().aside[axis][bin]);
+        (x * along_x + y * along_y) / along_x.hypot(along_y).max(1.0)
+    }
+
+    /// A factor for each bin, times a form.
+    fn column<'a>(self: &Arc<Self>, factor: Factor, form: Form) -> Direction<'a> {
+        let seen = Arc::clone(self);
+        let feature = Feature { covariate: "", unit: "", form, range: [0.0; 2], factor };
+        Direction::Column(Box::new(move |bins: Range<usize>| {
+            seen.forms.values(&feature, bins, seen.elements)
+        }))
+    }
+
+    /// A smooth function of a value of single readings in contact, times another value.
+    fn smooth<'a>(seen: &Arc<Self>, value: OfReading, times: OfReading) -> Vec<Direction<'a>> {
+        let loud = |(bin, element): &(usize, usize)| {
+            seen.deep[*bin] && seen.signal(*bin, *element) > SIGNAL_SHARE * seen.largest[*bin]
+        };
+        let readings = (0..seen.deep.len()).flat_map(|bin| (0..seen.elements).map(move |e| (bin, e)));
+        let knots: Arc<Vec<f64>> =
+            Arc::new(knots(readings.filter(loud).map(|(bin, element)| value(seen, bin, element)).collect()));
+        let column = |knot: usize| -> Direction<'a> {
+            let (seen, knots) = (Arc::clone(seen), Arc::clone(&knots));
+            Direction::Column(Box::new(move |bins: Range<usize>| {
+                let mut column = vec![0.0; bins.len() * seen.elements];
+                for (place, bin) in bins.enumerate().filter(|(_, bin)| seen.deep[*bin]) {
+                    for element in 0..seen.elements {
+                        column[place * seen.elements + element] =
+                            times(&seen, bin, element) * weight(&knots, knot, value(&seen, bin, element));
+                    }
+                }
+                column
+            }))
+        };
+        if knots.len() < 2 { Vec::new() } else { (0..knots.len()).map(column).collect() }
+    }
 }
 
 /// For each knot, the weight of its value in a function that is straight between knots; 0 for bins that are not among those. No knots if
@@ -99,20 +303,22 @@ pub(crate) fn rivals(problem: &Problem<'_>, at: &Fitted, rounds: bool) -> Result
 fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
     let kept = values.iter().zip(among).filter(|(value, among)| **among && value.is_finite());
     let knots = knots(kept.map(|(value, _)| *value).collect());
-    // Beyond the first and the last knot the function is constant.
-    let slope =
-        |value: f64, from: Option<f64>, knot: f64| from.map_or(1.0, |from| (value - from) / (knot - from));
     let hat = |knot: usize| {
-        let (below, above) = (knot.checked_sub(1).map(|below| knots[below]), knots.get(knot + 1).copied());
         let of = |(value, among): (&f64, &bool)| {
-            if !among || !value.is_finite() {
-                return 0.0;
-            }
-            slope(*value, below, knots[knot]).min(slope(*value, above, knots[knot])).clamp(0.0, 1.0)
+            if *among && value.is_finite() { weight(&knots, knot, *value) } else { 0.0 }
         };
         values.iter().zip(among).map(of).collect()
     };
     if knots.len() < 2 { Vec::new() } else { (0..knots.len()).map(hat).collect() }
+}
+
+/// The weight of a knot's value in a function that is straight between knots, and constant beyond the first and the last.
+fn weight(knots: &[f64], knot: usize, value: f64) -> f64 {
+    let slope = |from: Option<usize>| {
+        let from = from.and_then(|from| knots.get(from));
+        from.map_or(1.0, |from| (value - from) / (knots[knot] - from))
+    };
+    slope(knot.checked_sub(1)).min(slope(Some(knot + 1))).clamp(0.0, 1.0)
 }
 
 /// Quantiles of the values from the least to the greatest, each apart from the one before.

@@ -15,6 +15,9 @@
 //! median it does not let an effect in a single block, or in all, inflate its own scatter. For the same reason a block
 //! counts at most four standard deviations in the flipped sums.
 //!
+//! A direction that the residual itself picked from many, such as a pair of elements or the frequency of a tone, is not picked again under
+//! flips. It is charged instead: its probability counts as many times as there were alternatives (Bonferroni).
+//!
 //! Several directions of one effect are made orthonormal under the weights and combined: the sum of the squares of their
 //! scores is chi-square, which Wilson and Hilferty's cube root brings to the scale of a normal deviate.
 //!
@@ -25,7 +28,7 @@
 use nalgebra::DMatrix;
 
 use crate::fit::Grams;
-use crate::numbers::{Rng, median, parallel};
+use crate::numbers::{Rng, median, of_picked, parallel};
 
 /// Median of the squared standard normal distribution.
 const MEDIAN_SQUARE: f64 = 0.454_936;
@@ -148,6 +151,12 @@ impl Score {
             chi_square: ChiSquare { times: 1.0, freedom },
             parts: directions.into_iter().map(|one| one.parts).collect(),
         }
+    }
+
+    /// The same of a direction that the residual picked from so many: the pick is not repeated under flips, so its probability is
+    /// multiplied by their number instead.
+    pub(crate) fn picked_from(self, among: f64) -> Self {
+        Self { z: of_picked(self.z, among), ..self }
     }
 
     /// Its value after a flip of the blocks' signs.

@@ -1,4 +1,7 @@
-use super::{deviate, p_value, q_values, sign_flip_p};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Score, deviate, flipped, largest, p_value, q_values, sign_flip_p, standardised};
 
 #[test]
 fn q_values_are_those_of_the_published_example() {
@@ -33,4 +36,44 @@ fn gains_of_one_sign_are_significant_and_gains_of_both_are_not() {
     assert!(sign_flip_p(&[1.0; 12], 1999, 1) < 0.005);
     let both: Vec<f64> = (0..12).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
     assert!(sign_flip_p(&both, 1999, 1) > 0.3);
+}
+
+/// Residuals without any effect, and the pair of elements that they suggest most. Each residual is noise; the signals are not.
+#[test]
+fn the_best_of_many_pairs_is_significant_no_more_often_than_its_level_says() {
+    const ELEMENTS: usize = 12;
+    const BLOCKS: usize = 60;
+    const NULLS: u32 = 400;
+    let pairs = (ELEMENTS * (ELEMENTS - 1)) as f64;
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let (mut alarms, mut uncharged) = (0, 0);
+    for seed in 0..NULLS {
+        let mut draw =
+            || -> Vec<f64> { (0..ELEMENTS * BLOCKS).map(|_| rng.random_range(-1.0..1.0)).collect() };
+        let (signal, noise) = (draw(), draw());
+        let of_pair = |element: usize, other: usize| {
+            let at = |block: usize, of: usize| block * ELEMENTS + of;
+            let along: Vec<f64> =
+                (0..BLOCKS).map(|block| noise[at(block, element)] * signal[at(block, other)]).collect();
+            // The variance of the noise is a third.
+            let squares: Vec<f64> = (0..BLOCKS).map(|block| signal[at(block, other)].powi(2) / 3.0).collect();
+            Score::of(vec![standardised(&along, &squares)])
+        };
+        let all = (0..ELEMENTS).flat_map(|one| (0..ELEMENTS).map(move |other| [one, other]));
+        let scores = all.filter(|[one, other]| one != other).map(|[one, other]| of_pair(one, other));
+        let best = scores.max_by(|a, b| a.z.total_cmp(&b.z)).unwrap();
+        let significant = |score: Score| {
+            let under_none = largest(&flipped(&[vec![&score]], 199, u64::from(seed)));
+            u32::from(p_value(score.z, &under_none) <= 0.05)
+        };
+        uncharged += significant(best.clone());
+        alarms += significant(best.picked_from(pairs));
+    }
+    // Three standard errors above 5 %.
+    assert!(
+        f64::from(alarms) <= f64::from(NULLS) * (0.05 + 3.0 * (0.05 * 0.95 / f64::from(NULLS)).sqrt()),
+        "{alarms}"
+    );
+    // The same test sees the pick if nothing is charged for it.
+    assert!(uncharged > NULLS / 2, "{uncharged}");
 }

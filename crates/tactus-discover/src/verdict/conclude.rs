@@ -14,8 +14,8 @@ use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
 use crate::fit::{Fitted, LOUD, Parameters, Prepared, Problem, RandomWalk, Term};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
-    ALPHA, Alike, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS, Refuted,
-    RefutedFormula, Rule, Search, Tried, names, not_shown, q_values, sign_flip_p, without,
+    ALPHA, Alike, Contest, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS,
+    Refuted, RefutedFormula, Rule, Search, Tried, names, not_shown, q_values, sign_flip_p, without,
 };
 
 /// An effect is confirmed if noise alone would let it gain as much, on fitted presses that its parameters have not seen, with at most this
@@ -33,6 +33,7 @@ pub(crate) struct SearchOutcome {
     pub(crate) confirmed: Confirmed,
     pub(crate) rounds: Vec<Tried>,
     pub(crate) equivalent: Equivalent,
+    pub(crate) contests: Vec<Contest>,
     /// What the grown model may still lack.
     pub(crate) left: Left,
     /// Where the base model and the data disagree, and where the grown model still does.
@@ -109,7 +110,7 @@ pub(crate) fn conclude(
     experiments: &dyn Experiments,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
-    let SearchOutcome { lacking, base, confirmed, rounds, equivalent, left, before, after } = found;
+    let SearchOutcome { lacking, base, confirmed, rounds, equivalent, contests, left, before, after } = found;
     let Confirmed { grown, mut steps, tentative } = confirmed;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
@@ -164,6 +165,7 @@ pub(crate) fn conclude(
         elements: of_base.elements_beside(&of_grown),
         rounds: rounds.into_iter().map(|tried| tried.round).collect(),
         inclusions: inclusions(&steps, &equivalent, &left),
+        contests,
         steps,
         tentative,
         final_: Final {
@@ -337,6 +339,7 @@ impl Prepared<'_> {
             steps: Vec::new(),
             tentative: Vec::new(),
             inclusions: Vec::new(),
+            contests: Vec::new(),
             final_: Final { level, shrink: None },
             verdict: Verdict::CannotJudge,
             unexplained: Unexplained { depends_on: Vec::new(), share: 1.0 },

@@ -7,7 +7,7 @@ use super::structured::Structured;
 use crate::data::Floor;
 use crate::fit::RunWalks;
 use crate::next::Plan;
-use crate::search::{Curve, Gap, NotShown, Round};
+use crate::search::{Contest, Curve, Gap, NotShown, Round};
 
 /// What the data say about a model, and what they add to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,6 +59,8 @@ pub struct Discovery {
     pub grown: BaseModel,
     /// How probable each effect of the library is, the most probable first; those that these data cannot show are left out.
     pub inclusions: Vec<Inclusion>,
+    /// The added effects beside rivals without a name, those included that lost against one.
+    pub contests: Vec<Contest>,
     /// The effects of the grown model; those that it had before come first. An effect may act more than once.
     pub effects: Vec<Effect>,
 }

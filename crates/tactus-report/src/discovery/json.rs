@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tactus_discover::{
-    AddedEffect, Curve, Discovery, Estimated, FaultyElement, FittedCurve, Floor, Gap, GlobalTest, Inclusion,
-    LeftOut, Level, NextExperiment, OpenQuestion, Round, Structured, TriedEffect,
+    AddedEffect, Contest, Curve, Discovery, Estimated, FaultyElement, FittedCurve, Floor, Gap, GlobalTest,
+    Inclusion, LeftOut, Level, NextExperiment, OpenQuestion, Rivalry, Round, Structured, TriedEffect,
 };
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
@@ -50,6 +50,7 @@ struct ReportJson<'a> {
     steps: Vec<StepJson<'a>>,
     tentative: Vec<StepJson<'a>>,
     inclusions: Vec<InclusionJson<'a>>,
+    contests: Vec<ContestJson<'a>>,
     #[serde(rename = "final")]
     grown: GrownJson,
     verdict: &'static str,
@@ -219,6 +220,21 @@ struct KnotJson {
 }
 
 #[derive(Serialize)]
+struct ContestJson<'a> {
+    effect: &'a str,
+    ln_odds: f64,
+    rivals: Vec<RivalryJson<'a>>,
+    kept: bool,
+}
+
+#[derive(Serialize)]
+struct RivalryJson<'a> {
+    rival: &'a str,
+    instead_ln_odds: Option<f64>,
+    beside_ln_odds: Option<f64>,
+}
+
+#[derive(Serialize)]
 struct InclusionJson<'a> {
     effect: &'a str,
     probability: f64,
@@ -318,6 +334,7 @@ impl<'a> ReportJson<'a> {
             steps: found.steps.iter().map(StepJson::of).collect(),
             tentative: found.tentative.iter().map(StepJson::of).collect(),
             inclusions: found.inclusions.iter().map(InclusionJson::of).collect(),
+            contests: found.contests.iter().map(ContestJson::of).collect(),
             grown: GrownJson {
                 level: LevelJson::of(found.final_.level, found.floor),
                 shrink: found.final_.shrink,
@@ -440,6 +457,24 @@ impl<'a> CandidateJson<'a> {
 impl<'a> InclusionJson<'a> {
     fn of(Inclusion { effect, probability }: &'a Inclusion) -> Self {
         Self { effect, probability: *probability }
+    }
+}
+
+impl<'a> ContestJson<'a> {
+    fn of(contest: &'a Contest) -> Self {
+        // A rival that gains nothing has no odds.
+        let known = |ln_odds: f64| Some(ln_odds).filter(|ln_odds| ln_odds.is_finite());
+        let rivalry = |one: &'a Rivalry| RivalryJson {
+            rival: one.rival,
+            instead_ln_odds: known(one.instead),
+            beside_ln_odds: known(one.beside),
+        };
+        Self {
+            effect: contest.effect,
+            ln_odds: contest.ln_odds,
+            rivals: contest.rivals.iter().map(rivalry).collect(),
+            kept: contest.kept,
+        }
     }
 }
 

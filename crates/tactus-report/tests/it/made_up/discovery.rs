@@ -1,9 +1,9 @@
 //! Synthetic discoveries with known numbers.
 
 use tactus_discover::{
-    AddedEffect, BaseModel, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement, Final, Floor,
-    Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NotShown, OpenQuestion, Plan, Point, Round,
-    Split, Structured, TriedEffect, Unexplained, Verdict,
+    AddedEffect, BaseModel, Contest, Curve, Discovery, ElementGap, Estimated, FaultKind, FaultyElement,
+    Final, Floor, Gap, GlobalTest, Inclusion, LeftOut, Level, NextExperiment, NotShown, OpenQuestion, Plan,
+    Point, Rivalry, Round, Split, Structured, TriedEffect, Unexplained, Verdict,
 };
 use tactus_model::{Array, Covering, Effect, Indenter, Psf, Response};
 use tactus_report::discovery::{DataSource, DiscoveryReport};
@@ -63,6 +63,7 @@ pub(crate) fn explained() -> Discovery {
         rounds: rounds(),
         tentative: vec![],
         inclusions: inclusions(),
+        contests: contests(),
         steps: vec![
             AddedEffect {
                 effect: "hysteresis",
@@ -136,6 +137,14 @@ fn inclusions() -> Vec<Inclusion> {
         .to_vec()
 }
 
+/// A rival that gains nothing has no odds.
+fn contests() -> Vec<Contest> {
+    let rivalry = |rival, instead, beside| Rivalry { rival, instead, beside };
+    let rivals =
+        vec![rivalry("sum of signals", 412.5, 3.25), rivalry("tone in counts", f64::NEG_INFINITY, -4.5)];
+    vec![Contest { effect: "hysteresis", ln_odds: 1530.25, rivals, kept: true }]
+}
+
 /// Nothing is missing from the base model.
 pub(crate) fn nothing_missing() -> Discovery {
     let flat = |mut curve: Curve| {
@@ -158,6 +167,7 @@ pub(crate) fn nothing_missing() -> Discovery {
         steps: vec![],
         tentative: vec![],
         inclusions: vec![],
+        contests: vec![],
         final_: Final { level: level(2.01), shrink: None },
         verdict: Verdict::NothingMissing,
         unexplained: Unexplained { depends_on: vec![], share: 0.0 },
@@ -203,6 +213,7 @@ pub(crate) fn unexplained() -> Discovery {
         steps: vec![],
         tentative: vec![],
         inclusions: vec![],
+        contests: vec![],
         verdict: Verdict::Unexplained,
         unexplained: Unexplained { depends_on: vec!["time since contact", "depth"], share: 1.0 },
         plan: Plan::default(),

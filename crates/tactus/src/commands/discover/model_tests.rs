@@ -75,6 +75,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
         rounds: Vec::new(),
         tentative: vec![],
         inclusions: vec![],
+        contests: vec![],
         steps: vec![AddedEffect {
             effect: "miswired",
             terms: vec![term(miswired(18.0, 19.0)), term(miswired(19.0, 18.0))],

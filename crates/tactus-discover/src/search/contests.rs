@@ -1,0 +1,108 @@
+//! Each added class beside the rivals without a name, as it stands in the grown model.
+//!
+//! That no rival beats a class in its place is not enough: the class may be only the nearest form in the library of what a rival describes
+//! better in part. Such a class is no name. With `E` the logarithm of the class's odds, `R` that of a rival in its place, and `B` that of the
+//! rival beside it,
+//!
+//! ```text
+//! (R - B) / E    the share of what the class explains that the rival would take over
+//! B / E          what the rival still explains beside the class, although that was fitted to the end
+//! ```
+//!
+//! If both are large for one rival, the class stands in part for what the rival describes. A physics of the class itself, in any form, leaves
+//! little to a rival that acts like it; what another physics leaves, a rival explains that hardly takes over from the class.
+//!
+//! The bounds of the two shares are chosen on tuning sets: `tactus-bench evidence contests` prints both of right and wrong names.
+
+use super::forms::Formed;
+use super::grow::{Equivalent, LN_ODDS_LEAST, POLISH_ROUNDS, SHARE_AFTER_HOLD, Search, names, without};
+use crate::data::DiscoverError;
+
+/// A rival acts like a class if it would take over more than this share.
+const TAKEN_SHARE: f64 = 0.3;
+/// A class is only the nearest form if such a rival explains more than this share beside it.
+const BESIDE_SHARE: f64 = 0.1;
+
+/// An added class and the rivals that compete with it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contest {
+    /// Name of the effect.
+    pub effect: &'static str,
+    /// Logarithm of its odds in its place, with the knots or the formula that it has.
+    pub ln_odds: f64,
+    /// The rivals.
+    pub rivals: Vec<Rivalry>,
+    /// False if it lost against one of them, so that it is no name.
+    pub kept: bool,
+}
+
+/// A rival without a name, against a class.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rivalry {
+    /// What it depends on.
+    pub rival: &'static str,
+    /// Logarithm of its odds in the place of the class.
+    pub instead: f64,
+    /// Logarithm of its odds beside the class and all others; minus infinity if the class lost before that was asked.
+    pub beside: f64,
+}
+
+impl Contest {
+    /// That of a class that lost against a rival in its place.
+    pub(super) fn refused(effect: &'static str, ln_odds: f64, rivals: Vec<(&'static str, f64)>) -> Self {
+        let rivalry = |(rival, instead)| Rivalry { rival, instead, beside: f64::NEG_INFINITY };
+        Self { effect, ln_odds, rivals: rivals.into_iter().map(rivalry).collect(), kept: false }
+    }
+
+    /// True if the class is only the nearest form of what a rival describes.
+    fn is_nearest_form(&self) -> bool {
+        self.rivals.iter().any(|rival| {
+            rival.instead - rival.beside.max(0.0) > TAKEN_SHARE * self.ln_odds
+                && rival.beside > LN_ODDS_LEAST.max(BESIDE_SHARE * self.ln_odds)
+        })
+    }
+}
+
+impl Search<'_> {
+    /// The contest of each added class, and the model without those that lost.
+    pub(crate) fn contested(
+        &self,
+        mut formed: Formed,
+        equivalent: &mut Equivalent,
+    ) -> Result<(Formed, Vec<Contest>), DiscoverError> {
+        let names = names(&formed.at.parameters, self.known_terms);
+        if names.is_empty() {
+            return Ok((formed, Vec::new()));
+        }
+        (self.progress)("comparing the names with what has none", SHARE_AFTER_HOLD);
+        let pass = self.pass(&formed.at)?;
+        let contest = |effect: &'static str| {
+            let (alike, beside) = (equivalent.get(effect)?, pass.beside(effect));
+            let rivalry = |(rival, instead): &(&'static str, f64)| Rivalry {
+                rival,
+                instead: *instead,
+                beside: beside.iter().find(|(one, _)| one == rival).map_or(f64::NEG_INFINITY, |(_, of)| *of),
+            };
+            let ln_odds = self.ln_odds(&alike.without, &formed.at);
+            let rivals = alike.rivals.iter().map(rivalry).collect();
+            let contest = Contest { effect, ln_odds, rivals, kept: true };
+            Some(Contest { kept: !contest.is_nearest_form(), ..contest })
+        };
+        let contests: Vec<Contest> = names.into_iter().filter_map(contest).collect();
+        let lost: Vec<&'static str> =
+            contests.iter().filter(|contest| !contest.kept).map(|contest| contest.effect).collect();
+        if !lost.is_empty() {
+            let mut firm = formed.at.parameters.clone();
+            for name in lost {
+                equivalent.remove(name);
+                firm = without(&firm, name, self.known_terms);
+            }
+            formed.at = self.problem.fit_from(firm, POLISH_ROUNDS)?;
+        }
+        Ok((formed, contests))
+    }
+}
+
+#[cfg(test)]
+#[path = "contests_tests.rs"]
+mod tests;

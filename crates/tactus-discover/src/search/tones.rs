@@ -1,0 +1,75 @@
+//! Tones in a covariate: the frequency that a residual shows most clearly, and among how many.
+//!
+//! The residual and the square of what the tone multiplies are summed in narrow cells of the covariate. With `q` and `s` those sums of a
+//! cell at `v`, the power of a frequency `f` is
+//!
+//! ```text
+//! P(f) = | sum over cells of (q - s sum q / sum s) exp(2 pi i f v) |^2
+//! ```
+//!
+//! The greatest of many powers is large without a tone too, so who picks a frequency is charged for the number of those it was picked from.
+//!
+//! # Source
+//! J. D. Scargle, *Astrophys. J.* 263 (1982) 835: the periodogram, and the false alarms of its greatest power.
+
+use crate::data::spectrum::transform;
+
+/// Cells of the covariate's range; the transform has several times as many points, so that no tone lies between two frequencies.
+const CELLS: usize = 8192;
+const FINER: usize = 4;
+/// Least number of periods in the range; anything slower is a smooth function.
+const PERIODS_LEAST: usize = 3;
+/// A period has at least this many cells.
+const CELLS_LEAST: usize = 4;
+
+/// A frequency that was picked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tone {
+    /// Periods per unit of the covariate.
+    pub(super) per_unit: f64,
+    /// Number of independent frequencies from which it was picked.
+    pub(super) among: f64,
+}
+
+/// A reading, or a sum of some at one value of the covariate.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point {
+    pub(super) value: f64,
+    /// Weight times residual times what the tone multiplies.
+    pub(super) wanted: f64,
+    /// Weight times the square of what the tone multiplies.
+    pub(super) square: f64,
+}
+
+/// The clearest tone; `None` if the covariate does not vary.
+pub(super) fn clearest(points: impl Iterator<Item = Point> + Clone) -> Option<Tone> {
+    let weighed = || points.clone().filter(|point| point.square > 0.0);
+    let least = weighed().map(|point| point.value).fold(f64::INFINITY, f64::min);
+    let most = weighed().map(|point| point.value).fold(f64::NEG_INFINITY, f64::max);
+    let range = most - least;
+    if !(range > 0.0 && range.is_finite()) {
+        return None;
+    }
+    let (mut wanted, mut squares) = (vec![0.0; CELLS], vec![0.0; CELLS]);
+    for point in weighed() {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to CELLS")]
+        let cell = (((point.value - least) / range * CELLS as f64) as usize).min(CELLS - 1);
+        wanted[cell] += point.wanted;
+        squares[cell] += point.square;
+    }
+    let mean = wanted.iter().sum::<f64>() / squares.iter().sum::<f64>();
+    let mut series = vec![[0.0; 2]; FINER * CELLS];
+    for (at, (wanted, square)) in series.iter_mut().zip(wanted.iter().zip(&squares)) {
+        at[0] = wanted - mean * square;
+    }
+    transform(&mut series);
+    let frequencies = PERIODS_LEAST..CELLS / CELLS_LEAST;
+    let power = |place: &usize| series[*place][0].powi(2) + series[*place][1].powi(2);
+    let places = FINER * frequencies.start..FINER * frequencies.end;
+    let best = places.max_by(|a, b| power(a).total_cmp(&power(b)))?;
+    Some(Tone { per_unit: best as f64 / (FINER as f64 * range), among: frequencies.len() as f64 })
+}
+
+#[cfg(test)]
+#[path = "tones_tests.rs"]
+mod tests;
