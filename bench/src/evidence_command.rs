@@ -28,7 +28,7 @@ enum Part {
     /// Writes into the labels of sets that have been run how far their physics is from the nearest wrong effect; continues an
     /// interrupted run.
     Separate(WhichArgs),
-    /// Prints how near rivals without a name come to the effects that are named, rightly and wrongly, in the tuning sets that have been run.
+    /// Prints how near rivals without a name come to the effects that are named in the tuning sets that have been run.
     Contests(WhichArgs),
     /// Prints how well the library's effects follow each form of hidden physics.
     Forms(FormsArgs),

@@ -7,7 +7,8 @@
 //! P(f) = | sum over cells of (q - s sum q / sum s) exp(2 pi i f v) |^2
 //! ```
 //!
-//! The greatest of many powers is large without a tone too, so who picks a frequency is charged for the number of those it was picked from.
+//! The greatest of many powers is large without a tone too, so who picks a frequency is charged for the number of those it was picked
+//! from.
 //!
 //! # Source
 //! J. D. Scargle, *Astrophys. J.* 263 (1982) 835: the periodogram, and the false alarms of its greatest power.
