@@ -1,8 +1,11 @@
 //! What a model leaves of presses that its fit has not seen, by folds of the fitted presses.
 //!
 //! The presses are divided into five folds. For each, the model's parameters, gains and baselines are fitted to the other four, in the
-//! linear approximation at the model that is fitted to all, and the weighted squares of what is left are summed over the presses of the
+//! linear approximation at the model that is fitted to all, and the weighted squares of what is left are summed over the blocks of the
 //! fold. Both take only products of the directions, block by block, which one pass gives ([`super::sums`]).
+//!
+//! Presses of which a parameter depends may all be in one fold. So each parameter has a prior: the coefficients of a class that it had with
+//! the evidence ([`Prior`]), and of any other parameter that it stays within the longest step of a fit.
 //!
 //! The held-out presses take no part.
 //!
@@ -12,16 +15,26 @@
 use nalgebra::DMatrix;
 
 use super::elimination::Elimination;
-use super::problem::{Fitted, Problem};
+use super::parameters::Parameters;
+use super::problem::{Fitted, Free, Problem};
+use super::scale::Scale;
 use super::sums::{Block, Border, Kept, Segments, Total};
 use crate::data::DiscoverError;
 
 /// Number of folds. The fit of each has four fifths of the presses.
 const FOLDS: usize = 5;
 
+/// What is known of a parameter before a fold is fitted: a normal density, on the parameter's [`Scale`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Prior {
+    /// Where it is centred, counted from the parameter's value.
+    centre: f64,
+    precision: f64,
+}
+
 impl Problem<'_> {
-    /// By how much `more` is nearer than `less` to the fitted presses that a fit to the others predicts, press by press, in units of the
-    /// noise's variance. `None` for models with random walks, which have a state of their own in every press.
+    /// By how much `more` is nearer than `less` to fitted presses that a fit to the others predicts, block by block, in units of the noise's
+    /// variance. `None` for models with random walks, which have a state of their own in every press.
     pub(crate) fn gains_by_folds(
         &self,
         less: &Fitted,
@@ -33,29 +46,78 @@ impl Problem<'_> {
         Ok(Some(less.iter().zip(&more).map(|(less, more)| less - more).collect()))
     }
 
-    /// The weighted squares of what a model leaves, press by press, each predicted by a fit to the other folds.
+    /// The weighted squares of what a model leaves, block by block, each predicted by a fit to the other folds.
     fn left_by_folds(&self, at: &Fitted) -> Result<Option<Vec<f64>>, DiscoverError> {
         if at.parameters.walk.is_some() {
             return Ok(None);
         }
         let own = self.own(&at.parameters);
+        let priors = self.priors(&at.parameters);
         let count = own.len();
         let segments = Segments::of(self, &at.parameters);
         let total = self.sums(&at.parameters, &at.predicted, own, count, Kept::AllAndBlocks, &segments)?;
         let press = self.press_of_blocks(&total.blocks);
-        let mut left = vec![0.0; press.iter().max().map_or(0, |last| last + 1)];
+        let mut left = vec![0.0; press.len()];
         for fold in 0..FOLDS {
             let is_in = |press: usize| press % FOLDS == fold;
             let others = total.blocks.iter().zip(&press).filter(|(_, press)| !is_in(**press));
             let others = sum(others.map(|(block, _)| block), count, &segments, self);
             let mut fitted = Elimination::of(self, &others, &segments, &at.parameters);
+            for (one, Prior { centre, precision }) in priors.iter().enumerate() {
+                fitted.reduced[(one, one)] += precision;
+                fitted.reduced[(one, count)] += precision * centre;
+                fitted.reduced[(count, one)] += precision * centre;
+                fitted.whole[one] += precision;
+            }
             let steps: Vec<f64> = fitted.sweep(count).column(count).iter().copied().collect();
             let element = fitted.fitted(&steps);
-            for (block, press) in total.blocks.iter().zip(&press).filter(|(_, press)| is_in(**press)) {
-                left[*press] += left_of(block, &steps, |number| element(block.segment, number));
+            let blocks = total.blocks.iter().zip(&press).zip(&mut left);
+            for ((block, _), left) in blocks.filter(|((_, press), _)| is_in(**press)) {
+                *left = left_of(block, &steps, |number| element(block.segment, number));
             }
         }
         Ok(Some(left))
+    }
+
+    /// The priors of a model's free parameters. Coefficients that are 0 without their class have one variance for the class, as in the
+    /// odds: that of their values, in units of their widths. Several are pulled towards 0; a single one is its own variance.
+    fn priors(&self, at: &Parameters) -> Vec<Prior> {
+        let free = self.free(at);
+        // Of a coefficient: its class, and its value and width.
+        let coefficient = |one: &Free| match *one {
+            Free::Of { term, parameter } => {
+                let of = &at.terms[term];
+                let known = &of.definition.parameters[parameter];
+                let width = Scale::of(known, self.duration_s).width();
+                (known.neutral == 0.0).then(|| (of.definition.name, of.values[parameter], width))
+            }
+            Free::Knot { term, knot } => {
+                let of = &at.terms[term];
+                let value = of.knots.as_ref().map_or(0.0, |knots| knots.values[knot]);
+                Some((of.definition.name, value, 1.0))
+            }
+            Free::SigmaIntercept | Free::SigmaSlope => None,
+        };
+        let coefficients: Vec<_> = free.iter().map(coefficient).collect();
+        let prior = |(one, coefficient): (&Free, &Option<(&str, f64, f64)>)| match (*one, coefficient) {
+            (_, Some((class, value, width))) => {
+                let of_class = coefficients.iter().flatten().filter(|(of, ..)| of == class);
+                let squares: Vec<f64> = of_class.map(|(_, value, width)| (value / width).powi(2)).collect();
+                let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+                let variance = (mean * width * width).max(f64::MIN_POSITIVE);
+                let is_pulled = squares.len() > 1 && matches!(one, Free::Of { .. });
+                Prior { centre: if is_pulled { -value } else { 0.0 }, precision: 1.0 / variance }
+            }
+            (Free::Of { term, parameter }, None) => {
+                let known = &at.terms[term].definition.parameters[parameter];
+                let stride = Scale::of(known, self.duration_s).stride_max();
+                Prior { centre: 0.0, precision: 1.0 / (stride * stride) }
+            }
+            (Free::SigmaIntercept | Free::SigmaSlope | Free::Knot { .. }, None) => {
+                Prior { centre: 0.0, precision: 0.0 }
+            }
+        };
+        free.iter().zip(&coefficients).map(prior).collect()
     }
 
     /// The press of each block, counted from 0 in order of time. Where many short blocks are joined, that of the first.

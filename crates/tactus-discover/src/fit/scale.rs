@@ -58,6 +58,11 @@ impl Scale {
         step.clamp(-self.stride_max, self.stride_max)
     }
 
+    /// The longest step that a fit takes: further away, derivatives say nothing.
+    pub(crate) const fn stride_max(&self) -> f64 {
+        self.stride_max
+    }
+
     /// Error of a value from its error on the scale.
     pub(crate) fn error(&self, value: f64, along: f64) -> f64 {
         if self.logarithmic { value * along } else { along }
