@@ -20,9 +20,14 @@ use super::problem::{Fitted, Free, Problem};
 use super::scale::Scale;
 use super::sums::{Block, Border, Kept, Segments, Total};
 use crate::data::DiscoverError;
+use crate::numbers::median;
 
 /// Number of folds. The fit of each has four fifths of the presses.
 const FOLDS: usize = 5;
+/// Greatest part of a block, in standard deviations.
+const CLIP: f64 = 4.0;
+/// Standard deviation over the median of the absolute value, of a normal density.
+const NORMAL_PER_MEDIAN: f64 = 1.482_602;
 
 /// What is known of a parameter before a fold is fitted: a normal density, on the parameter's [`Scale`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +39,8 @@ struct Prior {
 
 impl Problem<'_> {
     /// By how much `more` is nearer than `less` to fitted presses that a fit to the others predicts, block by block, in units of the noise's
-    /// variance. `None` for models with random walks, which have a state of their own in every press.
+    /// variance. A block counts at most four standard deviations: the press at the end of a drift, for example, is out of reach for a fit to
+    /// the others. `None` for models with random walks, which have a state of their own in every press.
     pub(crate) fn gains_by_folds(
         &self,
         less: &Fitted,
@@ -43,7 +49,9 @@ impl Problem<'_> {
         let Some((less, more)) = self.left_by_folds(less)?.zip(self.left_by_folds(more)?) else {
             return Ok(None);
         };
-        Ok(Some(less.iter().zip(&more).map(|(less, more)| less - more).collect()))
+        let gains: Vec<f64> = less.iter().zip(&more).map(|(less, more)| less - more).collect();
+        let most = CLIP * NORMAL_PER_MEDIAN * median(&gains.iter().map(|gain| gain.abs()).collect::<Vec<_>>());
+        Ok(Some(gains.into_iter().map(|gain| gain.clamp(-most, most)).collect()))
     }
 
     /// The weighted squares of what a model leaves, block by block, each predicted by a fit to the other folds.
