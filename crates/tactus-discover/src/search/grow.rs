@@ -78,14 +78,16 @@ const OTHERS_MAX: usize = 4;
 /// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
 /// `1 + MISFIT_SHARE x gain`.
 const MISFIT_SHARE: f64 = 0.02;
-/// As [`MISFIT_SHARE`], of what the model leaves beyond the noise: a form that misses so much may be another's.
-const LEFT_SHARE: f64 = 0.1;
+/// As [`MISFIT_SHARE`], of what the model leaves beyond the noise. A form that misses so much may be another's: one that leaves twice the
+/// square that the best one leaves is out of the 95 % set, since `exp(-1 / LEFT_SHARE)` is 5 %.
+const LEFT_SHARE: f64 = 1.0 / 3.0;
 /// A class with less than this share of the strongest one's odds may be an error of that one's form.
 const FORM_SHARE: f64 = 0.07;
 /// A class must gain so many standard errors, from the scatter of blocks.
 const BLOCKS_Z: f64 = 2.0;
-/// Probability of a reported set of classes.
+/// Probability of a reported set of classes, and by how many units one at its end is behind the best.
 const SET_PROBABILITY: f64 = 0.95;
+const SET_UNITS: f64 = 3.0;
 
 /// Data, candidates and options of a search.
 pub(crate) struct Search<'a> {
@@ -470,7 +472,14 @@ impl Search<'_> {
             .into_iter()
             .collect::<Result<_, DiscoverError>>()?;
         fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
-        fits.truncate(FINISHED_MAX);
+        // Where the form misses much, more of them may be in the set.
+        let most =
+            fits.first().map_or(0.0, |best| best.ln_odds - SET_UNITS * self.unit(best.ln_odds, &best.fitted));
+        let mut nth = 0;
+        fits.retain(|one| {
+            nth += 1;
+            nth <= FINISHED_MAX || one.ln_odds > most
+        });
         let finish = |one: &Beside| {
             let fitted = self.problem.fit_from(one.fitted.parameters.clone(), TRIAL_ROUNDS)?;
             Ok(Beside { name: one.name, ln_odds: self.ln_odds(at, &fitted), fitted })
@@ -518,7 +527,9 @@ impl Search<'_> {
                 }
                 (self.progress)(&format!("comparing {name} with others in its place"));
                 let pass = self.pass(&less)?;
-                if pass.best_rival() > ln_odds + RIVAL_LN_ODDS {
+                // A rival that is ahead by no more than the misfit of forms is no better.
+                let unit = self.unit(ln_odds, &grown.at);
+                if pass.best_rival() > ln_odds + RIVAL_LN_ODDS.max(unit) {
                     grown.at = self.problem.fit_from(less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
                 }
@@ -532,7 +543,6 @@ impl Search<'_> {
                     continue 'again;
                 }
                 let mut same = Vec::new();
-                let unit = self.unit(ln_odds, &grown.at);
                 let probabilities = probabilities(name, ln_odds, unit, &others);
                 for (other, fitted) in credible(&probabilities, others) {
                     let model_leaves = match leaves {
