@@ -180,3 +180,7 @@ fn distinct(sorted: &[f64], differ: impl Fn(f64, f64) -> bool) -> usize {
         })
         .count()
 }
+
+#[cfg(test)]
+#[path = "contacts_tests.rs"]
+mod tests;
