@@ -446,19 +446,17 @@ fn two_parts_of_a_measured_run_do_not_contradict_each_other() {
         rows.push((press >= 5, Row::from(row)));
     });
     let rig = source.unwrap().rig;
+    let zeros = rows[0].1.counts.clone();
     let part = |name: &str, is_later: bool| {
         let mut rig = rig.clone();
-        let mut changed = |row: &mut Row| {
-            name.clone_into(&mut row.run);
-            if is_later {
-                for (counts, zero) in row.counts.iter_mut().zip(&rig.baseline_counts) {
-                    *counts = (f64::from(*counts) + 40.0 + 0.02 * (f64::from(*counts) - zero)).round() as f32;
-                }
-            }
+        let changed = |row: &Row| {
+            let gained = |(counts, zero): (&f32, &f32)| (counts + 40.0 + 0.02 * (counts - zero)).round();
+            let of_later = || row.counts.iter().zip(&zeros).map(gained).collect();
+            let counts = if is_later { of_later() } else { row.counts.clone() };
+            Row { run: name.to_owned(), counts, ..row.clone() }
         };
-        let mut of_part: Vec<Row> =
-            rows.iter().filter(|(later, _)| *later == is_later).map(|(_, row)| row.clone()).collect();
-        of_part.iter_mut().for_each(&mut changed);
+        let of_part: Vec<Row> =
+            rows.iter().filter(|(later, _)| *later == is_later).map(|(_, row)| changed(row)).collect();
         name.clone_into(&mut rig.name);
         if is_later {
             rig.baseline_counts.iter_mut().for_each(|counts| *counts += 40.0);
