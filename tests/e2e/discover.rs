@@ -11,6 +11,8 @@ use rustix::process::Signal;
 use serde_json::Value;
 use tactus_e2e::{CommandOutput, Process, repository, tactus};
 use tactus_record::rows;
+use tactus_record::table::TableWriter;
+use tactus_schema::table::Row;
 use tempfile::TempDir;
 
 /// Runs a discovery that must be refused, in an empty folder that must stay empty.
@@ -426,4 +428,72 @@ fn a_measured_run_names_hardening_and_a_loop_with_its_causes() {
         assert!(set.len() > 1 && set.contains(&"hysteresis".to_owned()), "{set:?}");
     }
     assert!(one[1].iter().filter(|name| other[1].contains(name)).count() > 1, "{one:?} {other:?}");
+}
+
+/// The same data as two runs of five strokes each, of which the second was made after the rig was calibrated again and renamed: its
+/// zeros lie elsewhere, and all channels are 2 % more sensitive.
+#[test]
+fn two_parts_of_a_measured_run_do_not_contradict_each_other() {
+    let data = repository("../shared/data/eflesh-normal-20250401_014340.parquet");
+    if !data.is_file() {
+        eprintln!("skipped: {} is not here", data.display());
+        return;
+    }
+    let folder = TempDir::new().unwrap();
+    let (mut rows, mut press) = (Vec::new(), 0);
+    let source = rows::visit(&[&data], |_, row| {
+        press = press.max(row.press);
+        rows.push((press >= 5, Row::from(row)));
+    });
+    let rig = source.unwrap().rig;
+    let zeros = rows[0].1.counts.clone();
+    let part = |name: &str, is_later: bool| {
+        let mut rig = rig.clone();
+        let changed = |row: &Row| {
+            let gained = |(counts, zero): (&f32, &f32)| (counts + 40.0 + 0.02 * (counts - zero)).round();
+            let of_later = || row.counts.iter().zip(&zeros).map(gained).collect();
+            let counts = if is_later { of_later() } else { row.counts.clone() };
+            Row { run: name.to_owned(), counts, ..row.clone() }
+        };
+        let of_part: Vec<Row> =
+            rows.iter().filter(|(later, _)| *later == is_later).map(|(_, row)| changed(row)).collect();
+        name.clone_into(&mut rig.name);
+        if is_later {
+            rig.baseline_counts.iter_mut().for_each(|counts| *counts += 40.0);
+            rig.sensitivity_counts_per_mm.iter_mut().for_each(|gain| *gain *= 1.02);
+        }
+        let path = folder.path().join(name);
+        let mut table = TableWriter::create(&path, &rig.to_json()).unwrap();
+        of_part.iter().for_each(|row| table.push(row.into()).unwrap());
+        table.finish().unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let [one, other] = [part("first", false), part("second", true)];
+    let found = |files: &[&str]| -> Value {
+        let folder = TempDir::new().unwrap();
+        let said = tactus(folder.path(), &[&["discover"], files].concat());
+        assert_eq!(said.code, Some(0), "{said:?}");
+        serde_json::from_slice(&fs::read(folder.path().join("discovery/report.json")).unwrap()).unwrap()
+    };
+    let sets = |report: &Value| -> Vec<Vec<String>> {
+        let name = |value: &Value| value.as_str().unwrap().to_owned();
+        let set = |step: &Value| {
+            let others = step["equivalent"].as_array().unwrap().iter().map(name);
+            std::iter::once(name(&step["effect"])).chain(others).collect()
+        };
+        report["steps"].as_array().unwrap().iter().map(set).collect()
+    };
+    let together = found(&[&one, &other]);
+    let warnings = together["warnings"].to_string();
+    assert!(warnings.contains("first") && warnings.contains("second"), "{warnings}");
+    let slots = sets(&together);
+    assert_eq!((slots.len(), &*slots[0][0]), (2, "hardening"), "{slots:?}");
+    assert!(slots[1].contains(&"hysteresis".to_owned()) && slots[1].len() > 1, "{slots:?}");
+    // Alone, with four fitted strokes and one held out, each names less or the same.
+    for alone in [&one, &other] {
+        for set in sets(&found(&[alone])) {
+            let meets = slots.iter().any(|slot| slot.iter().any(|name| set.contains(name)));
+            assert!(meets, "{set:?} is in no set of {slots:?}");
+        }
+    }
 }

@@ -107,6 +107,7 @@ pub fn predict(
     let bins = Bins::of(frames, false)?;
     let parameters = Parameters {
         sensitivity: base.response.sensitivity_counts_per_mm.clone(),
+        run_gain: base.run_gains.clone(),
         baseline: base.run_baselines_counts.clone(),
         walk: base.run_walks.as_ref().map(RandomWalk::of),
         psf: base.psf,

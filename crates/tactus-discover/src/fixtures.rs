@@ -74,6 +74,7 @@ pub(crate) fn measured(known: &Known, effects: &[Effect], upon: &[Vec<f64>]) -> 
     let base = BaseModel {
         psf: known.psf,
         response: known.response.clone(),
+        run_gains: vec![1.0],
         run_baselines_counts: vec![vec![100.0; ELEMENTS]],
         run_walks: None,
     };

@@ -259,9 +259,15 @@ impl Plan {
     }
 }
 
-/// The same model for a single new run, with mean baselines and without random walks.
+/// The same model for a single new run, with mean gains and baselines and without random walks.
 fn once(of_runs: &Parameters) -> Parameters {
-    Parameters { baseline: vec![of_runs.mean_baseline()], walk: None, ..of_runs.clone() }
+    Parameters {
+        sensitivity: of_runs.centred().0,
+        run_gain: vec![1.0],
+        baseline: vec![of_runs.mean_baseline()],
+        walk: None,
+        ..of_runs.clone()
+    }
 }
 
 fn largest(predicted: &[f64], baseline: &[f64]) -> f64 {

@@ -110,7 +110,7 @@ pub enum RowsError {
     /// A table could not be read or written, or a row breaks its contract.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// Files that are read together must be of one rig.
+    /// Files that are read together must be of one array at one place, with the same tools.
     #[error("{} was made with another rig than {}: take them apart", path.display(), first.display())]
     RigsDiffer { first: PathBuf, path: PathBuf },
     /// No run may be in two files.

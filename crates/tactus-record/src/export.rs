@@ -58,6 +58,8 @@ pub fn export<P: AsRef<Path>>(recordings: &[P], out: impl Into<PathBuf>) -> Resu
     let mut clocks = Vec::new();
     let mut add = |timeline: &Timeline| {
         clocks.push(RunClocks::of(timeline));
+        // A table describes one rig.
+        sources.one_calibration(timeline.path(), timeline.rig())?;
         sources.recording(timeline, |_, row| Ok(table.put(row)?))
     };
     let filled = add(&first).and_then(|()| rest.iter().try_for_each(|path| add(&Timeline::read(path)?)));

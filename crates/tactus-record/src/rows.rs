@@ -27,12 +27,25 @@ const PARQUET_MAGIC: &[u8] = b"PAR1";
 pub struct Source {
     /// The measured rig as the first file describes it; each row has its own covering and tool.
     pub rig: Rig,
+    /// Names that the files give the rig, each once.
+    pub names: Vec<String>,
     /// The runs, in the order of their rows.
     pub runs: Vec<RunSource>,
     /// Warnings for readers of the rows, a sentence each.
     pub warnings: Vec<String>,
     /// What was left out although nothing is wrong, a sentence each.
     pub notes: Vec<String>,
+}
+
+impl Source {
+    /// A warning if the files give the rig several names.
+    pub fn renamed(&self) -> Option<String> {
+        let (first, others) = self.names.split_first().filter(|(_, others)| !others.is_empty())?;
+        Some(format!(
+            "the files name the rig {first:?} and {}: they are read as one rig, because array, place and tools agree",
+            others.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ")
+        ))
+    }
 }
 
 /// Where the rows of one run came from.
@@ -53,10 +66,13 @@ pub struct RunSource {
 /// [`export`](crate::export()) writes. Each row is checked before `take` sees it. Memory holds no more than a few dozen
 /// bytes per frame of one recording, or one row group of one table.
 ///
+/// The files must be of one array at one place with the same tools. Name, spread, sensitivities and baselines of the rig may differ:
+/// a lab calibrates it again between runs.
+///
 /// If a recording goes on with the run of another one here, the presses that it did again are left out of the other one.
 ///
 /// # Errors
-/// If a file is neither, cannot be read, was made with another rig or holds a run of a file before; if a recording
+/// If a file is neither, cannot be read, was made with another sensor, place or tools or holds a run of a file before; if a recording
 /// holds no stage position; or if a row breaks the table's contract. `take` has then seen the rows before it.
 pub fn visit<P: AsRef<Path>>(
     paths: &[P],
@@ -112,11 +128,13 @@ pub fn visit_frames(
     Ok(())
 }
 
-/// The files read so far: of one rig, with each run once.
+/// The files read so far: of one sensor, with each run once.
 #[derive(Debug, Default)]
 pub(crate) struct RowSources {
     /// The first file, and its rig.
     first: Option<(PathBuf, Rig)>,
+    /// Names of the rig, each once.
+    names: Vec<String>,
     runs: Vec<RunSource>,
     warnings: Vec<String>,
     notes: Vec<String>,
@@ -146,7 +164,7 @@ impl RowSources {
         mut take: impl FnMut(&Rig, RowView<'_>) -> Result<(), RowsError>,
     ) -> Result<(), RowsError> {
         let (path, run) = (timeline.path(), timeline.run());
-        self.same_rig(path, timeline.rig())?;
+        self.one_sensor(path, timeline.rig())?;
         self.new_run(path, &run.run_id, run.simulated)?;
         if timeline.stage().is_empty() {
             return Err(RowsError::NoStage { path: path.to_owned() });
@@ -178,7 +196,7 @@ impl RowSources {
     ) -> Result<(), RowsError> {
         let (path, rig) = (table.path().to_owned(), table.head().rig.clone());
         let (simulated, before) = (rig.simulated, self.runs.len());
-        self.same_rig(&path, &rig)?;
+        self.one_sensor(&path, &rig)?;
         table.visit(|row| {
             if self.runs[before..].last().is_none_or(|last| last.run != row.run) {
                 self.new_run(&path, row.run, simulated)?;
@@ -190,17 +208,29 @@ impl RowSources {
 
     /// The rig of the first file, the runs and the warnings of all files.
     pub(crate) fn into_source(self) -> Result<Source, RowsError> {
-        let Self { first, runs, warnings, notes, .. } = self;
+        let Self { first, names, runs, warnings, notes, .. } = self;
         let (_, rig) = first.ok_or(RowsError::Nothing)?;
-        Ok(Source { rig, runs, warnings, notes })
+        Ok(Source { rig, names, runs, warnings, notes })
     }
 
-    fn same_rig(&mut self, path: &Path, rig: &Rig) -> Result<(), RowsError> {
+    fn one_sensor(&mut self, path: &Path, rig: &Rig) -> Result<(), RowsError> {
         let (first, first_rig) = self.first.get_or_insert_with(|| (path.to_owned(), rig.clone()));
-        if permanent(first_rig) == permanent(rig) {
-            Ok(())
-        } else {
-            Err(RowsError::RigsDiffer { first: first.clone(), path: path.to_owned() })
+        if !is_one_sensor(first_rig, rig) {
+            return Err(RowsError::RigsDiffer { first: first.clone(), path: path.to_owned() });
+        }
+        if !self.names.contains(&rig.name) {
+            self.names.push(rig.name.clone());
+        }
+        Ok(())
+    }
+
+    /// Refuses files whose rigs differ in more than covering and tool.
+    pub(crate) fn one_calibration(&self, path: &Path, rig: &Rig) -> Result<(), RowsError> {
+        match &self.first {
+            Some((first, known)) if calibrated(known) != calibrated(rig) => {
+                Err(RowsError::RigsDiffer { first: first.clone(), path: path.to_owned() })
+            }
+            _ => Ok(()),
         }
     }
 
@@ -214,8 +244,21 @@ impl RowSources {
     }
 }
 
-/// The part of a rig that must be the same in all runs: all but covering and tool, which the rows state.
-fn permanent(rig: &Rig) -> Rig {
+/// True if two rigs agree in what must be the same in all runs. Covering and tool are in the rows. Between runs a lab may calibrate or
+/// rename its rig.
+fn is_one_sensor(first: &Rig, rig: &Rig) -> bool {
+    let as_first = Rig {
+        name: first.name.clone(),
+        psf: first.psf,
+        sensitivity_counts_per_mm: first.sensitivity_counts_per_mm.clone(),
+        baseline_counts: first.baseline_counts.clone(),
+        ..calibrated(rig)
+    };
+    as_first == calibrated(first)
+}
+
+/// A rig without covering and tool.
+fn calibrated(rig: &Rig) -> Rig {
     Rig { covering: rig.sensitivity_reference.covering, indenter: String::new(), ..rig.clone() }
 }
 

@@ -9,8 +9,13 @@ use super::motion::{pressing, still};
 const SAME_DEPTH_MM: f64 = 0.03;
 const SAME_PLACE_MM: f64 = 0.05;
 const SAME_SPEED_RATIO: f64 = 1.5;
+/// The speed of a load varies if it has so many frames and its quartiles differ by more than this factor: then they are no frames in
+/// which a move at one speed starts or stops.
+const FRAMES_MANY: usize = 20;
+const VARIED_SPEED_RATIO: f64 = 2.0;
 
-/// Contacts in order of time: unbroken sequences of frames below the surface.
+/// Contacts in order of time: unbroken sequences of frames below the surface. Where the tip rests a little below it, the next press is
+/// another contact.
 #[derive(Debug)]
 pub(crate) struct Contacts<'a> {
     frames: &'a Frames,
@@ -24,11 +29,17 @@ impl<'a> Contacts<'a> {
         let touches = |frame: usize| frames.position_mm[frame][2] < 0.0 || pressing(frames.phase[frame]);
         let ends: Vec<usize> = frames.runs.iter().map(|(_, end)| *end).collect();
         let mut spans: Vec<[usize; 2]> = Vec::new();
+        let mut press = -1;
         for frame in (0..frames.len()).filter(|frame| touches(*frame)) {
+            let is_next = frames.press[frame] >= 0 && press >= 0 && frames.press[frame] != press;
             match spans.last_mut() {
-                Some([_, end]) if *end == frame && !ends.contains(&frame) => *end = frame + 1,
-                _ => spans.push([frame, frame + 1]),
+                Some([_, end]) if *end == frame && !ends.contains(&frame) && !is_next => *end = frame + 1,
+                _ => {
+                    spans.push([frame, frame + 1]);
+                    press = -1;
+                }
             }
+            press = press.max(frames.press[frame]);
         }
         Self { frames, spans, still: still(frames) }
     }
@@ -82,12 +93,18 @@ impl<'a> Contacts<'a> {
         })
     }
 
-    /// Number of loading speeds.
+    /// Number of loading speeds. A load whose speed changes on the way, as in a half-sine stroke, has two.
     pub(crate) fn distinct_speeds(&self) -> usize {
-        let mut speeds: Vec<f64> =
-            self.spans.iter().filter_map(|[first, end]| self.speed_mm_per_s(*first, *end)).collect();
-        speeds.sort_by(f64::total_cmp);
-        distinct(&speeds, |a, b| b / a > SAME_SPEED_RATIO)
+        let loads: Vec<Vec<f64>> = self.spans.iter().map(|[first, end]| self.speeds(*first, *end)).collect();
+        let quantile = |speeds: &[f64], share: usize| speeds.get(speeds.len() * share / 4).copied();
+        let varies = |speeds: &Vec<f64>| {
+            let ends = quantile(speeds, 1).zip(quantile(speeds, 3));
+            speeds.len() >= FRAMES_MANY && ends.is_some_and(|(slow, fast)| fast > VARIED_SPEED_RATIO * slow)
+        };
+        let mut medians: Vec<f64> = loads.iter().filter_map(|speeds| quantile(speeds, 2)).collect();
+        medians.sort_by(f64::total_cmp);
+        let apart = distinct(&medians, |a, b| b / a > SAME_SPEED_RATIO);
+        if loads.iter().any(varies) { apart.max(2) } else { apart }
     }
 
     /// True if one place was reached from different sides.
@@ -123,8 +140,8 @@ impl<'a> Contacts<'a> {
         })
     }
 
-    /// Median loading speed of a contact.
-    fn speed_mm_per_s(&self, first: usize, end: usize) -> Option<f64> {
+    /// Loading speeds of a contact, frame by frame, in ascending order.
+    fn speeds(&self, first: usize, end: usize) -> Vec<f64> {
         let speed = |frame: usize| {
             let dt_s = self.frames.t_s[frame] - self.frames.t_s[frame - 1];
             (self.depth_mm(frame) - self.depth_mm(frame - 1)) / dt_s.max(1e-6)
@@ -133,7 +150,7 @@ impl<'a> Contacts<'a> {
             (first + 1..end).filter(|frame| self.frames.phase[*frame] != Phase::Unload).map(speed).collect();
         speeds.retain(|speed| *speed > 0.01);
         speeds.sort_by(f64::total_cmp);
-        speeds.get(speeds.len() / 2).copied()
+        speeds
     }
 
     /// A contact's place, and whether it was last approached in the positive direction of x and of y.
@@ -163,3 +180,7 @@ fn distinct(sorted: &[f64], differ: impl Fn(f64, f64) -> bool) -> usize {
         })
         .count()
 }
+
+#[cfg(test)]
+#[path = "contacts_tests.rs"]
+mod tests;

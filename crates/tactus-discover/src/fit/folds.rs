@@ -104,7 +104,7 @@ impl Problem<'_> {
                 let value = of.knots.as_ref().map_or(0.0, |knots| knots.values[knot]);
                 Some((of.definition.name, value, 1.0))
             }
-            Free::SigmaIntercept | Free::SigmaSlope => None,
+            Free::SigmaIntercept | Free::SigmaSlope | Free::RunGain { .. } => None,
         };
         let coefficients: Vec<_> = free.iter().map(coefficient).collect();
         let prior = |(one, coefficient): (&Free, &Option<(&str, f64, f64)>)| match (*one, coefficient) {
@@ -121,7 +121,7 @@ impl Problem<'_> {
                 let stride = Scale::of(known, self.duration_s).stride_max();
                 Prior { centre: 0.0, precision: 1.0 / (stride * stride) }
             }
-            (Free::SigmaIntercept | Free::SigmaSlope | Free::Knot { .. }, None) => {
+            (Free::SigmaIntercept | Free::SigmaSlope | Free::RunGain { .. } | Free::Knot { .. }, None) => {
                 Prior { centre: 0.0, precision: 0.0 }
             }
         };

@@ -11,6 +11,8 @@ use crate::data::{DiscoverError, Known, rewired};
 pub(crate) struct Parameters {
     /// Counts per mm, one per element.
     pub(crate) sensitivity: Vec<f64>,
+    /// Factor of all sensitivities in each run.
+    pub(crate) run_gain: Vec<f64>,
     /// Baselines, run by run, one per element.
     pub(crate) baseline: Vec<Vec<f64>>,
     /// Random walks of the baselines, if the model has them.
@@ -83,6 +85,7 @@ impl Parameters {
     pub(crate) fn declared(known: &Known, runs: usize) -> Self {
         Self {
             sensitivity: known.response.sensitivity_counts_per_mm.clone(),
+            run_gain: vec![1.0; runs],
             baseline: vec![known.response.baseline_counts.clone(); runs],
             walk: None,
             psf: known.psf,
@@ -126,6 +129,14 @@ impl Parameters {
         };
         let both = covering(self).into_iter().zip(covering(other));
         Ok(Some(both.take_while(|(one, other)| one == other).count()))
+    }
+
+    /// The same gains with run factors of which the geometric mean is 1.
+    pub(crate) fn centred(&self) -> (Vec<f64>, Vec<f64>) {
+        let runs = self.run_gain.len().max(1) as f64;
+        let mean = (self.run_gain.iter().map(|gain| gain.ln()).sum::<f64>() / runs).exp();
+        let times = |of: &[f64], factor: f64| of.iter().map(|gain| gain * factor).collect();
+        (times(&self.sensitivity, mean), times(&self.run_gain, 1.0 / mean))
     }
 
     /// Baselines of the elements, the mean over the runs.

@@ -87,7 +87,11 @@ impl<'a> Predictor<'a> {
     ) -> Result<Pipeline, DiscoverError> {
         let known = self.known;
         let response = Response {
-            sensitivity_counts_per_mm: parameters.sensitivity.clone(),
+            sensitivity_counts_per_mm: parameters
+                .sensitivity
+                .iter()
+                .map(|gain| gain * parameters.run_gain[run])
+                .collect(),
             baseline_counts: parameters.baseline[run].clone(),
             ..known.response.clone()
         };

@@ -1,8 +1,11 @@
 //! The joint fit: base parameters and effects together, by weighted least squares.
 //!
 //! ```text
-//! counts(bin, e) = baseline(run, e) + gain_e m_e(bin; sigma, effects) + ...
+//! counts(bin, e) = baseline(run, e) + g_run gain_e m_e(bin; sigma, effects) + ...
 //! ```
+//!
+//! Several runs of one rig have the effects, the spread and the ratios of the gains in common. Between runs a covering is laid anew and a
+//! supply changes, so that all elements together may be more or less sensitive: each run but the first has a factor `g_run`.
 //!
 //! A baseline and a gain each act on one element, so they are eliminated in closed form: every residual and every
 //! derivative by another parameter is first projected onto the complement of the element's own baseline and gain. What
@@ -59,6 +62,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) variance: f64,
     /// Number of coverings in the data. With one, the slope of the spread is not fitted.
     pub(crate) coverings: usize,
+    /// The runs whose factor of all gains is fitted: those with a fitted press, but one.
+    pub(crate) gained_runs: Vec<usize>,
     /// True if the spread is fitted.
     pub(crate) spread_free: bool,
     /// Duration of the longest run; at least 1 s.
@@ -84,6 +89,10 @@ pub(crate) struct Fitted {
 pub(crate) enum Free {
     SigmaIntercept,
     SigmaSlope,
+    /// The logarithm of the factor of all gains in a run.
+    RunGain {
+        run: usize,
+    },
     Of {
         term: usize,
         parameter: usize,
@@ -146,6 +155,10 @@ impl<'a> Problem<'a> {
         // A single element that is quieter than most cannot be distinguished from rounding.
         let element_weight =
             noise.by_element_counts.iter().map(|rms| rms.max(0.7 * noise.rms_counts).powi(-2)).collect();
+        let presses = |bin: &usize| train[*bin] > 0.0 && frames.position_mm[bins.first[*bin]][2] < 0.0;
+        let mut gained_runs: Vec<usize> = (0..bins.len()).filter(presses).map(|bin| bins.run[bin]).collect();
+        gained_runs.dedup();
+        let gained_runs = gained_runs.split_off(gained_runs.len().min(1));
         let mut coverings_mm = frames.covering_mm.clone();
         coverings_mm.sort_by(f64::total_cmp);
         coverings_mm.dedup();
@@ -156,6 +169,7 @@ impl<'a> Problem<'a> {
             slow_and_clear,
             variance,
             coverings: coverings_mm.len(),
+            gained_runs,
             spread_free: Contacts::of(frames).distinct_places() > 1,
             duration_s: frames.t_s.iter().copied().fold(1.0, f64::max),
             predictor,
@@ -172,6 +186,7 @@ impl<'a> Problem<'a> {
                 free.push(Free::SigmaSlope);
             }
         }
+        free.extend(self.gained_runs.iter().map(|run| Free::RunGain { run: *run }));
         for (term, at) in parameters.terms.iter().enumerate() {
             let Term { definition, values, knots } = at;
             if at.rewires().is_some_and(|element| self.element_weight[element] == 0.0) {
@@ -235,6 +250,9 @@ impl<'a> Problem<'a> {
 
     /// The direction of a free parameter.
     pub(crate) fn towards(&self, at: &Parameters, free: Free) -> Direction<'static> {
+        if let Free::RunGain { run } = free {
+            return Direction::RunGain(run);
+        }
         let (parameters, step) = self.moved(at, free);
         Direction::Towards { parameters, step }
     }
@@ -249,6 +267,10 @@ impl<'a> Problem<'a> {
             }
             Free::SigmaSlope => {
                 moved.psf.sigma_per_mm += 1e-3;
+                1e-3
+            }
+            Free::RunGain { run } => {
+                moved.run_gain[run] *= 1.0 + 1e-3;
                 1e-3
             }
             Free::Of { term, parameter } => {
@@ -337,7 +359,11 @@ impl<'a> Problem<'a> {
                 let slope = self.slope(at, predicted, *one)?;
                 Ok(Some(Arc::new(Stretch::of(&slope, elements))))
             }
-            Free::SigmaIntercept | Free::SigmaSlope | Free::Of { .. } | Free::Knot { .. } => Ok(None),
+            Free::SigmaIntercept
+            | Free::SigmaSlope
+            | Free::RunGain { .. }
+            | Free::Of { .. }
+            | Free::Knot { .. } => Ok(None),
         };
         parallel::map(free, knot).into_iter().collect()
     }
@@ -397,6 +423,11 @@ impl<'a> Problem<'a> {
                     next.psf.sigma_per_mm = (old + step.clamp(-0.3, 0.3)).max(0.0_f64.min(old));
                     next.psf.sigma_per_mm - old
                 }
+                Free::RunGain { run } => {
+                    let old = next.run_gain[*run];
+                    next.run_gain[*run] = old * (1.0 + step.clamp(-0.5, 1.0));
+                    next.run_gain[*run] / old - 1.0
+                }
                 Free::Of { term, parameter } => {
                     let scale = self.scale(at, *term, *parameter);
                     let value = &mut next.terms[*term].values[*parameter];
@@ -452,7 +483,7 @@ impl<'a> Problem<'a> {
 fn least_step(at: &Parameters, free: Free) -> f64 {
     match free {
         Free::Knot { term, knot } => at.terms[term].least_step(knot),
-        Free::SigmaIntercept | Free::SigmaSlope | Free::Of { .. } => f64::NEG_INFINITY,
+        Free::SigmaIntercept | Free::SigmaSlope | Free::RunGain { .. } | Free::Of { .. } => f64::NEG_INFINITY,
     }
 }
 

@@ -36,6 +36,8 @@ const GAIN_SHARE: f64 = 1e-3;
 pub(crate) enum Direction<'a> {
     /// Finite difference towards a changed model, divided by a step.
     Towards { parameters: Parameters, step: f64 },
+    /// Relative change of all gains in a run.
+    RunGain(usize),
     /// Values of any bins, bin by bin, element by element.
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
 }
@@ -101,7 +103,12 @@ pub(super) struct Segments {
 
 /// A direction during a pass.
 enum Running<'a> {
-    Towards { stream: Box<Mutex<Stream<'a>>>, per_step: f64 },
+    Towards {
+        stream: Box<Mutex<Stream<'a>>>,
+        per_step: f64,
+    },
+    /// Taken from the derivative by all gains.
+    RunGain(usize),
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
 }
 
@@ -150,6 +157,11 @@ impl Problem<'_> {
             let mut columns: Vec<Vec<f64>> =
                 parallel::map(&running, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             let by_gain = columns.pop().unwrap_or_default();
+            for (direction, column) in running.iter().zip(&mut columns) {
+                if let Running::RunGain(run) = direction {
+                    *column = self.of_run(*run, range.start, &by_gain);
+                }
+            }
             let chunk = Chunk { bins: range.clone(), columns, by_gain };
             // The chunk's parts of one block and one segment each.
             let key = |bin: usize| (bins.block[bin] / joined, segments.of_bin[bin]);
@@ -175,8 +187,16 @@ impl Problem<'_> {
                 // A parameter that cannot move has no derivative.
                 per_step: if step == 0.0 { 0.0 } else { 1.0 / step },
             },
+            Direction::RunGain(run) => Running::RunGain(run),
             Direction::Column(values) => Running::Column(values),
         })
+    }
+
+    /// Values of the bins from `first` on, and 0 for those of other runs.
+    fn of_run(&self, run: usize, first: usize, values: &[f64]) -> Vec<f64> {
+        let bins = self.predictor.bins;
+        let is_there = |place: usize| bins.run[first + place / bins.elements] == run;
+        values.iter().enumerate().map(|(place, value)| if is_there(place) { *value } else { 0.0 }).collect()
     }
 
     /// Sums over the bins of a chunk that belong to one block. The products are those of the first `pivots` directions and of the
@@ -290,6 +310,7 @@ impl Running<'_> {
     ) -> Result<Vec<f64>, DiscoverError> {
         let (stream, per_step) = match self {
             Self::Column(values) => return Ok(values(bins)),
+            Self::RunGain(_) => return Ok(Vec::new()),
             Self::Towards { stream, per_step } => (stream, per_step),
         };
         let mut stream = stream.lock().unwrap_or_else(PoisonError::into_inner);

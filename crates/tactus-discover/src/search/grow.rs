@@ -81,14 +81,16 @@ const OTHERS_MAX: usize = 4;
 /// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
 /// `1 + MISFIT_SHARE x gain`.
 const MISFIT_SHARE: f64 = 0.02;
-/// As [`MISFIT_SHARE`], of what the model leaves beyond the noise: a form that misses so much may be another's.
-const LEFT_SHARE: f64 = 0.1;
+/// As [`MISFIT_SHARE`], of what the model leaves beyond the noise. A form that misses so much may be another's: one that leaves twice the
+/// square that the best one leaves is out of the 95 % set, since `exp(-1 / LEFT_SHARE)` is 5 %.
+const LEFT_SHARE: f64 = 1.0 / 3.0;
 /// A class with less than this share of the strongest one's odds may be an error of that one's form.
 const FORM_SHARE: f64 = 0.07;
 /// A class must gain so many standard errors, from the scatter of blocks.
 const BLOCKS_Z: f64 = 2.0;
-/// Probability of a reported set of classes.
+/// Probability of a reported set of classes, and by how many units one at its end is behind the best.
 const SET_PROBABILITY: f64 = 0.95;
+const SET_UNITS: f64 = 3.0;
 
 /// Estimated shares of a discovery that are done before the classes have to hold their places, and after.
 const SHARE_BEFORE_HOLD: f64 = 0.65;
@@ -526,7 +528,7 @@ impl Search<'_> {
                 starts.push((RANDOM_WALK.name, vec![walk.start.clone()]));
             }
         }
-        let mut fits = self.fits(at, &starts)?;
+        let mut fits = self.fits(at, &starts, 0.0)?;
         fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
         let best_has_names = best_set.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
         let contest = |one: &Beside| {
@@ -556,8 +558,14 @@ impl Search<'_> {
         set.members.iter().filter_map(term).collect()
     }
 
-    /// Fits of a model with the terms of each class: first all in a few rounds, then the best to the end.
-    fn fits(&self, at: &Fitted, starts: &[(&'static str, Vec<Term>)]) -> Result<Vec<Beside>, DiscoverError> {
+    /// Fits of a model with the terms of each class: first all in a few rounds, then the best to the end, and those that are behind them by
+    /// no more than so many units.
+    fn fits(
+        &self,
+        at: &Fitted,
+        starts: &[(&'static str, Vec<Term>)],
+        units: f64,
+    ) -> Result<Vec<Beside>, DiscoverError> {
         let fit = |(name, terms): &(&'static str, Vec<Term>)| {
             (self.progress)(&format!("fitting {name}"), 0.0);
             let mut started = at.parameters.clone();
@@ -569,7 +577,10 @@ impl Search<'_> {
             .into_iter()
             .collect::<Result<_, DiscoverError>>()?;
         fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
-        fits.truncate(FINISHED_MAX);
+        let least =
+            fits.first().map_or(0.0, |best| best.ln_odds - units * self.unit(best.ln_odds, &best.fitted));
+        let finished = fits.iter().filter(|one| one.ln_odds >= least).count();
+        fits.truncate(finished.max(FINISHED_MAX));
         let finish = |one: &Beside| {
             let fitted = self.problem.fit_from(one.fitted.parameters.clone(), TRIAL_ROUNDS)?;
             Ok(Beside { name: one.name, ln_odds: self.ln_odds(at, &fitted), fitted })
@@ -621,7 +632,9 @@ impl Search<'_> {
                 );
                 let pass = self.pass(&less)?;
                 let (strength, rivals) = pass.rivalry(name, ln_odds);
-                if best(&rivals) > strength + RIVAL_LN_ODDS {
+                // A rival that is ahead by no more than the misfit of forms is no better.
+                let unit = self.unit(ln_odds, &grown.at);
+                if best(&rivals) > strength + RIVAL_LN_ODDS.max(unit) {
                     grown.refused.push(Contest::refused(name, ln_odds, rivals));
                     grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
@@ -635,7 +648,6 @@ impl Search<'_> {
                     grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
                     continue 'again;
                 }
-                let unit = self.unit(ln_odds, &grown.at);
                 let model_leaves = match leaves {
                     Some(known) => known,
                     None if others.is_empty() => true,
@@ -701,7 +713,8 @@ impl Search<'_> {
             (name, self.starts(pass, &evidence, &evidence.set([one]), name))
         };
         let starts: Vec<(&'static str, Vec<Term>)> = best.into_iter().map(start).collect();
-        self.fits(less, &starts)
+        // Where the form misses much, more of them may be in the set.
+        self.fits(less, &starts, SET_UNITS)
     }
 
     /// What counts as one in differences of the logarithm of the odds between classes in one place.

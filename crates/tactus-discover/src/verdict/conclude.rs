@@ -21,6 +21,9 @@ use crate::search::{
 /// An effect is confirmed if noise alone would let it gain as much, on fitted presses that its parameters have not seen, with at most this
 /// probability.
 const CONFIRMED_P: f64 = 0.05;
+/// Few blocks cannot give so small a probability. They confirm if all agree: then it is the least that they can give, and otherwise at
+/// least twice as much.
+const AGREED: f64 = 1.5;
 /// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests,
 const SEEN_NOISE: f64 = 2.0;
 /// and for the verdict `Explained` whatever the tests say.
@@ -70,6 +73,21 @@ pub(crate) struct Confirmed {
     pub(crate) steps: Vec<AddedEffect>,
     /// Those that are not confirmed.
     pub(crate) tentative: Vec<AddedEffect>,
+    /// Those with which all blocks agree, too few as they are.
+    pub(crate) agreed: Vec<&'static str>,
+}
+
+/// An added effect, and whether presses that its parameters have not seen confirm it.
+pub(crate) struct Step {
+    added: AddedEffect,
+    /// The least probability that flips of so few blocks can give.
+    least_p: f64,
+}
+
+impl Step {
+    fn is_confirmed(&self) -> bool {
+        self.added.folds_p_value <= CONFIRMED_P.max(AGREED * self.least_p)
+    }
 }
 
 /// A model with those of its added effects that folds of the fitted presses confirm. The held-out presses have no say.
@@ -84,21 +102,24 @@ pub(crate) fn confirmed(
     let names = names(&grown.parameters, search.known_terms);
     let steps = search.steps(&grown, equivalent, &refuted, &with_silent)?;
     // A miswired element acts on its own readings, of which a fold may have none.
-    let is_tentative = |step: &AddedEffect| {
-        names.contains(&step.effect) && step.effect != MISWIRED && step.folds_p_value > CONFIRMED_P
+    let is_firm = |step: &Step| {
+        !names.contains(&step.added.effect) || step.added.effect == MISWIRED || step.is_confirmed()
     };
-    if !steps.iter().any(is_tentative) {
-        return Ok(Confirmed { grown, steps, tentative: Vec::new() });
+    let (steps, tentative): (Vec<Step>, Vec<Step>) = steps.into_iter().partition(is_firm);
+    let added = |steps: Vec<Step>| steps.into_iter().map(|step| step.added).collect();
+    let few = |step: &&Step| names.contains(&step.added.effect) && step.added.folds_p_value > CONFIRMED_P;
+    let agreed = steps.iter().filter(few).map(|step| step.added.effect).collect();
+    if tentative.is_empty() {
+        return Ok(Confirmed { grown, steps: added(steps), tentative: Vec::new(), agreed });
     }
-    let tentative: Vec<AddedEffect> = steps.into_iter().filter(is_tentative).collect();
     let mut firm = grown.parameters;
     for step in &tentative {
-        equivalent.remove(step.effect);
-        firm = without(&firm, step.effect, search.known_terms);
+        equivalent.remove(step.added.effect);
+        firm = without(&firm, step.added.effect, search.known_terms);
     }
     let grown = search.problem.fit_from(firm, POLISH_ROUNDS)?;
     let steps = search.steps(&grown, equivalent, &refuted, &with_silent)?;
-    Ok(Confirmed { grown, steps, tentative })
+    Ok(Confirmed { grown, steps: added(steps), tentative: added(tentative), agreed })
 }
 
 /// Decides the verdict and builds the report of a search.
@@ -111,7 +132,7 @@ pub(crate) fn conclude(
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
     let SearchOutcome { lacking, base, confirmed, rounds, equivalent, contests, left, before, after } = found;
-    let Confirmed { grown, mut steps, tentative } = confirmed;
+    let Confirmed { grown, mut steps, tentative, agreed } = confirmed;
     // Two tests: Bonferroni's correction.
     let first = rounds.first();
     let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
@@ -156,6 +177,12 @@ pub(crate) fn conclude(
     let is_clean = matches!(verdict, Verdict::NothingMissing | Verdict::CannotJudge);
     let mut warnings = prepared.warnings.clone();
     warnings.extend(prepared.not_judged(&of_grown, floor));
+    if !agreed.is_empty() {
+        warnings.push(format!(
+            "the presses are few: all their independent blocks agree with {}, but they are too few for a probability of {CONFIRMED_P}",
+            agreed.join(" and ")
+        ));
+    }
     Ok(Discovery {
         not_shown,
         warnings,
@@ -292,14 +319,16 @@ fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffec
 }
 
 fn base_of(prepared: &Prepared<'_>, parameters: &Parameters) -> BaseModel {
+    let (sensitivity_counts_per_mm, run_gains) = parameters.centred();
     let response = Response {
-        sensitivity_counts_per_mm: parameters.sensitivity.clone(),
+        sensitivity_counts_per_mm,
         baseline_counts: parameters.mean_baseline(),
         ..prepared.known.response.clone()
     };
     BaseModel {
         psf: parameters.psf,
         response,
+        run_gains,
         run_baselines_counts: parameters.baseline.clone(),
         run_walks: parameters.walk.as_ref().and_then(RandomWalk::apart),
     }
@@ -509,7 +538,7 @@ impl Search<'_> {
         equivalent: &Equivalent,
         refuted: &Refuted,
         with_silent: &Problem<'_>,
-    ) -> Result<Vec<AddedEffect>, DiscoverError> {
+    ) -> Result<Vec<Step>, DiscoverError> {
         let known_terms = self.problem.predictor.known.effects.len();
         let names = names(&grown.parameters, known_terms);
         let mut steps = Vec::new();
@@ -543,7 +572,9 @@ impl Search<'_> {
             let curve = refuted.get(name).and_then(|formula| fitted_curve(grown, name, formula));
             let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
             let by_folds = self.problem.gains_by_folds(&before, grown)?;
-            steps.push(AddedEffect {
+            let blocks = by_folds.iter().flatten().filter(|gain| **gain != 0.0).count();
+            let least_p = 0.5_f64.powf(blocks as f64);
+            let added = AddedEffect {
                 effect: name,
                 terms: terms.filter(|(term, _)| term.definition.name == name).map(estimated).collect(),
                 p_value,
@@ -558,11 +589,12 @@ impl Search<'_> {
                     .into_iter()
                     .flat_map(|alike| alike.same.iter().map(|(rival, _)| *rival))
                     .collect(),
-            });
+            };
+            steps.push(Step { added, least_p });
         }
-        let p_values: Vec<f64> = steps.iter().map(|step| step.p_value).collect();
+        let p_values: Vec<f64> = steps.iter().map(|step| step.added.p_value).collect();
         for (step, q_value) in steps.iter_mut().zip(q_values(&p_values)) {
-            step.q_value = q_value;
+            step.added.q_value = q_value;
         }
         Ok(steps)
     }

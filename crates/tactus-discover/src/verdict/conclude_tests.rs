@@ -3,7 +3,7 @@ use rand_chacha::ChaCha8Rng;
 use tactus_schema::table::{Phase, RowView};
 
 use super::*;
-use crate::fixtures::{ELEMENTS, ShippedRig, known, measured, processes};
+use crate::fixtures::{ELEMENTS, ShippedRig, found, known, measured, processes};
 use crate::{Frames, discover};
 
 /// Effects were named, a test rejects the base model, and none the grown one.
@@ -89,4 +89,36 @@ fn repeats_of_places_are_a_floor_of_one_frame_a_press() {
     let structured = found.base.structured.unwrap();
     assert!(structured.upper_noise < SEEN_NOISE, "{structured:?}");
     assert_eq!(found.tolerance_counts, Some(5.0));
+}
+
+/// Two runs of one rig: in the second all elements are 2 % more sensitive, and their zeros lie elsewhere.
+#[test]
+fn runs_of_one_rig_may_differ_in_gain_and_zeros() {
+    let known = known();
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut run = || measured(&known, &[], &processes(ELEMENTS, 1.0, 1e-3, &mut rng));
+    let (first, second) = (run(), run());
+    let mut both = Frames::new(ELEMENTS);
+    first.rows().for_each(|row| both.push(row));
+    for row in second.rows() {
+        let counts: Vec<f32> = row.counts.iter().map(|counts| 130.0 + 1.02 * (counts - 100.0)).collect();
+        both.push(RowView { run: "b", counts: &counts, ..row });
+    }
+    let found = found(&known, &both);
+    assert_eq!(found.verdict, Verdict::NothingMissing, "{:?}", found.gap);
+    let [one, other] = found.grown.run_gains[..] else { panic!("two runs: {:?}", found.grown.run_gains) };
+    assert!((other / one - 1.02).abs() < 1e-3, "{other} / {one}");
+    assert!((one * other - 1.0).abs() < 1e-9, "the mean is 1: {one} {other}");
+}
+
+/// Two blocks cannot give less than a quarter, and do so if both gain.
+#[test]
+fn few_blocks_confirm_what_all_of_them_show() {
+    let step = |folds_p_value: f64, blocks: f64| Step {
+        added: AddedEffect { folds_p_value, ..coarse(1.0, 1.0, 1.0) },
+        least_p: 0.5_f64.powf(blocks),
+    };
+    assert!(step(0.26, 2.0).is_confirmed() && !step(0.5, 2.0).is_confirmed());
+    assert!(step(0.52, 1.0).is_confirmed() && !step(1.0, 1.0).is_confirmed());
+    assert!(step(0.04, 20.0).is_confirmed() && !step(0.06, 20.0).is_confirmed());
 }

@@ -70,8 +70,10 @@ pub struct Discovery {
 pub struct BaseModel {
     /// Spread against covering thickness.
     pub psf: Psf,
-    /// Response of the elements; its baselines are the mean over the runs.
+    /// Response of the elements; its gains and baselines are the means over the runs.
     pub response: Response,
+    /// Factor of all sensitivities in each run; their geometric mean is 1.
+    pub run_gains: Vec<f64>,
     /// Baselines of each run, one per element, in counts.
     pub run_baselines_counts: Vec<Vec<f64>>,
     /// Random walks of each run's baselines, less the part common to all runs, which the effects contain.

@@ -91,11 +91,27 @@ fn what_does_not_go_together_is_refused_before_its_first_row() {
     }
 
     let mut other = plan("b", 1).make();
-    other.rig.baseline_counts[5] += 1.0;
+    other.rig.registration.origin_mm[0] += 0.5;
     let other = exported(&recorded(dir.path(), &other));
     let (error, given) = refused(&[&recording, &other]);
     assert!(matches!(&error, RowsError::RigsDiffer { path, .. } if *path == other), "{error}");
     assert_eq!(given, rows);
+}
+
+#[test]
+fn runs_of_a_rig_that_was_calibrated_and_renamed_between_them_go_together() {
+    let dir = tempfile::tempdir().unwrap();
+    let first = recorded(dir.path(), &plan("a", 1).make());
+    let mut later = plan("b", 1).make();
+    later.rig.baseline_counts[5] += 1.0;
+    later.rig.sensitivity_counts_per_mm[2] *= 1.02;
+    later.rig.name = "monday".into();
+    let later = exported(&recorded(dir.path(), &later));
+    let (source, rows) = visited(&[&first, &later]);
+    assert_eq!(rows, [&first, &later].map(|file| visited(&[file]).1).concat());
+    let alone = visited(&[&first]).0;
+    assert_eq!(source.rig, alone.rig, "as the first file describes it");
+    assert_eq!(source.names, [alone.rig.name, "monday".into()]);
 }
 
 #[test]

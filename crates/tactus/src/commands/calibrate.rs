@@ -63,6 +63,7 @@ pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
     if readings.frames == 0 {
         bail!("the files hold no frame");
     }
+    let renamed = source.renamed();
     let rig = source.rig;
     let model = Model::of_rig(&rig).context("the rig's reference indenter is not among its tools")?;
     let declared = Declared {
@@ -76,7 +77,7 @@ pub(crate) fn from_files(files: &[PathBuf]) -> anyhow::Result<Calibrated> {
         rig,
         simulated,
         runs: source.runs,
-        notes: [source.warnings, source.notes].concat(),
+        notes: [source.warnings, source.notes, Vec::from_iter(renamed)].concat(),
         calibration,
     })
 }

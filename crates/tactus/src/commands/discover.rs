@@ -114,12 +114,13 @@ fn analysed(
     let found = tactus_discover::discover(&known, &measured.frames, options, &experiments, &|now| {
         progress.show(&now.what, now.share);
     });
-    let discovery = found.map_err(|error| match error {
+    let mut discovery = found.map_err(|error| match error {
         DiscoverError::TooLittle(_) => {
             anyhow!("{error}; `tactus run diagnose` measures enough; give its recording beside these data")
         }
         DiscoverError::Model(_) | DiscoverError::Effect(_) | DiscoverError::Threads { .. } => error.into(),
     })?;
+    discovery.warnings.extend(measured.renamed.clone());
     Ok(Discovered { measured, model, known, discovery, active: Vec::new(), active_ended: None })
 }
 

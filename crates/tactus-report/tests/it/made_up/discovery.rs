@@ -385,6 +385,7 @@ fn base() -> BaseModel {
             reference_indenter: Indenter::Cylinder { diameter_mm: 1.0 },
             reference_covering: Covering { thickness_mm: 1.016 },
         },
+        run_gains: vec![1.0],
         run_baselines_counts: vec![vec![100.0; 48]],
         run_walks: None,
     }

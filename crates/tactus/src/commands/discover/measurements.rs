@@ -15,6 +15,8 @@ use crate::sha256;
 pub(super) struct Measurements {
     pub(super) files: Vec<PathBuf>,
     pub(super) rig: Rig,
+    /// A warning if the files give the rig several names.
+    pub(super) renamed: Option<String>,
     pub(super) simulated: bool,
     pub(super) data: Vec<DataSource>,
     /// Defects of the files.
@@ -60,8 +62,19 @@ impl Measurements {
         });
         let data = data.collect();
         let simulated = source.rig.simulated || source.runs.iter().any(|run| run.simulated);
+        let renamed = source.renamed();
         let (rig, notes) = (source.rig, [source.warnings, source.notes].concat());
-        Ok(Self { files: files.to_owned(), rig, simulated, data, notes, frames, covering_mm, indenter })
+        Ok(Self {
+            files: files.to_owned(),
+            rig,
+            renamed,
+            simulated,
+            data,
+            notes,
+            frames,
+            covering_mm,
+            indenter,
+        })
     }
 
     /// The run ids, as evidence names them.

@@ -47,6 +47,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
     let base = tactus_discover::BaseModel {
         psf: model.base.psf,
         response: model.base.response.clone(),
+        run_gains: vec![1.0],
         run_baselines_counts: vec![model.base.response.baseline_counts.clone()],
         run_walks: None,
     };

@@ -27,6 +27,7 @@ fn measured(rig: Rig) -> Measurements {
         rig,
         data: Vec::new(),
         notes: Vec::new(),
+        renamed: None,
         frames,
         covering_mm: 2.54,
         indenter: "cyl1".to_owned(),
