@@ -8,8 +8,8 @@ use super::wiring;
 use crate::data::{DiscoverError, interval_s};
 use crate::fit::{Fitted, Free, Problem, Scale, Term};
 
-/// Number of grid values of a time that spans orders of magnitude, and of any other shape parameter.
-const TIMES_MANY: usize = 5;
+/// Number of grid values of a shape parameter that spans orders of magnitude, and of any other or a ratio of times.
+const VALUES_MANY: usize = 5;
 const VALUES_FEW: usize = 3;
 
 /// If an element's reading seems to contain more than this share of another's signal, or a negative share, the element may
@@ -119,7 +119,9 @@ impl Candidate {
             let [least, most] = known.range;
             let value = &mut start.values[*parameter];
             let margin = [0.02 * (*value - least), 0.02 * (most - *value)];
-            let moved = Scale::of(known, problem.duration_s).forward(*value, *step);
+            let scale = Scale::of(known, problem.duration_s);
+            // Beyond the longest step of a fit, derivatives at neutral amplitudes say nothing.
+            let moved = scale.forward(*value, scale.bounded(*step));
             *value = moved.clamp(least + margin[0], most - margin[1]);
         }
         start
@@ -155,7 +157,8 @@ fn grid(name: &str, range: [f64; 2], neutral: f64, duration_s: f64) -> Vec<f64> 
     if ratio < 1.0 + 1e-9 {
         return vec![least];
     }
-    let count = if is_time && ratio > 300.0 { TIMES_MANY } else { VALUES_FEW };
+    let is_wide = ratio > 300.0 && !name.ends_with("_ratio");
+    let count = if is_wide { VALUES_MANY } else { VALUES_FEW };
     // The middles of equal parts of the logarithmic range.
     (0..count).map(|k| least * ratio.powf((k as f64 + 0.5) / count as f64)).collect()
 }

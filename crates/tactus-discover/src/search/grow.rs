@@ -503,24 +503,34 @@ impl Search<'_> {
         let is_free = |one: usize| matches!(pass.kinds[one], Kind::Free(_));
         let best_set = evidence.sets(|one| !is_free(one)).into_iter().next();
         let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
-        let mut starts: Vec<(&'static str, Vec<Term>)> = Vec::new();
+        let alone = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), 0.0);
+        let most = alone.first().map_or(0.0, |(_, gain)| gain.ln_odds);
+        let mut proposed: Vec<(&'static str, Set)> = Vec::new();
         let mut propose = |set: &Set| {
             for member in set.members.iter().copied().filter(|member| pass.is_named(*member)) {
                 let name = pass.class_of(member);
-                if starts.iter().all(|(known, ..)| *known != name) {
-                    starts.push((name, self.starts(pass, &evidence, set, name)));
+                if proposed.iter().all(|(known, ..)| *known != name) {
+                    proposed.push((name, set.clone()));
                 }
             }
         };
         best_set.iter().chain(&named).for_each(&mut propose);
-        let alone = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), 0.0);
-        let most = alone.first().map_or(0.0, |(_, gain)| gain.ln_odds);
         for (one, _) in alone.iter().filter(|(_, gain)| gain.ln_odds > PROMISE_SHARE * most) {
             propose(&evidence.set([*one]));
         }
-        starts.truncate(FITTED_MAX);
-        if named.map_or(0.0, |set| set.ln_odds).max(most) < PROMISE_SHARE * least {
-            starts.clear();
+        proposed.truncate(FITTED_MAX);
+        if named.as_ref().map_or(0.0, |set| set.ln_odds).max(most) < PROMISE_SHARE * least {
+            proposed.clear();
+        }
+        let mut starts: Vec<(&'static str, Vec<Term>)> = Vec::new();
+        for (name, set) in proposed {
+            let terms = self.starts(pass, &evidence, &set, name);
+            // A fit of several shapes may end at worse values than one of a single shape.
+            let single = alone.iter().find(|(one, _)| terms.len() > 1 && pass.class_of(*one) == name);
+            let single =
+                single.map(|(one, _)| self.starts(pass, &evidence, &evidence.set([*one]), name));
+            starts.push((name, terms));
+            starts.extend(single.map(|terms| (name, terms)));
         }
         if let Some(walk) = &pass.walk {
             let ln_odds = 0.5 * walk.promise - ODDS_AGAINST.ln();
@@ -577,6 +587,13 @@ impl Search<'_> {
             .into_iter()
             .collect::<Result<_, DiscoverError>>()?;
         fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
+        // Of each class the better start.
+        let mut names: Vec<&'static str> = Vec::new();
+        fits.retain(|one| {
+            let is_new = !names.contains(&one.name);
+            names.push(one.name);
+            is_new
+        });
         let least =
             fits.first().map_or(0.0, |best| best.ln_odds - units * self.unit(best.ln_odds, &best.fitted));
         let finished = fits.iter().filter(|one| one.ln_odds >= least).count();
