@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use libfuzzer_sys::fuzz_target;
 use tactus_engine::CoveringMemory as _;
 use tactus_fuzz::Scratch;
-use tactus_runner::config::{Config, RigFiles};
+use tactus_runner::config::{RigFiles, ServiceConfig};
 use tactus_runner::covering_file::CoveringFile;
 
 /// The shipped rig beside the configuration, so that one which names it is read to its end.
@@ -21,7 +21,7 @@ static SCRATCH: LazyLock<Scratch> = LazyLock::new(|| {
 fuzz_target!(|text: &str| {
     let path = SCRATCH.file("any.covering.toml", text.as_bytes());
     let folder = path.parent().expect("a file is in a folder");
-    if let Err(error) = Config::load(&path) {
+    if let Err(error) = ServiceConfig::load(&path) {
         assert!(!error.to_string().is_empty());
     }
     if let Err(error) = RigFiles::of(text, Path::new("any.toml")) {

@@ -357,6 +357,7 @@ fn order(run: usize, steps: &[Step]) -> RunOrder {
         seed: 1,
         who: "any".into(),
         limits: ScriptLimits::default(),
+        earlier: None,
         planned: None,
         versions: BTreeMap::new(),
         recording: String::new(),

@@ -222,8 +222,10 @@ fn stop_pause_and_resume_work_from_another_client() {
     let Some(Event::Finished(finished)) = events.last() else { panic!("{events:?}") };
     assert_eq!(finished.exit_status(), pb::ExitStatus::Aborted);
     assert!(finished.message.contains("wrong covering"), "{finished:?}");
-    assert!(events.iter().any(|event| matches!(event, Event::Paused(_))));
-    assert!(events.iter().any(|event| matches!(event, Event::Resumed(_))));
+    let is_takeover = |event: &Event| matches!(event, Event::LeaseTaken(taken) if taken.reason == "to look");
+    assert!(events.iter().any(is_takeover), "{events:?}");
+    assert!(events.iter().any(|event| matches!(event, Event::Paused(paused) if !paused.by.is_empty())));
+    assert!(events.iter().any(|event| matches!(event, Event::Resumed(resumed) if !resumed.by.is_empty())));
 }
 
 #[test]

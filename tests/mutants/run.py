@@ -55,7 +55,11 @@ MUTANTS = [
     ("a failed reset forgets that the tip is not up", SAFETY + "supervisor.rs", "if let Some(fault) = self.not_retracted.take() {", "if let Some(fault) = self.not_retracted.take().filter(|_| false) {", "tactus-safety"),
     ("a frame that reads nothing is believed", SAFETY + "force.rs", "        let unwatched = &self.rig.unwatched;\n", "        self.last_frame = Some(at);\n        let unwatched = &self.rig.unwatched;\n", "tactus-safety"),
     ("a thinner covering counts only once it is confirmed", ENGINE + "run/steps.rs", "let is_thinner = thickness_mm <= before.thickness_mm;", "let is_thinner = thickness_mm < 0.0;", "tactus-engine"),
-    ("stops hold the rising tip", ENGINE + "engine.rs", "if !self.shared.way_up().outlasts_stop(self.shared.clock.now().mono) {", "if true {", "tactus-engine"),
+    ("stops hold the rising tip", ENGINE + "engine.rs", "if self.shared.way_up().takes_stop(self.shared.clock.now().mono) {", "if true {", "tactus-engine"),
+    ("a stop of the supervisor takes the place of somebody's", ENGINE + "engine.rs", "        self.permits.revoke();\n        self.stage.stop();", "        self.way_up().takes_stop(self.clock.now().mono);\n        self.permits.revoke();\n        self.stage.stop();", "tactus-engine"),
+    ("lost frames hold the rising tip", ENGINE + "acquisition.rs", "if is_a_failure && self.shared.end(Ending::FramesLost(frames_lost)) {", "if is_a_failure && (self.shared.end(Ending::FramesLost(frames_lost)) || true) {", "tactus-engine"),
+    ("a retract that fails is not tried again", ENGINE + "motion.rs", "if troubles > TROUBLES_MAX ||", "if troubles > 0 ||", "tactus-engine"),
+    ("a tip that is not up is no fault", ENGINE + "motion.rs", "self.latch_not_retracted(broken.to_string()).await;", "let _ = broken;", "tactus-engine"),
     ("a thick covering must be felt like a thin one", SAFETY + "contact.rs", ".powi(2).min(1.0)", ".powi(2).clamp(1.0, 1.0)", "tactus-safety"),
 ]
 

@@ -41,6 +41,22 @@ def test_the_recording_opens_with_stock_mcap(element_centres):
     assert [frame.seq for frame in frames] == list(range(frames[0].seq, frames[0].seq + len(frames)))
 
 
+def test_a_recording_that_was_damaged_and_cut_opens_with_stock_mcap_once_it_is_recovered(element_centres, tmp_path):
+    damaged, recovered = tmp_path / "damaged.mcap", tmp_path / "recovered.mcap"
+    content = bytearray(Path(element_centres["recording"]).read_bytes())
+    # One bit in the middle, and no end.
+    content[len(content) // 2] ^= 1
+    damaged.write_bytes(content[: len(content) * 9 // 10])
+    told = tactus("recover", damaged, "--out", recovered, check=False)
+    with open(recovered, "rb") as file:
+        topics = ["tactus/sim/sensor/frame"]
+        reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        seqs = [frame.seq for *_, frame in reader.iter_decoded_messages(topics=topics)]
+    assert seqs == sorted(set(seqs)), told
+    # A tenth is cut off, and a chunk holds half a second.
+    assert len(seqs) > 0.85 * element_centres["frames"], told
+
+
 def test_the_table_opens_with_pyarrow_and_holds_the_press(element_centres, table):
     rows = pq.read_table(table)
     assert rows.num_rows == element_centres["frames"]

@@ -250,8 +250,10 @@ impl Acquisition {
         warn!(lost = gap.frames_lost, after = gap.after_seq, reason = gap.reason, "frames lost");
         let frames_lost = gap.frames_lost;
         self.emit(pb::run_event::Event::Gap(gap));
-        if self.shared.service.policy.on_gap == OnGap::Fail && self.recording.is_some() {
-            self.end_run(Ending::FramesLost(frames_lost));
+        let is_a_failure = self.shared.service.policy.on_gap == OnGap::Fail && self.recording.is_some();
+        // Once: the tip must be able to rise although more are lost.
+        if is_a_failure && self.shared.end(Ending::FramesLost(frames_lost)) {
+            self.shared.stop_motion();
         }
     }
 

@@ -303,8 +303,8 @@ impl Engine {
 
     /// Stops motion at once and ends the run in progress or in preparation, if there is one. Does not wait.
     ///
-    /// While the tip rises after a stop, straight up, it is stopped once a second at most: stops without end would hold it in
-    /// contact.
+    /// While the tip rises straight up, a stop within a second after another of these has no effect: stops without end would
+    /// hold it in contact.
     ///
     /// Returns true if there was one.
     pub fn stop(&self, order: StopOrder) -> bool {
@@ -313,7 +313,7 @@ impl Engine {
         if claimed {
             self.shared.end(Ending::Stop(order));
         }
-        if !self.shared.way_up().outlasts_stop(self.shared.clock.now().mono) {
+        if self.shared.way_up().takes_stop(self.shared.clock.now().mono) {
             self.shared.stop_motion();
         }
         claimed
@@ -510,7 +510,6 @@ impl Shared {
 
     /// Stops motion now and voids all permits. Never waits.
     pub(crate) fn stop_motion(&self) {
-        self.way_up().stopped(self.clock.now().mono);
         self.permits.revoke();
         self.stage.stop();
     }
@@ -521,18 +520,21 @@ impl Shared {
     }
 
     /// Asks the run to end. The first reason counts, except that any other reason replaces a silence of the sensor,
-    /// after which the run might have continued.
-    pub(crate) fn end(&self, ending: Ending) {
+    /// after which the run might have continued. True if this one counts.
+    pub(crate) fn end(&self, ending: Ending) -> bool {
+        let mut counts = false;
         self.control.send_modify(|control| {
             // A run goes on after a silence, and a pause holds.
             if !ending.is_silence() {
                 control.paused = None;
                 control.wanted_covering_mm = None;
             }
-            if control.ending.as_ref().is_none_or(Ending::is_silence) {
+            counts = control.ending.as_ref().is_none_or(Ending::is_silence);
+            if counts {
                 control.ending = Some(ending);
             }
         });
+        counts
     }
 
     /// Sample period of the sensor.

@@ -29,10 +29,10 @@ const HOMINGS_MAX: u32 = 4;
 /// Longest time to wait for a permit that the next frame or report may bring.
 const PERMIT_PATIENCE: Duration = Duration::from_secs(5);
 
-/// Least time between two stops of a rising tip.
+/// Least time between two stops of a rising tip that somebody presses.
 const STOP_OF_RISE_EVERY: Duration = Duration::from_secs(1);
 
-/// Whether the tip rises, and when it was last stopped.
+/// Whether the tip rises, and when somebody last stopped it.
 #[derive(Debug, Default)]
 pub(crate) struct WayUp {
     is_under_way: bool,
@@ -43,13 +43,15 @@ pub(crate) struct WayUp {
 struct Rising<'a>(&'a Shared);
 
 impl WayUp {
-    /// True if a stop must wait for its turn, so that the tip gets up.
-    pub(crate) fn outlasts_stop(&self, now: MonoTime) -> bool {
-        self.is_under_way && self.stopped.is_some_and(|stopped| now.since(stopped) < STOP_OF_RISE_EVERY)
-    }
-
-    pub(crate) fn stopped(&mut self, now: MonoTime) {
-        self.stopped = Some(now);
+    /// True if somebody's stop is carried out now. A rising tip gets up although stops never cease: it takes one a second.
+    /// The supervisor's stops do not count, so that nobody's stop is without effect because of one.
+    pub(crate) fn takes_stop(&mut self, now: MonoTime) -> bool {
+        let is_early = self.stopped.is_some_and(|stopped| now.since(stopped) < STOP_OF_RISE_EVERY);
+        let takes = !(self.is_under_way && is_early);
+        if takes {
+            self.stopped = Some(now);
+        }
+        takes
     }
 }
 

@@ -190,7 +190,7 @@ async fn stop_works_while_preparing_moving_paused_and_retracting() {
     bench.engine.stop(order(false));
     assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
 
-    // Retracting already: a second stop halts the tip, which then goes on up.
+    // Retracting already: a second stop does not keep the tip down.
     let mut bench = Bench::start(|rig| rig);
     let run = start(&bench, HOLD, &Memory::default());
     until_deep(&mut bench, 0.3).await;
@@ -301,6 +301,20 @@ async fn where_the_policy_says_fail_lost_frames_fail_the_run() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn frames_that_are_lost_again_and_again_stop_the_rising_tip_once() {
+    let mut bench = Bench::start(|rig| rig.replace("on_gap = \"repeat\"", "on_gap = \"fail\""));
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    let before = *bench.stops.borrow();
+    while height_mm(&bench) < 2.0 - 1e-9 {
+        bench.trouble.lock().unwrap().lose = 1;
+        sleep(Duration::from_millis(10)).await;
+    }
+    assert_eq!(*bench.stops.borrow() - before, 1);
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Failed);
+}
+
+#[tokio::test(start_paused = true)]
 async fn too_much_force_stops_retracts_and_refuses() {
     let mut bench = Bench::start(|rig| rig);
     let memory = Memory::default();
@@ -351,6 +365,28 @@ async fn three_periods_without_a_frame_stop() {
     print_greatest("no frame", &times);
     // Three periods, and one until the supervisor looks at its clock.
     assert!(times.iter().all(|[stopped, _]| *stopped <= Duration::from_millis(134)), "{times:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_array_that_goes_on_reading_the_same_stops_the_tip() {
+    let deeper = "def run(rig):\n    press(5.0, 5.0, depths_mm = [0.2, 0.6], dwell_s = 1.0)\n";
+    // At the first depth, and from the beginning.
+    for (stuck_at_mm, rule) in [(0.2, "frozen"), (0.0, "no-response")] {
+        let mut bench = Bench::start(|rig| rig);
+        let memory = Memory::default();
+        let run = start(&bench, deeper, &memory);
+        until_deep(&mut bench, stuck_at_mm).await;
+        bench.trouble.lock().unwrap().stuck_depth_mm = Some(stuck_at_mm);
+        let outcome = run.await.unwrap();
+        assert_eq!(outcome.exit_status, ExitStatus::Refused, "{outcome:?}");
+        assert_eq!(memory.safety.lock().unwrap()[0].rule, rule);
+        let deepest_mm = *bench.deepest_mm.lock().unwrap();
+        println!("{rule}: {deepest_mm:.3} mm deep, and read like {stuck_at_mm} mm");
+        // Way that it may not show, three frames at 1 mm/s, and the step under way; the depth that was asked for.
+        let limit_mm = if rule == "frozen" { stuck_at_mm + 0.15 + 0.1 + 0.1 } else { 0.6 };
+        assert!(deepest_mm < limit_mm + 1e-9, "{deepest_mm}");
+        assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
+    }
 }
 
 #[tokio::test(start_paused = true)]
@@ -454,6 +490,24 @@ async fn while_stop_is_pressed_without_end_the_tip_rises() {
         sleep(Duration::from_millis(5)).await;
     }
     assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_just_after_one_of_the_supervisor_reaches_the_stage() {
+    let mut bench = Bench::start(|rig| rig);
+    let run = start(&bench, HOLD, &Memory::default());
+    until_deep(&mut bench, 0.3).await;
+    bench.stops.mark_unchanged();
+    bench.trouble.lock().unwrap().silent = true;
+    bench.stops.changed().await.unwrap();
+    let is_rising = |stage: &pb::StageState| stage.status() == StageStatus::Moving;
+    bench.stage.wait_for(is_rising).await.unwrap();
+    bench.stops.mark_unchanged();
+    bench.engine.stop(order(false));
+    assert!(bench.stops.has_changed().unwrap(), "the stop has no effect");
+    bench.trouble.lock().unwrap().silent = false;
+    assert_eq!(run.await.unwrap().exit_status, ExitStatus::Stopped);
+    assert!((height_mm(&bench) - 2.0).abs() < 1e-9);
 }
 
 #[tokio::test(start_paused = true)]
@@ -567,6 +621,33 @@ async fn a_panic_of_the_run_leaves_the_tip_up_and_the_recording_closed() {
     assert!(matches!(memory.kinds().last(), Some(Event::Finished(_))));
     assert!(matches!(bench.engine.fault(), Some(Fault::Defect(_))), "{:?}", bench.engine.fault());
     bench.engine.reset().await.unwrap();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_retract_that_fails_is_tried_again_and_then_told_until_a_reset() {
+    for (refused_rises, is_up) in [(5, true), (6, false)] {
+        let mut bench = Bench::start(|rig| rig);
+        let memory = Memory::default();
+        let run = start(&bench, HOLD, &memory);
+        until_deep(&mut bench, 0.3).await;
+        bench.trouble.lock().unwrap().refused_rises = refused_rises;
+        bench.engine.stop(order(false));
+        let outcome = run.await.unwrap();
+        assert_eq!((height_mm(&bench) - 2.0).abs() < 1e-9, is_up, "{outcome:?}");
+        assert_eq!(outcome.message.contains("THE TIP IS NOT RETRACTED"), !is_up, "{outcome:?}");
+        if is_up {
+            assert_eq!((outcome.exit_status, bench.engine.fault()), (ExitStatus::Stopped, None));
+            continue;
+        }
+        assert_eq!(outcome.exit_status, ExitStatus::Failed);
+        assert_eq!(memory.safety.lock().unwrap()[0].rule, "retract");
+        let order = RunOrder { resets: false, ..bench.order(PRESS) };
+        let refused = bench.engine.run(order, Memory::default().sink()).await.unwrap();
+        assert_eq!(refused.exit_status, ExitStatus::Refused);
+        assert!(refused.message.contains("THE TIP IS NOT RETRACTED"), "{}", refused.message);
+        bench.engine.reset().await.unwrap();
+        assert_eq!(bench.engine.fault(), None);
+    }
 }
 
 #[tokio::test(start_paused = true)]

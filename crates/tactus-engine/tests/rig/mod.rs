@@ -28,6 +28,8 @@ pub(crate) struct Trouble {
     pub(crate) look_panics: bool,
     /// Moves down that the stage will break off half-way, because no report came, before the next one.
     pub(crate) unanswered: u32,
+    /// Moves up that the stage will refuse.
+    pub(crate) refused_rises: u32,
     /// Epoch of the stage's position.
     pub(crate) epoch: u32,
     /// Number of the stage's alarm, if it is in one.
@@ -36,6 +38,8 @@ pub(crate) struct Trouble {
     pub(crate) panics: bool,
     /// Counts on top of all elements.
     pub(crate) push_counts: f32,
+    /// The array goes on to read what it does at this depth.
+    pub(crate) stuck_depth_mm: Option<f64>,
 }
 
 pub(crate) struct Bench {
@@ -80,7 +84,7 @@ impl Sensor for FakeSensor {
                     continue;
                 }
                 let lost = std::mem::take(&mut trouble.lose);
-                let depth_mm = -self.stage.borrow().z_mm.min(0.0);
+                let depth_mm = trouble.stuck_depth_mm.unwrap_or(-self.stage.borrow().z_mm.min(0.0));
                 #[expect(clippy::cast_possible_truncation, reason = "a fake reading")]
                 let counts = vec![100.0 + 1000.0 * depth_mm as f32 + trouble.push_counts; 48];
                 let frame = Frame {
@@ -187,6 +191,9 @@ impl Stage for FakeStage {
             let target = permit.target();
             let from = self.position_mm();
             let way: Vec<_> = from.iter().zip(target.position_mm).map(|(from, to)| to - from).collect();
+            if way[2] > 0.0 && take_one(&mut self.trouble.lock().unwrap().refused_rises) {
+                return Err(StageError::Refused { command: "G1".into(), reason: "test".into() });
+            }
             let distance_mm = way.iter().map(|d| d * d).sum::<f64>().sqrt();
             let mut stops = self.stops.subscribe();
             let lasts = Duration::from_secs_f64(distance_mm / target.speed_mm_per_s);
@@ -200,10 +207,8 @@ impl Stage for FakeStage {
             let moved = self.clock.now().mono.since(start).saturating_sub(STARTING);
             let share = if lasts.is_zero() { 1.0 } else { moved.as_secs_f64() / lasts.as_secs_f64() };
             let share = if stopped { share.min(1.0) } else { 1.0 };
-            let is_unanswered = !stopped && way[2] < 0.0 && {
-                let unanswered = &mut self.trouble.lock().unwrap().unanswered;
-                std::mem::replace(unanswered, unanswered.saturating_sub(1)) > 0
-            };
+            let is_unanswered =
+                !stopped && way[2] < 0.0 && take_one(&mut self.trouble.lock().unwrap().unanswered);
             let share = if is_unanswered { 0.5 } else { share };
             let at: Vec<_> = from.iter().zip(&way).map(|(from, way)| from + way * share).collect();
             let at = if share < 1.0 { [at[0], at[1], at[2]] } else { target.position_mm };
@@ -246,6 +251,11 @@ impl Stage for FakeStage {
     fn clear_alarm(&self) -> BoxFuture<'_, Result<(), StageError>> {
         async { Ok(()) }.boxed()
     }
+}
+
+/// True if there was one.
+fn take_one(left: &mut u32) -> bool {
+    std::mem::replace(left, left.saturating_sub(1)) > 0
 }
 
 impl Bench {
