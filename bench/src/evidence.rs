@@ -7,6 +7,7 @@
 
 mod ablation;
 mod campaign;
+mod constants;
 mod contests;
 mod document;
 mod forms;
@@ -22,6 +23,7 @@ mod twins;
 
 pub use ablation::{Ablation, ablations};
 pub use campaign::{Campaign, Planned, Seeds, Sizes, campaigns};
+pub use constants::{Observed, Place, constants_table};
 pub use contests::{Contest, contests, contests_table};
 pub use document::{Costs, Part, document, into_document, misses};
 pub use forms::{Form, forms_table};

@@ -8,9 +8,9 @@ use std::thread;
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use tactus_bench::evidence::{
-    self, Ablation, Campaign, Costs, Form, Outcome, Places, Planned, Scores, Seeds, Sizes, TWINS, Timing,
-    Workflow, ablations, campaigns, contests, contests_table, document, forms_table, into_document, misses,
-    pictures, quantile, read, run, separate, summary, twins_table,
+    self, Ablation, Campaign, Costs, Form, Observed, Outcome, Places, Planned, Scores, Seeds, Sizes, TWINS,
+    Timing, Workflow, ablations, campaigns, constants_table, contests, contests_table, document, forms_table,
+    into_document, misses, pictures, quantile, read, run, separate, summary, twins_table,
 };
 
 #[derive(Debug, Args)]
@@ -28,6 +28,8 @@ enum Part {
     /// Writes into the labels of sets that have been run how far their physics is from the nearest wrong effect; continues an
     /// interrupted run.
     Separate(WhichArgs),
+    /// Prints what each value of the search's constants would do on the tuning sets that have been run.
+    Constants(WhichArgs),
     /// Prints how near rivals without a name come to the effects that are named in the tuning sets that have been run.
     Contests(WhichArgs),
     /// Prints how well the library's effects follow each form of hidden physics.
@@ -187,6 +189,7 @@ impl EvidenceArgs {
             Part::Run(args) => args.run(),
             Part::Score(which) => which.score().map(drop),
             Part::Separate(which) => which.separate(),
+            Part::Constants(which) => which.constants(),
             Part::Contests(which) => which.contests(),
             Part::Forms(args) => args.run(),
             Part::Time(args) => args.run(),
@@ -287,9 +290,20 @@ impl WhichArgs {
         separate(&self.sets(), &self.places(), cores(), &|id| println!("{id}"))
     }
 
+    fn constants(&self) -> Result<()> {
+        self.check_tuning()?;
+        println!("{}", constants_table(&Observed::read(&self.sets(), &self.places())?));
+        Ok(())
+    }
+
     fn contests(&self) -> Result<()> {
-        ensure!(self.seeds == Seeds::Tuning, "constants are chosen by this: take --seeds tuning");
+        self.check_tuning()?;
         println!("{}", contests_table(&contests(&self.sets(), &self.places())?));
+        Ok(())
+    }
+
+    fn check_tuning(&self) -> Result<()> {
+        ensure!(self.seeds == Seeds::Tuning, "constants are chosen by this: take --seeds tuning");
         Ok(())
     }
 

@@ -91,8 +91,14 @@ fn labels_and_reports_are_read_from_files() -> Result<()> {
     assert_eq!(read(std::slice::from_ref(&set), &places)?, [], "the set was not run");
 
     let label = set.recipe.make()?.label;
-    let ran =
-        Ran { program: String::new(), seconds: 9.0, processor_s: 2.5, peak_mib: 80.0, exit: Some(0), said: String::new() };
+    let ran = Ran {
+        program: String::new(),
+        seconds: 9.0,
+        processor_s: 2.5,
+        peak_mib: 80.0,
+        exit: Some(0),
+        said: String::new(),
+    };
     let report = json!({
         "split": { "frames": 3000, "train_presses": 20, "heldout_presses": 10 },
         "base": { "heldout_chi2": 1.5 },

@@ -72,9 +72,8 @@ impl Timing {
             let costs = (0..runs).map(|_| cost(tactus, &table, &out)).collect::<Result<Vec<_>>>()?;
             fs::rename(out.join("residuals.parquet"), place("residuals", "parquet"))?;
             fs::rename(out.join("report.json"), place("reports", "json"))?;
-            let median = |of: fn(&Watched) -> f64| {
-                quantile(costs.iter().map(of).collect(), 0.5).unwrap_or(f64::NAN)
-            };
+            let median =
+                |of: fn(&Watched) -> f64| quantile(costs.iter().map(of).collect(), 0.5).unwrap_or(f64::NAN);
             rows.push(Cost {
                 frames: *frames,
                 seconds: median(|cost| cost.seconds),

@@ -37,8 +37,8 @@ pub(crate) use grow::{
 };
 pub use grow::{Round, TriedEffect};
 pub(crate) use locate::Located;
-pub(crate) use memory::Memory;
 pub use locate::{Curve, Gap, Point};
+pub(crate) use memory::Memory;
 pub use not_shown::NotShown;
 pub use options::{Options, Rule};
 pub(crate) use score::{q_values, sign_flip_p};

@@ -50,7 +50,8 @@ impl Problem<'_> {
             return Ok(None);
         };
         let gains: Vec<f64> = less.iter().zip(&more).map(|(less, more)| less - more).collect();
-        let most = CLIP * NORMAL_PER_MEDIAN * median(&gains.iter().map(|gain| gain.abs()).collect::<Vec<_>>());
+        let most =
+            CLIP * NORMAL_PER_MEDIAN * median(&gains.iter().map(|gain| gain.abs()).collect::<Vec<_>>());
         Ok(Some(gains.into_iter().map(|gain| gain.clamp(-most, most)).collect()))
     }
 

@@ -51,7 +51,8 @@ fn what_is_left_is_what_fits_to_the_other_presses_leave() {
         let squares = weights.filter(|(place, _)| is_in(place / ELEMENTS));
         let wanted: f64 = squares.map(|(_, (weight, residual))| weight * residual * residual).sum();
         let of_blocks = left.iter().zip(&press_of_blocks);
-        let found: f64 = of_blocks.filter(|(_, (_, press))| press % FOLDS == fold).map(|(left, _)| left).sum();
+        let found: f64 =
+            of_blocks.filter(|(_, (_, press))| press % FOLDS == fold).map(|(left, _)| left).sum();
         assert!((found - wanted).abs() < 2e-3 * wanted, "fold {fold}: {found} {wanted}");
     }
 }

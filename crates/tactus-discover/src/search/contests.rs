@@ -36,7 +36,11 @@ pub struct Contest {
     pub ln_odds: f64,
     /// The rivals.
     pub rivals: Vec<Rivalry>,
-    /// False if it lost against one of them, so that it is no name.
+    /// Other classes that were fitted in its place, with the logarithm of their odds.
+    pub classes: Vec<(&'static str, f64)>,
+    /// What the model with it leaves beyond the noise of the fitted presses, as a logarithm of odds.
+    pub left: f64,
+    /// False if it is no name: it lost against a rival, or is too small beside another class.
     pub kept: bool,
 }
 
@@ -52,10 +56,16 @@ pub struct Rivalry {
 }
 
 impl Contest {
-    /// That of a class that lost against a rival in its place.
-    pub(super) fn refused(effect: &'static str, ln_odds: f64, rivals: Vec<(&'static str, f64)>) -> Self {
+    /// That of a class that lost against a rival in its place, or without rivals, that is too small.
+    pub(super) fn lost(
+        effect: &'static str,
+        ln_odds: f64,
+        left: f64,
+        rivals: Vec<(&'static str, f64)>,
+    ) -> Self {
         let rivalry = |(rival, instead)| Rivalry { rival, instead, beside: f64::NEG_INFINITY };
-        Self { effect, ln_odds, rivals: rivals.into_iter().map(rivalry).collect(), kept: false }
+        let rivals = rivals.into_iter().map(rivalry).collect();
+        Self { effect, ln_odds, rivals, classes: Vec::new(), left, kept: false }
     }
 
     /// True if the class is only the nearest form of what a rival describes.
@@ -89,7 +99,8 @@ impl Search<'_> {
             };
             let ln_odds = self.ln_odds(&alike.without, &formed.at);
             let rivals = alike.rivals.iter().map(rivalry).collect();
-            let contest = Contest { effect, ln_odds, rivals, kept: true };
+            let (classes, left) = (alike.classes.clone(), self.left_over(&formed.at));
+            let contest = Contest { effect, ln_odds, rivals, classes, left, kept: true };
             Some(Contest { kept: !contest.is_nearest_form(), ..contest })
         };
         let contests: Vec<Contest> = names.into_iter().filter_map(contest).collect();

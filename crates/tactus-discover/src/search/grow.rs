@@ -121,8 +121,9 @@ pub(crate) struct Alike {
     pub(crate) same: Vec<(&'static str, Fitted)>,
     /// Probability of the effect and of each other in its place, given that one of them is there; those not listed have hardly any.
     pub(crate) probabilities: Vec<(&'static str, f64)>,
-    /// Logarithm of the odds of each rival without a name in its place.
+    /// Logarithm of the odds of each rival without a name in its place, and of each other class that was fitted there.
     pub(crate) rivals: Vec<(&'static str, f64)>,
+    pub(crate) classes: Vec<(&'static str, f64)>,
 }
 
 /// What a grown model may still lack.
@@ -393,7 +394,11 @@ impl Search<'_> {
             for fit in &fits {
                 self.tell(fit, base, &mut tried.round);
             }
-            let taken = fits.into_iter().next().filter(|best| best.ln_odds > least);
+            let (taken, small) = match fits.into_iter().next() {
+                Some(best) if best.ln_odds > least => (Some(best), None),
+                best => (None, best.filter(|best| best.ln_odds > LN_ODDS_LEAST)),
+            };
+            grown.refused.extend(small.map(|of| self.too_small(of.name, of.ln_odds, &of.fitted)));
             tried.round.taken = taken.as_ref().map(|taken| taken.name);
             grown.rounds.push(tried);
             match taken {
@@ -527,8 +532,7 @@ impl Search<'_> {
             let terms = self.starts(pass, &evidence, &set, name);
             // A fit of several shapes may end at worse values than one of a single shape.
             let single = alone.iter().find(|(one, _)| terms.len() > 1 && pass.class_of(*one) == name);
-            let single =
-                single.map(|(one, _)| self.starts(pass, &evidence, &evidence.set([*one]), name));
+            let single = single.map(|(one, _)| self.starts(pass, &evidence, &evidence.set([*one]), name));
             starts.push((name, terms));
             starts.extend(single.map(|terms| (name, terms)));
         }
@@ -544,7 +548,7 @@ impl Search<'_> {
         let contest = |one: &Beside| {
             let (strength, rivals) = pass.rivalry(one.name, one.ln_odds);
             let is_beaten = best(&rivals) > strength + RIVAL_LN_ODDS && !best_has_names;
-            is_beaten.then(|| Contest::refused(one.name, one.ln_odds, rivals))
+            is_beaten.then(|| Contest::lost(one.name, one.ln_odds, self.left_over(&one.fitted), rivals))
         };
         let refused = fits.first().and_then(contest);
         if refused.is_some() {
@@ -634,6 +638,7 @@ impl Search<'_> {
             let worths: Vec<f64> = lesses.iter().enumerate().map(worth).collect();
             let weakest = worths.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
             if let Some((weakest, _)) = weakest.filter(|(_, worth)| **worth < 1.0) {
+                grown.refused.push(self.too_small(names[weakest], odds[weakest], &grown.at));
                 grown.at = self.fitted(grown, lesses[weakest].parameters.clone(), POLISH_ROUNDS)?;
                 continue 'again;
             }
@@ -652,7 +657,7 @@ impl Search<'_> {
                 // A rival that is ahead by no more than the misfit of forms is no better.
                 let unit = self.unit(ln_odds, &grown.at);
                 if best(&rivals) > strength + RIVAL_LN_ODDS.max(unit) {
-                    grown.refused.push(Contest::refused(name, ln_odds, rivals));
+                    grown.refused.push(Contest::lost(name, ln_odds, self.left_over(&grown.at), rivals));
                     grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
                 }
@@ -665,6 +670,7 @@ impl Search<'_> {
                     grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
                     continue 'again;
                 }
+                let classes = others.iter().map(|other| (other.name, other.ln_odds)).collect();
                 let model_leaves = match leaves {
                     Some(known) => known,
                     None if others.is_empty() => true,
@@ -680,7 +686,7 @@ impl Search<'_> {
                         same.push((other, fitted));
                     }
                 }
-                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals });
+                grown.equivalent.insert(name, Alike { without: less, same, probabilities, rivals, classes });
             }
             return Ok(());
         }
@@ -692,6 +698,10 @@ impl Search<'_> {
             Some(passed) => Ok(passed.clone()),
             None => self.problem.fit_from(from, rounds),
         }
+    }
+
+    fn too_small(&self, name: &'static str, ln_odds: f64, at: &Fitted) -> Contest {
+        Contest::lost(name, ln_odds, self.left_over(at), Vec::new())
     }
 
     /// What a class gains over the least gain with which it holds its place: from 1 on it does. What is small beside the
@@ -736,9 +746,13 @@ impl Search<'_> {
 
     /// What counts as one in differences of the logarithm of the odds between classes in one place.
     fn unit(&self, ln_odds: f64, at: &Fitted) -> f64 {
+        1.0 + MISFIT_SHARE * ln_odds.max(0.0) + LEFT_SHARE * self.left_over(at)
+    }
+
+    /// What a model leaves beyond the noise of the fitted presses, as a logarithm of odds.
+    pub(super) fn left_over(&self, at: &Fitted) -> f64 {
         let readings = self.problem.weights().filter(|weight| *weight > 0.0).count() as f64;
-        let left = (at.cost - readings).max(0.0) / (2.0 * self.problem.variance);
-        1.0 + MISFIT_SHARE * ln_odds.max(0.0) + LEFT_SHARE * left
+        (at.cost - readings).max(0.0) / (2.0 * self.problem.variance)
     }
 }
 

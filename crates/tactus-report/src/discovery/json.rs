@@ -224,7 +224,15 @@ struct ContestJson<'a> {
     effect: &'a str,
     ln_odds: f64,
     rivals: Vec<RivalryJson<'a>>,
+    classes: Vec<InPlaceJson<'a>>,
+    left_ln_odds: f64,
     kept: bool,
+}
+
+#[derive(Serialize)]
+struct InPlaceJson<'a> {
+    effect: &'a str,
+    ln_odds: f64,
 }
 
 #[derive(Serialize)]
@@ -473,6 +481,12 @@ impl<'a> ContestJson<'a> {
             effect: contest.effect,
             ln_odds: contest.ln_odds,
             rivals: contest.rivals.iter().map(rivalry).collect(),
+            classes: contest
+                .classes
+                .iter()
+                .map(|(effect, ln_odds)| InPlaceJson { effect, ln_odds: *ln_odds })
+                .collect(),
+            left_ln_odds: contest.left,
             kept: contest.kept,
         }
     }

@@ -11,7 +11,9 @@ use crate::plot::number;
 fn tentative(found: &Discovery) -> Option<String> {
     let names = list(found.tentative.iter().map(|step| step.effect));
     let of = || {
-        format!("Tentative: {names}. A fit shows it, but presses that the fit has not seen do not confirm it.")
+        format!(
+            "Tentative: {names}. A fit shows it, but presses that the fit has not seen do not confirm it."
+        )
     };
     (!found.tentative.is_empty()).then(of)
 }

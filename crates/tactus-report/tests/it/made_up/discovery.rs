@@ -142,7 +142,8 @@ fn contests() -> Vec<Contest> {
     let rivalry = |rival, instead, beside| Rivalry { rival, instead, beside };
     let rivals =
         vec![rivalry("sum of signals", 412.5, 3.25), rivalry("tone in counts", f64::NEG_INFINITY, -4.5)];
-    vec![Contest { effect: "hysteresis", ln_odds: 1530.25, rivals, kept: true }]
+    let classes = vec![("backlash", 1511.5)];
+    vec![Contest { effect: "hysteresis", ln_odds: 1530.25, rivals, classes, left: 0.75, kept: true }]
 }
 
 /// Nothing is missing from the base model.
