@@ -223,6 +223,16 @@ bench-discovery: bench-peers-tools
         json.dump({who: json.load(open(f"{at}{who}.json")) for who in ("ours", "peers")}, open(f"{at}costs.json", "w"), indent=1)'
     cat target/evidence/costs.json
 
+# The same tables from a first look at sealed sets: every physics once, strong, some 200 sets in half an hour on two cores.
+discovery-glance:
+    cargo build --profile dist --package tactus --package tactus-bench
+    target/dist/tactus-bench evidence run --seeds sealed --size glance --work target/evidence/glance/work \
+        --labels target/evidence/glance/labels
+    target/dist/tactus-bench evidence separate --seeds sealed --size glance --work target/evidence/glance/work \
+        --labels target/evidence/glance/labels
+    target/dist/tactus-bench evidence score --seeds sealed --size glance --work target/evidence/glance/work \
+        --labels target/evidence/glance/labels --document docs/discovery-evidence.md --images docs/images
+
 # Some 1,500 sets, two to four hours on two cores; it goes on where it was cut off, and says how long it still takes.
 # What discovery finds and names of hidden physics, beside other ways to go about it: docs/discovery-evidence.md.
 discovery-evidence: bench-discovery
@@ -244,6 +254,14 @@ discovery-active:
 discovery-quick: build
     rm -rf target/evidence/quick
     target/debug/tactus-bench evidence run --size quick --tactus target/debug/tactus \
+        --work target/evidence/quick/work --labels target/evidence/quick/labels
+
+# What the constants of the search rest on, from the same sets: how often sets of twins hold the hidden class, how large the odds of wrong
+# classes are, and how near rivals without a name come.
+discovery-constants: discovery-quick
+    target/debug/tactus-bench evidence constants --size quick \
+        --work target/evidence/quick/work --labels target/evidence/quick/labels
+    target/debug/tactus-bench evidence contests --size quick \
         --work target/evidence/quick/work --labels target/evidence/quick/labels
 
 # The part of it that fails if discovery has become worse: always the same 46 sets, some two minutes on two cores.

@@ -79,12 +79,14 @@ const EXCHANGES_MAX: usize = 4;
 /// Greatest number of other classes that are fitted in a class's place.
 const OTHERS_MAX: usize = 4;
 /// Real physics has not quite the form of the library: differences of the logarithm of the odds count for one part in
-/// `1 + MISFIT_SHARE x gain`.
+/// `1 + MISFIT_SHARE x gain`. From tuning sets: `just discovery-constants` prints how many sets hold the hidden class at each value, and
+/// their size.
 const MISFIT_SHARE: f64 = 0.02;
 /// As [`MISFIT_SHARE`], of what the model leaves beyond the noise. A form that misses so much may be another's: one that leaves twice the
 /// square that the best one leaves is out of the 95 % set, since `exp(-1 / LEFT_SHARE)` is 5 %.
 const LEFT_SHARE: f64 = 1.0 / 3.0;
-/// A class with less than this share of the strongest one's odds may be an error of that one's form.
+/// A class with less than this share of the strongest one's odds may be an error of that one's form. From tuning sets: 95 % of the wrong
+/// classes beside a right one are within it (`just discovery-constants`).
 const FORM_SHARE: f64 = 0.07;
 /// A class must gain so many standard errors, from the scatter of blocks.
 const BLOCKS_Z: f64 = 2.0;
