@@ -444,7 +444,9 @@ fn two_parts_of_a_measured_run_do_not_contradict_each_other() {
         }
         let path = folder.path().join(name);
         let mut table = TableWriter::create(&path, &rig.to_json()).unwrap();
-        of_part.iter().for_each(|row| table.push(row.into()).unwrap());
+        for row in &of_part {
+            table.push(row.into()).unwrap();
+        }
         table.finish().unwrap();
         path.to_str().unwrap().to_owned()
     };

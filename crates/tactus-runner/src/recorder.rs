@@ -298,11 +298,10 @@ impl ThreadRecorder {
         let living = Living::begin(gauge.clone());
         let recording = recording.map_storage(|storage| Watched::new(storage, gauge.clone()));
         let writer =
-            Writer { recording, gauge: gauge.clone(), sync_to, wished: None, at: MonoTime::default() };
+            Writer { queue, recording, gauge: gauge.clone(), sync_to, wished: None, at: MonoTime::default() };
         thread::Builder::new().name("recorder".into()).spawn(move || {
             let _living = living;
-            // `write_all` owns the queue: also after a panic, who sees that the thread has ended finds that it takes no message.
-            let result = writer.write_all(queue);
+            let result = writer.write_all();
             // Nobody may wait for the result any more.
             let _told = end.send(result);
         })?;
@@ -453,6 +452,8 @@ impl Entry {
 
 /// The recorder thread.
 struct Writer<S> {
+    /// It goes with the writer, also after a panic: who sees that the thread has ended finds that it takes no message.
+    queue: Receiver<Entry>,
     recording: Recording<S>,
     gauge: Gauge,
     sync_to: SyncSender<MonoTime>,
@@ -463,10 +464,10 @@ struct Writer<S> {
 
 impl<S: Storage> Writer<S> {
     /// Writes until the queue ends. After a failure it takes what comes nevertheless: the recording keeps what it can.
-    fn write_all(mut self, queue: Receiver<Entry>) -> Result<(), RecordError> {
+    fn write_all(mut self) -> Result<(), RecordError> {
         loop {
             self.gauge.0.life.beat();
-            let written = match queue.recv_timeout(IDLE) {
+            let written = match self.queue.recv_timeout(IDLE) {
                 Ok(entry) => {
                     let written = self.write(&entry);
                     self.gauge.show_unstored(self.recording.unstored());

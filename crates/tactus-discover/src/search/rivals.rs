@@ -157,7 +157,7 @@ fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>) -> Vec<
             point
         };
         let points: Vec<Point> = (0..bins.len()).map(point).collect();
-        clearest(points.into_iter())
+        clearest(&points.into_iter())
     };
     let of_bins = |name, values: Vec<f64>, form: Form, carrier: &dyn Fn(usize) -> f64| {
         let tone = in_bins(&values, carrier)?;
@@ -169,11 +169,12 @@ fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>) -> Vec<
     };
     let in_counts = || {
         let readings = residual.iter().zip(&weights).zip(&at.predicted);
-        let tone = clearest(readings.map(|((residual, weight), counts)| Point {
+        let points = readings.map(|((residual, weight), counts)| Point {
             value: *counts,
             wanted: weight * residual,
             square: *weight,
-        }))?;
+        });
+        let tone = clearest(&points)?;
         let column = |wave: fn(f64) -> f64| -> Direction<'a> {
             Direction::Column(Box::new(move |bins: Range<usize>| {
                 let counts = &at.predicted[bins.start * elements..bins.end * elements];
@@ -247,19 +248,19 @@ impl Seen {
         self.signal(bin, element) / self.largest[bin].max(f64::MIN_POSITIVE)
     }
 
-    fn from_tip_mm(&self, bin: usize, element: usize) -> [f64; 2] {
+    fn offset_from_tip_mm(&self, bin: usize, element: usize) -> [f64; 2] {
         let (centre, tip) = (self.centres_mm[element], self.place_mm[bin]);
         [centre[0] - tip[0], centre[1] - tip[1]]
     }
 
     fn distance_mm(&self, bin: usize, element: usize) -> f64 {
-        let [x, y] = self.from_tip_mm(bin, element);
+        let [x, y] = self.offset_from_tip_mm(bin, element);
         x.hypot(y)
     }
 
     /// How far the element is from the tip, along the direction of the last move aside.
     fn ahead_mm(&self, bin: usize, element: usize) -> f64 {
-        let [x, y] = self.from_tip_mm(bin, element);
+        let [x, y] = self.offset_from_tip_mm(bin, element);
         let [along_x, along_y] = [0, 1].map(|axis: usize| self.forms.history().aside[axis][bin]);
         (x * along_x + y * along_y) / along_x.hypot(along_y).max(1.0)
     }

@@ -43,7 +43,7 @@ pub(super) struct Point {
 }
 
 /// The clearest tone; `None` if the covariate does not vary.
-pub(super) fn clearest(points: impl Iterator<Item = Point> + Clone) -> Option<Tone> {
+pub(super) fn clearest(points: &(impl Iterator<Item = Point> + Clone)) -> Option<Tone> {
     let weighed = || points.clone().filter(|point| point.square > 0.0);
     let least = weighed().map(|point| point.value).fold(f64::INFINITY, f64::min);
     let most = weighed().map(|point| point.value).fold(f64::NEG_INFINITY, f64::max);
