@@ -8,16 +8,20 @@ fn reported(effect: &str, ln_odds: f64, classes: Vec<Class>, kept: bool) -> Repo
     Reported { effect: effect.into(), ln_odds, classes, left_ln_odds: 0.0, kept }
 }
 
+fn near(found: [f64; 2], wanted: [f64; 2]) -> bool {
+    found.iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1e-12)
+}
+
 #[test]
 fn a_hidden_class_that_is_behind_is_held_once_forms_may_mislead_by_as_much() {
     let mut observed = Observed::default();
     let behind = vec![class("low-pass", 990.0), class("relaxation", 500.0)];
     observed.add(&["low-pass"], &[reported("time-lag", 1000.0, behind, true)]);
     // e^-10 beside 1, then e^(-10/11) / sqrt(11) = 0.12 beside 1.
-    assert_eq!(observed.sets_at(0.0), [0.0, 1.0]);
-    assert_eq!(observed.sets_at(0.01), [1.0, 2.0]);
+    assert!(near(observed.sets_at(0.0), [0.0, 1.0]));
+    assert!(near(observed.sets_at(0.01), [1.0, 2.0]));
     observed.add(&["hardening"], &[reported("hardening", 800.0, Vec::new(), true)]);
-    assert_eq!(observed.sets_at(0.01), [1.0, 1.5]);
+    assert!(near(observed.sets_at(0.01), [1.0, 1.5]));
 }
 
 #[test]
