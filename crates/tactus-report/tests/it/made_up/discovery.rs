@@ -103,22 +103,7 @@ pub(crate) fn explained() -> Discovery {
         final_: Final { level: level(2.08), shrink: Some(0.996_1) },
         verdict: Verdict::Explained,
         unexplained: Unexplained { depends_on: vec![], share: 0.003_9 },
-        plan: Plan {
-            next: vec![NextExperiment {
-                experiment: "diagnose".into(),
-                parameters: vec![("parts", "approach".into())],
-                seed: 2_718_281_828,
-                duration_s: 60.0,
-                separates: ["hysteresis".into(), "backlash".into()],
-                expected_z: Some(11.3),
-            }],
-            open: vec![OpenQuestion { separates: ["miswired".into(), "crosstalk".into()], best: None }],
-            left_out: vec![LeftOut {
-                experiment: "lab/deep.star".into(),
-                parameters: vec![],
-                reason: "deep.star:7: no sample".into(),
-            }],
-        },
+        plan: plan(),
         recalibrated: base(),
         grown: base(),
         effects: vec![
@@ -138,6 +123,25 @@ fn inclusions() -> Vec<Inclusion> {
 }
 
 /// A rival that gains nothing has no odds.
+fn plan() -> Plan {
+    Plan {
+        next: vec![NextExperiment {
+            experiment: "diagnose".into(),
+            parameters: vec![("parts", "approach".into())],
+            seed: 2_718_281_828,
+            duration_s: 60.0,
+            separates: ["hysteresis".into(), "backlash".into()],
+            expected_z: Some(11.3),
+        }],
+        open: vec![OpenQuestion { separates: ["miswired".into(), "crosstalk".into()], best: None }],
+        left_out: vec![LeftOut {
+            experiment: "lab/deep.star".into(),
+            parameters: vec![],
+            reason: "deep.star:7: no sample".into(),
+        }],
+    }
+}
+
 fn contests() -> Vec<Contest> {
     let rivalry = |rival, instead, beside| Rivalry { rival, instead, beside };
     let rivals =
