@@ -3,10 +3,10 @@
 use std::fmt;
 
 use anyhow::Result;
-use serde::Deserialize;
 use tactus_sets::Label;
 
 use super::campaign::{Campaign, Planned};
+use super::contests::{Report, Reported};
 use super::outcome::parsed;
 use super::rate::quantile;
 use super::run::Places;
@@ -42,26 +42,6 @@ pub struct Observed {
     pub wrong_shares: Vec<f64>,
     /// In sets with several: odds of the weakest right class over those of the strongest.
     pub right_shares: Vec<f64>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Report {
-    contests: Vec<Reported>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Reported {
-    effect: String,
-    ln_odds: f64,
-    classes: Vec<Class>,
-    left_ln_odds: f64,
-    kept: bool,
-}
-
-#[derive(Debug, Deserialize)]
-struct Class {
-    effect: String,
-    ln_odds: f64,
 }
 
 impl Observed {

@@ -1,3 +1,4 @@
+use super::super::contests::Class;
 use super::*;
 
 fn class(effect: &str, ln_odds: f64) -> Class {
@@ -5,7 +6,7 @@ fn class(effect: &str, ln_odds: f64) -> Class {
 }
 
 fn reported(effect: &str, ln_odds: f64, classes: Vec<Class>, kept: bool) -> Reported {
-    Reported { effect: effect.into(), ln_odds, classes, left_ln_odds: 0.0, kept }
+    Reported { effect: effect.into(), ln_odds, rivals: Vec::new(), classes, left_ln_odds: 0.0, kept }
 }
 
 fn near(found: [f64; 2], wanted: [f64; 2]) -> bool {

@@ -33,21 +33,31 @@ pub struct Contest {
     pub beside: Option<(String, f64)>,
 }
 
+/// The contests of a report.
 #[derive(Debug, Deserialize)]
-struct Report {
-    contests: Vec<Reported>,
+pub(super) struct Report {
+    pub(super) contests: Vec<Reported>,
 }
 
 #[derive(Debug, Deserialize)]
-struct Reported {
-    effect: String,
-    ln_odds: f64,
-    rivals: Vec<Rivalry>,
-    kept: bool,
+pub(super) struct Reported {
+    pub(super) effect: String,
+    pub(super) ln_odds: f64,
+    pub(super) rivals: Vec<Rivalry>,
+    /// Other classes in its place.
+    pub(super) classes: Vec<Class>,
+    pub(super) left_ln_odds: f64,
+    pub(super) kept: bool,
 }
 
 #[derive(Debug, Deserialize)]
-struct Rivalry {
+pub(super) struct Class {
+    pub(super) effect: String,
+    pub(super) ln_odds: f64,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Rivalry {
     rival: String,
     instead_ln_odds: Option<f64>,
     beside_ln_odds: Option<f64>,

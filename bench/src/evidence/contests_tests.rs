@@ -7,7 +7,9 @@ fn rivalry(rival: &str, instead: f64, beside: f64) -> Rivalry {
 #[test]
 fn only_rivals_that_act_like_a_class_count_beside_it() {
     let rivals = vec![rivalry("place", 80.0, 12.0), rivalry("tone in x", 20.0, 70.0)];
-    let reported = Reported { effect: "backlash".into(), ln_odds: 100.0, rivals, kept: true };
+    let effect = "backlash".into();
+    let reported =
+        Reported { effect, ln_odds: 100.0, rivals, classes: Vec::new(), left_ln_odds: 0.0, kept: true };
     let label = tactus_sets::Recipe::new(3).make().unwrap().label;
     let contest = Contest::of("outside/any", &label, &reported);
     assert_eq!(contest.instead, Some(("place".into(), 0.8)));

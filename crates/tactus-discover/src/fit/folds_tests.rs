@@ -3,8 +3,19 @@ use rand_chacha::ChaCha8Rng;
 use tactus_model::Effect;
 
 use super::*;
+use crate::data::{Frames, Known};
 use crate::fit::{Prepared, Term};
 use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
+
+fn hardening() -> Effect {
+    Effect::new("hardening", [("growth_at_1_mm", 0.5), ("exponent", 2.0), ("own_share", 0.0)]).unwrap()
+}
+
+/// Presses of a sensor with that effect, and white noise of one count.
+fn hardened(known: &Known, seed: u64) -> Frames {
+    let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(seed));
+    measured(known, &[hardening()], &noise)
+}
 
 /// The press of each bin, counted from 0 among those with fitted bins.
 fn presses(problem: &Problem<'_>) -> Vec<Option<usize>> {
@@ -24,11 +35,8 @@ fn presses(problem: &Problem<'_>) -> Vec<Option<usize>> {
 /// Each fold by itself: a fit to the other presses, without any approximation, then its residual.
 #[test]
 fn what_is_left_is_what_fits_to_the_other_presses_leave() {
-    let known = known();
-    let hidden =
-        Effect::new("hardening", [("growth_at_1_mm", 0.5), ("exponent", 2.0), ("own_share", 0.0)]).unwrap();
-    let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(5));
-    let frames = measured(&known, std::slice::from_ref(&hidden), &noise);
+    let (known, hidden) = (known(), hardening());
+    let frames = hardened(&known, 5);
     let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
     let problem = prepared.problem();
     let at = problem.fit_from(prepared.base.parameters.with(Term::of(&hidden)), 12).unwrap();
@@ -59,11 +67,8 @@ fn what_is_left_is_what_fits_to_the_other_presses_leave() {
 
 #[test]
 fn presses_that_a_fit_has_not_seen_are_further_from_it_and_a_true_effect_gains_on_them() {
-    let known = known();
-    let hidden =
-        Effect::new("hardening", [("growth_at_1_mm", 0.5), ("exponent", 2.0), ("own_share", 0.0)]).unwrap();
-    let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(6));
-    let frames = measured(&known, std::slice::from_ref(&hidden), &noise);
+    let (known, hidden) = (known(), hardening());
+    let frames = hardened(&known, 6);
     let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
     let problem = prepared.problem();
     let with = problem.fit_from(prepared.base.parameters.with(Term::of(&hidden)), 12).unwrap();
