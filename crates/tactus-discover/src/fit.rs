@@ -26,6 +26,7 @@ mod random_walk;
 mod scale;
 mod sums;
 
+pub(crate) use folds::gains_by_folds;
 pub(crate) use grams::Grams;
 pub(crate) use heldout::LOUD;
 pub(crate) use knots::{of_formulas, places};

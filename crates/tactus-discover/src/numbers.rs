@@ -9,7 +9,7 @@ pub(crate) mod parallel;
 mod quantiles;
 mod rng;
 
-pub(crate) use median::median;
+pub(crate) use median::{NORMAL_PER_MEDIAN, median};
 pub(crate) use normal::of_picked;
 pub(crate) use quantiles::{Z_95, student_95};
 pub(crate) use rng::Rng;

@@ -5,15 +5,13 @@
 
 use super::frames::Frames;
 use super::motion::interval_s;
-use crate::numbers::median;
+use crate::numbers::{NORMAL_PER_MEDIAN, median};
 
 /// Least height of a line above the surrounding power, in units of the scatter of that power. The sum over elements with
 /// independent noise scatters less.
 const STANDS_OUT: f64 = 8.0;
 /// Factor over the surrounding power at which the rhythm of the presses has a line.
 const RHYTHM_STANDS_OUT: f64 = 6.0;
-/// Standard deviation of a normal distribution with a median absolute deviation of 1.
-const OF_NORMAL: f64 = 1.482_602_2;
 /// Number of frequencies on each side that count as surrounding.
 const AROUND: usize = 40;
 /// Least number of periods in the data; anything slower is a drift.
@@ -103,7 +101,7 @@ pub(crate) fn lines_hz(frames: &Frames, residual: &[f64]) -> Vec<f64> {
 fn clearness(power: f64, around: &[f64]) -> f64 {
     let middle = median(around);
     let off: Vec<f64> = around.iter().map(|one| (one - middle).abs()).collect();
-    (power - middle) / (OF_NORMAL * median(&off)).max(f64::MIN_POSITIVE)
+    (power - middle) / (NORMAL_PER_MEDIAN * median(&off)).max(f64::MIN_POSITIVE)
 }
 
 /// The discrete Fourier transform in place; the number of points is a power of two.

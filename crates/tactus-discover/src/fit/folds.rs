@@ -4,7 +4,7 @@
 //! linear approximation at the model that is fitted to all, and the weighted squares of what is left are summed over the blocks of the
 //! fold. Both take only products of the directions, block by block, which one pass gives ([`super::sums`]).
 //!
-//! Presses of which a parameter depends may all be in one fold. So each parameter has a prior: the coefficients of a class that it had with
+//! The presses that show a parameter may all be in one fold. So each parameter has a prior: the coefficients of a class that it had with
 //! the evidence ([`Prior`]), and of any other parameter that it stays within the longest step of a fit.
 //!
 //! The held-out presses take no part.
@@ -18,16 +18,14 @@ use super::elimination::Elimination;
 use super::parameters::Parameters;
 use super::problem::{Fitted, Free, Problem};
 use super::scale::Scale;
-use super::sums::{Block, Border, Kept, Segments, Total};
+use super::sums::{Block, Kept, Segments, Total, add};
 use crate::data::DiscoverError;
-use crate::numbers::median;
+use crate::numbers::{NORMAL_PER_MEDIAN, median};
 
 /// Number of folds. The fit of each has four fifths of the presses.
 const FOLDS: usize = 5;
 /// Greatest part of a block, in standard deviations.
 const CLIP: f64 = 4.0;
-/// Standard deviation over the median of the absolute value, of a normal density.
-const NORMAL_PER_MEDIAN: f64 = 1.482_602;
 
 /// What is known of a parameter before a fold is fitted: a normal density, on the parameter's [`Scale`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,25 +36,9 @@ struct Prior {
 }
 
 impl Problem<'_> {
-    /// By how much `more` is nearer than `less` to fitted presses that a fit to the others predicts, block by block, in units of the noise's
-    /// variance. A block counts at most four standard deviations: the press at the end of a drift, for example, is out of reach for a fit to
-    /// the others. `None` for models with random walks, which have a state of their own in every press.
-    pub(crate) fn gains_by_folds(
-        &self,
-        less: &Fitted,
-        more: &Fitted,
-    ) -> Result<Option<Vec<f64>>, DiscoverError> {
-        let Some((less, more)) = self.left_by_folds(less)?.zip(self.left_by_folds(more)?) else {
-            return Ok(None);
-        };
-        let gains: Vec<f64> = less.iter().zip(&more).map(|(less, more)| less - more).collect();
-        let most =
-            CLIP * NORMAL_PER_MEDIAN * median(&gains.iter().map(|gain| gain.abs()).collect::<Vec<_>>());
-        Ok(Some(gains.into_iter().map(|gain| gain.clamp(-most, most)).collect()))
-    }
-
-    /// The weighted squares of what a model leaves, block by block, each predicted by a fit to the other folds.
-    fn left_by_folds(&self, at: &Fitted) -> Result<Option<Vec<f64>>, DiscoverError> {
+    /// The weighted squares of what a model leaves, block by block, each predicted by a fit to the other folds. `None` for models with
+    /// random walks, which have a state of their own in every press.
+    pub(crate) fn left_by_folds(&self, at: &Fitted) -> Result<Option<Vec<f64>>, DiscoverError> {
         if at.parameters.walk.is_some() {
             return Ok(None);
         }
@@ -148,6 +130,15 @@ impl Problem<'_> {
     }
 }
 
+/// By how much a model that leaves `more` is nearer than one that leaves `less` to presses that a fit to the others predicts, block by
+/// block, in units of the noise's variance. A block counts at most four standard deviations: the press at the end of a drift, for
+/// example, is out of reach for a fit to the others.
+pub(crate) fn gains_by_folds(less: &[f64], more: &[f64]) -> Vec<f64> {
+    let gains: Vec<f64> = less.iter().zip(more).map(|(less, more)| less - more).collect();
+    let most = CLIP * NORMAL_PER_MEDIAN * median(&gains.iter().map(|gain| gain.abs()).collect::<Vec<_>>());
+    gains.into_iter().map(|gain| gain.clamp(-most, most)).collect()
+}
+
 /// The sums over some blocks.
 fn sum<'a>(
     blocks: impl Iterator<Item = &'a Block>,
@@ -156,19 +147,13 @@ fn sum<'a>(
     problem: &Problem<'_>,
 ) -> Total {
     let elements = problem.predictor.bins.elements;
-    let mut total = Total {
-        products: DMatrix::zeros(own + 1, own + 1),
-        segments: vec![Border::new(own + 1, elements); segments.run.len()],
-        blocks: Vec::new(),
-    };
+    let mut total = Total::new(own + 1, elements, segments.run.len());
     for block in blocks {
         total.products += block.rows.map(f64::from);
         let border = &mut total.segments[block.segment];
         border.by_baseline += block.by_baseline.map(f64::from);
         border.by_gain += block.by_gain.map(f64::from);
-        for (sum, of) in border.own.iter_mut().flatten().zip(block.own.iter().flatten()) {
-            *sum += of;
-        }
+        add(&mut border.own, &block.own);
     }
     total
 }

@@ -74,7 +74,8 @@ fn presses_that_a_fit_has_not_seen_are_further_from_it_and_a_true_effect_gains_o
     let with = problem.fit_from(prepared.base.parameters.with(Term::of(&hidden)), 12).unwrap();
     let left: f64 = problem.left_by_folds(&with).unwrap().unwrap().iter().sum();
     assert!(left > with.cost, "{left} {}", with.cost);
-    let gains = problem.gains_by_folds(&prepared.base, &with).unwrap().unwrap();
+    let [base, with] = [&prepared.base, &with].map(|at| problem.left_by_folds(at).unwrap().unwrap());
+    let gains = gains_by_folds(&base, &with);
     let gained = gains.iter().filter(|gain| **gain > 0.0).count();
     assert!(2 * gained > gains.len(), "{gained} of {}", gains.len());
 }

@@ -323,7 +323,7 @@ impl Running<'_> {
 }
 
 impl Border {
-    pub(super) fn new(count: usize, elements: usize) -> Self {
+    fn new(count: usize, elements: usize) -> Self {
         let zeros = || DMatrix::zeros(elements, count);
         Self { by_baseline: zeros(), by_gain: zeros(), own: vec![[0.0; 3]; elements] }
     }
@@ -335,14 +335,14 @@ impl Border {
     }
 }
 
-fn add(to: &mut [[f64; 3]], of: &[[f64; 3]]) {
+pub(super) fn add(to: &mut [[f64; 3]], of: &[[f64; 3]]) {
     for (to, of) in to.iter_mut().flatten().zip(of.iter().flatten()) {
         *to += of;
     }
 }
 
 impl Total {
-    fn new(count: usize, elements: usize, segments: usize) -> Self {
+    pub(super) fn new(count: usize, elements: usize, segments: usize) -> Self {
         Self {
             products: DMatrix::zeros(count, count),
             segments: vec![Border::new(count, elements); segments],

@@ -1,5 +1,8 @@
 //! The median.
 
+/// Standard deviation of a normal distribution with a median absolute deviation of 1.
+pub(crate) const NORMAL_PER_MEDIAN: f64 = 1.482_602_2;
+
 /// The median; 0 of no values.
 pub(crate) fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();

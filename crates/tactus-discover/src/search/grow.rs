@@ -152,7 +152,7 @@ pub(crate) struct Grown {
     pub(crate) equivalent: Equivalent,
     /// The models of the rounds: the base, and each with one more class.
     path: Vec<Fitted>,
-    /// Classes that lost against a rival without a name.
+    /// Classes that lost against a rival without a name, or are too small beside another.
     pub(crate) refused: Vec<Contest>,
 }
 

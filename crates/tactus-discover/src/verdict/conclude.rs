@@ -11,7 +11,7 @@ use super::discovery::{
 };
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
-use crate::fit::{Fitted, LOUD, Parameters, Prepared, Problem, RandomWalk, Term};
+use crate::fit::{Fitted, LOUD, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
     ALPHA, Alike, Contest, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS,
@@ -541,6 +541,7 @@ impl Search<'_> {
     ) -> Result<Vec<Step>, DiscoverError> {
         let known_terms = self.problem.predictor.known.effects.len();
         let names = names(&grown.parameters, known_terms);
+        let of_grown = if names.is_empty() { None } else { self.problem.left_by_folds(grown)? };
         let mut steps = Vec::new();
         for name in names {
             let problem = if name == MISWIRED { with_silent } else { self.problem };
@@ -571,7 +572,8 @@ impl Search<'_> {
             };
             let curve = refuted.get(name).and_then(|formula| fitted_curve(grown, name, formula));
             let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
-            let by_folds = self.problem.gains_by_folds(&before, grown)?;
+            let of_less = self.problem.left_by_folds(&before)?;
+            let by_folds = of_less.zip(of_grown.as_ref()).map(|(less, grown)| gains_by_folds(&less, grown));
             let blocks = by_folds.iter().flatten().filter(|gain| **gain != 0.0).count();
             let least_p = 0.5_f64.powf(blocks as f64);
             let added = AddedEffect {
