@@ -73,7 +73,7 @@ fn discover_on_threads(
         Rule::Bic => search.grow_by_bic(base.clone())?,
     };
     let formed = match options.rule {
-        Rule::Protocol => search.formed(grown)?,
+        Rule::Protocol => search.formed(grown, &equivalent)?,
         Rule::Bic => Formed::from(grown),
     };
     let (formed, mut contests) = search.contested(formed, &mut equivalent)?;

@@ -29,7 +29,7 @@ mod sums;
 pub(crate) use folds::gains_by_folds;
 pub(crate) use grams::Grams;
 pub(crate) use heldout::LOUD;
-pub(crate) use knots::{of_formulas, places};
+pub(crate) use knots::{hat, of_formulas, places, table_places};
 pub(crate) use parameters::{Parameters, Term};
 pub(crate) use predictor::Predictor;
 pub(crate) use prepare::Prepared;

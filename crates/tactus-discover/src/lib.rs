@@ -24,5 +24,5 @@ pub use search::{Contest, Curve, Gap, NotShown, Options, Point, Rivalry, Round, 
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 pub use verdict::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
-    Inclusion, Level, Split, Structured, Unexplained, Verdict,
+    Inclusion, Level, ReplacedFormula, Split, Structured, Unexplained, Verdict,
 };

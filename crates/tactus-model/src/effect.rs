@@ -34,6 +34,19 @@
 //! # Ok::<(), tactus_model::effect::EffectError>(())
 //! ```
 //!
+//! **Tables.** A parameter that [`varies`](Parameter::varies) may have, in place of one value, a [`Table`] of the tip's depth or place: a tool
+//! with a rounded rim is narrower where it only touches.
+//!
+//! ```
+//! use tactus_model::Effect;
+//! use tactus_model::effect::{By, Table};
+//!
+//! let rim = Table { by: By::Depth, at: vec![0.0, 0.1], values: vec![0.8, 1.0] };
+//! let rounded = Effect::new("indenter-size", [("ratio", 1.0)])?.with_table("ratio", rim)?;
+//! assert_eq!(rounded.value("ratio"), None);
+//! # Ok::<(), tactus_model::effect::EffectError>(())
+//! ```
+//!
 //! **The library**, in [`REGISTRY`]; these names are a contract of reports and model files:
 //!
 //! | stage | effects |
@@ -113,6 +126,7 @@ mod softening;
 mod stage;
 mod surface_offset;
 mod surface_tilt;
+mod table;
 mod time_lag;
 
 /// The page on adding one: its last example runs.
@@ -123,6 +137,8 @@ struct AddingAnEffect;
 pub use definition::{Definition, Effect, EffectError, Make, Parameter, ParameterKind, PipelineStage};
 pub use knots::{CurveKind, FreeCurve, KNOTS_MAX, Knots, Values};
 pub use stage::{BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, TipState};
+pub(crate) use table::Tabled;
+pub use table::{By, PLACES_MAX, Table};
 
 /// Every effect of the library, in the order of the stages.
 pub static REGISTRY: &[&Definition] = &[

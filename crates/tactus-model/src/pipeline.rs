@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::effect::{
     BaseModel, Effect, EffectError, Load, Make, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout,
-    TipState,
+    Tabled, TipState,
 };
 use crate::{
     Contact, Covering, ForwardModel, Images, Indenter, Path, PressTable, PressTableError, Readout,
@@ -297,7 +297,11 @@ impl Stages {
         let mut stages = Self::default();
         for effect in effects {
             let values = effect.values();
+            let is_tabled = effect.tables().next().is_some();
             match effect.definition().make {
+                Make::Motion(make) if is_tabled => stages.motion.push(Box::new(Tabled::of(make, values))),
+                Make::Contact(make) if is_tabled => stages.contact.push(Box::new(Tabled::of(make, values))),
+                Make::Covering(make) if is_tabled => stages.covering.push(Box::new(Tabled::of(make, values))),
                 Make::Motion(make) => stages.motion.push(make(values)),
                 Make::Contact(make) => stages.contact.push(make(values)),
                 Make::Covering(make) => stages.covering.push(make(values)),
@@ -327,8 +331,8 @@ impl Pressed {
         self.contact = contact;
         let mut lean = [0.0; 2];
         for effect in &stages.contact {
+            let [x, y] = effect.lean(&self.contact);
             effect.touch(base, &mut self.contact);
-            let [x, y] = effect.lean();
             lean = [lean[0] + x, lean[1] + y];
         }
         if lean.iter().any(|by| *by != 0.0) {

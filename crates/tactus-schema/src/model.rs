@@ -12,6 +12,14 @@
 //! parameters = { own_share = 0.0 }
 //! knots = { at_mm = [0.2, 0.4, 0.6], growth = [0.0, 0.3, 0.4] }
 //! ```
+//!
+//! A parameter that may differ with where the tip stands ([`tactus_model::effect::Parameter::varies`]) has a value or a table:
+//!
+//! ```toml
+//! [[effect]]
+//! name = "indenter-size"
+//! tables.ratio = { by = "depth_mm", at = [0.0, 0.2], values = [0.8, 1.0] }
+//! ```
 
 mod file;
 

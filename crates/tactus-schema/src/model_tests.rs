@@ -222,3 +222,44 @@ fn on_another_array_the_elements_are_alike_and_the_spread_is_the_same() {
     forward.image(&contact, Covering { thickness_mm: 1.016 }, &mut counts);
     assert!((counts[130] - (100.0 + 923.5 * 0.5)).abs() < 1e-9);
 }
+
+const TABLED: &str = r#"
+[[effect]]
+name = "indenter-tilt"
+parameters = { tilt_y_deg = 0.0, touched_share = 0.5 }
+tables.tilt_x_deg = { by = "x_mm", at = [0.0, 0.30000000000000004], values = [0.0, 3.3333333333333335] }
+"#;
+
+#[test]
+fn a_parameter_may_have_a_table_in_place_of_its_value() {
+    let model = Model::from_toml(&format!("{DIGITACTS}{TABLED}")).unwrap();
+    let (name, table) = model.effects[0].effect.tables().next().unwrap();
+    assert_eq!((name, table.value(0.1 + 0.2), table.value(9.0)), ("tilt_x_deg", 10.0 / 3.0, 10.0 / 3.0));
+    assert_eq!(model.effects[0].effect.value("tilt_x_deg"), None);
+    let text = model.to_toml().unwrap();
+    assert_eq!(Model::from_toml(&text).unwrap(), model, "to the bit: {text}");
+    for (from, to, error) in [
+        ("x_mm", "force_n", "effect[0].tables.tilt_x_deg.by: must be one of depth_mm, x_mm, y_mm"),
+        ("tables.tilt_x_deg", "tables.lean", "effect[0]: indenter-tilt: no parameter \"lean\""),
+        (
+            "tilt_y_deg = 0.0",
+            "tilt_y_deg = 0.0, tilt_x_deg = 1",
+            "effect[0]: indenter-tilt: tilt_x_deg is replaced by its table",
+        ),
+        (
+            "[0.0, 3.3333333333333335]",
+            "[0.0, 11]",
+            "effect[0]: indenter-tilt: the table of tilt_x_deg must have values from -10 to 10",
+        ),
+        (
+            "[0.0, 3.3333333333333335]",
+            "[0.0]",
+            "effect[0]: indenter-tilt: the table of tilt_x_deg must have 1 to 64 places",
+        ),
+    ] {
+        assert!(TABLED.contains(from), "there is no {from:?}");
+        let text = format!("{DIGITACTS}{}", TABLED.replacen(from, to, 1));
+        let refused = Model::from_toml(&text).unwrap_err().to_string();
+        assert!(refused.contains(error), "{refused}");
+    }
+}

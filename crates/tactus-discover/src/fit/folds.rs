@@ -84,8 +84,8 @@ impl Problem<'_> {
             }
             Free::Knot { term, knot } => {
                 let of = &at.terms[term];
-                let value = of.knots.as_ref().map_or(0.0, |knots| knots.values[knot]);
-                Some((of.definition.name, value, 1.0))
+                let (value, width) = of.knot(knot)?;
+                Some((of.definition.name, value, if of.tables.is_empty() { 1.0 } else { width }))
             }
             Free::SigmaIntercept | Free::SigmaSlope | Free::RunGain { .. } => None,
         };

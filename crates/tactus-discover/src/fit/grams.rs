@@ -44,7 +44,7 @@ impl Problem<'_> {
     ) -> Result<Grams, DiscoverError> {
         let mut all = self.own(&at.parameters);
         let own = all.len();
-        all.extend(directions);
+        all.extend(directions.into_iter().map(|direction| direction.after(own)));
         let segments = Segments::of(self, &at.parameters);
         let total = self.sums(&at.parameters, &at.predicted, all, own, kept, &segments)?;
         let mut elimination = Elimination::of(self, &total, &segments, &at.parameters);
@@ -71,7 +71,7 @@ impl Problem<'_> {
     ) -> Result<Vec<f64>, DiscoverError> {
         let mut all = self.own(at);
         let own = all.len();
-        all.extend(directions);
+        all.extend(directions.into_iter().map(|direction| direction.after(own)));
         let mut elimination = self.eliminated(at, predicted, all)?;
         elimination.sweep(own);
         let last = elimination.reduced.nrows() - 1;

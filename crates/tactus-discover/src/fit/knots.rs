@@ -7,10 +7,12 @@
 //! Least squares under bounds: C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems* (1974), chapter 23.
 
 use nalgebra::{DMatrix, DVector};
-use tactus_model::effect::{CurveKind, FreeCurve, Knots};
+use tactus_model::Registration;
+use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Table};
 
 use super::parameters::Term;
-use super::problem::solve;
+use super::problem::{Problem, solve};
+use super::scale::Scale;
 use crate::data::{Frames, interval_s};
 
 /// Step of a value for derivatives, as a share of its range.
@@ -19,9 +21,21 @@ const STEP: f64 = 1e-3;
 const OF_LINE: usize = 10;
 const OF_TIMES: usize = 9;
 const OF_THRESHOLDS: usize = 8;
+/// Number of places of a table, and the least distance from the first to the last, in mm.
+const OF_TABLE: usize = 5;
+const APART_MM: f64 = 0.05;
 /// The narrowest threshold and the slowest speed, as shares of the greatest.
 const LEAST_THRESHOLD: f64 = 0.03;
 const LEAST_SPEED: f64 = 0.01;
+
+/// The values among which a knot is, and their rules.
+struct Listed<'a> {
+    values: &'a [f64],
+    /// The knot's number among them.
+    at: usize,
+    range: [f64; 2],
+    rises: bool,
+}
 
 impl Term {
     /// The curve that its effect may have.
@@ -29,23 +43,85 @@ impl Term {
         self.definition.curve.as_ref()
     }
 
+    /// True if it has knots or a table.
+    pub(crate) fn is_free(&self) -> bool {
+        self.listed() > 0
+    }
+
+    /// Moves all its knots from their neutral values: those of a curve by these steps, those of a table by steps on the parameter's scale.
+    pub(crate) fn free_steps(&mut self, steps: &[f64], duration_s: f64) {
+        for (knot, step) in steps.iter().enumerate() {
+            if let Some((table, at)) = self.table_at(knot) {
+                let (parameter, table) = &mut self.tables[table];
+                let scale = Scale::of(&self.definition.parameters[*parameter], duration_s);
+                table.values[at] = scale.forward(table.values[at], scale.bounded(*step));
+            } else {
+                self.move_knot(knot, *step);
+            }
+        }
+    }
+
+    /// A knot's value, less that at which the effect changes nothing, and the width of its range.
+    pub(super) fn knot(&self, knot: usize) -> Option<(f64, f64)> {
+        let Listed { values, at, range, .. } = self.listed_at(knot)?;
+        let neutral = self.table_at(knot).map_or(0.0, |(table, _)| {
+            let (parameter, _) = self.tables[table];
+            self.definition.parameters[parameter].neutral
+        });
+        Some((values[at] - neutral, range[1] - range[0]))
+    }
+
+    /// True if a knot's value must not be less than the one before.
+    pub(super) fn rises(&self, knot: usize) -> bool {
+        self.listed_at(knot).is_some_and(|listed| listed.rises)
+    }
+
+    /// Those of its curve come first, then those of its tables.
+    fn listed_at(&self, knot: usize) -> Option<Listed<'_>> {
+        if let Some((table, at)) = self.table_at(knot) {
+            let (parameter, table) = &self.tables[table];
+            let range = self.definition.parameters[*parameter].range;
+            return Some(Listed { values: &table.values, at, range, rises: false });
+        }
+        let (curve, knots) = self.curve().zip(self.knots.as_ref())?;
+        Some(Listed { values: &knots.values, at: knot, range: curve.range, rises: curve.increasing })
+    }
+
+    /// The table that a knot is in, and its number there; `None` if it is one of the curve's.
+    fn table_at(&self, knot: usize) -> Option<(usize, usize)> {
+        let mut at = knot.checked_sub(self.knots.as_ref().map_or(0, |knots| knots.values.len()))?;
+        for (table, (_, of)) in self.tables.iter().enumerate() {
+            if at < of.values.len() {
+                return Some((table, at));
+            }
+            at -= of.values.len();
+        }
+        None
+    }
+
+    fn listed_mut(&mut self, knot: usize) -> Option<&mut Vec<f64>> {
+        match self.table_at(knot) {
+            Some((table, _)) => Some(&mut self.tables[table].1.values),
+            None => self.knots.as_mut().map(|knots| &mut knots.values),
+        }
+    }
+
     /// Moves a value, or from one knot on all values, and returns by how much; less than `step` at the end of the range.
     pub(super) fn move_knot(&mut self, knot: usize, step: f64) -> f64 {
         let least_step = self.least_step(knot);
-        let Some((curve, knots)) = self.definition.curve.as_ref().zip(self.knots.as_mut()) else {
+        let Some(Listed { values, at, range: [least, most], rises }) = self.listed_at(knot) else {
             return 0.0;
         };
-        let moved = if curve.increasing { &mut knots.values[knot..] } else { &mut knots.values[knot..=knot] };
-        let [least, most] = curve.range;
-        let last = moved.last().copied().unwrap_or_default();
-        let taken = step.max(least_step).min((most - last).max(0.0));
+        let last = if rises { values.len() - 1 } else { at };
+        let taken = step.max(least_step).min((most - values[last]).max(0.0));
+        let Some(values) = self.listed_mut(knot) else { return 0.0 };
         // Rounding must not bring a value out of its range, or below the one before.
-        for value in moved {
+        for value in &mut values[at..=last] {
             *value = (*value + taken).clamp(least, most);
         }
-        if curve.increasing {
-            for knot in knot.max(1)..knots.values.len() {
-                knots.values[knot] = knots.values[knot].max(knots.values[knot - 1]);
+        if rises {
+            for knot in at.max(1)..values.len() {
+                values[knot] = values[knot].max(values[knot - 1]);
             }
         }
         taken
@@ -53,18 +129,53 @@ impl Term {
 
     /// A small step of a knot, for a derivative: away from the end of the range.
     pub(super) fn small_step(&self, knot: usize) -> f64 {
-        let Some((curve, knots)) = self.curve().zip(self.knots.as_ref()) else { return 0.0 };
-        let step = STEP * (curve.range[1] - curve.range[0]);
-        let last = if curve.increasing { knots.values.len() - 1 } else { knot };
-        if knots.values[last] + step > curve.range[1] { -step } else { step }
+        let Some(Listed { values, at, range, rises }) = self.listed_at(knot) else { return 0.0 };
+        let step = STEP * (range[1] - range[0]);
+        let last = if rises { values.len() - 1 } else { at };
+        if values[last] + step > range[1] { -step } else { step }
     }
 
     /// The least step of a knot that its class allows: not above 0.
     pub(super) fn least_step(&self, knot: usize) -> f64 {
-        let Some((curve, knots)) = self.curve().zip(self.knots.as_ref()) else { return 0.0 };
-        let before = knot.checked_sub(1).filter(|_| curve.increasing).map(|before| knots.values[before]);
-        before.unwrap_or(curve.range[0]) - knots.values[knot]
+        let Some(Listed { values, at, range, rises }) = self.listed_at(knot) else { return 0.0 };
+        let before = at.checked_sub(1).filter(|_| rises).map(|before| values[before]);
+        before.unwrap_or(range[0]) - values[at]
     }
+}
+
+impl Problem<'_> {
+    /// For each place of a table, its weight at each bin.
+    pub(crate) fn weights_at(&self, table: &Table) -> Vec<Vec<f64>> {
+        let (bins, frames) = (self.predictor.bins, self.predictor.frames);
+        let registration = &self.predictor.known.registration;
+        let place = |bin: usize| place(table.by, &frames.position_mm[bins.first[bin]], registration);
+        let places: Vec<f64> = (0..bins.len()).map(place).collect();
+        let weights = |knot| places.iter().map(|place| hat(&table.at, knot, *place)).collect();
+        (0..table.at.len()).map(weights).collect()
+    }
+}
+
+/// Where the tip stands, as a table has it; the covering's surface is at a height of 0.
+fn place(by: By, [x_mm, y_mm, z_mm]: &[f64; 3], registration: &Registration) -> f64 {
+    let [x_mm, y_mm] = registration.to_sensor([*x_mm, *y_mm]);
+    match by {
+        By::Depth => -z_mm,
+        By::X => x_mm,
+        By::Y => y_mm,
+    }
+}
+
+/// Places of a table that these frames can tell apart: evenly from end to end of where the tool pressed. `None` if it pressed at one place.
+pub(crate) fn table_places(by: By, frames: &Frames, registration: &Registration) -> Option<Vec<f64>> {
+    let pressed = frames.position_mm.iter().filter(|[_, _, z_mm]| *z_mm < 0.0);
+    let pressed = pressed.map(|tip_mm| place(by, tip_mm, registration));
+    let (mut least, most) = pressed
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), place| (least.min(place), most.max(place)));
+    if by == By::Depth {
+        least = 0.0;
+    }
+    let places = (0..OF_TABLE).map(|k| least + (most - least) * k as f64 / (OF_TABLE - 1) as f64);
+    (most - least > APART_MM).then(|| places.collect())
 }
 
 /// Places of a curve's knots that these frames can tell apart.
@@ -86,6 +197,15 @@ pub(crate) fn places(curve: &FreeCurve, frames: &Frames) -> Vec<f64> {
         ("at_mm", _) => even(depth_mm),
         _ => even(1.0),
     }
+}
+
+/// The weight of a knot's value in a function that is straight between knots, and constant beyond the first and the last.
+pub(crate) fn hat(knots: &[f64], knot: usize, value: f64) -> f64 {
+    let slope = |from: Option<usize>| {
+        let from = from.and_then(|from| knots.get(from));
+        from.map_or(1.0, |from| (value - from) / (knots[knot] - from))
+    };
+    slope(knot.checked_sub(1)).min(slope(Some(knot + 1))).clamp(0.0, 1.0)
 }
 
 fn logarithmic(least: f64, most: f64, count: usize) -> Vec<f64> {

@@ -1,6 +1,6 @@
 //! Parameters of the whole model during a fit.
 
-use tactus_model::effect::{Definition, Knots, ParameterKind, PipelineStage};
+use tactus_model::effect::{By, Definition, Knots, ParameterKind, PipelineStage, Table};
 use tactus_model::{Effect, Psf};
 
 use super::random_walk::{RandomWalk, is_random_walk};
@@ -25,33 +25,35 @@ pub(crate) struct Parameters {
 #[derive(Debug, Clone)]
 pub(crate) struct Term {
     pub(crate) definition: &'static Definition,
-    /// One for each parameter; those that knots replace do not act.
+    /// One for each parameter; those that knots or tables replace do not act.
     pub(crate) values: Vec<f64>,
     /// The free curve in place of its formula, if it has one.
     pub(crate) knots: Option<Knots>,
+    /// Tables in place of parameters, in their order. A term with a table has nothing else that is fitted.
+    pub(crate) tables: Vec<(usize, Table)>,
 }
 
 impl PartialEq for Term {
     fn eq(&self, other: &Self) -> bool {
-        (self.definition.name, &self.values, &self.knots)
-            == (other.definition.name, &other.values, &other.knots)
+        (self.definition.name, &self.values, &self.knots, &self.tables)
+            == (other.definition.name, &other.values, &other.knots, &other.tables)
     }
 }
 
 impl Term {
     pub(crate) fn neutral(definition: &'static Definition) -> Self {
         let values = definition.parameters.iter().map(|one| one.neutral).collect();
-        Self { definition, values, knots: None }
+        Self { definition, values, knots: None, tables: Vec::new() }
     }
 
     pub(crate) fn effect(&self) -> Result<Effect, DiscoverError> {
         let known = self.definition.parameters.iter().enumerate();
         let acting = known.filter(|(parameter, _)| self.acts(*parameter));
         let parameters = acting.map(|(parameter, known)| (known.name, self.values[parameter]));
-        Ok(match &self.knots {
-            None => Effect::of(self.definition, parameters)?,
-            Some(knots) => Effect::of_knots(self.definition, parameters, knots.clone())?,
-        })
+        let tables = self.tables.iter();
+        let tables =
+            tables.map(|(parameter, table)| (self.definition.parameters[*parameter].name, table.clone()));
+        Ok(Effect::with_tables(self.definition, parameters, self.knots.clone(), tables)?)
     }
 
     pub(crate) fn of(effect: &Effect) -> Self {
@@ -59,19 +61,35 @@ impl Term {
         for (known, value) in term.definition.parameters.iter().zip(&mut term.values) {
             *value = effect.value(known.name).unwrap_or(known.neutral);
         }
+        let index = |name| term.definition.parameters.iter().position(|known| known.name == name);
+        let tables = effect.tables().filter_map(|(name, table)| Some((index(name)?, table.clone())));
+        term.tables = tables.collect();
         term
     }
 
-    /// True unless knots replace a parameter.
+    /// True unless knots or a table replace a parameter.
     pub(crate) fn acts(&self, parameter: usize) -> bool {
-        self.knots.is_none() || !self.definition.replaces(self.definition.parameters[parameter].name)
+        let in_knots =
+            self.knots.is_some() && self.definition.replaces(self.definition.parameters[parameter].name);
+        !in_knots && self.tables.iter().all(|(of, _)| *of != parameter)
+    }
+
+    /// True if fits vary a parameter.
+    pub(super) fn varies(&self, parameter: usize) -> bool {
+        self.definition.parameters[parameter].kind == ParameterKind::Real
+            && self.tables.is_empty()
+            && self.acts(parameter)
     }
 
     /// Number of real numbers that make it.
     pub(crate) fn numbers(&self) -> usize {
-        let parameters = self.definition.parameters.iter().enumerate();
-        let reals = parameters.filter(|(at, known)| known.kind == ParameterKind::Real && self.acts(*at));
-        reals.count() + self.knots.as_ref().map_or(0, |knots| knots.values.len())
+        (0..self.values.len()).filter(|parameter| self.varies(*parameter)).count() + self.listed()
+    }
+
+    /// Number of values of its knots and tables.
+    pub(crate) fn listed(&self) -> usize {
+        let of_knots = self.knots.as_ref().map_or(0, |knots| knots.values.len());
+        of_knots + self.tables.iter().map(|(_, table)| table.values.len()).sum::<usize>()
     }
 
     /// The element whose signal this term replaces, if it is a term of that kind.
@@ -95,9 +113,12 @@ impl Parameters {
 
     /// True if the terms are those of another model in the same order, whatever their values.
     pub(crate) fn has_terms_like(&self, other: &Self) -> bool {
-        let kinds = |of: &Self| -> Vec<(&'static str, bool)> {
-            of.terms.iter().map(|term| (term.definition.name, term.knots.is_some())).collect()
+        type Kind = (&'static str, bool, Vec<(usize, By)>);
+        let kind = |term: &Term| -> Kind {
+            let tables = term.tables.iter().map(|(parameter, table)| (*parameter, table.by));
+            (term.definition.name, term.knots.is_some(), tables.collect())
         };
+        let kinds = |of: &Self| -> Vec<Kind> { of.terms.iter().map(kind).collect() };
         kinds(self) == kinds(other)
     }
 

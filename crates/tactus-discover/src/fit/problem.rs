@@ -97,7 +97,7 @@ pub(crate) enum Free {
         term: usize,
         parameter: usize,
     },
-    /// A knot of a term's free curve.
+    /// A knot of a term's free curve, or a place of its tables.
     Knot {
         term: usize,
         knot: usize,
@@ -188,7 +188,7 @@ impl<'a> Problem<'a> {
         }
         free.extend(self.gained_runs.iter().map(|run| Free::RunGain { run: *run }));
         for (term, at) in parameters.terms.iter().enumerate() {
-            let Term { definition, values, knots } = at;
+            let Term { definition, values, .. } = at;
             if at.rewires().is_some_and(|element| self.element_weight[element] == 0.0) {
                 // Nothing shows the shares of an element without weight.
                 continue;
@@ -199,12 +199,11 @@ impl<'a> Problem<'a> {
                 continue;
             }
             for (parameter, known) in definition.parameters.iter().enumerate() {
-                if known.kind == ParameterKind::Real && known.name != "duration_s" && at.acts(parameter) {
+                if known.name != "duration_s" && at.varies(parameter) {
                     free.push(Free::Of { term, parameter });
                 }
             }
-            let knots = knots.as_ref().map_or(0, |knots| knots.values.len());
-            free.extend((0..knots).map(|knot| Free::Knot { term, knot }));
+            free.extend((0..at.listed()).map(|knot| Free::Knot { term, knot }));
         }
         free
     }
@@ -444,7 +443,7 @@ impl<'a> Problem<'a> {
     }
 
     fn errors(&self, at: &Parameters, free: &[Free], gram: Option<DMatrix<f64>>) -> Vec<Vec<f64>> {
-        let numbers = |term: &Term| term.values.len() + term.knots.as_ref().map_or(0, |of| of.at.len());
+        let numbers = |term: &Term| term.values.len() + term.listed();
         let mut errors: Vec<Vec<f64>> = at.terms.iter().map(|term| vec![f64::NAN; numbers(term)]).collect();
         let Some(gram) = gram else { return errors };
         let size = gram.nrows();
@@ -454,8 +453,7 @@ impl<'a> Problem<'a> {
             if let Free::Knot { term, knot } = one {
                 let of = &at.terms[*term];
                 // A value that is a sum of increments has the variance of the sum.
-                let first =
-                    if of.curve().is_some_and(|curve| curve.increasing) { index - knot } else { index };
+                let first = if of.rises(*knot) { index - knot } else { index };
                 let covariance =
                     |(i, j)| inverse[(i, j)] / (positive_root(gram[(i, i)]) * positive_root(gram[(j, j)]));
                 let seen = || (first..=index).filter(|i| gram[(*i, *i)] > 0.0);

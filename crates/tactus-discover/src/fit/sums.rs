@@ -12,7 +12,7 @@
 //! [`super::elimination`] needs. Memory does not grow with the number of bins.
 
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::DMatrix;
 
@@ -38,8 +38,20 @@ pub(crate) enum Direction<'a> {
     Towards { parameters: Parameters, step: f64 },
     /// Relative change of all gains in a run.
     RunGain(usize),
+    /// An earlier direction, by its number, times a factor for each bin.
+    Times { direction: usize, factor: Arc<Vec<f64>> },
     /// Values of any bins, bin by bin, element by element.
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
+}
+
+impl Direction<'_> {
+    /// The same direction in a list with so many others before.
+    pub(super) fn after(self, others: usize) -> Self {
+        if let Self::Times { direction, factor } = self {
+            return Self::Times { direction: direction + others, factor };
+        }
+        self
+    }
 }
 
 impl Direction<'static> {
@@ -109,6 +121,11 @@ enum Running<'a> {
     },
     /// Taken from the derivative by all gains.
     RunGain(usize),
+    /// Taken from another direction.
+    Times {
+        direction: usize,
+        factor: Arc<Vec<f64>>,
+    },
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
 }
 
@@ -157,9 +174,13 @@ impl Problem<'_> {
             let mut columns: Vec<Vec<f64>> =
                 parallel::map(&running, column).into_iter().collect::<Result<_, DiscoverError>>()?;
             let by_gain = columns.pop().unwrap_or_default();
-            for (direction, column) in running.iter().zip(&mut columns) {
-                if let Running::RunGain(run) = direction {
-                    *column = self.of_run(*run, range.start, &by_gain);
+            for (number, direction) in running.iter().enumerate().take(columns.len()) {
+                match direction {
+                    Running::RunGain(run) => columns[number] = self.of_run(*run, range.start, &by_gain),
+                    Running::Times { direction, factor } => {
+                        columns[number] = times(&columns[*direction], &factor[range.clone()]);
+                    }
+                    Running::Towards { .. } | Running::Column(_) => {}
                 }
             }
             let chunk = Chunk { bins: range.clone(), columns, by_gain };
@@ -188,6 +209,7 @@ impl Problem<'_> {
                 per_step: if step == 0.0 { 0.0 } else { 1.0 / step },
             },
             Direction::RunGain(run) => Running::RunGain(run),
+            Direction::Times { direction, factor } => Running::Times { direction, factor },
             Direction::Column(values) => Running::Column(values),
         })
     }
@@ -293,6 +315,12 @@ impl Problem<'_> {
     }
 }
 
+/// Values bin by bin, each bin's times its factor.
+fn times(values: &[f64], factors: &[f64]) -> Vec<f64> {
+    let of_bins = values.chunks_exact(values.len() / factors.len());
+    of_bins.zip(factors).flat_map(|(values, factor)| values.iter().map(move |value| factor * value)).collect()
+}
+
 /// A model whose gains are greater by a small share.
 pub(super) fn with_more_gain(at: &Parameters) -> (Parameters, f64) {
     let mut more = at.clone();
@@ -310,7 +338,7 @@ impl Running<'_> {
     ) -> Result<Vec<f64>, DiscoverError> {
         let (stream, per_step) = match self {
             Self::Column(values) => return Ok(values(bins)),
-            Self::RunGain(_) => return Ok(Vec::new()),
+            Self::RunGain(_) | Self::Times { .. } => return Ok(Vec::new()),
             Self::Towards { stream, per_step } => (stream, per_step),
         };
         let mut stream = stream.lock().unwrap_or_else(PoisonError::into_inner);

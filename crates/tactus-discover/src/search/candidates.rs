@@ -2,11 +2,11 @@
 
 use std::borrow::Cow;
 
-use tactus_model::effect::{Definition, ParameterKind, REGISTRY};
+use tactus_model::effect::{By, CurveKind, Definition, Knots, ParameterKind, REGISTRY, Table};
 
 use super::wiring;
 use crate::data::{DiscoverError, interval_s};
-use crate::fit::{Fitted, Free, Problem, Scale, Term};
+use crate::fit::{Fitted, Free, Problem, Scale, Term, places, table_places};
 
 /// Number of grid values of a shape parameter that spans orders of magnitude, and of any other or a ratio of times.
 const VALUES_MANY: usize = 5;
@@ -24,6 +24,8 @@ pub(crate) struct Candidate {
     amplitudes: Vec<usize>,
     /// Values of the others from which fits start.
     shapes: Shapes,
+    /// Free parts of the class: knots in place of its formula, and each amplitude that may be a table, as one; at their neutral values.
+    free: Vec<Term>,
     /// From how many shapes a residual picks: all pairs of elements, or all frequencies that the frames can tell apart. 1 for a grid.
     alternatives: f64,
 }
@@ -83,7 +85,8 @@ impl Candidate {
             alternatives = (problem.predictor.bins.elements as f64).powi(2);
         }
         let shapes = if wires { Shapes::Wiring } else { Shapes::Grid(shapes) };
-        Ok(Self { definition, amplitudes, shapes, alternatives })
+        let free = free(definition, &amplitudes, problem);
+        Ok(Self { definition, amplitudes, shapes, free, alternatives })
     }
 
     /// Starts of fits of this effect in addition to a model, with neutral amplitudes.
@@ -102,6 +105,11 @@ impl Candidate {
         (self.alternatives / shapes.max(1) as f64).max(1.0)
     }
 
+    /// Free parts of the class, at their neutral values: one with knots, or with a table.
+    pub(crate) fn free(&self) -> &[Term] {
+        &self.free
+    }
+
     /// The parameters that change the prediction of a shape.
     pub(crate) fn amplitudes(&self) -> &[usize] {
         &self.amplitudes
@@ -113,6 +121,10 @@ impl Candidate {
         let wires = matches!(self.shapes, Shapes::Wiring);
         if wires && coefficients.iter().any(|step| !(0.0..CROSSED_SHARE).contains(step)) {
             return crossed(start);
+        }
+        if start.is_free() {
+            start.free_steps(coefficients, problem.duration_s);
+            return start;
         }
         for (parameter, step) in self.amplitudes.iter().zip(coefficients) {
             let known = &self.definition.parameters[*parameter];
@@ -126,6 +138,28 @@ impl Candidate {
         }
         start
     }
+}
+
+/// The free parts of a class.
+fn free(definition: &'static Definition, amplitudes: &[usize], problem: &Problem<'_>) -> Vec<Term> {
+    let frames = problem.predictor.frames;
+    let mut free = Vec::new();
+    // Weights of times or thresholds are what several shapes make together.
+    if let Some(curve) = definition.curve.as_ref().filter(|curve| curve.kind == CurveKind::Line) {
+        let at = places(curve, frames);
+        let knots = Knots { values: vec![0.0; at.len()], at };
+        free.push(Term { knots: Some(knots), ..Term::neutral(definition) });
+    }
+    for parameter in amplitudes {
+        let known = &definition.parameters[*parameter];
+        let table = |by: &By| {
+            let at = table_places(*by, frames, &problem.predictor.known.registration)?;
+            let table = Table { by: *by, values: vec![known.neutral; at.len()], at };
+            Some(Term { tables: vec![(*parameter, table)], ..Term::neutral(definition) })
+        };
+        free.extend(known.varies.iter().filter_map(table));
+    }
+    free
 }
 
 fn cross(shapes: &[Term], parameter: usize, values: &[f64]) -> Vec<Term> {

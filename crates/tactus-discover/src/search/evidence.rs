@@ -89,6 +89,8 @@ pub(crate) struct Evidence<'a> {
 /// Sets kept from one size to the next, and the greatest size.
 const BEAM: usize = 6;
 const SIZE_MAX: usize = 6;
+/// Greatest number of additions of one class alone.
+const PARTS_MAX: usize = 3;
 /// An addition is worth a look if it multiplies the odds by more than the exponential of this.
 const GAIN_LEAST: f64 = 1.0;
 
@@ -265,6 +267,27 @@ impl Evidence<'_> {
         }
         best.sort_by(|a, b| b.1.ln_odds.total_cmp(&a.1.ln_odds));
         best
+    }
+
+    /// For each class, the set of its additions that gains most, found step by step, if its odds are greater than `ln_odds_least`; greatest
+    /// odds first.
+    pub(crate) fn sets_of_classes(&self, among: &[usize], ln_odds_least: f64) -> Vec<Set> {
+        let firsts = self.best_of_classes(&self.none(), among, f64::NEG_INFINITY);
+        let grown = |(first, _): &(usize, Gain)| {
+            let class = self.additions[*first].class;
+            let own: Vec<usize> =
+                among.iter().copied().filter(|one| self.additions[*one].class == class).collect();
+            let mut set = self.set([*first]);
+            while set.members.len() < PARTS_MAX {
+                let next = self.best_of_classes(&set, &own, GAIN_LEAST).into_iter().next();
+                let Some((one, gain)) = next else { break };
+                set = set.with(one, &gain);
+            }
+            set
+        };
+        let mut sets: Vec<Set> = firsts.iter().map(grown).filter(|set| set.ln_odds > ln_odds_least).collect();
+        sets.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
+        sets
     }
 
     fn exchanged(&self, mut best: Set, among: &[usize]) -> Set {

@@ -1,7 +1,7 @@
 //! The form of each class: its formula, or knots where the data refute the formula.
 //!
 //! A name stands for a class, and its formula is one member. Each added effect that may have a free curve is fitted again with knots, which
-//! start at the formula's own values. The knots stay if they gain more than their freedom would by chance:
+//! start at the formula's own values; one that was grown with knots is fitted again with the best formula. The knots stay if they gain more than their freedom would by chance:
 //!
 //! ```text
 //! gain - freedom > 2 sqrt(2 freedom)          gain = (cost of the formula - cost of the knots) / variance
@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use super::grow::{POLISH_ROUNDS, Search, names};
+use super::grow::{Equivalent, POLISH_ROUNDS, Search, names};
 use crate::data::DiscoverError;
 use crate::fit::{Fitted, Parameters, Term, of_formulas, places, undone};
 
@@ -46,49 +46,76 @@ pub(crate) struct RefutedFormula {
 }
 
 impl Search<'_> {
-    /// A grown model, with knots in place of each added effect's formula that the data refute.
-    pub(crate) fn formed(&self, grown: Fitted) -> Result<Formed, DiscoverError> {
+    /// A grown model, with knots in place of each added effect's formula that the data refute, and a formula in place of knots that it
+    /// explains.
+    pub(crate) fn formed(&self, grown: Fitted, equivalent: &Equivalent) -> Result<Formed, DiscoverError> {
         let mut formed = Formed::from(grown);
         for name in names(&formed.at.parameters, self.known_terms) {
-            let Some(start) = self.with_knots(&formed.at, name) else { continue };
-            (self.progress)(&format!("fitting {name} with knots"), 0.0);
-            let values = start.knots.as_ref().map_or_else(Vec::new, |knots| knots.values.clone());
-            let free = self.problem.fit_from(self.replaced(&formed.at, start), POLISH_ROUNDS)?;
-            if self.refutes(&formed.at, &free) {
-                let heldout_rms_counts = self.problem.heldout_rms_counts(&formed.at.predicted);
-                formed.refuted.insert(name, RefutedFormula { values, heldout_rms_counts });
-                formed.at = free;
+            let Some(curve) = self.added(&formed.at, name).find_map(Term::curve) else { continue };
+            let has_knots = self.added(&formed.at, name).any(|term| term.knots.is_some());
+            let formula = if has_knots {
+                (self.progress)(&format!("fitting the formula of {name}"), 0.0);
+                match self.with_formula(&formed.at, name, equivalent)? {
+                    Some(formula) => formula,
+                    None => continue,
+                }
+            } else {
+                formed.at.clone()
+            };
+            let at = places(curve, self.problem.predictor.frames);
+            let of_formula = of_formulas(curve, self.added(&formula, name), &at);
+            if of_formula.values.iter().all(|value| *value == 0.0) {
+                continue;
             }
+            let values = of_formula.values.clone();
+            let free = if has_knots {
+                formed.at.clone()
+            } else {
+                (self.progress)(&format!("fitting {name} with knots"), 0.0);
+                let Some(first) = self.added(&formula, name).next() else { continue };
+                let start = Term { knots: Some(of_formula), ..first.clone() };
+                self.problem.fit_from(self.replaced(&formula, name, vec![start]), POLISH_ROUNDS)?
+            };
+            formed.at = if self.refutes(&formula, &free) {
+                let heldout_rms_counts = self.problem.heldout_rms_counts(&formula.predicted);
+                formed.refuted.insert(name, RefutedFormula { values, heldout_rms_counts });
+                free
+            } else {
+                formula
+            };
         }
         Ok(formed)
     }
 
-    /// One term with knots for all added terms of a class; `None` if it has no curve, or no formula to refute.
-    fn with_knots(&self, at: &Fitted, name: &str) -> Option<Term> {
-        let added = || {
-            let terms = at.parameters.terms.iter().skip(self.known_terms);
-            terms.filter(|term| term.definition.name == name)
-        };
-        let first = added().next()?;
-        let curve = first.curve()?;
-        let knots = of_formulas(curve, added(), &places(curve, self.problem.predictor.frames));
-        let acts = knots.values.iter().any(|value| *value != 0.0);
-        acts.then(|| Term { knots: Some(knots), ..first.clone() })
+    /// The added terms of a class.
+    pub(super) fn added<'a>(&self, at: &'a Fitted, name: &'a str) -> impl Iterator<Item = &'a Term> {
+        let terms = at.parameters.terms.iter().skip(self.known_terms);
+        terms.filter(move |term| term.definition.name == name)
     }
 
-    /// A model with one term in place of all added terms of its class.
-    fn replaced(&self, at: &Fitted, term: Term) -> Parameters {
+    /// A model with the best formula in place of all added terms of a class; `None` if no formula explains anything.
+    fn with_formula(
+        &self,
+        at: &Fitted,
+        name: &str,
+        equivalent: &Equivalent,
+    ) -> Result<Option<Fitted>, DiscoverError> {
+        let Some(alike) = equivalent.get(name) else { return Ok(None) };
+        let Some(start) = self.formula_start(&*self.pass(&alike.without)?, name) else { return Ok(None) };
+        self.problem.fit_from(self.replaced(at, name, vec![start]), POLISH_ROUNDS).map(Some)
+    }
+
+    /// A model with other terms in place of all added terms of a class.
+    fn replaced(&self, at: &Fitted, name: &str, terms: Vec<Term>) -> Parameters {
         let mut replaced = at.parameters.clone();
-        let is_class = |(index, of): (usize, &Term)| {
-            index >= self.known_terms && of.definition.name == term.definition.name
-        };
+        let is_class = |(index, of): (usize, &Term)| index >= self.known_terms && of.definition.name == name;
         let place = replaced.terms.iter().enumerate().position(is_class).unwrap_or(replaced.terms.len());
         let mut index = 0;
         replaced.terms.retain(|of| {
             index += 1;
             !is_class((index - 1, of))
         });
-        replaced.terms.insert(place, term);
+        replaced.terms.splice(place..place, terms);
         replaced
     }
 

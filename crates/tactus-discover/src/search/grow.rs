@@ -10,6 +10,7 @@
 //! All choices use the fitted presses only. The held-out presses give the figures of the report.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -18,7 +19,7 @@ use tactus_model::effect::Definition;
 use super::candidates::Candidate;
 use super::contests::Contest;
 use super::drift::TriedWalk;
-use super::evidence::{Addition, Evidence, Gain, ODDS_AGAINST, Set, Signs};
+use super::evidence::{Addition, Evidence, ODDS_AGAINST, Set, Signs};
 use super::memory::Memory;
 use super::options::Options;
 use super::rivals::rivals;
@@ -71,8 +72,11 @@ const FINISHED_MAX: usize = 2;
 const PROMISE_SHARE: f64 = 0.3;
 /// Logarithm of the odds with which a class is added and holds its place.
 pub(super) const LN_ODDS_LEAST: f64 = 5.0;
-/// A rival without a name takes the place of a class if its odds are greater by this logarithm.
+/// A rival without a name takes the place of a class if its odds are greater by this logarithm, and by this share of it. Real physics has
+/// not quite the form of its class, and a rival has any form. From tuning sets (`just discovery-constants`): rivals are ahead of right
+/// classes by up to 0.05 of theirs, of wrong ones that lose by 0.11 and more.
 const RIVAL_LN_ODDS: f64 = 5.0;
+const RIVAL_SHARE: f64 = 0.075;
 /// Another class takes the place of one if its odds are greater by this logarithm.
 const BETTER_LN_ODDS: f64 = 3.0;
 const EXCHANGES_MAX: usize = 4;
@@ -268,9 +272,10 @@ impl Pass {
     }
 }
 
-/// The greatest odds.
-fn best(rivals: &[(&'static str, f64)]) -> f64 {
-    rivals.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max)
+/// True if a rival takes the place of a class with these odds.
+fn rivals_win(rivals: &[(&'static str, f64)], ln_odds: f64) -> bool {
+    let best = rivals.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max);
+    best > ln_odds + RIVAL_LN_ODDS.max(RIVAL_SHARE * ln_odds)
 }
 
 impl Search<'_> {
@@ -287,6 +292,7 @@ impl Search<'_> {
             let class = classes.len();
             classes.push(of.definition.name);
             let shapes = of.shapes(problem, at);
+            let of_class = directions.len();
             for shape in shapes.iter() {
                 let start = at.parameters.with(shape.clone());
                 let term = start.terms.len() - 1;
@@ -316,6 +322,20 @@ impl Search<'_> {
                     });
                     kinds.push(Kind::Term { candidate, shape: shape.clone() });
                 }
+            }
+            for shape in of.free() {
+                let first = directions.len();
+                let own = of_class..first;
+                let (of_shape, widths, signs) = self.free_directions(of, shape, at, own);
+                directions.extend(of_shape);
+                additions.push(Addition {
+                    class,
+                    directions: (first..directions.len()).collect(),
+                    widths,
+                    signs,
+                    among: 1.0,
+                });
+                kinds.push(Kind::Term { candidate, shape: shape.clone() });
             }
         }
         let named = directions.len();
@@ -372,6 +392,36 @@ impl Search<'_> {
             present,
             variance: problem.variance * if self.rounds { excess } else { 1.0 },
         })
+    }
+
+    /// The directions of a free part of a class, with their widths and signs. A table is a parameter's own direction, which is among those
+    /// of the class that come first, times the weight of each place.
+    fn free_directions(
+        &self,
+        of: &Candidate,
+        shape: &Term,
+        at: &Fitted,
+        own: Range<usize>,
+    ) -> (Vec<Direction<'static>>, Vec<f64>, Vec<Signs>) {
+        let problem = self.problem;
+        if let Some((parameter, table)) = shape.tables.first() {
+            let amplitude = of.amplitudes().iter().position(|one| one == parameter).unwrap_or(0);
+            let width = Scale::of(&of.definition.parameters[*parameter], problem.duration_s).width();
+            let direction = own.start + amplitude;
+            let times = |factor| Direction::Times { direction, factor: Arc::new(factor) };
+            let directions: Vec<_> = problem.weights_at(table).into_iter().map(times).collect();
+            let count = directions.len();
+            return (directions, vec![width; count], vec![Signs::Both; count]);
+        }
+        let start = at.parameters.with(shape.clone());
+        let term = start.terms.len() - 1;
+        let width = shape.curve().map_or(0.0, |curve| curve.range[1] - curve.range[0]);
+        let knots = 0..shape.listed();
+        let directions: Vec<_> =
+            knots.map(|knot| problem.towards(&start, Free::Knot { term, knot })).collect();
+        let count = directions.len();
+        // Each is an increment of a curve that must not fall.
+        (directions, vec![width; count], vec![Signs::Positive; count])
     }
 
     /// Grows a model until no class is missing, unnecessary or worse than another.
@@ -510,8 +560,8 @@ impl Search<'_> {
         let is_free = |one: usize| matches!(pass.kinds[one], Kind::Free(_));
         let best_set = evidence.sets(|one| !is_free(one)).into_iter().next();
         let named = evidence.sets(|one| pass.is_named(one)).into_iter().next();
-        let alone = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), 0.0);
-        let most = alone.first().map_or(0.0, |(_, gain)| gain.ln_odds);
+        let alone = evidence.sets_of_classes(&pass.among(|_| true), 0.0);
+        let most = alone.first().map_or(0.0, |set| set.ln_odds);
         let mut proposed: Vec<(&'static str, Set)> = Vec::new();
         let mut propose = |set: &Set| {
             for member in set.members.iter().copied().filter(|member| pass.is_named(*member)) {
@@ -522,21 +572,14 @@ impl Search<'_> {
             }
         };
         best_set.iter().chain(&named).for_each(&mut propose);
-        for (one, _) in alone.iter().filter(|(_, gain)| gain.ln_odds > PROMISE_SHARE * most) {
-            propose(&evidence.set([*one]));
-        }
+        alone.iter().filter(|set| set.ln_odds > PROMISE_SHARE * most).for_each(&mut propose);
         proposed.truncate(FITTED_MAX);
         if named.as_ref().map_or(0.0, |set| set.ln_odds).max(most) < PROMISE_SHARE * least {
             proposed.clear();
         }
         let mut starts: Vec<(&'static str, Vec<Term>)> = Vec::new();
         for (name, set) in proposed {
-            let terms = self.starts(pass, &evidence, &set, name);
-            // A fit of several shapes may end at worse values than one of a single shape.
-            let single = alone.iter().find(|(one, _)| terms.len() > 1 && pass.class_of(*one) == name);
-            let single = single.map(|(one, _)| self.starts(pass, &evidence, &evidence.set([*one]), name));
-            starts.push((name, terms));
-            starts.extend(single.map(|terms| (name, terms)));
+            starts.extend(self.starts_of(pass, &evidence, &set, name));
         }
         if let Some(walk) = &pass.walk {
             let ln_odds = 0.5 * walk.promise - ODDS_AGAINST.ln();
@@ -545,11 +588,10 @@ impl Search<'_> {
             }
         }
         let mut fits = self.fits(at, &starts, 0.0)?;
-        fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
         let best_has_names = best_set.is_some_and(|set| set.members.iter().any(|one| pass.is_named(*one)));
         let contest = |one: &Beside| {
             let (strength, rivals) = pass.rivalry(one.name, one.ln_odds);
-            let is_beaten = best(&rivals) > strength + RIVAL_LN_ODDS && !best_has_names;
+            let is_beaten = rivals_win(&rivals, strength) && !best_has_names;
             is_beaten.then(|| Contest::lost(one.name, one.ln_odds, self.left_over(&one.fitted), rivals))
         };
         let refused = fits.first().and_then(contest);
@@ -557,6 +599,21 @@ impl Search<'_> {
             fits.clear();
         }
         Ok((fits, refused))
+    }
+
+    /// Starts of fits of a class: its members of a set, and if these are several or free, its best formula. A fit of several may end at worse
+    /// values than one of a single formula.
+    fn starts_of(
+        &self,
+        pass: &Pass,
+        evidence: &Evidence<'_>,
+        set: &Set,
+        name: &'static str,
+    ) -> Vec<(&'static str, Vec<Term>)> {
+        let terms = self.starts(pass, evidence, set, name);
+        let is_formula = terms.len() == 1 && !terms[0].is_free();
+        let formula = if is_formula { None } else { self.formula_start(pass, name) };
+        [terms].into_iter().chain(formula.map(|term| vec![term])).map(|terms| (name, terms)).collect()
     }
 
     /// The terms of a class from which a fit starts: its members of a set.
@@ -572,6 +629,17 @@ impl Search<'_> {
             (pass.class_of(*member) == name).then(start)
         };
         set.members.iter().filter_map(term).collect()
+    }
+
+    /// The formula of a class from which a fit starts: that with the greatest odds by itself.
+    pub(super) fn formula_start(&self, pass: &Pass, name: &str) -> Option<Term> {
+        let evidence = pass.evidence();
+        let is_formula =
+            |one: &usize| matches!(&pass.kinds[*one], Kind::Term { shape, .. } if !shape.is_free());
+        let among: Vec<usize> = pass.among(|class| class == name).into_iter().filter(is_formula).collect();
+        let (best, _) =
+            evidence.best_of_classes(&evidence.none(), &among, f64::NEG_INFINITY).into_iter().next()?;
+        self.starts(pass, &evidence, &evidence.set([best]), name).pop()
     }
 
     /// Fits of a model with the terms of each class: first all in a few rounds, then the best to the end, and those that are behind them by
@@ -592,7 +660,23 @@ impl Search<'_> {
         let mut fits: Vec<Beside> = parallel::map_longest_first(starts, |(_, terms)| terms.len(), fit)
             .into_iter()
             .collect::<Result<_, DiscoverError>>()?;
-        fits.sort_by(|a, b| b.ln_odds.total_cmp(&a.ln_odds));
+        self.rank_all(&mut fits);
+        let least =
+            fits.first().map_or(0.0, |best| best.ln_odds - units * self.unit(best.ln_odds, &best.fitted));
+        let mut finished: Vec<&'static str> = Vec::new();
+        for one in &fits {
+            if !finished.contains(&one.name) && (one.ln_odds >= least || finished.len() < FINISHED_MAX) {
+                finished.push(one.name);
+            }
+        }
+        fits.retain(|one| finished.contains(&one.name));
+        let finish = |one: &Beside| {
+            let fitted = self.problem.fit_from(one.fitted.parameters.clone(), TRIAL_ROUNDS)?;
+            Ok(Beside { name: one.name, ln_odds: self.ln_odds(at, &fitted), fitted })
+        };
+        let mut fits: Vec<Beside> =
+            parallel::map(&fits, finish).into_iter().collect::<Result<_, DiscoverError>>()?;
+        self.rank_all(&mut fits);
         // Of each class the better start.
         let mut names: Vec<&'static str> = Vec::new();
         fits.retain(|one| {
@@ -600,15 +684,11 @@ impl Search<'_> {
             names.push(one.name);
             is_new
         });
-        let least =
-            fits.first().map_or(0.0, |best| best.ln_odds - units * self.unit(best.ln_odds, &best.fitted));
-        let finished = fits.iter().filter(|one| one.ln_odds >= least).count();
-        fits.truncate(finished.max(FINISHED_MAX));
-        let finish = |one: &Beside| {
-            let fitted = self.problem.fit_from(one.fitted.parameters.clone(), TRIAL_ROUNDS)?;
-            Ok(Beside { name: one.name, ln_odds: self.ln_odds(at, &fitted), fitted })
-        };
-        parallel::map(&fits, finish).into_iter().collect()
+        Ok(fits)
+    }
+
+    fn rank_all(&self, fits: &mut [Beside]) {
+        fits.sort_by(|a, b| self.rank(b).total_cmp(&self.rank(a)));
     }
 
     /// Logarithm of the odds of a model with further terms, against the model without. Each of their numbers is charged as if its
@@ -656,17 +736,17 @@ impl Search<'_> {
                 );
                 let pass = self.pass(&less)?;
                 let (strength, rivals) = pass.rivalry(name, ln_odds);
-                // A rival that is ahead by no more than the misfit of forms is no better.
                 let unit = self.unit(ln_odds, &grown.at);
-                if best(&rivals) > strength + RIVAL_LN_ODDS.max(unit) {
+                if rivals_win(&rivals, strength) {
                     grown.refused.push(Contest::lost(name, ln_odds, self.left_over(&grown.at), rivals));
                     grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
-                let likeliest = others.iter().max_by(|a, b| a.ln_odds.total_cmp(&b.ln_odds));
+                let likeliest = others.iter().max_by(|a, b| self.rank(a).total_cmp(&self.rank(b)));
+                let present = self.rank_of(name, ln_odds, &grown.at);
                 let better =
-                    likeliest.filter(|best| best.ln_odds > ln_odds + BETTER_LN_ODDS && exchanges_left > 0);
+                    likeliest.filter(|best| self.rank(best) > present + BETTER_LN_ODDS && exchanges_left > 0);
                 if let Some(better) = better {
                     exchanges_left -= 1;
                     grown.at = self.problem.fit_from(better.fitted.parameters.clone(), POLISH_ROUNDS)?;
@@ -735,15 +815,23 @@ impl Search<'_> {
     ) -> Result<Vec<Beside>, DiscoverError> {
         let evidence = pass.evidence();
         let among = pass.among(|name| !names.contains(&name));
-        let mut best = evidence.best_of_classes(&evidence.none(), &among, ln_odds_least);
+        let mut best = evidence.sets_of_classes(&among, ln_odds_least);
         best.truncate(OTHERS_MAX);
-        let start = |(one, _): (usize, Gain)| {
-            let name = pass.class_of(one);
-            (name, self.starts(pass, &evidence, &evidence.set([one]), name))
-        };
-        let starts: Vec<(&'static str, Vec<Term>)> = best.into_iter().map(start).collect();
+        let start = |set: &Set| self.starts_of(pass, &evidence, set, pass.class_of(set.members[0]));
+        let starts: Vec<(&'static str, Vec<Term>)> = best.iter().flat_map(start).collect();
         // Where the form misses much, more of them may be in the set.
         self.fits(less, &starts, SET_UNITS)
+    }
+
+    /// By what classes in one place are ranked: the logarithm of the odds, less a unit for one with a free part. That takes up the misfit for
+    /// which a formula is excused.
+    fn rank(&self, one: &Beside) -> f64 {
+        self.rank_of(one.name, one.ln_odds, &one.fitted)
+    }
+
+    fn rank_of(&self, name: &str, ln_odds: f64, at: &Fitted) -> f64 {
+        let is_free = self.added(at, name).any(Term::is_free);
+        ln_odds - if is_free { self.unit(ln_odds, at) } else { 0.0 }
     }
 
     /// What counts as one in differences of the logarithm of the odds between classes in one place.

@@ -34,7 +34,7 @@ use super::covariates::{Factor, Feature, Form, Forms, LOW_MM};
 use super::evidence::Signs;
 use super::tones::{Point, Tone, clearest};
 use crate::data::DiscoverError;
-use crate::fit::{Direction, Fitted, Problem};
+use crate::fit::{Direction, Fitted, Problem, hat};
 
 /// Knots of a function of one covariate.
 const KNOTS: usize = 5;
@@ -289,7 +289,7 @@ impl Seen {
                 for (place, bin) in bins.enumerate().filter(|(_, bin)| seen.deep[*bin]) {
                     for element in 0..seen.elements {
                         column[place * seen.elements + element] =
-                            times(&seen, bin, element) * weight(&knots, knot, value(&seen, bin, element));
+                            times(&seen, bin, element) * hat(&knots, knot, value(&seen, bin, element));
                     }
                 }
                 column
@@ -306,20 +306,11 @@ fn hats(values: &[f64], among: &[bool]) -> Vec<Vec<f64>> {
     let knots = knots(kept.map(|(value, _)| *value).collect());
     let hat = |knot: usize| {
         let of = |(value, among): (&f64, &bool)| {
-            if *among && value.is_finite() { weight(&knots, knot, *value) } else { 0.0 }
+            if *among && value.is_finite() { hat(&knots, knot, *value) } else { 0.0 }
         };
         values.iter().zip(among).map(of).collect()
     };
     if knots.len() < 2 { Vec::new() } else { (0..knots.len()).map(hat).collect() }
-}
-
-/// The weight of a knot's value in a function that is straight between knots, and constant beyond the first and the last.
-fn weight(knots: &[f64], knot: usize, value: f64) -> f64 {
-    let slope = |from: Option<usize>| {
-        let from = from.and_then(|from| knots.get(from));
-        from.map_or(1.0, |from| (value - from) / (knots[knot] - from))
-    };
-    slope(knot.checked_sub(1)).min(slope(Some(knot + 1))).clamp(0.0, 1.0)
 }
 
 /// Quantiles of the values from the least to the greatest, each apart from the one before.

@@ -7,7 +7,7 @@ use tactus_model::{Effect, Response};
 
 use super::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
-    Inclusion, Level, Split, Unexplained, Verdict,
+    Inclusion, Level, ReplacedFormula, Split, Unexplained, Verdict,
 };
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
@@ -313,7 +313,7 @@ fn coarse(step_counts: f64, p_value: f64, heldout_rms_counts: f64) -> AddedEffec
         // It does not change a mean.
         heldout_rms_before_counts: heldout_rms_counts,
         heldout_rms_after_counts: heldout_rms_counts,
-        curve: None,
+        curves: Vec::new(),
         equivalent: Vec::new(),
     }
 }
@@ -560,7 +560,10 @@ impl Search<'_> {
                     .zip(&term.values)
                     .zip(errors)
                     .enumerate()
-                    .filter(|(parameter, _)| term.acts(*parameter))
+                    .filter(|(parameter, ((known, value), _))| {
+                        // Beside a table, the others stay neutral.
+                        term.acts(*parameter) && (term.tables.is_empty() || **value != known.neutral)
+                    })
                     .map(|(_, ((known, value), error))| Estimated {
                         name: known.name,
                         value: *value,
@@ -570,7 +573,7 @@ impl Search<'_> {
                     })
                     .collect()
             };
-            let curve = refuted.get(name).and_then(|formula| fitted_curve(grown, name, formula));
+            let curves = fitted_curves(grown, known_terms, name, refuted.get(name));
             let p_value = sign_flip_p(&gains, FLIPS, self.options.seed);
             let of_less = self.problem.left_by_folds(&before)?;
             let by_folds = of_less.zip(of_grown.as_ref()).map(|(less, grown)| gains_by_folds(&less, grown));
@@ -585,7 +588,7 @@ impl Search<'_> {
                 folds_p_value: by_folds.map_or(0.0, |gains| sign_flip_p(&gains, FLIPS, self.options.seed)),
                 heldout_rms_before_counts: problem.heldout_rms_counts(&before.predicted),
                 heldout_rms_after_counts: problem.heldout_rms_counts(&grown.predicted),
-                curve,
+                curves,
                 equivalent: equivalent
                     .get(name)
                     .into_iter()
@@ -602,25 +605,47 @@ impl Search<'_> {
     }
 }
 
-/// The knots of an effect, beside its formula's values at their places.
-fn fitted_curve(grown: &Fitted, name: &str, formula: &RefutedFormula) -> Option<FittedCurve> {
-    let mut terms = grown.parameters.terms.iter().zip(&grown.errors);
-    let (term, errors) = terms.find(|(term, _)| term.definition.name == name && term.knots.is_some())?;
-    let (curve, knots) = term.curve().zip(term.knots.as_ref())?;
-    let errors = errors.iter().skip(term.values.len());
-    let values = knots.at.iter().zip(&knots.values).zip(errors).zip(&formula.values);
-    let knot = |(((at, value), error), formula): (((&f64, &f64), &f64), &f64)| FittedKnot {
-        at: *at,
-        value: *value,
-        standard_error: Some(*error).filter(|error| error.is_finite()),
-        formula: *formula,
-    };
-    Some(FittedCurve {
-        at: curve.at,
-        of: curve.of,
-        knots: values.map(knot).collect(),
-        heldout_rms_formula_counts: formula.heldout_rms_counts,
-    })
+/// The free curves and the tables of an added effect, beside the formula that the data refute.
+fn fitted_curves(
+    grown: &Fitted,
+    known_terms: usize,
+    name: &str,
+    refuted: Option<&RefutedFormula>,
+) -> Vec<FittedCurve> {
+    let terms = grown.parameters.terms.iter().zip(&grown.errors).skip(known_terms);
+    let mut curves = Vec::new();
+    for (term, errors) in terms.filter(|(term, _)| term.definition.name == name) {
+        let mut errors = errors.iter().skip(term.values.len());
+        let mut knots = |at: &[f64], values: &[f64]| -> Vec<FittedKnot> {
+            let knot = |((at, value), error): ((&f64, &f64), &f64)| FittedKnot {
+                at: *at,
+                value: *value,
+                standard_error: Some(*error).filter(|error| error.is_finite()),
+            };
+            at.iter().zip(values).zip(errors.by_ref()).map(knot).collect()
+        };
+        if let Some((curve, of)) = term.curve().zip(term.knots.as_ref()) {
+            let formula = refuted.map(|formula| ReplacedFormula {
+                values: formula.values.clone(),
+                heldout_rms_counts: formula.heldout_rms_counts,
+            });
+            curves.push(FittedCurve {
+                at: curve.at,
+                of: curve.of,
+                knots: knots(&of.at, &of.values),
+                formula,
+            });
+        }
+        for (parameter, table) in &term.tables {
+            curves.push(FittedCurve {
+                at: table.by.name(),
+                of: term.definition.parameters[*parameter].name,
+                knots: knots(&table.at, &table.values),
+                formula: None,
+            });
+        }
+    }
+    curves
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The result of a discovery.
 
 use tactus_calibrate::FaultyElement;
+use tactus_model::effect::By;
 use tactus_model::{Effect, Psf, Response};
 
 use super::structured::Structured;
@@ -141,8 +142,8 @@ pub struct AddedEffect {
     pub heldout_rms_before_counts: f64,
     /// The same for the whole grown model.
     pub heldout_rms_after_counts: f64,
-    /// The free curve that it has in place of its formula, which the data refute; `None` if it has its formula.
-    pub curve: Option<FittedCurve>,
+    /// The free curve that it has in place of its formula, and the tables of its parameters.
+    pub curves: Vec<FittedCurve>,
     /// Effects that these data cannot distinguish from this one.
     pub equivalent: Vec<&'static str>,
 }
@@ -157,20 +158,36 @@ pub struct Inclusion {
     pub probability: f64,
 }
 
-/// A free curve of an effect.
+/// A free curve of an effect, or a table of one of its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedCurve {
-    /// Key of the places in the model file, with their unit.
+    /// Key of the places in the model file, with their unit; of a table what it is a function of.
     pub at: &'static str,
-    /// Key of the values.
+    /// Key of the values; of a table the parameter.
     pub of: &'static str,
     /// Its knots, in order of their places.
     pub knots: Vec<FittedKnot>,
-    /// Root mean square of the held-out residuals with the formula in its place.
-    pub heldout_rms_formula_counts: f64,
+    /// The formula that it replaces, if the data refute one.
+    pub formula: Option<ReplacedFormula>,
 }
 
-/// A knot of a curve, beside the formula that it replaces.
+impl FittedCurve {
+    /// True if it is a table of a parameter.
+    pub fn is_table(&self) -> bool {
+        By::ALL.iter().any(|by| by.name() == self.at)
+    }
+}
+
+/// A formula that the data refute.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReplacedFormula {
+    /// Its values at the places of the knots, the best of the formula.
+    pub values: Vec<f64>,
+    /// Root mean square of the held-out residuals with it.
+    pub heldout_rms_counts: f64,
+}
+
+/// A knot of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FittedKnot {
     /// Its place.
@@ -179,8 +196,6 @@ pub struct FittedKnot {
     pub value: f64,
     /// `None` where the data do not determine it.
     pub standard_error: Option<f64>,
-    /// The value of the best formula there.
-    pub formula: f64,
 }
 
 /// A parameter of an effect.

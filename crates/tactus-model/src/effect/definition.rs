@@ -1,6 +1,7 @@
 //! Definitions of effects: name, parameters and their values.
 
 use super::knots::{FreeCurve, KNOTS_MAX, Knots, Values};
+use super::table::{By, Table};
 use super::{OnContact, OnCovering, OnElement, OnMotion, OnReadout, REGISTRY};
 use crate::Array;
 
@@ -36,6 +37,8 @@ pub struct Parameter {
     pub kind: ParameterKind,
     /// True if it is neutral where no value is given.
     pub is_optional: bool,
+    /// What it may be a table of, in place of one value.
+    pub varies: &'static [By],
 }
 
 /// Kinds of parameters.
@@ -73,7 +76,7 @@ pub enum Make {
     Readout(fn(&Values) -> Box<dyn OnReadout>),
 }
 
-/// A definition with a value for each parameter, each within its range; or with knots in place of its formula.
+/// A definition with a value or a table for each parameter, within its range; or with knots in place of its formula.
 #[derive(Debug, Clone)]
 pub struct Effect {
     definition: &'static Definition,
@@ -111,6 +114,15 @@ pub enum EffectError {
     /// A place or a value of the knots breaks the rules of the effect's curve.
     #[error("{effect}: knots.{key}[{index}] must be {want}, not {value}")]
     Knot { effect: &'static str, key: &'static str, index: usize, value: f64, want: String },
+    /// A table for a parameter that has one value everywhere.
+    #[error("{effect}: {parameter} is no table of {by}{}", allowed(varies))]
+    NoTable { effect: &'static str, parameter: String, by: &'static str, varies: &'static [By] },
+    /// A parameter is given beside its table.
+    #[error("{effect}: {parameter} is replaced by its table; leave it out")]
+    Tabled { effect: &'static str, parameter: &'static str },
+    /// A table breaks its rules.
+    #[error("{effect}: the table of {parameter} {want}")]
+    Table { effect: &'static str, parameter: &'static str, want: String },
     /// An index is not that of an element of the array.
     #[error("{effect}: {parameter} must be one of the elements 0 to {last}, not {value}")]
     Element { effect: &'static str, parameter: &'static str, last: usize, value: f64 },
@@ -142,6 +154,14 @@ impl Definition {
         self.curve.as_ref().is_some_and(|curve| curve.replaces.contains(&parameter))
     }
 
+    fn index_of(&self, parameter: &str) -> Result<usize, EffectError> {
+        self.parameters.iter().position(|one| one.name == parameter).ok_or_else(|| EffectError::NoParameter {
+            effect: self.name,
+            parameter: parameter.into(),
+            known: names(self.parameters.iter().map(|one| one.name)),
+        })
+    }
+
     fn check(&self, parameter: &Parameter, value: f64) -> Result<f64, EffectError> {
         let Parameter { name, range, .. } = *parameter;
         if (range[0]..=range[1]).contains(&value) {
@@ -155,13 +175,19 @@ impl Definition {
 impl Parameter {
     /// A real number within a range.
     pub const fn real(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
-        Self { name, neutral, range, kind: ParameterKind::Real, is_optional: false }
+        Self { name, neutral, range, kind: ParameterKind::Real, is_optional: false, varies: &[] }
     }
 
     /// The same parameter as optional. Parameters that an effect has had since its first version are not optional.
     #[must_use]
     pub const fn or_neutral(self) -> Self {
         Self { is_optional: true, ..self }
+    }
+
+    /// The same parameter, which may also be a table. Only parameters of stages without memory before the elements can be.
+    #[must_use]
+    pub const fn or_table_of(self, varies: &'static [By]) -> Self {
+        Self { varies, ..self }
     }
 
     /// Index of an element.
@@ -172,6 +198,7 @@ impl Parameter {
             range: [0.0, u32::MAX as f64],
             kind: ParameterKind::Element,
             is_optional: false,
+            varies: &[],
         }
     }
 
@@ -183,12 +210,13 @@ impl Parameter {
             range: [-1.0, u32::MAX as f64],
             kind: ParameterKind::ElementOrAll,
             is_optional: true,
+            varies: &[],
         }
     }
 
     /// A number within a range that no fit varies.
     pub const fn given(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
-        Self { name, neutral, range, kind: ParameterKind::Given, is_optional: true }
+        Self { name, neutral, range, kind: ParameterKind::Given, is_optional: true, varies: &[] }
     }
 
     /// True if a value is the index of an element.
@@ -219,7 +247,7 @@ impl Effect {
         definition: &'static Definition,
         parameters: impl IntoIterator<Item = (&'a str, f64)>,
     ) -> Result<Self, EffectError> {
-        Self::checked(definition, parameters, None)
+        Self::checked(definition, parameters, None, Vec::new())
     }
 
     /// An effect with knots in place of its formula, and a value for each parameter that they do not replace.
@@ -231,26 +259,60 @@ impl Effect {
         parameters: impl IntoIterator<Item = (&'a str, f64)>,
         knots: Knots,
     ) -> Result<Self, EffectError> {
-        Self::checked(definition, parameters, Some(knots))
+        Self::checked(definition, parameters, Some(knots), Vec::new())
+    }
+
+    /// The same effect with a table in place of a parameter's value.
+    ///
+    /// # Errors
+    /// [`EffectError::NoParameter`], [`EffectError::NoTable`] and [`EffectError::Table`].
+    pub fn with_table(&self, parameter: &str, table: Table) -> Result<Self, EffectError> {
+        let Values { knots, mut tables, .. } = self.values.clone();
+        let index = self.definition.index_of(parameter)?;
+        tables.retain(|(of, _)| *of != index);
+        tables.push((index, table));
+        let parameters = self.parameters().filter(|(name, _)| *name != parameter);
+        Self::checked(self.definition, parameters, knots, tables)
+    }
+
+    /// An effect with a value or a table for each parameter, or with knots in place of its formula; tables by the names of parameters.
+    ///
+    /// # Errors
+    /// As [`Effect::new`], [`Effect::of_knots`] and [`Effect::with_table`]; [`EffectError::Tabled`].
+    pub fn with_tables<'a>(
+        definition: &'static Definition,
+        parameters: impl IntoIterator<Item = (&'a str, f64)>,
+        knots: Option<Knots>,
+        tables: impl IntoIterator<Item = (&'a str, Table)>,
+    ) -> Result<Self, EffectError> {
+        let index = |(name, table)| Ok((definition.index_of(name)?, table));
+        let tables = tables.into_iter().map(index).collect::<Result<_, EffectError>>()?;
+        Self::checked(definition, parameters, knots, tables)
     }
 
     fn checked<'a>(
         definition: &'static Definition,
         parameters: impl IntoIterator<Item = (&'a str, f64)>,
         knots: Option<Knots>,
+        mut tables: Vec<(usize, Table)>,
     ) -> Result<Self, EffectError> {
         let effect = definition.name;
+        tables.sort_by_key(|(of, _)| *of);
         if let Some(knots) = &knots {
             knots.check(effect, definition.curve.as_ref().ok_or(EffectError::NoKnots { effect })?)?;
         }
+        for (parameter, table) in &tables {
+            table.check(effect, &definition.parameters[*parameter])?;
+        }
         let is_replaced = |parameter: &Parameter| knots.is_some() && definition.replaces(parameter.name);
+        let is_tabled = |index: usize| tables.iter().any(|(of, _)| *of == index);
         let mut given = vec![None; definition.parameters.len()];
         for (name, value) in parameters {
-            let Some(index) = definition.parameters.iter().position(|one| one.name == name) else {
-                let known = names(definition.parameters.iter().map(|one| one.name));
-                return Err(EffectError::NoParameter { effect, parameter: name.into(), known });
-            };
+            let index = definition.index_of(name)?;
             let parameter = &definition.parameters[index];
+            if is_tabled(index) {
+                return Err(EffectError::Tabled { effect, parameter: parameter.name });
+            }
             if is_replaced(parameter) {
                 return Err(EffectError::Replaced { effect, parameter: parameter.name });
             }
@@ -258,19 +320,24 @@ impl Effect {
                 return Err(EffectError::Twice { effect, parameter: parameter.name });
             }
         }
-        let value = |(parameter, value): (&Parameter, Option<f64>)| match value {
-            Some(value) => definition.check(parameter, value),
-            None if parameter.is_optional || is_replaced(parameter) => Ok(parameter.neutral),
-            None => Err(EffectError::Missing { effect, parameter: parameter.name }),
+        let value = |(index, value): (usize, Option<f64>)| {
+            let parameter = &definition.parameters[index];
+            match value {
+                Some(value) => definition.check(parameter, value),
+                None if parameter.is_optional || is_replaced(parameter) || is_tabled(index) => {
+                    Ok(parameter.neutral)
+                }
+                None => Err(EffectError::Missing { effect, parameter: parameter.name }),
+            }
         };
-        let values = definition.parameters.iter().zip(given).map(value).collect::<Result<_, _>>()?;
-        Ok(Self { definition, values: Values { parameters: values, knots } })
+        let values = given.into_iter().enumerate().map(value).collect::<Result<_, _>>()?;
+        Ok(Self { definition, values: Values { parameters: values, knots, tables } })
     }
 
     /// The effect that changes nothing.
     pub fn neutral(definition: &'static Definition) -> Self {
         let parameters = definition.parameters.iter().map(|one| one.neutral).collect();
-        Self { definition, values: Values { parameters, knots: None } }
+        Self { definition, values: Values { parameters, knots: None, tables: Vec::new() } }
     }
 
     /// The same effect with another value of one parameter.
@@ -280,8 +347,8 @@ impl Effect {
     pub fn with(&self, parameter: &str, value: f64) -> Result<Self, EffectError> {
         let replaced = |(name, old)| (name, if name == parameter { value } else { old });
         let unknown = self.parameters().all(|(name, _)| name != parameter).then_some((parameter, value));
-        let knots = self.values.knots.clone();
-        Self::checked(self.definition, self.parameters().map(replaced).chain(unknown), knots)
+        let Values { knots, tables, .. } = self.values.clone();
+        Self::checked(self.definition, self.parameters().map(replaced).chain(unknown), knots, tables)
     }
 
     /// What it is.
@@ -294,11 +361,22 @@ impl Effect {
         self.definition.name
     }
 
-    /// Its parameters with their values, less those that knots replace.
+    /// Its parameters with their values, less those that knots or tables replace.
     pub fn parameters(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        let names = self.definition.parameters.iter().map(|parameter| parameter.name);
-        let all = names.zip(self.values.iter().copied());
-        all.filter(|(name, _)| self.knots().is_none() || !self.definition.replaces(name))
+        let all = self.definition.parameters.iter().zip(self.values.iter().copied()).enumerate();
+        all.filter_map(|(index, (parameter, value))| {
+            let is_replaced = self.knots().is_some() && self.definition.replaces(parameter.name)
+                || self.values.tables.iter().any(|(of, _)| *of == index);
+            (!is_replaced).then_some((parameter.name, value))
+        })
+    }
+
+    /// Its parameters that are tables.
+    pub fn tables(&self) -> impl Iterator<Item = (&'static str, &Table)> {
+        self.values
+            .tables
+            .iter()
+            .map(|(parameter, table)| (self.definition.parameters[*parameter].name, table))
     }
 
     /// The knots in place of its formula; `None` if it has its formula.
@@ -306,7 +384,7 @@ impl Effect {
         self.values.knots()
     }
 
-    /// A parameter's value; `None` if there is no such parameter, or if knots replace it.
+    /// A parameter's value; `None` if there is no such parameter, or if knots or a table replace it.
     pub fn value(&self, parameter: &str) -> Option<f64> {
         self.parameters().find(|(name, _)| *name == parameter).map(|(_, value)| value)
     }
@@ -351,6 +429,15 @@ impl Effect {
 impl PartialEq for Effect {
     fn eq(&self, other: &Self) -> bool {
         self.name() == other.name() && self.values == other.values
+    }
+}
+
+/// What a parameter may be a table of, for a message.
+fn allowed(varies: &[By]) -> String {
+    if varies.is_empty() {
+        ", only a value".into()
+    } else {
+        format!("; it may be one of {}", names(varies.iter().map(|by| by.name())))
     }
 }
 

@@ -6,7 +6,7 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `growth_share` | - | 0 | -0.9 to 5 | relative growth of sigma where the depth is the whole thickness |
+//! | `growth_share` | - | 0 | -0.9 to 5 | relative growth of sigma where the depth is the whole thickness; may be a table of `depth_mm` |
 //!
 //! The volume is conserved: the peak falls as the width grows.
 //!
@@ -16,12 +16,12 @@
 //! The paper's Sec. 3 and Fig. 5a measure sigma at three depths under each covering and fit all with one line in
 //! thickness (Eq. 4); this is the first term that the line leaves out.
 
-use super::{BaseModel, Definition, Load, Make, OnCovering, Parameter};
+use super::{BaseModel, By, Definition, Load, Make, OnCovering, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "depth-dependent-spread",
     summary: "the point spread changes with depth",
-    parameters: &[Parameter::real("growth_share", 0.0, [-0.9, 5.0])],
+    parameters: &[Parameter::real("growth_share", 0.0, [-0.9, 5.0]).or_table_of(&[By::Depth])],
     near_twins: &["hardening", "saturation", "quadratic_per_mm"],
     shown_by: &["grid-sweep", "ladder", "tilt"],
     curve: None,

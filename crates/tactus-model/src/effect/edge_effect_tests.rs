@@ -25,3 +25,24 @@ fn all_elements_gain_by_the_tools_distance_from_edge_and_seam() {
         }
     }
 }
+
+#[test]
+fn each_side_and_the_corners_have_shares_of_their_own() {
+    let without = linear([]);
+    let at_mm = [14.0, 1.5];
+    let [x, y] = without.registration.to_robot(at_mm);
+    let tip_mm = [x, y, without.surface_mm - 0.4];
+    for (parameter, distance_mm) in [
+        ("x_min_share", 14.0),
+        ("x_max_share", 2.2),
+        ("y_min_share", 1.5),
+        ("y_max_share", 10.3),
+        ("corner_share", f64::hypot(2.2, 1.5)),
+    ] {
+        let with = linear([edge(0.0, 0.0, 1.5).with(parameter, -0.4).unwrap()]);
+        let want = 1.0 - 0.4 * f64::exp(-distance_mm / 1.5);
+        for (with, without) in still(&with, tip_mm).iter().zip(still(&without, tip_mm)) {
+            assert!((with / without - want).abs() < 1e-9, "{parameter}: {} {want}", with / without);
+        }
+    }
+}

@@ -7,8 +7,8 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `tilt_x_deg` | degree | 0 | -10 to 10 | tilt along the tool's own x; positive: the side of positive x is deeper |
-//! | `tilt_y_deg` | degree | 0 | -10 to 10 | the same along the tool's own y |
+//! | `tilt_x_deg` | degree | 0 | -10 to 10 | tilt along the tool's own x; positive: the side of positive x is deeper; may be a table of `x_mm` or `y_mm`, as for an arm that bends with its reach |
+//! | `tilt_y_deg` | degree | 0 | -10 to 10 | the same along the tool's own y; may be a table, too |
 //! | `touched_share` | - | 0.5 | 0 to 1 | the point to which depth is measured: 0 the foot of the axis, 1 the lowest point |
 //!
 //! `u, v` run along the tool's own sides (the robot's axes) from the foot of its axis. With a `touched_share` of 0 one edge is
@@ -21,15 +21,15 @@
 //! # Source
 //! A rigid flat punch that is turned about an axis in the plane: K. L. Johnson, *Contact Mechanics* (1985).
 
-use super::{BaseModel, Definition, Make, OnContact, Parameter};
+use super::{BaseModel, By, Definition, Make, OnContact, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "indenter-tilt",
     summary: "the tool's face is not parallel to the plane",
     parameters: &[
-        Parameter::real("tilt_x_deg", 0.0, [-10.0, 10.0]),
-        Parameter::real("tilt_y_deg", 0.0, [-10.0, 10.0]),
+        Parameter::real("tilt_x_deg", 0.0, [-10.0, 10.0]).or_table_of(&[By::X, By::Y]),
+        Parameter::real("tilt_y_deg", 0.0, [-10.0, 10.0]).or_table_of(&[By::X, By::Y]),
         Parameter::real("touched_share", 0.5, [0.0, 1.0]),
     ],
     near_twins: &["misregistration", "surface-offset", "surface-tilt", "indenter-size"],
@@ -48,10 +48,10 @@ struct IndenterTilt {
 
 impl OnContact for IndenterTilt {
     fn touch(&self, _: BaseModel<'_>, contact: &mut Contact) {
-        contact.depth_mm -= self.touched_share * contact.indenter.lowered_mm(self.lean());
+        contact.depth_mm -= self.touched_share * contact.indenter.lowered_mm(self.lean(contact));
     }
 
-    fn lean(&self) -> [f64; 2] {
+    fn lean(&self, _: &Contact) -> [f64; 2] {
         self.tilt_deg.map(|tilt_deg| tilt_deg.to_radians().tan())
     }
 }

@@ -14,6 +14,7 @@
 use std::ops::Deref;
 
 use super::EffectError;
+use super::table::Table;
 
 /// The free curve that an effect may have in place of its formula.
 #[derive(Debug)]
@@ -52,12 +53,14 @@ pub struct Knots {
     pub values: Vec<f64>,
 }
 
-/// An effect's values: one for each parameter, as a slice, and the knots if it has a free curve in place of its formula. Parameters that
-/// the curve replaces are at their neutral values.
+/// An effect's values: one for each parameter, as a slice, the knots if it has a free curve in place of its formula, and the tables of
+/// parameters. Parameters that the curve or a table replaces are at their neutral values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     pub(super) parameters: Vec<f64>,
     pub(super) knots: Option<Knots>,
+    /// In the order of the parameters.
+    pub(super) tables: Vec<(usize, Table)>,
 }
 
 /// Greatest number of knots.

@@ -10,8 +10,8 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `offset_x_mm` | mm | 0 | -5 to 5 | the sensor's origin lies so far from where the registration has it, along the robot's x |
-//! | `offset_y_mm` | mm | 0 | -5 to 5 | the same along the robot's y |
+//! | `offset_x_mm` | mm | 0 | -5 to 5 | the sensor's origin lies so far from where the registration has it, along the robot's x; may be a table of `x_mm` or `y_mm`, as for a bent guide |
+//! | `offset_y_mm` | mm | 0 | -5 to 5 | the same along the robot's y; may be a table, too |
 //! | `rotation_deg` | degree | 0 | -45 to 45 | the sensor is turned so far beyond the registration, counter-clockwise |
 //! | `scale_error` | - | 0 | -0.2 to 0.2 | the stage moves this share further than it reports |
 //! | `squareness_deg` | degree | 0 | -10 to 10 | the stage's y axis leans so far towards its x axis; may be left out |
@@ -22,14 +22,14 @@
 //! # Source
 //! The paper's Sec. 2.1: two touches near opposite corners define the registration, which inherits their errors.
 
-use super::{Definition, Make, Now, OnMotion, Parameter, TipState};
+use super::{By, Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "misregistration",
     summary: "the transform from robot to sensor is off by a shift, a turn, a scale and a stage that is not square",
     parameters: &[
-        Parameter::real("offset_x_mm", 0.0, [-5.0, 5.0]),
-        Parameter::real("offset_y_mm", 0.0, [-5.0, 5.0]),
+        Parameter::real("offset_x_mm", 0.0, [-5.0, 5.0]).or_table_of(&[By::X, By::Y]),
+        Parameter::real("offset_y_mm", 0.0, [-5.0, 5.0]).or_table_of(&[By::X, By::Y]),
         Parameter::real("rotation_deg", 0.0, [-45.0, 45.0]),
         Parameter::real("scale_error", 0.0, [-0.2, 0.2]),
         Parameter::real("squareness_deg", 0.0, [-10.0, 10.0]).or_neutral(),

@@ -72,8 +72,9 @@ pub trait OnContact: Debug + Send + Sync {
     fn touch(&self, _base: BaseModel<'_>, _contact: &mut Contact) {}
 
     /// Lean of the tool about the foot of its axis: the increase of a flat face's depth per mm along the tool's own x and
-    /// y. A [`Contact`] is always upright, so the lean is separate. The leans of several effects add.
-    fn lean(&self) -> [f64; 2] {
+    /// y, for the contact before [`OnContact::touch`]. A [`Contact`] is always upright, so the lean is separate. The leans of several effects
+    /// add.
+    fn lean(&self, _contact: &Contact) -> [f64; 2] {
         [0.0; 2]
     }
 }

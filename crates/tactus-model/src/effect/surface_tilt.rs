@@ -6,8 +6,8 @@
 //!
 //! | parameter | unit | neutral | range | meaning |
 //! |---|---|---|---|---|
-//! | `slope_x_mm_per_mm` | mm/mm | 0 | -0.2 to 0.2 | rise of the surface along the sensor's x |
-//! | `slope_y_mm_per_mm` | mm/mm | 0 | -0.2 to 0.2 | rise of the surface along the sensor's y |
+//! | `slope_x_mm_per_mm` | mm/mm | 0 | -0.2 to 0.2 | rise of the surface along the sensor's x; may be a table of `x_mm` or `y_mm`, as for a bowed or twisted surface |
+//! | `slope_y_mm_per_mm` | mm/mm | 0 | -0.2 to 0.2 | rise of the surface along the sensor's y; may be a table, too |
 //! | `touched_x_mm` | mm | 0 | -50 to 50 | where the surface's height was found: x from the middle of the active area |
 //! | `touched_y_mm` | mm | 0 | -50 to 50 | the same in y |
 //!
@@ -17,14 +17,14 @@
 //! # Source
 //! The paper's Sec. 2.1: the surface was measured at a single point and taken to be level.
 
-use super::{BaseModel, Definition, Make, Now, OnMotion, Parameter, TipState};
+use super::{BaseModel, By, Definition, Make, Now, OnMotion, Parameter, TipState};
 
 pub(super) static DEFINITION: Definition = Definition {
     name: "surface-tilt",
     summary: "the surface's height changes linearly over the plane",
     parameters: &[
-        Parameter::real("slope_x_mm_per_mm", 0.0, [-0.2, 0.2]),
-        Parameter::real("slope_y_mm_per_mm", 0.0, [-0.2, 0.2]),
+        Parameter::real("slope_x_mm_per_mm", 0.0, [-0.2, 0.2]).or_table_of(&[By::X, By::Y]),
+        Parameter::real("slope_y_mm_per_mm", 0.0, [-0.2, 0.2]).or_table_of(&[By::X, By::Y]),
         Parameter::real("touched_x_mm", 0.0, [-50.0, 50.0]),
         Parameter::real("touched_y_mm", 0.0, [-50.0, 50.0]),
     ],

@@ -88,9 +88,7 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {
         }
         writeln!(f, "{table}")?;
     }
-    if let Some(curve) = &step.curve {
-        self::curve(f, step.effect, curve)?;
-    }
+    step.curves.iter().try_for_each(|curve| self::curve(f, step.effect, curve))?;
     writeln!(
         f,
         "<p>On held-out presses the residual is {} counts rms without it (all else fitted again) and {} with it. The probability of such a \
@@ -114,23 +112,37 @@ fn step(f: &mut fmt::Formatter<'_>, step: &AddedEffect) -> fmt::Result {
     }
 }
 
-/// A free curve in place of a formula, in a table and a figure.
+/// A free curve in place of a formula, or a parameter's table, in a table and a figure.
 fn curve(f: &mut fmt::Formatter<'_>, effect: &str, curve: &FittedCurve) -> fmt::Result {
     let (at, of) = (curve.at, curve.of);
-    writeln!(
-        f,
-        "<p>The fitted presses refute its formula, so the model has a free curve through knots in its place. With the formula the residual on \
-         held-out presses would be {} counts rms.</p>",
-        digits(curve.heldout_rms_formula_counts, 3)
-    )?;
-    let columns = [Column::Number(at), Column::Number(of), Column::Number("by the formula")];
+    if let Some(formula) = &curve.formula {
+        writeln!(
+            f,
+            "<p>The fitted presses refute its formula, so the model has a free curve through knots in its place. With the formula the residual \
+             on held-out presses would be {} counts rms.</p>",
+            digits(formula.heldout_rms_counts, 3)
+        )?;
+    } else if curve.is_table() {
+        writeln!(
+            f,
+            "<p>No one value of <code>{}</code> describes the presses: it differs with the tip's <code>{}</code>.</p>",
+            Text(of),
+            Text(at)
+        )?;
+    } else {
+        writeln!(f, "<p>A free curve through knots describes it better than its formula.</p>")?;
+    }
+    let by_formula = curve.formula.iter().map(|_| Column::Number("by the formula"));
+    let columns: Vec<Column> =
+        [Column::Number(at), Column::Number(of)].into_iter().chain(by_formula).collect();
     let mut table = Table::new(&columns);
-    for knot in &curve.knots {
+    for (nth, knot) in curve.knots.iter().enumerate() {
         let value = match knot.standard_error {
             Some(error) => with_error(knot.value, error),
             None => short(knot.value, 6),
         };
-        table.row([short(knot.at, 4), value, short(knot.formula, 4)]);
+        let by_formula = curve.formula.iter().map(|formula| short(formula.values[nth], 4));
+        table.row([short(knot.at, 4), value].into_iter().chain(by_formula));
     }
     writeln!(f, "{table}\n{}", free_curve(effect, curve))
 }

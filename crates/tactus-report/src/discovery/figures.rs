@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use tactus_discover::{Curve, Discovery, ElementGap, FittedCurve, FittedKnot, Point};
+use tactus_discover::{Curve, Discovery, ElementGap, FittedCurve, Point};
 use tactus_model::Array;
 
 use crate::{
@@ -41,22 +41,31 @@ pub fn residual_against(curve: &Curve) -> Figure {
     figure.with(bars.ink(Ink::Blue)).with(dots.ink(Ink::Blue).label(AFTER))
 }
 
-/// A free curve with the standard errors of its knots, beside the formula that it replaces.
+/// A free curve or a table with the standard errors of its knots, beside the formula that it replaces.
 pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
-    let unit = curve.at.trim_start_matches("at_").replace("_per_", "/");
-    let (x, y) = (Axis::new("place", unit).tight(), Axis::new(curve.of.replace('_', " "), "").from_zero());
-    let line = |of: fn(&FittedKnot) -> f64| {
-        let knots = curve.knots.iter().map(|knot| [knot.at, of(knot)]);
-        Series::line([[0.0; 2]].into_iter().chain(knots).collect())
+    let of = Axis::new(curve.of.replace('_', " "), "");
+    let (x, y) = if curve.is_table() {
+        let (name, unit) = curve.at.rsplit_once('_').unwrap_or((curve.at, ""));
+        (Axis::new(name, unit.to_owned()).tight(), of)
+    } else {
+        let unit = curve.at.trim_start_matches("at_").replace("_per_", "/");
+        (Axis::new("place", unit).tight(), of.from_zero())
     };
+    let formula = curve.formula.iter().map(|formula| {
+        let points = curve.knots.iter().zip(&formula.values).map(|(knot, value)| [knot.at, *value]);
+        let line = Series::line([[0.0; 2]].into_iter().chain(points).collect());
+        line.ink(Ink::Muted).dashed().label("formula")
+    });
     let bars = curve.knots.iter().filter_map(|knot| {
         let error = knot.standard_error?;
         Some([knot.at, knot.value - error, knot.value + error])
     });
     let dots = curve.knots.iter().map(|knot| [knot.at, knot.value]).collect();
-    Figure::new(format!("Free curve of {effect}"), x, y)
-        .size_px(CURVE_PX)
-        .with(line(|knot| knot.formula).ink(Ink::Muted).dashed().label("formula"))
+    let figure =
+        Figure::new(format!("{} of {effect}", if curve.is_table() { "Table" } else { "Free curve" }), x, y)
+            .size_px(CURVE_PX);
+    formula
+        .fold(figure, Figure::with)
         .with(Series::bars(bars).width_px(1.2).ink(Ink::Blue))
         .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label("knots"))
 }

@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tactus_discover::{
-    AddedEffect, Contest, Curve, Discovery, Estimated, FaultyElement, FittedCurve, Floor, Gap, GlobalTest,
-    Inclusion, LeftOut, Level, NextExperiment, OpenQuestion, Rivalry, Round, Structured, TriedEffect,
+    AddedEffect, Contest, Curve, Discovery, Estimated, FaultyElement, FittedCurve, FittedKnot, Floor, Gap,
+    GlobalTest, Inclusion, LeftOut, Level, NextExperiment, OpenQuestion, Rivalry, Round, Structured,
+    TriedEffect,
 };
 
 use super::{ActiveRun, AmbiguousEffect, DataSource, DiscoveryReport, in_words};
@@ -196,9 +197,10 @@ struct StepJson<'a> {
     folds_p_value: f64,
     heldout_rms_before: f64,
     heldout_rms_after: f64,
-    /// `formula` or `knots`.
+    /// `formula`, `knots`, or `table` if only parameters are free.
     form: &'static str,
     knots: Option<KnotsJson<'a>>,
+    tables: Vec<TableJson<'a>>,
     equivalent: &'a [&'static str],
 }
 
@@ -208,7 +210,15 @@ struct KnotsJson<'a> {
     at: &'a str,
     of: &'a str,
     points: Vec<KnotJson>,
-    heldout_rms_formula: f64,
+    heldout_rms_formula: Option<f64>,
+}
+
+/// A parameter that differs with where the tip stands, as the model file has it.
+#[derive(Serialize)]
+struct TableJson<'a> {
+    parameter: &'a str,
+    by: &'a str,
+    points: Vec<KnotJson>,
 }
 
 #[derive(Serialize)]
@@ -216,7 +226,8 @@ struct KnotJson {
     at: f64,
     value: f64,
     se: Option<f64>,
-    formula: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    formula: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -499,6 +510,8 @@ impl<'a> StepJson<'a> {
             term.iter().map(move |one| (format!("{}{suffix}", one.name), EstimateJson::of(one)))
         });
         let term = |term: &'a Vec<Estimated>| term.iter().map(|one| (one.name, EstimateJson::of(one)));
+        let knots = step.curves.iter().find(|curve| !curve.is_table()).map(KnotsJson::of);
+        let tables: Vec<_> = step.curves.iter().filter(|curve| curve.is_table()).map(TableJson::of).collect();
         Self {
             effect: step.effect,
             parameters: numbered.collect(),
@@ -508,8 +521,15 @@ impl<'a> StepJson<'a> {
             folds_p_value: step.folds_p_value,
             heldout_rms_before: step.heldout_rms_before_counts,
             heldout_rms_after: step.heldout_rms_after_counts,
-            form: if step.curve.is_some() { "knots" } else { "formula" },
-            knots: step.curve.as_ref().map(KnotsJson::of),
+            form: if knots.is_some() {
+                "knots"
+            } else if tables.is_empty() {
+                "formula"
+            } else {
+                "table"
+            },
+            knots,
+            tables,
             equivalent: &step.equivalent,
         }
     }
@@ -517,18 +537,32 @@ impl<'a> StepJson<'a> {
 
 impl<'a> KnotsJson<'a> {
     fn of(curve: &'a FittedCurve) -> Self {
-        let points = curve.knots.iter().map(|knot| KnotJson {
-            at: knot.at,
-            value: knot.value,
-            se: knot.standard_error,
-            formula: knot.formula,
-        });
+        let formula = curve.formula.as_ref();
         Self {
             at: curve.at,
             of: curve.of,
-            points: points.collect(),
-            heldout_rms_formula: curve.heldout_rms_formula_counts,
+            points: KnotJson::all(curve),
+            heldout_rms_formula: formula.map(|formula| formula.heldout_rms_counts),
         }
+    }
+}
+
+impl<'a> TableJson<'a> {
+    fn of(table: &'a FittedCurve) -> Self {
+        Self { parameter: table.of, by: table.at, points: KnotJson::all(table) }
+    }
+}
+
+impl KnotJson {
+    fn all(curve: &FittedCurve) -> Vec<Self> {
+        let formula = |nth: usize| Some(curve.formula.as_ref()?.values[nth]);
+        let knot = |(nth, knot): (usize, &FittedKnot)| Self {
+            at: knot.at,
+            value: knot.value,
+            se: knot.standard_error,
+            formula: formula(nth),
+        };
+        curve.knots.iter().enumerate().map(knot).collect()
     }
 }
 

@@ -11,7 +11,8 @@ use crate::made_up::discovery::{
 };
 use serde_json::Value;
 use tactus_discover::{
-    Discovery, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, Unexplained, Verdict,
+    Discovery, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, ReplacedFormula, Unexplained,
+    Verdict,
 };
 use tactus_model::Array;
 use tactus_report::discovery::{
@@ -94,13 +95,13 @@ fn the_json_has_every_field_of_its_schema_where_it_belongs() {
 #[test]
 fn an_effect_with_knots_has_them_beside_its_formula() {
     let mut discovery = explained();
-    let knot = |at: f64, value: f64, standard_error| FittedKnot { at, value, standard_error, formula: at };
-    discovery.steps[0].curve = Some(FittedCurve {
+    let knot = |at: f64, value: f64, standard_error| FittedKnot { at, value, standard_error };
+    discovery.steps[0].curves = vec![FittedCurve {
         at: "at_mm",
         of: "loss_share",
         knots: vec![knot(0.05, 0.31, Some(0.02)), knot(0.4, 0.77, None)],
-        heldout_rms_formula_counts: 3.45,
-    });
+        formula: Some(ReplacedFormula { values: vec![0.05, 0.4], heldout_rms_counts: 3.45 }),
+    }];
     let (page, json) = (html(&discovery), json(&discovery));
     show("knots.html", &page);
     for part in ["refute its formula", "would be 3.45 counts", "at_mm", "0.31", "Free curve of hysteresis"] {
@@ -110,6 +111,29 @@ fn an_effect_with_knots_has_them_beside_its_formula() {
     let knots = &json["steps"][0]["knots"];
     assert_eq!(knots["points"][0].to_string(), r#"{"at":0.05,"formula":0.05,"se":0.02,"value":0.31}"#);
     assert_eq!((&knots["at"], &knots["heldout_rms_formula"]), (&"at_mm".into(), &3.45.into()));
+    assert_eq!(json["steps"][0]["tables"].to_string(), "[]");
+}
+
+#[test]
+fn an_effect_with_a_table_shows_it() {
+    let mut discovery = explained();
+    let knot = |at: f64, value: f64| FittedKnot { at, value, standard_error: Some(0.02) };
+    discovery.steps[0].curves = vec![FittedCurve {
+        at: "depth_mm",
+        of: "ratio",
+        knots: vec![knot(0.0, 0.81), knot(0.4, 1.0)],
+        formula: None,
+    }];
+    let (page, json) = (html(&discovery), json(&discovery));
+    show("table.html", &page);
+    for part in ["No one value of <code>ratio</code>", "<code>depth_mm</code>", "0.81", "Table of hysteresis"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    let step = &json["steps"][0];
+    assert_eq!((&step["form"], &step["knots"]), (&"table".into(), &Value::Null));
+    let table = r#"{"by":"depth_mm","parameter":"ratio","points":[{"at":0.0,"se":0.02,"value":0.81},{"at":0.4,"se":0.02,"value":1.0}]}"#;
+    assert_eq!(step["tables"][0].to_string(), table);
 }
 
 /// A discovery with every kind of field filled, compared byte for byte with `golden/discovery.json`.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use tactus_model::effect::{Definition, Knots};
+use tactus_model::effect::{By, Definition, Knots, Table};
 use tactus_model::{Array, Covering, Effect, Psf, Response};
 
 use super::{BaseModel, Evidence, KnownEffect, Model, ModelFileError};
@@ -69,10 +69,21 @@ struct RawEffect {
     /// Places and values, by the keys of the effect's curve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     knots: Option<BTreeMap<String, Vec<f64>>>,
+    /// Tables in place of parameters, by their names.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    tables: BTreeMap<String, RawTable>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     standard_errors: BTreeMap<String, f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     evidence: Option<RawEvidence>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTable {
+    by: String,
+    at: Vec<f64>,
+    values: Vec<f64>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -203,6 +214,7 @@ impl RawEffect {
             name: known.effect.name().into(),
             parameters: known.effect.parameters().map(|(name, value)| (name.into(), value)).collect(),
             knots,
+            tables: known.effect.tables().map(|(name, table)| (name.into(), RawTable::of(table))).collect(),
             standard_errors: known.standard_errors.clone(),
             evidence: known.evidence.as_ref().map(|evidence| RawEvidence {
                 data: evidence.data.clone(),
@@ -216,10 +228,12 @@ impl RawEffect {
         let wrong_effect = |source| ModelFileError::Effect { index, source };
         let parameters = self.parameters.iter().map(|(name, value)| (name.as_str(), *value));
         let definition = Definition::find(&self.name).map_err(wrong_effect)?;
-        let effect = match &self.knots {
-            None => Effect::of(definition, parameters),
-            Some(raw) => Effect::of_knots(definition, parameters, knots(raw, index, definition)?),
-        };
+        let knots = self.knots.as_ref().map(|raw| knots(raw, index, definition)).transpose()?;
+        let mut tables = BTreeMap::new();
+        for (name, raw) in &self.tables {
+            tables.insert(name.as_str(), raw.check(index, name)?);
+        }
+        let effect = Effect::with_tables(definition, parameters, knots, tables);
         let effect = effect.and_then(|effect| effect.fits(array).map(|()| effect)).map_err(wrong_effect)?;
         for (name, se) in &self.standard_errors {
             let field = format!("effect[{index}].standard_errors.{name}");
@@ -246,6 +260,20 @@ fn knots(
             format!("effect[{index}].knots"),
             format!("those of {} have {} and {} and nothing else", definition.name, curve.at, curve.of),
         )),
+    }
+}
+
+impl RawTable {
+    fn of(Table { by, at, values }: &Table) -> Self {
+        Self { by: by.name().into(), at: at.clone(), values: values.clone() }
+    }
+
+    fn check(&self, effect: usize, parameter: &str) -> Result<Table, WrongField> {
+        let by = By::ALL.into_iter().find(|by| by.name() == self.by).ok_or_else(|| {
+            let known = By::ALL.map(By::name).join(", ");
+            wrong(format!("effect[{effect}].tables.{parameter}.by"), format!("must be one of {known}"))
+        })?;
+        Ok(Table { by, at: self.at.clone(), values: self.values.clone() })
     }
 }
 

@@ -76,7 +76,7 @@ pub(crate) fn explained() -> Discovery {
                 folds_p_value: 0.000_5,
                 heldout_rms_before_counts: 9.12,
                 heldout_rms_after_counts: 2.08,
-                curve: None,
+                curves: Vec::new(),
                 equivalent: vec!["backlash"],
             },
             AddedEffect {
@@ -96,7 +96,7 @@ pub(crate) fn explained() -> Discovery {
                 folds_p_value: 0.000_5,
                 heldout_rms_before_counts: 4.31,
                 heldout_rms_after_counts: 2.08,
-                curve: None,
+                curves: Vec::new(),
                 equivalent: vec![],
             },
         ],

@@ -40,7 +40,10 @@ pub(super) fn grown(before: &Model, found: &Discovery, data: &str) -> Model {
 
 /// The term of a step that belongs to this effect.
 fn term<'a>(step: &'a AddedEffect, effect: &Effect) -> Option<&'a [Estimated]> {
-    let is = |term: &&Vec<Estimated>| term.iter().all(|one| effect.value(one.name) == Some(one.value));
+    // One with a table has hardly anything else.
+    let is = |term: &&Vec<Estimated>| {
+        !term.is_empty() && term.iter().all(|one| effect.value(one.name) == Some(one.value))
+    };
     (step.effect == effect.name()).then(|| step.terms.iter().find(is)).flatten().map(Vec::as_slice)
 }
 

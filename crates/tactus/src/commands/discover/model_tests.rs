@@ -85,7 +85,7 @@ pub(crate) fn found(model: &Model) -> Discovery {
             folds_p_value: 1e-4,
             heldout_rms_before_counts: 8.0,
             heldout_rms_after_counts: 2.0,
-            curve: None,
+            curves: Vec::new(),
             equivalent: Vec::new(),
         }],
         final_: Final { level, shrink: Some(1.0) },

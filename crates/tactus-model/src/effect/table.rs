@@ -1,0 +1,168 @@
+//! Tables: parameters that differ with where the tip stands.
+//!
+//! A tool with a rounded rim is narrower where it only touches; a guide that is bent shifts the tip by another amount at each place. An effect
+//! whose parameter [`varies`](super::Parameter::varies) has, in place of one value, a table of the tip's depth or place: straight lines
+//! between the listed places, and constant beyond the first and the last.
+//!
+//! Only effects without memory have such parameters: at each moment they act as if the parameter had the table's value there.
+
+use super::{
+    BaseModel, EffectError, Load, Now, OnContact, OnCovering, OnMotion, Parameter, TipState, Values,
+};
+use crate::Contact;
+
+/// What a table is a function of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum By {
+    /// The tip's depth below the covering's surface, in mm.
+    Depth,
+    /// The tip's x, sensor frame, in mm.
+    X,
+    /// The tip's y, sensor frame, in mm.
+    Y,
+}
+
+/// A parameter's values at places; in the parameter's unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// What it is a function of.
+    pub by: By,
+    /// In mm, each greater than the one before.
+    pub at: Vec<f64>,
+    /// One for each place.
+    pub values: Vec<f64>,
+}
+
+/// Greatest number of places.
+pub const PLACES_MAX: usize = 64;
+
+impl By {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Depth, Self::X, Self::Y];
+
+    /// The name in model files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Depth => "depth_mm",
+            Self::X => "x_mm",
+            Self::Y => "y_mm",
+        }
+    }
+
+    fn of_contact(self, contact: &Contact) -> f64 {
+        self.of(contact.position_mm, contact.depth_mm)
+    }
+
+    fn of_tip(self, tip: &TipState) -> f64 {
+        self.of(tip.position_mm(), tip.surface_mm - tip.tip_mm[2])
+    }
+
+    const fn of(self, [x_mm, y_mm]: [f64; 2], depth_mm: f64) -> f64 {
+        match self {
+            Self::Depth => depth_mm,
+            Self::X => x_mm,
+            Self::Y => y_mm,
+        }
+    }
+}
+
+impl Table {
+    /// The value at a place.
+    pub fn value(&self, place: f64) -> f64 {
+        let next = self.at.partition_point(|at| *at <= place);
+        let (before, after) = (next.saturating_sub(1), next.min(self.at.len() - 1));
+        let [low, high] = [before, after].map(|index| self.values[index]);
+        if before == after || next == 0 {
+            return low;
+        }
+        low + (high - low) * (place - self.at[before]) / (self.at[after] - self.at[before])
+    }
+
+    /// Checks it as that of a parameter.
+    pub(super) fn check(&self, effect: &'static str, of: &Parameter) -> Result<(), EffectError> {
+        let Parameter { name: parameter, range: [least, most], varies, .. } = *of;
+        if !varies.contains(&self.by) {
+            return Err(EffectError::NoTable {
+                effect,
+                parameter: parameter.into(),
+                by: self.by.name(),
+                varies,
+            });
+        }
+        let refuse = |want| Err(EffectError::Table { effect, parameter, want });
+        let [places, values] = [self.at.len(), self.values.len()];
+        if places != values || !(1..=PLACES_MAX).contains(&places) {
+            return refuse(format!(
+                "must have 1 to {PLACES_MAX} places, with as many values, not {places} and {values}"
+            ));
+        }
+        if let Some(index) = self.at.iter().position(|at| !at.is_finite()) {
+            return refuse(format!("must have finite places; at[{index}] is {}", self.at[index]));
+        }
+        if let Some(index) = self.at.windows(2).position(|two| two[1] <= two[0]) {
+            let [before, after] = [self.at[index], self.at[index + 1]];
+            return refuse(format!("must have places in order; {after} follows {before}"));
+        }
+        if let Some(value) = self.values.iter().find(|value| !(least..=most).contains(value)) {
+            return refuse(format!("must have values from {least} to {most}, not {value}"));
+        }
+        Ok(())
+    }
+}
+
+/// An effect of which some parameters are tables.
+#[derive(Debug)]
+pub(crate) struct Tabled<Make> {
+    make: Make,
+    values: Values,
+}
+
+impl<Object: ?Sized> Tabled<fn(&Values) -> Box<Object>> {
+    pub(crate) fn of(make: fn(&Values) -> Box<Object>, values: &Values) -> Self {
+        Self { make, values: values.clone() }
+    }
+
+    /// The effect's object with the values at a place.
+    fn at(&self, place: impl Fn(By) -> f64) -> Box<Object> {
+        let mut parameters = self.values.parameters.clone();
+        for (parameter, table) in &self.values.tables {
+            parameters[*parameter] = table.value(place(table.by));
+        }
+        (self.make)(&Values { parameters, knots: self.values.knots.clone(), tables: Vec::new() })
+    }
+}
+
+impl OnMotion for Tabled<fn(&Values) -> Box<dyn OnMotion>> {
+    fn place(&mut self, now: Now<'_>, tip: &mut TipState) {
+        self.at(|by| by.of_tip(tip)).place(now, tip);
+    }
+}
+
+impl OnContact for Tabled<fn(&Values) -> Box<dyn OnContact>> {
+    fn touch(&self, base: BaseModel<'_>, contact: &mut Contact) {
+        self.at(|by| by.of_contact(contact)).touch(base, contact);
+    }
+
+    fn lean(&self, contact: &Contact) -> [f64; 2] {
+        self.at(|by| by.of_contact(contact)).lean(contact)
+    }
+}
+
+impl OnCovering for Tabled<fn(&Values) -> Box<dyn OnCovering>> {
+    fn spread(&self, base: BaseModel<'_>, loads: &mut Vec<Load>) {
+        let Some(contact) = loads.first().map(|load| load.contact.clone()) else { return };
+        self.at(|by| by.of_contact(&contact)).spread(base, loads);
+    }
+
+    fn spreads(&self) -> bool {
+        (self.make)(&self.values).spreads()
+    }
+
+    fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
+        self.at(|by| by.of_contact(contact)).signal(now, contact, signal_mm);
+    }
+}
+
+#[cfg(test)]
+#[path = "table_tests.rs"]
+mod tests;
