@@ -68,6 +68,7 @@ fn discover_on_threads(
         progress: &|what, share| reporter.report(what, share),
     };
     let before = search.locate(&base)?;
+    let scattered = search.scattered(&base)?;
     let Grown { at: grown, rounds, mut equivalent, refused, .. } = match options.rule {
         Rule::Protocol => search.grow(&base)?,
         Rule::Bic => search.grow_by_bic(base.clone())?,
@@ -82,11 +83,23 @@ fn discover_on_threads(
     reporter.report("locating what remains", 0.9);
     let left = search.left(&confirmed.grown)?;
     let after = search.locate(&confirmed.grown)?;
+    let scatters = [scattered, search.scattered(&confirmed.grown)?];
     reporter.report("planning what to measure next", 0.95);
     let told = conclude(
         &prepared,
         &search,
-        SearchOutcome { lacking, base, confirmed, rounds, equivalent, contests, left, before, after },
+        SearchOutcome {
+            lacking,
+            base,
+            confirmed,
+            rounds,
+            equivalent,
+            contests,
+            left,
+            before,
+            after,
+            scatters,
+        },
         options,
         experiments,
     )?;

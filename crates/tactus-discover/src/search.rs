@@ -8,7 +8,7 @@
 //! their own ([`drift`]), and pairs of elements are proposed by the residual ([`wiring`]).
 //!
 //! [`locate`] applies the same test to covariates in place of effects: it tells where a model and the data disagree, in words that do
-//! not depend on the library. [`not_shown`] lists effects that these data could not show at any size.
+//! not depend on the library; [`scatter`] tests whether the noise is the same everywhere. [`not_shown`] lists effects that these data could not show at any size.
 //!
 //! Each file names its sources.
 
@@ -25,6 +25,7 @@ mod memory;
 pub(crate) mod not_shown;
 mod options;
 mod rivals;
+mod scatter;
 mod score;
 mod tones;
 mod wiring;
@@ -41,4 +42,5 @@ pub use locate::{Curve, Gap, Point};
 pub(crate) use memory::Memory;
 pub use not_shown::NotShown;
 pub use options::{Options, Rule};
+pub(crate) use scatter::Scattered;
 pub(crate) use score::{q_values, sign_flip_p};

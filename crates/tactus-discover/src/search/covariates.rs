@@ -167,6 +167,11 @@ impl Forms {
     pub(crate) fn signal(&self) -> &[f64] {
         &self.signal
     }
+
+    /// Derivative of the signal along x or y.
+    pub(crate) fn slope(&self, axis: usize) -> &[f64] {
+        &self.along[axis]
+    }
 }
 
 fn is_within([least, most]: [f64; 2], signal: f64) -> bool {

@@ -15,7 +15,8 @@ use crate::fit::{Fitted, LOUD, Parameters, Prepared, Problem, RandomWalk, Term, 
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
     ALPHA, Alike, Contest, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS,
-    Refuted, RefutedFormula, Rule, Search, Tried, names, not_shown, q_values, sign_flip_p, without,
+    Refuted, RefutedFormula, Rule, Scattered, Search, Tried, names, not_shown, q_values, sign_flip_p,
+    without,
 };
 
 /// An effect is confirmed if noise alone would let it gain as much, on fitted presses that its parameters have not seen, with at most this
@@ -42,6 +43,8 @@ pub(crate) struct SearchOutcome {
     /// Where the base model and the data disagree, and where the grown model still does.
     pub(crate) before: Arc<Located>,
     pub(crate) after: Arc<Located>,
+    /// Whether the noise is the same everywhere, at the base model and at the grown one.
+    pub(crate) scatters: [Scattered; 2],
 }
 
 /// The residual of a model on the held-out frames.
@@ -131,13 +134,24 @@ pub(crate) fn conclude(
     experiments: &dyn Experiments,
 ) -> Result<Discovery, DiscoverError> {
     let Prepared { lattice, faulty, .. } = prepared;
-    let SearchOutcome { lacking, base, confirmed, rounds, equivalent, contests, left, before, after } = found;
+    let SearchOutcome {
+        lacking,
+        base,
+        confirmed,
+        rounds,
+        equivalent,
+        contests,
+        left,
+        before,
+        after,
+        scatters,
+    } = found;
     let Confirmed { grown, mut steps, tentative, agreed } = confirmed;
-    // Two tests: Bonferroni's correction.
     let first = rounds.first();
-    let p_value = (2.0 * first.map_or(1.0, |round| round.p_value).min(before.p_value)).min(1.0);
+    let of_first = first.map_or([1.0; 2], |round| [round.p_value, round.rivals_p_value]);
+    let p_value = least_p_value(of_first, before.p_value, scatters[0]);
     let share = search.share_left(&base, &grown);
-    let is_left = 2.0 * left.p_value.min(after.p_value) <= ALPHA;
+    let is_left = least_p_value([left.p_value, left.rivals_p_value], after.p_value, scatters[1]) <= ALPHA;
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
     let floor = prepared.floor_of(&of_grown);
@@ -203,7 +217,9 @@ pub(crate) fn conclude(
         verdict,
         unexplained: Unexplained {
             depends_on: if is_left && !is_clean {
-                after.gap.iter().map(|gap| gap.covariate).collect()
+                let is_scattered = TESTS * scatters[1].p_value <= ALPHA;
+                let scatter = is_scattered.then_some(scatters[1].with);
+                after.gap.iter().map(|gap| gap.covariate).chain(scatter).collect()
             } else {
                 Vec::new()
             },
@@ -221,6 +237,14 @@ pub(crate) fn conclude(
         gap: before.gap.clone(),
         ..prepared.unjudged(&of_base, base_level, options)?
     })
+}
+
+/// Tests of a model: by effects, by rivals without a name, by covariates, and of the scatter.
+const TESTS: f64 = 4.0;
+
+/// The least p-value of a model's tests, by Bonferroni's correction.
+fn least_p_value([of_effects, of_rivals]: [f64; 2], of_covariates: f64, scatter: Scattered) -> f64 {
+    (TESTS * of_effects.min(of_rivals).min(of_covariates).min(scatter.p_value)).min(1.0)
 }
 
 /// The report of data without a floor: figures of the base model in counts, no names, and what to measure next.

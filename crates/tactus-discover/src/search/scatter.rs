@@ -1,0 +1,177 @@
+//! Whether the noise grows with what the sensor does: with a signal, its slope, its change, or contact.
+//!
+//! A gain that flickers or a table that shakes leaves no mean in the residual. What it leaves is a scatter that is larger where the signal, or
+//! its slope, is larger. No effect of the library acts so, and a test of means cannot see it. With `q` the square of a reading's departure over
+//! the mean square of its element, `v` what the scatter may grow with, and both taken from their means over the element,
+//!
+//! ```text
+//! T = sum over readings of (v - mean v) (q - mean q)
+//! ```
+//!
+//! is 0 in the mean if the scatter is always the same. Blocks are independent, so the signs of their parts are flipped. At rest a departure is
+//! that of a frame from the straight line through the frames of its bin, which needs no model; in motion it is the residual.
+//!
+//! Where the noise is smaller than the converter's step, its scatter depends on where between two codes a reading lies. Then nothing is tested.
+//!
+//! # Source
+//! A regression of squares on what the variance may depend on: T. S. Breusch and A. R. Pagan, *Econometrica* 47 (1979) 1287.
+
+use super::covariates::Forms;
+use super::grow::Search;
+use super::score::sign_flip_p;
+use crate::data::DiscoverError;
+use crate::fit::Fitted;
+use crate::numbers::{median, parallel};
+
+/// Least number of frames of a bin at rest; a line through them takes two.
+const REST_FRAMES: usize = 3;
+/// Least noise, in steps of the converter.
+const NOISE_STEPS: f64 = 0.7;
+/// Flipped data sets: enough for a small p-value that is corrected for many tests.
+const FLIPS: usize = 9999;
+/// Changes the seed, so that scatter has other sign flips than means.
+const STREAM: u64 = 0x5ca7_7e12;
+
+/// What the scatter may grow with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum With {
+    Signal,
+    Slope,
+    Contact,
+    Change,
+}
+
+/// The strongest growth of the scatter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scattered {
+    /// Of all that it may grow with.
+    pub(crate) p_value: f64,
+    /// In words; empty if nothing was tested.
+    pub(crate) with: &'static str,
+}
+
+impl With {
+    const ALL: [Self; 4] = [Self::Signal, Self::Slope, Self::Contact, Self::Change];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Signal => "noise that grows with the signal",
+            Self::Slope => "noise that grows with the slope of the image",
+            Self::Contact => "noise that grows in contact",
+            Self::Change => "noise that grows with the change of the signal",
+        }
+    }
+
+    /// True if it acts where the tip rests.
+    fn at_rest(self) -> bool {
+        self != Self::Change
+    }
+}
+
+/// Readings of one element: bin, square of the departures, how many they are, and what it may grow with.
+type Readings = Vec<(usize, f64, f64, f64)>;
+
+impl Search<'_> {
+    /// Tests whether the scatter of the readings is the same everywhere.
+    pub(crate) fn scattered(&self, at: &Fitted) -> Result<Scattered, DiscoverError> {
+        let mut most = Scattered { p_value: 1.0, with: "" };
+        let weights = self.problem.element_weight.iter().filter(|weight| **weight > 0.0);
+        let noise_counts = median(&weights.map(|weight| weight.sqrt().recip()).collect::<Vec<_>>());
+        if self.rounds || noise_counts < NOISE_STEPS * self.problem.predictor.known.array.step_counts() {
+            return Ok(most);
+        }
+        let forms = Forms::of(self.problem, &at.parameters, &at.predicted)?;
+        let p_value = |(number, with): (usize, With)| {
+            let blocks = self.by_blocks(at, &forms, with);
+            sign_flip_p(&blocks, FLIPS, self.options.seed ^ STREAM ^ number as u64)
+        };
+        let numbered: Vec<(usize, With)> = With::ALL.into_iter().enumerate().collect();
+        let p_values = parallel::map(&numbered, |one| p_value(*one));
+        for (with, p_value) in With::ALL.into_iter().zip(p_values) {
+            let corrected = (p_value * With::ALL.len() as f64).min(1.0);
+            if corrected < most.p_value {
+                most = Scattered { p_value: corrected, with: with.name() };
+            }
+        }
+        Ok(most)
+    }
+
+    /// Each block's part of the sum.
+    fn by_blocks(&self, at: &Fitted, forms: &Forms, with: With) -> Vec<f64> {
+        let bins = self.problem.predictor.bins;
+        let mut blocks = vec![0.0; bins.blocks];
+        for element in 0..bins.elements {
+            let readings = self.readings(at, forms, with, element);
+            let mean = |of: fn(&(usize, f64, f64, f64)) -> f64| {
+                let count: f64 = readings.iter().map(|(_, _, count, _)| count).sum();
+                readings.iter().map(of).sum::<f64>() / count.max(f64::MIN_POSITIVE)
+            };
+            let square = mean(|(_, square, _, _)| *square);
+            let value = mean(|(_, _, count, value)| count * value);
+            if square > 0.0 {
+                for (bin, departures, count, of) in &readings {
+                    blocks[bins.block[*bin]] += (of - value) * (departures / square - count);
+                }
+            }
+        }
+        blocks
+    }
+
+    fn readings(&self, at: &Fitted, forms: &Forms, with: With, element: usize) -> Readings {
+        let problem = self.problem;
+        let (bins, frames) = (problem.predictor.bins, problem.predictor.frames);
+        let (elements, last) = (bins.elements, bins.len().saturating_sub(1));
+        let mut readings = Vec::new();
+        for bin in (0..bins.len()).filter(|bin| problem.train[*bin] > 0.0) {
+            if problem.element_weight[element] == 0.0 {
+                continue;
+            }
+            let reading = bin * elements + element;
+            let count = bins.frames_in(bin);
+            let (departures, count) = if with.at_rest() && count >= REST_FRAMES {
+                let counts = (bins.first[bin]..bins.first[bin + 1])
+                    .map(|frame| f64::from(frames.counts[frame * elements + element]));
+                (from_line(counts), (count - 2) as f64)
+            } else if !with.at_rest() && count == 1 {
+                ((bins.counts[reading] - at.predicted[reading]).powi(2), 1.0)
+            } else {
+                continue;
+            };
+            let value = match with {
+                With::Signal => forms.signal()[reading].powi(2),
+                With::Slope => forms.slope(0)[reading].powi(2) + forms.slope(1)[reading].powi(2),
+                With::Contact => f64::from(u8::from(forms.history().depth_mm[bin] > 0.0)),
+                With::Change => {
+                    let [before, after] = [bin.saturating_sub(1), (bin + 1).min(last)];
+                    if bins.run[before] != bins.run[after] {
+                        continue;
+                    }
+                    let of = |bin: usize| at.predicted[bin * elements + element];
+                    ((of(after) - of(before)) / (bins.t_s[after] - bins.t_s[before]).max(f64::MIN_POSITIVE))
+                        .powi(2)
+                }
+            };
+            readings.push((bin, departures, count, value));
+        }
+        readings
+    }
+}
+
+/// The sum of squared departures of values from a straight line through them.
+fn from_line(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    let middle = 0.5 * (count - 1.0);
+    let places = (0..).map(|place| f64::from(place) - middle);
+    let (mut square, mut along, mut spread) = (0.0, 0.0, 0.0);
+    for (value, place) in values.zip(places) {
+        square += (value - mean).powi(2);
+        along += (value - mean) * place;
+        spread += place * place;
+    }
+    if spread > 0.0 { square - along * along / spread } else { square }
+}
+
+#[cfg(test)]
+#[path = "scatter_tests.rs"]
+mod tests;
