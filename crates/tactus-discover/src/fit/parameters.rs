@@ -81,6 +81,17 @@ impl Term {
             && self.acts(parameter)
     }
 
+    /// True if a parameter is one of several whose names differ in their number: a knot of a curve.
+    pub(super) fn is_numbered(&self, parameter: usize) -> bool {
+        let family = self.family(parameter);
+        (0..self.values.len()).any(|other| other != parameter && self.family(other) == family)
+    }
+
+    /// A parameter's name without digits.
+    pub(super) fn family(&self, parameter: usize) -> String {
+        self.definition.parameters[parameter].name.replace(|letter: char| letter.is_ascii_digit(), "")
+    }
+
     /// Number of real numbers that make it.
     pub(crate) fn numbers(&self) -> usize {
         (0..self.values.len()).filter(|parameter| self.varies(*parameter)).count() + self.listed()

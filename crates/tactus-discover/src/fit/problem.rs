@@ -43,9 +43,6 @@ const UNSEEN_SHARE: f64 = 0.1;
 /// A number of frames long beside the correlation time of the noise.
 const LONG_FRAMES: usize = 1000;
 
-/// Effects with more parameters have their derivatives taken once per fit.
-const PARAMETERS_MANY: usize = 6;
-
 /// A least-squares problem: the data with their weights, and the model.
 #[derive(Debug)]
 pub(crate) struct Problem<'a> {
@@ -294,8 +291,8 @@ impl<'a> Problem<'a> {
         Scale::of(known, self.duration_s)
     }
 
-    /// The best parameters near a start, in at most `rounds` rounds. Derivatives by the parameters of effects with many
-    /// parameters, such as the knots of a curve, are taken once, because the counts are nearly linear in them.
+    /// The best parameters near a start, in at most `rounds` rounds. Derivatives by numbered parameters, the knots of a curve, are taken
+    /// once, because the counts are nearly linear in them.
     pub(crate) fn fit_from(&self, start: Parameters, rounds: usize) -> Result<Fitted, DiscoverError> {
         let free = self.free(&start);
         let mut at = self.with_walk(start)?;
@@ -354,7 +351,7 @@ impl<'a> Problem<'a> {
     fn knots(&self, at: &Parameters, predicted: &[f64], free: &[Free]) -> Result<Knots, DiscoverError> {
         let elements = self.predictor.bins.elements;
         let knot = |one: &Free| match one {
-            Free::Of { term, .. } if at.terms[*term].values.len() > PARAMETERS_MANY => {
+            Free::Of { term, parameter } if at.terms[*term].is_numbered(*parameter) => {
                 let slope = self.slope(at, predicted, *one)?;
                 Ok(Some(Arc::new(Stretch::of(&slope, elements))))
             }
@@ -498,13 +495,10 @@ fn follow(at: &mut Parameters, free: &[Free], gram: &DMatrix<f64>) -> bool {
         let [Free::Of { term, parameter: before }, Free::Of { term: same, parameter: knot }] = pair else {
             continue;
         };
-        let Term { definition, values, .. } = &mut at.terms[*term];
-        let family = |parameter: usize| {
-            definition.parameters[parameter].name.replace(|letter: char| letter.is_ascii_digit(), "")
-        };
+        let of = &mut at.terms[*term];
         let unseen = gram[(index + 1, index + 1)] < UNSEEN_SHARE * gram[(index, index)];
-        if term == same && values.len() > PARAMETERS_MANY && family(*before) == family(*knot) && unseen {
-            values[*knot] = values[*before];
+        if term == same && of.family(*before) == of.family(*knot) && unseen {
+            of.values[*knot] = of.values[*before];
             any = true;
         }
     }

@@ -14,6 +14,7 @@ fn additions(sizes: &[usize]) -> Vec<Addition> {
             widths: vec![1.0; *size],
             signs: vec![Signs::Both; *size],
             among: 1.0,
+            is_free: false,
         }
     };
     sizes.iter().enumerate().map(of).collect()

@@ -19,11 +19,11 @@ use tactus_model::effect::Definition;
 use super::candidates::Candidate;
 use super::contests::Contest;
 use super::drift::TriedWalk;
-use super::evidence::{Addition, Evidence, ODDS_AGAINST, Set, Signs};
+use super::evidence::{Addition, Evidence, ODDS_AGAINST, Set, Signs, excused};
 use super::memory::Memory;
 use super::options::Options;
 use super::rivals::rivals;
-use super::score::{self, Score, flipped, largest};
+use super::score::{Score, flipped, largest, p_value};
 use crate::data::{DiscoverError, MISWIRED};
 use crate::fit::{Direction, Fitted, Free, Grams, Parameters, Problem, RANDOM_WALK, Scale, Term};
 use crate::numbers::{median, parallel};
@@ -60,8 +60,6 @@ pub(crate) const FLIPS: usize = 1999;
 pub(crate) const ALPHA: f64 = 0.005;
 /// Greatest number of added effects.
 pub(crate) const NAMES_MAX: usize = 5;
-/// Changes the seed, so that rivals have other sign flips than candidates.
-const RIVALS_STREAM: u64 = 0x0041_7a15;
 /// Rounds of a fit that compares candidates: of all, and of the best.
 const FIRST_ROUNDS: usize = 2;
 const TRIAL_ROUNDS: usize = 6;
@@ -74,11 +72,6 @@ const FINISHED_MAX: usize = 2;
 const PROMISE_SHARE: f64 = 0.3;
 /// Logarithm of the odds with which a class is added and holds its place.
 pub(super) const LN_ODDS_LEAST: f64 = 5.0;
-/// A rival without a name takes the place of a class if its odds are greater by this logarithm, and by this share of it. Real physics has
-/// not quite the form of its class, and a rival has any form. From tuning sets (`just discovery-constants`): rivals are ahead of right
-/// classes by up to 0.05 of theirs, of wrong ones that lose by 0.11 and more.
-const RIVAL_LN_ODDS: f64 = 5.0;
-const RIVAL_SHARE: f64 = 0.075;
 /// A class speaks for its free part, which model files cannot hold, if it has this share of the odds of that. From tuning sets: right classes
 /// have 0.83 and more, wrong ones 0.21.
 const FREE_SHARE: f64 = 0.4;
@@ -139,9 +132,8 @@ pub(crate) struct Alike {
 
 /// What a grown model may still lack.
 pub(crate) struct Left {
-    /// p-value of the largest score of all additions, and of rivals without a name.
+    /// p-value of the largest score of all additions.
     pub(crate) p_value: f64,
-    pub(crate) rivals_p_value: f64,
     /// Probability that each effect is missing; for one that the model has, that there is more of it.
     pub(crate) probabilities: Vec<(&'static str, f64)>,
 }
@@ -151,8 +143,6 @@ pub(crate) struct Tried {
     pub(crate) round: Round,
     /// p-value of the largest score of all additions.
     pub(crate) p_value: f64,
-    /// The same of rivals without a name alone.
-    pub(crate) rivals_p_value: f64,
     /// How well the data can show each effect: the width of its range in standard errors.
     pub(crate) reach: Vec<(&'static Definition, f64)>,
 }
@@ -284,7 +274,7 @@ impl Pass {
 /// True if a rival takes the place of a class with these odds.
 fn rivals_win(rivals: &[(&'static str, f64)], ln_odds: f64) -> bool {
     let best = rivals.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max);
-    best > ln_odds + RIVAL_LN_ODDS.max(RIVAL_SHARE * ln_odds)
+    best > ln_odds + excused(ln_odds)
 }
 
 impl Search<'_> {
@@ -328,6 +318,7 @@ impl Search<'_> {
                         widths,
                         signs,
                         among: of.among(shapes.len()),
+                        is_free: false,
                     });
                     kinds.push(Kind::Term { candidate, shape: shape.clone() });
                 }
@@ -343,6 +334,7 @@ impl Search<'_> {
                     widths,
                     signs,
                     among: 1.0,
+                    is_free: true,
                 });
                 kinds.push(Kind::Term { candidate, shape: shape.clone() });
             }
@@ -364,6 +356,7 @@ impl Search<'_> {
                 signs,
                 directions: own,
                 among: rival.among,
+                is_free: false,
             });
             classes.push(rival.name);
             kinds.push(kind);
@@ -480,7 +473,7 @@ impl Search<'_> {
     /// What a grown model may still lack.
     pub(crate) fn left(&self, grown: &Fitted) -> Result<Left, DiscoverError> {
         let pass = self.pass(grown)?;
-        let Tried { p_value, rivals_p_value, .. } = self.tested(&pass, grown, 2 * NAMES_MAX + 1);
+        let p_value = self.tested(&pass, grown, 2 * NAMES_MAX + 1).p_value;
         let (evidence, unit) = (pass.evidence(), self.unit(0.0, grown));
         let gains = evidence.best_of_classes(&evidence.none(), &pass.among(|_| true), f64::NEG_INFINITY);
         // Where nothing is gained, the odds are those before the data.
@@ -490,11 +483,7 @@ impl Search<'_> {
             gain.map_or(nothing, |(_, gain)| 1.0 / (1.0 + (-gain.ln_odds / unit).exp()))
         };
         let names = self.candidates.iter().map(|candidate| candidate.definition.name);
-        Ok(Left {
-            p_value,
-            rivals_p_value,
-            probabilities: names.map(|name| (name, probability(name))).collect(),
-        })
+        Ok(Left { p_value, probabilities: names.map(|name| (name, probability(name))).collect() })
     }
 
     /// True if the residual of a model depends on any covariate.
@@ -525,23 +514,14 @@ impl Search<'_> {
             .map(|(effect, scores)| TriedEffect {
                 effect,
                 score: statistic(scores),
-                p_value: score::p_value(statistic(scores), &under_none),
+                p_value: p_value(statistic(scores), &under_none),
                 heldout_rms_counts: None,
                 shrink: None,
             })
             .collect();
         candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let p_value = groups
-            .iter()
-            .map(|(_, scores)| score::p_value(statistic(scores), &under_none))
-            .fold(1.0, f64::min);
-        let rivals: Vec<&Score> = (0..pass.additions.len())
-            .filter(|one| matches!(pass.kinds[*one], Kind::Rival))
-            .map(|one| &pass.scores[one])
-            .collect();
-        let seed = self.options.seed ^ RIVALS_STREAM ^ (index as u64 + 1);
-        let under_none = largest(&flipped(&[rivals.clone()], FLIPS, seed));
-        let rivals_p_value = score::p_value(statistic(&rivals), &under_none);
+        let p_value =
+            groups.iter().map(|(_, scores)| p_value(statistic(scores), &under_none)).fold(1.0, f64::min);
         let reach = |(index, of): (usize, &Candidate)| {
             let mut widest = 0.0_f64;
             for (addition, kind) in pass.additions.iter().zip(&pass.kinds) {
@@ -557,7 +537,6 @@ impl Search<'_> {
         Tried {
             round: Round { with: names(&at.parameters, self.known_terms), candidates, taken: None },
             p_value,
-            rivals_p_value,
             reach: self.candidates.iter().enumerate().map(reach).collect(),
         }
     }
@@ -748,10 +727,6 @@ impl Search<'_> {
                 continue 'again;
             }
             for (nth, ((name, less), ln_odds)) in names.iter().zip(lesses).zip(odds).enumerate() {
-                if is_exact(name) {
-                    // No other effect acts like miswired elements.
-                    continue;
-                }
                 let share = nth as f64 / names.len() as f64;
                 (self.progress)(
                     &format!("comparing {name} with others in its place"),
@@ -764,6 +739,10 @@ impl Search<'_> {
                     grown.refused.push(Contest::lost(name, ln_odds, self.left_over(&grown.at), rivals));
                     grown.at = self.fitted(grown, less.parameters, POLISH_ROUNDS)?;
                     continue 'again;
+                }
+                if is_exact(name) {
+                    // No other effect acts like miswired elements.
+                    continue;
                 }
                 let others = self.others(&pass, &less, &names, PROMISE_SHARE * ln_odds)?;
                 let likeliest = others.iter().max_by(|a, b| self.rank(a).total_cmp(&self.rank(b)));

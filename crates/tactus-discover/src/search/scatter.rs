@@ -1,20 +1,23 @@
 //! Whether the noise grows with what the sensor does: with a signal, its slope, its change, or contact.
 //!
 //! A gain that flickers or a table that shakes leaves no mean in the residual. What it leaves is a scatter that is larger where the signal, or
-//! its slope, is larger. No effect of the library acts so, and a test of means cannot see it. With `q` the square of a reading's departure over
-//! the mean square of its element, `v` what the scatter may grow with, and both taken from their means over the element,
+//! its slope, is larger. No effect of the library acts so, and a test of means cannot see it. With `q` the cube root of a bin's mean squared
+//! departure, `n` how many departures that are, `v` what the scatter may grow with, and `q` and `v` taken from their means over the element's
+//! bins with the same `n`,
 //!
 //! ```text
-//! T = sum over readings of (v - mean v) (q - mean q)
+//! T = sum over bins and elements of n (v - mean v) (q - mean q)
 //! ```
 //!
-//! is 0 in the mean if the scatter is always the same. Blocks are independent, so the signs of their parts are flipped. At rest a departure is
-//! that of a frame from the straight line through the frames of its bin, which needs no model; in motion it is the residual.
+//! is 0 in the mean if the scatter is always the same. Blocks are independent, and the cube root of a mean square is nearly normal, so the signs
+//! of the blocks' parts are flipped. At rest departures are those of a bin's frames from the straight line through them, which needs no model; in
+//! motion a bin is one frame, and its departure the residual.
 //!
 //! Where the noise is smaller than the converter's step, its scatter depends on where between two codes a reading lies. Then nothing is tested.
 //!
 //! # Source
-//! A regression of squares on what the variance may depend on: T. S. Breusch and A. R. Pagan, *Econometrica* 47 (1979) 1287.
+//! A regression of squares on what the variance may depend on: T. S. Breusch and A. R. Pagan, *Econometrica* 47 (1979) 1287. The cube root:
+//! E. B. Wilson and M. M. Hilferty, *Proc. Natl. Acad. Sci.* 17 (1931) 684.
 
 use super::covariates::Forms;
 use super::grow::Search;
@@ -68,8 +71,17 @@ impl With {
     }
 }
 
-/// Readings of one element: bin, square of the departures, how many they are, and what it may grow with.
-type Readings = Vec<(usize, f64, f64, f64)>;
+/// A bin's departures of one element.
+#[derive(Debug, Clone, Copy)]
+struct Departures {
+    bin: usize,
+    /// How many independent ones there are.
+    count: usize,
+    /// Cube root of their mean square.
+    size: f64,
+    /// What the scatter may grow with.
+    value: f64,
+}
 
 impl Search<'_> {
     /// Tests whether the scatter of the readings is the same everywhere.
@@ -101,39 +113,38 @@ impl Search<'_> {
         let bins = self.problem.predictor.bins;
         let mut blocks = vec![0.0; bins.blocks];
         for element in 0..bins.elements {
-            let readings = self.readings(at, forms, with, element);
-            let mean = |of: fn(&(usize, f64, f64, f64)) -> f64| {
-                let count: f64 = readings.iter().map(|(_, _, count, _)| count).sum();
-                readings.iter().map(of).sum::<f64>() / count.max(f64::MIN_POSITIVE)
-            };
-            let square = mean(|(_, square, _, _)| *square);
-            let value = mean(|(_, _, count, value)| count * value);
-            if square > 0.0 {
-                for (bin, departures, count, of) in &readings {
-                    blocks[bins.block[*bin]] += (of - value) * (departures / square - count);
+            let mut departures = self.departures(at, forms, with, element);
+            departures.sort_by_key(|of| of.count);
+            for alike in departures.chunk_by(|one, next| one.count == next.count) {
+                let mean =
+                    |of: fn(&Departures) -> f64| alike.iter().map(of).sum::<f64>() / alike.len() as f64;
+                let (size, value) = (mean(|of| of.size), mean(|of| of.value));
+                for of in alike.iter().filter(|_| size > 0.0) {
+                    blocks[bins.block[of.bin]] +=
+                        of.count as f64 * (of.value - value) * (of.size / size - 1.0);
                 }
             }
         }
         blocks
     }
 
-    fn readings(&self, at: &Fitted, forms: &Forms, with: With, element: usize) -> Readings {
+    fn departures(&self, at: &Fitted, forms: &Forms, with: With, element: usize) -> Vec<Departures> {
         let problem = self.problem;
         let (bins, frames) = (problem.predictor.bins, problem.predictor.frames);
         let (elements, last) = (bins.elements, bins.len().saturating_sub(1));
-        let mut readings = Vec::new();
+        let mut departures = Vec::new();
         for bin in (0..bins.len()).filter(|bin| problem.train[*bin] > 0.0) {
             if problem.element_weight[element] == 0.0 {
                 continue;
             }
             let reading = bin * elements + element;
             let count = bins.frames_in(bin);
-            let (departures, count) = if with.at_rest() && count >= REST_FRAMES {
+            let (square, count) = if with.at_rest() && count >= REST_FRAMES {
                 let counts = (bins.first[bin]..bins.first[bin + 1])
                     .map(|frame| f64::from(frames.counts[frame * elements + element]));
-                (from_line(counts), (count - 2) as f64)
+                (from_line(counts), count - 2)
             } else if !with.at_rest() && count == 1 {
-                ((bins.counts[reading] - at.predicted[reading]).powi(2), 1.0)
+                ((bins.counts[reading] - at.predicted[reading]).powi(2), 1)
             } else {
                 continue;
             };
@@ -151,9 +162,9 @@ impl Search<'_> {
                         .powi(2)
                 }
             };
-            readings.push((bin, departures, count, value));
+            departures.push(Departures { bin, count, size: (square / count as f64).cbrt(), value });
         }
-        readings
+        departures
     }
 }
 

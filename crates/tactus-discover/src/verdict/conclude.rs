@@ -148,10 +148,9 @@ pub(crate) fn conclude(
     } = found;
     let Confirmed { grown, mut steps, tentative, agreed } = confirmed;
     let first = rounds.first();
-    let of_first = first.map_or([1.0; 2], |round| [round.p_value, round.rivals_p_value]);
-    let p_value = least_p_value(of_first, before.p_value, scatters[0]);
+    let p_value = least_p_value(first.map_or(1.0, |round| round.p_value), before.p_value, scatters[0]);
     let share = search.share_left(&base, &grown);
-    let is_left = least_p_value([left.p_value, left.rivals_p_value], after.p_value, scatters[1]) <= ALPHA;
+    let is_left = least_p_value(left.p_value, after.p_value, scatters[1]) <= ALPHA;
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
     let floor = prepared.floor_of(&of_grown);
@@ -239,12 +238,12 @@ pub(crate) fn conclude(
     })
 }
 
-/// Tests of a model: by effects, by rivals without a name, by covariates, and of the scatter.
-const TESTS: f64 = 4.0;
+/// Tests of a model: by effects, by covariates, and of the scatter.
+const TESTS: f64 = 3.0;
 
 /// The least p-value of a model's tests, by Bonferroni's correction.
-fn least_p_value([of_effects, of_rivals]: [f64; 2], of_covariates: f64, scatter: Scattered) -> f64 {
-    (TESTS * of_effects.min(of_rivals).min(of_covariates).min(scatter.p_value)).min(1.0)
+fn least_p_value(of_effects: f64, of_covariates: f64, scatter: Scattered) -> f64 {
+    (TESTS * of_effects.min(of_covariates).min(scatter.p_value)).min(1.0)
 }
 
 /// The report of data without a floor: figures of the base model in counts, no names, and what to measure next.
