@@ -1,6 +1,6 @@
 //! The search for effects that, together with the base model, leave only noise.
 //!
-//! At a model, one pass over the data gives the products of the derivatives by every shape of every effect ([`candidates`]) and of rivals
+//! At a model, one [`pass`] over the data gives the products of the derivatives by every shape of every effect ([`candidates`]) and of rivals
 //! without a name ([`rivals`]). From the products follow a [`score`] of each effect, whose largest is compared with those of data sets in
 //! which the signs of whole blocks are flipped, and the odds of sets of effects ([`evidence`]). The classes of the best sets are fitted, and
 //! one is added; in the end each must hold its place against no effect, rivals and other classes ([`grow`]), and then has knots in place of
@@ -24,6 +24,7 @@ mod locate;
 mod memory;
 pub(crate) mod not_shown;
 mod options;
+mod pass;
 mod rivals;
 mod scatter;
 mod score;

@@ -10,23 +10,19 @@
 //! All choices use the fitted presses only. The held-out presses give the figures of the report.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
-use std::sync::Arc;
 
-use nalgebra::DMatrix;
 use tactus_model::effect::Definition;
 
 use super::candidates::Candidate;
 use super::contests::Contest;
-use super::drift::TriedWalk;
-use super::evidence::{Addition, Evidence, ODDS_AGAINST, Set, Signs, excused};
+use super::evidence::{Evidence, ODDS_AGAINST, Set};
 use super::memory::Memory;
 use super::options::Options;
-use super::rivals::rivals;
+use super::pass::{Kind, Pass, rivals_win};
 use super::score::{Score, flipped, largest, p_value};
 use crate::data::{DiscoverError, MISWIRED};
-use crate::fit::{Direction, Fitted, Free, Grams, Parameters, Problem, RANDOM_WALK, Scale, Term};
-use crate::numbers::{median, parallel};
+use crate::fit::{Fitted, Parameters, Problem, RANDOM_WALK, Term};
+use crate::numbers::parallel;
 
 /// A round of the search.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,9 +68,6 @@ const FINISHED_MAX: usize = 2;
 const PROMISE_SHARE: f64 = 0.3;
 /// Logarithm of the odds with which a class is added and holds its place.
 pub(super) const LN_ODDS_LEAST: f64 = 5.0;
-/// A class speaks for its free part, which model files cannot hold, if it has this share of the odds of that. From tuning sets: right classes
-/// have 0.83 and more, wrong ones 0.21.
-const FREE_SHARE: f64 = 0.4;
 /// Another class takes the place of one if its odds are greater by this logarithm.
 const BETTER_LN_ODDS: f64 = 3.0;
 const EXCHANGES_MAX: usize = 4;
@@ -177,34 +170,6 @@ impl Grown {
     }
 }
 
-/// All additions at a model, with their products.
-pub(crate) struct Pass {
-    additions: Vec<Addition>,
-    kinds: Vec<Kind>,
-    /// Names of the classes.
-    classes: Vec<&'static str>,
-    scores: Vec<Score>,
-    grams: Grams,
-    /// The products of named additions, whose directions come first, and of the residual.
-    named: DMatrix<f64>,
-    walk: Option<TriedWalk>,
-    /// Classes of the model.
-    present: Vec<usize>,
-    variance: f64,
-}
-
-/// What an addition is.
-enum Kind {
-    /// A candidate in a shape.
-    Term {
-        candidate: usize,
-        shape: Term,
-    },
-    Rival,
-    /// The free part of a class.
-    Free(&'static str),
-}
-
 /// A class that was fitted beside a model.
 pub(crate) struct Beside {
     pub(crate) name: &'static str,
@@ -213,219 +178,7 @@ pub(crate) struct Beside {
     pub(crate) ln_odds: f64,
 }
 
-impl Pass {
-    /// The evidence for named additions.
-    fn evidence(&self) -> Evidence<'_> {
-        self.evidence_on(&self.named)
-    }
-
-    fn evidence_on<'a>(&'a self, products: &'a DMatrix<f64>) -> Evidence<'a> {
-        Evidence { additions: &self.additions, products, variance: self.variance, present: &self.present }
-    }
-
-    fn is_named(&self, addition: usize) -> bool {
-        matches!(self.kinds[addition], Kind::Term { .. })
-    }
-
-    fn class_of(&self, addition: usize) -> &'static str {
-        self.classes[self.additions[addition].class]
-    }
-
-    /// The additions whose class `among` selects by name.
-    fn among(&self, among: impl Fn(&str) -> bool) -> Vec<usize> {
-        (0..self.additions.len()).filter(|one| self.is_named(*one) && among(self.class_of(*one))).collect()
-    }
-
-    /// The additions that are the free part of a class.
-    fn free(&self, class: &str) -> Vec<usize> {
-        (0..self.additions.len())
-            .filter(|one| matches!(self.kinds[*one], Kind::Free(of) if of == class))
-            .collect()
-    }
-
-    /// Logarithm of the odds of each rival of a class that has these odds: in the place of the class, and in that of its free part where
-    /// that is stronger, but not so strong that the class as the model can have it is only a shadow of it.
-    fn rivalry(&self, class: &str, ln_odds: f64) -> (f64, Vec<(&'static str, f64)>) {
-        let evidence = self.evidence_on(self.grams.reduced());
-        let free = self.free(class).into_iter();
-        let free = free.map(|one| evidence.gain_alone(one).ln_odds.min(ln_odds / FREE_SHARE));
-        (free.fold(ln_odds, f64::max), self.rivals(&evidence, &evidence.none(), class))
-    }
-
-    /// Logarithm of the odds of each rival beside a model that has a class, and beside the free part of that.
-    pub(crate) fn beside(&self, class: &str) -> Vec<(&'static str, f64)> {
-        let evidence = self.evidence_on(self.grams.reduced());
-        let free = self.free(class).into_iter().filter(|one| evidence.gain_alone(*one).ln_odds > 0.0);
-        self.rivals(&evidence, &evidence.set(free), class)
-    }
-
-    /// Logarithm of the odds of each rival beside a set; that of which a class is a part is none of its rivals.
-    fn rivals(&self, evidence: &Evidence<'_>, set: &Set, class: &str) -> Vec<(&'static str, f64)> {
-        let own: Vec<&[usize]> =
-            self.free(class).into_iter().map(|one| &self.additions[one].directions[..]).collect();
-        let is_rival = |one: &usize| {
-            matches!(self.kinds[*one], Kind::Rival) && !own.contains(&&self.additions[*one].directions[..])
-        };
-        let rivals = (0..self.additions.len()).filter(is_rival);
-        rivals.map(|one| (self.class_of(one), evidence.gain(set, one).ln_odds)).collect()
-    }
-}
-
-/// True if a rival takes the place of a class with these odds.
-fn rivals_win(rivals: &[(&'static str, f64)], ln_odds: f64) -> bool {
-    let best = rivals.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max);
-    best > ln_odds + excused(ln_odds)
-}
-
 impl Search<'_> {
-    /// The products of all additions at a model.
-    pub(crate) fn pass(&self, at: &Fitted) -> Result<Arc<Pass>, DiscoverError> {
-        self.memory.passes.at(&at.parameters, || self.pass_over(at).map(Arc::new))
-    }
-
-    fn pass_over(&self, at: &Fitted) -> Result<Pass, DiscoverError> {
-        let problem = self.problem;
-        let mut directions: Vec<Direction<'_>> = Vec::new();
-        let (mut additions, mut kinds, mut classes) = (Vec::new(), Vec::new(), Vec::new());
-        for (candidate, of) in self.candidates.iter().enumerate() {
-            let class = classes.len();
-            classes.push(of.definition.name);
-            let shapes = of.shapes(problem, at);
-            let of_class = directions.len();
-            for shape in shapes.iter() {
-                let start = at.parameters.with(shape.clone());
-                let term = start.terms.len() - 1;
-                let first = directions.len();
-                let (mut widths, mut signs) = (Vec::new(), Vec::new());
-                for parameter in of.amplitudes() {
-                    directions.push(problem.towards(&start, Free::Of { term, parameter: *parameter }));
-                    let known = &of.definition.parameters[*parameter];
-                    widths.push(Scale::of(known, problem.duration_s).width());
-                    let value = shape.values[*parameter];
-                    let wires = shape.rewires().is_some();
-                    signs.push(match known.range {
-                        _ if wires => Signs::Both,
-                        [least, _] if value <= least => Signs::Positive,
-                        [_, most] if value >= most => Signs::Negative,
-                        _ => Signs::Both,
-                    });
-                }
-                if first < directions.len() {
-                    let directions = (first..directions.len()).collect();
-                    additions.push(Addition {
-                        class,
-                        directions,
-                        widths,
-                        signs,
-                        among: of.among(shapes.len()),
-                        is_free: false,
-                    });
-                    kinds.push(Kind::Term { candidate, shape: shape.clone() });
-                }
-            }
-            for shape in of.free() {
-                let first = directions.len();
-                let own = of_class..first;
-                let (of_shape, widths, signs) = self.free_directions(of, shape, at, own);
-                directions.extend(of_shape);
-                additions.push(Addition {
-                    class,
-                    directions: (first..directions.len()).collect(),
-                    widths,
-                    signs,
-                    among: 1.0,
-                    is_free: true,
-                });
-                kinds.push(Kind::Term { candidate, shape: shape.clone() });
-            }
-        }
-        let named = directions.len();
-        for rival in rivals(problem, at, self.rounds)? {
-            let shared = classes.iter().position(|class| Some(*class) == rival.beside);
-            let shared = shared.and_then(|class| additions.iter().find(|one| one.class == class));
-            let mut own = shared.map_or_else(Vec::new, |of| of.directions.clone());
-            own.extend(directions.len()..directions.len() + rival.columns.len());
-            directions.extend(rival.columns);
-            let (kind, signs) = match rival.free {
-                Some((class, signs)) => (Kind::Free(class), signs),
-                None => (Kind::Rival, vec![Signs::Both; own.len()]),
-            };
-            additions.push(Addition {
-                class: classes.len(),
-                widths: vec![1.0; own.len()],
-                signs,
-                directions: own,
-                among: rival.among,
-                is_free: false,
-            });
-            classes.push(rival.name);
-            kinds.push(kind);
-        }
-        let grams = problem.grams(at, directions)?;
-        let last = grams.reduced().nrows() - 1;
-        let residual = grams.reduced()[(last, last)].sqrt();
-        for (addition, kind) in additions.iter_mut().zip(&kinds) {
-            if !matches!(kind, Kind::Term { .. }) {
-                // As a rival has no range: what would make the whole residual.
-                for (width, direction) in addition.widths.iter_mut().zip(&addition.directions) {
-                    *width = residual / grams.whole(*direction).max(f64::MIN_POSITIVE);
-                }
-            }
-        }
-        let shapes = |class: usize| additions.iter().filter(|one| one.class == class).count() as f64;
-        let score = |one: &Addition| {
-            let among = if one.among > 1.0 { one.among * shapes(one.class) } else { 1.0 };
-            Score::of_grams(&grams, &one.directions).picked_from(among)
-        };
-        let scores = parallel::map(&additions, score);
-        // The errors of a coarse converter's rounding differ from press to press, and are no noise.
-        let excess = median(&scores.iter().map(|score| score.excess).collect::<Vec<_>>());
-        let names = names(&at.parameters, self.known_terms);
-        let present = (0..classes.len()).filter(|class| names.contains(&classes[*class])).collect();
-        let walk = if classes.contains(&RANDOM_WALK.name) { problem.tried_walk(at)? } else { None };
-        Ok(Pass {
-            additions,
-            kinds,
-            classes,
-            scores,
-            named: grams.first(named),
-            grams,
-            walk,
-            present,
-            variance: problem.variance * if self.rounds { excess } else { 1.0 },
-        })
-    }
-
-    /// The directions of a free part of a class, with their widths and signs. A table is a parameter's own direction, which is among those
-    /// of the class that come first, times the weight of each place.
-    fn free_directions(
-        &self,
-        of: &Candidate,
-        shape: &Term,
-        at: &Fitted,
-        own: Range<usize>,
-    ) -> (Vec<Direction<'static>>, Vec<f64>, Vec<Signs>) {
-        let problem = self.problem;
-        if let Some((parameter, table)) = shape.tables.first() {
-            let amplitude = of.amplitudes().iter().position(|one| one == parameter).unwrap_or(0);
-            let width = Scale::of(&of.definition.parameters[*parameter], problem.duration_s).width();
-            let direction = own.start + amplitude;
-            let times = |factor| Direction::Times { direction, factor: Arc::new(factor) };
-            let directions: Vec<_> = problem.weights_at(table).into_iter().map(times).collect();
-            let count = directions.len();
-            return (directions, vec![width; count], vec![Signs::Both; count]);
-        }
-        let start = at.parameters.with(shape.clone());
-        let term = start.terms.len() - 1;
-        let width = shape.curve().map_or(0.0, |curve| curve.range[1] - curve.range[0]);
-        let knots = 0..shape.listed();
-        let directions: Vec<_> =
-            knots.map(|knot| problem.towards(&start, Free::Knot { term, knot })).collect();
-        let count = directions.len();
-        // Each is an increment of a curve that must not fall.
-        (directions, vec![width; count], vec![Signs::Positive; count])
-    }
-
     /// Grows a model until no class is missing, unnecessary or worse than another.
     pub(crate) fn grow(&self, base: &Fitted) -> Result<Grown, DiscoverError> {
         let mut grown = Grown::from(base.clone());

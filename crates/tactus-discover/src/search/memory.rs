@@ -3,8 +3,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::grow::Pass;
 use super::locate::Located;
+use super::pass::Pass;
 use crate::data::DiscoverError;
 use crate::fit::Parameters;
 

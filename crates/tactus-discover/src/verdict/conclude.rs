@@ -585,7 +585,8 @@ impl Search<'_> {
                     .enumerate()
                     .filter(|(parameter, ((known, value), _))| {
                         // Beside a table, the others stay neutral.
-                        term.acts(*parameter) && (term.tables.is_empty() || **value != known.neutral)
+                        term.acts(*parameter)
+                            && (term.tables.is_empty() || value.to_bits() != known.neutral.to_bits())
                     })
                     .map(|(_, ((known, value), error))| Estimated {
                         name: known.name,
