@@ -76,9 +76,9 @@ impl Term {
 
     /// True if fits vary a parameter.
     pub(super) fn varies(&self, parameter: usize) -> bool {
-        self.definition.parameters[parameter].kind == ParameterKind::Real
-            && self.tables.is_empty()
-            && self.acts(parameter)
+        let known = &self.definition.parameters[parameter];
+        let is_left_out = known.is_apart && self.values[parameter].to_bits() == known.neutral.to_bits();
+        known.kind == ParameterKind::Real && !is_left_out && self.tables.is_empty() && self.acts(parameter)
     }
 
     /// True if a parameter is one of several whose names differ in their number: a knot of a curve.

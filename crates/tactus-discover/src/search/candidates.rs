@@ -20,8 +20,9 @@ const CROSSED_SHARE: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) definition: &'static Definition,
-    /// Parameters that change the prediction if all others are neutral.
+    /// Parameters that change the prediction if all others are neutral, and of these the ones that stand apart.
     amplitudes: Vec<usize>,
+    apart: Vec<usize>,
     /// Values of the others from which fits start.
     shapes: Shapes,
     /// Free parts of the class: knots in place of its formula, and each amplitude that may be a table, as one; at their neutral values.
@@ -55,7 +56,7 @@ impl Candidate {
         at: &Fitted,
         frequencies_hz: &[f64],
     ) -> Result<Self, DiscoverError> {
-        let mut amplitudes = Vec::new();
+        let (mut amplitudes, mut apart) = (Vec::new(), Vec::new());
         let mut alternatives = 1.0;
         let mut shapes = vec![Term::neutral(definition)];
         for (parameter, known) in definition.parameters.iter().enumerate() {
@@ -73,6 +74,8 @@ impl Candidate {
                 alternatives = problem.duration_s / (2.0 * interval_s(problem.predictor.frames));
             } else if known.name == "duration_s" {
                 shapes = cross(&shapes, parameter, &[problem.duration_s.clamp(range[0], range[1])]);
+            } else if acts && known.is_apart {
+                apart.push(parameter);
             } else if acts {
                 amplitudes.push(parameter);
             } else {
@@ -86,7 +89,7 @@ impl Candidate {
         }
         let shapes = if wires { Shapes::Wiring } else { Shapes::Grid(shapes) };
         let free = free(definition, &amplitudes, problem);
-        Ok(Self { definition, amplitudes, shapes, free, alternatives })
+        Ok(Self { definition, amplitudes, apart, shapes, free, alternatives })
     }
 
     /// Starts of fits of this effect in addition to a model, with neutral amplitudes.
@@ -110,13 +113,24 @@ impl Candidate {
         &self.free
     }
 
-    /// The parameters that change the prediction of a shape.
+    /// The parameters that change the prediction of a shape together.
     pub(crate) fn amplitudes(&self) -> &[usize] {
         &self.amplitudes
     }
 
-    /// A shape with the coefficients of its amplitudes, from which a fit starts.
-    pub(crate) fn start(&self, problem: &Problem<'_>, shape: &Term, coefficients: &[f64]) -> Term {
+    /// The parameters that do so each by itself.
+    pub(crate) fn apart(&self) -> &[usize] {
+        &self.apart
+    }
+
+    /// A shape with the coefficients of some of its amplitudes, from which a fit starts.
+    pub(crate) fn start(
+        &self,
+        problem: &Problem<'_>,
+        shape: &Term,
+        amplitudes: &[usize],
+        coefficients: &[f64],
+    ) -> Term {
         let mut start = shape.clone();
         let wires = matches!(self.shapes, Shapes::Wiring);
         if wires && coefficients.iter().any(|step| !(0.0..CROSSED_SHARE).contains(step)) {
@@ -126,7 +140,7 @@ impl Candidate {
             start.free_steps(coefficients, problem.duration_s);
             return start;
         }
-        for (parameter, step) in self.amplitudes.iter().zip(coefficients) {
+        for (parameter, step) in amplitudes.iter().zip(coefficients) {
             let known = &self.definition.parameters[*parameter];
             let [least, most] = known.range;
             let value = &mut start.values[*parameter];

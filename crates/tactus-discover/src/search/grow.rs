@@ -378,9 +378,9 @@ impl Search<'_> {
             coefficients.iter().find(|(one, _)| one == direction).map_or(0.0, |(_, coefficient)| *coefficient)
         };
         let term = |member: &usize| {
-            let Kind::Term { candidate, shape } = &pass.kinds[*member] else { return None };
+            let Kind::Term { candidate, shape, amplitudes } = &pass.kinds[*member] else { return None };
             let steps: Vec<f64> = pass.additions[*member].directions.iter().map(of).collect();
-            let start = || self.candidates[*candidate].start(self.problem, shape, &steps);
+            let start = || self.candidates[*candidate].start(self.problem, shape, amplitudes, &steps);
             (pass.class_of(*member) == name).then(start)
         };
         set.members.iter().filter_map(term).collect()

@@ -44,6 +44,8 @@ pub(super) enum Kind {
     Term {
         candidate: usize,
         shape: Term,
+        /// Its parameters to which the directions belong; none if it is a free part.
+        amplitudes: Vec<usize>,
     },
     Rival,
     /// The free part of a class.
@@ -181,21 +183,20 @@ impl<'a> Gathered<'a> {
         self.classes.push(candidate.definition.name);
         let shapes = candidate.shapes(problem, at);
         let first = self.directions.len();
-        for shape in shapes.iter() {
-            let part = shape_directions(problem, at, candidate, shape);
-            if !part.directions.is_empty() {
-                self.add(
-                    class,
-                    part,
-                    candidate.among(shapes.len()),
-                    Kind::Term { candidate: number, shape: shape.clone() },
-                );
+        let together = [candidate.amplitudes()].into_iter().filter(|amplitudes| !amplitudes.is_empty());
+        for amplitudes in together.chain(candidate.apart().chunks(1)) {
+            for shape in shapes.iter() {
+                let part = shape_directions(problem, at, amplitudes, shape);
+                let kind =
+                    Kind::Term { candidate: number, shape: shape.clone(), amplitudes: amplitudes.to_vec() };
+                self.add(class, part, candidate.among(shapes.len()), kind);
             }
         }
         let own = first..self.directions.len();
         for shape in candidate.free() {
             let part = free_directions(problem, at, candidate, shape, &own);
-            self.add(class, part, 1.0, Kind::Term { candidate: number, shape: shape.clone() });
+            let kind = Kind::Term { candidate: number, shape: shape.clone(), amplitudes: Vec::new() };
+            self.add(class, part, 1.0, kind);
         }
     }
 
@@ -243,15 +244,15 @@ struct Part {
     signs: Vec<Signs>,
 }
 
-/// The directions of a candidate's amplitudes in a shape.
-fn shape_directions(problem: &Problem<'_>, at: &Fitted, of: &Candidate, shape: &Term) -> Part {
+/// The directions of some amplitudes in a shape.
+fn shape_directions(problem: &Problem<'_>, at: &Fitted, amplitudes: &[usize], shape: &Term) -> Part {
     let start = at.parameters.with(shape.clone());
     let term = start.terms.len() - 1;
     let wires = shape.rewires().is_some();
     let mut part = Part { directions: Vec::new(), widths: Vec::new(), signs: Vec::new() };
-    for parameter in of.amplitudes() {
+    for parameter in amplitudes {
         part.directions.push(problem.towards(&start, Free::Of { term, parameter: *parameter }));
-        let known = &of.definition.parameters[*parameter];
+        let known = &shape.definition.parameters[*parameter];
         part.widths.push(Scale::of(known, problem.duration_s).width());
         let value = shape.values[*parameter];
         part.signs.push(match known.range {

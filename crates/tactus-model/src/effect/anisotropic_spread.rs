@@ -28,7 +28,7 @@ pub(super) static DEFINITION: Definition = Definition {
     summary: "the point spread differs along x and y",
     parameters: &[
         Parameter::real("ratio", 1.0, [0.2, 5.0]).or_table_of(&By::ALL),
-        Parameter::real("slant", 0.0, [-0.8, 0.8]).or_neutral(),
+        Parameter::real("slant", 0.0, [-0.8, 0.8]).apart(),
     ],
     near_twins: &["crosstalk", "indenter-size", "misregistration", "sigma_intercept_mm"],
     shown_by: &["grid-sweep", "element-centres"],

@@ -39,6 +39,9 @@ pub struct Parameter {
     pub is_optional: bool,
     /// What it may be a table of, in place of one value.
     pub varies: &'static [By],
+    /// True if fits leave it neutral unless they start from another value: one of several places or directions, of which a rig has hardly
+    /// more than one.
+    pub is_apart: bool,
 }
 
 /// Kinds of parameters.
@@ -175,13 +178,27 @@ impl Definition {
 impl Parameter {
     /// A real number within a range.
     pub const fn real(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
-        Self { name, neutral, range, kind: ParameterKind::Real, is_optional: false, varies: &[] }
+        Self {
+            name,
+            neutral,
+            range,
+            kind: ParameterKind::Real,
+            is_optional: false,
+            varies: &[],
+            is_apart: false,
+        }
     }
 
     /// The same parameter as optional. Parameters that an effect has had since its first version are not optional.
     #[must_use]
     pub const fn or_neutral(self) -> Self {
         Self { is_optional: true, ..self }
+    }
+
+    /// The same parameter as optional, which fits leave neutral unless they start from another value.
+    #[must_use]
+    pub const fn apart(self) -> Self {
+        Self { is_optional: true, is_apart: true, ..self }
     }
 
     /// The same parameter, which may also be a table. Only parameters of stages without memory before the elements can be.
@@ -199,6 +216,7 @@ impl Parameter {
             kind: ParameterKind::Element,
             is_optional: false,
             varies: &[],
+            is_apart: false,
         }
     }
 
@@ -211,12 +229,21 @@ impl Parameter {
             kind: ParameterKind::ElementOrAll,
             is_optional: true,
             varies: &[],
+            is_apart: false,
         }
     }
 
     /// A number within a range that no fit varies.
     pub const fn given(name: &'static str, neutral: f64, range: [f64; 2]) -> Self {
-        Self { name, neutral, range, kind: ParameterKind::Given, is_optional: true, varies: &[] }
+        Self {
+            name,
+            neutral,
+            range,
+            kind: ParameterKind::Given,
+            is_optional: true,
+            varies: &[],
+            is_apart: false,
+        }
     }
 
     /// True if a value is the index of an element.
