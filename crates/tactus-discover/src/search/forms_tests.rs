@@ -2,7 +2,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tactus_model::Effect;
-use tactus_model::effect::{Definition, Knots};
+use tactus_model::effect::{By, Definition, Knots, Table};
 
 use crate::fixtures::{ELEMENTS, found, known, measured};
 use crate::{Discovery, Known, Verdict};
@@ -91,4 +91,25 @@ fn knots_of_a_known_effect_are_fitted_again() {
     let ratio = (1.0 + knots.values[2]) / (1.0 + knots.values[0]);
     assert!((ratio - 1.5).abs() < 0.01, "{knots:?}");
     assert_eq!(knots.at, [0.2, 0.3, 0.5]);
+}
+
+/// A guide that is bent: no shift, turn, scale or skew is like it.
+#[test]
+fn a_parameter_that_differs_with_the_place_is_found_as_a_table() {
+    let at = vec![0.9, 4.5, 8.1, 11.7, 15.3];
+    let values = vec![0.2, 0.05, 0.0, 0.05, 0.2];
+    let straight = Effect::neutral(Definition::find("misregistration").unwrap());
+    let bent = straight.with_table("offset_y_mm", Table { by: By::X, at, values: values.clone() }).unwrap();
+    let found = discovered(bent);
+    let [step] = &found.steps[..] else { panic!("{:?}", found.steps) };
+    assert_eq!(step.effect, "misregistration");
+    let [table] = &step.curves[..] else { panic!("{step:?}") };
+    assert!(table.is_table(), "{table:?}");
+    assert_eq!((table.of, table.at, &table.formula), ("offset_y_mm", "x_mm", &None));
+    for (knot, value) in table.knots.iter().zip(values) {
+        assert!((knot.value - value).abs() < 0.02, "{table:?}");
+    }
+    let effect = found.effects.iter().find(|effect| effect.name() == "misregistration").unwrap();
+    let (_, of_model) = effect.tables().next().unwrap();
+    assert_eq!(of_model.values, table.knots.iter().map(|knot| knot.value).collect::<Vec<_>>());
 }

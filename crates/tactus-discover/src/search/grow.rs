@@ -356,8 +356,8 @@ impl Search<'_> {
         Ok((fits, refused))
     }
 
-    /// Starts of fits of a class: its members of a set, and if these are several or free, its best formula. A fit of several may end at worse
-    /// values than one of a single formula.
+    /// Starts of fits of a class: its members of a set; if these are several, the best of them; and if they are several or free, its best formula.
+    /// A fit of several may end at worse values than one of a single shape, or gain too little for all its numbers.
     fn starts_of(
         &self,
         pass: &Pass,
@@ -368,7 +368,15 @@ impl Search<'_> {
         let terms = self.starts(pass, evidence, set, name);
         let is_formula = terms.len() == 1 && !terms[0].is_free();
         let formula = if is_formula { None } else { self.formula_start(pass, name) };
-        [terms].into_iter().chain(formula.map(|term| vec![term])).map(|terms| (name, terms)).collect()
+        let alone = |member: &usize| evidence.gain_alone(*member).ln_odds;
+        let members =
+            set.members.iter().filter(|member| pass.is_named(**member) && pass.class_of(**member) == name);
+        let best = members.max_by(|a, b| alone(a).total_cmp(&alone(b))).filter(|_| terms.len() > 1);
+        let best = best.map(|best| self.starts(pass, evidence, &evidence.set([*best]), name));
+        let others = best.into_iter().chain(formula.map(|term| vec![term]));
+        let mut starts: Vec<Vec<Term>> = [terms].into_iter().chain(others).collect();
+        starts.dedup();
+        starts.into_iter().map(|terms| (name, terms)).collect()
     }
 
     /// The terms of a class from which a fit starts: its members of a set.

@@ -64,10 +64,13 @@ pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
     let figure =
         Figure::new(format!("{} of {effect}", if curve.is_table() { "Table" } else { "Free curve" }), x, y)
             .size_px(CURVE_PX);
-    formula
-        .fold(figure, Figure::with)
-        .with(Series::bars(bars).width_px(1.2).ink(Ink::Blue))
-        .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label("knots"))
+    formula.fold(figure, Figure::with).with(Series::bars(bars).width_px(1.2).ink(Ink::Blue)).with(
+        Series::dots(dots).width_px(4.5).ink(Ink::Blue).label(if curve.is_table() {
+            "table"
+        } else {
+            "knots"
+        }),
+    )
 }
 
 /// Root mean square residual of each element, of the base model and, if different, of the grown model, on one scale: in

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tactus_calibrate::Estimate;
-use tactus_discover::{AddedEffect, Estimated, Level};
+use tactus_discover::{AddedEffect, Estimated, FittedCurve, Level};
 use tactus_report::discovery::{
     AmbiguousEffect, DiscoveryReport, Proposal, command, in_words, not_proposed, not_shown, proposals,
 };
@@ -126,7 +126,7 @@ fn step(step: &AddedEffect) -> Vec<Vec<String>> {
         let (before, after) = (step.heldout_rms_before_counts, step.heldout_rms_after_counts);
         vec![
             of_step(nth, step.effect.into()),
-            parameters(term),
+            if nth == 0 { with_curves(parameters(term), &step.curves) } else { parameters(term) },
             of_step(nth, format!("{before:.3} -> {after:.3}")),
             of_step(nth, probability(step.q_value)),
             of_step(nth, step.equivalent.join(", ")),
@@ -144,6 +144,19 @@ fn parameters(term: &[Estimated]) -> String {
     said.join(", ")
 }
 
+/// Parameters, and the names of free curves and tables.
+fn with_curves(parameters: String, curves: &[FittedCurve]) -> String {
+    let curve = |curve: &FittedCurve| {
+        if curve.is_table() {
+            format!("{} as a table of {}", curve.of, curve.at)
+        } else {
+            format!("{} through knots", curve.of)
+        }
+    };
+    let parameters = [parameters].into_iter().filter(|parameters| !parameters.is_empty());
+    parameters.chain(curves.iter().map(curve)).collect::<Vec<_>>().join(", ")
+}
+
 fn parameter(parameter: &Estimated) -> String {
     let Estimated { name, value, standard_error } = *parameter;
     match standard_error {
@@ -155,3 +168,7 @@ fn parameter(parameter: &Estimated) -> String {
 fn probability(value: f64) -> String {
     if value < 1e-4 { "< 0.0001".into() } else { format!("{value:.4}") }
 }
+
+#[cfg(test)]
+#[path = "print_tests.rs"]
+mod tests;
