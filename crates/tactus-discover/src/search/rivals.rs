@@ -54,7 +54,8 @@ pub(crate) struct Rival<'a> {
     pub(crate) free: Option<(&'static str, Vec<Signs>)>,
 }
 
-/// The rivals at a model. `rounds` if the converter's steps are seen: then each element in contact has an offset of its own anyway.
+/// The rivals at a model. `rounds` if the converter's steps are seen: then each element in contact has an offset of its own anyway, and a tone
+/// in counts is the rounding.
 pub(crate) fn rivals<'a>(
     problem: &'a Problem<'_>,
     at: &'a Fitted,
@@ -121,7 +122,7 @@ pub(crate) fn rivals<'a>(
         alone("speed of travel", smooth(hats(&history.travel_mm_per_s, &free), Form::Offset)),
         alone("height above the surface", smooth(hats(&height_mm, &low), Form::Place)),
     ];
-    found.extend(tones(problem, at, &seen));
+    found.extend(tones(problem, at, &seen, rounds));
     if !rounds {
         let in_contact: Arc<Vec<f64>> =
             Arc::new(deep.iter().map(|deep| f64::from(u8::from(*deep))).collect());
@@ -134,7 +135,7 @@ pub(crate) fn rivals<'a>(
 }
 
 /// Tones in counts, in travel, in x and in y.
-fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>) -> Vec<Rival<'a>> {
+fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>, rounds: bool) -> Vec<Rival<'a>> {
     let bins = problem.predictor.bins;
     let elements = seen.elements;
     let residual: Vec<f64> = problem.residuals(&at.predicted).collect();
@@ -186,7 +187,8 @@ fn tones<'a>(problem: &'a Problem<'_>, at: &'a Fitted, seen: &Arc<Seen>) -> Vec<
     let signal = |reading: usize| seen.signal(reading / elements, reading % elements);
     let place = |axis: usize| seen.place_mm.iter().map(|place| place[axis]).collect();
     let found = [
-        in_counts(),
+        // The tone of a coarse converter is its rounding, which is known by then.
+        if rounds { None } else { in_counts() },
         of_bins("tone in travel", seen.travel_mm.clone(), Form::Offset, &|_| 1.0),
         of_bins("tone in x", place(0), Form::Signal, &signal),
         of_bins("tone in y", place(1), Form::Signal, &signal),
