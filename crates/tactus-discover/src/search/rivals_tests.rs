@@ -1,4 +1,10 @@
-use super::hats;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::{hats, rivals};
+use crate::fit::Prepared;
+use crate::fixtures::{ELEMENTS, known, measured};
 
 #[test]
 fn hats_add_up_to_one_and_interpolate() {
@@ -21,4 +27,31 @@ fn values_that_do_not_differ_and_bins_that_do_not_count_have_no_part() {
     assert!(hats(&[2.0; 9], &[true; 9]).is_empty());
     let hats = hats(&[1.0, 2.0, 3.0, f64::NAN, 5.0], &[true, true, true, true, false]);
     assert!(hats.iter().all(|hat| hat[3..] == [0.0, 0.0]));
+}
+
+/// The rounding of a converter with steps of 8 counts is a tone in counts. Once the steps are seen it is no rival of a name.
+#[test]
+fn the_tone_of_a_coarse_converter_is_no_rival() {
+    const STEP_COUNTS: f64 = 8.0;
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let known = known();
+    let silent = vec![vec![0.0; ELEMENTS]; 30 * ELEMENTS];
+    let clean = measured(&known, &[], &silent);
+    let rounding = (0..30 * ELEMENTS).map(|frame| {
+        let of = |counts: &f32| -> f64 {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            let counts = f64::from(*counts);
+            ((counts + normal) / STEP_COUNTS).round() * STEP_COUNTS - counts
+        };
+        clean.counts_of(frame).iter().map(of).collect()
+    });
+    let frames = measured(&known, &[], &rounding.collect::<Vec<_>>());
+    let prepared = Prepared::new(&known, &frames, 1).unwrap();
+    assert!(prepared.lattice.is_some(), "the steps are seen");
+    let problem = prepared.problem();
+    let has_tone = |rounds: bool| {
+        let rivals = rivals(&problem, &prepared.base, rounds).unwrap();
+        rivals.iter().any(|rival| rival.name == "tone in counts")
+    };
+    assert!(has_tone(false) && !has_tone(true));
 }
