@@ -13,7 +13,7 @@
 //! | `x_max_share` | - | 0 | -1 to 2 | the same at the side of the greatest x |
 //! | `y_min_share` | - | 0 | -1 to 2 | the same at the side of the least y |
 //! | `y_max_share` | - | 0 | -1 to 2 | the same at the side of the greatest y |
-//! | `corner_share` | - | 0 | -1 to 2 | the same at the nearest corner |
+//! | `corner_share` | - | 0 | -1 to 2 | the same at the nearest corner; its distance is the sum of those from its two sides |
 //!
 //! The distances are those of the tool's axis: from the nearest side of the active area (0 on it and outside), and from
 //! the line in the middle of x, where the paper's two sensors meet. A covering may be glued down along one side only, or cut round at its
@@ -84,7 +84,8 @@ fn distances_mm(base: BaseModel<'_>, contact: &Contact) -> [f64; PLACES] {
     let [x, y] = contact.position_mm;
     let sides_mm = [x - x_min, x_max - x, y - y_min, y_max - y].map(|side_mm| side_mm.max(0.0));
     let [left_mm, right_mm, low_mm, high_mm] = sides_mm;
-    let corner_mm = left_mm.min(right_mm).hypot(low_mm.min(high_mm));
+    // Near along both sides: the product of the two nearnesses.
+    let corner_mm = left_mm.min(right_mm) + low_mm.min(high_mm);
     let edge_mm = sides_mm.into_iter().fold(f64::INFINITY, f64::min);
     let seam_mm = (x - f64::midpoint(x_min, x_max)).abs();
     [edge_mm, seam_mm, left_mm, right_mm, low_mm, high_mm, corner_mm]

@@ -37,7 +37,7 @@ fn each_side_and_the_corners_have_shares_of_their_own() {
         ("x_max_share", 2.2),
         ("y_min_share", 1.5),
         ("y_max_share", 10.3),
-        ("corner_share", f64::hypot(2.2, 1.5)),
+        ("corner_share", 2.2 + 1.5),
     ] {
         let with = linear([edge(0.0, 0.0, 1.5).with(parameter, -0.4).unwrap()]);
         let want = 1.0 - 0.4 * f64::exp(-distance_mm / 1.5);
