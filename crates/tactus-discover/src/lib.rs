@@ -20,9 +20,11 @@ pub use fit::RunWalks;
 pub use next::{
     Experiments, LeftOut, NextExperiment, OpenQuestion, Plan, Rehearsal, RehearsalOrder, WORTH_Z,
 };
-pub use search::{Contest, Curve, Gap, NotShown, Options, Point, Rivalry, Round, Rule, TriedEffect};
+pub use search::{
+    Contest, Curve, Gap, NotShown, Options, Point, RefutedFormula, Rivalry, Round, Rule, TriedEffect,
+};
 pub use tactus_calibrate::{FaultKind, FaultyElement};
 pub use verdict::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
-    Inclusion, Level, ReplacedFormula, Split, Structured, Unexplained, Verdict,
+    Inclusion, Level, Split, Structured, Unexplained, Verdict,
 };

@@ -33,7 +33,8 @@ mod wiring;
 
 pub(crate) use candidates::Candidate;
 pub use contests::{Contest, Rivalry};
-pub(crate) use forms::{Formed, Refuted, RefutedFormula};
+pub use forms::RefutedFormula;
+pub(crate) use forms::{Formed, Refuted};
 pub(crate) use grow::{
     ALPHA, Alike, Equivalent, FLIPS, Grown, Left, POLISH_ROUNDS, Search, Tried, names, without,
 };

@@ -20,6 +20,6 @@ mod structured;
 pub(crate) use conclude::{SearchOutcome, cannot_judge, conclude, confirmed};
 pub use discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
-    Inclusion, Level, ReplacedFormula, Split, Unexplained, Verdict,
+    Inclusion, Level, Split, Unexplained, Verdict,
 };
 pub use structured::Structured;

@@ -138,7 +138,7 @@ pub use definition::{Definition, Effect, EffectError, Make, Parameter, Parameter
 pub use knots::{CurveKind, FreeCurve, KNOTS_MAX, Knots, Values};
 pub use stage::{BaseModel, Load, Now, OnContact, OnCovering, OnElement, OnMotion, OnReadout, TipState};
 pub(crate) use table::Tabled;
-pub use table::{By, PLACES_MAX, Table};
+pub use table::{By, Table};
 
 /// Every effect of the library, in the order of the stages.
 pub static REGISTRY: &[&Definition] = &[

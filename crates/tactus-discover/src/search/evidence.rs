@@ -92,19 +92,20 @@ pub(crate) struct Evidence<'a> {
 const BEAM: usize = 6;
 const SIZE_MAX: usize = 6;
 /// What a form may miss because it is not quite that of the class: real physics has not quite the form of the library, and whatever has a free
-/// form has any. By so much of the logarithm of a class's odds, and of the least, must others be ahead to take its place. From the 133 tuning sets
+/// form has any. By so much of the logarithm of a class's odds, and at least by so much, must others be ahead to take its place. From the 133 tuning sets
 /// of one physics (`tactus-bench evidence contests --size glance` prints them): rivals are ahead of right classes by up to 0.05 of theirs, of wrong
 /// ones that lose by 0.11 and more.
-pub(super) fn excused(ln_odds: f64) -> f64 {
-    EXCUSED_LN_ODDS.max(EXCUSED_SHARE * ln_odds)
-}
-
-const EXCUSED_LN_ODDS: f64 = 5.0;
 const EXCUSED_SHARE: f64 = 0.075;
+const EXCUSED_LN_ODDS: f64 = 5.0;
 /// Greatest number of additions of one class alone.
 const PARTS_MAX: usize = 3;
 /// An addition is worth a look if it multiplies the odds by more than the exponential of this.
 const GAIN_LEAST: f64 = 1.0;
+
+/// By how much of the logarithm of odds others must be ahead of a class.
+pub(super) fn excused(ln_odds: f64) -> f64 {
+    EXCUSED_LN_ODDS.max(EXCUSED_SHARE * ln_odds)
+}
 
 impl Signs {
     fn allow(self, value: f64) -> bool {

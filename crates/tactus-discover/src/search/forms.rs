@@ -14,6 +14,8 @@
 
 use std::collections::BTreeMap;
 
+use tactus_model::effect::Knots;
+
 use super::grow::{Equivalent, POLISH_ROUNDS, Search, names};
 use crate::data::DiscoverError;
 use crate::fit::{Fitted, Parameters, Term, of_formulas, places, undone};
@@ -37,12 +39,12 @@ impl From<Fitted> for Formed {
 pub(crate) type Refuted = BTreeMap<&'static str, RefutedFormula>;
 
 /// A formula that the data refute.
-#[derive(Debug, Clone)]
-pub(crate) struct RefutedFormula {
-    /// Its values at the places of the knots.
-    pub(crate) values: Vec<f64>,
+#[derive(Debug, Clone, PartialEq)]
+pub struct RefutedFormula {
+    /// Its values at the places of the knots, the best of the formula.
+    pub values: Vec<f64>,
     /// Root mean square of the held-out residuals with it, for the report alone.
-    pub(crate) heldout_rms_counts: f64,
+    pub heldout_rms_counts: f64,
 }
 
 impl Search<'_> {
@@ -51,40 +53,40 @@ impl Search<'_> {
     pub(crate) fn formed(&self, grown: Fitted, equivalent: &Equivalent) -> Result<Formed, DiscoverError> {
         let mut formed = Formed::from(grown);
         for name in names(&formed.at.parameters, self.known_terms) {
-            let Some(curve) = self.added(&formed.at, name).find_map(Term::curve) else { continue };
             let has_knots = self.added(&formed.at, name).any(|term| term.knots.is_some());
             let formula = if has_knots {
-                (self.progress)(&format!("fitting the formula of {name}"), 0.0);
-                match self.with_formula(&formed.at, name, equivalent)? {
-                    Some(formula) => formula,
-                    None => continue,
-                }
+                self.with_formula(&formed.at, name, equivalent)?
             } else {
-                formed.at.clone()
+                Some(formed.at.clone())
             };
-            let at = places(curve, self.problem.predictor.frames);
-            let of_formula = of_formulas(curve, self.added(&formula, name), &at);
-            if of_formula.values.iter().all(|value| *value == 0.0) {
-                continue;
-            }
-            let values = of_formula.values.clone();
-            let free = if has_knots {
-                formed.at.clone()
-            } else {
-                (self.progress)(&format!("fitting {name} with knots"), 0.0);
-                let Some(first) = self.added(&formula, name).next() else { continue };
-                let start = Term { knots: Some(of_formula), ..first.clone() };
-                self.problem.fit_from(self.replaced(&formula, name, vec![start]), POLISH_ROUNDS)?
-            };
+            let Some(formula) = formula else { continue };
+            let Some(knots) = self.as_knots(&formula, name) else { continue };
+            let free = if has_knots { formed.at.clone() } else { self.with_knots(&formula, name, &knots)? };
             formed.at = if self.refutes(&formula, &free) {
                 let heldout_rms_counts = self.problem.heldout_rms_counts(&formula.predicted);
-                formed.refuted.insert(name, RefutedFormula { values, heldout_rms_counts });
+                formed.refuted.insert(name, RefutedFormula { values: knots.values, heldout_rms_counts });
                 free
             } else {
                 formula
             };
         }
         Ok(formed)
+    }
+
+    /// The formula of a class as knots; `None` if it has no curve, or no formula to refute.
+    fn as_knots(&self, formula: &Fitted, name: &str) -> Option<Knots> {
+        let curve = self.added(formula, name).find_map(Term::curve)?;
+        let at = places(curve, self.problem.predictor.frames);
+        let knots = of_formulas(curve, self.added(formula, name), &at);
+        knots.values.iter().any(|value| *value != 0.0).then_some(knots)
+    }
+
+    /// A model with knots, fitted, in place of all added terms of a class.
+    fn with_knots(&self, at: &Fitted, name: &str, knots: &Knots) -> Result<Fitted, DiscoverError> {
+        (self.progress)(&format!("fitting {name} with knots"), 0.0);
+        let terms =
+            self.added(at, name).take(1).map(|term| Term { knots: Some(knots.clone()), ..term.clone() });
+        self.problem.fit_from(self.replaced(at, name, terms.collect()), POLISH_ROUNDS)
     }
 
     /// The added terms of a class.
@@ -100,6 +102,7 @@ impl Search<'_> {
         name: &str,
         equivalent: &Equivalent,
     ) -> Result<Option<Fitted>, DiscoverError> {
+        (self.progress)(&format!("fitting the formula of {name}"), 0.0);
         let Some(alike) = equivalent.get(name) else { return Ok(None) };
         let Some(start) = self.formula_start(&*self.pass(&alike.without)?, name) else { return Ok(None) };
         self.problem.fit_from(self.replaced(at, name, vec![start]), POLISH_ROUNDS).map(Some)

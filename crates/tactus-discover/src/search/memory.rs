@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::locate::Located;
 use super::pass::Pass;
+use super::scatter::Scattered;
 use crate::data::DiscoverError;
 use crate::fit::Parameters;
 
@@ -16,6 +17,7 @@ const MODELS_MAX: usize = 8;
 pub(crate) struct Memory {
     pub(super) passes: Kept<Arc<Pass>>,
     pub(super) located: Kept<Arc<Located>>,
+    pub(super) scattered: Kept<Scattered>,
 }
 
 /// Results by model, the oldest first.

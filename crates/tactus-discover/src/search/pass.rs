@@ -3,7 +3,6 @@
 //! The additions are every shape of every effect, the free parts of their classes, and rivals without a name. From the products follow the
 //! odds of any set of them ([`super::evidence`]).
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -192,9 +191,8 @@ impl<'a> Gathered<'a> {
                 self.add(class, part, candidate.among(shapes.len()), kind);
             }
         }
-        let own = first..self.directions.len();
         for shape in candidate.free() {
-            let part = free_directions(problem, at, candidate, shape, &own);
+            let part = free_directions(problem, at, candidate, shape, first);
             let kind = Kind::Term { candidate: number, shape: shape.clone(), amplitudes: Vec::new() };
             self.add(class, part, 1.0, kind);
         }
@@ -265,19 +263,13 @@ fn shape_directions(problem: &Problem<'_>, at: &Fitted, amplitudes: &[usize], sh
     part
 }
 
-/// The directions of a free part of a class. A table is a parameter's own direction, which is among those of the class that come first, times the
-/// weight of each place.
-fn free_directions(
-    problem: &Problem<'_>,
-    at: &Fitted,
-    of: &Candidate,
-    shape: &Term,
-    own: &Range<usize>,
-) -> Part {
+/// The directions of a free part of a class, whose own begin with that of its first amplitude, the `first`. A table is a parameter's own
+/// direction times the weight of each place.
+fn free_directions(problem: &Problem<'_>, at: &Fitted, of: &Candidate, shape: &Term, first: usize) -> Part {
     if let Some((parameter, table)) = shape.tables.first() {
         let amplitude = of.amplitudes().iter().position(|one| one == parameter).unwrap_or(0);
         let width = Scale::of(&of.definition.parameters[*parameter], problem.duration_s).width();
-        let direction = own.start + amplitude;
+        let direction = first + amplitude;
         let times = |factor| Direction::Times { direction, factor: Arc::new(factor) };
         let directions: Vec<_> = problem.weights_at(table).into_iter().map(times).collect();
         let count = directions.len();

@@ -86,6 +86,10 @@ struct Departures {
 impl Search<'_> {
     /// Tests whether the scatter of the readings is the same everywhere.
     pub(crate) fn scattered(&self, at: &Fitted) -> Result<Scattered, DiscoverError> {
+        self.memory.scattered.at(&at.parameters, || self.scattered_at(at))
+    }
+
+    fn scattered_at(&self, at: &Fitted) -> Result<Scattered, DiscoverError> {
         let mut most = Scattered { p_value: 1.0, with: "" };
         let weights = self.problem.element_weight.iter().filter(|weight| **weight > 0.0);
         let noise_counts = median(&weights.map(|weight| weight.sqrt().recip()).collect::<Vec<_>>());
@@ -112,7 +116,7 @@ impl Search<'_> {
     fn by_blocks(&self, at: &Fitted, forms: &Forms, with: With) -> Vec<f64> {
         let bins = self.problem.predictor.bins;
         let mut blocks = vec![0.0; bins.blocks];
-        for element in 0..bins.elements {
+        for element in (0..bins.elements).filter(|element| self.problem.element_weight[*element] > 0.0) {
             let mut departures = self.departures(at, forms, with, element);
             departures.sort_by_key(|of| of.count);
             for alike in departures.chunk_by(|one, next| one.count == next.count) {
@@ -134,9 +138,6 @@ impl Search<'_> {
         let (elements, last) = (bins.elements, bins.len().saturating_sub(1));
         let mut departures = Vec::new();
         for bin in (0..bins.len()).filter(|bin| problem.train[*bin] > 0.0) {
-            if problem.element_weight[element] == 0.0 {
-                continue;
-            }
             let reading = bin * elements + element;
             let count = bins.frames_in(bin);
             let (square, count) = if with.at_rest() && count >= REST_FRAMES {

@@ -7,7 +7,7 @@ use tactus_model::{Effect, Response};
 
 use super::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
-    Inclusion, Level, ReplacedFormula, Split, Unexplained, Verdict,
+    Inclusion, Level, Split, Unexplained, Verdict,
 };
 use super::structured::{Readings, Structured};
 use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
@@ -649,15 +649,11 @@ fn fitted_curves(
             at.iter().zip(values).zip(errors.by_ref()).map(knot).collect()
         };
         if let Some((curve, of)) = term.curve().zip(term.knots.as_ref()) {
-            let formula = refuted.map(|formula| ReplacedFormula {
-                values: formula.values.clone(),
-                heldout_rms_counts: formula.heldout_rms_counts,
-            });
             curves.push(FittedCurve {
                 at: curve.at,
                 of: curve.of,
                 knots: knots(&of.at, &of.values),
-                formula,
+                formula: refuted.cloned(),
             });
         }
         for (parameter, table) in &term.tables {

@@ -8,7 +8,7 @@ use super::structured::Structured;
 use crate::data::Floor;
 use crate::fit::RunWalks;
 use crate::next::Plan;
-use crate::search::{Contest, Curve, Gap, NotShown, Round};
+use crate::search::{Contest, Curve, Gap, NotShown, RefutedFormula, Round};
 
 /// What the data say about a model, and what they add to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -168,7 +168,7 @@ pub struct FittedCurve {
     /// Its knots, in order of their places.
     pub knots: Vec<FittedKnot>,
     /// The formula that it replaces, if the data refute one.
-    pub formula: Option<ReplacedFormula>,
+    pub formula: Option<RefutedFormula>,
 }
 
 impl FittedCurve {
@@ -176,15 +176,6 @@ impl FittedCurve {
     pub fn is_table(&self) -> bool {
         By::ALL.iter().any(|by| by.name() == self.at)
     }
-}
-
-/// A formula that the data refute.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReplacedFormula {
-    /// Its values at the places of the knots, the best of the formula.
-    pub values: Vec<f64>,
-    /// Root mean square of the held-out residuals with it.
-    pub heldout_rms_counts: f64,
 }
 
 /// A knot of a curve.

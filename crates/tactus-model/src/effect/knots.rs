@@ -63,7 +63,7 @@ pub struct Values {
     pub(super) tables: Vec<(usize, Table)>,
 }
 
-/// Greatest number of knots.
+/// Greatest number of knots, and of places of a table.
 pub const KNOTS_MAX: usize = 64;
 
 impl Values {

@@ -7,7 +7,8 @@
 //! Only effects without memory have such parameters: at each moment they act as if the parameter had the table's value there.
 
 use super::{
-    BaseModel, EffectError, Load, Now, OnContact, OnCovering, OnMotion, Parameter, TipState, Values,
+    BaseModel, EffectError, KNOTS_MAX, Load, Now, OnContact, OnCovering, OnMotion, Parameter, TipState,
+    Values,
 };
 use crate::Contact;
 
@@ -32,9 +33,6 @@ pub struct Table {
     /// One for each place.
     pub values: Vec<f64>,
 }
-
-/// Greatest number of places.
-pub const PLACES_MAX: usize = 64;
 
 impl By {
     /// All of them.
@@ -91,9 +89,9 @@ impl Table {
         }
         let refuse = |want| Err(EffectError::Table { effect, parameter, want });
         let [places, values] = [self.at.len(), self.values.len()];
-        if places != values || !(1..=PLACES_MAX).contains(&places) {
+        if places != values || !(1..=KNOTS_MAX).contains(&places) {
             return refuse(format!(
-                "must have 1 to {PLACES_MAX} places, with as many values, not {places} and {values}"
+                "must have 1 to {KNOTS_MAX} places, with as many values, not {places} and {values}"
             ));
         }
         if let Some(index) = self.at.iter().position(|at| !at.is_finite()) {

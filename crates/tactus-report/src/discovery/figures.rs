@@ -44,12 +44,12 @@ pub fn residual_against(curve: &Curve) -> Figure {
 /// A free curve or a table with the standard errors of its knots, beside the formula that it replaces.
 pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
     let of = Axis::new(curve.of.replace('_', " "), "");
-    let (x, y) = if curve.is_table() {
+    let (kind, label, x, y) = if curve.is_table() {
         let (name, unit) = curve.at.rsplit_once('_').unwrap_or((curve.at, ""));
-        (Axis::new(name, unit.to_owned()).tight(), of)
+        ("Table", "table", Axis::new(name, unit.to_owned()).tight(), of)
     } else {
         let unit = curve.at.trim_start_matches("at_").replace("_per_", "/");
-        (Axis::new("place", unit).tight(), of.from_zero())
+        ("Free curve", "knots", Axis::new("place", unit).tight(), of.from_zero())
     };
     let formula = curve.formula.iter().map(|formula| {
         let points = curve.knots.iter().zip(&formula.values).map(|(knot, value)| [knot.at, *value]);
@@ -61,16 +61,11 @@ pub fn free_curve(effect: &str, curve: &FittedCurve) -> Figure {
         Some([knot.at, knot.value - error, knot.value + error])
     });
     let dots = curve.knots.iter().map(|knot| [knot.at, knot.value]).collect();
-    let figure =
-        Figure::new(format!("{} of {effect}", if curve.is_table() { "Table" } else { "Free curve" }), x, y)
-            .size_px(CURVE_PX);
-    formula.fold(figure, Figure::with).with(Series::bars(bars).width_px(1.2).ink(Ink::Blue)).with(
-        Series::dots(dots).width_px(4.5).ink(Ink::Blue).label(if curve.is_table() {
-            "table"
-        } else {
-            "knots"
-        }),
-    )
+    let figure = Figure::new(format!("{kind} of {effect}"), x, y).size_px(CURVE_PX);
+    formula
+        .fold(figure, Figure::with)
+        .with(Series::bars(bars).width_px(1.2).ink(Ink::Blue))
+        .with(Series::dots(dots).width_px(4.5).ink(Ink::Blue).label(label))
 }
 
 /// Root mean square residual of each element, of the base model and, if different, of the grown model, on one scale: in

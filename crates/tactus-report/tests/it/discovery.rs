@@ -11,7 +11,7 @@ use crate::made_up::discovery::{
 };
 use serde_json::Value;
 use tactus_discover::{
-    Discovery, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, ReplacedFormula, Unexplained,
+    Discovery, FittedCurve, FittedKnot, GlobalTest, LeftOut, NextExperiment, RefutedFormula, Unexplained,
     Verdict,
 };
 use tactus_model::Array;
@@ -100,7 +100,7 @@ fn an_effect_with_knots_has_them_beside_its_formula() {
         at: "at_mm",
         of: "loss_share",
         knots: vec![knot(0.05, 0.31, Some(0.02)), knot(0.4, 0.77, None)],
-        formula: Some(ReplacedFormula { values: vec![0.05, 0.4], heldout_rms_counts: 3.45 }),
+        formula: Some(RefutedFormula { values: vec![0.05, 0.4], heldout_rms_counts: 3.45 }),
     }];
     let (page, json) = (html(&discovery), json(&discovery));
     show("knots.html", &page);

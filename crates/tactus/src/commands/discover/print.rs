@@ -126,7 +126,7 @@ fn step(step: &AddedEffect) -> Vec<Vec<String>> {
         let (before, after) = (step.heldout_rms_before_counts, step.heldout_rms_after_counts);
         vec![
             of_step(nth, step.effect.into()),
-            if nth == 0 { with_curves(parameters(term), &step.curves) } else { parameters(term) },
+            with_curves(parameters(term), if nth == 0 { &step.curves } else { &[] }),
             of_step(nth, format!("{before:.3} -> {after:.3}")),
             of_step(nth, probability(step.q_value)),
             of_step(nth, step.equivalent.join(", ")),
