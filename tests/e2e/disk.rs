@@ -70,7 +70,7 @@ impl Disk {
         let (image, path) = (folder.path().join("image"), folder.path().join("disk"));
         std::fs::create_dir(&path).map_err(|error| error.to_string())?;
         let [image, place] = [&image, &path].map(|path| path.display().to_string());
-        system("truncate", &["--size=256M", &image])?;
+        system("truncate", &["--size=2G", &image])?;
         system("mkfs.ext4", &["-q", &image])?;
         system("mount", &["-o", "loop", &image, &place])?;
         Ok(Self { folder, path, hangs: false })

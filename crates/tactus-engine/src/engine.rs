@@ -303,7 +303,7 @@ impl Engine {
 
     /// Stops motion at once and ends the run in progress or in preparation, if there is one. Does not wait.
     ///
-    /// While the tip rises straight up, a stop within a second after another of these has no effect: stops without end would
+    /// While the tip rises straight up, a stop within a second after another of this rise has no effect: stops without end would
     /// hold it in contact.
     ///
     /// Returns true if there was one.

@@ -32,7 +32,7 @@ const PERMIT_PATIENCE: Duration = Duration::from_secs(5);
 /// Least time between two stops of a rising tip that somebody presses.
 const STOP_OF_RISE_EVERY: Duration = Duration::from_secs(1);
 
-/// Whether the tip rises, and when somebody last stopped it.
+/// Whether the tip rises, and when somebody last stopped it: in this rise, or while it did not rise.
 #[derive(Debug, Default)]
 pub(crate) struct WayUp {
     is_under_way: bool,
@@ -43,6 +43,11 @@ pub(crate) struct WayUp {
 struct Rising<'a>(&'a Shared);
 
 impl WayUp {
+    /// A stop from before the rise is forgotten: it may be one of another run, and stopped another motion.
+    fn begin(&mut self) {
+        *self = Self { is_under_way: true, stopped: None };
+    }
+
     /// True if somebody's stop is carried out now. A rising tip gets up although stops never cease: it takes one a second.
     /// The supervisor's stops do not count, so that nobody's stop is without effect because of one.
     pub(crate) fn takes_stop(&mut self, now: MonoTime) -> bool {
@@ -57,7 +62,7 @@ impl WayUp {
 
 impl<'a> Rising<'a> {
     fn begin(shared: &'a Shared) -> Self {
-        shared.way_up().is_under_way = true;
+        shared.way_up().begin();
         Self(shared)
     }
 }
@@ -306,3 +311,7 @@ fn confirmed_step_mm(way_mm: f64) -> f64 {
     // Rounding must not add a step to a whole number of steps.
     way_mm / (way_mm / STEP_DOWN_MAX_MM - 1e-6).ceil().max(1.0)
 }
+
+#[cfg(test)]
+#[path = "motion_tests.rs"]
+mod tests;
