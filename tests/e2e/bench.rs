@@ -259,7 +259,11 @@ impl Bench {
     /// machine without time for the frames makes the supervisor stop it.
     pub(crate) fn run_until_below(&self, script: &str, limit_mm: f64) {
         for _ in 0..TRIES_MAX {
-            self.run(script);
+            if !self.try_run(script).ok {
+                // A rule that such a machine broke on the way up of the run before.
+                self.reset();
+                continue;
+            }
             let idle_below = |_, seen: &Seen| match seen {
                 Seen::Report { state, z_mm } => (state == "Idle" && *z_mm < limit_mm).then_some(()),
                 Seen::Stop | Seen::Home => None,

@@ -7,8 +7,8 @@
 //! Least squares under bounds: C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems* (1974), chapter 23.
 
 use nalgebra::{DMatrix, DVector};
-use tactus_model::Registration;
 use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Table};
+use tactus_model::Registration;
 
 use super::parameters::Term;
 use super::problem::{Problem, solve};
@@ -88,7 +88,7 @@ impl Term {
     }
 
     /// The table that a knot is in, and its number there; `None` if it is one of the curve's.
-    fn table_at(&self, knot: usize) -> Option<(usize, usize)> {
+    pub(super) fn table_at(&self, knot: usize) -> Option<(usize, usize)> {
         let mut at = knot.checked_sub(self.knots.as_ref().map_or(0, |knots| knots.values.len()))?;
         for (table, (_, of)) in self.tables.iter().enumerate() {
             if at < of.values.len() {
@@ -97,6 +97,18 @@ impl Term {
             at -= of.values.len();
         }
         None
+    }
+
+    /// The same with all values of a table moved by a small step, and that step, for derivatives; `None` if the range leaves no room.
+    pub(super) fn with_table_moved(&self, table: usize) -> Option<(Self, f64)> {
+        let mut moved = self.clone();
+        let (parameter, of) = &mut moved.tables[table];
+        let [least, most] = self.definition.parameters[*parameter].range;
+        let step = STEP * (most - least);
+        let has_room = |step: &f64| of.values.iter().all(|value| (least..=most).contains(&(value + step)));
+        let step = [step, -step].into_iter().find(has_room)?;
+        of.values.iter_mut().for_each(|value| *value += step);
+        Some((moved, step))
     }
 
     fn listed_mut(&mut self, knot: usize) -> Option<&mut Vec<f64>> {

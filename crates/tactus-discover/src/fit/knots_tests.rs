@@ -1,6 +1,10 @@
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use tactus_model::effect::Definition;
 
 use super::*;
+use crate::fit::{Free, Prepared};
+use crate::fixtures::{ELEMENTS, OPTIONS, known, measured, processes};
 
 fn term(effect: &str, at: &[f64], values: &[f64]) -> Term {
     let knots = Knots { at: at.to_vec(), values: values.to_vec() };
@@ -84,4 +88,39 @@ fn terms_of_a_class_add_to_one_curve_within_its_rules() {
     rising.values[0] = -0.3;
     let none = of_formulas(relaxation.curve.as_ref().unwrap(), &[rising], &[1.0, 10.0]);
     assert_near(&none.values, &[0.0, 0.0]);
+}
+
+#[test]
+fn the_places_of_a_table_share_one_direction_by_their_weights() {
+    let known = known();
+    let noise = processes(ELEMENTS, 1.0, 1e-3, &mut ChaCha8Rng::seed_from_u64(5));
+    let frames = measured(&known, &[], &noise);
+    let prepared = Prepared::new(&known, &frames, OPTIONS.seed).unwrap();
+    let problem = prepared.problem();
+    let definition = Definition::find("indenter-size").unwrap();
+    let parameter = definition.parameters.iter().position(|one| one.varies.contains(&By::Depth)).unwrap();
+    let at = table_places(By::Depth, &frames, &known.registration).unwrap();
+    let neutral = definition.parameters[parameter].neutral;
+    let values: Vec<f64> = (0..at.len()).map(|place| neutral + 0.02 * place as f64).collect();
+    let table = Table { by: By::Depth, at, values };
+    let places = table.at.len();
+    let model =
+        prepared.base.parameters.with(Term { tables: vec![(parameter, table)], ..Term::neutral(definition) });
+    let free: Vec<Free> = (0..places).map(|knot| Free::Knot { term: model.terms.len() - 1, knot }).collect();
+    let predicted = problem.predict(&model).unwrap();
+    let products = |directions| problem.eliminated(&model, &predicted, directions).unwrap().reduced;
+    let of_table = |(number, one): (usize, &Free)| problem.of_table(&model, *one, number).unwrap();
+    let shared = products(free.iter().enumerate().map(of_table).collect());
+    // Each place moved by itself: the same but for the curvature within a small step.
+    let apart = products(free.iter().map(|one| problem.towards(&model, *one)).collect());
+    for row in 0..=places {
+        for column in 0..=places {
+            let scale = (apart[(row, row)] * apart[(column, column)]).sqrt();
+            let [found, wanted] = [shared[(row, column)], apart[(row, column)]];
+            assert!(
+                scale > 0.0 && (found - wanted).abs() < 5e-3 * scale,
+                "{row}, {column}: {found} {wanted}"
+            );
+        }
+    }
 }

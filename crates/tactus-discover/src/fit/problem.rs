@@ -250,7 +250,7 @@ impl<'a> Problem<'a> {
             return Direction::RunGain(run);
         }
         let (parameters, step) = self.moved(at, free);
-        Direction::Towards { parameters, step }
+        Direction::Towards { parameters, step, factor: None }
     }
 
     /// The parameters after a small step for a derivative, and that step on the parameter's [`Scale`].
@@ -372,11 +372,27 @@ impl<'a> Problem<'a> {
         free: &[Free],
         knots: &Knots,
     ) -> Result<Elimination, DiscoverError> {
-        let direction = |(one, knot): (&Free, &Option<Arc<Stretch>>)| match knot {
+        let direction = |(number, (one, knot)): (usize, (&Free, &Option<Arc<Stretch>>))| match knot {
             Some(knot) => Arc::clone(knot).direction(),
-            None => self.towards(at, *one),
+            None => self.of_table(at, *one, number).unwrap_or_else(|| self.towards(at, *one)),
         };
-        self.eliminated(at, predicted, free.iter().zip(knots).map(direction).collect())
+        self.eliminated(at, predicted, free.iter().zip(knots).enumerate().map(direction).collect())
+    }
+
+    /// The direction of a place of a table, the `number`-th of a fit: that of all its places together, times the weight of this one. So
+    /// a table costs one prediction. Where the covering remembers, this is an approximation, as the directions of a pass are. `None` if the
+    /// parameter is of no table.
+    pub(super) fn of_table(&self, at: &Parameters, free: Free, number: usize) -> Option<Direction<'static>> {
+        let Free::Knot { term, knot } = free else { return None };
+        let (table, place) = at.terms[term].table_at(knot)?;
+        let (moved, step) = at.terms[term].with_table_moved(table)?;
+        let factor = Arc::new(self.weights_at(&at.terms[term].tables[table].1).swap_remove(place));
+        if place > 0 {
+            return Some(Direction::Times { direction: number - place, factor });
+        }
+        let mut parameters = at.clone();
+        parameters.terms[term] = moved;
+        Some(Direction::Towards { parameters, step, factor: Some(factor) })
     }
 
     /// The parameters with refitted gains and baselines, and their prediction, if this reduces the cost by much. A start whose

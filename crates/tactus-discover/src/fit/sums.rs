@@ -34,11 +34,11 @@ const GAIN_SHARE: f64 = 1e-3;
 
 /// A direction.
 pub(crate) enum Direction<'a> {
-    /// Finite difference towards a changed model, divided by a step.
-    Towards { parameters: Parameters, step: f64 },
+    /// Finite difference towards a changed model, divided by a step; times a factor for each bin, if it has one.
+    Towards { parameters: Parameters, step: f64, factor: Option<Arc<Vec<f64>>> },
     /// Relative change of all gains in a run.
     RunGain(usize),
-    /// An earlier direction, by its number, times a factor for each bin.
+    /// An earlier direction without its own factor, by its number, times a factor for each bin.
     Times { direction: usize, factor: Arc<Vec<f64>> },
     /// Values of any bins, bin by bin, element by element.
     Column(Box<dyn Fn(Range<usize>) -> Vec<f64> + Sync + 'a>),
@@ -118,6 +118,7 @@ enum Running<'a> {
     Towards {
         stream: Box<Mutex<Stream<'a>>>,
         per_step: f64,
+        factor: Option<Arc<Vec<f64>>>,
     },
     /// Taken from the derivative by all gains.
     RunGain(usize),
@@ -165,7 +166,7 @@ impl Problem<'_> {
         let mut running: Vec<Running<'_>> =
             directions.into_iter().map(|one| self.running(one, at)).collect::<Result<_, DiscoverError>>()?;
         let (parameters, step) = with_more_gain(at);
-        running.push(self.running(Direction::Towards { parameters, step }, at)?);
+        running.push(self.running(Direction::Towards { parameters, step, factor: None }, at)?);
         let mut trunk = self.predictor.stream(at.clone())?;
         for first in (0..bins.len()).step_by(CHUNK_BINS) {
             let range = first..(first + CHUNK_BINS).min(bins.len());
@@ -181,6 +182,11 @@ impl Problem<'_> {
                         columns[number] = times(&columns[*direction], &factor[range.clone()]);
                     }
                     Running::Towards { .. } | Running::Column(_) => {}
+                }
+            }
+            for (column, direction) in columns.iter_mut().zip(&running) {
+                if let Running::Towards { factor: Some(factor), .. } = direction {
+                    *column = times(column, &factor[range.clone()]);
                 }
             }
             let chunk = Chunk { bins: range.clone(), columns, by_gain };
@@ -203,10 +209,11 @@ impl Problem<'_> {
         trunk: &Parameters,
     ) -> Result<Running<'a>, DiscoverError> {
         Ok(match direction {
-            Direction::Towards { parameters, step } => Running::Towards {
+            Direction::Towards { parameters, step, factor } => Running::Towards {
                 stream: Box::new(Mutex::new(self.predictor.branch(parameters, trunk)?)),
                 // A parameter that cannot move has no derivative.
                 per_step: if step == 0.0 { 0.0 } else { 1.0 / step },
+                factor,
             },
             Direction::RunGain(run) => Running::RunGain(run),
             Direction::Times { direction, factor } => Running::Times { direction, factor },
@@ -339,7 +346,7 @@ impl Running<'_> {
         let (stream, per_step) = match self {
             Self::Column(values) => return Ok(values(bins)),
             Self::RunGain(_) | Self::Times { .. } => return Ok(Vec::new()),
-            Self::Towards { stream, per_step } => (stream, per_step),
+            Self::Towards { stream, per_step, .. } => (stream, per_step),
         };
         let mut stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
         let mut column = Vec::new();

@@ -295,7 +295,9 @@ impl Evidence<'_> {
                 among.iter().copied().filter(|one| self.additions[*one].class == class).collect();
             let mut set = self.set([*first]);
             while set.members.len() < PARTS_MAX {
-                let next = self.best_of_classes(&set, &own, GAIN_LEAST).into_iter().next();
+                // What is less than a form is excused for does not tell classes apart, and each part costs a fit.
+                let least = GAIN_LEAST.max(excused(set.ln_odds));
+                let next = self.best_of_classes(&set, &own, least).into_iter().next();
                 let Some((one, gain)) = next else { break };
                 set = set.with(one, &gain);
             }

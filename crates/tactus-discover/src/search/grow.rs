@@ -15,7 +15,7 @@ use tactus_model::effect::Definition;
 
 use super::candidates::Candidate;
 use super::contests::Contest;
-use super::evidence::{Evidence, ODDS_AGAINST, Set};
+use super::evidence::{Evidence, ODDS_AGAINST, Set, excused};
 use super::memory::Memory;
 use super::options::Options;
 use super::pass::{Kind, Pass, rivals_win};
@@ -426,13 +426,19 @@ impl Search<'_> {
         self.rank_all(&mut fits);
         let least =
             fits.first().map_or(0.0, |best| best.ln_odds - units * self.unit(best.ln_odds, &best.fitted));
-        let mut finished: Vec<&'static str> = Vec::new();
-        for one in &fits {
-            if !finished.contains(&one.name) && (one.ln_odds >= least || finished.len() < FINISHED_MAX) {
-                finished.push(one.name);
+        let mut finished: Vec<(&'static str, f64)> = Vec::new();
+        fits.retain(|one| {
+            let rank = self.rank(one);
+            if let Some((_, best)) = finished.iter().find(|(name, _)| *name == one.name) {
+                // Another start of the class, so far behind after the first rounds, would not catch up.
+                return rank >= best - excused(*best);
             }
-        }
-        fits.retain(|one| finished.contains(&one.name));
+            let is_taken = one.ln_odds >= least || finished.len() < FINISHED_MAX;
+            if is_taken {
+                finished.push((one.name, rank));
+            }
+            is_taken
+        });
         let finish = |one: &Beside| {
             let fitted = self.problem.fit_from(one.fitted.parameters.clone(), TRIAL_ROUNDS)?;
             Ok(Beside { name: one.name, ln_odds: self.ln_odds(at, &fitted), fitted })
