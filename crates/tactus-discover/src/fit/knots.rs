@@ -7,8 +7,8 @@
 //! Least squares under bounds: C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems* (1974), chapter 23.
 
 use nalgebra::{DMatrix, DVector};
-use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Table};
 use tactus_model::Registration;
+use tactus_model::effect::{By, CurveKind, FreeCurve, Knots, Table};
 
 use super::parameters::Term;
 use super::problem::{Problem, solve};
