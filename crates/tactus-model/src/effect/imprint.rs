@@ -28,7 +28,7 @@
 //! Compression set of rubber, as ISO 815 measures it; the Kelvin-Voigt element's recovery, J. D. Ferry, *Viscoelastic
 //! Properties of Polymers* (1980), chapter 1.
 
-use super::lag::{mean, spread};
+use super::lag::spread;
 use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
@@ -136,7 +136,7 @@ impl OnCovering for FreeImprint {
 
 /// What is left of all three.
 fn left_mm(dents: &[Dent; 3]) -> f64 {
-    mean(dents.map(|dent| dent.left_mm))
+    dents.iter().map(|dent| dent.left_mm).sum::<f64>() / 3.0
 }
 
 impl Dent {

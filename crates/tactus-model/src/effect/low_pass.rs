@@ -11,7 +11,7 @@
 //! # Source
 //! The first-order filter of a charge amplifier or of the controller's averaging.
 
-use super::lag::Lag;
+use super::lag::Lags;
 use super::{Definition, Make, Now, OnReadout, Parameter};
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -21,12 +21,12 @@ pub(super) static DEFINITION: Definition = Definition {
     near_twins: &["time-lag", "relaxation", "scan-skew", "rate-stiffening", "imprint"],
     shown_by: &["rates", "ladder"],
     curve: None,
-    make: Make::Readout(|values| Box::new(LowPass { lag: Lag::new(values[0]) })),
+    make: Make::Readout(|values| Box::new(LowPass { lag: Lags::new([(values[0], 1.0)]) })),
 };
 
 #[derive(Debug)]
 struct LowPass {
-    lag: Lag,
+    lag: Lags,
 }
 
 impl OnReadout for LowPass {

@@ -41,8 +41,8 @@
 //! The generalised Maxwell solid (a Prony series, here of three terms), in stress under prescribed strain: J. D. Ferry,
 //! *Viscoelastic Properties of Polymers* (1980), chapter 1.
 
-use super::lag::{Lag, SpreadLag, spread};
-use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter, Values};
+use super::lag::{Lags, spread};
+use super::{CurveKind, Definition, FreeCurve, Knots, Make, Now, OnCovering, Parameter};
 use crate::Contact;
 
 pub(super) static DEFINITION: Definition = Definition {
@@ -78,94 +78,40 @@ pub(super) static DEFINITION: Definition = Definition {
         },
     }),
     make: Make::Covering(|values| {
-        Box::new(Relaxation {
-            relaxed: Relaxed::of(values),
-            after_release: values[3],
-            recovery_ratio: values[4],
-        })
+        let relaxed = match values.knots() {
+            Some(Knots { at, values }) => Lags::new(at.iter().copied().zip(values.iter().copied())),
+            None => Lags::new(spread(values[1], values[2]).map(|tau_s| (tau_s, values[0] / 3.0))),
+        };
+        Box::new(Relaxation { relaxed, after_release: values[3], recovery_ratio: values[4] })
     }),
 };
 
 #[derive(Debug)]
 struct Relaxation {
-    relaxed: Relaxed,
+    /// What each element has lost, in mm.
+    relaxed: Lags,
     after_release: f64,
     recovery_ratio: f64,
 }
 
-/// What has relaxed.
-#[derive(Debug)]
-enum Relaxed {
-    Three { share: f64, lag: SpreadLag },
-    Free(Vec<(f64, Lag)>),
-}
-
 impl OnCovering for Relaxation {
     fn signal(&mut self, now: Now<'_>, contact: &Contact, signal_mm: &mut [f64]) {
-        let haste = if contact.depth_mm > 0.0 { 1.0 } else { self.recovery_ratio };
-        self.relaxed.follow(haste * now.dt_s, signal_mm);
-        for (element, u) in signal_mm.iter_mut().enumerate() {
-            let lost = self.relaxed.lost(element);
-            *u = if contact.depth_mm > 0.0 {
-                left(*u, lost).unwrap_or(u.min(0.0))
-            } else {
-                *u - self.after_release * lost
-            };
+        let is_pressed = contact.depth_mm > 0.0;
+        if self.relaxed.has_begun() {
+            let haste = if is_pressed { 1.0 } else { self.recovery_ratio };
+            self.relaxed.follow(haste * now.dt_s, signal_mm);
+        } else {
+            self.relaxed.begin(&vec![0.0; signal_mm.len()], signal_mm);
+        }
+        for (u, lost) in signal_mm.iter_mut().zip(self.relaxed.output()) {
+            // A covering does not pull.
+            *u = if is_pressed { (*u - lost).max(u.min(0.0)) } else { *u - self.after_release * lost };
         }
     }
 
     fn reset(&mut self) {
         self.relaxed.reset();
     }
-}
-
-impl Relaxed {
-    fn of(values: &Values) -> Self {
-        let three = || Self::Three { share: values[0], lag: SpreadLag::new(values[1], values[2]) };
-        let free = |knots: &Knots| {
-            let lags = knots.at.iter().zip(&knots.values).map(|(tau_s, weight)| (*weight, Lag::new(*tau_s)));
-            Self::Free(lags.collect())
-        };
-        values.knots().map_or_else(three, free)
-    }
-
-    fn follow(&mut self, dt_s: f64, signal_mm: &[f64]) {
-        let none = || vec![0.0; signal_mm.len()];
-        match self {
-            Self::Three { lag, .. } if lag.has_begun() => lag.follow(dt_s, signal_mm),
-            Self::Three { lag, .. } => lag.begin(&none(), signal_mm),
-            Self::Free(lags) => {
-                for (_, lag) in lags {
-                    if lag.has_begun() {
-                        lag.follow(dt_s, signal_mm);
-                    } else {
-                        lag.begin(&none(), signal_mm);
-                    }
-                }
-            }
-        }
-    }
-
-    /// What an element has lost, in mm.
-    fn lost(&self, element: usize) -> f64 {
-        match self {
-            Self::Three { share, lag } => share * lag.output(element),
-            Self::Free(lags) => lags.iter().map(|(weight, lag)| weight * lag.output()[element]).sum(),
-        }
-    }
-
-    fn reset(&mut self) {
-        match self {
-            Self::Three { lag, .. } => lag.reset(),
-            Self::Free(lags) => lags.iter_mut().for_each(|(_, lag)| lag.reset()),
-        }
-    }
-}
-
-/// What is left of `u`; `None` if the covering would have to pull.
-fn left(u: f64, lost: f64) -> Option<f64> {
-    let left = u - lost;
-    (left >= u.min(0.0)).then_some(left)
 }
 
 #[cfg(test)]
