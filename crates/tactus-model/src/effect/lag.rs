@@ -11,7 +11,7 @@
 /// an average of the three: more moments on the same line change nothing but rounding.
 #[derive(Debug)]
 pub(super) struct Lags {
-    lags: Vec<Lag>,
+    parts: Vec<Lag>,
     before: Vec<f64>,
     sum: Vec<f64>,
 }
@@ -27,7 +27,7 @@ impl Lags {
     /// With time constants that are not negative, 0 following at once, and the weight of each.
     pub(super) fn new(of: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let lag = |(tau_s, weight)| Lag { tau_s, weight, output: Vec::new() };
-        Self { lags: of.into_iter().map(lag).collect(), before: Vec::new(), sum: Vec::new() }
+        Self { parts: of.into_iter().map(lag).collect(), before: Vec::new(), sum: Vec::new() }
     }
 
     /// True once there is a past.
@@ -37,8 +37,8 @@ impl Lags {
 
     /// Begins with an output of each lag; the input so far was `input`.
     pub(super) fn begin(&mut self, output: &[f64], input: &[f64]) {
-        let weights: f64 = self.lags.iter().map(|lag| lag.weight).sum();
-        self.lags.iter_mut().for_each(|lag| lag.output = output.to_vec());
+        let weights: f64 = self.parts.iter().map(|lag| lag.weight).sum();
+        self.parts.iter_mut().for_each(|lag| lag.output = output.to_vec());
         self.sum = output.iter().map(|output| weights * output).collect();
         self.before = input.to_vec();
     }
@@ -46,7 +46,7 @@ impl Lags {
     /// Goes on to `input`, reached `dt_s` after the last; at once (a jump) if that is 0.
     pub(super) fn follow(&mut self, dt_s: f64, input: &[f64]) {
         self.sum.fill(0.0);
-        for lag in &mut self.lags {
+        for lag in &mut self.parts {
             let [keeps, of_before, of_input] = lag.shares(dt_s);
             let inputs = self.before.iter().zip(input);
             for ((q, sum), (u0, u1)) in lag.output.iter_mut().zip(&mut self.sum).zip(inputs) {
@@ -64,7 +64,7 @@ impl Lags {
 
     /// Forgets the past.
     pub(super) fn reset(&mut self) {
-        self.lags.iter_mut().for_each(|lag| lag.output.clear());
+        self.parts.iter_mut().for_each(|lag| lag.output.clear());
         self.before.clear();
         self.sum.clear();
     }
