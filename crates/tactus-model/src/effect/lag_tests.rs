@@ -47,7 +47,9 @@ fn several_lags_add_up_by_their_weights() {
     let mut together = Lags::new(parts);
     let mut apart = parts.map(|(tau_s, _)| one(tau_s));
     together.begin(&[1.0, 3.0], &[1.0, 0.0]);
-    apart.iter_mut().for_each(|lag| lag.begin(&[1.0, 3.0], &[1.0, 0.0]));
+    for lag in &mut apart {
+        lag.begin(&[1.0, 3.0], &[1.0, 0.0]);
+    }
     for input in [[1.0, 3.0], [2.0, -1.0], [0.5, 7.0]] {
         for element in 0..2 {
             let want: f64 =
@@ -55,7 +57,9 @@ fn several_lags_add_up_by_their_weights() {
             assert!((together.output()[element] - want).abs() < 1e-14);
         }
         together.follow(0.2, &input);
-        apart.iter_mut().for_each(|lag| lag.follow(0.2, &input));
+        for lag in &mut apart {
+            lag.follow(0.2, &input);
+        }
     }
     together.reset();
     assert!(!together.has_begun());
