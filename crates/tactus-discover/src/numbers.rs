@@ -10,6 +10,6 @@ mod quantiles;
 mod rng;
 
 pub(crate) use median::{NORMAL_PER_MEDIAN, median};
-pub(crate) use normal::of_picked;
+pub(crate) use normal::{of_picked, upper_tail};
 pub(crate) use quantiles::{Z_95, student_95};
 pub(crate) use rng::Rng;

@@ -7,7 +7,7 @@ const FAR: f64 = 30.0;
 const HALVINGS: usize = 60;
 
 /// Probability of a greater standard normal number.
-fn upper_tail(z: f64) -> f64 {
+pub(crate) fn upper_tail(z: f64) -> f64 {
     0.5 * libm::erfc(z * FRAC_1_SQRT_2)
 }
 

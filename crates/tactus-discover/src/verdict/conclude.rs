@@ -1,6 +1,5 @@
 //! The verdict on a search, and the [`Discovery`] that reports it.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use tactus_model::{Effect, Response};
@@ -9,9 +8,9 @@ use super::discovery::{
     AddedEffect, BaseModel, Discovery, ElementGap, Estimated, Final, FittedCurve, FittedKnot, GlobalTest,
     Inclusion, Level, Split, Unexplained, Verdict,
 };
-use super::structured::{Readings, Structured};
-use crate::data::{DiscoverError, Floor, MISWIRED, Noise, QUIETEST, turns};
-use crate::fit::{Fitted, LOUD, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
+use super::held_out::{HeldOutResidual, SEEN_NOISE};
+use crate::data::{DiscoverError, MISWIRED};
+use crate::fit::{Fitted, Parameters, Prepared, Problem, RandomWalk, Term, gains_by_folds};
 use crate::next::{Experiments, Explanation, Open, Pair, Plan, Planner};
 use crate::search::{
     ALPHA, Alike, Contest, Equivalent, FLIPS, Formed, Left, Located, NotShown, Options, POLISH_ROUNDS,
@@ -25,9 +24,7 @@ const CONFIRMED_P: f64 = 0.05;
 /// Few blocks cannot give so small a probability. They confirm if all agree: then it is the least that they can give, and otherwise at
 /// least twice as much.
 const AGREED: f64 = 1.5;
-/// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests,
-const SEEN_NOISE: f64 = 2.0;
-/// and for the verdict `Explained` whatever the tests say.
+/// Upper bound of what is structured, in noise units, for the verdict `Explained` whatever the tests say.
 const LITTLE_NOISE: f64 = 0.5;
 /// The outcome of a search.
 pub(crate) struct SearchOutcome {
@@ -45,28 +42,6 @@ pub(crate) struct SearchOutcome {
     pub(crate) after: Arc<Located>,
     /// Whether the noise is the same everywhere, at the base model and at the grown one.
     pub(crate) scatters: [Scattered; 2],
-}
-
-/// The residual of a model on the held-out frames.
-struct HeldOutResidual {
-    /// Root mean square.
-    rms_counts: f64,
-    /// Root mean square for each element.
-    elements_rms_counts: Vec<f64>,
-    /// For all frames, fitted and held out: frame by frame, element by element.
-    residual: Vec<f32>,
-    /// Whether each reading has a signal.
-    has_signal: Vec<bool>,
-}
-
-impl HeldOutResidual {
-    /// The residual of each element, and that of a grown model.
-    fn elements_beside(&self, grown: &Self) -> Vec<ElementGap> {
-        let elements = self.elements_rms_counts.iter().zip(&grown.elements_rms_counts);
-        elements
-            .map(|(before, after)| ElementGap { before_rms_counts: *before, after_rms_counts: *after })
-            .collect()
-    }
 }
 
 /// A grown model whose effects are confirmed.
@@ -148,11 +123,14 @@ pub(crate) fn conclude(
     } = found;
     let Confirmed { grown, mut steps, tentative, agreed } = confirmed;
     let first = rounds.first();
-    let p_value = least_p_value(first.map_or(1.0, |round| round.p_value), before.p_value, scatters[0]);
     let share = search.share_left(&base, &grown);
-    let is_left = least_p_value(left.p_value, after.p_value, scatters[1]) <= ALPHA;
     let named = !names(&grown.parameters, search.known_terms).is_empty();
     let (of_base, of_grown) = (prepared.held(&base.parameters)?, prepared.held(&grown.parameters)?);
+    let [noise_of_base, noise_of_grown] = [&of_base, &of_grown].map(|held| prepared.own_noise(held));
+    let of_effects = first.map_or(1.0, |round| round.p_value);
+    let p_value = least_p_value([of_effects, before.p_value, scatters[0].p_value, noise_of_base.p_value]);
+    let is_left =
+        least_p_value([left.p_value, after.p_value, scatters[1].p_value, noise_of_grown.p_value]) <= ALPHA;
     let floor = prepared.floor_of(&of_grown);
     let [base_level, grown_level] = [&of_base, &of_grown].map(|held| prepared.level(held, floor));
     let upper_noise = grown_level.structured.map_or(f64::INFINITY, |part| part.upper_noise);
@@ -216,9 +194,7 @@ pub(crate) fn conclude(
         verdict,
         unexplained: Unexplained {
             depends_on: if is_left && !is_clean {
-                let is_scattered = TESTS * scatters[1].p_value <= ALPHA;
-                let scatter = is_scattered.then_some(scatters[1].with);
-                after.gap.iter().map(|gap| gap.covariate).chain(scatter).collect()
+                depends_on(&after, [scatters[1], noise_of_grown])
             } else {
                 Vec::new()
             },
@@ -238,12 +214,18 @@ pub(crate) fn conclude(
     })
 }
 
-/// Tests of a model: by effects, by covariates, and of the scatter.
-const TESTS: f64 = 3.0;
+/// Tests of a model: by effects, by covariates, of the scatter, and of the noise that should be each reading's own.
+const TESTS: f64 = 4.0;
 
 /// The least p-value of a model's tests, by Bonferroni's correction.
-fn least_p_value(of_effects: f64, of_covariates: f64, scatter: Scattered) -> f64 {
-    (TESTS * of_effects.min(of_covariates).min(scatter.p_value)).min(1.0)
+fn least_p_value(of_tests: [f64; 4]) -> f64 {
+    TESTS * of_tests.into_iter().fold(1.0 / TESTS, f64::min)
+}
+
+/// On what the residual depends: covariates, and what the tests of the noise reject.
+fn depends_on(located: &Located, of_noise: [Scattered; 2]) -> Vec<&'static str> {
+    let of_noise = of_noise.into_iter().filter(|of| TESTS * of.p_value <= ALPHA).map(|of| of.with);
+    located.gap.iter().map(|gap| gap.covariate).chain(of_noise).collect()
 }
 
 /// The report of data without a floor: figures of the base model in counts, no names, and what to measure next.
@@ -400,133 +382,6 @@ impl Prepared<'_> {
             recalibrated,
             effects: self.base.parameters.effects()?,
         })
-    }
-
-    /// The residual of a model on the held-out frames.
-    fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
-        let Self { frames, heldout, noise, whole, .. } = self;
-        let predicted = self.predictor(whole).predict(parameters)?;
-        let elements = frames.elements;
-        let mut squares = vec![0.0; elements];
-        let mut count = 0.0_f64;
-        for (frame, of) in
-            predicted.chunks_exact(elements).enumerate().filter(|(frame, _)| heldout.frames[*frame])
-        {
-            count += 1.0;
-            for ((sum, counts), of) in squares.iter_mut().zip(frames.counts_of(frame)).zip(of) {
-                *sum += (f64::from(*counts) - of).powi(2);
-            }
-        }
-        let count = count.max(1.0);
-        let weightless = |element: usize| self.faulty.is_weightless(element);
-        let weighed: Vec<f64> =
-            (0..elements).filter(|element| !weightless(*element)).map(|element| squares[element]).collect();
-        let mean = weighed.iter().sum::<f64>() / (count * weighed.len().max(1) as f64);
-        #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
-        let residual = frames.counts.iter().zip(&predicted).map(|(counts, of)| counts - *of as f32).collect();
-        let mut signal = predicted;
-        if let Some(walk) = &parameters.walk {
-            walk.add(whole, -1.0, &mut signal);
-        }
-        let baselines = whole.run.iter().flat_map(|run| &parameters.baseline[*run]);
-        let noises = noise.by_element_counts.iter().cycle();
-        let signal = signal.iter().zip(baselines).zip(noises);
-        Ok(HeldOutResidual {
-            rms_counts: mean.sqrt(),
-            elements_rms_counts: (0..elements)
-                .map(|element| if weightless(element) { f64::NAN } else { (squares[element] / count).sqrt() })
-                .collect(),
-            residual,
-            has_signal: signal.map(|((of, zero), noise)| (of - zero).abs() > LOUD * noise).collect(),
-        })
-    }
-
-    /// The floor given the grown model. Before a tone is in the model, it looks like noise.
-    fn floor_of(&self, grown: &HeldOutResidual) -> Floor {
-        let left = Noise::in_time(self.frames, &grown.residual, &self.still, self.step_counts);
-        let is_weightless = |element| self.faulty.is_weightless(element);
-        let left = left.map(|(left, freedom)| (left.without(is_weightless), freedom));
-        match (self.floor, left) {
-            (Floor::Time { rms_counts, .. }, Some((left, freedom))) if left.rms_counts < rms_counts => {
-                Floor::Time { rms_counts: left.rms_counts, freedom }
-            }
-            (floor, _) => floor,
-        }
-    }
-
-    /// How far a model is from the held-out frames.
-    fn level(&self, held: &HeldOutResidual, floor: Floor) -> Level {
-        let in_noise = |noise_counts: f64| (held.rms_counts / noise_counts).powi(2);
-        Level {
-            heldout_rms_counts: held.rms_counts,
-            heldout_chi2: floor.rms_counts().map(in_noise),
-            structured: self.structured(held, floor),
-        }
-    }
-
-    /// The structured part of a residual on held-out presses: among all readings or among those with a signal.
-    fn structured(&self, held: &HeldOutResidual, floor: Floor) -> Option<Structured> {
-        let (elements, turns) = (self.frames.elements, self.turns());
-        let is_known = |place: usize| !turns[place / elements];
-        let parts = [
-            self.structured_among(held, floor, is_known),
-            self.structured_among(held, floor, |place| is_known(place) && held.has_signal[place])
-                .map(|part| Structured { with_signal: true, ..part }),
-        ];
-        parts.into_iter().flatten().max_by(|one, other| one.upper_noise.total_cmp(&other.upper_noise))
-    }
-
-    /// A warning if much is structured in the frames that are not judged.
-    fn not_judged(&self, held: &HeldOutResidual, floor: Floor) -> Option<String> {
-        let (elements, turns) = (self.frames.elements, self.turns());
-        let part = self.structured_among(held, floor, |place| turns[place / elements])?;
-        (part.rms_noise > SEEN_NOISE).then(|| {
-            format!(
-                "frames at which the stage starts or stops near the surface are not judged, because its position between two reports \
-                 is not known: what is structured in them is {:.1} times the noise",
-                part.rms_noise
-            )
-        })
-    }
-
-    /// Whether the stage starts or stops near the surface, for each frame.
-    fn turns(&self) -> Vec<bool> {
-        (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect()
-    }
-
-    fn structured_among(
-        &self,
-        held: &HeldOutResidual,
-        floor: Floor,
-        among: impl Fn(usize) -> bool,
-    ) -> Option<Structured> {
-        let rms_counts = floor.rms_counts()?;
-        let scale = rms_counts / self.noise.rms_counts;
-        let noise_counts: Vec<f64> = self.noise.by_element_counts.iter().map(|rms| rms * scale).collect();
-        let lag = self.noise.memory_frames();
-        let readings = Readings {
-            elements: self.frames.elements,
-            residual: &held.residual,
-            presses: &self.heldout_presses(),
-            unit_counts: &noise_counts.iter().map(|rms| rms.max(QUIETEST * rms_counts)).collect::<Vec<_>>(),
-            noise_counts: &noise_counts,
-            lag,
-            correlation: self.noise.correlation_at(lag),
-            freedom: floor.freedom()?,
-        };
-        readings.structured(among)
-    }
-
-    /// Frames of each held-out press and of each held-out rest between presses.
-    fn heldout_presses(&self) -> Vec<Range<usize>> {
-        let (frames, held) = (self.frames, &self.heldout.frames);
-        let key = |frame: usize| (held[frame], self.whole.run[frame], frames.press[frame]);
-        let all: Vec<usize> = (0..frames.len()).collect();
-        let presses = all.chunk_by(|one, next| key(*one) == key(*next));
-        presses
-            .filter_map(|press| Some(*press.first()?..press.last()? + 1))
-            .filter(|press| held[press.start])
-            .collect()
     }
 
     fn planner<'p>(&'p self, experiments: &'p dyn Experiments, options: Options) -> Planner<'p> {

@@ -4,7 +4,7 @@ use tactus_schema::table::{Phase, RowView};
 
 use super::*;
 use crate::fixtures::{ELEMENTS, ShippedRig, found, known, measured, processes};
-use crate::{Frames, discover};
+use crate::{Floor, Frames, discover};
 
 /// Effects were named, a test rejects the base model, and none the grown one.
 const NAMED: Evidence =

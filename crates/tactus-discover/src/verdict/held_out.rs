@@ -1,0 +1,207 @@
+//! A model's residual: how large it is on the held-out presses, how much of that is structured, and whether its noise is each reading's own.
+
+use std::ops::Range;
+
+use super::discovery::{ElementGap, Level};
+use super::own_noise::{AtRest, WINDOW_FRAMES};
+use super::structured::{Readings, Structured};
+use crate::data::{CLEAR_MM, DiscoverError, Floor, Noise, QUIETEST, turns};
+use crate::fit::{LOUD, Parameters, Prepared};
+use crate::search::Scattered;
+
+/// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests.
+pub(super) const SEEN_NOISE: f64 = 2.0;
+
+/// The residual of a model on the held-out frames.
+pub(super) struct HeldOutResidual {
+    /// Root mean square.
+    pub(super) rms_counts: f64,
+    /// Root mean square for each element.
+    pub(super) elements_rms_counts: Vec<f64>,
+    /// For all frames, fitted and held out: frame by frame, element by element.
+    residual: Vec<f32>,
+    /// As predicted, in counts, for the same.
+    signal: Vec<f32>,
+    /// Whether each reading has a signal.
+    has_signal: Vec<bool>,
+}
+
+impl HeldOutResidual {
+    /// The residual of each element, and that of a grown model.
+    pub(super) fn elements_beside(&self, grown: &Self) -> Vec<ElementGap> {
+        let elements = self.elements_rms_counts.iter().zip(&grown.elements_rms_counts);
+        elements
+            .map(|(before, after)| ElementGap { before_rms_counts: *before, after_rms_counts: *after })
+            .collect()
+    }
+}
+
+impl Prepared<'_> {
+    /// The residual of a model on the held-out frames.
+    pub(super) fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
+        let Self { frames, heldout, noise, whole, .. } = self;
+        let predicted = self.predictor(whole).predict(parameters)?;
+        let elements = frames.elements;
+        let mut squares = vec![0.0; elements];
+        let mut count = 0.0_f64;
+        for (frame, of) in
+            predicted.chunks_exact(elements).enumerate().filter(|(frame, _)| heldout.frames[*frame])
+        {
+            count += 1.0;
+            for ((sum, counts), of) in squares.iter_mut().zip(frames.counts_of(frame)).zip(of) {
+                *sum += (f64::from(*counts) - of).powi(2);
+            }
+        }
+        let count = count.max(1.0);
+        let weightless = |element: usize| self.faulty.is_weightless(element);
+        let weighed: Vec<f64> =
+            (0..elements).filter(|element| !weightless(*element)).map(|element| squares[element]).collect();
+        let mean = weighed.iter().sum::<f64>() / (count * weighed.len().max(1) as f64);
+        #[expect(clippy::cast_possible_truncation, reason = "as precise as counts are")]
+        let single = |counts: f64| counts as f32;
+        let residual =
+            frames.counts.iter().zip(&predicted).map(|(counts, of)| counts - single(*of)).collect();
+        let mut signal = predicted;
+        if let Some(walk) = &parameters.walk {
+            walk.add(whole, -1.0, &mut signal);
+        }
+        let baselines = whole.run.iter().flat_map(|run| &parameters.baseline[*run]);
+        let noises = noise.by_element_counts.iter().cycle();
+        signal.iter_mut().zip(baselines).for_each(|(of, zero)| *of -= zero);
+        Ok(HeldOutResidual {
+            rms_counts: mean.sqrt(),
+            elements_rms_counts: (0..elements)
+                .map(|element| if weightless(element) { f64::NAN } else { (squares[element] / count).sqrt() })
+                .collect(),
+            residual,
+            has_signal: signal.iter().zip(noises).map(|(of, noise)| of.abs() > LOUD * noise).collect(),
+            signal: signal.into_iter().map(single).collect(),
+        })
+    }
+
+    /// The floor given the grown model. Before a tone is in the model, it looks like noise.
+    pub(super) fn floor_of(&self, grown: &HeldOutResidual) -> Floor {
+        let left = Noise::in_time(self.frames, &grown.residual, &self.still, self.step_counts);
+        let is_weightless = |element| self.faulty.is_weightless(element);
+        let left = left.map(|(left, freedom)| (left.without(is_weightless), freedom));
+        match (self.floor, left) {
+            (Floor::Time { rms_counts, .. }, Some((left, freedom))) if left.rms_counts < rms_counts => {
+                Floor::Time { rms_counts: left.rms_counts, freedom }
+            }
+            (floor, _) => floor,
+        }
+    }
+
+    /// How far a model is from the held-out frames.
+    pub(super) fn level(&self, held: &HeldOutResidual, floor: Floor) -> Level {
+        let in_noise = |noise_counts: f64| (held.rms_counts / noise_counts).powi(2);
+        Level {
+            heldout_rms_counts: held.rms_counts,
+            heldout_chi2: floor.rms_counts().map(in_noise),
+            structured: self.structured(held, floor),
+        }
+    }
+
+    /// The structured part of a residual on held-out presses: among all readings or among those with a signal.
+    fn structured(&self, held: &HeldOutResidual, floor: Floor) -> Option<Structured> {
+        let (elements, turns) = (self.frames.elements, self.turns());
+        let is_known = |place: usize| !turns[place / elements];
+        let parts = [
+            self.structured_among(held, floor, is_known),
+            self.structured_among(held, floor, |place| is_known(place) && held.has_signal[place])
+                .map(|part| Structured { with_signal: true, ..part }),
+        ];
+        parts.into_iter().flatten().max_by(|one, other| one.upper_noise.total_cmp(&other.upper_noise))
+    }
+
+    /// Whether the noise of the fitted frames is each reading's own.
+    pub(super) fn own_noise(&self, held: &HeldOutResidual) -> Scattered {
+        let (frames, elements) = (self.frames, self.frames.elements);
+        // A window begins as long after the tip came to rest as it lasts.
+        let is_window = |start: &usize| {
+            let last = start + WINDOW_FRAMES - 1;
+            last < frames.len()
+                && self.still[*start] >= WINDOW_FRAMES
+                && self.still[last] == self.still[*start] + WINDOW_FRAMES - 1
+                && (*start..=last).all(|frame| !self.heldout.frames[frame])
+        };
+        let mut windows: Vec<Range<usize>> = Vec::new();
+        for start in 0..frames.len() {
+            if windows.last().is_none_or(|last| last.end <= start) && is_window(&start) {
+                windows.push(start..start + WINDOW_FRAMES);
+            }
+        }
+        let is_quiet = |frame: usize| {
+            !self.heldout.frames[frame]
+                && (self.still[frame] >= WINDOW_FRAMES || frames.position_mm[frame][2] > CLEAR_MM)
+        };
+        let is_one_run = |frame: usize| self.whole.run[frame - 1] == self.whole.run[frame + 1];
+        let singles: Vec<usize> = (1..frames.len().saturating_sub(1))
+            .filter(|frame| is_one_run(*frame) && (frame - 1..=frame + 1).all(is_quiet))
+            .collect();
+        let at_rest = AtRest {
+            elements,
+            cols: self.known.array.cols(),
+            residual: &held.residual,
+            signal: &held.signal,
+            windows: &windows,
+            singles: &singles,
+            noise_counts: &self.noise.by_element_counts,
+            step_counts: self.step_counts,
+        };
+        at_rest.shared_or_far_out()
+    }
+
+    /// A warning if much is structured in the frames that are not judged.
+    pub(super) fn not_judged(&self, held: &HeldOutResidual, floor: Floor) -> Option<String> {
+        let (elements, turns) = (self.frames.elements, self.turns());
+        let part = self.structured_among(held, floor, |place| turns[place / elements])?;
+        (part.rms_noise > SEEN_NOISE).then(|| {
+            format!(
+                "frames at which the stage starts or stops near the surface are not judged, because its position between two reports \
+                 is not known: what is structured in them is {:.1} times the noise",
+                part.rms_noise
+            )
+        })
+    }
+
+    /// Whether the stage starts or stops near the surface, for each frame.
+    fn turns(&self) -> Vec<bool> {
+        (0..self.frames.len()).map(|frame| turns(self.frames, frame)).collect()
+    }
+
+    fn structured_among(
+        &self,
+        held: &HeldOutResidual,
+        floor: Floor,
+        among: impl Fn(usize) -> bool,
+    ) -> Option<Structured> {
+        let rms_counts = floor.rms_counts()?;
+        let scale = rms_counts / self.noise.rms_counts;
+        let noise_counts: Vec<f64> = self.noise.by_element_counts.iter().map(|rms| rms * scale).collect();
+        let lag = self.noise.memory_frames();
+        let readings = Readings {
+            elements: self.frames.elements,
+            residual: &held.residual,
+            presses: &self.heldout_presses(),
+            unit_counts: &noise_counts.iter().map(|rms| rms.max(QUIETEST * rms_counts)).collect::<Vec<_>>(),
+            noise_counts: &noise_counts,
+            lag,
+            correlation: self.noise.correlation_at(lag),
+            freedom: floor.freedom()?,
+        };
+        readings.structured(among)
+    }
+
+    /// Frames of each held-out press and of each held-out rest between presses.
+    fn heldout_presses(&self) -> Vec<Range<usize>> {
+        let (frames, held) = (self.frames, &self.heldout.frames);
+        let key = |frame: usize| (held[frame], self.whole.run[frame], frames.press[frame]);
+        let all: Vec<usize> = (0..frames.len()).collect();
+        let presses = all.chunk_by(|one, next| key(*one) == key(*next));
+        presses
+            .filter_map(|press| Some(*press.first()?..press.last()? + 1))
+            .filter(|press| held[press.start])
+            .collect()
+    }
+}

@@ -1,0 +1,177 @@
+//! Whether each reading's noise is its own.
+//!
+//! A model's noise differs from element to element, and no reading is far out. An excitation that flickers, an amplifier that serves a row or
+//! the mains in the array move several elements together, in the mean by nothing, so that no test of means sees them. While the tip rests, with
+//! `d` the departures of an element's residuals from a parabola within a window of time, in standard deviations, and `p` a pattern,
+//!
+//! ```text
+//! C(e, e') = p(e, e') sum over the window's frames of d(e) d(e')
+//! T = 2 sum of C over pairs of elements and windows        z = T / sqrt(4 sum of C^2)
+//! ```
+//!
+//! If the elements' noises are independent and symmetric, each element's departures in a window could as well have the other sign. Then
+//! `T` has a mean of 0 and the variance under the root, however large each noise is and however long it remembers. The patterns are all pairs,
+//! those of a row, those of a column, and the product of the two signals.
+//!
+//! A single reading is far out by how much it differs from the mean of the one before and the one after, where the tip rests or is clear of the
+//! surface; all of them count as alternatives (Bonferroni).
+//!
+//! # Source
+//! Signs that could as well be others: R. A. Fisher, *The Design of Experiments* (1935), section 21.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use crate::numbers::upper_tail;
+use crate::search::Scattered;
+
+/// Frames of a window, half a second of the paper's sensor: as long as the longest bin.
+pub(crate) const WINDOW_FRAMES: usize = 15;
+/// Variance of the difference between a reading and the mean of its neighbours, over that of a reading.
+const DIFFERENCE_VARIANCE: f64 = 1.5;
+/// Variance of rounding, in squared steps.
+const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
+/// Number of tests.
+const TESTS: f64 = 5.0;
+
+/// A model's residual where the tip rests.
+pub(crate) struct AtRest<'a> {
+    pub(crate) elements: usize,
+    /// Elements of a row.
+    pub(crate) cols: usize,
+    /// In counts: frame by frame, element by element.
+    pub(crate) residual: &'a [f32],
+    /// As the model predicts it, in counts: frame by frame, element by element.
+    pub(crate) signal: &'a [f32],
+    /// Frames of each window.
+    pub(crate) windows: &'a [Range<usize>],
+    /// Frames that are compared with the one before and the one after.
+    pub(crate) singles: &'a [usize],
+    /// Standard deviation of each element's noise; infinite for those without weight.
+    pub(crate) noise_counts: &'a [f64],
+    /// Step of the converter.
+    pub(crate) step_counts: f64,
+}
+
+/// What elements that move together have in common.
+#[derive(Debug, Clone, Copy)]
+enum Pattern {
+    All,
+    Row,
+    Column,
+    Signal,
+}
+
+/// The sum over pairs and windows, and its variance.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shared {
+    sum: f64,
+    variance: f64,
+}
+
+impl Pattern {
+    const ALL: [Self; 4] = [Self::All, Self::Row, Self::Column, Self::Signal];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::All => "noise that all elements share",
+            Self::Row => "noise that the elements of a row share",
+            Self::Column => "noise that the elements of a column share",
+            Self::Signal => "noise that elements share by their signals",
+        }
+    }
+}
+
+impl AtRest<'_> {
+    /// The clearest sign that noise is shared or readings are far out, corrected for the number of tests.
+    pub(crate) fn shared_or_far_out(&self) -> Scattered {
+        let shared = self.shared();
+        let mut found: Vec<(f64, &'static str)> = Pattern::ALL
+            .into_iter()
+            .zip(shared)
+            .filter(|(_, shared)| shared.variance > 0.0)
+            .map(|(pattern, Shared { sum, variance })| (upper_tail(sum / variance.sqrt()), pattern.name()))
+            .collect();
+        found.push((self.far_out(), "single readings"));
+        let least = found.into_iter().min_by(|one, other| one.0.total_cmp(&other.0));
+        let (p_value, with) = least.unwrap_or((1.0, ""));
+        Scattered { p_value: (TESTS * p_value).min(1.0), with }
+    }
+
+    fn shared(&self) -> [Shared; 4] {
+        let mut shared = [Shared::default(); 4];
+        let weighed = self.weighed();
+        for window in self.windows {
+            let departures = self.departures(window, &weighed);
+            let products = departures.transpose() * &departures;
+            let middle = window.start + window.len() / 2;
+            let signal = |element: usize| f64::from(self.signal[middle * self.elements + element]);
+            for (i, one) in weighed.iter().enumerate() {
+                for (j, other) in weighed.iter().enumerate().skip(i + 1) {
+                    for (pattern, shared) in Pattern::ALL.into_iter().zip(&mut shared) {
+                        let weight = match pattern {
+                            Pattern::All => 1.0,
+                            Pattern::Row => f64::from(u8::from(one / self.cols == other / self.cols)),
+                            Pattern::Column => f64::from(u8::from(one % self.cols == other % self.cols)),
+                            Pattern::Signal => signal(*one) * signal(*other),
+                        };
+                        let part = 2.0 * weight * products[(i, j)];
+                        shared.sum += part;
+                        shared.variance += part * part;
+                    }
+                }
+            }
+        }
+        shared
+    }
+
+    /// Elements with a weight.
+    fn weighed(&self) -> Vec<usize> {
+        (0..self.elements).filter(|element| self.noise_counts[*element].is_finite()).collect()
+    }
+
+    fn residual(&self, frame: usize, element: usize) -> f64 {
+        f64::from(self.residual[frame * self.elements + element])
+    }
+
+    /// Departures from a parabola, in standard deviations: frame by frame, for each element with a weight.
+    fn departures(&self, window: &Range<usize>, weighed: &[usize]) -> DMatrix<f64> {
+        let mut departures = DMatrix::from_fn(window.len(), weighed.len(), |frame, one| {
+            let element = weighed[one];
+            self.residual(window.start + frame, element) / self.deviation(element)
+        });
+        let powers = DMatrix::from_fn(window.len(), 3, |frame, power| {
+            let place = frame as f64 - 0.5 * (window.len() as f64 - 1.0);
+            (0..power).map(|_| place).product::<f64>()
+        });
+        let parabolas = powers.qr().q();
+        let fitted = parabolas.transpose() * &departures;
+        departures -= parabolas * fitted;
+        departures
+    }
+
+    /// Of a reading, its rounding included.
+    fn deviation(&self, element: usize) -> f64 {
+        (self.noise_counts[element].powi(2) + ROUNDING_VARIANCE * self.step_counts.powi(2)).sqrt()
+    }
+
+    /// The probability of a reading that is as far out as the farthest.
+    fn far_out(&self) -> f64 {
+        let (mut farthest, mut count) = (0.0_f64, 0.0);
+        for element in self.weighed() {
+            let deviation = DIFFERENCE_VARIANCE.sqrt() * self.deviation(element);
+            for frame in self.singles {
+                let beside =
+                    f64::midpoint(self.residual(frame - 1, element), self.residual(frame + 1, element));
+                farthest = farthest.max((self.residual(*frame, element) - beside).abs() / deviation);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { (2.0 * count * upper_tail(farthest)).min(1.0) } else { 1.0 }
+    }
+}
+
+#[cfg(test)]
+#[path = "own_noise_tests.rs"]
+mod tests;
