@@ -81,7 +81,7 @@ fn one_reading_far_out_is_seen_and_slow_changes_are_not() {
     let flipped = tested(6, 1.0, 0.5, |frame, element| if (frame, element) == at { 16.0 } else { 0.0 });
     assert_eq!(flipped.with, "single readings");
     assert!(flipped.p_value < 1e-6, "{flipped:?}");
-    let slow = tested(6, 1.0, 0.5, |frame, _| 20.0 * (-((frame % 150) as f64) / 60.0).exp());
+    let slow = tested(6, 1.0, 0.5, |frame, _| 20.0 * (TAU * frame as f64 / 600.0).sin());
     assert!(slow.p_value > 0.01, "{slow:?}");
 }
 
