@@ -2,7 +2,8 @@
 //!
 //! A model's residual on held-out presses is noise and structure. [`structured`] bounds the structure from above, in units of the noise.
 //! The verdict depends on four things: whether effects were added, whether a test rejects the base model, whether one rejects the grown
-//! model, and that bound ([`conclude()`]). One of the tests is of the noise ([`own_noise`]): whether elements share it, and single readings. How much of the gap is closed is
+//! model, and that bound ([`conclude()`]). One of the tests is of the noise ([`own_noise`]): whether elements share it, and single readings.
+//! How much of the gap is closed is
 //!
 //! ```text
 //! shrink = (MSE_base - MSE_grown) / (MSE_base - noise^2)        mean squares of the residual on held-out presses

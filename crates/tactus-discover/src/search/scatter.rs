@@ -44,10 +44,10 @@ enum With {
     Change,
 }
 
-/// The strongest growth of the scatter.
+/// What a test of the noise rejects most clearly: here, the strongest growth of the scatter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scattered {
-    /// Of all that it may grow with.
+    /// Corrected for all that was tested.
     pub(crate) p_value: f64,
     /// In words; empty if nothing was tested.
     pub(crate) with: &'static str,

@@ -215,16 +215,21 @@ pub(crate) fn conclude(
 }
 
 /// Tests of a model: by effects, by covariates, of the scatter, and of the noise that should be each reading's own.
-const TESTS: f64 = 4.0;
+const TESTS: usize = 4;
 
-/// The least p-value of a model's tests, by Bonferroni's correction.
-fn least_p_value(of_tests: [f64; 4]) -> f64 {
-    TESTS * of_tests.into_iter().fold(1.0 / TESTS, f64::min)
+/// The least p-value of a model's tests, corrected.
+fn least_p_value(of_tests: [f64; TESTS]) -> f64 {
+    of_tests.into_iter().map(corrected).fold(1.0, f64::min)
+}
+
+/// A test's p-value by Bonferroni's correction.
+fn corrected(p_value: f64) -> f64 {
+    (TESTS as f64 * p_value).min(1.0)
 }
 
 /// On what the residual depends: covariates, and what the tests of the noise reject.
 fn depends_on(located: &Located, of_noise: [Scattered; 2]) -> Vec<&'static str> {
-    let of_noise = of_noise.into_iter().filter(|of| TESTS * of.p_value <= ALPHA).map(|of| of.with);
+    let of_noise = of_noise.into_iter().filter(|of| corrected(of.p_value) <= ALPHA).map(|of| of.with);
     located.gap.iter().map(|gap| gap.covariate).chain(of_noise).collect()
 }
 

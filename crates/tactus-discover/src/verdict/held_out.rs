@@ -1,13 +1,11 @@
-//! A model's residual: how large it is on the held-out presses, how much of that is structured, and whether its noise is each reading's own.
+//! A model's residual: how large it is on the held-out presses, and how much of that is structured.
 
 use std::ops::Range;
 
 use super::discovery::{ElementGap, Level};
-use super::own_noise::{AtRest, WINDOW_FRAMES};
 use super::structured::{Readings, Structured};
-use crate::data::{CLEAR_MM, DiscoverError, Floor, Noise, QUIETEST, turns};
+use crate::data::{DiscoverError, Floor, Noise, QUIETEST, turns};
 use crate::fit::{LOUD, Parameters, Prepared};
-use crate::search::Scattered;
 
 /// Upper bound of what is structured, in noise units, for the verdicts `NothingMissing` and `Explained` beside the tests.
 pub(super) const SEEN_NOISE: f64 = 2.0;
@@ -19,11 +17,9 @@ pub(super) struct HeldOutResidual {
     /// Root mean square for each element.
     pub(super) elements_rms_counts: Vec<f64>,
     /// For all frames, fitted and held out: frame by frame, element by element.
-    residual: Vec<f32>,
+    pub(super) residual: Vec<f32>,
     /// As predicted, in counts, for the same.
-    signal: Vec<f32>,
-    /// Whether each reading has a signal.
-    has_signal: Vec<bool>,
+    pub(super) signal: Vec<f32>,
 }
 
 impl HeldOutResidual {
@@ -39,7 +35,7 @@ impl HeldOutResidual {
 impl Prepared<'_> {
     /// The residual of a model on the held-out frames.
     pub(super) fn held(&self, parameters: &Parameters) -> Result<HeldOutResidual, DiscoverError> {
-        let Self { frames, heldout, noise, whole, .. } = self;
+        let Self { frames, heldout, whole, .. } = self;
         let predicted = self.predictor(whole).predict(parameters)?;
         let elements = frames.elements;
         let mut squares = vec![0.0; elements];
@@ -66,7 +62,6 @@ impl Prepared<'_> {
             walk.add(whole, -1.0, &mut signal);
         }
         let baselines = whole.run.iter().flat_map(|run| &parameters.baseline[*run]);
-        let noises = noise.by_element_counts.iter().cycle();
         signal.iter_mut().zip(baselines).for_each(|(of, zero)| *of -= zero);
         Ok(HeldOutResidual {
             rms_counts: mean.sqrt(),
@@ -74,7 +69,6 @@ impl Prepared<'_> {
                 .map(|element| if weightless(element) { f64::NAN } else { (squares[element] / count).sqrt() })
                 .collect(),
             residual,
-            has_signal: signal.iter().zip(noises).map(|(of, noise)| of.abs() > LOUD * noise).collect(),
             signal: signal.into_iter().map(single).collect(),
         })
     }
@@ -106,50 +100,15 @@ impl Prepared<'_> {
     fn structured(&self, held: &HeldOutResidual, floor: Floor) -> Option<Structured> {
         let (elements, turns) = (self.frames.elements, self.turns());
         let is_known = |place: usize| !turns[place / elements];
+        let noise_counts = &self.noise.by_element_counts;
+        let has_signal =
+            |place: usize| f64::from(held.signal[place].abs()) > LOUD * noise_counts[place % elements];
         let parts = [
             self.structured_among(held, floor, is_known),
-            self.structured_among(held, floor, |place| is_known(place) && held.has_signal[place])
+            self.structured_among(held, floor, |place| is_known(place) && has_signal(place))
                 .map(|part| Structured { with_signal: true, ..part }),
         ];
         parts.into_iter().flatten().max_by(|one, other| one.upper_noise.total_cmp(&other.upper_noise))
-    }
-
-    /// Whether the noise of the fitted frames is each reading's own.
-    pub(super) fn own_noise(&self, held: &HeldOutResidual) -> Scattered {
-        let (frames, elements) = (self.frames, self.frames.elements);
-        // A window begins as long after the tip came to rest as it lasts.
-        let is_window = |start: &usize| {
-            let last = start + WINDOW_FRAMES - 1;
-            last < frames.len()
-                && self.still[*start] >= WINDOW_FRAMES
-                && self.still[last] == self.still[*start] + WINDOW_FRAMES - 1
-                && (*start..=last).all(|frame| !self.heldout.frames[frame])
-        };
-        let mut windows: Vec<Range<usize>> = Vec::new();
-        for start in 0..frames.len() {
-            if windows.last().is_none_or(|last| last.end <= start) && is_window(&start) {
-                windows.push(start..start + WINDOW_FRAMES);
-            }
-        }
-        let is_quiet = |frame: usize| {
-            !self.heldout.frames[frame]
-                && (self.still[frame] >= WINDOW_FRAMES || frames.position_mm[frame][2] > CLEAR_MM)
-        };
-        let is_one_run = |frame: usize| self.whole.run[frame - 1] == self.whole.run[frame + 1];
-        let singles: Vec<usize> = (1..frames.len().saturating_sub(1))
-            .filter(|frame| is_one_run(*frame) && (frame - 1..=frame + 1).all(is_quiet))
-            .collect();
-        let at_rest = AtRest {
-            elements,
-            cols: self.known.array.cols(),
-            residual: &held.residual,
-            signal: &held.signal,
-            windows: &windows,
-            singles: &singles,
-            noise_counts: &self.noise.by_element_counts,
-            step_counts: self.step_counts,
-        };
-        at_rest.shared_or_far_out()
     }
 
     /// A warning if much is structured in the frames that are not judged.

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! C(e, e') = p(e, e') sum over the window's frames of d(e) d(e')
-//! T = 2 sum of C over pairs of elements and windows        z = T / sqrt(4 sum of C^2)
+//! T = sum of C over pairs of elements and windows        z = T / sqrt(sum of C^2)
 //! ```
 //!
 //! If the elements' noises are independent and symmetric, each element's departures in a window could as well have the other sign. Then
@@ -23,35 +23,36 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
+use super::held_out::HeldOutResidual;
+use crate::data::CLEAR_MM;
+use crate::fit::Prepared;
 use crate::numbers::upper_tail;
 use crate::search::Scattered;
 
 /// Frames of a window, half a second of the paper's sensor: as long as the longest bin.
-pub(crate) const WINDOW_FRAMES: usize = 15;
+const WINDOW_FRAMES: usize = 15;
 /// Variance of the difference between a reading and the mean of its neighbours, over that of a reading.
 const DIFFERENCE_VARIANCE: f64 = 1.5;
 /// Variance of rounding, in squared steps.
 const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
-/// Number of tests.
-const TESTS: f64 = 5.0;
 
 /// A model's residual where the tip rests.
-pub(crate) struct AtRest<'a> {
-    pub(crate) elements: usize,
+struct AtRest<'a> {
+    elements: usize,
     /// Elements of a row.
-    pub(crate) cols: usize,
+    cols: usize,
     /// In counts: frame by frame, element by element.
-    pub(crate) residual: &'a [f32],
+    residual: &'a [f32],
     /// As the model predicts it, in counts: frame by frame, element by element.
-    pub(crate) signal: &'a [f32],
+    signal: &'a [f32],
     /// Frames of each window.
-    pub(crate) windows: &'a [Range<usize>],
+    windows: &'a [Range<usize>],
     /// Frames that are compared with the one before and the one after.
-    pub(crate) singles: &'a [usize],
+    singles: &'a [usize],
     /// Standard deviation of each element's noise; infinite for those without weight.
-    pub(crate) noise_counts: &'a [f64],
+    noise_counts: &'a [f64],
     /// Step of the converter.
-    pub(crate) step_counts: f64,
+    step_counts: f64,
 }
 
 /// What elements that move together have in common.
@@ -83,9 +84,47 @@ impl Pattern {
     }
 }
 
+impl Prepared<'_> {
+    /// Whether the noise of the fitted frames is each reading's own.
+    pub(super) fn own_noise(&self, held: &HeldOutResidual) -> Scattered {
+        let (frames, elements) = (self.frames, self.frames.elements);
+        let is_fitted = |frame: usize| !self.heldout.frames[frame];
+        // A window begins as long after the tip came to rest as it lasts.
+        let is_window = |window: &Range<usize>| {
+            self.still[window.end - 1] >= 2 * WINDOW_FRAMES - 1 && window.clone().all(is_fitted)
+        };
+        let mut windows: Vec<Range<usize>> = Vec::new();
+        for end in WINDOW_FRAMES..=frames.len() {
+            let window = end - WINDOW_FRAMES..end;
+            if windows.last().is_none_or(|last| last.end <= window.start) && is_window(&window) {
+                windows.push(window);
+            }
+        }
+        let is_quiet = |frame: usize| {
+            is_fitted(frame)
+                && (self.still[frame] >= WINDOW_FRAMES || frames.position_mm[frame][2] > CLEAR_MM)
+        };
+        let is_one_run = |frame: usize| self.whole.run[frame - 1] == self.whole.run[frame + 1];
+        let singles: Vec<usize> = (1..frames.len().saturating_sub(1))
+            .filter(|frame| is_one_run(*frame) && (frame - 1..=frame + 1).all(is_quiet))
+            .collect();
+        let at_rest = AtRest {
+            elements,
+            cols: self.known.array.cols(),
+            residual: &held.residual,
+            signal: &held.signal,
+            windows: &windows,
+            singles: &singles,
+            noise_counts: &self.noise.by_element_counts,
+            step_counts: self.step_counts,
+        };
+        at_rest.shared_or_far_out()
+    }
+}
+
 impl AtRest<'_> {
     /// The clearest sign that noise is shared or readings are far out, corrected for the number of tests.
-    pub(crate) fn shared_or_far_out(&self) -> Scattered {
+    fn shared_or_far_out(&self) -> Scattered {
         let shared = self.shared();
         let mut found: Vec<(f64, &'static str)> = Pattern::ALL
             .into_iter()
@@ -94,16 +133,18 @@ impl AtRest<'_> {
             .map(|(pattern, Shared { sum, variance })| (upper_tail(sum / variance.sqrt()), pattern.name()))
             .collect();
         found.push((self.far_out(), "single readings"));
+        let tests = Pattern::ALL.len() as f64 + 1.0;
         let least = found.into_iter().min_by(|one, other| one.0.total_cmp(&other.0));
         let (p_value, with) = least.unwrap_or((1.0, ""));
-        Scattered { p_value: (TESTS * p_value).min(1.0), with }
+        Scattered { p_value: (tests * p_value).min(1.0), with }
     }
 
-    fn shared(&self) -> [Shared; 4] {
-        let mut shared = [Shared::default(); 4];
+    fn shared(&self) -> [Shared; Pattern::ALL.len()] {
+        let mut shared = [Shared::default(); Pattern::ALL.len()];
+        let parabolas = parabolas();
         let weighed = self.weighed();
         for window in self.windows {
-            let departures = self.departures(window, &weighed);
+            let departures = self.departures(window, &weighed, &parabolas);
             let products = departures.transpose() * &departures;
             let middle = window.start + window.len() / 2;
             let signal = |element: usize| f64::from(self.signal[middle * self.elements + element]);
@@ -116,7 +157,7 @@ impl AtRest<'_> {
                             Pattern::Column => f64::from(u8::from(one % self.cols == other % self.cols)),
                             Pattern::Signal => signal(*one) * signal(*other),
                         };
-                        let part = 2.0 * weight * products[(i, j)];
+                        let part = weight * products[(i, j)];
                         shared.sum += part;
                         shared.variance += part * part;
                     }
@@ -136,16 +177,11 @@ impl AtRest<'_> {
     }
 
     /// Departures from a parabola, in standard deviations: frame by frame, for each element with a weight.
-    fn departures(&self, window: &Range<usize>, weighed: &[usize]) -> DMatrix<f64> {
+    fn departures(&self, window: &Range<usize>, weighed: &[usize], parabolas: &DMatrix<f64>) -> DMatrix<f64> {
         let mut departures = DMatrix::from_fn(window.len(), weighed.len(), |frame, one| {
             let element = weighed[one];
             self.residual(window.start + frame, element) / self.deviation(element)
         });
-        let powers = DMatrix::from_fn(window.len(), 3, |frame, power| {
-            let place = frame as f64 - 0.5 * (window.len() as f64 - 1.0);
-            (0..power).map(|_| place).product::<f64>()
-        });
-        let parabolas = powers.qr().q();
         let fitted = parabolas.transpose() * &departures;
         departures -= parabolas * fitted;
         departures
@@ -170,6 +206,15 @@ impl AtRest<'_> {
         }
         if count > 0.0 { (2.0 * count * upper_tail(farthest)).min(1.0) } else { 1.0 }
     }
+}
+
+/// Orthonormal functions of the frames of a window, of which all parabolas are sums.
+fn parabolas() -> DMatrix<f64> {
+    let powers = DMatrix::from_fn(WINDOW_FRAMES, 3, |frame, power| {
+        let place = frame as f64 - 0.5 * (WINDOW_FRAMES as f64 - 1.0);
+        (0..power).map(|_| place).product::<f64>()
+    });
+    powers.qr().q()
 }
 
 #[cfg(test)]
