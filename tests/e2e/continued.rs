@@ -105,7 +105,7 @@ fn after_kill_9_in_a_press_the_run_goes_on_and_each_press_is_in_the_table_once()
     let run_id = id(&first);
     let busy = lab.tactus(&["run", "--continue", &run_id]);
     assert_eq!(busy.code, Some(5), "one run at a time, and the lease is held: {busy:?}");
-    lab.daemon.signal(Signal::KILL);
+    lab.daemon.kill();
     assert!(lab.truth()["z_mm"].as_f64().unwrap() < 0.0, "the tip stands in contact");
 
     lab.daemon = Process::start("tactusd", lab.folder.path(), &["--config", "tactusd.toml"]);

@@ -276,7 +276,7 @@ fn after_a_start_nothing_moves_before_an_explicit_reset() {
     assert_eq!(done.code, Some(0), "{done:?}");
 
     // The stage knows its position; even so the new service moves it only after a reset.
-    lab.daemon.signal(Signal::KILL);
+    lab.daemon.kill();
     lab.daemon = Process::start("tactusd", lab.folder.path(), &["--config", "tactusd.toml"]);
     lab.daemon.wait_for("ready");
     refused_before_a_reset(&mut lab);

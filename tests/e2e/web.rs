@@ -187,7 +187,7 @@ fn without_a_service_it_says_so_and_finds_it_when_it_comes() {
 
     let web = Web::start(&lab, &lab.endpoint);
     web.until(|view| view["frame"].is_object());
-    lab.daemon.signal(rustix::process::Signal::KILL);
+    lab.daemon.kill();
     web.until(|view| view["problem"].as_str().is_some_and(|problem| !problem.is_empty()));
     lab.daemon = Process::start("tactusd", lab.folder.path(), &["--config", "tactusd.toml"]);
     lab.daemon.wait_for("ready");

@@ -12,6 +12,7 @@ use std::net::TcpListener;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Output, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -238,6 +239,15 @@ impl Process {
         kill_process(pid, signal).expect("the process is there");
     }
 
+    /// Kills it, and returns when it is gone with all that it held: a port that it listened on is free again.
+    ///
+    /// # Panics
+    /// If it has already ended.
+    pub fn kill(&mut self) {
+        self.signal(Signal::KILL);
+        self.child.wait().expect("a child can be waited for");
+    }
+
     /// Waits for its end and returns the exit code and everything that it printed.
     ///
     /// # Panics
@@ -398,11 +408,26 @@ impl ServiceUnderTest {
     }
 }
 
-/// An endpoint on this machine that nobody uses.
+/// An endpoint on this machine that nobody uses, and that no connection takes while its service is away: its port is below
+/// those that the system gives to connections. A client that tries such a port again and again would in the end be given it
+/// as its own.
 ///
 /// # Panics
 /// If there is none.
 pub fn free_endpoint() -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-    format!("tcp/{}", listener.local_addr().expect("a bound port"))
+    /// Tests of one process take one after the other.
+    static TAKEN: AtomicU32 = AtomicU32::new(0);
+    let first = std::process::id().wrapping_mul(64);
+    let mut addresses = (0..PORTS).map(|_| {
+        let offset = first.wrapping_add(TAKEN.fetch_add(1, Ordering::Relaxed)) % PORTS;
+        format!("127.0.0.1:{}", FIRST_PORT + offset)
+    });
+    let address = addresses.find(|address| TcpListener::bind(address).is_ok()).expect("a free port");
+    format!("tcp/{address}")
 }
+
+/// The first port of an endpoint, above those of services that are known to all.
+const FIRST_PORT: u32 = 10_000;
+
+/// Number of ports from it, all below those that Linux gives to connections.
+const PORTS: u32 = 22_000;
